@@ -26,6 +26,7 @@ fn main() -> Result<(), Box<dyn Error>> {
         style: Style::default(),
         drawing: Drawing::Last(Box::new(screen)),
         png: Some(picture_file.clone()),
+        depth: None,
         film: None,
     };
     let outcome = play_headless(Session::open(scene)?, plan, &mut |_, _| true)?;

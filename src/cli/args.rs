@@ -211,12 +211,16 @@ impl OutputArgs {
 pub enum StyleWord {
     /// Draw every edge
     Wireframe,
+    /// Contact points, and forces as arrows
+    Forces,
     /// Colour by (ε, n): hue for n, stripes for ε
     Resolution,
     /// Colour by the age of what is shown
     Age,
     /// Shade by detail: dark is an object's coarsest level, white its finest
     Detail,
+    /// Greys of the distance along the view: white is at the eye
+    Depth,
 }
 
 /// `run`.
@@ -276,6 +280,12 @@ pub struct OutputArgs {
     /// Write the last frame's picture here (PNG)
     #[arg(long, value_name = "FILE", value_hint = ValueHint::FilePath)]
     pub png: Option<PathBuf>,
+    /// Write the depths of the last frame here: PNG of 16 bits, whose text says how many metres a unit is; 0 is nothing. Needs --headless
+    #[arg(long, value_name = "FILE", value_hint = ValueHint::FilePath)]
+    pub depth: Option<PathBuf>,
+    /// See with this one of the scene's cameras, by name; the first where none is given
+    #[arg(long, value_name = "NAME")]
+    pub camera: Option<String>,
     /// Write a film of all frames here (YUV4MPEG2, which ffmpeg and most players read); late frames show as on the screen. Needs --headless
     #[arg(long, value_name = "FILE", value_hint = ValueHint::FilePath)]
     pub video: Option<PathBuf>,
@@ -285,7 +295,7 @@ pub struct OutputArgs {
     /// Write every frame's surfaces into this folder as a VTK series, which ParaView opens (series.pvd). Needs --headless
     #[arg(long, value_name = "FOLDER", value_hint = ValueHint::DirPath)]
     pub vtk: Option<PathBuf>,
-    /// Style of headless pictures: wireframe, or colours by resolution, age or detail; several are separated by commas
+    /// Style of headless pictures: wireframe, or contact forces, or colours by resolution, age, detail or depth; several are separated by commas
     #[arg(long, value_name = "STYLE", value_delimiter = ',')]
     pub style: Vec<StyleWord>,
     /// Write the report here (JSON); - is standard output

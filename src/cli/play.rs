@@ -73,7 +73,8 @@ fn in_window(session: Session, request: &Request, go_on: GoOn<'_>) -> anyhow::Re
 }
 
 #[cfg(feature = "viewer")]
-fn in_window(session: Session, request: &Request, go_on: GoOn<'_>) -> anyhow::Result<Played> {
+fn in_window(mut session: Session, request: &Request, go_on: GoOn<'_>) -> anyhow::Result<Played> {
+    choose_camera(&mut session, request)?;
     match play_in_window(session, window_plan(request), &mut |record, done| go_on(step(record, done))) {
         Ok(outcome) => Ok(played(&request.scene, outcome, None)),
         Err(WindowFailure::NoWindow(session, why)) => without_window(*session, &why, request, go_on),
@@ -110,22 +111,36 @@ fn without_window(session: Session, why: &WindowError, request: &Request, go_on:
     Ok(played)
 }
 
+/// Uses the camera that the user has named.
+fn choose_camera(session: &mut Session, request: &Request) -> anyhow::Result<()> {
+    let Some(name) = &request.camera else { return Ok(()) };
+    let Some(number) = session.camera_names().position(|known| known == name) else {
+        let known: Vec<_> = session.camera_names().collect();
+        let known = if known.is_empty() { "none".to_owned() } else { known.join(", ") };
+        return Err(BadInput(format!("the scene has no camera `{name}`; its cameras are: {known}")).into());
+    };
+    session.use_camera(number);
+    Ok(())
+}
+
 pub(super) fn headless(
-    session: Session,
+    mut session: Session,
     request: &Request,
     png: Option<PathBuf>,
     go_on: GoOn<'_>,
 ) -> anyhow::Result<Played> {
+    choose_camera(&mut session, request)?;
     let [width, height] = request.size.unwrap_or(PICTURE_SIZE);
     let size = Size { width, height };
-    let drawing = drawing(&session, request, png.is_some() || request.video.is_some(), size)?;
+    let drawing = drawing(&session, request, request.draws(png.is_some()), size)?;
     let picture = png.clone().filter(|_| !matches!(drawing, Drawing::Nothing));
     let end = match request.headless_end() {
         RunLength::Frames(frames) => End::Frames(frames),
         RunLength::Seconds(seconds) => End::Seconds(seconds),
         RunLength::Recording => End::Recording,
     };
-    let plan = Headless { end, size, style: request.style, drawing, png, film: request.video.clone() };
+    let (depth, film) = (request.depth.clone(), request.video.clone());
+    let plan = Headless { end, size, style: request.style, drawing, png, depth, film };
     // the second run takes about as long as the first, so each is half of the whole
     let half = if request.oracle { 0.5 } else { 1.0 };
     let mut exports = Exports::create(&request.exports, &request.scene, session.world())?;
@@ -163,7 +178,7 @@ fn drawing(session: &Session, request: &Request, picture: bool, size: Size) -> a
     }
     let gpu = match Gpu::headless() {
         Ok(gpu) => gpu,
-        Err(error @ GpuError::NoAdapter { .. }) if request.png.is_none() && request.video.is_none() => {
+        Err(error @ GpuError::NoAdapter { .. }) if !request.draws(request.png.is_some()) => {
             if !request.quiet {
                 metachron_console::output::message(&format!("nothing is drawn: {error}"));
             }
@@ -171,7 +186,7 @@ fn drawing(session: &Session, request: &Request, picture: bool, size: Size) -> a
         }
         Err(error) => {
             let error = anyhow::Error::from(error);
-            return Err(match request.png.as_ref().or(request.video.as_ref()) {
+            return Err(match request.png.as_ref().or(request.depth.as_ref()).or(request.video.as_ref()) {
                 Some(path) => error.context(format!("the picture {} cannot be drawn", path.display())),
                 None => error,
             });

@@ -38,6 +38,8 @@ pub(super) fn command(args: &ReplayArgs) -> anyhow::Result<Exit> {
         style: style(&args.output.style),
         oracle: false,
         png: args.output.png.clone(),
+        depth: args.output.depth.clone(),
+        camera: args.output.camera.clone(),
         video: args.output.video.clone(),
         exports: args.output.exports(),
         record: None,

@@ -50,6 +50,10 @@ pub struct Request {
     pub oracle: bool,
     /// Where to write the last picture as PNG.
     pub png: Option<PathBuf>,
+    /// Where to write the depths of the last frame (PNG, 16 bits); only without a window.
+    pub depth: Option<PathBuf>,
+    /// The name of the camera; `None`: the scene's first.
+    pub camera: Option<String>,
     /// Where to write the film of all frames (YUV4MPEG2); only without a window.
     pub video: Option<PathBuf>,
     /// Where to write its moments for other programs.
@@ -104,6 +108,11 @@ pub struct Step {
 }
 
 impl Request {
+    /// Whether a file is wanted that only an adapter makes; `png`: a picture is.
+    pub const fn draws(&self, png: bool) -> bool {
+        png || self.depth.is_some() || self.video.is_some()
+    }
+
     /// When a headless run ends.
     #[must_use]
     pub fn headless_end(&self) -> RunLength {
@@ -178,6 +187,8 @@ fn request(args: &RunArgs, matches: Option<&ArgMatches>) -> anyhow::Result<Reque
         style: style(&args.output.style),
         oracle: args.oracle,
         png: args.output.png.clone(),
+        depth: args.output.depth.clone(),
+        camera: args.output.camera.clone(),
         video: args.output.video.clone(),
         exports: args.output.exports(),
         record: args.record.clone(),
@@ -189,8 +200,10 @@ fn request(args: &RunArgs, matches: Option<&ArgMatches>) -> anyhow::Result<Reque
 pub(super) fn style(words: &[StyleWord]) -> Style {
     words.iter().fold(Style::default(), |style, word| match word {
         StyleWord::Wireframe => Style { wireframe: true, ..style },
+        StyleWord::Forces => Style { forces: true, ..style },
         StyleWord::Resolution => Style { colouring: Colouring::Resolution, ..style },
         StyleWord::Age => Style { colouring: Colouring::Age, ..style },
+        StyleWord::Depth => Style { colouring: Colouring::Depth, ..style },
         StyleWord::Detail => Style { colouring: Colouring::Detail, ..style },
     })
 }
@@ -230,6 +243,7 @@ pub(super) fn check_outputs(
     }
     let files = [
         ("--png", args.png.as_deref()),
+        ("--depth", args.depth.as_deref()),
         ("--video", args.video.as_deref()),
         ("--mcap", args.mcap.as_deref()),
         ("--frames-csv", args.frames_csv.as_deref()),

@@ -54,7 +54,7 @@ fn every_built_in_scene_loads_and_says_what_it_shows() {
     for scene in &metachron::scenes::ALL {
         metachron::scenes::provide();
         let loaded = scene.source().and_then(|s| load(&s, &[])).unwrap_or_else(|e| panic!("{e:?}"));
-        assert!(!loaded.description.is_empty() && loaded.camera.is_some(), "{}", scene.name);
+        assert!(!loaded.description.is_empty() && !loaded.cameras.is_empty(), "{}", scene.name);
     }
 }
 

@@ -23,6 +23,7 @@ fn play(text: &str, frames: u64) -> Outcome {
         style: Style::default(),
         drawing: Drawing::Nothing,
         png: None,
+        depth: None,
         film: None,
     };
     play_headless(session(text), plan, &mut |_, _| true).expect("nothing that can fail")

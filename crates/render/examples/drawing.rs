@@ -28,8 +28,8 @@ fn draw(gpu: Gpu, path: &Path, numbers: &[String]) -> Result<(), Box<dyn std::er
     let size = Size { width: number(2, 1280.0)? as u32, height: number(3, 720.0)? as u32 };
     let options = RendererOptions { samples: number(4, 4.0)? as u32, ..RendererOptions::STILL };
     let style = match numbers.get(5).map(String::as_str) {
-        Some("resolution") => Style { colouring: Colouring::Resolution, wireframe: true },
-        Some("age") => Style { colouring: Colouring::Age, wireframe: false },
+        Some("resolution") => Style { colouring: Colouring::Resolution, wireframe: true, ..Style::default() },
+        Some("age") => Style { colouring: Colouring::Age, ..Style::default() },
         _ => Style::default(),
     };
     let (mut stage, camera) = stage::still_life();

@@ -46,8 +46,8 @@ pub struct Hand {
 #[derive(Debug, Default)]
 pub(super) struct Scratch {
     /// The actors that the picture needs: visible ones, and those that may throw a shadow on a visible one.
-    shown: Vec<usize>,
-    solids: Solids,
+    pub shown: Vec<usize>,
+    pub solids: Solids,
     tubes: Vec<(u8, usize)>,
     skins: SkinScratch,
 }
@@ -87,6 +87,9 @@ impl SceneView {
             add_static(prop, &mut picture, &mut scratch.solids);
         }
         self.add_grasps(&picture, &mut scratch);
+        if style.forces {
+            self.add_forces(camera.distance_m, &mut picture, &mut scratch);
+        }
         if let Some((from, to)) =
             hand.and_then(|hand| Some((self.anchor_position(hand.object, hand.anchor)?, hand.target)))
         {
@@ -255,7 +258,7 @@ pub(super) fn level(levels: &[Level], number: usize) -> Level {
 pub(super) fn tint(style: Style, at: Level, age_s: f64) -> [u8; 4] {
     let with = |[r, g, b]: [u8; 3], share: u8| [r, g, b, share];
     match style.colouring {
-        Colouring::Material => [0; 4],
+        Colouring::Material | Colouring::Depth => [0; 4],
         Colouring::Resolution => with(resolution_colour(at.resolution), 220),
         Colouring::Detail => with(detail_colour(at.detail), 235),
         Colouring::Age => with(age_colour(age_s), 190),

@@ -144,6 +144,13 @@ impl SceneView {
 }
 
 impl ImpostorFit {
+    /// An actor was put in at the place `at`.
+    pub(super) fn shift(&mut self, at: usize) {
+        for actor in self.members.iter_mut().chain([&mut self.track]) {
+            *actor += usize::from(*actor >= at);
+        }
+    }
+
     fn move_impostor(&mut self, tracks: &mut [Track]) {
         let Some(now) = Group::of(&self.members, tracks) else { return };
         let track = &mut tracks[self.track];

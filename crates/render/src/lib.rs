@@ -25,8 +25,11 @@ mod benchmark;
 mod bounds_tree;
 mod compose;
 #[cfg(feature = "gpu")]
+mod depth_image;
+#[cfg(feature = "gpu")]
 mod draw;
 mod environment;
+mod forces;
 #[cfg(feature = "gpu")]
 mod image_metrics;
 mod impostor_fit;
@@ -34,6 +37,7 @@ mod instances;
 mod level;
 mod light_volume;
 mod lod_transition;
+mod membership;
 #[cfg(feature = "gpu")]
 pub mod offscreen;
 mod pick;
@@ -53,11 +57,15 @@ mod visibility;
 pub use benchmark::{Drawn, benchmark, benchmark_left};
 pub use compose::Hand;
 #[cfg(feature = "gpu")]
+pub use depth_image::DepthImage;
+#[cfg(feature = "gpu")]
 pub use draw::{DrawError, DrawTimes, Renderer, RendererOptions, Target};
 pub use environment::{Environment, EnvironmentLight};
+pub use forces::ToolForce;
 #[cfg(feature = "gpu")]
 pub use image_metrics::{psnr_db, ssim};
 pub use level::{Level, Shading};
+pub use membership::History;
 #[cfg(feature = "gpu")]
 pub use offscreen::{DeviceLoss, Gpu, GpuError, Offscreen, PictureFile};
 pub use pick::Hit;

@@ -3,8 +3,9 @@
 //! In: the environment (`WGPU_BACKEND`, `WGPU_ADAPTER_NAME`, as usual in wgpu), a picture. Out: pixels, PNG files. Never here: windows, the
 //! content of the picture.
 
+use super::depth_image::DepthImage;
 use super::draw::{DrawError, DrawTimes, Renderer, RendererOptions, Target};
-use super::picture::Picture;
+use super::picture::{Colouring, Picture, Style};
 use super::upscale::{Upscaled, Upscaler};
 use super::view::{Camera, Size};
 use image::RgbaImage;
@@ -296,6 +297,20 @@ impl Offscreen {
         }
     }
 
+    /// The depths of `picture` as `camera` sees it, at the target's full size. It draws the picture once more.
+    ///
+    /// # Errors
+    /// As [`Renderer::render`], and [`GpuError::ReadBack`].
+    pub fn depths(&self, picture: &Picture, camera: &Camera) -> Result<DepthImage, GpuError> {
+        // depths of several samples a pixel cannot be read
+        let options = RendererOptions { samples: 1, ..self.renderer.options() };
+        let mut screen = Self::new(self.gpu.clone(), self.size, options)?;
+        let style = Style { colouring: Colouring::Depth, wireframe: false, forces: false };
+        screen.render(&Picture { style, scale: 1.0, ..picture.clone() }, camera)?;
+        let depths_m = screen.renderer.read_depths(&self.gpu, camera, screen.renderer.lost())?;
+        Ok(DepthImage { size: self.size, depths_m })
+    }
+
     /// Writes the last picture to a PNG file.
     ///
     /// # Errors
@@ -351,6 +366,12 @@ pub fn wait(device: &wgpu::Device, lost: &DeviceLoss) -> Result<(), GpuError> {
 
 /// The pixels of a texture with four bytes per pixel, after all submitted work.
 pub fn read_back(gpu: &Gpu, texture: &wgpu::Texture, lost: &DeviceLoss) -> Result<PictureFile, GpuError> {
+    let image = RgbaImage::from_raw(texture.width(), texture.height(), read_bytes(gpu, texture, lost)?);
+    image.ok_or_else(|| GpuError::ReadBack { detail: "the buffer is shorter than the picture".into() })
+}
+
+/// The same as bytes, row by row.
+pub(crate) fn read_bytes(gpu: &Gpu, texture: &wgpu::Texture, lost: &DeviceLoss) -> Result<Vec<u8>, GpuError> {
     let (width, height) = (texture.width(), texture.height());
     let pitch = (4 * width).next_multiple_of(wgpu::COPY_BYTES_PER_ROW_ALIGNMENT);
     let buffer = gpu.device.create_buffer(&wgpu::BufferDescriptor {
@@ -378,8 +399,7 @@ pub fn read_back(gpu: &Gpu, texture: &wgpu::Texture, lost: &DeviceLoss) -> Resul
     }
     let bytes = buffer.get_mapped_range(..).map_err(|error| GpuError::ReadBack { detail: error.to_string() })?;
     let rows = bytes.chunks_exact(pitch as usize).flat_map(|row| &row[..4 * width as usize]);
-    let image = RgbaImage::from_raw(width, height, rows.copied().collect());
-    image.ok_or_else(|| GpuError::ReadBack { detail: "the buffer is shorter than the picture".into() })
+    Ok(rows.copied().collect())
 }
 
 /// The pixels of a texture that can be bound, enlarged to `shown` if it is smaller.

@@ -24,6 +24,8 @@ pub enum Colouring {
     Age,
     /// The fraction of its detail that an object is drawn with, from white (its coarsest) to nearly black (its finest), as in (FS93, fig. 8).
     Detail,
+    /// The distance along the view, in greys: white is at the eye, middle grey as far as the camera's target, black nothing.
+    Depth,
 }
 
 /// Drawing options of a picture.
@@ -33,6 +35,8 @@ pub struct Style {
     pub colouring: Colouring,
     /// Whether every edge is drawn as a line.
     pub wireframe: bool,
+    /// Whether contact points and forces are drawn.
+    pub forces: bool,
 }
 
 /// One end of an interval of a tube, in the GPU's layout: 72 bytes.
@@ -198,6 +202,8 @@ pub struct Picture {
     pub style: Style,
     /// Width and height to draw it with as a fraction of the target's, > 0, at most 1; below 1 it is enlarged to the target.
     pub scale: f64,
+    /// Metres that the arrow of one newton has, where forces are drawn; 0 before any was.
+    pub force_scale: f64,
     /// Whether objects throw shadows, where the light does.
     pub shadows: bool,
     /// All tubes' samples.
@@ -212,6 +218,8 @@ pub struct Picture {
     pub skins: Skins,
     /// The floor, if there is one.
     pub floor: Option<FloorDraw>,
+    /// Which of the meshes is the head of an arrow, once one was drawn.
+    pub(super) arrow_head: Option<u32>,
     /// Meshes that are not primitives.
     pub meshes: Arc<[PrimitiveMesh]>,
     /// Models that can be drawn with any number of triangles.
@@ -230,6 +238,7 @@ impl Default for Picture {
             environment: Environment::default(),
             style: Style::default(),
             scale: 1.0,
+            force_scale: 0.0,
             shadows: true,
             samples: Vec::new(),
             tubes: Vec::new(),
@@ -237,6 +246,7 @@ impl Default for Picture {
             solids: Vec::new(),
             skins: Skins::default(),
             floor: None,
+            arrow_head: None,
             meshes: Arc::default(),
             models: Arc::default(),
             textures: Arc::default(),

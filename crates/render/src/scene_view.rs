@@ -173,6 +173,8 @@ pub struct SceneView {
     /// The actors that the last survey updated.
     pub(super) updated: Vec<usize>,
     pub(super) eye: Option<(Camera, Size)>,
+    /// Metres that the arrow of one newton has.
+    pub(super) force_scale: f64,
     /// Frames over which meshes change their cut.
     pub(super) geomorph_frames: u8,
 }
@@ -182,11 +184,11 @@ pub struct SceneView {
 pub(super) struct Track {
     pub actor: Actor,
     pub body: BodyShape,
-    before: Option<Arc<Snapshot>>,
-    newest: Option<Arc<Snapshot>>,
-    awake: bool,
+    pub before: Option<Arc<Snapshot>>,
+    pub newest: Option<Arc<Snapshot>>,
+    pub awake: bool,
     /// The agent is at rest and shown at rest: its pose stays unchanged until the next snapshot.
-    still: bool,
+    pub still: bool,
     /// Whether it was posed again since the last survey.
     pub fresh: bool,
     /// The displayed state.
@@ -315,7 +317,7 @@ impl SceneView {
         }
     }
 
-    fn track_mut(&mut self, id: AgentId) -> Option<&mut Track> {
+    pub(super) fn track_mut(&mut self, id: AgentId) -> Option<&mut Track> {
         // the index of an actor is mostly its agent's number
         let here = |track: &Track| track.actor.id == id;
         let at = id.0 as usize;
@@ -348,7 +350,7 @@ impl SceneView {
 }
 
 impl Track {
-    fn new(actor: Actor, meshes: &mut Vec<PrimitiveMesh>, models: &mut Models) -> Self {
+    pub fn new(actor: Actor, meshes: &mut Vec<PrimitiveMesh>, models: &mut Models) -> Self {
         let body = match &actor.form {
             Form::Solid(solid) => BodyShape::of(solid, meshes),
             Form::Scenery(model, at) => models.body(model, at),
@@ -495,7 +497,7 @@ impl StaticShape {
 
 /// Every model once, with its extent, shared by its copies.
 #[derive(Default)]
-struct Models(Vec<(Model, Extent)>);
+pub(super) struct Models(Vec<(Model, Extent)>);
 
 impl Models {
     fn body(&mut self, model: &Model, at: &Placement) -> BodyShape {

@@ -51,8 +51,9 @@ impl Reader {
     }
 
     /// Reads the states for a frame at `now`; visits the agents whose state or condition has changed since the last frame, in their order,
-    /// with the newest state and whether they are running.
+    /// with the newest state and whether they are running. Those that joined since are visited first.
     pub fn read(&mut self, agents: &Agents, now: SimTime, mut visit: impl FnMut(&AgentHandle, &Arc<Snapshot>, bool)) {
+        self.join(agents, &mut visit);
         if let Some(first) = agents.first() {
             first.shared.sleep.changed.take(|id| {
                 let at = id.0 as usize;
@@ -68,6 +69,16 @@ impl Reader {
         self.frames.push_back(now);
         self.read += 1;
         self.catch_up(agents);
+    }
+
+    /// Takes up agents that joined the run since the last frame.
+    fn join(&mut self, agents: &Agents, visit: &mut impl FnMut(&AgentHandle, &Arc<Snapshot>, bool)) {
+        while let Some(agent) = agents.get(self.newest.len()) {
+            let state = agent.latest();
+            self.readings.push(LastReading { counted: self.read, time: state.moment(), rests: false });
+            visit(agent, &state, agent.state() == AgentState::Running);
+            self.newest.push(state);
+        }
     }
 
     /// Counts all ages that are not counted yet, at the end of a run.

@@ -143,7 +143,7 @@ fn assemble(c: &mut Checker<'_, '_>, source: &Source, file: SceneFile, gravity: 
         environment,
         gravity,
         target: build::target(c, file.target.as_ref()),
-        camera: build::camera(c, file.camera.as_ref()),
+        cameras: build::cameras(c, &file.camera),
         machine: build::machine(c, file.machine.as_ref()),
         agents: objects.agents,
         obstacles: objects.obstacles,

@@ -125,11 +125,7 @@ fn error_governor(
 
 /// All drawable objects: agents, then scenery, then the proxies of groups.
 pub fn scene_view(scene: &Scene) -> SceneView {
-    let agents = scene.agents.iter().map(|member| Actor {
-        id: member.id,
-        form: form(&member.spec),
-        appearance: appearance(&member.appearance),
-    });
+    let agents = scene.agents.iter().map(actor);
     let still = (scene.agents.len() as u32..).zip(scenery(scene)).map(|(id, it)| {
         let form = Form::Scenery(it.model.clone(), it.at);
         Actor { id: AgentId(id), form, appearance: appearance(&it.appearance) }
@@ -154,6 +150,11 @@ pub fn scene_view(scene: &Scene) -> SceneView {
         }
     }
     scene_view
+}
+
+/// How an agent is drawn.
+pub fn actor(member: &Member) -> Actor {
+    Actor { id: member.id, form: form(&member.spec), appearance: appearance(&member.appearance) }
 }
 
 const fn environment(kind: EnvironmentKind) -> Environment {
@@ -404,11 +405,11 @@ pub fn level(view: &ObjectView, demand: &LevelDemand) -> Level {
     Level { resolution: demand.resolution, triangles: demand.polygons as u32, shading, detail }
 }
 
-/// The scene's camera `seconds` after the start; if the scene has none, a camera in front that sees everything.
-pub fn camera(scene: &Scene, scene_view: &SceneView, seconds: f64) -> Camera {
-    match &scene.camera {
-        Some(camera) => {
-            let view = camera.view_at(seconds);
+/// A camera of the scene `seconds` after the start; if the scene has none of that number, a camera in front that sees everything.
+pub fn camera(scene: &Scene, at: usize, scene_view: &SceneView, seconds: f64) -> Camera {
+    match scene.cameras.get(at) {
+        Some(named) => {
+            let view = named.camera.view_at(seconds);
             Camera::looking(view.eye_m, view.look_at_m, view.fov_deg.to_radians())
         }
         None => overview(scene_view),

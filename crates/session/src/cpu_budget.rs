@@ -104,7 +104,7 @@ pub(super) enum FrameLoop {
 }
 
 /// The processor shared by agents and pictures.
-#[derive(Debug, Default)]
+#[derive(Debug, Clone, Default)]
 pub(super) struct CpuBudget {
     agents: Vec<Arc<AgentBudget>>,
     workers: Vec<Worker>,

@@ -28,7 +28,7 @@ impl FlyThrough {
     /// # Errors
     /// As [`Session::open`].
     pub fn open(scene: Scene, drawing: Drawing, size: Size) -> Result<Self, SessionError> {
-        let length_s = scene.camera.as_ref().and_then(metachron_world::Camera::length_s).unwrap_or(0.0);
+        let length_s = scene.cameras.first().and_then(|first| first.camera.length_s()).unwrap_or(0.0);
         let mut session = Session::open(scene)?;
         session.drive(TimelineCommand::Pause);
         if let Drawing::Every(screen) = &drawing {

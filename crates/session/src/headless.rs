@@ -70,6 +70,8 @@ pub struct Headless {
     pub drawing: Drawing,
     /// File for the picture of the last frame.
     pub png: Option<PathBuf>,
+    /// File for the depths of the last frame (PNG, 16 bits).
+    pub depth: Option<PathBuf>,
     /// File for the film of all frames (YUV4MPEG2).
     pub film: Option<PathBuf>,
 }
@@ -227,10 +229,12 @@ pub(super) fn pictured(session: &Session, camera: &Camera, drawing: &mut Drawing
     screen.read_back().map_err(SessionError::Picture)
 }
 
-/// Draws the last frame once more, without a time limit.
+/// Draws the last frame once more, without a time limit, and its depths.
 #[cfg(feature = "picture")]
 fn write_picture(session: &mut Session, plan: &mut Headless) -> Result<(), SessionError> {
-    let Some(path) = &plan.png else { return Ok(()) };
+    if plan.png.is_none() && plan.depth.is_none() {
+        return Ok(());
+    }
     let mut fresh;
     let still = match &mut plan.drawing {
         Drawing::Nothing => return Ok(()),
@@ -243,6 +247,13 @@ fn write_picture(session: &mut Session, plan: &mut Headless) -> Result<(), Sessi
     };
     let camera = session.scene_camera();
     session.compose(&camera, plan.size, plan.style, None);
-    still.render(session.picture(), &camera).map_err(SessionError::Draw)?;
-    still.save(path).map_err(SessionError::Picture)
+    if let Some(path) = &plan.depth {
+        let depths = still.depths(session.picture(), &camera).map_err(SessionError::Draw)?;
+        depths.save(path).map_err(SessionError::Picture)?;
+    }
+    if let Some(path) = &plan.png {
+        still.render(session.picture(), &camera).map_err(SessionError::Draw)?;
+        still.save(path).map_err(SessionError::Picture)?;
+    }
+    Ok(())
 }

@@ -11,7 +11,7 @@
 //! let text = b"format = 1\nexecutor = 'lockstep'\n[[object]]\nname = 'ball'\nmodel = 'rigid'\nshape = 'ball'\nradius_m = 0.1";
 //! let scene = load(&Source::memory("falling", text).unwrap(), &[]).unwrap();
 //! let (size, style) = (Size { width: 320, height: 180 }, Style::default());
-//! let plan = Headless { end: End::Frames(30), size, style, drawing: Drawing::Nothing, png: None, film: None };
+//! let plan = Headless { end: End::Frames(30), size, style, drawing: Drawing::Nothing, png: None, depth: None, film: None };
 //! let outcome = play_headless(Session::open(scene).unwrap(), plan, &mut |_, _| true).unwrap();
 //! assert_eq!((outcome.frames.len(), outcome.agents.len()), (30, 1));
 //! assert!((outcome.sim_s - 0.5).abs() < 0.02); // 30 frames at 60 Hz, to a frame
@@ -63,6 +63,6 @@ pub use integrator_cost::solve_prices;
 pub use outcome::{AgentOutcome, FrameRecord, Outcome, ProbeOutcome};
 pub use parameter_sweep::{Played, Point, apply, method_of, play_points, setting_of};
 pub use reference_run::{PairError, ReferenceComparison, compare_with_reference};
-pub use session::{Finished, Session};
+pub use session::{Finished, REWIND_BYTES, RewindStatus, Session};
 pub use step_response::{After, Pushes, median, push};
 pub use trace::Trace;

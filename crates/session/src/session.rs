@@ -4,10 +4,13 @@
 //! Never here: windows, files, arguments.
 
 mod ahead;
+mod cameras;
 mod choose;
+mod gather;
 mod limit;
 mod record;
 mod recording;
+mod rewind;
 
 use super::assemble;
 #[cfg(feature = "picture")]
@@ -27,10 +30,12 @@ use metachron_core::{AgentId, SimTime};
 use metachron_lod::control::{FrameWork, Law, ObjectView, PictureControl, Policy, Prices};
 #[cfg(feature = "picture")]
 use metachron_render::Gpu;
-use metachron_render::{Camera, Level, Picture, SceneView, States};
+use metachron_render::{Camera, Level, Picture, SceneView};
 use metachron_runtime::{AgentHandle, Agents, Command, Keyed, Machine, Reader, TimelineCommand};
-use metachron_world::kinds::{ExecutorKind, LawKind, StatesKind};
+use metachron_world::kinds::{ExecutorKind, LawKind};
 use metachron_world::{Govern, Scene, World, WorldError, machine};
+use rewind::Rewind;
+pub use rewind::{REWIND_BYTES, RewindStatus};
 use std::sync::Arc;
 use std::time::Duration;
 
@@ -58,6 +63,10 @@ pub struct Session {
     levels: Vec<Level>,
     couplings: Couplings,
     trace: Option<Trace>,
+    /// Moments that can be shown again, if any are kept.
+    rewind: Option<Rewind>,
+    /// Which of the scene's cameras is used.
+    camera: usize,
     records: Vec<FrameRecord>,
     chosen: Chosen,
     last_start: Option<Duration>,
@@ -168,6 +177,8 @@ impl Session {
             levels: Vec::new(),
             couplings: Couplings::default(),
             trace: None,
+            rewind: None,
+            camera: 0,
             records: Vec::new(),
             chosen: Chosen::default(),
             last_start: None,
@@ -328,18 +339,6 @@ impl Session {
         &self.levels
     }
 
-    /// The scene's own camera now.
-    #[must_use]
-    pub fn scene_camera(&self) -> Camera {
-        self.camera_at(self.sim_now().as_secs_f64())
-    }
-
-    /// The scene's own camera so many seconds after the start.
-    #[must_use]
-    pub fn camera_at(&self, seconds: f64) -> Camera {
-        assemble::camera(&self.scene, &self.scene_view, seconds)
-    }
-
     /// Waits until the wall time `until`, while the agents run.
     pub fn wait_until(&mut self, until: Duration) {
         self.world.wait_until(until);
@@ -471,11 +470,6 @@ impl Session {
         }
     }
 
-    /// Reads the newest states without a frame: for their couplings.
-    pub fn read_states(&mut self) {
-        self.gather();
-    }
-
     /// Couplings between agents so far.
     #[must_use]
     pub fn couplings(&self) -> &[Coupling] {
@@ -485,30 +479,5 @@ impl Session {
     /// Records the states of all agents from now on, for comparison with another run.
     pub fn keep_trace(&mut self) {
         self.trace.get_or_insert_default();
-    }
-
-    fn gather(&mut self) {
-        let now = self.world.time();
-        let (scene_view, couplings) = (&mut self.scene_view, &mut self.couplings);
-        self.reader.read(self.world.agents(), now, |agent, newest, awake| {
-            scene_view.set_snapshot(agent.id(), newest, awake);
-            agent.form().iter().for_each(|form| scene_view.set_shape(agent.id(), form));
-            couplings.mark_changed(agent.id());
-        });
-        self.scene_view.pose(now, states(self.scene.states));
-        self.chosen.sim = now;
-        self.couplings.note(self.reader.newest());
-        if let Some(trace) = &mut self.trace {
-            trace.note(&self.scene, self.reader.newest());
-            trace.note_couplings(now, self.couplings.all());
-        }
-    }
-}
-
-const fn states(kind: StatesKind) -> States {
-    match kind {
-        StatesKind::Interpolate => States::Interpolate,
-        StatesKind::Extrapolate => States::Extrapolate,
-        StatesKind::Latest => States::Latest,
     }
 }

@@ -14,7 +14,7 @@ use std::sync::Arc;
 use std::time::Duration;
 
 /// Visibility of the steered agents.
-#[derive(Debug)]
+#[derive(Debug, Clone)]
 pub(super) struct VisibleResolution {
     tracked: Vec<TrackedAgent>,
     /// The groups with agents in them, inner ones first.
@@ -22,14 +22,14 @@ pub(super) struct VisibleResolution {
 }
 
 /// A steered agent, and when it was last in view.
-#[derive(Debug)]
+#[derive(Debug, Clone)]
 struct TrackedAgent {
     budget: Arc<AgentBudget>,
     seen_at: Duration,
 }
 
 /// A group with agents in it.
-#[derive(Debug)]
+#[derive(Debug, Clone)]
 struct AgentGroup {
     /// The actor of its impostor.
     actor: usize,
@@ -69,6 +69,11 @@ impl VisibleResolution {
             tracked: budgets.iter().map(track).collect(),
             groups: groups.filter(|group| group.holds.contains(&true)).collect(),
         }
+    }
+
+    /// An agent has joined: the impostors are one place further on.
+    pub fn join(&mut self) {
+        self.groups.iter_mut().for_each(|group| group.actor += 1);
     }
 
     /// Takes the actors as `camera` sees them at the time `now`.

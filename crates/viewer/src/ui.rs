@@ -8,8 +8,10 @@ mod blit;
 mod budget_bar;
 mod commands;
 mod couplings;
+mod forces;
 mod history;
 mod icons;
+mod lanes;
 mod mouse;
 mod native_window;
 mod overlays;
@@ -21,16 +23,18 @@ mod side;
 mod table;
 mod text;
 mod theme;
+mod timeline;
 
 pub use commands::{Command, Group, MOUSE, SHORTCUTS, Shortcut, keys_text};
 pub use history::{FrameSummary, History};
 pub use native_window::{WindowEnd, WindowError, WindowOptions, run_window};
 pub use protocol::{
-    Action, AgentRow, AgentState, Bounds, CouplingRow, Filled, FrameTimes, HandStatus, Law, Message, Severity, Shares,
-    Simulation, Skip, Status, Tuning, ViewRequest,
+    Action, AgentRow, AgentState, Bounds, CouplingRow, Filled, Forces, FrameTimes, HandStatus, Law, Look, Message,
+    Severity, Shares, Simulation, Skip, Status, Tuning, ViewRequest,
 };
 
 use egui::{Frame, Margin, Panel, Rect, Sense, Ui};
+use lanes::Lanes;
 use metachron_render::{Colouring, Size, Style};
 use mouse::Hand;
 use overlays::Finder;
@@ -66,19 +70,35 @@ pub struct DrawingOptions {
     pub ages: bool,
     /// Shade objects by their detail; not together with the other two.
     pub details: bool,
+    /// Show distances along the view; not together with the other three.
+    pub depths: bool,
     /// Draw the edges of triangles.
     pub wireframe: bool,
+    /// Draw contact points and forces.
+    pub forces: bool,
 }
 
 impl DrawingOptions {
+    /// These, but of the meanings of colours the one that `wanted` has in addition.
+    fn plain_or(self, wanted: Self) -> Self {
+        Self {
+            colours: wanted.colours && !self.colours,
+            ages: wanted.ages && !self.ages,
+            details: wanted.details && !self.details,
+            depths: wanted.depths && !self.depths,
+            ..wanted
+        }
+    }
+
     fn style(self) -> Style {
         let colouring = match self {
             Self { colours: true, .. } => Colouring::Resolution,
             Self { ages: true, .. } => Colouring::Age,
             Self { details: true, .. } => Colouring::Detail,
+            Self { depths: true, .. } => Colouring::Depth,
             _ => Colouring::Material,
         };
-        Style { colouring, wireframe: self.wireframe }
+        Style { colouring, wireframe: self.wireframe, forces: self.forces }
     }
 }
 
@@ -90,6 +110,10 @@ pub struct Layout {
     pub looks: DrawingOptions,
     /// Whether the panels are shown.
     pub panels: bool,
+    /// Whether the timeline is shown.
+    pub timeline: bool,
+    /// Whether the lanes of turns are shown.
+    pub lanes: bool,
     /// Whether the run's numbers are shown over the picture.
     pub info: bool,
     /// Whether the window of costs and rates is open.
@@ -100,7 +124,15 @@ pub struct Layout {
 
 impl Default for Layout {
     fn default() -> Self {
-        Self { looks: DrawingOptions::default(), panels: true, info: false, costs: false, histories: false }
+        Self {
+            panels: true,
+            timeline: true,
+            lanes: false,
+            info: false,
+            costs: false,
+            histories: false,
+            looks: DrawingOptions::default(),
+        }
     }
 }
 
@@ -111,6 +143,7 @@ pub struct Viewer {
     pub layout: Layout,
     hand: Hand,
     history: History,
+    lanes: Lanes,
     help: bool,
     finder: Option<Finder>,
     size: Size,
@@ -131,6 +164,7 @@ impl Default for Viewer {
             layout: Layout::default(),
             hand: Hand::default(),
             history: History::default(),
+            lanes: Lanes::default(),
             help: false,
             finder: None,
             size: Size { width: 1, height: 1 },
@@ -156,6 +190,10 @@ impl Viewer {
     ) -> (WindowRequests, Duration) {
         let now = ui.ctx().time();
         self.history.sample(now, simulation.status());
+        match self.layout.panels && self.layout.lanes {
+            true => self.lanes.sample(now, simulation.status()),
+            false => self.lanes.clear(),
+        }
         self.notes.retain(|(until, _)| now < *until);
         let mut commands = commands::pressed(ui.ctx());
         let mut actions = dropped_scenes(ui);
@@ -204,7 +242,18 @@ impl Viewer {
         if room.y < TALL {
             return; // only the picture and the bar fit
         }
-        Panel::bottom("agents").resizable(true).default_size(182.0).min_size(70.0).frame(frame(8, 6)).show(ui, |ui| {
+        if self.layout.timeline {
+            Panel::bottom("timeline").exact_size(timeline::HEIGHT).frame(frame(14, 0)).show(ui, |ui| {
+                actions.extend(timeline::show(ui, status));
+            });
+        }
+        if self.layout.lanes {
+            let panel = Panel::bottom("lanes").resizable(true).default_size(120.0).min_size(40.0);
+            panel.frame(frame(8, 4)).show(ui, |ui| {
+                actions.extend(lanes::show(ui, status, &self.lanes).map(|id| Action::Select(Some(id))));
+            });
+        }
+        Panel::bottom("agents").resizable(true).default_size(152.0).min_size(70.0).frame(frame(8, 6)).show(ui, |ui| {
             match table::show(ui, status) {
                 Some(table::Press::Select(id)) => actions.push(Action::Select(Some(id))),
                 Some(table::Press::Frame(id)) => {
@@ -220,6 +269,9 @@ impl Viewer {
         Panel::right("side").default_size(318.0).size_range(280.0..=460.0).frame(frame(14, 6)).show(ui, |ui| {
             actions.extend(side::show(ui, status, &self.history, &mut self.layout.looks));
         });
+        if actions.iter().any(|action| matches!(action, Action::Camera(_))) {
+            self.hand.follow_scene();
+        }
     }
 
     fn overlays(&mut self, ui: &Ui, simulation: &dyn Simulation, commands: &mut Vec<Command>) {
@@ -270,6 +322,9 @@ impl Viewer {
         let nothing = || egui::Shape::rect_filled(rect, 0.0, theme::palette(ui).ground);
         ui.painter().add(shape.unwrap_or_else(nothing));
         self.hand.draw(ui, &response, simulation);
+        if let Some(shown) = &simulation.status().forces {
+            forces::draw(ui, &self.hand.window(ui, &response, simulation), shown);
+        }
         let status = simulation.status();
         if self.layout.info {
             overlays::info(ui, rect, status, &self.history.summary(status.target_hz), screen.adapter());
@@ -291,7 +346,12 @@ impl Viewer {
         let looks = &mut self.layout.looks;
         match command {
             Command::PauseOrRun => actions.push(if status.running { Action::Pause } else { Action::Run }),
+            Command::Step if status.rewind.is_some_and(|rewind| rewind.shown.is_some()) => {
+                actions.push(Action::Look(Look::Forward));
+            }
             Command::Step => actions.push(Action::SingleStep),
+            Command::Back => actions.push(Action::Look(Look::Back)),
+            Command::Live => actions.push(Action::Look(Look::Live)),
             Command::Reset => actions.push(Action::Reset),
             Command::Reload => actions.push(Action::Reload),
             Command::Faster => actions.push(Action::Speed(commands::next_speed(status.speed, true))),
@@ -299,14 +359,21 @@ impl Viewer {
             Command::RealTime => actions.push(Action::Speed(1.0)),
             Command::Frame => self.frame_object(simulation, status.selected),
             Command::Track => self.hand.track = !self.hand.track && status.selected.is_some(),
-            Command::SceneCamera => self.hand.follow_scene(),
-            Command::Free => self.close_or_deselect(simulation, actions),
-            Command::Colours => {
-                *looks = DrawingOptions { colours: !looks.colours, ages: false, details: false, ..*looks }
+            Command::SceneCamera => {
+                if self.hand.follows_scene() && status.cameras.len() > 1 {
+                    actions.push(Action::Camera((status.camera + 1) % status.cameras.len()));
+                }
+                self.hand.follow_scene();
             }
+            Command::Free => self.close_or_deselect(simulation, actions),
+            Command::Colours => *looks = looks.plain_or(DrawingOptions { colours: !looks.colours, ..*looks }),
+            Command::Depths => *looks = looks.plain_or(DrawingOptions { depths: !looks.depths, ..*looks }),
+            Command::Forces => looks.forces = !looks.forces,
+            Command::Lanes => self.layout.lanes = !self.layout.lanes,
             Command::Wireframe => looks.wireframe = !looks.wireframe,
-            Command::Ages => *looks = DrawingOptions { ages: !looks.ages, colours: false, details: false, ..*looks },
+            Command::Ages => *looks = looks.plain_or(DrawingOptions { ages: !looks.ages, ..*looks }),
             Command::HideUi => self.layout.panels = !self.layout.panels,
+            Command::Timeline => self.layout.timeline = !self.layout.timeline,
             Command::Theme => requests.theme = true,
             Command::Screenshot => requests.screenshot = true,
             Command::Help => self.help = !self.help,

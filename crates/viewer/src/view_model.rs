@@ -32,6 +32,7 @@ pub(super) fn initial_status(session: &Session) -> Status {
         executor: scene.executor.name().to_owned(),
         policies: PolicyKind::ALL.iter().map(|kind| kind.name().to_owned()).collect(),
         laws,
+        cameras: session.camera_names().map(str::to_owned).collect(),
         running: true,
         speed: 1.0,
         agents: scene.agents.iter().map(row).collect(),
@@ -77,6 +78,10 @@ impl Meter {
     }
 
     fn read(&mut self, session: &Session) {
+        let agents = session.agents().len();
+        for list in [&mut self.cpu_s, &mut self.shares, &mut self.dropped_s] {
+            list.resize(agents, 0.0);
+        }
         let (now, sim) = (session.now(), session.sim_now());
         let wall_s = now.saturating_sub(self.since.0).as_secs_f64();
         if wall_s < METER_EVERY.as_secs_f64() {
@@ -99,6 +104,9 @@ impl Meter {
 /// Updates the numbers; returns a line for each agent that was parked since the last call.
 pub(super) fn fill(status: &mut Status, session: &mut Session, meter: &mut Meter) -> Vec<String> {
     meter.read(session);
+    // those that have joined
+    let known = status.agents.len();
+    status.agents.extend(session.scene().agents.iter().skip(known).map(row));
     status.real_time_factor = meter.real_time;
     let mut messages = Vec::new();
     let control = session.control();
@@ -118,12 +126,13 @@ pub(super) fn fill(status: &mut Status, session: &mut Session, meter: &mut Meter
     status.shares = shares(session, meter);
     fill_couplings(status, session);
     status.energy_j = 0.0;
-    for (at, agent) in session.agents().iter().enumerate() {
+    let now = session.sim_now();
+    for (at, agent) in session.agents().iter().enumerate().take(status.agents.len()) {
         let (stats, newest) = (agent.stats(), agent.latest());
         let row = &mut status.agents[at];
         let was_parked = matches!(row.state, AgentState::Parked(_));
         fill_row(row, &stats, &newest);
-        row.led_by = stats.led_by.map(|leader| session.agents()[leader.0 as usize].name().to_owned());
+        row.led_by = stats.led_by.and_then(|leader| Some(session.agents().of(leader)?.name().to_owned()));
         row.cpu_share = meter.shares[at];
         if let AgentState::Parked(reason) = &row.state
             && !was_parked
@@ -131,6 +140,11 @@ pub(super) fn fill(status: &mut Status, session: &mut Session, meter: &mut Meter
             messages.push(format!("{} is parked: {reason}", row.name));
         }
         row.picture = session.levels().get(at).map(|level| level.resolution);
+        row.late_s = if stats.state == metachron_runtime::AgentState::Running {
+            now.secs_after(newest.moment()).max(0.0)
+        } else {
+            0.0
+        };
         row.age_s = session.scene_view().age_s(agent.id()).unwrap_or(0.0);
         status.energy_j += stats.energy_j;
     }
@@ -157,10 +171,11 @@ fn shares(session: &Session, meter: &Meter) -> Shares {
 fn fill_couplings(status: &mut Status, session: &Session) {
     let Status { couplings, agents, .. } = status;
     couplings.clear();
+    let name = |at: usize| agents.get(at).map_or_else(String::new, |row| row.name.clone());
     for (owner, agent) in session.agents().iter().enumerate() {
         couplings.extend(agent.latest().pairs.iter().filter(|pair| pair.contacts > 0).map(|pair| CouplingRow {
-            a: agents[owner].name.clone(),
-            b: agents[pair.with.0 as usize].name.clone(),
+            a: name(owner),
+            b: name(pair.with.0 as usize),
             kind: pair.kind.name(),
             contacts: pair.contacts,
             force_n: pair.force_n,
@@ -178,6 +193,8 @@ fn fill_row(row: &mut AgentRow, stats: &AgentStats, newest: &Snapshot) {
     row.nodes = stats.nodes;
     row.step_s = stats.work_s;
     row.dropped_s = stats.dropped.as_secs_f64();
+    row.put_off_s = newest.clock_offset.as_secs_f64();
+    row.leader = newest.cluster.map(|cluster| cluster.leader);
     row.residual_m = stats.residual_m;
     row.force_n = newest.body.tool().map(|tool| tool.force_n);
     row.state = match &stats.state {

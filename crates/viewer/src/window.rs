@@ -2,6 +2,9 @@
 //!
 //! In: a session and where its scene came from. Out: an [`Outcome`] when the window closes. Never here: egui, panels.
 
+mod scene_file;
+mod time;
+
 use super::live_tuning;
 use super::live_tuning::{Tuned, Tuning};
 use super::view_model;
@@ -17,11 +20,9 @@ use metachron_core::{AgentId, SimSpan};
 use metachron_lod::control::Policy;
 use metachron_render::{Camera, Gpu, Hand, Hit, Picture, Ray};
 use metachron_runtime::TimelineCommand;
-use metachron_scene::{SceneError, Source};
-use metachron_session::SessionError;
-use metachron_session::{Finished, Session};
-use metachron_session::{FrameRecord, Outcome};
-use metachron_world::Scene;
+use metachron_scene::Source;
+use metachron_session::{Finished, FrameRecord, Outcome, REWIND_BYTES, Session, SessionError};
+use scene_file::WatchedFile;
 use std::path::PathBuf;
 use std::time::{Duration, Instant};
 
@@ -97,6 +98,11 @@ struct WindowSimulation<'a> {
     pictures: u64,
     speed: f64,
     running: bool,
+    /// The run was put back, and its next frame begins at this moment.
+    went_on: bool,
+    file: WatchedFile,
+    /// Why the file as it is now cannot be shown.
+    file_error: Option<Message>,
 }
 
 /// Frames stored of a run without an end: an hour at 30 frames a second, some 10 MB.
@@ -113,6 +119,7 @@ const HAND_DAMPING: f64 = 0.7;
 impl<'a> WindowSimulation<'a> {
     fn new(mut session: Session, plan: WindowPlan, go_on: GoOn<'a>) -> Self {
         session.keep_frames(frames_kept(&plan));
+        session.keep_moments(REWIND_BYTES);
         // time is paused until the window shows the scene
         session.drive(TimelineCommand::Pause);
         let mut simulation = Self {
@@ -123,6 +130,8 @@ impl<'a> WindowSimulation<'a> {
             meter: Meter::new(&session),
             notices: Vec::new(),
             session,
+            file: WatchedFile::of(&plan.source),
+            file_error: None,
             plan,
             hand: None,
             tuning: None,
@@ -133,22 +142,16 @@ impl<'a> WindowSimulation<'a> {
             pictures: 0,
             speed: 1.0,
             running: true,
+            went_on: false,
         };
         simulation.refresh();
         simulation
     }
 
-    /// Restarts with `scene`; speed and pause are kept.
-    fn restart(&mut self, scene: Scene) {
-        match Session::open(scene) {
-            Ok(session) => self.replace(session),
-            Err(error) => self.show_message(Severity::Failure, error.to_string()),
-        }
-    }
-
     fn replace(&mut self, mut session: Session) {
         self.stop_tuning();
         session.keep_frames(frames_kept(&self.plan));
+        session.keep_moments(REWIND_BYTES);
         session.drive(TimelineCommand::Speed(self.speed));
         if self.running {
             session.begin();
@@ -170,7 +173,7 @@ impl<'a> WindowSimulation<'a> {
             Ok(false) => {}
             Err(error) => self.show_message(Severity::Failure, error.to_string()),
         }
-        (self.hand, self.refreshed) = (None, None);
+        (self.hand, self.refreshed, self.went_on) = (None, None, false);
         self.refresh();
     }
 
@@ -205,42 +208,10 @@ impl<'a> WindowSimulation<'a> {
         }
     }
 
-    fn reload(&mut self) {
-        match Source::open(self.plan.source.name()).and_then(|source| self.load(source)) {
-            Ok(scene) => self.restart(scene),
-            Err(error) => {
-                self.show_message(Severity::Failure, format!("scene not reloaded: {}", first_problem(&error)))
-            }
-        }
-    }
-
-    fn open(&mut self, path: &std::path::Path) {
-        self.plan.overrides.clear();
-        match Source::open(&path.to_string_lossy()).and_then(|source| self.load(source)) {
-            Ok(scene) => self.restart(scene),
-            Err(error) => self.show_message(Severity::Failure, format!("scene not opened: {}", first_problem(&error))),
-        }
-    }
-
-    fn load(&mut self, source: Source) -> Result<Scene, SceneError> {
-        let scene = metachron_scene::load(&source, &self.plan.overrides)?;
-        self.plan.source = source;
-        Ok(scene)
-    }
-
     fn show_message(&mut self, severity: Severity, text: String) {
         let message = Message { severity, text };
         self.notices.retain(|(_, old)| *old != message);
         self.notices.push((Instant::now() + MESSAGE_STAYS, message));
-    }
-
-    fn drive(&mut self, drive: TimelineCommand) {
-        match drive {
-            TimelineCommand::Run => self.running = true,
-            TimelineCommand::Pause | TimelineCommand::Step(_) | TimelineCommand::Leap(_) => self.running = false,
-            TimelineCommand::Speed(speed) => self.speed = speed,
-        }
-        self.session.drive(drive);
     }
 
     fn pull(&mut self, hand: Option<Hand>) {
@@ -321,25 +292,20 @@ impl<'a> WindowSimulation<'a> {
         messages.into_iter().for_each(|text| self.show_message(Severity::Failure, text));
         self.refreshed = Some(now);
     }
-
-    /// Lets virtual time pass by one frame; real time passes by itself.
-    fn pass_time(&mut self) {
-        let now = self.session.now();
-        let next = self.started + self.session.period();
-        self.started = if self.session.is_virtual() && now > Duration::ZERO { next.max(now) } else { now };
-        self.session.wait_until(self.started);
-    }
 }
 
-/// The problems of a scene in one line: the first one, and how many more there are.
-fn first_problem(error: &SceneError) -> String {
-    let Some(first) = error.problems.first() else { return error.to_string() };
-    let line = if first.line == 0 { String::new() } else { format!(", line {}", first.line) };
-    let more = match error.problems.len() + error.hidden - 1 {
-        0 => String::new(),
-        more => format!(" (and {more} more)"),
-    };
-    format!("{}{line}: {first}{more}", error.name)
+/// Whether an action changes what the run will do, other than when.
+const fn acts(action: &Action) -> bool {
+    !matches!(
+        action,
+        Action::Look(_)
+            | Action::Run
+            | Action::Pause
+            | Action::SingleStep
+            | Action::Speed(_)
+            | Action::Select(_)
+            | Action::Camera(_)
+    )
 }
 
 /// Frames stored in a run of this plan: all if it ends by itself.
@@ -352,6 +318,9 @@ impl Simulation for WindowSimulation<'_> {
         if matches!(action, Action::TargetFps(_) | Action::Policy(_) | Action::Law(_) | Action::Freeze(true)) {
             self.stop_tuning();
         }
+        if acts(&action) {
+            self.session.branch_off();
+        }
         match action {
             Action::Run => self.drive(TimelineCommand::Run),
             Action::Pause => self.drive(TimelineCommand::Pause),
@@ -359,6 +328,11 @@ impl Simulation for WindowSimulation<'_> {
                 let frame = SimSpan::from_secs_f64(self.session.period().as_secs_f64()).unwrap_or(SimSpan::ZERO);
                 self.drive(TimelineCommand::Step(frame));
             }
+            Action::Camera(number) => {
+                self.session.use_camera(number);
+                self.status.camera = self.session.camera_number();
+            }
+            Action::Look(look) => self.look(look),
             Action::Reset => self.reset(),
             Action::Reload => self.reload(),
             Action::Speed(speed) => self.drive(TimelineCommand::Speed(speed)),
@@ -388,6 +362,7 @@ impl Simulation for WindowSimulation<'_> {
         if self.pictures == 2 {
             self.begin();
         }
+        self.follow_file();
         self.pass_time();
         self.take_gains();
         self.refresh();
@@ -395,7 +370,10 @@ impl Simulation for WindowSimulation<'_> {
         self.notices.retain(|(until, _)| now < *until);
         self.status.messages.clear();
         self.status.messages.extend(self.notices.iter().map(|(_, message)| message.clone()));
-        self.status.sim_time = self.session.sim_now();
+        self.status.messages.extend(self.file_error.clone());
+        self.status.rewind = self.session.rewind();
+        let shown = self.session.rewind().and_then(|rewind| rewind.shown);
+        self.status.sim_time = shown.unwrap_or_else(|| self.session.sim_now());
         (self.status.running, self.status.speed) = (self.running, self.speed);
         self.status.held =
             self.hand.map(|hand| HandStatus { target: hand.target, force_n: self.session.hand_force_n(hand.object) });
@@ -407,10 +385,14 @@ impl Simulation for WindowSimulation<'_> {
             tuning.choose(self.session.control());
         }
         self.session.compose(&view.camera, view.size, view.style, self.hand);
-        if self.session.is_virtual() {
+        if self.session.is_virtual() && !self.session.is_put_back() {
             self.session.choose_next_frame(&view.camera, view.size);
             self.declared_draw = self.session.spend_declared(view.size);
         }
+        self.status.forces = view.style.forces.then(|| ui::Forces {
+            scale_m_per_n: self.session.picture().force_scale,
+            tools: self.session.scene_view().tool_forces(),
+        });
         self.session.picture()
     }
 

@@ -295,7 +295,7 @@ impl SceneBuilder {
                 factors: Factors::default(),
                 render_scale: RENDER_SCALE,
             },
-            camera: None,
+            cameras: Vec::new(),
             machine: Machine::default(),
             agents,
             obstacle_appearances: obstacles.iter().map(|_| DEFAULT_APPEARANCE).collect(),

@@ -33,6 +33,7 @@ mod events;
 mod frames;
 mod initial_overlap;
 mod initial_shape;
+mod joined;
 pub mod kinds;
 mod log;
 mod object;
@@ -61,8 +62,8 @@ pub use pace::Pace;
 pub use queries::{Cast, ContactNow, Hit};
 pub use recording::{BadRecording, RecordError, Recording, SceneText};
 pub use scene::{
-    Appearance, Camera, Factors, GROUP_LEVELS_MAX, Gains, Group, Machine, Member, ObjectCost, PaceWish, Probe,
-    RENDER_SCALE, Scene, Scenery, Spec, Target, View,
+    Appearance, Camera, Factors, GROUP_LEVELS_MAX, Gains, Group, Machine, Member, NamedCamera, ObjectCost, PaceWish,
+    Probe, RENDER_SCALE, Scene, Scenery, Spec, Target, View,
 };
 pub use sensors::{JointRef, Reading, Sensor, SensorKind};
 pub use spec::Division;

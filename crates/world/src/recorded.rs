@@ -8,6 +8,7 @@ use super::assemble;
 use super::assemble::Govern;
 use super::checkpoint::{CheckpointError, SceneIdentity};
 use super::kinds::ExecutorKind;
+use super::joined::Joined;
 use super::log::{Log, TurnsToLog, logged};
 use super::recording::{Entry, RecordError, Recorder, Recording, SceneText};
 use super::replay::{Followed, Player};
@@ -116,6 +117,7 @@ impl World {
         } else {
             Followed::Lockstep(Box::new(Lockstep::start(spawns, assemble::machine(scene)).map_err(WorldError::Run)?))
         };
+        let joined = Arc::<Joined>::default();
         let player = Player {
             run,
             recording,
@@ -128,8 +130,9 @@ impl World {
             gravity: scene.gravity,
             surroundings: Arc::clone(&surroundings),
             identity,
+            joined: Arc::clone(&joined),
         };
-        let setting = Setting { surroundings, clock: Arc::new(SystemClock::new()), log };
+        let setting = Setting { surroundings, clock: Arc::new(SystemClock::new()), log, joined };
         Ok(Self::of_run(scene, lockstep, Box::new(player), setting))
     }
 

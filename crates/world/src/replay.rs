@@ -6,6 +6,7 @@
 use super::assemble;
 use super::builder::{Part, member};
 use super::checkpoint::{Checkpoint, SceneIdentity};
+use super::joined::Joined;
 use super::kinds::ExecutorKind;
 use super::log::Log;
 use super::recording::{Entry, Recording};
@@ -38,6 +39,7 @@ pub(super) struct Player {
     pub gravity: DVec3,
     pub surroundings: Arc<ClusterScene>,
     pub identity: SceneIdentity,
+    pub joined: Arc<Joined>,
 }
 
 /// What does again what was done.
@@ -169,6 +171,7 @@ impl Player {
         let member = member(id, name, part, self.gravity).map_err(|error| error.to_string())?;
         let spawn = assemble::lone(&member, &self.surroundings, ExecutorKind::Lockstep);
         let spawn = spawn.map_err(|error| error.to_string())?;
+        self.joined.push(member);
         let added = match (&mut self.run, self.present.take()) {
             (Followed::RealTime(run), Some(at)) => run.add_at(spawn, at),
             (run, _) => run.run_mut().add(spawn),

@@ -44,8 +44,8 @@ pub struct Scene {
     pub gravity: DVec3,
     /// The target frame rate and how it is held.
     pub target: Target,
-    /// The camera; `None` where the scene gives none.
-    pub camera: Option<Camera>,
+    /// The cameras; the first is used where none is chosen. None where the scene gives none.
+    pub cameras: Vec<NamedCamera>,
     /// The declared machine.
     pub machine: Machine,
     /// The agents; an agent's id is its index here.
@@ -142,7 +142,16 @@ pub struct Gains {
     pub agent_yield: Option<f64>,
 }
 
-/// The camera of a scene.
+/// A camera of a scene, by its name.
+#[derive(Debug, Clone, PartialEq)]
+pub struct NamedCamera {
+    /// Its name; no other camera of the scene has it.
+    pub name: String,
+    /// Where it is and looks.
+    pub camera: Camera,
+}
+
+/// Where a camera is and looks, at every time.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Camera {
     /// A still view.

@@ -10,10 +10,12 @@ use super::builder::{Part, SceneBuildError, member};
 use super::checkpoint::{Checkpoint, CheckpointError, SceneIdentity};
 use super::events::{EventFilter, Events};
 use super::frames::{Frame, Frames};
+use super::joined::Joined;
 use super::kinds::ExecutorKind;
 use super::log::{Log, logged};
 use super::object::{Object, WorldTag};
 use super::recording::{Entry, added};
+use super::scene::Member;
 use super::sensors::Instruments;
 use glam::DVec3;
 use metachron_contact::stepper::ClusterScene;
@@ -131,6 +133,9 @@ pub(super) struct Shared {
     tag: WorldTag,
     state: Mutex<State>,
     agents: Agents,
+    /// How many agents the scene has, and those that joined since, in the order of their numbers.
+    of_scene: usize,
+    pub joined: Arc<Joined>,
     /// Gravity, m/s²: that of objects that join it.
     pub gravity: DVec3,
     /// The static solids and joints.
@@ -172,6 +177,7 @@ pub(super) struct Setting {
     pub surroundings: Arc<ClusterScene>,
     pub clock: Arc<SystemClock>,
     pub log: Arc<Log>,
+    pub joined: Arc<Joined>,
 }
 
 /// Why a replay refuses what is asked of it.
@@ -204,12 +210,12 @@ impl World {
         if executor != ExecutorKind::Lockstep {
             run.drive(TimelineCommand::Pause);
         }
-        Ok(Self::of_run(scene, executor, run, Setting { surroundings, clock, log }))
+        Ok(Self::of_run(scene, executor, run, Setting { surroundings, clock, log, joined: Arc::default() }))
     }
 
     /// The world of a run of the agents of `scene`.
     pub(super) fn of_run(scene: &Scene, executor: ExecutorKind, run: Box<dyn Run>, setting: Setting) -> Self {
-        let Setting { surroundings, clock, log } = setting;
+        let Setting { surroundings, clock, log, joined } = setting;
         let (agents, gravity, identity) = (run.agents().clone(), scene.gravity, SceneIdentity::of(scene));
         let (tag, state) = (WorldTag::new(), Mutex::new(State::Running(run)));
         let (joint_names, joints) = (scene.joint_names.clone(), Arc::clone(&scene.joints));
@@ -219,6 +225,8 @@ impl World {
             tag,
             state,
             agents,
+            of_scene: scene.agents.len(),
+            joined,
             gravity,
             surroundings,
             instruments,
@@ -453,7 +461,9 @@ impl World {
             }
             log.note(|| entry);
         };
-        let joined = self.in_order(|| run.add(spawn), note)?;
+        // who sees the agent can ask for its member
+        self.shared.joined.push(member);
+        let joined = self.in_order(|| run.add(spawn), note).inspect_err(|_| self.shared.joined.pop())?;
         Ok(self.shared.tag.object(joined.id()))
     }
 
@@ -530,6 +540,19 @@ impl World {
     #[must_use]
     pub fn agents(&self) -> &Agents {
         &self.shared.agents
+    }
+
+    /// How many agents its scene has; those of higher numbers joined it since ([`World::joined`]).
+    #[must_use]
+    pub fn agents_of_scene(&self) -> usize {
+        self.shared.of_scene
+    }
+
+    /// What an agent that joined since the start was built from, as a scene has it of its own; `None` of agents of the scene.
+    #[must_use]
+    pub fn joined(&self, id: AgentId) -> Option<Member> {
+        let at = (id.0 as usize).checked_sub(self.shared.of_scene)?;
+        self.shared.joined.get(at)
     }
 
     /// Wall time since the start; virtual in lockstep.

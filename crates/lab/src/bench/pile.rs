@@ -143,6 +143,7 @@ fn agents(scene: &Scene, executor: ExecutorKind, seconds: f64) -> anyhow::Result
         style: Style::default(),
         drawing: Drawing::Nothing,
         png: None,
+        depth: None,
         film: None,
     };
     let from = own_cpu() + others_cpu();

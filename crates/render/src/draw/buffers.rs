@@ -57,7 +57,7 @@ pub struct Targets {
 impl Targets {
     /// Depth and, with more than one sample a pixel, colour of `size`.
     pub fn new(device: &wgpu::Device, format: wgpu::TextureFormat, size: Size, samples: u32) -> Self {
-        let texture = |label, format| {
+        let texture = |label, format, more| {
             device
                 .create_texture(&wgpu::TextureDescriptor {
                     label: Some(label),
@@ -66,15 +66,19 @@ impl Targets {
                     sample_count: samples,
                     dimension: wgpu::TextureDimension::D2,
                     format,
-                    usage: wgpu::TextureUsages::RENDER_ATTACHMENT,
+                    usage: wgpu::TextureUsages::RENDER_ATTACHMENT | more,
                     view_formats: &[],
                 })
                 .create_view(&wgpu::TextureViewDescriptor::default())
         };
         Self {
             size,
-            depth: texture("depth", super::bindings::DEPTH),
-            samples: (samples > 1).then(|| texture("samples", format)),
+            depth: texture(
+                "depth",
+                super::bindings::DEPTH,
+                wgpu::TextureUsages::TEXTURE_BINDING | wgpu::TextureUsages::COPY_SRC,
+            ),
+            samples: (samples > 1).then(|| texture("samples", format, wgpu::TextureUsages::empty())),
         }
     }
 

@@ -6,6 +6,7 @@
 mod bindings;
 mod buffers;
 mod cuts;
+mod depth;
 mod globals;
 mod meshes;
 mod passes;
@@ -17,11 +18,12 @@ mod tissue;
 
 use super::environment::Environment;
 use super::offscreen::DeviceLoss;
-use super::picture::{Picture, SkinSample, SolidInstance};
+use super::picture::{Colouring, Picture, SkinSample, SolidInstance};
 use super::view::{Camera, Size};
 use bindings::{Bindings, Layouts};
 use buffers::{Growing, Targets};
 use cuts::Cuts;
+use depth::DepthPass;
 use globals::Globals;
 use meshes::Meshes;
 use pipelines::{Pipelines, Setup};
@@ -127,6 +129,8 @@ pub struct Renderer {
     skins: SkinBuffers,
     textures: Textures,
     targets: Option<Targets>,
+    /// Made when depths are first shown.
+    depth_pass: Option<DepthPass>,
     timing: Option<Timing>,
 }
 
@@ -168,6 +172,7 @@ impl Renderer {
             textures: Textures::new(device, layouts.texture.clone()),
             layouts,
             targets: None,
+            depth_pass: None,
             timing: Timing::new(device, queue),
         };
         refusal(scope)?;
@@ -204,7 +209,10 @@ impl Renderer {
         let mut encoder = self.device.create_command_encoder(&wgpu::CommandEncoderDescriptor { label: Some("frame") });
         let shadows = self.draw_shadows(&mut encoder, picture);
         let room = !globals::floor_fills(picture, camera, target.shown);
-        let draws = shadows + self.draw_picture(&mut encoder, picture, target, room);
+        let mut draws = shadows + self.draw_picture(&mut encoder, picture, target, room);
+        if picture.style.colouring == Colouring::Depth {
+            draws += self.show_depths(&mut encoder, camera, target.view);
+        }
         if let Some(timing) = &mut self.timing {
             timing.resolve(&mut encoder);
         }

@@ -2,7 +2,7 @@
 //!
 //! In: a picture whose meshes and uniforms are uploaded. Out: draws. Never here: uploads, pipelines, submission.
 
-use super::super::picture::{MeshKey, Picture, SkinSample, SolidInstance, SolidRun, TubeRun};
+use super::super::picture::{Colouring, MeshKey, Picture, SkinSample, SolidInstance, SolidRun, TubeRun};
 use super::super::skin::SkinRun;
 use super::cuts::MorphedCut;
 use super::meshes::Mesh;
@@ -54,10 +54,12 @@ impl Renderer {
         room: bool,
     ) -> u32 {
         let Some(targets) = &self.targets else { return 0 };
+        let shown = picture.style.colouring == Colouring::Depth;
+        let depths = if shown { wgpu::StoreOp::Store } else { wgpu::StoreOp::Discard };
         let mut pass = encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
             label: Some("picture"),
             color_attachments: &[Some(targets.colour(target.view))],
-            depth_stencil_attachment: Some(depth(&targets.depth, 0.0, wgpu::StoreOp::Discard)),
+            depth_stencil_attachment: Some(depth(&targets.depth, 0.0, depths)),
             timestamp_writes: self.timing.as_ref().map(Timing::last_pass),
             ..Default::default()
         });

@@ -1,5 +1,6 @@
 //! Pictures drawn on the adapter present, compared with what they must show.
 mod adapter;
+mod depth;
 mod light;
 mod painting;
 mod reduced;

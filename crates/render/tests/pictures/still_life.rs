@@ -78,7 +78,7 @@ fn lean_light_looks_like_full_light() {
     let lean = RendererOptions { lean: true, ..OPTIONS };
     for camera in [near, far] {
         for colouring in [Colouring::Material, Colouring::Resolution] {
-            let style = Style { colouring, wireframe: false };
+            let style = Style { colouring, ..Style::default() };
             let mut drawn = |options| draw_with(&gpu, (&mut stage, &camera), &stage::level(0.02, 3), style, options);
             let (full, lean) = (drawn(OPTIONS), drawn(lean));
             // measured: 0.17 and 0.7 at most, where colours are mixed after the tone curve instead of before it
@@ -151,9 +151,9 @@ fn colours_edges_and_the_hand_show() {
     let levels = stage::level(0.02, 3);
     let plain = draw(&gpu, &mut stage, &camera, &levels, Style::default());
     for style in [
-        Style { colouring: Colouring::Resolution, wireframe: false },
-        Style { colouring: Colouring::Age, wireframe: false },
-        Style { colouring: Colouring::Material, wireframe: true },
+        Style { colouring: Colouring::Resolution, ..Style::default() },
+        Style { colouring: Colouring::Age, ..Style::default() },
+        Style { wireframe: true, ..Style::default() },
     ] {
         let other = draw(&gpu, &mut stage, &camera, &levels, style);
         assert!(difference(&plain, &other) > 0.5, "{style:?}");

@@ -42,7 +42,7 @@ pub(super) use group::groups;
 pub(super) use joint::joints;
 pub(super) use object::{AGENTS_MAX, Names, Objects, SceneContext, read_objects};
 pub(super) use sensor::{joint_names, sensors};
-pub(super) use stage::{camera, machine, probes, target};
+pub(super) use stage::{cameras, machine, probes, target};
 
 /// Coordinates of a scene stay within this, metres: past it a millimetre is lost in 32-bit drawing.
 pub(super) const POSITION_MAX_M: f64 = 1e5;

@@ -4,12 +4,12 @@ use super::{Names, POSITION_MAX_M, TIME};
 use crate::check::{Allowed, Checker, Place, allowed};
 use crate::diagnostic::{Problem, did_you_mean};
 use crate::format::{
-    CameraFile, CameraKeyFile, LoadFile, MODELS, MachineFile, Point, ProbeFile, ShadingCostFile, TargetFile,
-    model_named,
+    CameraFile, CameraFiles, CameraKeyFile, LoadFile, MODELS, MachineFile, Point, ProbeFile, ShadingCostFile,
+    TargetFile, model_named,
 };
 use glam::DVec3;
 use metachron_core::{SimSpan, gains};
-use metachron_world::{Camera, Factors, Gains, Machine, ObjectCost, Probe, RENDER_SCALE, Target, View};
+use metachron_world::{Camera, Factors, Gains, Machine, NamedCamera, ObjectCost, Probe, RENDER_SCALE, Target, View};
 
 /// Default share of the lag that is reserved for choosing levels: the most that (GB99) needed.
 const OPTIMISER_SHARE: f64 = 0.05;
@@ -85,11 +85,38 @@ fn lag(c: &mut Checker<'_, '_>, place: &Place, file: Option<&TargetFile>) -> Opt
     Some((c.number(place, "lag_ms", lag_ms, &allowed(1.0..=1000.0, "ms")) * 1e-3, part))
 }
 
-/// Reads the camera of the scene.
-pub(crate) fn camera(c: &mut Checker<'_, '_>, file: Option<&CameraFile>) -> Option<Camera> {
-    let file = file?;
+/// Most cameras of a scene.
+const CAMERAS_MAX: usize = 100;
+
+/// Reads the cameras of the scene, which have different names.
+pub(crate) fn cameras(c: &mut Checker<'_, '_>, files: &CameraFiles) -> Vec<NamedCamera> {
     let place = Place::new("camera", "of `[camera]`");
-    let fov_deg = c.optional(&place, "fov_deg", file.fov_deg, &FOV).unwrap_or(FOV_DEFAULT_DEG);
+    let files = match files {
+        CameraFiles::One(file) => {
+            let name = file.name.clone().unwrap_or_else(|| "camera".to_owned());
+            return camera(c, &place, file).map(|camera| NamedCamera { name, camera }).into_iter().collect();
+        }
+        CameraFiles::Several(files) => files,
+    };
+    if files.len() > CAMERAS_MAX {
+        let what = format!("has {} entries", files.len());
+        c.wrong(&Place::new("", ""), "camera", what, format!("expected at most {CAMERAS_MAX}"));
+        return Vec::new();
+    }
+    let mut cameras: Vec<NamedCamera> = Vec::with_capacity(files.len());
+    for (at, file) in files.iter().enumerate() {
+        let place = Place::new("", "").entry("camera", at);
+        let name = file.name.clone().unwrap_or_else(|| format!("camera {}", at + 1));
+        if cameras.iter().any(|other| other.name == name) {
+            c.wrong(&place, "name", format_args!("is \"{name}\" twice"), "expected another name for each camera");
+        }
+        cameras.extend(camera(c, &place, file).map(|camera| NamedCamera { name, camera }));
+    }
+    cameras
+}
+
+fn camera(c: &mut Checker<'_, '_>, place: &Place, file: &CameraFile) -> Option<Camera> {
+    let fov_deg = c.optional(place, "fov_deg", file.fov_deg, &FOV).unwrap_or(FOV_DEFAULT_DEG);
     if let Some(keys) = &file.keyframe {
         for (key, given) in [
             ("eye_m", file.eye_m.is_some()),
@@ -97,28 +124,28 @@ pub(crate) fn camera(c: &mut Checker<'_, '_>, file: Option<&CameraFile>) -> Opti
             ("period_s", file.period_s.is_some()),
         ] {
             if given {
-                c.wrong(&place, key, "contradicts `keyframe`", "expected it in the keyframes only");
+                c.wrong(place, key, "contradicts `keyframe`", "expected it in the keyframes only");
             }
         }
-        let keys = camera_keys(c, &place, keys, fov_deg)?;
+        let keys = camera_keys(c, place, keys, fov_deg)?;
         return Some(Camera::Path { keys, repeat: file.repeat.unwrap_or(false), even: file.even.unwrap_or(false) });
     }
     for (key, given) in [("repeat", file.repeat.is_some()), ("even", file.even.is_some())] {
         if given {
-            c.wrong(&place, key, "has no effect without a path", "expected `[[camera.keyframe]]` tables beside it");
+            c.wrong(place, key, "has no effect without a path", "expected `[[camera.keyframe]]` tables beside it");
         }
     }
     let Some(eye) = file.eye_m else {
-        c.wrong(&place, "eye_m", "is missing", "expected `eye_m` or `[[camera.keyframe]]` tables");
+        c.wrong(place, "eye_m", "is missing", "expected `eye_m` or `[[camera.keyframe]]` tables");
         return None;
     };
-    let start = view(c, &place, eye, file.look_at_m.unwrap_or_default(), fov_deg);
+    let start = view(c, place, eye, file.look_at_m.unwrap_or_default(), fov_deg);
     Some(match file.period_s {
         None => Camera::Still(start),
         Some(period_s) if (0.1..=1e5).contains(&period_s.abs()) => Camera::Orbit { start, period_s },
         Some(period_s) => {
             let expected = "expected 0.1 to 100000 s, or -100000 to -0.1 s for the other direction";
-            c.wrong(&place, "period_s", format_args!("is {period_s}"), expected);
+            c.wrong(place, "period_s", format_args!("is {period_s}"), expected);
             Camera::Still(start)
         }
     })

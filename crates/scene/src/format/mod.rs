@@ -25,8 +25,8 @@ pub use coupling::{CouplingFile, CouplingKind, CouplingLaw, FaultsFile, Spot};
 pub use joint::{JointFile, JointKind, MotorFile};
 pub use rigid::{Axis, PartFile, PoseKeyFile, RigidFile, Shape};
 pub use scene::{
-    CameraFile, CameraKeyFile, ContactPath, ContactsFile, LoadFile, MachineFile, ModelCostFile, ProbeFile, SceneFile,
-    ShadingCostFile, TargetFile, WorldFile,
+    CameraFile, CameraFiles, CameraKeyFile, ContactPath, ContactsFile, LoadFile, MachineFile, ModelCostFile, ProbeFile,
+    SceneFile, ShadingCostFile, TargetFile, WorldFile,
 };
 pub use scenery::{GeneratorKind, GroupFile, MeshFile, MotionFile, TreeFile, TreeLod};
 pub use sensor::{SensorFile, SensorFileKind};

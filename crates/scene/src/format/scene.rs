@@ -4,8 +4,10 @@ use super::{CellFile, CouplingFile, FaultsFile, GroupFile, JointFile, OneOrRange
 use metachron_core::gains;
 use metachron_world::kinds::{EnvironmentKind, ExecutorKind, LawKind, PolicyKind, PriorityKind, StatesKind, ValueKind};
 use schemars::JsonSchema;
-use serde::Deserialize;
 use serde::de::IgnoredAny;
+use serde::de::value::{MapAccessDeserializer, SeqAccessDeserializer};
+use serde::de::{MapAccess, SeqAccess, Visitor};
+use serde::{Deserialize, Deserializer};
 use std::collections::BTreeMap;
 
 /// A scene file without its `[[object]]` tables, which are read one by one according to their models.
@@ -28,8 +30,9 @@ pub struct SceneFile {
     pub world: Option<WorldFile>,
     /// The target frame rate and how it is held.
     pub target: Option<TargetFile>,
-    /// The camera. Default: far enough away to see the whole scene.
-    pub camera: Option<CameraFile>,
+    /// The camera, or several as `[[camera]]`; at most 100. Default: far enough away to see the whole scene.
+    #[serde(default)]
+    pub camera: CameraFiles,
     /// The declared machine: costs that lockstep charges instead of measuring them.
     pub machine: Option<MachineFile>,
     /// Material points whose position and velocity are reported; at most 1000.
@@ -167,10 +170,51 @@ pub struct TargetFile {
     pub render_scale: Option<OneOrRange<f64>>,
 }
 
-/// `[camera]`: a still view; with `period_s` an orbit about `look_at_m`; with `keyframe` a path.
+/// One camera as a table, or several as a list of tables.
+#[derive(Debug, Clone, JsonSchema)]
+#[serde(untagged)]
+pub enum CameraFiles {
+    /// `[camera]`.
+    One(Box<CameraFile>),
+    /// `[[camera]]`; at most 100.
+    Several(#[schemars(length(max = 100))] Vec<CameraFile>),
+}
+
+impl Default for CameraFiles {
+    fn default() -> Self {
+        Self::Several(Vec::new())
+    }
+}
+
+/// Read by hand: of an untagged enum an error says neither the key nor its place.
+impl<'de> Deserialize<'de> for CameraFiles {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        struct OneOrSeveral;
+        impl<'de> Visitor<'de> for OneOrSeveral {
+            type Value = CameraFiles;
+
+            fn expecting(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+                f.write_str("a table `[camera]`, or tables `[[camera]]`")
+            }
+
+            fn visit_map<A: MapAccess<'de>>(self, map: A) -> Result<CameraFiles, A::Error> {
+                Deserialize::deserialize(MapAccessDeserializer::new(map)).map(CameraFiles::One)
+            }
+
+            fn visit_seq<A: SeqAccess<'de>>(self, seq: A) -> Result<CameraFiles, A::Error> {
+                Deserialize::deserialize(SeqAccessDeserializer::new(seq)).map(CameraFiles::Several)
+            }
+        }
+        deserializer.deserialize_any(OneOrSeveral)
+    }
+}
+
+/// `[camera]`, or one of `[[camera]]`: a still view; with `period_s` an orbit about `look_at_m`; with `keyframe` a path.
 #[derive(Debug, Clone, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct CameraFile {
+    /// Its name, by which it is chosen; each camera has another. Default: `camera`, and of several `camera 1` and so on.
+    pub name: Option<String>,
     /// Position of the eye, metres. Not with `keyframe`.
     pub eye_m: Option<Point>,
     /// Point that it looks at, metres. Default: the origin.

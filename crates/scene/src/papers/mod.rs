@@ -166,7 +166,7 @@ mod tests {
     #[test]
     fn no_camera_path_turns_so_far_between_keyframes_that_it_looks_at_its_eye() {
         for (paper, zigzag) in Paper::ALL.map(|p| (p, false)).into_iter().chain([(Paper::Grove, true)]) {
-            let camera = scene(paper, &Choices { zigzag, ..Choices::default() }).camera.unwrap();
+            let camera = scene(paper, &Choices { zigzag, ..Choices::default() }).cameras.remove(0).camera;
             let length = camera.length_s().unwrap();
             for k in 0..4000 {
                 let view = camera.view_at(length * f64::from(k) / 4000.0);

@@ -60,6 +60,7 @@ pub fn show(ui: &mut Ui, status: &Status, summary: &FrameSummary) -> Vec<Command
 fn transport(ui: &mut Ui, status: &Status, out: &mut Vec<Command>) {
     ui.spacing_mut().item_spacing.x = 2.0;
     let (icon, name) = if status.running { (Icon::Pause, "Pause") } else { (Icon::Run, "Run") };
+    button(ui, Icon::Back, "Back", Command::Back, out);
     button(ui, icon, name, Command::PauseOrRun, out);
     button(ui, Icon::Step, "Step", Command::Step, out);
     button(ui, Icon::Reset, "Reset", Command::Reset, out);

@@ -12,6 +12,10 @@ pub enum Command {
     PauseOrRun,
     /// Advance by one frame.
     Step,
+    /// Look at the moment before.
+    Back,
+    /// Return to the present.
+    Live,
     /// Restart the scene.
     Reset,
     /// Reload the scene file.
@@ -36,8 +40,16 @@ pub enum Command {
     Wireframe,
     /// Colour by age.
     Ages,
+    /// Show distances along the view.
+    Depths,
+    /// Draw contact forces.
+    Forces,
+    /// Show or hide the lanes of turns.
+    Lanes,
     /// Hide the panels.
     HideUi,
+    /// Show or hide the timeline.
+    Timeline,
     /// Switch between light and dark.
     Theme,
     /// Write the picture to a file.
@@ -93,9 +105,11 @@ const fn row(command: Command, keys: &'static [KeyboardShortcut], does: &'static
 }
 
 /// Every key binding of the window.
-pub const SHORTCUTS: [Shortcut; 23] = [
+pub const SHORTCUTS: [Shortcut; 29] = [
     row(Command::PauseOrRun, &[key(Key::Space)], "Pause or run", Group::Time),
-    row(Command::Step, &[key(Key::ArrowRight)], "Step one frame", Group::Time),
+    row(Command::Step, &[key(Key::ArrowRight)], "Step one frame, or to the next moment", Group::Time),
+    row(Command::Back, &[key(Key::ArrowLeft)], "Step back", Group::Time),
+    row(Command::Live, &[key(Key::End)], "Return to the present", Group::Time),
     row(Command::Reset, &[key(Key::Backspace)], "Reset the scene", Group::Time),
     row(Command::Reload, &[ctrl(Key::L)], "Reload the scene file", Group::Time),
     row(Command::Faster, &[key(Key::Equals), key(Key::Plus)], "Faster", Group::Time),
@@ -104,12 +118,16 @@ pub const SHORTCUTS: [Shortcut; 23] = [
     row(Command::Quit, &[ctrl(Key::Q)], "Quit", Group::Time),
     row(Command::Frame, &[key(Key::F)], "Frame the selected object, or all", Group::Camera),
     row(Command::Track, &[key(Key::T)], "Track the selected object", Group::Camera),
-    row(Command::SceneCamera, &[key(Key::V)], "View of the scene's camera", Group::Camera),
+    row(Command::SceneCamera, &[key(Key::V)], "View of the scene's camera, then of the next", Group::Camera),
     row(Command::Free, &[key(Key::Escape)], "Close, deselect, free camera", Group::Camera),
     row(Command::Colours, &[key(Key::C)], "Colour by resolution", Group::Picture),
     row(Command::Wireframe, &[key(Key::W)], "Wireframe", Group::Picture),
     row(Command::Ages, &[key(Key::A)], "Colour by age", Group::Picture),
+    row(Command::Depths, &[key(Key::Z)], "Depth", Group::Picture),
+    row(Command::Forces, &[key(Key::N)], "Contact forces", Group::Picture),
+    row(Command::Lanes, &[key(Key::L)], "Lanes of turns", Group::Picture),
     row(Command::HideUi, &[key(Key::H)], "Hide the panels", Group::Picture),
+    row(Command::Timeline, &[key(Key::F5)], "Timeline", Group::Picture),
     row(Command::Theme, &[ctrl(Key::T)], "Light or dark", Group::Picture),
     row(Command::Screenshot, &[key(Key::F12)], "Screenshot", Group::Picture),
     row(Command::Help, &[key(Key::F1), key(Key::Questionmark)], "Help", Group::Picture),
@@ -144,8 +162,8 @@ pub fn next_speed(speed: f64, up: bool) -> f64 {
 
 /// Takes the commands pressed in this frame out of the input.
 ///
-/// While text is typed only keys with Ctrl and function keys count; while a widget has focus, Space, Right and Backspace do not count
-/// either.
+/// While text is typed only keys with Ctrl and function keys count; while a widget has focus, Space, arrows, End and Backspace do not
+/// count either.
 #[must_use]
 pub fn pressed(ctx: &egui::Context) -> Vec<Command> {
     let typing = ctx.text_edit_focused();
@@ -167,14 +185,15 @@ fn is_active(keys: &KeyboardShortcut, typing: bool, focused: bool, flying: bool)
     if keys.modifiers.any() || is_function(keys.logical_key) || keys.logical_key == Key::Escape {
         return true;
     }
-    let widget_key = matches!(keys.logical_key, Key::Space | Key::ArrowRight | Key::Backspace);
+    let widget_key =
+        matches!(keys.logical_key, Key::Space | Key::ArrowLeft | Key::ArrowRight | Key::End | Key::Backspace);
     let fly_key = matches!(keys.logical_key, Key::W | Key::A);
     let taken = typing || (focused && widget_key) || (flying && fly_key);
     !taken
 }
 
 fn is_function(key: Key) -> bool {
-    matches!(key, Key::F1 | Key::F2 | Key::F3 | Key::F4 | Key::F12)
+    matches!(key, Key::F1 | Key::F2 | Key::F3 | Key::F4 | Key::F5 | Key::F12)
 }
 
 /// The keys of `command` as shown to the user, such as `Ctrl+L` or `= or +`.
@@ -188,6 +207,7 @@ pub fn keys_text(ctx: &egui::Context, command: Command) -> String {
 fn name(ctx: &egui::Context, keys: &KeyboardShortcut) -> String {
     let modifiers = ctx.format_modifiers(keys.modifiers);
     let key = match keys.logical_key {
+        Key::ArrowLeft => "Left",
         Key::ArrowRight => "Right",
         Key::Equals => "=",
         Key::Plus => "+",

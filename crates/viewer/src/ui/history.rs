@@ -70,10 +70,7 @@ impl History {
         }
         self.sampled_at_s = Some(at_s);
         let count = status.agents.len().min(AGENTS);
-        if self.agents.len() != count {
-            self.agents.clear();
-            self.agents.resize_with(count, VecDeque::new);
-        }
+        self.agents.resize_with(count, VecDeque::new);
         for (ring, row) in self.agents.iter_mut().zip(&status.agents) {
             push_bounded(ring, sample_of(at_s, row), SAMPLES);
         }

@@ -14,6 +14,8 @@ pub enum Icon {
     Pause,
     /// A triangle against a bar.
     Step,
+    /// A bar before a triangle to the left.
+    Back,
     /// A turning arrow.
     Reset,
     /// A camera.
@@ -58,6 +60,12 @@ fn shapes(icon: Icon, r: Rect, color: Color32) -> Vec<Shape> {
         Icon::Step => {
             let bar = Rect::from_center_size(pos2(r.right() - 1.0, c.y), vec2(2.6, w));
             vec![triangle(r.with_max_x(r.right() - 3.5), color), Shape::rect_filled(bar, 1.0, color)]
+        }
+        Icon::Back => {
+            let bar = Rect::from_center_size(pos2(r.left() + 1.0, c.y), vec2(2.6, w));
+            let right = r.right() - 1.0;
+            let points = vec![pos2(right, r.top()), pos2(r.left() + 3.5, c.y), pos2(right, r.bottom())];
+            vec![Shape::convex_polygon(points, color, Stroke::NONE), Shape::rect_filled(bar, 1.0, color)]
         }
         Icon::Reset => turning_arrow(c, 0.45 * w, stroke),
         Icon::Screenshot => {

@@ -34,10 +34,12 @@ pub struct Hand {
 
 /// The picture's place in the window and its camera.
 #[derive(Debug, Clone, Copy)]
-struct Window {
-    rect: Rect,
+pub struct Window {
+    /// Its place, points.
+    pub rect: Rect,
     scale: f32,
-    camera: Camera,
+    /// Its camera.
+    pub camera: Camera,
 }
 
 /// One frame of input and the actions that it causes.
@@ -58,7 +60,8 @@ impl Window {
         self.camera.ray(self.pixels(at - self.rect.min), self.size())
     }
 
-    fn place(&self, point: DVec3) -> Option<Pos2> {
+    /// Where a point is seen.
+    pub fn place(&self, point: DVec3) -> Option<Pos2> {
         let (pixel, _) = self.camera.project(point, self.size())?;
         Some(self.rect.min + vec2(pixel.x as f32, pixel.y as f32) / self.scale)
     }
@@ -80,6 +83,12 @@ impl Hand {
     #[must_use]
     pub fn camera(&self, simulation: &dyn Simulation) -> Camera {
         self.own.unwrap_or_else(|| simulation.scene_camera())
+    }
+
+    /// Whether the scene's own camera is in use.
+    #[must_use]
+    pub const fn follows_scene(&self) -> bool {
+        self.own.is_none()
     }
 
     /// Switches to the scene's own camera.
@@ -120,7 +129,8 @@ impl Hand {
         turn.actions
     }
 
-    fn window(&self, ui: &Ui, response: &Response, simulation: &dyn Simulation) -> Window {
+    /// The picture as it is shown.
+    pub fn window(&self, ui: &Ui, response: &Response, simulation: &dyn Simulation) -> Window {
         Window { rect: response.rect, scale: ui.ctx().pixels_per_point(), camera: self.camera(simulation) }
     }
 
@@ -251,7 +261,8 @@ fn draw_name(ui: &Ui, hit: &Hit, simulation: &dyn Simulation, palette: &Palette)
     label(ui, at + vec2(14.0, 4.0), &row.name, palette);
 }
 
-fn label(ui: &Ui, at: Pos2, text: &str, palette: &Palette) {
+/// A text on a card.
+pub fn label(ui: &Ui, at: Pos2, text: &str, palette: &Palette) {
     let galley = ui.painter().layout_no_wrap(text.to_owned(), FontId::proportional(12.0), palette.text);
     let rect = Align2::LEFT_TOP.anchor_size(at, galley.size()).expand2(vec2(6.0, 3.0));
     ui.painter().rect_filled(rect, 4.0, palette.panel.gamma_multiply(0.88));

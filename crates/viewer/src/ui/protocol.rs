@@ -6,7 +6,8 @@
 use glam::DVec3;
 use metachron_core::{AgentId, Resolution, SimTime};
 use metachron_lod::cost::benefit::Sliders;
-use metachron_render::{Camera, Hit, Picture, Ray, Size, Style};
+use metachron_render::{Camera, Hit, Picture, Ray, Size, Style, ToolForce};
+use metachron_session::RewindStatus;
 use std::path::PathBuf;
 use std::time::Duration;
 
@@ -61,6 +62,10 @@ pub enum Action {
     Pause,
     /// Pause and advance by one frame.
     SingleStep,
+    /// Use the camera of the scene with this number in [`Status::cameras`].
+    Camera(usize),
+    /// Look at a moment of the past, or return from it.
+    Look(Look),
     /// Restart the scene from its initial state.
     Reset,
     /// Reload the scene file and start it.
@@ -98,6 +103,19 @@ pub enum Action {
     },
     /// Load the scene file that was dropped on the window.
     OpenScene(PathBuf),
+}
+
+/// What of the moments that are kept is looked at.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Look {
+    /// The last one that is not later than this.
+    At(SimTime),
+    /// The one before.
+    Back,
+    /// The one after.
+    Forward,
+    /// The present.
+    Live,
 }
 
 /// The picture's feedback law and its gains.
@@ -191,6 +209,8 @@ pub struct Status {
     pub scene: String,
     /// Simulated time of the picture.
     pub sim_time: SimTime,
+    /// The moments that can be looked at; `None` before there is one.
+    pub rewind: Option<RewindStatus>,
     /// Whether the simulation runs.
     pub running: bool,
     /// Requested simulated seconds per second of wall time, > 0.
@@ -241,10 +261,25 @@ pub struct Status {
     pub held: Option<HandStatus>,
     /// One row for each agent, in the scene's order.
     pub agents: Vec<AgentRow>,
+    /// The names of the scene's cameras.
+    pub cameras: Vec<String>,
+    /// The number of the one that is used.
+    pub camera: usize,
+    /// What contact forces are drawn with; `None` where they are not.
+    pub forces: Option<Forces>,
     /// The couplings between agents at present.
     pub couplings: Vec<CouplingRow>,
     /// Messages for the user, oldest first.
     pub messages: Vec<Message>,
+}
+
+/// The scale of contact forces, and those on tools.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Forces {
+    /// Metres that the arrow of one newton has; 0 before any was drawn.
+    pub scale_m_per_n: f64,
+    /// What acts on each tool.
+    pub tools: Vec<ToolForce>,
 }
 
 /// A search for better gains.
@@ -327,6 +362,10 @@ pub struct AgentRow {
     pub picture: Option<Resolution>,
     /// Age of the displayed state, seconds, ≥ 0.
     pub age_s: f64,
+    /// How far its newest state is behind the scene's time, seconds, ≥ 0.
+    pub late_s: f64,
+    /// How far its own time has been put off behind the scene's, seconds, ≥ 0.
+    pub put_off_s: f64,
     /// Wall time of a step, seconds, ≥ 0.
     pub step_s: f64,
     /// Share of one core, 0 … 1.
@@ -341,6 +380,8 @@ pub struct AgentRow {
     pub filled: Option<Filled>,
     /// The agent that steps it as a member of its cluster.
     pub led_by: Option<String>,
+    /// The leader of its cluster, itself included; `None` of an agent that is alone.
+    pub leader: Option<AgentId>,
     /// Present activity.
     pub state: AgentState,
 }
@@ -369,6 +410,8 @@ impl AgentRow {
             nodes: None,
             picture: None,
             age_s: 0.0,
+            late_s: 0.0,
+            put_off_s: 0.0,
             step_s: 0.0,
             cpu_share: 0.0,
             dropped_s: 0.0,
@@ -376,6 +419,7 @@ impl AgentRow {
             force_n: None,
             filled: None,
             led_by: None,
+            leader: None,
             state: AgentState::Running,
         }
     }

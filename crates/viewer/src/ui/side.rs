@@ -19,6 +19,9 @@ const TARGET_HZ: RangeInclusive<f64> = 5.0..=144.0;
 /// Tooltip of the tuning button.
 const TUNE: &str = "Tune the gains: a few seconds of frames at many resolutions, then a search in the background; the best gains are applied";
 
+/// Tooltip of contact forces.
+const FORCES: &str = "A ball at each contact; an arrow along its normal as long as the force (orange), friction (blue), and what a tool feels (red)";
+
 /// Draws the panel.
 pub fn show(ui: &mut Ui, status: &Status, history: &History, looks: &mut DrawingOptions) -> Vec<Action> {
     let mut actions = Vec::new();
@@ -27,7 +30,7 @@ pub fn show(ui: &mut Ui, status: &Status, history: &History, looks: &mut Drawing
         let summary = history.summary(status.target_hz);
         section(ui, "Frame", |ui| frame(ui, status, history, &summary, &mut actions));
         section(ui, "Control", |ui| control(ui, status, &mut actions));
-        section(ui, "Picture", |ui| picture(ui, looks, status));
+        section(ui, "Picture", |ui| picture(ui, looks, status, &mut actions));
         let row = status.selected.and_then(|id| status.agents.iter().find(|row| row.id == id));
         if !status.couplings.is_empty() {
             section(ui, "Couplings", |ui| super::couplings::show(ui, &status.couplings));
@@ -192,19 +195,40 @@ fn as_toml(status: &Status, law: &Law) -> String {
     format!("[target]\nframe_hz = {:?}\npolicy = \"{}\"\n{gains}", status.target_hz, status.policy)
 }
 
-fn picture(ui: &mut Ui, looks: &mut DrawingOptions, status: &Status) {
+/// A checkbox of a meaning of colours: no two are chosen.
+fn colouring(ui: &mut Ui, looks: &mut DrawingOptions, name: &str, of: fn(&mut DrawingOptions) -> &mut bool) {
+    let mut wanted = *looks;
+    if ui.checkbox(of(&mut wanted), name).changed() {
+        *looks = looks.plain_or(wanted);
+    }
+}
+
+/// A menu of the scene's cameras, where there are several.
+fn camera(ui: &mut Ui, status: &Status, out: &mut Vec<Action>) {
+    let Some(name) = status.cameras.get(status.camera).filter(|_| status.cameras.len() > 1) else { return };
+    labelled(ui, "Camera", |ui| {
+        let combo = ComboBox::from_id_salt("camera").selected_text(name).width(130.0).show_ui(ui, |ui| {
+            for (number, name) in status.cameras.iter().enumerate() {
+                if ui.selectable_label(number == status.camera, name).clicked() {
+                    out.push(Action::Camera(number));
+                }
+            }
+        });
+        combo.response.accessible_name("Camera");
+    });
+}
+
+fn picture(ui: &mut Ui, looks: &mut DrawingOptions, status: &Status, out: &mut Vec<Action>) {
+    camera(ui, status, out);
     egui::Grid::new("looks").num_columns(2).spacing(egui::vec2(18.0, 4.0)).show(ui, |ui| {
-        if ui.checkbox(&mut looks.colours, "Colour by resolution").changed() && looks.colours {
-            (looks.ages, looks.details) = (false, false);
-        }
+        colouring(ui, looks, "Colour by resolution", |looks| &mut looks.colours);
         ui.checkbox(&mut looks.wireframe, "Wireframe");
         ui.end_row();
-        if ui.checkbox(&mut looks.ages, "Colour by age").changed() && looks.ages {
-            (looks.colours, looks.details) = (false, false);
-        }
-        if ui.checkbox(&mut looks.details, "Shade by detail").changed() && looks.details {
-            (looks.colours, looks.ages) = (false, false);
-        }
+        colouring(ui, looks, "Colour by age", |looks| &mut looks.ages);
+        colouring(ui, looks, "Shade by detail", |looks| &mut looks.details);
+        ui.end_row();
+        colouring(ui, looks, "Depth", |looks| &mut looks.depths);
+        ui.checkbox(&mut looks.forces, "Contact forces").on_hover_text(FORCES);
         ui.end_row();
     });
     value(ui, "Triangles", &text::count(status.triangles), "In the last picture");
@@ -350,7 +374,7 @@ mod tests {
     fn the_scale_of_the_picture_is_shown() {
         for (shadows, text) in [(true, "65 %"), (false, "65 %, no shadows")] {
             let status = Status { render_scale: 0.65, shadows, ..Status::default() };
-            let harness = Harness::new_ui(|ui| picture(ui, &mut DrawingOptions::default(), &status));
+            let harness = Harness::new_ui(|ui| picture(ui, &mut DrawingOptions::default(), &status, &mut Vec::new()));
             assert!(harness.query_by_label(text).is_some(), "{text}");
         }
     }

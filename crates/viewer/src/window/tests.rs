@@ -2,6 +2,8 @@
 //!
 //! In virtual time, which passes a frame a picture, so that every number is the same each time.
 
+mod past_tests;
+
 use super::*;
 use metachron_render::{Size, Style};
 use std::path::Path;

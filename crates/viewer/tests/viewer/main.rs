@@ -7,10 +7,11 @@ use egui::{Key, Modifiers, pos2};
 use egui_kittest::Harness;
 use egui_kittest::kittest::{NodeT, Queryable};
 use fake::{BALL, Fake, World, asked, last_view, middle, press, window, window_of};
-use metachron_core::AgentId;
+use metachron_core::{AgentId, SimTime};
 use metachron_render::{Colouring, Hit};
+use metachron_session::RewindStatus;
 use metachron_viewer::ui::{
-    Action, AgentRow, FrameTimes, Law, MOUSE, Message, SHORTCUTS, Severity, Simulation, keys_text,
+    Action, AgentRow, Forces, FrameTimes, Law, Look, MOUSE, Message, SHORTCUTS, Severity, Simulation, keys_text,
 };
 use std::time::Duration;
 
@@ -351,4 +352,80 @@ fn a_narrow_window_keeps_every_digit_of_the_table() {
     assert!(row.width() > 900.0, "{} points", row.width()); // wider than the window: it scrolls
     harness.get_by_label("Pause").click();
     assert_eq!(asked(&mut harness), [Action::Pause]);
+}
+
+#[test]
+fn the_timeline_goes_back_by_scrubber_button_and_key_and_returns() {
+    let mut simulation = Fake::new();
+    let at = |s: u64| SimTime::from_nanos(s * 1_000_000_000);
+    simulation.status.rewind = Some(RewindStatus {
+        oldest: at(2),
+        newest: at(12),
+        shown: None,
+        moments: 600,
+        bytes: 3 << 20,
+        bytes_max: 128 << 20,
+        cost_s: 1e-4,
+        restores: true,
+    });
+    let mut harness = window_of(simulation);
+    assert!(harness.query_by_label_contains("600 moments, 3.00 of 128 MiB").is_some());
+    harness.get_by_label("Back").click();
+    assert_eq!(asked(&mut harness), [Action::Look(Look::Back)]);
+    assert_eq!(press(&mut harness, Key::ArrowLeft), [Action::Look(Look::Back)]);
+    harness.get_by_role_and_label(egui::Role::Slider, "Moment").set_value_accesskit(7.0);
+    assert_eq!(asked(&mut harness), [Action::Look(Look::At(at(7)))]);
+    harness.state_mut().simulation.status.rewind.as_mut().unwrap().shown = Some(at(7));
+    harness.run_steps(2);
+    assert_eq!(press(&mut harness, Key::ArrowRight), [Action::Look(Look::Forward)]);
+    harness.get_by_label("Live").click();
+    assert_eq!(asked(&mut harness), [Action::Look(Look::Live)]);
+    press(&mut harness, Key::F5);
+    assert!(harness.query_by_label("Live").is_none());
+}
+
+#[test]
+fn lanes_of_a_thousand_agents_are_laid_out_as_far_as_they_fit_and_tell_of_turns() {
+    let mut simulation = Fake::new();
+    simulation.status.agents = (0..1000).map(|i| AgentRow::new(AgentId(i), format!("box {i}"), "rigid")).collect();
+    let row = &mut simulation.status.agents[1];
+    (row.rate_hz, row.wanted_hz, row.dt_s, row.late_s, row.leader) = (120.0, 240.0, 4e-3, 9e-3, Some(AgentId(0)));
+    let mut harness = window_of(simulation);
+    press(&mut harness, Key::L);
+    for tick in 1..40 {
+        harness.state_mut().simulation.status.sim_time = SimTime::from_nanos(tick * 100_000_000);
+        harness.run_steps(8);
+    }
+    let lanes = harness.query_all_by_label_contains("Lane of box ").count();
+    assert!((2..40).contains(&lanes), "{lanes} lanes were laid out");
+    let lane = harness.get_by_label("Lane of box 1").rect();
+    harness.hover_at(lane.right_center() - egui::vec2(18.0, 0.0));
+    harness.run_steps(60);
+    let told = harness.query_by_label_contains("120 of 240 Hz").expect("a tooltip");
+    let told = told.accesskit_node().label().or(told.accesskit_node().value()).unwrap_or_default();
+    assert!(["late 9.00 ms", "dt 4.00 ms", "cluster of box 0"].iter().all(|what| told.contains(what)), "{told}");
+    harness.get_by_label("Lane of box 1").click();
+    assert_eq!(asked(&mut harness), [Action::Select(Some(AgentId(1)))]);
+}
+
+#[test]
+fn forces_depths_and_cameras_are_chosen_by_key_and_by_label() {
+    let mut simulation = Fake::new();
+    simulation.status.cameras = vec!["side".to_owned(), "above".to_owned()];
+    simulation.status.forces = Some(Forces { scale_m_per_n: 0.02, tools: Vec::new() });
+    let mut harness = window_of(simulation);
+    press(&mut harness, Key::N);
+    assert!(last_view(&harness).style.forces);
+    harness.get_by_label("Contact forces").click_accesskit();
+    asked(&mut harness);
+    assert!(!last_view(&harness).style.forces);
+    press(&mut harness, Key::Z);
+    assert_eq!(last_view(&harness).style.colouring, Colouring::Depth);
+    press(&mut harness, Key::C);
+    assert_eq!(last_view(&harness).style.colouring, Colouring::Resolution);
+    assert_eq!(press(&mut harness, Key::V), [Action::Camera(1)]);
+    harness.get_by_role_and_label(egui::Role::ComboBox, "Camera").click();
+    harness.run_steps(3);
+    harness.get_by_label("above").click();
+    assert_eq!(asked(&mut harness), [Action::Camera(1)]);
 }

@@ -1,0 +1,79 @@
+//! Reading of states: what a frame shows, who has joined, who has left.
+//!
+//! In: what agents have published. Out: an up-to-date scene view and list of couplings. Never here: a choice, drawing.
+
+use super::super::assemble;
+use super::Session;
+use metachron_core::SimTime;
+use metachron_render::States;
+use metachron_runtime::AgentState;
+use metachron_world::kinds::StatesKind;
+
+impl Session {
+    /// Reads the newest states without a frame: for their couplings.
+    pub fn read_states(&mut self) {
+        self.gather();
+    }
+
+    /// Simulated time of what the last frame shows.
+    #[must_use]
+    pub const fn picture_time(&self) -> SimTime {
+        self.chosen.sim
+    }
+
+    /// Reads the newest states and poses what the frame shows: these, or the moment that is looked at.
+    pub(super) fn gather(&mut self) {
+        let now = self.world.time();
+        let shown = self.rewind.as_ref().and_then(super::Rewind::shown_beside);
+        let Self { scene, scene_view, couplings, world, reader, .. } = self;
+        let before = scene.agents.len();
+        reader.read(world.agents(), now, |agent, newest, awake| {
+            let id = agent.id();
+            if id.0 as usize == scene.agents.len()
+                && let Some(member) = world.joined(id)
+            {
+                scene_view.join(assemble::actor(&member));
+                scene.agents.push(member);
+            }
+            couplings.mark_changed(id);
+            match agent.state() {
+                _ if shown.is_some() => {}
+                AgentState::Gone => scene_view.leave(id),
+                _ => scene_view.set_snapshot(id, newest, awake),
+            }
+            agent.form().iter().for_each(|form| scene_view.set_shape(id, form));
+        });
+        if self.scene.agents.len() > before {
+            (before..self.scene.agents.len()).for_each(|_| self.visible_resolution.join());
+            self.parents = assemble::parents(&self.scene);
+            self.levels.clear();
+        }
+        let time = shown.unwrap_or(now);
+        self.scene_view.pose(time, states(self.scene.states));
+        self.chosen.sim = time;
+        self.couplings.note(self.reader.newest());
+        if let Some(trace) = &mut self.trace {
+            trace.note(&self.scene, self.reader.newest());
+            trace.note_couplings(now, self.couplings.all());
+        }
+    }
+
+    /// Shows the newest states of all agents again.
+    pub(super) fn show_newest(&mut self) {
+        let agents = self.world.agents().iter().take(self.scene.agents.len());
+        for (agent, newest) in agents.zip(self.reader.newest()) {
+            match agent.state() {
+                AgentState::Gone => self.scene_view.leave(agent.id()),
+                state => self.scene_view.set_snapshot(agent.id(), newest, state == AgentState::Running),
+            }
+        }
+    }
+}
+
+const fn states(kind: StatesKind) -> States {
+    match kind {
+        StatesKind::Interpolate => States::Interpolate,
+        StatesKind::Extrapolate => States::Extrapolate,
+        StatesKind::Latest => States::Latest,
+    }
+}
