@@ -5,7 +5,7 @@
 
 use super::Member;
 use super::assemble::Govern;
-use super::recording::{Entry, Recorder, Recording};
+use super::recording::{Entry, RecordError, Recorder, Recording};
 use metachron_core::{AgentId, Archive, ArchiveError};
 use metachron_runtime::{Demand, Governor, TurnMeasure};
 use std::collections::{BTreeMap, VecDeque};
@@ -49,12 +49,31 @@ impl Log {
 
     /// Writes down what is about to be done.
     pub fn note(&self, entry: impl FnOnce() -> Entry) {
+        self.mode().note(entry);
+    }
+
+    /// Sends something to an object, which waits for nobody, and writes it down; while the world is recorded, once the call in progress has ended
+    /// for which `order` waits. No recording begins or ends between the two.
+    ///
+    /// # Errors
+    /// Those of `send`; nothing is written down then.
+    pub fn sent<G, E>(
+        &self,
+        order: impl FnOnce() -> G,
+        send: impl FnOnce() -> Result<(), E>,
+        entry: impl FnOnce() -> Entry,
+    ) -> Result<(), E> {
         let mut mode = self.mode();
-        match &mut *mode {
-            Mode::Recorded(recorder) => recorder.note(entry()),
-            Mode::Fresh => *mode = Mode::Unrecorded,
-            Mode::Unrecorded | Mode::Replayed(_) => {}
+        let mut _order = None;
+        if matches!(*mode, Mode::Recorded(_)) {
+            // who lets time pass writes that down
+            drop(mode);
+            _order = Some(order());
+            mode = self.mode();
         }
+        send()?;
+        mode.note(entry);
+        Ok(())
     }
 
     /// Notes that something was done which is not written down.
@@ -65,11 +84,6 @@ impl Log {
         }
     }
 
-    /// Whether nothing was done to the world since its start.
-    pub fn is_fresh(&self) -> bool {
-        matches!(*self.mode(), Mode::Fresh)
-    }
-
     pub fn is_recorded(&self) -> bool {
         matches!(*self.mode(), Mode::Recorded(_))
     }
@@ -78,9 +92,18 @@ impl Log {
         matches!(*self.mode(), Mode::Replayed(_))
     }
 
-    /// Begins to write down.
-    pub fn record(&self, recorder: Recorder) {
-        *self.mode() = Mode::Recorded(recorder);
+    /// Begins to write down with what `begin` gives, which is told whether nothing was done to the world since its start. Nothing is done to it
+    /// meanwhile.
+    ///
+    /// # Errors
+    /// [`RecordError::Recorded`]; those of `begin`.
+    pub fn record(&self, begin: impl FnOnce(bool) -> Result<Recorder, RecordError>) -> Result<(), RecordError> {
+        let mut mode = self.mode();
+        if matches!(*mode, Mode::Recorded(_)) {
+            return Err(RecordError::Recorded);
+        }
+        *mode = Mode::Recorded(begin(matches!(*mode, Mode::Fresh))?);
+        Ok(())
     }
 
     /// Takes the recorder, if there is one: nothing more is written down.
@@ -128,6 +151,16 @@ impl Log {
                 drop(mode);
                 answer()
             }
+        }
+    }
+}
+
+impl Mode {
+    fn note(&mut self, entry: impl FnOnce() -> Entry) {
+        match self {
+            Self::Recorded(recorder) => recorder.note(entry()),
+            Self::Fresh => *self = Self::Unrecorded,
+            Self::Unrecorded | Self::Replayed(_) => {}
         }
     }
 }

@@ -18,14 +18,13 @@ use std::sync::Arc;
 
 impl World {
     /// Writes down from now on, to the file at `path`, what is done to the world, so that [`World::replay`] can do it again, to the bit. In
-    /// lockstep only. A world that has run before begins with a checkpoint. Commands of other threads wait for the call in progress from now on;
-    /// one that is sent while this call runs may be left out.
+    /// lockstep only. A world that has run before begins with a checkpoint; one that an object has joined or left before does not begin, as a
+    /// replay starts the scene and has no other objects. Commands of other threads wait for the call in progress from now on.
     ///
     /// # Errors
-    /// [`RecordError`]; nothing is recorded then.
+    /// [`RecordError`]; nothing is recorded then, and the file is as it was unless it is that which cannot be written.
     pub fn record(&self, path: impl AsRef<Path>) -> Result<(), RecordError> {
-        self.check_recordable()?;
-        self.record_to(Recorder::file(path.as_ref())?, None)
+        self.begin_recording(|| Recorder::file(path.as_ref()), None)
     }
 
     /// As [`World::record`], to anything that takes bytes, and with the text of the scene, from which it can be started again.
@@ -33,24 +32,33 @@ impl World {
     /// # Errors
     /// [`RecordError`]; nothing is recorded then.
     pub fn record_to(&self, out: Box<dyn Write + Send>, scene: Option<SceneText>) -> Result<(), RecordError> {
-        self.check_recordable()?;
-        let begun = (!self.shared.log.is_fresh()).then(|| self.checkpoint()).transpose();
-        let begun = begun.map_err(RecordError::Begun)?;
-        let identity = &self.shared.identity;
-        if let Some(checkpoint) = &begun {
-            identity.check(&checkpoint.of).map_err(RecordError::Begun)?;
-        }
-        let mut recorder = Recorder::begin(out, identity.clone(), scene)?;
-        begun.into_iter().for_each(|checkpoint| recorder.note(Entry::Restore(checkpoint.to_bytes())));
-        self.shared.log.record(recorder);
-        Ok(())
+        self.begin_recording(|| Ok(out), scene)
     }
 
-    fn check_recordable(&self) -> Result<(), RecordError> {
+    /// Begins a recording to what `open` gives. Time and commands wait: what is done is in the state with which it begins, or written down.
+    fn begin_recording(
+        &self,
+        open: impl FnOnce() -> Result<Box<dyn Write + Send>, RecordError>,
+        scene: Option<SceneText>,
+    ) -> Result<(), RecordError> {
         if self.executor() != ExecutorKind::Lockstep {
             return Err(RecordError::RealTime);
         }
-        if self.has_stopped() || self.shared.log.is_replayed() { Err(RecordError::Stopped) } else { Ok(()) }
+        let Shared { log, identity, .. } = &*self.shared;
+        let mut state = self.state();
+        let State::Running(run) = &mut *state else { return Err(RecordError::Stopped) };
+        if log.is_replayed() {
+            return Err(RecordError::Stopped);
+        }
+        log.record(|is_fresh| {
+            let begun = (!is_fresh).then(|| self.cut(run.as_mut())).transpose().map_err(RecordError::Begun)?;
+            if let Some(checkpoint) = &begun {
+                identity.check(&checkpoint.of).map_err(RecordError::Begun)?;
+            }
+            let mut recorder = Recorder::begin(open()?, identity.clone(), scene)?;
+            begun.into_iter().for_each(|checkpoint| recorder.note(Entry::Restore(checkpoint.to_bytes())));
+            Ok(recorder)
+        })
     }
 
     /// Ends the recording, as [`World::stop`] does; returns whether there was one.
@@ -58,6 +66,8 @@ impl World {
     /// # Errors
     /// [`RecordError::Write`] if not all of it could be written.
     pub fn end_recording(&self) -> Result<bool, RecordError> {
+        // what is done after it is in neither
+        let _order = self.state();
         let recorder = self.shared.log.take_recorder();
         recorder.map_or(Ok(false), |recorder| recorder.end(self.hash()).map(|()| true))
     }

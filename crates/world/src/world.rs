@@ -255,15 +255,20 @@ impl World {
     }
 
     /// The state of the world now: all that the next bit of it needs, but samples of watched points and CPU times. On threads and in a pool
-    /// turns in progress end first, and each object is saved at the end of its own step ([`Checkpoint::times`]): what it has given others is
+    /// turns in progress end first, however long they take, and each object is saved at the end of its own step ([`Checkpoint::times`]): what it has given others is
     /// either in their states or still in its own. Any executor goes on from it.
     ///
     /// # Errors
-    /// [`CheckpointError::Refused`] where a model or a governor does not save its state, and where a step takes longer than 0.4 s on threads and
-    /// in a pool: its object has failed then, as at the end of a run. [`CheckpointError::Stopped`]. All else goes on as it was.
+    /// [`CheckpointError::Refused`] where a model or a governor does not save its state, [`CheckpointError::Stopped`]. The world goes on as it
+    /// was.
     pub fn checkpoint(&self) -> Result<Checkpoint, CheckpointError> {
         let mut state = self.state();
         let State::Running(run) = &mut *state else { return Err(CheckpointError::Stopped) };
+        self.cut(run.as_mut())
+    }
+
+    /// The state of its run now.
+    pub(super) fn cut(&self, run: &mut dyn Run) -> Result<Checkpoint, CheckpointError> {
         let mut archive = Archive::writer();
         run.archive(&mut archive).map_err(CheckpointError::Refused)?;
         let of = self.shared.identity.now(&self.shared.agents);
@@ -359,15 +364,11 @@ impl World {
             }
             _ => {}
         }
-        // a recording has the order of commands and waits
-        let log = &self.shared.log;
-        if log.is_replayed() {
+        if self.shared.log.is_replayed() {
             return Err(refused(REPLAYED.to_owned()));
         }
-        let _order = log.is_recorded().then(|| self.state());
-        agent.send(command).map_err(|error| refused(error.to_string()))?;
-        log.note(|| Entry::Command(object.id(), command));
-        Ok(())
+        let send = || agent.send(command).map_err(|error| refused(error.to_string()));
+        self.shared.log.sent(|| self.state(), send, || Entry::Command(object.id(), command))
     }
 
     /// Puts an object into another state before its next step: one that [`World::latest`] gave before, or of as many nodes. A rigid body takes its
@@ -408,14 +409,14 @@ impl World {
         if !state.is_finite() {
             return refused("every number of a state must be finite".to_owned());
         }
-        let log = &self.shared.log;
-        if log.is_replayed() {
+        if self.shared.log.is_replayed() {
             return refused(REPLAYED.to_owned());
         }
-        let _order = log.is_recorded().then(|| self.state());
-        agent.set_state(state.clone());
-        log.note(|| Entry::SetState(object.id(), Box::new(state.clone())));
-        Ok(())
+        let send = || {
+            agent.set_state(state.clone());
+            Ok(())
+        };
+        self.shared.log.sent(|| self.state(), send, || Entry::SetState(object.id(), Box::new(state.clone())))
     }
 
     /// Takes up another object: it lives from its first step on, and touches what it meets. No other object waits for it.
@@ -433,6 +434,7 @@ impl World {
             return Err(WorldError::Refused { name, reason: REPLAYED.to_owned() });
         }
         let entry = added(&name, &part);
+        let State::Running(run) = &mut *self.state() else { return Err(WorldError::Stopped) };
         if log.is_recorded() && entry.is_none() {
             let reason =
                 "a recording has rigid bodies, tubes and soft bodies that join, and no agent of your own".to_owned();
@@ -441,7 +443,6 @@ impl World {
         let id = AgentId(self.shared.agents.len() as u32);
         let member = member(id, name, part, self.shared.gravity)?;
         let spawn = assemble::lone(&member, &self.shared.surroundings, self.executor())?;
-        let State::Running(run) = &mut *self.state() else { return Err(WorldError::Stopped) };
         let joined = run.add(spawn)?.id();
         match entry {
             Some(entry) => log.note(|| entry),
