@@ -22,6 +22,7 @@ use super::helpers::Helpers;
 use super::mailbox::SendError;
 use super::metrics::AgentStats;
 use super::priority::Priority;
+use super::sleep::Halt;
 use super::spawn::{AgentSpawn, AssembledRun, Everyone, RunError, assemble};
 use metachron_core::{AgentId, Archive, ArchiveError};
 use shared::PoolState;
@@ -94,10 +95,10 @@ impl Pool {
     }
 
     /// Ends all workers, between turns.
-    fn halt(&mut self) {
+    fn halt(&mut self, why: Halt) {
         self.state.sleep.stop();
         // the send fails only if the watchdog has already ended
-        let _ = self.messages.send(Message::Stop);
+        let _ = self.messages.send(Message::Stop(why));
         drop(self.watch.take().map(JoinHandle::join));
     }
 
@@ -110,7 +111,7 @@ impl Pool {
     }
 
     fn end(&mut self) {
-        self.halt();
+        self.halt(Halt::End);
         let (timeline, now) = (self.state.timeline.read(), self.state.clock.now());
         self.state.clear(|mut actor| actor.close_account(&timeline, now));
         close_remaining(&self.state.handles, &timeline, now);
@@ -159,7 +160,7 @@ impl Run for Pool {
     }
 
     fn archive(&mut self, archive: &mut Archive<'_>) -> Result<(), ArchiveError> {
-        self.halt();
+        self.halt(Halt::Cut);
         let mut homes = Vec::new();
         self.state.clear(|actor| homes.push(Some(actor)));
         let all = take_apart(homes.into_iter(), &self.all.handles);
