@@ -107,9 +107,13 @@ impl Scene {
         solid: &Bound<'py, PyAny>,
     ) -> PyResult<PyRefMut<'py, Self>> {
         let (shape, placed) = (shape(solid)?, Placed::of(solid)?);
-        let is_still = |m: Moving| m.mass.is_none() && m.velocity.is_none() && m.rate.is_none() && !m.kinematic;
+        let is_still = |m: Moving| {
+            let moves = m.mass.is_some() || m.velocity.is_some() || m.rate.is_some() || m.kinematic;
+            !(moves || m.gravity_scale.is_some() || m.damping.is_some())
+        };
         if !Moving::of(solid)?.is_none_or(is_still) {
-            let message = format!("\"{name}\" is fixed: it has no mass, no velocity and no rate");
+            let message =
+                format!("\"{name}\" is fixed: it has no mass, no velocity, no rate, no gravity_scale and no damping");
             return Err(PyValueError::new_err(message));
         }
         let mut obstacle = world::static_solid(name, shape);

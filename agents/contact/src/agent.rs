@@ -209,11 +209,13 @@ pub struct PoseGoal {
 }
 
 impl PoseGoal {
-    /// Whether every number is finite, and the rotation one.
-    #[must_use]
-    pub fn is_sound(&self) -> bool {
-        let vectors = [self.position_m, self.velocity_m_s, self.spin_rad_s];
-        vectors.into_iter().all(DVec3::is_finite) && self.rotation.is_finite() && self.rotation.length_squared() > 0.25
+    /// Whether a body can be led there.
+    ///
+    /// # Errors
+    /// What is wrong.
+    pub fn check(&self) -> Result<(), &'static str> {
+        let Self { position_m, rotation, velocity_m_s, spin_rad_s } = *self;
+        check_motion([Some(position_m), Some(velocity_m_s), Some(spin_rad_s)], Some(rotation))
     }
 
     /// Where it is `t_s` seconds later.
@@ -244,13 +246,32 @@ pub struct SetMotion {
 }
 
 impl SetMotion {
-    /// Whether every number is finite, and the rotation one.
-    #[must_use]
-    pub fn is_sound(&self) -> bool {
-        let vectors = [self.position_m, self.velocity_m_s, self.spin_rad_s];
-        let turns = |q: DQuat| q.is_finite() && q.length_squared() > 0.25;
-        vectors.into_iter().flatten().all(DVec3::is_finite) && self.rotation.is_none_or(turns)
+    /// Whether a body can be moved so.
+    ///
+    /// # Errors
+    /// What is wrong.
+    pub fn check(&self) -> Result<(), &'static str> {
+        check_motion([self.position_m, self.velocity_m_s, self.spin_rad_s], self.rotation)
     }
+}
+
+/// The largest coordinate of a place that a body is moved or led to, metres, and of its velocity and spin, m/s and rad/s.
+const MOTION_MAX: f64 = 1e6;
+
+/// Whether these are a place, a velocity and a spin within their range, and a rotation.
+fn check_motion(vectors: [Option<DVec3>; 3], rotation: Option<DQuat>) -> Result<(), &'static str> {
+    let problems = [
+        "a position must be finite and within 1e6 m of the origin along each axis",
+        "a velocity must be finite, at most 1e6 m/s along each axis",
+        "a spin must be finite, at most 1e6 rad/s about each axis",
+    ];
+    // no comparison holds for what is no number
+    let is_out = |v: DVec3| !(v.is_finite() && v.abs().max_element() <= MOTION_MAX);
+    if let Some((_, problem)) = vectors.into_iter().zip(problems).find(|(v, _)| v.is_some_and(is_out)) {
+        return Err(problem);
+    }
+    let turns = |q: DQuat| q.is_finite() && q.length_squared() > 0.25;
+    if rotation.is_none_or(turns) { Ok(()) } else { Err("a rotation must be a quaternion of length 1") }
 }
 
 /// A region of space, world axes: all that is within a radius of a line. A ball where both its ends are one point.

@@ -2,7 +2,7 @@
 
 use super::testing::{Dummy, Fault, Log, eventually, on_every_executor, system};
 use super::{AgentState, Clock, Command, ManualClock, Run, TimelineCommand};
-use metachron_core::{AgentId, Resolution, SimSpan, SimTime};
+use metachron_core::{AgentId, Archive, Resolution, SimSpan, SimTime};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering::SeqCst};
 use std::time::Duration;
@@ -138,6 +138,20 @@ fn a_run_that_is_dropped_ends_its_threads() {
         let kept: Vec<_> = run.agents().to_vec();
         drop(run);
         assert!(kept.iter().all(|a| Arc::strong_count(&a.shared) == 1));
+    });
+}
+
+#[test]
+fn a_cut_waits_for_the_steps_in_progress_however_long_they_take() {
+    on_every_executor(|start| {
+        let log = Log::default();
+        let slow = Dummy { fault: Some((3, Fault::Slow)), log: Some(Arc::clone(&log)), ..Dummy::new(1.0) };
+        let mut run = start(vec![Dummy::new(1.0).at(500.0), slow.at(500.0)], system());
+        eventually("its slow step", || log.lock().unwrap().len() == 3);
+        // whether its model can be saved is another matter
+        let _ = run.archive(&mut Archive::writer());
+        eventually("it goes on", || run.agents()[1].stats().steps > 5);
+        run.shutdown().iter().for_each(|stats| assert_eq!(stats.state, AgentState::Running));
     });
 }
 

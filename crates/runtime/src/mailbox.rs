@@ -67,11 +67,9 @@ pub enum SendError {
     /// There is no such agent.
     #[error("there is no agent {} in this run", .0.0)]
     NoAgent(AgentId),
-    /// The command holds a number that is not finite or outside its range.
-    #[error(
-        "every number must be finite, stiffness and damping not negative, a motor's effort and a radius above zero"
-    )]
-    BadNumber,
+    /// The command holds a number that is not finite or outside its range: what it must be.
+    #[error("{0}")]
+    BadNumber(&'static str),
     /// A key that is too large, or impulses at too many points or too many regions before the agent has taken a step.
     #[error(
         "an agent takes {KEYS} springs, {KEYS} forces, and impulses at {KEYS} points and {KEYS} carved regions a step; keys are 0 to 7"
@@ -131,9 +129,7 @@ impl Mailbox {
     /// # Errors
     /// [`SendError::BadNumber`] and [`SendError::TooMany`]; nothing is delivered then.
     pub fn send(&self, command: Command) -> Result<(), SendError> {
-        if !is_sound(&command) {
-            return Err(SendError::BadNumber);
-        }
+        check(&command).map_err(SendError::BadNumber)?;
         if key(&command).is_some_and(|key| key >= KEYS) {
             return Err(SendError::TooMany);
         }
@@ -271,29 +267,42 @@ fn key(command: &Command) -> Option<u32> {
     }
 }
 
-fn is_sound(command: &Command) -> bool {
+/// Whether the numbers of a command are in their ranges.
+///
+/// # Errors
+/// What they must be.
+fn check(command: &Command) -> Result<(), &'static str> {
     let force =
         |force: &AnchorForce| is_finite(force.anchor) && force.force_n.is_finite() && force.torque_n_m.is_finite();
-    match command {
-        Command::Retune(wanted) => wanted.eps_m.is_finite(),
-        Command::SetPressure(pressure_pa) => pressure_pa.is_finite(),
-        Command::SetDt(_) | Command::Wake => true,
-        Command::Spring(Keyed { what, .. }) => what.as_ref().is_none_or(|pull| {
-            let springs = [pull.stiffness_n_m, pull.damping_n_s_m];
-            is_finite(pull.anchor)
-                && pull.target.is_finite()
-                && pull.target_velocity.is_finite()
-                && springs.iter().all(|k| k.is_finite() && *k >= 0.0)
-        }),
-        Command::Force(Keyed { what, .. }) => what.as_ref().is_none_or(force),
-        Command::Impulse(impulse) => force(impulse),
-        Command::Motor(Keyed { what, .. }) => {
-            what.as_ref().and_then(|set| set.motor).is_none_or(|motor| motor.check().is_ok())
+    let spring = |pull: &AnchorSpring| {
+        let springs = [pull.stiffness_n_m, pull.damping_n_s_m];
+        let vectors = pull.target.is_finite() && pull.target_velocity.is_finite();
+        vectors && is_finite(pull.anchor) && springs.iter().all(|k| k.is_finite() && *k >= 0.0)
+    };
+    let forces = "a force, an impulse, a torque and their point must be finite";
+    let (is_good, wanted) = match command {
+        Command::Pose(Keyed { what, .. }) => return what.as_ref().map_or(Ok(()), PoseGoal::check),
+        Command::SetMotion(motion) => return motion.check(),
+        Command::SetDt(_) | Command::Wake => return Ok(()),
+        Command::Retune(wanted) => (wanted.eps_m.is_finite(), "a resolution must be finite"),
+        Command::SetPressure(pressure_pa) => (pressure_pa.is_finite(), "a pressure must be finite"),
+        Command::Spring(Keyed { what, .. }) => {
+            let wanted =
+                "a spring's point and target must be finite, its stiffness and damping finite and not negative";
+            (what.as_ref().is_none_or(spring), wanted)
         }
-        Command::Pose(Keyed { what, .. }) => what.as_ref().is_none_or(PoseGoal::is_sound),
-        Command::SetMotion(motion) => motion.is_sound(),
-        Command::Carve(carving) => carving.is_sound(),
-    }
+        Command::Force(Keyed { what, .. }) => (what.as_ref().is_none_or(force), forces),
+        Command::Impulse(impulse) => (force(impulse), forces),
+        Command::Motor(Keyed { what, .. }) => {
+            let motor = what.as_ref().and_then(|set| set.motor);
+            let wanted = "a motor's goal must be at most 1e9 in magnitude, its stiffness and damping not negative, its effort above zero";
+            (motor.is_none_or(|motor| motor.check().is_ok()), wanted)
+        }
+        Command::Carve(carving) => {
+            (carving.is_sound(), "the ends of a carved region must be finite, its radius finite and above zero")
+        }
+    };
+    if is_good { Ok(()) } else { Err(wanted) }
 }
 
 fn is_finite(anchor: Anchor) -> bool {
@@ -353,7 +362,7 @@ mod tests {
     fn a_spring_that_is_not_finite_is_refused_when_sent() {
         let mail = Mailbox::default();
         let bad = Command::Spring(Keyed::first(Some(pull(DVec3::NAN))));
-        assert!(matches!(mail.send(bad), Err(SendError::BadNumber)));
+        assert!(matches!(mail.send(bad), Err(SendError::BadNumber(_))));
         let negative = AnchorSpring { stiffness_n_m: -1.0, ..pull(DVec3::X) };
         assert!(mail.send(Command::Spring(Keyed::first(Some(negative)))).is_err());
         assert!(mail.send(Command::Retune(Resolution { eps_m: f64::NAN, n: 0 })).is_err());

@@ -75,8 +75,10 @@ impl std::fmt::Debug for Peer {
 }
 
 impl Peer {
+    /// By which it is settled who computes its asynchronous pairs: never what moves as it is led, which nothing that it is given moves.
     fn clock(&self) -> PairClock {
-        PairClock { id: self.shared.id, step_s: self.shared.wanted_hz.recip() }
+        let step_s = if self.shared.takes_poses { f64::INFINITY } else { self.shared.wanted_hz.recip() };
+        PairClock { id: self.shared.id, step_s }
     }
 
     /// The law of its pair with `other`.

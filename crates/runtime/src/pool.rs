@@ -22,6 +22,7 @@ use super::helpers::Helpers;
 use super::mailbox::SendError;
 use super::metrics::AgentStats;
 use super::priority::Priority;
+use super::sleep::Halt;
 use super::spawn::{AgentSpawn, AssembledRun, Everyone, RunError, assemble};
 use super::turn_order::TurnOrder;
 use metachron_core::{AgentId, Archive, ArchiveError};
@@ -95,10 +96,10 @@ impl Pool {
     }
 
     /// Ends all workers, between turns.
-    fn halt(&mut self) {
+    fn halt(&mut self, why: Halt) {
         self.state.sleep.stop();
         // the send fails only if the watchdog has already ended
-        let _ = self.messages.send(Message::Stop);
+        let _ = self.messages.send(Message::Stop(why));
         drop(self.watch.take().map(JoinHandle::join));
     }
 
@@ -115,7 +116,7 @@ impl Pool {
         &mut self,
         act: impl FnOnce(&mut Cut, &mut Option<Arc<TurnOrder>>) -> Result<(), ArchiveError>,
     ) -> Result<(), ArchiveError> {
-        self.halt();
+        self.halt(Halt::Cut);
         let mut homes = Vec::new();
         self.state.clear(|actor| homes.push(Some(actor)));
         let all = take_apart(homes.into_iter(), &self.all.handles);
@@ -133,7 +134,7 @@ impl Pool {
     }
 
     fn end(&mut self) {
-        self.halt();
+        self.halt(Halt::End);
         let (timeline, now) = (self.state.timeline.read(), self.state.clock.now());
         self.state.clear(|mut actor| actor.close_account(&timeline, now));
         close_remaining(&self.state.handles, &timeline, now);

@@ -7,7 +7,7 @@ use super::agent_clock::Timeline;
 use super::agent_runner::{AgentRunner, PendingTurn};
 use super::metrics::Entry;
 use super::probe::Trace;
-use metachron_core::SimTime;
+use metachron_core::{PairKind, SimTime};
 use std::sync::atomic::Ordering::Relaxed;
 use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::thread;
@@ -27,7 +27,10 @@ impl AgentRunner {
 
     /// Publishes the state that was written last; whether it is visible.
     pub fn publish(&mut self, now: SimTime) -> bool {
-        let concerns = self.writer.filled().is_some_and(|state| !(state.touches.is_empty() && state.given.is_empty()));
+        let concerns = self
+            .writer
+            .filled()
+            .is_some_and(|state| !(state.touches.is_empty() && state.given.is_empty() && state.pairs.is_empty()));
         let published = self.show();
         if published {
             self.notify_reader();
@@ -104,8 +107,10 @@ impl AgentRunner {
         let newest = self.shared.slot.latest();
         let sleep = &self.shared.sleep;
         let leader = sleep.leader(self.shared.id);
-        let others = newest.touches.iter().filter(|id| sleep.leader(**id) != leader);
-        others.for_each(|id| sleep.touch(*id, now));
+        // the far end of a line has to answer what comes down it
+        let pushing = newest.pairs.iter().filter(|pair| pair.kind == PairKind::Tlm && pair.force_n > 0.0);
+        let touched = newest.touches.iter().copied().chain(pushing.map(|pair| pair.with));
+        touched.filter(|id| sleep.leader(*id) != leader).for_each(|id| sleep.touch(id, now));
         let Some(broad_phase) = self.peers.broad_phase.get() else { return };
         for ledger in &newest.given {
             let known = self.announced.iter_mut().find(|(with, _)| *with == ledger.with);

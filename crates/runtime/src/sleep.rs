@@ -34,6 +34,15 @@ const FAR_BEHIND_NOTED: SimSpan = SimSpan::from_nanos(100_000_000);
 const END_PATIENCE: Duration = Duration::from_millis(400);
 const END_PATIENCE_MAX: u32 = 25;
 
+/// Why all turns are to end.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Halt {
+    /// The run ends: a step that does not is left behind.
+    End,
+    /// The run is cut, and goes on after it: each step in progress ends first.
+    Cut,
+}
+
 /// The flags of one agent.
 #[derive(Debug)]
 struct Signal {

@@ -75,6 +75,8 @@ pub(super) enum Fault {
     Panic,
     /// The step does not return.
     Hang,
+    /// The step takes longer than the end of a run waits for it.
+    Slow,
 }
 
 /// How a member moves along z: up and down.
@@ -207,6 +209,7 @@ impl Dummy {
             Some((_, Fault::Hang)) => loop {
                 thread::park();
             },
+            Some((_, Fault::Slow)) => thread::sleep(Duration::from_millis(600)),
             None => {}
         }
         Ok(())
@@ -251,7 +254,7 @@ impl Agent for Dummy {
 
     fn step(&mut self, dt: SimSpan, context: &StepContext<'_>) -> Result<StepReport, StepError> {
         let dt_s = dt.as_secs_f64();
-        if self.fault == Some((self.steps + 1, Fault::Hang)) {
+        if [Fault::Hang, Fault::Slow].map(|fault| Some((self.steps + 1, fault))).contains(&self.fault) {
             self.record(context.time, context);
         }
         self.fail(dt_s)?;

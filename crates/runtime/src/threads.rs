@@ -17,6 +17,7 @@ use super::helpers::Helpers;
 use super::mailbox::SendError;
 use super::metrics::AgentStats;
 use super::priority::Priority;
+use super::sleep::Halt;
 use super::spawn::{AgentSpawn, AssembledRun, Everyone, RunError, assemble};
 use super::turn_order::{Held, PartKind, TurnOrder, in_force};
 use super::turn_parts::Begun;
@@ -103,16 +104,20 @@ impl Threads {
         builder.spawn(body).map_err(|source| RunError::NoThread { name, source })
     }
 
-    /// Ends all threads and waits for them until a timeout: a step that takes longer counts as hung, and its thread is left behind. Gives back
-    /// the agents that make turns of their own.
-    fn halt(&mut self) -> Vec<Option<Box<AgentRunner>>> {
+    /// Ends all threads and waits for them: at the end of the run until a timeout, where a step that takes longer counts as hung, and its thread
+    /// is left behind. Gives back the agents that make turns of their own.
+    fn halt(&mut self, why: Halt) -> Vec<Option<Box<AgentRunner>>> {
         self.all.sleep.stop();
         let (mut patience, mut homes) = (Duration::ZERO, Vec::with_capacity(self.threads.len()));
         homes.resize_with(self.threads.len(), || None);
         while self.threads.iter().any(Option::is_some) {
             let running = (0..).map(AgentId).zip(&self.threads).filter(|(_, thread)| thread.is_some());
             patience = self.all.sleep.end_patience(running.map(|(id, _)| id));
-            let Ok(id) = self.ended.recv_timeout(patience) else { break };
+            let ended = match why {
+                Halt::End => self.ended.recv_timeout(patience).ok(),
+                Halt::Cut => self.ended.recv().ok(),
+            };
+            let Some(id) = ended else { break };
             let at = id.0 as usize;
             if let Some(thread) = self.threads.get_mut(at).and_then(Option::take) {
                 // a panic outside a turn is a bug of metachron: it has been printed, and the other threads must still be joined
@@ -141,7 +146,7 @@ impl Threads {
         &mut self,
         act: impl FnOnce(&mut Cut, &mut Option<Arc<TurnOrder>>) -> Result<(), ArchiveError>,
     ) -> Result<(), ArchiveError> {
-        let homes = self.halt();
+        let homes = self.halt(Halt::Cut);
         let all = take_apart(homes.into_iter(), &self.all.handles);
         let agents = self.all.handles.len();
         let mut cut = Cut { all, agents, timeline: self.timeline.read(), now: self.clock.now() };
@@ -155,7 +160,7 @@ impl Threads {
     }
 
     fn end(&mut self) {
-        let homes = self.halt();
+        let homes = self.halt(Halt::End);
         let (timeline, now) = (self.timeline.read(), self.clock.now());
         homes.into_iter().flatten().for_each(|mut actor| actor.close_account(&timeline, now));
         close_remaining(&self.all.handles, &timeline, now);

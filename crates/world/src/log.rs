@@ -5,7 +5,7 @@
 
 use super::Member;
 use super::assemble::Govern;
-use super::recording::{Entry, Recorder, Recording};
+use super::recording::{Entry, RecordError, Recorder, Recording};
 use metachron_core::{AgentId, Archive, ArchiveError};
 use metachron_runtime::{Agents, Demand, Governor, OrderLog, TurnMeasure, TurnOrder, TurnPart, state_hash};
 use std::collections::{BTreeMap, VecDeque};
@@ -24,7 +24,7 @@ pub(super) struct Log {
 }
 
 #[derive(Default)]
-enum Mode {
+pub(super) enum Mode {
     /// Nothing was done to it since its start.
     #[default]
     Fresh,
@@ -58,25 +58,37 @@ impl Log {
 
     /// Writes down what is about to be done.
     pub fn note(&self, entry: impl FnOnce() -> Entry) {
-        let mut mode = self.mode();
-        match &mut *mode {
-            Mode::Recorded(recorder, _) => recorder.note(entry()),
-            Mode::Fresh => *mode = Mode::Unrecorded,
-            Mode::Unrecorded | Mode::Replayed(_) => {}
-        }
+        self.mode().note(entry);
     }
 
-    /// Notes that something was done which is not written down.
-    pub fn note_begun(&self) {
-        let mut mode = self.mode();
-        if matches!(*mode, Mode::Fresh) {
-            *mode = Mode::Unrecorded;
+    /// Does something to the world and writes it down: no part of a turn is made between the two, and no recording begins or ends. `wait` is for
+    /// those who do not have the run: it keeps calls in lockstep from letting time pass, which is written down before it is done.
+    pub fn in_order<T, G>(
+        &self,
+        wait: impl Fn() -> Option<G>,
+        act: impl FnOnce() -> T,
+        note: impl FnOnce(&mut Mode, &T),
+    ) -> T {
+        loop {
+            if let Some(order) = self.order() {
+                let _held = order.between();
+                // that of a recording which has ended meanwhile keeps nobody
+                if self.mode().order().is_some_and(|now| Arc::ptr_eq(now, &order)) {
+                    let done = act();
+                    note(&mut self.mode(), &done);
+                    return done;
+                }
+            } else {
+                let was_recorded = self.is_recorded();
+                let _waits = if was_recorded { wait() } else { None };
+                let mut mode = self.mode();
+                if mode.order().is_none() && was_recorded == matches!(*mode, Mode::Recorded(..)) {
+                    let done = act();
+                    note(&mut mode, &done);
+                    return done;
+                }
+            }
         }
-    }
-
-    /// Whether nothing was done to the world since its start.
-    pub fn is_fresh(&self) -> bool {
-        matches!(*self.mode(), Mode::Fresh)
     }
 
     pub fn is_recorded(&self) -> bool {
@@ -87,15 +99,28 @@ impl Log {
         matches!(*self.mode(), Mode::Replayed(_))
     }
 
-    /// Begins to write down, in real time what happens in `order`.
-    pub fn record(&self, recorder: Recorder, order: Option<Arc<TurnOrder>>) {
-        *self.mode() = Mode::Recorded(recorder, order);
+    /// Begins to write down with what `begin` gives, in real time what happens in its order; it is told whether nothing was done to the world
+    /// since its start. Nothing is done to it meanwhile.
+    ///
+    /// # Errors
+    /// [`RecordError::Recorded`]; those of `begin`.
+    pub fn record(
+        &self,
+        begin: impl FnOnce(bool) -> Result<(Recorder, Option<Arc<TurnOrder>>), RecordError>,
+    ) -> Result<(), RecordError> {
+        let mut mode = self.mode();
+        if matches!(*mode, Mode::Recorded(..)) {
+            return Err(RecordError::Recorded);
+        }
+        let (recorder, order) = begin(matches!(*mode, Mode::Fresh))?;
+        *mode = Mode::Recorded(recorder, order);
         self.is_heard.store(true, Release);
+        Ok(())
     }
 
     /// The order of turns of a world that is recorded in real time.
     pub fn order(&self) -> Option<Arc<TurnOrder>> {
-        if let Mode::Recorded(_, order) = &*self.mode() { order.clone() } else { None }
+        self.mode().order().map(Arc::clone)
     }
 
     /// Takes the recorder, if there is one: nothing more is written down.
@@ -168,6 +193,28 @@ impl OrderLog for TurnsToLog {
             recorder.note_turns(parts, || state_hash(&self.agents));
         }
         parts.clear();
+    }
+}
+
+impl Mode {
+    fn order(&self) -> Option<&Arc<TurnOrder>> {
+        if let Self::Recorded(_, order) = self { order.as_ref() } else { None }
+    }
+
+    /// Writes down what is done.
+    pub fn note(&mut self, entry: impl FnOnce() -> Entry) {
+        match self {
+            Self::Recorded(recorder, _) => recorder.note(entry()),
+            Self::Fresh => *self = Self::Unrecorded,
+            Self::Unrecorded | Self::Replayed(_) => {}
+        }
+    }
+
+    /// Notes that something was done which is not written down.
+    pub fn note_begun(&mut self) {
+        if matches!(self, Self::Fresh) {
+            *self = Self::Unrecorded;
+        }
     }
 }
 

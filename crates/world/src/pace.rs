@@ -16,8 +16,8 @@ pub enum Pace {
     RealTime,
     /// So many seconds a second, within [`SPEED_RANGE`].
     Factor(f64),
-    /// As fast as objects can step, and no faster: none is late, none gives up time, however slow the machine is. Time passes in
-    /// [`World::advance`] alone.
+    /// As fast as objects can step, and no faster: none is late, none gives up time, however slow the machine is. So time passes in
+    /// [`World::advance`]; where [`World::drive`] lets it run, it passes as beside the clock on the wall.
     Free,
 }
 
@@ -30,7 +30,8 @@ const POLL_FREE: Duration = Duration::from_micros(50);
 const FREE_SLICE: SimSpan = SimSpan::from_millis(10);
 
 impl World {
-    /// Sets how fast time passes from now on. In lockstep, where time is virtual, a factor changes how fast the declared machine has to be.
+    /// Sets how fast time passes from now on: how long a span takes on the clock, and not how much of it [`World::advance`] lives. In lockstep,
+    /// where the clock is virtual, a factor changes how fast the declared machine has to be.
     ///
     /// # Errors
     /// [`WorldError::BadPace`] for a factor outside its range; the pace is then as it was.
@@ -47,14 +48,15 @@ impl World {
         Ok(())
     }
 
-    /// Lets the world live for `span`, then stops its time: it stands still.
+    /// Lets the world live for `span`, whatever its pace, then stops its time: it stands still.
     ///
-    /// In lockstep every step that is due by then has been made. On threads and in the pool each object that neither rests nor has failed
+    /// In lockstep every step that is due by then has been made; its clock counts whole nanoseconds, so that at a factor that does not divide
+    /// `span` it lives longer by less than so many nanoseconds. On threads and in the pool each object that neither rests nor has failed
     /// has lived to the end at least; one whose step is longer than what was left is ahead by less than that step.
     /// A world that was stopped stays as it is; one that another thread pauses waits until it runs again.
     pub fn advance(&self, span: SimSpan) {
         if self.executor() == ExecutorKind::Lockstep {
-            return self.wait_until(self.now() + Duration::from_nanos(span.as_nanos()));
+            return self.advance_virtual(span);
         }
         if !self.shared.is_free.load(Relaxed) {
             self.drive(TimelineCommand::Step(span));
@@ -67,6 +69,17 @@ impl World {
             self.wait_for_all(TimelineCommand::Leap, POLL_FREE);
             left = SimSpan::from_nanos(left.as_nanos() - slice.as_nanos());
         }
+    }
+
+    /// Lets virtual time pass, which does so in calls alone: where it was stopped, it is let go so far.
+    fn advance_virtual(&self, span: SimSpan) {
+        if self.timeline().until().is_some() {
+            self.drive(TimelineCommand::Step(span));
+        }
+        let (now, timeline) = (self.now(), self.timeline());
+        // a step that was begun before is made first; a replay lets time go as its recording says
+        let left = timeline.until().map_or(span, |end| end.since(timeline.sim_at(now)).max(span));
+        self.wait_until(now + timeline.wall_span(left));
     }
 
     /// Waits until all objects have lived to where time stops. One that is led by another that has already arrived makes its last steps in a

@@ -22,14 +22,14 @@ use std::sync::Arc;
 
 impl World {
     /// Writes down from now on, to the file at `path`, what is done to the world, so that [`World::replay`] can do it again, to the bit: of a
-    /// world on threads or in a pool also the order of its turns. A world that has run before begins with a checkpoint. In lockstep commands of
-    /// other threads wait for the call in progress from now on; one that is sent while this call runs may be left out.
+    /// world on threads or in a pool also the order of its turns. A world that has run before begins with a checkpoint; one that an object has
+    /// joined or left before does not begin, as a replay starts the scene and has no other objects. In lockstep commands of other threads wait for
+    /// the call in progress from now on.
     ///
     /// # Errors
-    /// [`RecordError`]; nothing is recorded then.
+    /// [`RecordError`]; nothing is recorded then. In lockstep the file is as it was unless it is that which cannot be written.
     pub fn record(&self, path: impl AsRef<Path>) -> Result<(), RecordError> {
-        self.check_recordable()?;
-        self.record_to(Recorder::file(path.as_ref())?, None)
+        self.begin_recording(|| Recorder::file(path.as_ref()), None)
     }
 
     /// As [`World::record`], to anything that takes bytes, and with the text of the scene, from which it can be started again.
@@ -37,43 +37,56 @@ impl World {
     /// # Errors
     /// [`RecordError`]; nothing is recorded then.
     pub fn record_to(&self, out: Box<dyn Write + Send>, scene: Option<SceneText>) -> Result<(), RecordError> {
-        self.check_recordable()?;
+        self.begin_recording(|| Ok(out), scene)
+    }
+
+    /// Begins a recording to what `open` gives. Time and commands wait: what is done is in the state with which it begins, or written down.
+    fn begin_recording(
+        &self,
+        open: impl FnOnce() -> Result<Box<dyn Write + Send>, RecordError>,
+        scene: Option<SceneText>,
+    ) -> Result<(), RecordError> {
+        let Shared { log, identity, .. } = &*self.shared;
+        let mut state = self.state();
+        let State::Running(run) = &mut *state else { return Err(RecordError::Stopped) };
+        if log.is_replayed() {
+            return Err(RecordError::Stopped);
+        }
         if self.executor() != ExecutorKind::Lockstep {
-            return self.record_turns(out, scene);
+            return self.record_turns(run.as_mut(), open, scene);
         }
-        let begun = (!self.shared.log.is_fresh()).then(|| self.checkpoint()).transpose();
-        let begun = begun.map_err(RecordError::Begun)?;
-        let identity = &self.shared.identity;
-        if let Some(checkpoint) = &begun {
-            identity.check(&checkpoint.of).map_err(RecordError::Begun)?;
-        }
-        let mut recorder = Recorder::begin(out, identity.clone(), scene, false)?;
-        begun.into_iter().for_each(|checkpoint| recorder.note(Entry::Restore(checkpoint.to_bytes())));
-        self.shared.log.record(recorder, None);
-        Ok(())
+        log.record(|is_fresh| {
+            let begun = (!is_fresh).then(|| self.cut(run.as_mut())).transpose().map_err(RecordError::Begun)?;
+            if let Some(checkpoint) = &begun {
+                identity.check(&checkpoint.of).map_err(RecordError::Begun)?;
+            }
+            let mut recorder = Recorder::begin(open()?, identity.clone(), scene, false)?;
+            begun.into_iter().for_each(|checkpoint| recorder.note(Entry::Restore(checkpoint.to_bytes())));
+            Ok((recorder, None))
+        })
     }
 
     /// Begins to record a world in real time, between two turns of all of its objects.
-    fn record_turns(&self, out: Box<dyn Write + Send>, scene: Option<SceneText>) -> Result<(), RecordError> {
+    fn record_turns(
+        &self,
+        run: &mut dyn Run,
+        open: impl FnOnce() -> Result<Box<dyn Write + Send>, RecordError>,
+        scene: Option<SceneText>,
+    ) -> Result<(), RecordError> {
         let (Shared { identity, log, .. }, agents) = (&*self.shared, self.agents());
-        let mut state = self.state();
-        let State::Running(run) = &mut *state else { return Err(RecordError::Stopped) };
-        let is_fresh = log.is_fresh();
-        identity.check(&identity.now(agents)).map_err(RecordError::Begun)?;
-        let mut recorder = Recorder::begin(out, identity.clone(), scene, true)?;
         let turns = TurnsToLog { log: Arc::downgrade(log), agents: agents.clone() };
-        let (order, mut archive) = (Arc::new(TurnOrder::new(Box::new(turns))), Archive::writer());
+        let order = Arc::new(TurnOrder::new(Box::new(turns)));
         // no turn is made in this order before the log has what it begins with
         let _held = order.between();
-        let begun = run.record(Arc::clone(&order), (!is_fresh).then_some(&mut archive));
-        begun.map_err(|error| RecordError::Begun(CheckpointError::Refused(error)))?;
-        recorder.note(if is_fresh { Entry::Timeline(run.timeline()) } else { Entry::Begin(archive.into_bytes()) });
-        log.record(recorder, Some(Arc::clone(&order)));
-        Ok(())
-    }
-
-    fn check_recordable(&self) -> Result<(), RecordError> {
-        if self.has_stopped() || self.shared.log.is_replayed() { Err(RecordError::Stopped) } else { Ok(()) }
+        log.record(|is_fresh| {
+            identity.check(&identity.now(agents)).map_err(RecordError::Begun)?;
+            let mut recorder = Recorder::begin(open()?, identity.clone(), scene, true)?;
+            let mut archive = Archive::writer();
+            let begun = run.record(Arc::clone(&order), (!is_fresh).then_some(&mut archive));
+            begun.map_err(|error| RecordError::Begun(CheckpointError::Refused(error)))?;
+            recorder.note(if is_fresh { Entry::Timeline(run.timeline()) } else { Entry::Begin(archive.into_bytes()) });
+            Ok((recorder, Some(Arc::clone(&order))))
+        })
     }
 
     /// Ends the recording, as [`World::stop`] does; returns whether there was one.
@@ -81,6 +94,8 @@ impl World {
     /// # Errors
     /// [`RecordError::Write`] if not all of it could be written.
     pub fn end_recording(&self) -> Result<bool, RecordError> {
+        // what is done after it is in neither
+        let _calls = self.state();
         let order = self.shared.log.order();
         let _held = order.as_deref().map(TurnOrder::between);
         let recorder = self.shared.log.take_recorder();

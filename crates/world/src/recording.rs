@@ -132,6 +132,9 @@ pub enum RecordError {
     /// The world was stopped, or is a replay.
     #[error("a world that was stopped, or is a replay, cannot be recorded")]
     Stopped,
+    /// The world is being recorded.
+    #[error("the world is being recorded already: end that recording first")]
+    Recorded,
     /// The recording begins with the state of a world that has already run, which cannot be saved.
     #[error("a recording that does not begin at the start begins with a checkpoint: {0}")]
     Begun(CheckpointError),

@@ -12,7 +12,7 @@ use super::events::{EventFilter, Events};
 use super::frames::{Frame, Frames};
 use super::joined::Joined;
 use super::kinds::ExecutorKind;
-use super::log::{Log, logged};
+use super::log::{Log, Mode, logged};
 use super::object::{Object, WorldTag};
 use super::recording::{Entry, added};
 use super::scene::Member;
@@ -264,15 +264,20 @@ impl World {
     }
 
     /// The state of the world now: all that the next bit of it needs, but samples of watched points and CPU times. On threads and in a pool
-    /// turns in progress end first, and each object is saved at the end of its own step ([`Checkpoint::times`]): what it has given others is
+    /// turns in progress end first, however long they take, and each object is saved at the end of its own step ([`Checkpoint::times`]): what it has given others is
     /// either in their states or still in its own. Any executor goes on from it.
     ///
     /// # Errors
-    /// [`CheckpointError::Refused`] where a model or a governor does not save its state, and where a step takes longer than 0.4 s on threads and
-    /// in a pool: its object has failed then, as at the end of a run. [`CheckpointError::Stopped`]. All else goes on as it was.
+    /// [`CheckpointError::Refused`] where a model or a governor does not save its state, [`CheckpointError::Stopped`]. The world goes on as it
+    /// was.
     pub fn checkpoint(&self) -> Result<Checkpoint, CheckpointError> {
         let mut state = self.state();
         let State::Running(run) = &mut *state else { return Err(CheckpointError::Stopped) };
+        self.cut(run.as_mut())
+    }
+
+    /// The state of its run now.
+    pub(super) fn cut(&self, run: &mut dyn Run) -> Result<Checkpoint, CheckpointError> {
         let mut archive = Archive::writer();
         run.archive(&mut archive).map_err(CheckpointError::Refused)?;
         let of = self.shared.identity.now(&self.shared.agents);
@@ -369,17 +374,16 @@ impl World {
             }
             _ => {}
         }
-        let log = &self.shared.log;
-        if log.is_replayed() {
+        if self.shared.log.is_replayed() {
             return Err(refused(REPLAYED.to_owned()));
         }
-        let _waits = self.between_calls();
-        let note = |log: &Log, sent: &Result<(), String>| {
+        let note = |log: &mut Mode, sent: &Result<(), String>| {
             if sent.is_ok() {
                 log.note(|| Entry::Command(object.id(), command));
             }
         };
-        self.in_order(|| agent.send(command).map_err(|error| error.to_string()), note).map_err(refused)
+        let send = || agent.send(command).map_err(|error| error.to_string());
+        self.shared.log.in_order(|| self.between_calls(), send, note).map_err(refused)
     }
 
     /// Puts an object into another state before its next step: one that [`World::latest`] gave before, or of as many nodes. A rigid body takes its
@@ -420,13 +424,11 @@ impl World {
         if !state.is_finite() {
             return refused("every number of a state must be finite".to_owned());
         }
-        let log = &self.shared.log;
-        if log.is_replayed() {
+        if self.shared.log.is_replayed() {
             return refused(REPLAYED.to_owned());
         }
-        let _waits = self.between_calls();
-        let note = |log: &Log, (): &()| log.note(|| Entry::SetState(object.id(), Box::new(state.clone())));
-        self.in_order(|| agent.set_state(state.clone()), note);
+        let note = |log: &mut Mode, (): &()| log.note(|| Entry::SetState(object.id(), Box::new(state.clone())));
+        self.shared.log.in_order(|| self.between_calls(), || agent.set_state(state.clone()), note);
         Ok(())
     }
 
@@ -445,6 +447,7 @@ impl World {
             return Err(WorldError::Refused { name, reason: REPLAYED.to_owned() });
         }
         let entry = added(&name, &part);
+        let State::Running(run) = &mut *self.state() else { return Err(WorldError::Stopped) };
         if log.is_recorded() && entry.is_none() {
             let reason =
                 "a recording has rigid bodies, tubes and soft bodies that join, and no agent of your own".to_owned();
@@ -454,7 +457,7 @@ impl World {
         let member = member(id, name, part, self.shared.gravity)?;
         let spawn = assemble::lone(&member, &self.shared.surroundings, self.executor())?;
         let State::Running(run) = &mut *self.state() else { return Err(WorldError::Stopped) };
-        let note = |log: &Log, joined: &Result<AgentHandle, RunError>| {
+        let note = |log: &mut Mode, joined: &Result<AgentHandle, RunError>| {
             let (Ok(joined), Some(entry)) = (joined, entry) else { return log.note_begun() };
             if self.executor() != ExecutorKind::Lockstep {
                 log.note(|| Entry::Present(joined.latest().moment()));
@@ -480,7 +483,7 @@ impl World {
             return Err(refused(REPLAYED.to_owned()));
         }
         let State::Running(run) = &mut *self.state() else { return Err(WorldError::Stopped) };
-        let note = |log: &Log, left: &Result<(), String>| {
+        let note = |log: &mut Mode, left: &Result<(), String>| {
             if left.is_ok() {
                 log.note(|| Entry::Remove(object.id()));
             }
@@ -595,7 +598,7 @@ impl World {
         }
         let State::Running(run) = &mut *self.state() else { return };
         self.see(run.as_ref());
-        let note = |log: &Log, timeline: &Timeline| log.note(|| Entry::Timeline(*timeline));
+        let note = |log: &mut Mode, timeline: &Timeline| log.note(|| Entry::Timeline(*timeline));
         let act = || {
             run.drive(drive);
             run.timeline()
@@ -663,25 +666,14 @@ impl World {
         matches!(*self.state(), State::Stopped { .. })
     }
 
-    /// Does something to the world and notes what, with no turn in progress where the order of turns is recorded.
-    fn in_order<T>(&self, act: impl FnOnce() -> T, note: impl FnOnce(&Log, &T)) -> T {
-        let log = &self.shared.log;
-        let order = log.order();
-        let _held = order.as_deref().map(TurnOrder::between);
-        let done = act();
-        // a recording that has begun meanwhile does not have it
-        if order.is_some() || self.executor() == ExecutorKind::Lockstep {
-            note(log, &done);
-        } else {
-            log.note_begun();
-        }
-        done
+    /// [`Log::in_order`] for who has the run.
+    fn in_order<T>(&self, act: impl FnOnce() -> T, note: impl FnOnce(&mut Mode, &T)) -> T {
+        self.shared.log.in_order(|| None::<()>, act, note)
     }
 
-    /// Waits until no call lets time pass, where a recording has the order of calls alone.
+    /// Waits in lockstep until no call lets time pass: a recording there has the order of calls alone.
     fn between_calls(&self) -> Option<MutexGuard<'_, State>> {
-        let is_ordered = self.executor() == ExecutorKind::Lockstep && self.shared.log.is_recorded();
-        is_ordered.then(|| self.state())
+        (self.executor() == ExecutorKind::Lockstep).then(|| self.state())
     }
 
     /// Does something with a world in lockstep that runs; nothing with one that was stopped.

@@ -2,6 +2,7 @@
 
 use glam::{DQuat, DVec3};
 use metachron_core::{Body, RigidState, SimSpan};
+use metachron_runtime::AgentState;
 use metachron_world::kinds::ExecutorKind;
 use metachron_world::{Command, Object, Rigid, Scene, World, WorldError};
 
@@ -92,6 +93,25 @@ fn what_leads_a_kinematic_body_is_told_apart_from_what_moves_others() {
     assert!(refused(plate, force).contains("kinematic"));
     assert!(refused(ball, Command::pose(DVec3::ZERO, DQuat::IDENTITY)).contains("kinematic"));
     assert!(refused(plate, Command::pose(DVec3::NAN, DQuat::IDENTITY)).contains("finite"));
+}
+
+#[test]
+fn a_pose_out_of_range_is_refused_with_what_is_wrong() {
+    let scene = Scene::builder().add("plate", plate().kinematic()).build().unwrap();
+    let world = World::start(&scene, ExecutorKind::Lockstep).unwrap();
+    let plate = world.object("plate").unwrap();
+    let (place, turn) = (DVec3::Z, DQuat::IDENTITY);
+    for (pose, wanted) in [
+        (Command::pose(DVec3::X * 2e6, turn), "a position must be finite and within 1e6 m"),
+        (Command::pose(place, turn).moving(DVec3::X * f64::INFINITY, DVec3::ZERO), "a velocity must be finite"),
+        (Command::pose(place, turn).moving(DVec3::ZERO, DVec3::X * 1e200), "a spin must be finite, at most 1e6 rad/s"),
+        (Command::pose(place, DQuat::from_xyzw(0.0, 0.0, 0.0, 0.0)), "a rotation must be a quaternion of length 1"),
+    ] {
+        let said = world.command(plate, pose).expect_err(wanted).to_string();
+        assert!(said.contains(wanted), "{said}");
+    }
+    world.advance(SimSpan::from_millis(20));
+    assert_eq!(world.agents()[0].state(), AgentState::Resting, "it goes on, and nothing leads it");
 }
 
 #[test]

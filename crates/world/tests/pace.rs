@@ -3,6 +3,7 @@
 use glam::DVec3;
 use metachron_core::{Anchor, SimSpan, SimTime};
 use metachron_geometry::Solid;
+use metachron_runtime::TimelineCommand;
 use metachron_world::kinds::ExecutorKind;
 use metachron_world::{Checkpoint, Command, Pace, Rigid, Scene, Tube, World, WorldError};
 
@@ -67,6 +68,22 @@ fn after_an_advance_a_world_stands_still_where_it_was_to_come_to() {
         }
         let refused = world.set_pace(Pace::Factor(0.0));
         assert!(matches!(refused, Err(WorldError::BadPace { factor: 0.0 })));
+    }
+}
+
+#[test]
+fn an_advance_is_so_much_life_on_every_executor_at_every_pace() {
+    for executor in [ExecutorKind::Lockstep, ExecutorKind::Threads, ExecutorKind::Pool] {
+        let world = World::start(&apart(), executor).unwrap();
+        world.set_pace(Pace::Factor(4.0)).unwrap();
+        world.advance(ms(100));
+        assert_eq!(world.time(), SimTime::ZERO + ms(100), "{executor:?}");
+        for (drive, before_ms) in [(TimelineCommand::Pause, 0), (TimelineCommand::Step(ms(20)), 20)] {
+            let from = world.time();
+            world.drive(drive);
+            world.advance(ms(40));
+            assert_eq!(world.time(), from + ms(before_ms + 40), "{executor:?} {drive:?}");
+        }
     }
 }
 

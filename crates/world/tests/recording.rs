@@ -196,3 +196,34 @@ fn a_replay_takes_what_governors_answered_from_the_recording() {
     again.advance(ms(300));
     assert_eq!((again.replayed(), again.hash()), (Some(Ok(1.0)), world.hash()));
 }
+
+#[test]
+fn a_recording_of_a_world_that_another_thread_drives_repeats_it() {
+    let world = start();
+    std::thread::scope(|scope| {
+        let driver = world.clone();
+        let driven = scope.spawn(move || (0..400).for_each(|_| driver.advance(ms(1))));
+        let ball = world.object("ball").unwrap();
+        while !driven.is_finished() {
+            let kept = recorded(&world);
+            world.command(ball, Command::impulse(Anchor::Local(DVec3::ZERO), DVec3::X * 1e-3)).unwrap();
+            world.end_recording().unwrap();
+            let recording = kept.read().unwrap();
+            let hash = recording.hash();
+            assert_eq!(Some(replayed(recording).hash()), hash);
+        }
+    });
+}
+
+#[test]
+fn a_second_recording_is_refused_and_ends_nothing() {
+    let (world, path) = (start(), std::env::temp_dir().join(format!("metachron-second-{}.rec", std::process::id())));
+    std::fs::write(&path, "mine").unwrap();
+    let kept = recorded(&world);
+    assert!(matches!(world.record(&path), Err(RecordError::Recorded)));
+    assert_eq!(std::fs::read(&path).unwrap(), b"mine");
+    std::fs::remove_file(&path).unwrap();
+    world.advance(ms(10));
+    world.end_recording().unwrap();
+    assert!(kept.read().unwrap().is_complete());
+}

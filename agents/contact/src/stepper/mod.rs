@@ -549,6 +549,7 @@ impl ClusterStepper {
         ties.gather_own_springs(&step);
         ties.gather_links(&step);
         ties.gather_lines(&step, &self.outside.lines);
+        self.outside.give_led(h_s);
         joints.gather(scene, &step, ties);
         ties.add_inertia(&step);
     }

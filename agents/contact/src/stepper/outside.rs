@@ -151,12 +151,27 @@ impl Outside {
             self.line_impulses[number as usize] += impulse;
         }
     }
+
+    /// Adds what lines give in a fine step of `h_s` seconds at ends that move as they are led: no unknown, as nothing changes how they move.
+    pub(super) fn give_led(&mut self, h_s: f64) {
+        for (line, given) in self.lines.iter().zip(&mut self.line_impulses).filter(|(line, _)| line.is_led()) {
+            let asked = line.hold.held_part(line.target_m_s * (line.resistance_n_s_m * h_s));
+            *given += asked.clamp_length_max(line.hold.most_n_s(asked));
+        }
+    }
+}
+
+impl LineRow {
+    /// Whether its end moves as it is led.
+    fn is_led(&self) -> bool {
+        self.side.terms().is_empty()
+    }
 }
 
 impl Ties {
-    /// Lays out the ends of transmission lines (eq. 10): implicit in the motion of the point.
+    /// Lays out the ends of transmission lines (eq. 10): implicit in the motion of the point, where something moves it.
     pub fn gather_lines(&mut self, step: &FineStep<'_, '_>, lines: &[LineRow]) {
-        for (number, line) in (0..).zip(lines) {
+        for (number, line) in (0..).zip(lines).filter(|(_, line)| !line.is_led()) {
             let sides = [line.side.of_member(line.member), Side::FIXED];
             let row = JointRow {
                 target_m_s: line.target_m_s,

@@ -22,6 +22,8 @@ const FORETOLD_STEPS: f64 = 2.0;
 #[derive(Debug, Default)]
 pub struct RemoteMember {
     form: Option<Arc<CollisionShape>>,
+    /// How it moves as it is led, which no impulse changes; `None` of what impulses move.
+    led: Option<LedMotion>,
     /// The participants that compute their pairs with it.
     partners: Vec<AgentId>,
     matter: Matter,
@@ -40,6 +42,13 @@ pub struct RemoteMember {
     seen: Option<SimTime>,
     kept: (Matter, Vec<DVec3>),
     matrix: Vec<f64>,
+}
+
+/// The motion of a body that moves as it is led.
+#[derive(Debug, Clone, Copy)]
+struct LedMotion {
+    velocity_m_s: DVec3,
+    spin_rad_s: DVec3,
 }
 
 /// The velocity that a contact's sides are let go on with where one of them takes `late_s` seconds to answer: what is deeper than contacts
@@ -70,12 +79,18 @@ pub struct RemoteView<'a> {
 }
 
 impl RemoteMember {
-    /// Takes in the newest state of a partner; whether it can be met: it has a local model, or moves as a whole.
+    /// Takes in the newest state of a partner; whether it can be met: it has a local model, moves as a whole, or moves as it is led.
     pub fn see(&mut self, neighbour: &Neighbour) -> bool {
         self.form.clone_from(&neighbour.form);
         self.partners.clear();
         let snapshot = &neighbour.snapshot;
         let known = self.matter.take(&snapshot.body);
+        self.led = match (&snapshot.inertia, &snapshot.body) {
+            (Inertia::Immovable, Body::Rigid(state)) => {
+                Some(LedMotion { velocity_m_s: state.velocity, spin_rad_s: state.spin })
+            }
+            _ => None,
+        };
         if self.seen != Some(snapshot.time) || self.blocks.is_empty() {
             self.seen = Some(snapshot.time);
             if snapshot.local_model.blocks.is_empty() {
@@ -91,7 +106,7 @@ impl RemoteMember {
         }
         self.gain_m_s2.clear();
         self.gain_m_s2.extend(self.model.blocks.iter().map(|block| block.acceleration));
-        known && !self.blocks.is_empty()
+        known && (self.led.is_some() || !self.blocks.is_empty())
     }
 
     /// Adds a participant that computes its pair with the partner, to which it has `given` what is on its way (eq. 5).
@@ -138,6 +153,7 @@ impl RemoteMember {
         let step_s = self.model.step_s;
         let since_s = time.secs_after(neighbour.snapshot.time).clamp(-FORETOLD_STEPS * step_s, FORETOLD_STEPS * step_s);
         self.now.clear();
+        self.go_on(since_s);
         let Self { model, matter, now, deviation, carried, .. } = self;
         matter.drift.iter().zip(&mut matter.points).for_each(|(v, x)| *x += *v * since_s);
         for (at, block) in model.blocks.iter().enumerate() {
@@ -148,6 +164,19 @@ impl RemoteMember {
             let way = block.acceleration * (0.5 * since_s * since_s) + of(carried);
             matter.shift(block, way, since_s);
         }
+    }
+
+    /// Moves what is led for `for_s` seconds.
+    fn go_on(&mut self, for_s: f64) {
+        let Some(LedMotion { velocity_m_s, spin_rad_s }) = self.led else { return };
+        for (slot, velocity) in [(0, velocity_m_s), (1, spin_rad_s)] {
+            self.matter.shift(&LocalBlock { slot, velocity, acceleration: DVec3::ZERO }, DVec3::ZERO, for_s);
+        }
+    }
+
+    /// The velocity of a point of space as if it were the matter of a body that is led, m/s; zero of all others.
+    fn led_at(&self, point: DVec3) -> DVec3 {
+        self.led.map_or(DVec3::ZERO, |led| led.velocity_m_s + led.spin_rad_s.cross(point - self.matter.centre))
     }
 
     /// A = W⁻¹ of the local model; none where W is not positive definite.
@@ -217,7 +246,7 @@ impl RemoteMember {
 
 impl ClusterMember for RemoteMember {
     fn role(&self) -> Role {
-        Role::Rigid
+        if self.led.is_some() { Role::Kinematic } else { Role::Rigid }
     }
 
     fn begin(&mut self, h_s: f64) -> Result<(), StepError> {
@@ -255,12 +284,17 @@ impl ClusterMember for RemoteMember {
         }
     }
 
+    fn led_m_s(&self, place: &Place) -> DVec3 {
+        if let Place::Point(point) = *place { self.led_at(point) } else { DVec3::ZERO }
+    }
+
     fn anchor(&self, anchor: Anchor) -> Option<MaterialPoint> {
         let matter = &self.matter;
         match anchor {
             Anchor::Local(local) if matter.points.is_empty() => {
                 let arm = matter.rotation * local;
-                Some(MaterialPoint::new(matter.centre + arm, self.whole(arm)))
+                let position = matter.centre + arm;
+                Some(MaterialPoint { position, side: self.whole(arm), led_m_s: self.led_at(position) })
             }
             Anchor::Vertex(vertex) if matter.arc_m.is_empty() => {
                 let position = *matter.points.get(vertex as usize)?;
@@ -285,8 +319,9 @@ impl ClusterMember for RemoteMember {
         true
     }
 
+    // what is led answers nothing
     fn answers_after_s(&self) -> f64 {
-        self.model.step_s
+        if self.led.is_some() { 0.0 } else { self.model.step_s }
     }
 
     fn slot_of(&self, block: usize) -> u32 {
@@ -302,11 +337,12 @@ impl ClusterMember for RemoteMember {
             Some(ShapeKind::Solid(solid)) => solid.radius_m,
             _ => 0.0,
         };
+        let led = self.led.map_or(0.0, |led| led.velocity_m_s.length() + led.spin_rad_s.length() * radius_m);
         let is_spin = |block: &LocalBlock| self.matter.point(block.slot).is_none() && block.slot % 2 == 1;
         let of = |(block, v): (&LocalBlock, &DVec3)| v.length() * if is_spin(block) { radius_m } else { 1.0 };
         let blocks = self.model.blocks.iter().zip(v).map(of);
         if self.matter.points.is_empty() {
-            blocks.sum()
+            led + blocks.sum::<f64>()
         } else {
             blocks.chain(self.matter.fastest()).fold(0.0, f64::max)
         }
@@ -329,6 +365,7 @@ impl ClusterMember for RemoteMember {
     }
 
     fn end(&mut self, v: &[DVec3], h_s: f64, _touched: bool) -> Result<(), StepError> {
+        self.go_on(h_s);
         let Self { matter, model, now, .. } = self;
         matter.drift.iter().zip(&mut matter.points).for_each(|(v, x)| *x += *v * h_s);
         for (block, v) in model.blocks.iter_mut().zip(v) {

@@ -14,8 +14,8 @@ use metachron_contact::cluster::Side;
 use metachron_contact::stepper::{ClusterMember, MaterialPoint, Pose, Role};
 use metachron_contact::{Agent, PoseGoal, SetMotion, StepContext};
 use metachron_core::{
-    Anchor, Archive, ArchiveError, Body, Bounds, RigidState, SimSpan, SimTime, Snapshot, StepError, StepReport,
-    archive_values, check_span, shortest_turn,
+    Anchor, Archive, ArchiveError, Body, Bounds, Inertia, RigidState, SimSpan, SimTime, Snapshot, StepError,
+    StepReport, archive_values, check_span, shortest_turn,
 };
 use metachron_geometry::{CollisionShape, ContactSide, Place, PlacedShape, ShapeKind, ShapePose, SolidShape};
 use std::sync::Arc;
@@ -260,6 +260,7 @@ impl Agent for KinematicBody {
         into.steps = steps;
         into.resolution = None;
         into.body = Body::Rigid(RigidState { position, rotation, velocity, spin });
+        into.inertia = Inertia::Immovable;
         into.energy_j = 0.0;
         into.residual_m = (position.abs().max_element() + self.radius_m) * f64::EPSILON;
         into.at_rest = at_rest;

@@ -5,6 +5,7 @@
 
 use super::super::cluster::return_arrivals;
 use super::super::priority::Priority;
+use super::super::sleep::Halt;
 use super::shared::PoolState;
 use super::watchdog::{WatchdogWord, WatchedTurn};
 use super::worker::Worker;
@@ -32,8 +33,8 @@ pub(super) struct Supervisor {
 
 /// A message to the supervisor.
 pub(super) enum Message {
-    /// The run is to end.
-    Stop,
+    /// All workers are to end.
+    Stop(Halt),
     /// The worker started under this number has ended.
     Ended(u32),
 }
@@ -70,7 +71,7 @@ impl Supervisor {
                 Ok(worker) => supervisor.workers.push(worker),
                 Err(error) => {
                     supervisor.state.sleep.stop();
-                    supervisor.join_all();
+                    supervisor.join_all(Halt::End);
                     return Err(error);
                 }
             }
@@ -85,14 +86,14 @@ impl Supervisor {
 
     /// Watches the workers until the run is to end, and ends it.
     pub fn watch(mut self) {
-        loop {
+        let why = loop {
             match self.messages.recv_timeout(self.patience / CHECKS_MAX) {
-                Ok(Message::Stop) => break,
+                Ok(Message::Stop(why)) => break why,
                 Ok(Message::Ended(number)) => self.on_ended(number),
                 Err(_) => self.check(),
             }
-        }
-        self.join_all();
+        };
+        self.join_all(why);
     }
 
     fn start_worker(&mut self, at: usize) -> io::Result<WorkerRecord> {
@@ -164,15 +165,19 @@ impl Supervisor {
         drop(worker.and_then(|worker| worker.thread.take()).map(JoinHandle::join));
     }
 
-    /// Waits for the workers until a timeout: a step that takes longer counts as hung, and its thread is left behind.
-    fn join_all(&mut self) {
+    /// Waits for the workers until a timeout, for a cut that after which a step is given up anyway: one that takes longer counts as hung, and
+    /// its thread is left behind.
+    fn join_all(&mut self, why: Halt) {
         let mut patience = Duration::ZERO;
         while self.workers.iter().any(|worker| worker.thread.is_some()) {
             let turns = self.workers.iter().filter_map(|worker| worker.watchdog.current());
-            patience = self.state.sleep.end_patience(turns.map(WatchedTurn::agent));
+            patience = match why {
+                Halt::End => self.state.sleep.end_patience(turns.map(WatchedTurn::agent)),
+                Halt::Cut => self.patience,
+            };
             match self.messages.recv_timeout(patience) {
                 Ok(Message::Ended(number)) => self.join(number),
-                Ok(Message::Stop) => {}
+                Ok(Message::Stop(_)) => {}
                 Err(_) => break,
             }
         }
