@@ -22,7 +22,7 @@ use metachron_contact::stepper::ClusterScene;
 use metachron_core::{AgentId, Anchor, Archive, ArchiveError, Body, SimTime, Snapshot};
 use metachron_runtime::{
     AgentHandle, AgentState, AgentStats, Agents, Command, Keyed, Lockstep, Pool, Run, RunError, SystemClock, Threads,
-    Timeline, TimelineCommand, TurnOrder, state_hash, wait_until,
+    Timeline, TimelineCommand, state_hash, wait_until,
 };
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering::Relaxed};
@@ -456,7 +456,6 @@ impl World {
         let id = AgentId(self.shared.agents.len() as u32);
         let member = member(id, name, part, self.shared.gravity)?;
         let spawn = assemble::lone(&member, &self.shared.surroundings, self.executor())?;
-        let State::Running(run) = &mut *self.state() else { return Err(WorldError::Stopped) };
         let note = |log: &mut Mode, joined: &Result<AgentHandle, RunError>| {
             let (Ok(joined), Some(entry)) = (joined, entry) else { return log.note_begun() };
             if self.executor() != ExecutorKind::Lockstep {
