@@ -43,12 +43,6 @@ impl WatchedFile {
         Self { state: path.as_deref().and_then(FileState::of), path, looked: Instant::now() }
     }
 
-    /// Whether there is no file to watch.
-    #[cfg(test)]
-    pub fn is_of_nothing(&self) -> bool {
-        self.path.is_none()
-    }
-
     /// Whether it is another one than when this was asked last; a file that is gone has not changed.
     fn has_changed(&mut self, every: Duration) -> bool {
         let Some(path) = self.path.as_deref().filter(|_| self.looked.elapsed() >= every) else { return false };
