@@ -5,7 +5,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 /// The crates, and the crates of this workspace that each may depend on.
-const ARROWS: [(&str, &[&str]); 15] = [
+const ARROWS: [(&str, &[&str]); 16] = [
     ("agents/core", &[]),
     ("agents/geometry", &["core"]),
     ("agents/contact", &["core", "geometry"]),
@@ -13,11 +13,15 @@ const ARROWS: [(&str, &[&str]); 15] = [
     ("crates/runtime", &["core", "geometry", "contact"]),
     ("crates/world", &["core", "geometry", "contact", "models", "runtime"]),
     ("crates/scene", &["core", "geometry", "contact", "models", "world"]),
+    ("crates/devices", &["core", "geometry", "contact", "models", "runtime", "world"]),
     ("crates/export", &["core", "geometry", "runtime", "world"]),
     ("crates/import", &["geometry"]),
     ("crates/lod", &["core"]),
     ("crates/render", &["core", "geometry"]),
-    ("crates/session", &["core", "geometry", "contact", "models", "runtime", "world", "scene", "lod", "render"]),
+    (
+        "crates/session",
+        &["core", "geometry", "contact", "models", "runtime", "world", "devices", "scene", "lod", "render"],
+    ),
     ("crates/viewer", &["core", "contact", "runtime", "world", "scene", "lod", "render", "session"]),
     ("crates/console", &["core", "runtime", "world", "scene", "lod"]),
     (
