@@ -23,6 +23,8 @@ pub mod scenes;
 pub use glam;
 pub use metachron_contact as contact;
 pub use metachron_core as core;
+#[cfg(feature = "devices")]
+pub use metachron_devices as devices;
 #[cfg(feature = "export")]
 pub use metachron_export as export;
 pub use metachron_geometry as geometry;

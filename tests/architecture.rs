@@ -13,12 +13,16 @@ const ARROWS: [(&str, &[&str]); 16] = [
     ("crates/runtime", &["core", "geometry", "contact"]),
     ("crates/world", &["core", "geometry", "contact", "models", "runtime"]),
     ("crates/scene", &["core", "geometry", "contact", "models", "world"]),
+    ("crates/devices", &["core", "geometry", "contact", "models", "runtime", "world"]),
     ("crates/export", &["core", "geometry", "runtime", "world"]),
     ("crates/bevy", &["core", "runtime", "world", "export"]),
     ("crates/import", &["geometry"]),
     ("crates/lod", &["core"]),
     ("crates/render", &["core", "geometry"]),
-    ("crates/session", &["core", "geometry", "contact", "models", "runtime", "world", "scene", "lod", "render"]),
+    (
+        "crates/session",
+        &["core", "geometry", "contact", "models", "runtime", "world", "devices", "scene", "lod", "render"],
+    ),
     ("crates/viewer", &["core", "contact", "runtime", "world", "scene", "lod", "render", "session"]),
     ("crates/console", &["core", "runtime", "world", "scene", "lod"]),
     (

@@ -1,5 +1,6 @@
 //! The command-line arguments and their help texts.
 
+use super::devices::DeviceWish;
 use super::exports::ExportPaths;
 use clap::builder::PossibleValuesParser;
 use clap::{Args, Parser, Subcommand, ValueHint};
@@ -33,6 +34,7 @@ Examples:
   metachron run pendulum --executor lockstep --frames 300 --headless --report -
   metachron run yard --set object.hose.young_pa=5e5 --set target.frame_hz=30
   metachron run crossing --executor lockstep --headless --seconds 2 --oracle
+  metachron run cavity --device simulated=probe        a hand at 1 kHz leads the probe; its force is in the report
   METACHRON_EXECUTOR=lockstep metachron run overload --headless
 
 Flags go before --set, --set before the environment (METACHRON_…), that before the scene, and the scene before defaults.
@@ -266,6 +268,10 @@ pub struct RunArgs {
     /// Run the scene a second time as a reference, all agents on one very fine common clock, and report the differences (headless only)
     #[arg(long)]
     pub oracle: bool,
+    /// Let a device lead a tool or a kinematic body and feel what it touches: simulated=OBJECT, a hand that goes along the object's keyframes, or
+    /// gamepad=OBJECT in builds with the feature `gamepad`; may be repeated (not in lockstep)
+    #[arg(long = "device", value_name = "KIND=OBJECT", value_parser = super::devices::wish, conflicts_with = "oracle")]
+    pub device: Vec<DeviceWish>,
     /// Write down what is done to the run, so that `metachron replay` repeats it to the bit
     #[arg(long, value_name = "FILE", value_hint = ValueHint::FilePath)]
     pub record: Option<PathBuf>,

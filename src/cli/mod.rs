@@ -7,6 +7,7 @@ mod args;
 mod calibrate;
 mod check;
 mod describe;
+mod devices;
 mod exports;
 mod generate;
 mod import;

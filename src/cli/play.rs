@@ -2,6 +2,7 @@
 //!
 //! In: a [`Request`]. Out: [`Played`]. This is where the command line meets the frame loop; never here: the loop itself.
 
+use super::devices;
 use super::exports::Exports;
 use super::run::{Played, Request, RunLength, Step};
 use anyhow::Context;
@@ -58,10 +59,14 @@ pub(super) fn play(request: &Request, go_on: GoOn<'_>) -> anyhow::Result<Played>
     if let Some(path) = &request.record {
         record(&session, path, request)?;
     }
-    if !request.window {
-        return headless(session, request, request.png.clone(), go_on);
-    }
-    in_window(session, request, go_on)
+    let served = devices::serve(&session, &request.scene, &request.devices)?;
+    let mut played = if request.window {
+        in_window(session, request, go_on)?
+    } else {
+        headless(session, request, request.png.clone(), go_on)?
+    };
+    played.report.devices = devices::reports(served);
+    Ok(played)
 }
 
 #[cfg(not(feature = "viewer"))]
@@ -238,6 +243,7 @@ fn played(scene: &Scene, outcome: Outcome, picture: Option<PathBuf>) -> Played {
             .zip(&outcome.readings)
             .map(|(sensor, read)| reading(sensor, read.as_ref()))
             .collect(),
+        devices: Vec::new(),
         parked: outcome.agents.iter().filter(|one| matches!(one.stats.state, AgentState::Parked(_))).count() as u32,
         clusters,
         overlaps: scene.overlaps.iter().map(OverlapReport::of).collect(),

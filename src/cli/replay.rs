@@ -42,6 +42,7 @@ pub(super) fn command(args: &ReplayArgs) -> anyhow::Result<Exit> {
         camera: args.output.camera.clone(),
         video: args.output.video.clone(),
         exports: args.output.exports(),
+        devices: Vec::new(),
         record: None,
         png_without_window: format!("metachron-{}.png", stem(source.name())).into(),
         source,

@@ -4,6 +4,7 @@
 //! Never here: the loop itself.
 
 use super::args::{OutputArgs, RunArgs, StyleWord};
+use super::devices::DeviceWish;
 use super::exports::ExportPaths;
 use super::play::{GoOn, play};
 use anyhow::Context;
@@ -58,6 +59,8 @@ pub struct Request {
     pub video: Option<PathBuf>,
     /// Where to write its moments for other programs.
     pub exports: ExportPaths,
+    /// The devices that lead objects.
+    pub devices: Vec<DeviceWish>,
     /// Where to write down what is done to the run.
     pub record: Option<PathBuf>,
     /// Where to write it when the requested window could not be opened, and `png` is `None`.
@@ -191,6 +194,7 @@ fn request(args: &RunArgs, matches: Option<&ArgMatches>) -> anyhow::Result<Reque
         camera: args.output.camera.clone(),
         video: args.output.video.clone(),
         exports: args.output.exports(),
+        devices: args.device.clone(),
         record: args.record.clone(),
         png_without_window,
     })

@@ -80,6 +80,8 @@ pub const GRASP_BELOW: f64 = 0.2;
 pub struct ToolState {
     /// The point between the jaws, metres.
     pub tip: DVec3,
+    /// Where its drive leads that point, metres.
+    pub led: DVec3,
     /// Rotation from the tool's axes to the world's.
     pub rotation: DQuat,
     /// Velocity of the tip, m/s.

@@ -24,7 +24,7 @@ pub enum TetrahedraFault {
     #[error("it has no tetrahedra")]
     Empty,
     /// A corner does not exist.
-    #[error("tetrahedron {} has a corner that does not exist: point {} of {points}", tetrahedron + 1, point + 1)]
+    #[error("tetrahedron {} has a corner that does not exist: point {} of {points}", tetrahedron + 1, u64::from(*point) + 1)]
     NoPoint {
         /// Which one.
         tetrahedron: usize,
@@ -241,6 +241,7 @@ mod tests {
             with(|mesh| mesh.corners[1][3] = 8)
                 .contains("tetrahedron 2 has a corner that does not exist: point 9 of 8")
         );
+        assert!(with(|mesh| mesh.corners[1][3] = u32::MAX).contains("point 4294967296 of 8"));
         assert_eq!(with(|mesh| mesh.points[4].y = f64::NAN), "point 5 is not finite");
         assert_eq!(with(|mesh| mesh.points.push(DVec3::ONE)), "point 9 belongs to no tetrahedron");
         assert!(with(|mesh| mesh.corners.push(mesh.corners[0])).starts_with("tetrahedron 7 is not manifold"));

@@ -69,6 +69,7 @@ fn blend(a: &Body, b: &Body, w: f64, into: &mut Body) -> bool {
         (Body::Tool(a), Body::Tool(b)) => {
             *into = Body::Tool(ToolState {
                 tip: a.tip.lerp(b.tip, w),
+                led: a.led.lerp(b.led, w),
                 rotation: turn(a.rotation, b.rotation, w),
                 velocity: a.velocity.lerp(b.velocity, w),
                 spin: a.spin.lerp(b.spin, w),

@@ -49,6 +49,9 @@ pub struct ContactNow {
     pub force_n: DVec3,
     /// The deepest overlap, metres, ≥ 0.
     pub depth_m: f64,
+    /// How much more it bears for each metre that the object is pressed on further within the next step, along the normal, N/m, ≥ 0; 0 where
+    /// that is not known, as in heaps.
+    pub stiffness_n_m: f64,
 }
 
 impl World {
@@ -137,9 +140,9 @@ impl World {
     }
 
     fn contact(&self, with: ContactPartner, state: &ContactState, sign: f64) -> ContactNow {
-        let ContactState { since, point_m, normal, force_n, depth_m, .. } = *state;
+        let ContactState { since, point_m, normal, force_n, depth_m, stiffness_n_m, .. } = *state;
         let with = touched(self.tag(), with);
-        ContactNow { with, since, point_m, normal: normal * sign, force_n: force_n * sign, depth_m }
+        ContactNow { with, since, point_m, normal: normal * sign, force_n: force_n * sign, depth_m, stiffness_n_m }
     }
 
     /// What has matter in a box.

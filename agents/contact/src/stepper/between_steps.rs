@@ -26,6 +26,7 @@ impl ClusterStepper {
         self.remember_spins(all, h_s);
         let Self { solver, search, ties, joints, outside, tearing, yielding, efforts, .. } = self;
         let solution = solver.solution();
+        self.totals.iter_mut().for_each(|total| total.last_n_s = 0.0);
         for (k, (owner, contact)) in search.owners.iter().zip(&search.contacts).enumerate() {
             let impulse = solution.contacts_n_s[k];
             let owed_slip_m = contact.owed_slip_after(impulse, solution.contacts_m_s[k], h_s);
@@ -51,6 +52,10 @@ impl ClusterStepper {
                     total.point_m = point_m;
                     total.normal = contact.normal;
                     total.inverse_mass_per_kg = solver.inverse_masses(k, self.progress[owner.member].place);
+                    let own_s = |member: usize| h_s * f64::from(self.progress[member].share);
+                    let steps_s = [own_s(owner.member), owner.other.map_or(h_s, own_s)];
+                    let gives = total.inverse_mass_per_kg.into_iter().zip(steps_s);
+                    total.give_m_per_n = gives.map(|(inverse_mass, own_s)| own_s * own_s * inverse_mass).sum();
                 }
             } else if contact.gap_m < self.depth_m {
                 // no nearer than what bears something lies deep: the two touch, though nothing presses them together now
@@ -108,8 +113,17 @@ impl PairTotal {
     /// Adds the impulse of a contact or of a link's row.
     pub(super) fn add(&mut self, impulse_n_s: DVec3, depth_m: f64) {
         self.impulse_n_s += impulse_n_s;
+        self.last_n_s += impulse_n_s.length();
         self.depth_m = self.depth_m.max(depth_m);
         self.contacts += 1;
+    }
+
+    /// How much more the pair bears for each metre that it is pressed together further within a step, N/m, ≥ 0: each place in proportion to what
+    /// it bears (coupling.md, eq. 7s). 0 where neither gives way, and where it is not known.
+    #[must_use]
+    pub fn stiffness_n_m(&self) -> f64 {
+        let stiffness_n_m = self.last_n_s / (self.most_n_s * self.give_m_per_n);
+        if stiffness_n_m.is_finite() { stiffness_n_m } else { 0.0 }
     }
 }
 
@@ -137,6 +151,8 @@ pub(super) fn total_of(totals: &mut Vec<PairTotal>, member: usize, partner: Part
                 point_m: DVec3::NAN,
                 normal: DVec3::ZERO,
                 inverse_mass_per_kg: [0.0; 2],
+                last_n_s: 0.0,
+                give_m_per_n: 0.0,
             },
         );
         at

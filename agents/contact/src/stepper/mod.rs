@@ -174,6 +174,10 @@ pub struct PairTotal {
     pub normal: DVec3,
     /// How easily the participant and its partner give way at that contact along its normal, 1/kg, ≥ 0 (coupling.md, eq. 7h).
     pub inverse_mass_per_kg: [f64; 2],
+    /// What its places gave in the last fine step, magnitudes summed, N·s.
+    pub last_n_s: f64,
+    /// By how much the two give way at that contact under a newton that lasts for a step of theirs, m/N, ≥ 0 (coupling.md, eq. 7s).
+    pub give_m_per_n: f64,
 }
 
 /// Steps clusters one after the other, and keeps structure and storage between them.

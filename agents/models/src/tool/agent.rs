@@ -83,8 +83,8 @@ impl Tool {
         let tip = tip + spec.starts_off_m;
         let (tip, rotation) = through(pivot, tip, rotation);
         let spin = DVec3::ZERO;
-        let tool =
-            ToolState { tip, rotation, velocity, spin, jaw, grasp: None, admits: None, force_n: 0.0, is_idle: false };
+        let (grasp, admits, force_n, is_idle) = (None, None, 0.0, false);
+        let tool = ToolState { tip, led: tip, rotation, velocity, spin, jaw, grasp, admits, force_n, is_idle };
         let form = CollisionShape { traits: spec.traits, ..CollisionShape::new(ShapeKind::Tool(shape()), FRICTION) };
         let form = Arc::new(form);
         let (commanded, drive) = (PointMotion { position: tip, velocity }, Drive::new(spec.max_force_n));
@@ -232,7 +232,7 @@ impl Agent for Tool {
         into.clear();
         into.steps = self.steps;
         into.resolution = None;
-        into.body = Body::Tool(self.tool);
+        into.body = Body::Tool(ToolState { led: self.commanded.position, ..self.tool });
         into.energy_j = 0.0;
         into.residual_m = self.lag_m;
         into.touches.extend(self.tool.grasp.map(|grasp| grasp.target));

@@ -187,8 +187,8 @@ mod tests {
         let tip = PIVOT.at_m + DVec3::NEG_Z * 0.1;
         let rotation = PIVOT.aligned(DQuat::IDENTITY, tip);
         let (velocity, spin, jaw) = (DVec3::ZERO, DVec3::ZERO, 1.0);
-        let tool =
-            ToolState { tip, rotation, velocity, spin, jaw, grasp: None, admits: None, force_n: 0.0, is_idle: false };
+        let (grasp, admits, force_n, is_idle) = (None, None, 0.0, false);
+        let tool = ToolState { tip, led: tip, rotation, velocity, spin, jaw, grasp, admits, force_n, is_idle };
         for local_z in [-0.3, -0.05] {
             let local_m = DVec3::new(0.001, 0.0, local_z);
             let wanted = tip + rotation * local_m + DVec3::X * 1e-4;

@@ -34,6 +34,7 @@ impl ClusterSeat {
                 greatest_n: force_n,
                 told_n: force_n.length(),
                 depth_m: total.depth_m,
+                stiffness_n_m: total.stiffness_n_m(),
             };
             match self.contacts.binary_search_by_key(&with, |contact| contact.with) {
                 Ok(at) => {

@@ -13,6 +13,7 @@ pub use frames::{
 };
 pub use goal::{Goal, GoalError, Verdict};
 
+use metachron_devices::DeviceReport;
 use metachron_world::{Moved, Overlap};
 use serde::Serialize;
 
@@ -59,6 +60,9 @@ pub struct Report {
     /// What the scene's sensors read at the end; left out where it has none.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub readings: Vec<ReadingReport>,
+    /// Devices that led objects, and what they felt; left out where there were none.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub devices: Vec<DeviceReport>,
     /// Agents that failed and stepped no more.
     pub parked: u32,
     /// The contact clusters of the last states.
@@ -382,6 +386,7 @@ impl Report {
             events: vec![EventReport::default()],
             sensors: vec![SensorReport::default()],
             readings: vec![ReadingReport { values: vec![0.0], ..ReadingReport::default() }],
+            devices: vec![DeviceReport::default()],
             parked: 0,
             clusters: vec![ClusterRow { members: vec![name()], steps: vec![1], ..ClusterRow::default() }],
             overlaps: vec![OverlapReport::default()],
@@ -459,6 +464,12 @@ mod tests {
         "/couplings/0/inverse_mass_per_kg",
         "/couplings/0/penetration_m",
         "/events/0/at_s",
+        "/devices/0/object",
+        "/devices/0/late_ms/p99",
+        "/devices/0/age_steps/max",
+        "/devices/0/force_max_n",
+        "/devices/0/energy_out_j",
+        "/devices/0/tank_j",
         "/events/0/kind",
         "/events/0/attachment",
         "/events/0/a",

@@ -4,6 +4,7 @@ use super::{
     AgentReport, ChoiceSummary, CouplingReport, EventReport, FrameSummary, ReferenceReport, Report, ScaleSummary,
     SensorReport, Spread,
 };
+use metachron_devices::DeviceReport;
 use std::fmt::Write;
 
 impl Report {
@@ -31,6 +32,7 @@ impl Report {
         coupling_table(&mut out, &self.couplings);
         event_lines(&mut out, &self.events);
         sensor_lines(&mut out, &self.sensors);
+        self.devices.iter().for_each(|device| device_line(&mut out, device));
         if let Some(oracle) = &self.oracle {
             reference_table(&mut out, oracle);
         }
@@ -111,6 +113,19 @@ fn out_of_reach(out: &mut String, agent: &AgentReport) {
         tolerance_m * 1e3,
         residual_m * 1e3
     );
+}
+
+/// What a device has felt, and how steadily it was served.
+fn device_line(out: &mut String, report: &DeviceReport) {
+    let DeviceReport { device, object, ticks, late_ms, age_steps, force_mean_n, force_max_n, .. } = report;
+    let _ = writeln!(
+        out,
+        "device {device} · {object}: {ticks} ticks, late by {:.3} ms p50, {:.3} p99; state {:.2} steps old p99, {:.2} max; {force_mean_n:.3} N mean, {force_max_n:.3} max; {:.4} J of {:.4} given out",
+        late_ms.p50, late_ms.p99, age_steps.p99, age_steps.max, report.energy_out_j, report.tank_j
+    );
+    if let Some(why) = &report.first_failure {
+        let _ = writeln!(out, "note  the device failed {} times, first: {why}", report.failures);
+    }
 }
 
 /// More couplings or events than this are counted, not shown: the report has them all.

@@ -91,6 +91,7 @@ pub(super) fn grasp(stage: &mut StepHarness, length_m: f64) -> Option<()> {
     let (tip, _) = stage.own(TUBE).body.point(anchor)?;
     let pose = ToolState {
         tip,
+        led: tip,
         rotation: DQuat::IDENTITY,
         velocity: DVec3::ZERO,
         spin: DVec3::ZERO,

@@ -1,0 +1,189 @@
+//! The loop between a device and a world: what happens in one tick.
+//!
+//! read     the handle's state; a failure is reported, and nothing is led
+//! settle   what it was given, from the tank
+//! lead     the object to it
+//! feel     the local model of the object's contacts, where the handle is
+//! admit    as much of it as device and tank give
+//!
+//! In: ticks, whoever makes them. Out: a report. Never here: threads, waiting.
+
+use super::contact_model::ContactModel;
+use super::counts::Counts;
+use super::device::{Device, DeviceState};
+use super::report::DeviceReport;
+use super::tank::{EnergyTank, Handle};
+use glam::DVec3;
+use metachron_contact::AnchorSpring;
+use metachron_core::{Anchor, Body, SimSpan, Wrench};
+use metachron_runtime::Keyed;
+use metachron_world::{Command, Object, World, WorldError};
+use std::time::Duration;
+
+/// A state older than so many of its steps gives no force.
+const AGE_MAX_STEPS: f64 = 2.0;
+/// An object whose device has gone is led for so long, of its own time.
+const LEADS: SimSpan = SimSpan::from_millis(100);
+
+/// What a loop is to do.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct LoopOptions {
+    /// Ticks a second, 1 … 10 000. Beyond 4000 a thread that sleeps does not keep them.
+    pub rate_hz: f64,
+    /// Capacity of the energy tank, J, > 0: no more is given from any moment on than the hand puts in and this. Much below the energy that a
+    /// contact stores, contacts push back less than they were pressed; far above it, contacts may hum.
+    pub tank_j: f64,
+}
+
+impl Default for LoopOptions {
+    /// 1 kHz; a tank of what 5 N give over 4 cm.
+    fn default() -> Self {
+        Self { rate_hz: 1000.0, tank_j: 0.2 }
+    }
+}
+
+/// A device that leads an object of a world.
+pub struct DeviceLoop {
+    world: World,
+    object: Object,
+    device: Box<dyn Device>,
+    is_tool: bool,
+    period_s: f64,
+    model: ContactModel,
+    tank: EnergyTank,
+    before: Option<DeviceState>,
+    report: DeviceReport,
+    late_ms: Counts,
+    age_steps: Counts,
+    force_sum_n: f64,
+}
+
+impl std::fmt::Debug for DeviceLoop {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.debug_struct("DeviceLoop").field("report", &self.report).finish_non_exhaustive()
+    }
+}
+
+impl DeviceLoop {
+    /// A loop that leads the object of this name.
+    ///
+    /// # Errors
+    /// [`WorldError::NoObject`]; [`WorldError::Refused`] where the object is neither a kinematic body nor a tool, and for options outside their
+    /// ranges.
+    pub fn new(world: &World, name: &str, device: Box<dyn Device>, options: LoopOptions) -> Result<Self, WorldError> {
+        let object = world.object(name)?;
+        let refused = |reason: &str| WorldError::Refused { name: name.to_owned(), reason: reason.to_owned() };
+        let is_tool = matches!(world.latest(object)?.body, Body::Tool(_));
+        let is_kinematic = world.agents().of(object.id()).is_some_and(metachron_runtime::AgentHandle::takes_poses);
+        if !(is_tool || is_kinematic) {
+            return Err(refused("a device leads kinematic bodies and tools"));
+        }
+        let LoopOptions { rate_hz, tank_j } = options;
+        if !((1.0..=1e4).contains(&rate_hz) && tank_j > 0.0 && tank_j.is_finite()) {
+            return Err(refused("a device is served 1 to 10000 times a second, from a tank above 0 J"));
+        }
+        let report = DeviceReport {
+            device: device.name().to_owned(),
+            object: name.to_owned(),
+            tank_j,
+            ..DeviceReport::default()
+        };
+        Ok(Self {
+            world: world.clone(),
+            object,
+            device,
+            is_tool,
+            period_s: rate_hz.recip(),
+            model: ContactModel::default(),
+            tank: EnergyTank::new(tank_j),
+            before: None,
+            report,
+            late_ms: Counts::new(0.005),
+            age_steps: Counts::new(0.005),
+            force_sum_n: 0.0,
+        })
+    }
+
+    /// The time from a tick to the next.
+    #[must_use]
+    pub fn period(&self) -> Duration {
+        Duration::from_secs_f64(self.period_s)
+    }
+
+    /// One tick, `elapsed` after the one before and by so much too late. A failure is counted in the report; the next tick follows.
+    pub fn tick(&mut self, elapsed: Duration, late: Duration) {
+        self.report.ticks += 1;
+        self.late_ms.note(late.as_secs_f64() * 1e3);
+        if let Err(why) = self.serve(elapsed.as_secs_f64()) {
+            self.report.failures += 1;
+            self.report.first_failure.get_or_insert(why);
+        }
+    }
+
+    /// What happened so far.
+    #[must_use]
+    pub fn report(&self) -> DeviceReport {
+        DeviceReport {
+            late_ms: self.late_ms.quantiles(),
+            age_steps: self.age_steps.quantiles(),
+            force_mean_n: self.force_sum_n / self.report.ticks.max(1) as f64,
+            energy_out_j: self.tank.out_j(),
+            ..self.report.clone()
+        }
+    }
+
+    fn serve(&mut self, elapsed_s: f64) -> Result<(), String> {
+        let state = self.device.read(elapsed_s).map_err(|error| format!("the device gave no state: {error}"))?;
+        if !state.is_sound() {
+            return Err(format!("the device gave a state that is none: {state:?}"));
+        }
+        self.tank.settle(&state);
+        let before = self.before.replace(state);
+        self.report.presses += u64::from((state.buttons & !before.map_or(0, |before| before.buttons)).count_ones());
+        let led = self.lead(&state);
+        let felt = self.feel(&state);
+        // what the hand holds is released where there is nothing to feel
+        let wanted = *felt.as_ref().unwrap_or(&Wrench::default());
+        let limits = self.device.limits();
+        let given = self.tank.admit(&limits.of(&wanted), &Handle { state, limits, period_s: self.period_s });
+        let force_n = given.force_n.length();
+        self.force_sum_n += force_n;
+        self.report.force_max_n = self.report.force_max_n.max(force_n);
+        self.device.write(&given).map_err(|error| format!("the device took no wrench: {error}"))?;
+        led.and(felt.map(drop)).map_err(|error| error.to_string())
+    }
+
+    /// Leads the object to where the handle is.
+    fn lead(&self, state: &DeviceState) -> Result<(), WorldError> {
+        let DeviceState { position_m, rotation, velocity_m_s, spin_rad_s, .. } = *state;
+        let command = if self.is_tool {
+            Command::Spring(Keyed::first(Some(AnchorSpring {
+                by: None,
+                anchor: Anchor::Local(DVec3::ZERO),
+                target: position_m,
+                target_velocity: velocity_m_s,
+                // a tool follows by its own drive
+                stiffness_n_m: 0.0,
+                damping_n_s_m: 0.0,
+            })))
+        } else {
+            Command::pose(position_m, rotation).moving(velocity_m_s, spin_rad_s)
+        };
+        self.world.command(self.object, command.lasting(LEADS))
+    }
+
+    /// What the object would feel where the handle is; nothing by a state that is too old.
+    fn feel(&mut self, state: &DeviceState) -> Result<Wrench, WorldError> {
+        self.model.refresh(&self.world, self.object)?;
+        let age_s = self.world.time().secs_after(self.model.moment).max(0.0);
+        // before the first step nothing has been felt, and what rests is as it was
+        let age_steps = if self.model.step_s > 0.0 && !self.model.at_rest { age_s / self.model.step_s } else { 0.0 };
+        if age_steps > AGE_MAX_STEPS {
+            self.report.stale += 1;
+            return Ok(Wrench::default());
+        }
+        self.age_steps.note(age_steps);
+        let rotation = if self.is_tool { self.model.rotation() } else { state.rotation };
+        Ok(self.model.wrench(state.position_m, rotation))
+    }
+}
