@@ -5,7 +5,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 /// The crates, and the crates of this workspace that each may depend on.
-const ARROWS: [(&str, &[&str]); 16] = [
+const ARROWS: [(&str, &[&str]); 17] = [
     ("agents/core", &[]),
     ("agents/geometry", &["core"]),
     ("agents/contact", &["core", "geometry"]),
