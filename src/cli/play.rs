@@ -6,7 +6,6 @@ use super::devices;
 use super::exports::Exports;
 use super::run::{Played, Request, RunLength, Step};
 use anyhow::Context;
-use metachron_console::output::BadInput;
 use metachron_core::{AgentId, AttachmentEvent, ClusterState, ContactPartner, SensorTouch};
 use metachron_lod::Bound;
 use metachron_render::Size;
@@ -169,7 +168,7 @@ pub(super) fn headless(
 #[cfg(not(feature = "render"))]
 fn drawing(_: &Session, _: &Request, picture: bool, _: Size) -> anyhow::Result<Drawing> {
     if picture {
-        return Err(BadInput("this build cannot draw pictures: it lacks the feature `render`".to_owned()).into());
+        return Err(metachron_console::output::BadInput("this build cannot draw pictures: it lacks the feature `render`".to_owned()).into());
     }
     Ok(Drawing::Nothing)
 }

@@ -2,7 +2,7 @@
 //!
 //! Out: of pairs of runs with and without one the CPU time of a step in the mean of all, and its ratio; the size of a minute. Never here: a limit.
 
-use metachron_runtime::TimelineCommand;
+use metachron_core::SimSpan;
 use metachron_scene::{Source, load};
 use metachron_world::kinds::ExecutorKind;
 use metachron_world::{Scene, World};
@@ -10,7 +10,6 @@ use std::error::Error;
 use std::io::Write;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering::Relaxed};
-use std::time::Duration;
 
 /// Counts the bytes that are written.
 #[derive(Clone, Default)]
@@ -74,8 +73,7 @@ fn run(scene: &Scene, executor: ExecutorKind, seconds: f64, recorded: bool) -> R
     if recorded {
         world.record_to(Box::new(bytes.clone()), None)?;
     }
-    world.drive(TimelineCommand::Run);
-    world.wait_until(world.now() + Duration::from_secs_f64(seconds));
+    world.advance(SimSpan::from_secs_f64(seconds).ok_or("the time must be at least 0 s")?);
     let stats = world.stop();
     let (cpu_s, steps) =
         stats.iter().fold((0.0, 0.0), |(cpu_s, steps), agent| (cpu_s + agent.cpu_s, steps + agent.steps as f64));
