@@ -227,7 +227,9 @@ fn check_inputs(args: &RunArgs) -> anyhow::Result<()> {
         let why = "--oracle runs the scene twice without a window; add --headless";
         return Err(BadInput(why.to_owned()).into());
     }
-    let files = [("--video", &args.output.video), ("--mcap", &args.output.mcap), ("--vtk", &args.output.vtk)];
+    let output = &args.output;
+    let files =
+        [("--depth", &output.depth), ("--video", &output.video), ("--mcap", &output.mcap), ("--vtk", &output.vtk)];
     if let Some((flag, _)) = files.iter().find(|(_, path)| path.is_some() && !args.headless) {
         return Err(BadInput(format!("{flag} needs a run without a window; add --headless")).into());
     }
@@ -278,7 +280,11 @@ pub(super) fn check_outputs(
 
 /// Refuses a picture or film whose file has the ending of something else.
 fn check_extension(args: &OutputArgs) -> anyhow::Result<()> {
-    let outputs = [("--png", &args.png, "PNG picture", "png"), ("--video", &args.video, "YUV4MPEG2 film", "y4m")];
+    let outputs = [
+        ("--png", &args.png, "PNG picture", "png"),
+        ("--depth", &args.depth, "PNG picture", "png"),
+        ("--video", &args.video, "YUV4MPEG2 film", "y4m"),
+    ];
     for (flag, path, what, ending) in outputs {
         let other = |path: &&PathBuf| path.extension().is_some_and(|found| !found.eq_ignore_ascii_case(ending));
         if let Some(path) = path.as_ref().filter(other) {
