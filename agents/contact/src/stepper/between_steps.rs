@@ -42,20 +42,15 @@ impl ClusterStepper {
                 total.add(impulse, -contact.gap_m);
                 let skin = all[owner.member].member.skin();
                 let point_m = skin.map_or(DVec3::NAN, |skin| skin.point(&owner.place, -contact.normal));
-                for (member, impulse_n_s) in
-                    std::iter::once((owner.member, impulse)).chain(owner.other.map(|at| (at, -impulse)))
-                {
+                let given = std::iter::once((owner.member, impulse)).chain(owner.other.map(|at| (at, -impulse)));
+                for (member, impulse_n_s) in given {
                     give(&mut self.wrenches[member], &*all[member].member, impulse_n_s, point_m);
                 }
                 if impulse.length() > total.most_n_s {
-                    total.most_n_s = impulse.length();
-                    total.point_m = point_m;
-                    total.normal = contact.normal;
+                    (total.most_n_s, total.point_m, total.normal) = (impulse.length(), point_m, contact.normal);
                     total.inverse_mass_per_kg = solver.inverse_masses(k, self.progress[owner.member].place);
                     let own_s = |member: usize| h_s * f64::from(self.progress[member].share);
-                    let steps_s = [own_s(owner.member), owner.other.map_or(h_s, own_s)];
-                    let gives = total.inverse_mass_per_kg.into_iter().zip(steps_s);
-                    total.give_m_per_n = gives.map(|(inverse_mass, own_s)| own_s * own_s * inverse_mass).sum();
+                    total.note_give([own_s(owner.member), owner.other.map_or(h_s, own_s)]);
                 }
             } else if contact.gap_m < self.depth_m {
                 // no nearer than what bears something lies deep: the two touch, though nothing presses them together now
@@ -116,6 +111,12 @@ impl PairTotal {
         self.last_n_s += impulse_n_s.length();
         self.depth_m = self.depth_m.max(depth_m);
         self.contacts += 1;
+    }
+
+    /// Notes how the two give way at the contact that bears most, where their own steps take `steps_s`.
+    fn note_give(&mut self, steps_s: [f64; 2]) {
+        let gives = self.inverse_mass_per_kg.into_iter().zip(steps_s);
+        self.give_m_per_n = gives.map(|(inverse_mass, own_s)| own_s * own_s * inverse_mass).sum();
     }
 
     /// How much more the pair bears for each metre that it is pressed together further within a step, N/m, ≥ 0: each place in proportion to what
