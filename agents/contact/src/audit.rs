@@ -9,7 +9,7 @@
 //! Exact for rigid bodies whose acceleration is constant in between. Tubes count as published, with the work of what is on its way.
 
 use glam::{DMat3, DQuat, DVec3};
-use metachron_core::{AgentId, Body, CurveState, Inertia, RigidState, SimTime, Snapshot};
+use metachron_core::{AgentId, Body, CurveState, Inertia, RigidState, SimTime, Snapshot, inverse_of_free};
 use metachron_core::{Impulse, Ledger, Site};
 
 /// An agent as the audit sees it.
@@ -114,12 +114,16 @@ fn rigid(
     let Some(state) = settled(member, members, at) else { return };
     in_flight(member, members, |_, _, dj, _| sum.add_in_flight(dj));
     // free rotation keeps angular momentum and energy: both are those of the published rotation
-    let (mass, inertia) = (1.0 / inverse_mass, inverse_inertia.inverse());
+    let is_locked = |answers: DVec3| [0, 1, 2].map(|axis| answers[axis] == 0.0);
+    let turns = DVec3::new(inverse_inertia.x_axis.x, inverse_inertia.y_axis.y, inverse_inertia.z_axis.z);
+    let inertia = inverse_of_free(inverse_inertia, is_locked(turns));
+    // nothing moves along a locked axis
+    let mass = DVec3::select(inverse_mass.cmpgt(DVec3::ZERO), inverse_mass.recip(), DVec3::ZERO);
     let angular_momentum = inertia * state.spin;
     let spin_j = 0.5 * state.spin.dot(angular_momentum);
-    sum.energy_j += 0.5 * mass * state.velocity.length_squared() + spin_j + potential(member.id, &state);
+    sum.energy_j += 0.5 * state.velocity.dot(state.velocity * mass) + spin_j + potential(member.id, &state);
     sum.momentum += state.velocity * mass;
-    sum.angular += state.position.cross(state.velocity) * mass + angular_momentum;
+    sum.angular += state.position.cross(state.velocity * mass) + angular_momentum;
 }
 
 /// Adds a tube as it published itself: what is in flight to it counts as in flight alone.
@@ -178,5 +182,5 @@ impl Motion {
 pub fn rigid_inertia(mass_kg: f64, moments_kg_m2: DVec3, rotation: DQuat) -> Inertia {
     let turn = DMat3::from_quat(rotation);
     let inverse_inertia = turn * DMat3::from_diagonal(moments_kg_m2.recip()) * turn.transpose();
-    Inertia::Rigid { inverse_mass: 1.0 / mass_kg, inverse_inertia }
+    Inertia::Rigid { inverse_mass: DVec3::splat(1.0 / mass_kg), inverse_inertia }
 }

@@ -53,7 +53,7 @@ pub use cluster_state::{ClusterSolves, ClusterState};
 pub use contact::{ContactPartner, ContactState, JointEffort, Wrench};
 pub use disjoint_sets::DisjointSets;
 pub use id::AgentId;
-pub use inverse_mass::InverseMass;
+pub use inverse_mass::{InverseMass, inverse_of_free};
 pub use ledger::{Ahead, Entry, Impulse, Ledger, Page, Scheduled, Site};
 pub use local_model::{LocalBlock, LocalModel, LocalPartner};
 pub use pair::{PairKind, PairState};

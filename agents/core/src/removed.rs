@@ -9,8 +9,8 @@ use glam::DVec3;
 pub struct Removed {
     /// How many of its cells.
     pub cells: u32,
-    /// How many triangles its skin has fewer, net of those that close it over what was inside.
-    pub triangles: u32,
+    /// How many triangles its skin has fewer, net of those that close it over what was inside: below zero where these are more.
+    pub triangles: i32,
     /// Their mass, kg.
     pub mass_kg: f64,
     /// Their momentum when they went, kg·m/s, world axes.

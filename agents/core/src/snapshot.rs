@@ -75,9 +75,9 @@ pub enum Inertia {
     Immovable,
     /// A rigid body about its centre of mass.
     Rigid {
-        /// 1/kg.
-        inverse_mass: f64,
-        /// 1/(kg·m²), world axes.
+        /// Along the axes of the world, 1/kg; zero along one that is locked.
+        inverse_mass: DVec3,
+        /// 1/(kg·m²), world axes; zero about one that is locked.
         inverse_inertia: DMat3,
     },
 }

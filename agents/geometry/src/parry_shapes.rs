@@ -43,7 +43,13 @@ pub enum ShapeError {
         /// Number of triangles given.
         triangles: usize,
     },
-    /// A compound without parts, with too many, or with one that cannot be.
+    /// A compound without parts, or with too many.
+    #[error("a compound has {parts} parts; expected 1 to {COMPOUND_PARTS_MAX}")]
+    BadParts {
+        /// How many it has.
+        parts: usize,
+    },
+    /// A compound with a part that cannot be.
     #[error("part {index} of the compound {why}")]
     BadPart {
         /// Number of the part, from 0.
@@ -216,18 +222,28 @@ impl Solid {
     }
 }
 
+/// The largest coordinate of a part, metres.
+const PLACE_MAX_M: f64 = 1e6;
+/// The densities of parts against each other: those of the lightest and the heaviest material that a scene file takes.
+const DENSITY_RANGE: (f64, f64) = (1e-9, 1e9);
+
 fn check_parts(parts: &[CompoundPart]) -> Result<(), ShapeError> {
     if !(1..=COMPOUND_PARTS_MAX).contains(&parts.len()) {
-        let why = format!("is missing or too many: there are {}, and 1 to {COMPOUND_PARTS_MAX} can be", parts.len());
-        return Err(ShapeError::BadPart { index: parts.len().min(COMPOUND_PARTS_MAX), why });
+        return Err(ShapeError::BadParts { parts: parts.len() });
     }
     for (index, CompoundPart { solid, position_m, rotation, density }) in parts.iter().enumerate() {
         let bad = |why: String| Err(ShapeError::BadPart { index, why });
         if matches!(solid, Solid::Plane | Solid::Compound { .. }) {
             return bad("is a plane or a compound itself".to_owned());
         }
-        if !(position_m.as_vec3().is_finite() && rotation.is_normalized() && *density > 0.0 && density.is_finite()) {
-            return bad("has a place, a rotation or a density that is none".to_owned());
+        if !(position_m.is_finite() && position_m.abs().max_element() <= PLACE_MAX_M) {
+            return bad(format!("is at {position_m}; expected within {PLACE_MAX_M} m along each axis"));
+        }
+        if !rotation.is_normalized() {
+            return bad(format!("is turned by {rotation}; expected a quaternion of length 1"));
+        }
+        if !(DENSITY_RANGE.0..=DENSITY_RANGE.1).contains(density) {
+            return bad(format!("has a density of {density} against others; expected 1e-9 to 1e9"));
         }
         solid.check().or_else(|error| bad(format!("cannot be: {error}")))?;
     }

@@ -140,7 +140,7 @@ fn words(event: &AgentEvent) -> [u64; WORDS] {
         EventKind::RateMissed => (8, None),
         EventKind::Carved(Removed { cells, triangles, mass_kg, momentum }) => {
             words[1] = 11 | u64::from(cells) << 32;
-            words[2] = u64::from(triangles);
+            words[2] = u64::from(triangles.cast_unsigned());
             let numbers = [mass_kg, momentum.x, momentum.y, momentum.z];
             words[3..].iter_mut().zip(numbers).for_each(|(word, number)| *word = number.to_bits());
             return words;
@@ -178,7 +178,7 @@ fn event(words: &[u64; WORDS]) -> Option<AgentEvent> {
         10 => EventKind::Gone,
         11 => EventKind::Carved(Removed {
             cells: id,
-            triangles: words[2] as u32,
+            triangles: (words[2] as u32).cast_signed(),
             mass_kg: f64::from_bits(words[3]),
             momentum: vector(4),
         }),
@@ -205,7 +205,7 @@ mod tests {
             EventKind::AttachmentGave,
             EventKind::RateMissed,
             EventKind::Gone,
-            EventKind::Carved(Removed { cells: 10, triangles: 24, mass_kg: 0.25, momentum: DVec3::NEG_Y }),
+            EventKind::Carved(Removed { cells: 10, triangles: -24, mass_kg: 0.25, momentum: DVec3::NEG_Y }),
         ]
     }
 

@@ -36,3 +36,19 @@ fn what_no_body_has_is_refused_where_it_is() {
         assert!(said.starts_with(expected), "{said}\nis not {expected}");
     }
 }
+
+#[test]
+fn the_density_of_a_compound_is_one_with_a_mass_too_and_is_reported_once() {
+    for mass in ["", "mass_kg = 2\n"] {
+        for density in ["-5", "0", "nan"] {
+            let text = format!(
+                "format = 1\n[[object]]\nname = \"a\"\nmodel = \"rigid\"\nshape = \"compound\"\n{mass}density_kg_m3 = {density}\n\
+                 part = [{{ shape = \"ball\", radius_m = 0.1 }}, {{ shape = \"ball\", radius_m = 0.1, density_kg_m3 = 7, position_m = [1, 0, 0] }}]\n"
+            );
+            let source = Source::memory("density", text.as_bytes()).unwrap();
+            let problems = load(&source, &[]).unwrap_err().problems;
+            let said = &problems[0].message;
+            assert!(problems.len() == 1 && said.starts_with("`density_kg_m3` of `a` is "), "{density}: {problems:?}");
+        }
+    }
+}

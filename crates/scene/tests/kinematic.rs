@@ -51,6 +51,11 @@ fn what_contradicts_a_kinematic_object_is_refused_with_its_place() {
             "expected a time after the keyframe before, 0 s",
         ),
         ("kinematic = true\nkeyframe = [{ position_m = [0, 0, nan] }]\n", "line 8"),
+        ("kinematic = true\nlock_rotation = [\"x\"]\n", "line 8: `lock_rotation`"),
+        ("kinematic = true\ngravity_scale = 2\n", "has no effect on a kinematic object"),
+        ("fixed = true\nlinear_damping_per_s = 2\n", "has no effect on an object that is fixed"),
+        ("[[sensor]]\nname = \"f\"\nkind = \"contact-force\"\nobject = \"plate\"\nwith = \"plate\"\n", "`with`"),
+        ("kinematic = true\n[[joint]]\nkind = \"fixed\"\na = \"plate\"\nb = \"world\"\n", "is moved by no force"),
     ] {
         let said = scene(&format!("{PLATE}{keys}")).expect_err(keys);
         assert!(said.contains(why) && !said.contains('\n'), "{keys}: {said}");

@@ -143,3 +143,18 @@ fn a_checkpoint_has_the_pose_that_leads_a_body() {
     world.advance(SimSpan::from_millis(900));
     assert_eq!(hash, world.hash());
 }
+#[test]
+fn what_is_led_at_any_speed_meets_what_is_in_its_way_from_its_second_step_on() {
+    // in its first step nobody has heard of its speed; what is a foot away is seen anyway
+    for (far_m, speed_m_s) in [(0.3, 3000.0), (10.0, 1000.0)] {
+        let plate = Rigid::cuboid([0.02, 0.3, 0.3]).kinematic().at([-far_m, 0.0, 0.0]);
+        let scene = Scene::builder().gravity([0.0; 3]).add("plate", plate).add("ball", Rigid::ball(0.05));
+        let world = World::start(&scene.build().unwrap(), ExecutorKind::Lockstep).unwrap();
+        let [plate, ball] = world.objects(["plate", "ball"]).unwrap();
+        let led = Command::pose(DVec3::X * -far_m, DQuat::IDENTITY).moving(DVec3::X * speed_m_s, DVec3::ZERO);
+        world.command(plate, led).unwrap();
+        world.advance(SimSpan::from_millis(40));
+        let speed = state(&world, ball).velocity.x;
+        assert!(speed > 0.99 * speed_m_s, "{speed} m/s");
+    }
+}

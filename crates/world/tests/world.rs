@@ -2,11 +2,11 @@
 
 use glam::{DQuat, DVec3};
 use metachron_core::{Body, ContactPartner, SimSpan, Snapshot};
-use metachron_geometry::{CollisionGroups, ContactTraits, Obstacle, Solid};
+use metachron_geometry::{CollisionGroups, CompoundPart, ContactTraits, Obstacle, Solid};
 use metachron_models::rigid::{JointKind, Motor, MotorGoal};
 use metachron_runtime::Command;
 use metachron_world::kinds::ExecutorKind;
-use metachron_world::{Rigid, Scene, SceneBuildError, Tube, World, WorldError, static_solid};
+use metachron_world::{Part, Rigid, Scene, SceneBuildError, Soft, Tube, World, WorldError, static_solid};
 
 const EXECUTORS: [ExecutorKind; 3] = [ExecutorKind::Lockstep, ExecutorKind::Threads, ExecutorKind::Pool];
 
@@ -190,5 +190,29 @@ fn a_static_solid_is_as_rough_as_a_body_may_be() {
         let scene = Scene::builder().obstacle(floor).build().unwrap();
         let error = World::start(&scene, ExecutorKind::Lockstep).unwrap_err().to_string();
         assert!(error.contains("\"floor\"") && error.contains("must be between 0 and"), "{error}");
+    }
+}
+
+#[test]
+fn parts_and_spacings_out_of_range_are_refused_with_what_is_expected() {
+    let part = |x: f64, density: f64| {
+        let ball = Solid::Ball { radius_m: 0.1 };
+        CompoundPart { density, ..CompoundPart::new(ball, DVec3::X * x, DQuat::IDENTITY) }
+    };
+    let sheet = Soft::sheet([0.5, 0.5], 0.01, [4, 4]);
+    let parts: [(Part, &str); 5] = [
+        (Rigid::compound([]).into(), "has 0 parts"),
+        (Rigid::compound([part(0.0, 1e308)]).into(), "expected 1e-9 to 1e9"),
+        (Rigid::compound([part(0.0, 1e-320)]).into(), "expected 1e-9 to 1e9"),
+        (Rigid::compound([part(1e30, 1.0)]).into(), "expected within 1000000 m"),
+        (sheet.eps_m((0.1, 0.01)).into(), "no finer than the finest"),
+    ];
+    for (part, expected) in parts {
+        let scene = Scene::builder().add("a", part).build();
+        let world = scene
+            .map_err(|e| e.to_string())
+            .and_then(|scene| World::start(&scene, ExecutorKind::Lockstep).map_err(|e| e.to_string()));
+        let said = world.expect_err(expected);
+        assert!(said.contains(expected), "{said}");
     }
 }

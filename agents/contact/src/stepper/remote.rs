@@ -404,7 +404,7 @@ fn lone(inertia: &Inertia, body: &Body, step_s: f64, into: &mut LocalModel) {
     if let (Inertia::Rigid { inverse_mass, inverse_inertia }, Body::Rigid(state)) = (inertia, body) {
         let blocks = [(0, state.velocity), (1, state.spin)];
         into.blocks.extend(blocks.map(|(slot, velocity)| LocalBlock { slot, velocity, acceleration: DVec3::ZERO }));
-        let linear = DMat3::from_diagonal(DVec3::splat(*inverse_mass));
+        let linear = DMat3::from_diagonal(*inverse_mass);
         into.compliance.extend([linear, DMat3::ZERO, DMat3::ZERO, *inverse_inertia]);
     }
 }

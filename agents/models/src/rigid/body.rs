@@ -10,7 +10,7 @@ use glam::{DQuat, DVec3};
 use metachron_contact::stepper::ClusterMember;
 use metachron_contact::{Agent, SetMotion, StepContext};
 use metachron_core::{
-    Archive, ArchiveError, Body, Bounds, Inertia, RigidState, SimSpan, Snapshot, StepError, StepReport, archive_values,
+    Archive, ArchiveError, Body, Bounds, RigidState, SimSpan, Snapshot, StepError, StepReport, archive_values,
     check_span,
 };
 use metachron_geometry::{CollisionShape, ShapeKind, SolidShape};
@@ -170,8 +170,7 @@ impl Agent for RigidBody {
         into.energy_j = self.motion.energy_j(&self.spread, self.flight.gravity);
         into.residual_m = (self.motion.position.abs().max_element() + self.radius_m) * f64::EPSILON;
         (into.at_rest, into.acceleration) = (self.at_rest, self.acceleration);
-        let (inverse_mass, inverse_inertia) = self.motion.inverse_inertia(&self.spread);
-        into.inertia = Inertia::Rigid { inverse_mass, inverse_inertia };
+        into.inertia = self.answers();
         into.bounds = Some(self.bounds());
     }
 

@@ -9,7 +9,7 @@ use super::motion::{Flight, Motion};
 use glam::{DMat3, DQuat, DVec3};
 use metachron_contact::cluster::{Block, Side};
 use metachron_contact::stepper::{ClusterMember, Locked, MaterialPoint, Pose, Role};
-use metachron_core::{Anchor, Archive, ArchiveError, StepError};
+use metachron_core::{Anchor, Archive, ArchiveError, Inertia, StepError, inverse_of_free};
 use metachron_geometry::{ContactSide, Place, PlacedShape, ShapePose};
 
 /// The block of its spin; block 0 is the velocity of its centre of mass.
@@ -98,6 +98,18 @@ impl RigidBody {
         motion.position += motion.velocity * h_s;
         motion.turn_within(&self.spread, &restraint, h_s);
         motion
+    }
+
+    /// How it answers impulses: along and about locked axes not at all.
+    pub(super) fn answers(&self) -> Inertia {
+        let Restraint { locked_rotation, .. } = self.flight.restraint;
+        let inverse_mass = self.flight.restraint.translation(DVec3::splat(self.spread.mass_kg.recip()));
+        let inverse_inertia = if locked_rotation == [false; 3] {
+            self.motion.inverse_inertia(&self.spread)
+        } else {
+            inverse_of_free(self.inertia(), locked_rotation)
+        };
+        Inertia::Rigid { inverse_mass, inverse_inertia }
     }
 
     /// Its blocks: where an axis is locked, it is as heavy there as nothing that touches it moves, and no impulse is left over.
@@ -198,7 +210,7 @@ impl ClusterMember for RigidBody {
     fn carry(&mut self, impulses_n_s2: &[DVec3]) {
         let Flight { restraint, .. } = self.flight;
         self.motion.position += restraint.translation(impulses_n_s2[0] / self.spread.mass_kg);
-        let turn = restraint.rotation(self.inertia().inverse() * impulses_n_s2[SPIN]);
+        let turn = inverse_of_free(self.inertia(), restraint.locked_rotation) * impulses_n_s2[SPIN];
         if turn != DVec3::ZERO {
             self.motion.rotation = (glam::DQuat::from_scaled_axis(turn) * self.motion.rotation).normalize();
         }

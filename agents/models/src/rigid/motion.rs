@@ -62,10 +62,10 @@ impl Motion {
         to_world * ((to_world.conjugate() * w) * body.moments)
     }
 
-    /// The inverses of the mass, 1/kg, and of the inertia tensor in world axes, 1/(kg·m²).
-    pub(super) fn inverse_inertia(&self, body: &MassDistribution) -> (f64, DMat3) {
+    /// The inverse of the inertia tensor in world axes, 1/(kg·m²).
+    pub(super) fn inverse_inertia(&self, body: &MassDistribution) -> DMat3 {
         let to_world = DMat3::from_quat(self.rotation * body.axes);
-        (body.mass_kg.recip(), to_world * DMat3::from_diagonal(body.moments.recip()) * to_world.transpose())
+        to_world * DMat3::from_diagonal(body.moments.recip()) * to_world.transpose()
     }
 
     /// The largest spin the body can reach with its angular momentum, rad/s.

@@ -128,9 +128,15 @@ pub enum RigidError {
         /// The moments, kg·m²; not numbers where the tensor is not symmetric.
         moments_kg_m2: [f64; 3],
     },
-    /// A vector or rotation is not finite, too large, or a rotation is zero.
+    /// A vector is not finite, or too large.
     #[error("{what} must be finite and within the range of single precision")]
     BadVector {
+        /// Which one.
+        what: &'static str,
+    },
+    /// A rotation is not finite, or zero.
+    #[error("{what} must be a quaternion that is finite and not zero")]
+    BadRotation {
         /// Which one.
         what: &'static str,
     },
@@ -251,5 +257,5 @@ fn vector(what: &'static str, value: DVec3) -> Result<(), RigidError> {
 
 fn rotation(what: &'static str, value: DQuat) -> Result<(), RigidError> {
     let good = value.is_finite() && value.length_squared() > 0.0;
-    if good { Ok(()) } else { Err(RigidError::BadVector { what }) }
+    if good { Ok(()) } else { Err(RigidError::BadRotation { what }) }
 }

@@ -1,9 +1,10 @@
 //! What a rigid body must do by itself, against closed forms.
 
-use super::{RigidBody, RigidError, RigidSpec};
+use super::{Restraint, RigidBody, RigidError, RigidSpec};
 use glam::{DQuat, DVec3};
+use metachron_contact::stepper::ClusterMember;
 use metachron_contact::{Agent, StepContext};
-use metachron_core::{AgentId, Body, RigidState, SimSpan, SimTime, Snapshot, StepError, StepReport};
+use metachron_core::{AgentId, Body, Inertia, RigidState, SimSpan, SimTime, Snapshot, StepError, StepReport};
 use metachron_geometry::Solid;
 use std::sync::Arc;
 
@@ -91,11 +92,12 @@ fn numbers_outside_their_range_are_refused() {
     let vectors = [
         RigidSpec { position: DVec3::NAN, ..good.clone() },
         RigidSpec { velocity: DVec3::splat(1e300), ..good.clone() },
-        RigidSpec { rotation: DQuat::from_xyzw(0.0, 0.0, 0.0, 0.0), ..good.clone() },
     ];
     for bad in vectors {
         assert!(matches!(refuse(bad), RigidError::BadVector { .. }));
     }
+    let bad = RigidSpec { rotation: DQuat::from_xyzw(0.0, 0.0, 0.0, 0.0), ..good.clone() };
+    assert_eq!(refuse(bad), RigidError::BadRotation { what: "the rotation" });
     assert_eq!(refuse(RigidSpec { solid: Solid::Plane, ..good }), RigidError::MovingPlane);
 }
 
@@ -152,4 +154,24 @@ fn a_body_that_nothing_moves_comes_to_rest_unless_it_may_not_sleep() {
         let mut body = RigidBody::new(RigidSpec { gravity: DVec3::ZERO, sleep, ..cube(0.1, UP) }).unwrap();
         assert_eq!((0..60).any(|_| step(&mut body, 0.01).at_rest), sleep);
     }
+}
+
+#[test]
+fn a_body_with_locked_axes_answers_impulses_along_the_others_alone() {
+    let locked_rotation = [true, true, false];
+    let restraint = Restraint { locked_translation: [false, true, false], locked_rotation, ..Restraint::default() };
+    let turned = DQuat::from_scaled_axis(DVec3::new(0.4, 0.3, 0.2));
+    let solid = Solid::Box { half_extents_m: DVec3::new(0.3, 0.1, 0.2) };
+    let mut body = RigidBody::new(RigidSpec { restraint, rotation: turned, ..spec(solid, DVec3::ZERO) }).unwrap();
+    let Inertia::Rigid { inverse_mass, inverse_inertia } = snapshot(&body).inertia else { panic!("it moves") };
+    assert_eq!(inverse_mass, DVec3::new(1.0, 0.0, 1.0) / body.mass_kg());
+    // about an axis that alone is free it is as heavy as the inertia about that axis
+    let moments = DVec3::new(0.05, 0.13, 0.1) * (body.mass_kg() / 3.0);
+    let along = turned.conjugate() * DVec3::Z;
+    let about_z = (along * along).dot(moments);
+    assert!((inverse_inertia.z_axis.z * about_z - 1.0).abs() < 1e-12 && inverse_inertia.x_axis == DVec3::ZERO);
+    let given = DVec3::new(3.0, 2.0, 1.0) * 1e-3;
+    body.carry(&[DVec3::ZERO, given]);
+    let by = (state(&body).rotation * turned.conjugate()).to_scaled_axis();
+    assert!((by - DVec3::Z * (given.z / about_z)).length() < 1e-12, "{by}");
 }

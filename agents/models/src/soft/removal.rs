@@ -129,7 +129,7 @@ impl SoftBody {
             }
         }
         self.woken();
-        let triangles = before.saturating_sub(self.skin_triangles()) as u32;
+        let triangles = (before as i64 - self.skin_triangles() as i64) as i32;
         let went = Removed { triangles, ..went };
         self.removed = self.removed.and(went);
         Ok(went)
@@ -158,7 +158,7 @@ impl SoftBody {
         self.gone.iter_mut().filter(|gone| !**gone).for_each(|gone| *gone = again.next().unwrap_or_default());
     }
 
-    fn skin_triangles(&self) -> usize {
+    pub(super) fn skin_triangles(&self) -> usize {
         if let ShapeKind::Surface(surface) = &self.form.kind { surface.triangles.len() } else { 0 }
     }
 

@@ -373,7 +373,9 @@ impl SoftShape {
 impl NodeSpacing {
     fn check(&self) -> Result<(), SoftError> {
         let all = [("ε", self.eps_m), ("the finest ε", self.range_m.0), ("the coarsest ε", self.range_m.1)];
-        all.into_iter().try_for_each(|(what, value)| number(what, value, (1e-6, 1e4), "between 1e-6 and 1e4 m"))
+        all.into_iter().try_for_each(|(what, value)| number(what, value, (1e-6, 1e4), "between 1e-6 and 1e4 m"))?;
+        let (finest, coarsest) = self.range_m;
+        number("the coarsest ε", coarsest, (finest, 1e4), "no finer than the finest")
     }
 }
 

@@ -111,7 +111,7 @@ impl Drive {
     /// The tip's response to impulses apart from its spring.
     pub(super) fn inertia(&self) -> Inertia {
         Inertia::Rigid {
-            inverse_mass: self.mass_kg().recip(),
+            inverse_mass: DVec3::splat(self.mass_kg().recip()),
             inverse_inertia: DMat3::from_diagonal(DVec3::splat(TURNS_PER_KG_M2)),
         }
     }

@@ -25,6 +25,8 @@ pub(super) const WORLD: &str = "world";
 pub(super) struct End {
     /// `None` is the world.
     pub(super) agent: Option<AgentId>,
+    /// Whether no force moves it.
+    pub(super) is_led: bool,
     pub(super) position: DVec3,
     pub(super) rotation: DQuat,
 }
@@ -66,10 +68,16 @@ fn place_joint(c: &mut Checker<'_, '_>, index: usize, file: &JointFile, objects:
     let free = free_motion(c, &place, file);
     let (a, b) = (end(c, &place, "a", &file.a, objects), end(c, &place, "b", &file.b, objects));
     let (a, b) = (a?, b?);
-    if a.agent == b.agent {
-        let (what, expected) = match a.agent {
-            Some(_) => ("is the same object as `a`", "expected another object: a joint connects two"),
-            None => ("is fixed, and so is `a`", "expected at least one object that moves"),
+    if a.agent == b.agent || a.is_led && b.is_led {
+        let (what, expected) = if a.agent == b.agent && a.agent.is_some() {
+            ("is the same object as `a`", "expected another object: a joint connects two")
+        } else if a.agent.or(b.agent).is_some() {
+            (
+                "is moved by no force, and neither is `a`",
+                "expected at least one object that is neither fixed nor kinematic",
+            )
+        } else {
+            ("is fixed, and so is `a`", "expected at least one object that moves")
         };
         c.wrong(&place, "b", what, expected);
         return None;
@@ -94,7 +102,7 @@ fn end(c: &mut Checker<'_, '_>, place: &Place, key: &str, name: &str, objects: &
             c.wrong(place, key, "is the world", "expected a rigid object; the world is written as `b`");
             return None;
         }
-        return Some(End { agent: None, position: DVec3::ZERO, rotation: DQuat::IDENTITY });
+        return Some(End { agent: None, is_led: true, position: DVec3::ZERO, rotation: DQuat::IDENTITY });
     }
     let wrong = |c: &mut Checker<'_, '_>, what: &str, expected: &str| {
         c.wrong(place, key, format_args!("names `{name}`, {what}"), expected);
@@ -104,11 +112,12 @@ fn end(c: &mut Checker<'_, '_>, place: &Place, key: &str, name: &str, objects: &
         Some(NamedObject::Rigid(id)) => {
             let member = objects.agents.iter().find(|member| member.id == id)?;
             let Spec::Rigid(body) = &member.spec else { return None };
-            Some(End { agent: Some(id), position: body.position, rotation: body.rotation.normalize() })
+            let is_led = body.led.is_some();
+            Some(End { agent: Some(id), is_led, position: body.position, rotation: body.rotation.normalize() })
         }
         Some(NamedObject::Fixed) => {
             let solid = objects.obstacles.iter().find(|obstacle| obstacle.name == name)?;
-            Some(End { agent: None, position: solid.position, rotation: solid.rotation.normalize() })
+            Some(End { agent: None, is_led: true, position: solid.position, rotation: solid.rotation.normalize() })
         }
         Some(NamedObject::Tube(_)) => wrong(
             c,

@@ -59,7 +59,8 @@ pub(super) fn obstacle(c: &mut Checker<'_, '_>, place: &Place, file: &RigidFile,
     for (key, _) in led.into_iter().filter(|(_, given)| *given) {
         c.wrong(place, key, "moves an object that is fixed", "expected no motion, or `fixed = false`");
     }
-    let solid = solid(c, place, file, source)?;
+    refuse_restraint(c, place, file, "an object that is fixed");
+    let solid = solid(c, place, file, PartContext { source, density_kg_m3: DENSITY_DEFAULT_KG_M3 })?;
     let (position, rotation) = pose(c, place, file);
     let (restitution, friction) = surface(c, place, file);
     Some(Obstacle {
@@ -77,9 +78,10 @@ pub(super) fn obstacle(c: &mut Checker<'_, '_>, place: &Place, file: &RigidFile,
 pub(super) fn build(c: &mut Checker<'_, '_>, file: &RigidFile, context: &ModelContext<'_>) -> Option<RigidSpec> {
     let place = context.place;
     let before = c.count();
-    let solid = solid(c, place, file, context.source)?;
-    // a wrong shape gives a wrong mass: one problem is reported, not two
-    let mass_kg = if c.count() == before { mass(c, place, file, &solid) } else { 1.0 };
+    let density = c.optional(place, "density_kg_m3", file.density_kg_m3, &DENSITY).unwrap_or(DENSITY_DEFAULT_KG_M3);
+    let solid = solid(c, place, file, PartContext { source: context.source, density_kg_m3: density })?;
+    // a wrong shape or density gives a wrong mass: one problem is reported, not two
+    let mass_kg = if c.count() == before { mass(c, place, file, &solid, density) } else { 1.0 };
     let inertia = inertia(c, place, file);
     let (position, rotation) = pose(c, place, file);
     let led = led(c, place, file, rotation);
@@ -120,6 +122,21 @@ fn restraint(c: &mut Checker<'_, '_>, place: &Place, file: &RigidFile) -> Restra
     }
 }
 
+/// Reports what slows down, or keeps from moving, what forces do not move anyway.
+fn refuse_restraint(c: &mut Checker<'_, '_>, place: &Place, file: &RigidFile, what: &str) {
+    let keys = [
+        ("gravity_scale", file.gravity_scale.is_some()),
+        ("linear_damping_per_s", file.linear_damping_per_s.is_some()),
+        ("angular_damping_per_s", file.angular_damping_per_s.is_some()),
+        ("lock_translation", file.lock_translation.is_some()),
+        ("lock_rotation", file.lock_rotation.is_some()),
+    ];
+    for (key, _) in keys.into_iter().filter(|(_, given)| *given) {
+        let expected = "expected no such key, or an object that forces move";
+        c.wrong(place, key, format_args!("has no effect on {what}"), expected);
+    }
+}
+
 /// How a kinematic object is led; `None` for one that moves by what acts on it.
 fn led(c: &mut Checker<'_, '_>, place: &Place, file: &RigidFile, rotation: DQuat) -> Option<Led> {
     let is_led = file.kinematic == Some(true);
@@ -131,6 +148,7 @@ fn led(c: &mut Checker<'_, '_>, place: &Place, file: &RigidFile, rotation: DQuat
     if !is_led {
         return None;
     }
+    refuse_restraint(c, place, file, "a kinematic object");
     let moved = [("velocity_m_s", file.velocity_m_s.is_some()), ("spin_rad_s", file.spin_rad_s.is_some())];
     let placed = ("position_m", file.position_m.is_some() && file.keyframe.is_some());
     for (key, _) in moved.into_iter().chain([placed]).filter(|(_, given)| *given) {
@@ -314,25 +332,24 @@ impl ShapeKeys<'_> {
     }
 }
 
-fn solid(c: &mut Checker<'_, '_>, place: &Place, file: &RigidFile, source: &Source) -> Option<Solid> {
+fn solid(c: &mut Checker<'_, '_>, place: &Place, file: &RigidFile, among: PartContext<'_>) -> Option<Solid> {
     let keys = shape_keys!(file, file.part.is_some());
     if !keys.check(c, place) {
         return None;
     }
     let Some(parts) = file.part.as_ref().filter(|_| file.shape == Shape::Compound) else {
-        return keys.solid(c, place, source);
+        return keys.solid(c, place, among.source);
     };
     if !(1..=COMPOUND_PARTS_MAX).contains(&parts.len()) {
         let expected = format!("expected 1 … {COMPOUND_PARTS_MAX}");
         c.wrong(place, "part", format_args!("has {} entries", parts.len()), expected);
         return None;
     }
-    let among = PartContext { source, density_kg_m3: file.density_kg_m3.unwrap_or(DENSITY_DEFAULT_KG_M3) };
     let parts = parts.iter().enumerate().map(|(i, file)| part(c, &place.entry("part", i), file, among));
     Some(Solid::Compound { parts: parts.collect::<Option<Vec<_>>>()?.into() })
 }
 
-/// What the parts of a compound share.
+/// What the solid of an object, or the parts of a compound, share.
 #[derive(Clone, Copy)]
 struct PartContext<'a> {
     source: &'a Source,
@@ -372,7 +389,8 @@ fn sound(c: &mut Checker<'_, '_>, place: &Place, solid: Solid) -> Option<Solid> 
     }
 }
 
-fn mass(c: &mut Checker<'_, '_>, place: &Place, file: &RigidFile, solid: &Solid) -> f64 {
+/// Its mass: that of the file, or that of `solid` of `density`, kg/m³.
+fn mass(c: &mut Checker<'_, '_>, place: &Place, file: &RigidFile, solid: &Solid, density: f64) -> f64 {
     if let Some(mass) = file.mass_kg {
         if file.density_kg_m3.is_some() && file.part.is_none() {
             let expected = "expected `mass_kg` or `density_kg_m3`, not both";
@@ -380,7 +398,6 @@ fn mass(c: &mut Checker<'_, '_>, place: &Place, file: &RigidFile, solid: &Solid)
         }
         return c.number(place, "mass_kg", mass, &MASS);
     }
-    let density = c.optional(place, "density_kg_m3", file.density_kg_m3, &DENSITY).unwrap_or(DENSITY_DEFAULT_KG_M3);
     let volume = weighted_m3(solid);
     if is_flat(solid, volume) {
         let what =

@@ -75,6 +75,10 @@ impl Mounts<'_> {
                     Some(with) => Some(self.partner(c, place, with)?),
                     None => None,
                 };
+                if with == Some(ContactPartner::Agent(object)) {
+                    c.wrong(place, "with", "is the object itself", "expected another object");
+                    return None;
+                }
                 SensorKind::ContactForce { object, with }
             }
             Kind::Imu => {

@@ -144,6 +144,8 @@ fn what_is_cut_in_two_parts_falls_apart_and_is_where_its_parts_are() {
     body.velocities.iter_mut().zip(&body.positions).for_each(|(v, x)| *v = (*x - middle) * 4.0);
     let gone = body.carve(&Carving { from_m: middle, to_m: middle, radius_m: 0.06 }).unwrap();
     assert_eq!(gone.cells, 8);
+    // 4 of its sides were seen, each 2 × 2 squares; the two that are seen now have as many each
+    assert_eq!(gone.triangles, 2 * (4 - 2) * 4);
     assert!((gone.mass_kg - 0.1 * 0.1 * 0.1 * MATTER.density_kg_m3).abs() < 1e-12 && gone.momentum.length() < 1e-14);
     run(&mut body, 0.005, 100);
     let bounds = body.bounds();
@@ -160,7 +162,9 @@ fn the_skin_loses_the_triangles_of_the_cells_and_closes_over_what_was_inside() {
         // the cell farthest along x is at the skin
         let along = |cell: &usize| body.cell_middle(*cell).unwrap().x;
         let last = (0..body.cells()).max_by(|a, b| along(a).total_cmp(&along(b))).unwrap();
+        let before = body.skin_triangles() as i32;
         let gone = body.remove_cells(&[last]).unwrap();
+        assert_eq!(gone.triangles, before - body.skin_triangles() as i32);
         let form = body.form().unwrap();
         let ShapeKind::Surface(skin) = &form.kind else { panic!("a skin") };
         let surface = Triangles { points: state(&body).positions, triangles: skin.triangles.to_vec() };
