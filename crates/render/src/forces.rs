@@ -181,6 +181,7 @@ mod tests {
             greatest_n: 40.0 * DVec3::Z,
             told_n: 0.0,
             depth_m: 0.0,
+            stiffness_n_m: 0.0,
         };
         let body = Body::Rigid(RigidState::default());
         let state = Snapshot { body, contacts: vec![contact], ..Snapshot::default() };

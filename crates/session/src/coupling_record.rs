@@ -271,6 +271,7 @@ mod tests {
         let still = DVec3::ZERO;
         let tool = ToolState {
             tip,
+            led: tip,
             rotation,
             velocity: still,
             spin: still,

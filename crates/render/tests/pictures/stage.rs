@@ -48,6 +48,7 @@ pub fn still_life() -> (SceneView, Camera) {
         let still = DVec3::ZERO;
         Body::Tool(ToolState {
             tip,
+            led: tip,
             rotation,
             velocity: still,
             spin: still,
