@@ -42,7 +42,7 @@ Data goes to standard output, messages to standard error.";
 
 const REPLAY_EXAMPLES: &str = "\
 Examples:
-  metachron run tube --headless --executor lockstep --seconds 10 --record tube.rec
+  metachron run tube --headless --seconds 10 --record tube.rec
   metachron replay tube.rec                            ends with the same state hash, or says where it differs
   metachron replay tube.rec --until 2.5 --png then.png
 

@@ -168,7 +168,10 @@ pub(super) fn headless(
 #[cfg(not(feature = "render"))]
 fn drawing(_: &Session, _: &Request, picture: bool, _: Size) -> anyhow::Result<Drawing> {
     if picture {
-        return Err(metachron_console::output::BadInput("this build cannot draw pictures: it lacks the feature `render`".to_owned()).into());
+        return Err(metachron_console::output::BadInput(
+            "this build cannot draw pictures: it lacks the feature `render`".to_owned(),
+        )
+        .into());
     }
     Ok(Drawing::Nothing)
 }
