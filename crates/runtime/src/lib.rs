@@ -59,6 +59,7 @@ mod priority;
 mod probe;
 mod publish;
 mod reader;
+mod ring;
 mod seqlock;
 mod sleep;
 mod slot;
@@ -68,6 +69,7 @@ mod table;
 #[cfg(test)]
 mod testing;
 mod threads;
+mod turns;
 mod worker_wakeup;
 
 pub use agent_clock::{AgentClock, LAG_CAP, Start};
@@ -89,6 +91,7 @@ pub use reader::Reader;
 pub use slot::{LatestSlot, SlotWriter};
 pub use spawn::{AgentSpawn, RATE_MAX_HZ, RunError};
 pub use threads::{AUTO_THREADS_MAX, THREADS_MAX, Threads};
+pub use turns::{TURNS_KEPT, Turn};
 
 use metachron_core::{AgentId, Archive, ArchiveError, SimTime};
 use std::time::Duration;

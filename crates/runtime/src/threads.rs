@@ -18,6 +18,7 @@ use super::mailbox::SendError;
 use super::metrics::AgentStats;
 use super::priority::Priority;
 use super::spawn::{AgentSpawn, AssembledRun, Everyone, RunError, assemble};
+use super::turns::Took;
 use metachron_core::{AgentId, Archive, ArchiveError};
 use std::sync::Arc;
 use std::sync::mpsc::{Receiver, Sender, channel};
@@ -94,7 +95,7 @@ impl Threads {
             drop(priority.take());
             stage.run(actor, &shared)
         };
-        builder.spawn(body).map_err(|source| RunError::NoThread { name, source })
+        builder.spawn(body).map_err(|error| RunError::NoThread { name, error })
     }
 
     /// Ends all threads and waits for them until a timeout: a step that takes longer counts as hung, and its thread is left behind. Gives back
@@ -304,7 +305,8 @@ impl AgentThread {
             None => Next::Parked,
             Some(_) => {
                 let now = self.clock.now();
-                actor.finish(timeline, now, now.saturating_sub(began).as_secs_f64())
+                let turn_s = now.saturating_sub(began).as_secs_f64();
+                actor.finish(timeline, Took { begun: began, ended: now }, turn_s)
             }
         };
         let wall = started.elapsed();

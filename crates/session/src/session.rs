@@ -468,6 +468,7 @@ impl Session {
             clamp,
             unpriced: self.unpriced,
             interrupted,
+            unwritten: None,
         }
     }
 

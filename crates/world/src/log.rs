@@ -74,6 +74,11 @@ impl Log {
         matches!(*self.mode(), Mode::Recorded(_))
     }
 
+    /// Whether it is recorded no further, because something could not be written.
+    pub fn recording_failed(&self) -> bool {
+        matches!(&*self.mode(), Mode::Recorded(recorder) if recorder.has_failed())
+    }
+
     pub fn is_replayed(&self) -> bool {
         matches!(*self.mode(), Mode::Replayed(_))
     }

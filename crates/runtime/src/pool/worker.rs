@@ -7,6 +7,7 @@ use super::super::agent_clock::Timeline;
 use super::super::agent_runner::{AgentRunner, Next};
 use super::super::cluster::hand_over;
 use super::super::cpu::CpuShare;
+use super::super::turns::Took;
 use super::shared::PoolState;
 use super::watchdog::WatchdogWord;
 use metachron_core::AgentId;
@@ -103,7 +104,7 @@ impl Worker {
         let wall = self.now.saturating_sub(began);
         let next = match begun {
             None => Next::Parked,
-            Some(_) => actor.finish(timeline, self.now, wall.as_secs_f64()),
+            Some(_) => actor.finish(timeline, Took { begun: began, ended: self.now }, wall.as_secs_f64()),
         };
         actor.count(wall);
         actor.settle(self.cpu.count(wall));
@@ -259,22 +260,5 @@ mod tests {
         let steps: u64 = worker.state.handles.iter().map(|agent| agent.steps()).sum();
         // 5.6 s of simulated time
         assert!((62_000..64_000).contains(&steps), "{steps}");
-    }
-}
-#[cfg(test)]
-mod dbg {
-    #[test]
-    fn sizes() {
-        use super::super::super::*;
-        println!(
-            "runner {} shared {} seat {} mailbox {} events {} metrics {}",
-            size_of::<agent_runner::AgentRunner>(),
-            size_of::<handle::Shared>(),
-            size_of::<cluster::ClusterSeat>(),
-            size_of::<mailbox::Mailbox>(),
-            size_of::<events::EventRing>(),
-            size_of::<metrics::Metrics>()
-        );
-        println!("bc {}", size_of::<boxcar::Vec<u64>>());
     }
 }
