@@ -138,7 +138,7 @@ impl AgentRunner {
 
     /// Tells readers of its events what happens to it now.
     pub fn tell(&self, kind: EventKind) {
-        self.shared.told.event(&AgentEvent { at: self.pace.time(), kind });
+        self.shared.streams.event(&AgentEvent { at: self.pace.time(), kind });
     }
 
     /// Whether the agent is parked.

@@ -34,7 +34,7 @@ pub(super) struct Shared {
     /// Its contact shape; `None` where nothing can touch it.
     pub form: FormSlot,
     pub mail: Mailbox,
-    pub told: Told,
+    pub streams: EventStreams,
     pub slot: Arc<LatestSlot<Snapshot>>,
     pub sleep: Arc<SleepRegistry>,
     /// Entry for agents that it is to lead, and the place to which it returns from a leader; `None` where no agent can be led.
@@ -47,7 +47,7 @@ pub(super) struct Shared {
 
 /// What an agent tells readers; there is nothing of it before the first of them.
 #[derive(Debug, Default)]
-pub(super) struct Told(OnceLock<Box<Rings>>);
+pub(super) struct EventStreams(OnceLock<Box<Rings>>);
 
 #[derive(Debug, Default)]
 struct Rings {
@@ -55,7 +55,7 @@ struct Rings {
     turns: Ring<Turn>,
 }
 
-impl Told {
+impl EventStreams {
     fn rings(&self) -> &Rings {
         self.0.get_or_init(Box::default)
     }
@@ -197,24 +197,24 @@ impl AgentHandle {
 
     /// Begins to keep its events for readers; the number of the next one.
     pub fn listen(&self) -> u64 {
-        self.shared.told.rings().events.listen()
+        self.shared.streams.rings().events.listen()
     }
 
     /// Passes its events from number `next` on to `take`; returns the number of the next one, and how many were lost: an agent keeps the
     /// newest [`crate::EVENTS_KEPT`].
     pub fn events_from(&self, next: u64, take: impl FnMut(AgentEvent)) -> (u64, u64) {
-        self.shared.told.rings().events.read(next, take)
+        self.shared.streams.rings().events.read(next, take)
     }
 
     /// Begins to keep its turns for readers; the number of the next one.
     pub fn listen_to_turns(&self) -> u64 {
-        self.shared.told.rings().turns.listen()
+        self.shared.streams.rings().turns.listen()
     }
 
     /// Passes its turns from number `next` on to `take`; returns the number of the next one, and how many were lost: an agent keeps the
     /// newest [`crate::TURNS_KEPT`].
     pub fn turns_from(&self, next: u64, take: impl FnMut(Turn)) -> (u64, u64) {
-        self.shared.told.rings().turns.read(next, take)
+        self.shared.streams.rings().turns.read(next, take)
     }
 
     /// CPU time of its turns so far, seconds; updated about twice a second on threads.

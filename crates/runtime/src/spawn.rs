@@ -11,7 +11,7 @@ use super::cluster::{ClusterSeat, Handover, JointedTo, Led, assign_leaders};
 use super::faults::Faults;
 use super::form_slot::FormSlot;
 use super::governor::Governor;
-use super::handle::{AgentHandle, Shared, Told};
+use super::handle::{AgentHandle, EventStreams, Shared};
 use super::helpers::Helpers;
 use super::histogram::Histogram;
 use super::mailbox::{Mailbox, SendError};
@@ -346,7 +346,7 @@ fn shared(
         gauges: Metrics::default(),
         form: FormSlot::new(spawn.agent.form()),
         mail: Mailbox::default(),
-        told: Told::default(),
+        streams: EventStreams::default(),
         slot: writer.slot(),
         sleep: Arc::clone(sleep),
         handover: moves.then(Handover::default),

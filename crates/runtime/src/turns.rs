@@ -76,7 +76,7 @@ pub(super) struct Took {
 impl AgentRunner {
     /// Tells readers of its turns of the step that is `open`, made in a turn of `led_by`.
     pub(super) fn tell_turn(&self, open: &PendingTurn, led_by: AgentId, took: Took) {
-        self.shared.told.turn(|| Turn {
+        self.shared.streams.turn(|| Turn {
             begun: took.begun,
             ended: took.ended,
             time: self.pace.time(),
@@ -90,7 +90,7 @@ impl AgentRunner {
 
     /// Tells readers of its turns that it waits, with all it leads.
     pub(super) fn tell_wait(&self, took: Took) {
-        self.shared.told.turn(|| Turn {
+        self.shared.streams.turn(|| Turn {
             begun: took.begun,
             ended: took.ended,
             time: self.pace.time(),
