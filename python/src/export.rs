@@ -1,9 +1,9 @@
-//! Moments of a world as files that other programs open.
+//! Moments of a world, and when its objects stepped, as files that other programs open.
 //!
-//! In: a world, paths. Out: an MCAP file, a VTK series. Never here: what is in them.
+//! In: a world, paths. Out: an MCAP file, a VTK series, a Perfetto trace. Never here: what is in them.
 
 use crate::raised;
-use metachron::export::{McapFile, MomentWriter, Moments, Surface, VtkSeries};
+use metachron::export::{McapFile, MomentWriter, Moments, PerfettoFile, Surface, VtkSeries};
 use metachron::world::World;
 use pyo3::exceptions::{PyRuntimeError, PyValueError};
 use pyo3::prelude::*;
@@ -20,11 +20,20 @@ pub struct Export {
 struct Files {
     moments: Moments,
     writers: Vec<Box<dyn MomentWriter + Send>>,
+    trace: Option<PerfettoFile>,
+}
+
+/// Where they are written.
+pub struct Paths {
+    pub mcap: Option<PathBuf>,
+    pub vtk: Option<PathBuf>,
+    pub perfetto: Option<PathBuf>,
 }
 
 impl Export {
     /// Begins the files; `fixed` is the surface of what never moves.
-    pub fn create(world: &World, fixed: &Surface, mcap: Option<PathBuf>, vtk: Option<PathBuf>) -> PyResult<Self> {
+    pub fn create(world: &World, fixed: &Surface, paths: Paths) -> PyResult<Self> {
+        let Paths { mcap, vtk, perfetto } = paths;
         let mut writers: Vec<Box<dyn MomentWriter + Send>> = Vec::new();
         if let Some(path) = mcap {
             writers.push(Box::new(McapFile::create(&path, fixed).map_err(raised::export)?));
@@ -32,12 +41,14 @@ impl Export {
         if let Some(path) = vtk {
             writers.push(Box::new(VtkSeries::create(&path, fixed).map_err(raised::export)?));
         }
-        if writers.is_empty() {
+        let trace = perfetto.map(|path| PerfettoFile::create(&path, world)).transpose().map_err(raised::export)?;
+        if writers.is_empty() && trace.is_none() {
             return Err(PyValueError::new_err(
-                "nothing would be written: name a file for mcap, a folder for vtk, or both",
+                "nothing would be written: name a file for mcap or perfetto, or a folder for vtk",
             ));
         }
-        Ok(Self { world: world.clone(), files: Mutex::new(Some(Files { moments: Moments::default(), writers })) })
+        let files = Files { moments: Moments::default(), writers, trace };
+        Ok(Self { world: world.clone(), files: Mutex::new(Some(files)) })
     }
 }
 
@@ -47,19 +58,24 @@ impl Export {
     fn write(&self, py: Python<'_>) -> PyResult<()> {
         py.detach(|| {
             let mut files = self.files.lock().unwrap_or_else(PoisonError::into_inner);
-            let Some(Files { moments, writers }) = &mut *files else {
+            let Some(Files { moments, writers, trace }) = &mut *files else {
                 return Err(PyRuntimeError::new_err("the files are complete; nothing more can be written"));
             };
-            let moment = moments.take(&self.world);
-            writers.iter_mut().try_for_each(|writer| writer.write(&moment)).map_err(raised::export)
+            if !writers.is_empty() {
+                let moment = moments.take(&self.world);
+                writers.iter_mut().try_for_each(|writer| writer.write(&moment)).map_err(raised::export)?;
+            }
+            trace.as_mut().map_or(Ok(()), |trace| trace.write(None)).map_err(raised::export)
         })
     }
 
     /// Completes the files.
     fn close(&self) -> PyResult<()> {
         let files = self.files.lock().unwrap_or_else(PoisonError::into_inner).take();
-        let mut writers = files.map(|files| files.writers).unwrap_or_default();
-        writers.iter_mut().try_for_each(|writer| writer.finish()).map_err(raised::export)
+        let Some(Files { mut writers, trace, .. }) = files else { return Ok(()) };
+        let moments = writers.iter_mut().try_for_each(|writer| writer.finish());
+        let trace = trace.map_or(Ok(()), |mut trace| trace.finish());
+        moments.and(trace).map_err(raised::export)
     }
 
     fn __enter__(slf: Py<Self>) -> Py<Self> {

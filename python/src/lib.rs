@@ -11,8 +11,10 @@ mod numbers;
 mod object;
 mod queries;
 mod raised;
+mod recording;
 mod rollout;
 mod scene;
+mod soft;
 mod state;
 mod world;
 
@@ -29,6 +31,8 @@ mod _metachron {
     use crate::object::Object;
     #[pymodule_export]
     use crate::queries::{Contact, Hit};
+    #[pymodule_export]
+    use crate::recording::replay;
     #[pymodule_export]
     use crate::rollout::{Rollout, rollout};
     #[pymodule_export]

@@ -5,7 +5,7 @@
 
 use metachron::export::ExportError;
 use metachron::scene::{SceneError, SceneProblem};
-use metachron::world::{CheckpointError, SceneBuildError, WorldError};
+use metachron::world::{CheckpointError, RecordError, SceneBuildError, WorldError};
 use pyo3::exceptions::{PyKeyError, PyOSError, PyOverflowError, PyRuntimeError, PyValueError};
 use pyo3::{PyErr, Python};
 
@@ -47,6 +47,16 @@ pub fn checkpoint(error: CheckpointError) -> PyErr {
         CheckpointError::File { .. } => PyOSError::new_err(message),
         CheckpointError::BadFile { .. } | CheckpointError::OtherScene { .. } => PyValueError::new_err(message),
         CheckpointError::Start(error) => exception(&error, message),
+        _ => PyRuntimeError::new_err(message),
+    }
+}
+
+/// Why a world is not recorded, or a recording cannot be read.
+pub fn record(error: RecordError) -> PyErr {
+    let message = error.to_string();
+    match error {
+        RecordError::File { .. } | RecordError::Write(_) => PyOSError::new_err(message),
+        RecordError::BadFile { .. } => PyValueError::new_err(message),
         _ => PyRuntimeError::new_err(message),
     }
 }

@@ -6,11 +6,12 @@
 use crate::numbers::{Rotation, Vector};
 use crate::object::Names;
 use crate::raised;
+use crate::soft::soft;
 use crate::world::World;
 use metachron::contact::joint::JointKind;
 use metachron::geometry::Solid;
 use metachron::scene::{Source, load};
-use metachron::world::{self, Part, Rigid, SceneBuilder, Tube};
+use metachron::world::{self, Part, Rigid, SceneBuilder, SceneText, Tube};
 use pyo3::conversion::FromPyObjectOwned;
 use pyo3::exceptions::{PyTypeError, PyValueError};
 use pyo3::prelude::*;
@@ -29,7 +30,8 @@ const ENDS: [&str; 2] = ["start", "end"];
 
 enum Inner {
     Built(SceneBuilder),
-    Read(Box<world::Scene>),
+    /// As it was read, and its text.
+    Read(Box<world::Scene>, Box<SceneText>),
 }
 
 /// What every solid says of itself; `None` where the engine's default stands.
@@ -96,8 +98,15 @@ impl Scene {
                 Source::open(&path.to_string_lossy())
             }
         };
-        let scene = source.and_then(|source| load(&source, &[])).map_err(|error| raised::scene(&error))?;
-        Ok(Self { inner: Inner::Read(Box::new(scene)), joints: Vec::new() })
+        let source = source.map_err(|error| raised::scene(&error))?;
+        let scene = load(&source, &[]).map_err(|error| raised::scene(&error))?;
+        let text = SceneText {
+            name: source.name().to_owned(),
+            text: source.text().to_owned(),
+            folder: source.folder().map(|folder| folder.to_string_lossy().into_owned()),
+            overrides: Vec::new(),
+        };
+        Ok(Self { inner: Inner::Read(Box::new(scene), Box::new(text)), joints: Vec::new() })
     }
 
     /// Adds a solid that never moves.
@@ -125,7 +134,7 @@ impl Scene {
         Ok(slf)
     }
 
-    /// Adds a rigid body or a tube.
+    /// Adds what moves: a rigid body, a tube, a sheet, a solid or a rope.
     fn add<'py>(mut slf: PyRefMut<'py, Self>, name: String, what: &Bound<'py, PyAny>) -> PyResult<PyRefMut<'py, Self>> {
         let part = part(what)?;
         slf.build(|builder| builder.add(name, part))?;
@@ -153,7 +162,11 @@ impl Scene {
     /// Starts a world of it, whose time stands at first. Raises `ValueError` for what cannot be built.
     #[pyo3(signature = (executor = "lockstep"))]
     pub fn start(&self, py: Python<'_>, executor: &str) -> PyResult<World> {
-        World::start(py, &self.resolved()?, executor)
+        let text = match &self.inner {
+            Inner::Built(_) => None,
+            Inner::Read(_, text) => Some((**text).clone()),
+        };
+        World::start(py, &self.resolved()?, executor, text)
     }
 }
 
@@ -162,7 +175,7 @@ impl Scene {
     pub fn resolved(&self) -> PyResult<world::Scene> {
         match &self.inner {
             Inner::Built(builder) => builder.clone().build().map_err(|error| raised::build(&error)),
-            Inner::Read(scene) => Ok((**scene).clone()),
+            Inner::Read(scene, _) => Ok((**scene).clone()),
         }
     }
 
@@ -177,20 +190,23 @@ impl Scene {
 }
 
 /// A field of a part.
-fn field<'py, T: FromPyObjectOwned<'py>>(part: &Bound<'py, PyAny>, name: &str) -> PyResult<T> {
+pub fn field<'py, T: FromPyObjectOwned<'py>>(part: &Bound<'py, PyAny>, name: &str) -> PyResult<T> {
     let wrong = |error: T::Error| raised::of_argument(part.py(), &format!("field '{name}'"), &error.into());
     part.getattr(name)?.extract().map_err(wrong)
 }
 
 /// The class of a part.
-fn class(part: &Bound<'_, PyAny>) -> PyResult<String> {
+pub fn class(part: &Bound<'_, PyAny>) -> PyResult<String> {
     Ok(part.get_type().name()?.to_string())
 }
 
-/// What moves: a rigid body or a tube.
+/// What moves: a rigid body, a tube or a soft body.
 pub fn part(part: &Bound<'_, PyAny>) -> PyResult<Part> {
     if class(part)? == "Tube" {
         return Ok(tube(part)?.into());
+    }
+    if let Some(soft) = soft(part)? {
+        return Ok(soft.into());
     }
     let (solid, placed) = (shape(part)?, Placed::of(part)?);
     let Some(moving) = Moving::of(part)? else {
@@ -227,7 +243,8 @@ fn shape(part: &Bound<'_, PyAny>) -> PyResult<Solid> {
         "Cylinder" => Solid::Cylinder { radius_m: number("radius")?, half_height_m: number("half_height")? },
         other => {
             let message = format!(
-                "a solid is a Plane, Ball, Box, Capsule or Cylinder, and what moves may be a Tube; got a {other}"
+                "a solid is a Plane, Ball, Box, Capsule or Cylinder, and what moves may be a Tube, Sheet, SoftBox, SoftBall, SoftMesh or Rope; \
+                 got a {other}"
             );
             return Err(PyTypeError::new_err(message));
         }

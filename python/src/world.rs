@@ -6,7 +6,7 @@
 use crate::checkpoint::Checkpoint;
 use crate::command::Keywords;
 use crate::events::Events;
-use crate::export::Export;
+use crate::export::{Export, Paths};
 use crate::numbers::{Rotation, Vector, span};
 use crate::object::{Named, Object};
 use crate::queries::{Contact, Hit};
@@ -16,14 +16,15 @@ use crate::state::State;
 use glam::{DQuat, DVec3};
 use metachron::contact::joint::{Motor, MotorGoal};
 use metachron::core::SimSpan;
-use metachron::export::Surface;
+use metachron::export::{Moments, Surface, write_glb};
 use metachron::runtime::{AgentState, TimelineCommand};
 use metachron::world::kinds::ExecutorKind;
-use metachron::world::{self, Command, EventFilter};
+use metachron::world::{self, Command, EventFilter, RecordError, SceneText};
 use numpy::PyArray1;
-use pyo3::exceptions::{PyKeyError, PyTypeError, PyValueError};
+use pyo3::exceptions::{PyKeyError, PyRuntimeError, PyTypeError, PyValueError};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
+use std::fs::File;
 use std::path::PathBuf;
 use std::sync::Arc;
 
@@ -36,6 +37,8 @@ pub struct World {
     /// Their surface.
     fixed_surface: Surface,
     joints: Vec<Joint>,
+    /// The text of its scene; `None` of one that was built of parts.
+    text: Option<SceneText>,
 }
 
 /// A joint that a motor may drive.
@@ -76,19 +79,24 @@ type Given<'py> = Bound<'py, PyDict>;
 
 impl World {
     /// Starts a scene.
-    pub fn start(py: Python<'_>, scene: &world::Scene, executor: &str) -> PyResult<Self> {
+    pub fn start(py: Python<'_>, scene: &world::Scene, executor: &str, text: Option<SceneText>) -> PyResult<Self> {
         let Some(kind) = EXECUTORS.into_iter().find(|kind| kind.name() == executor) else {
             let known = EXECUTORS.map(ExecutorKind::name).join(", ");
             return Err(PyValueError::new_err(format!("there is no executor {executor:?}; expected one of {known}")));
         };
         let inner = py.detach(|| world::World::start(scene, kind)).map_err(raised::world)?;
+        Self::of(inner, scene, text)
+    }
+
+    /// A world that was started of this scene.
+    pub fn of(inner: world::World, scene: &world::Scene, text: Option<SceneText>) -> PyResult<Self> {
         let joints = scene.joints.iter().zip(&scene.joint_names).map(|(joint, name)| {
             let body = inner.object_of(joint.a).map_err(raised::world)?;
             Ok(Joint { name: Some(name.clone()).filter(|name| !name.is_empty()), body })
         });
         let joints = joints.collect::<PyResult<_>>()?;
         let fixed = scene.obstacles.iter().map(|solid| solid.name.clone()).collect();
-        Ok(Self { inner, fixed, fixed_surface: Surface::fixed(scene), joints })
+        Ok(Self { inner, fixed, fixed_surface: Surface::fixed(scene), joints, text })
     }
 
     fn send(&self, object: &Named<'_>, command: Command) -> PyResult<()> {
@@ -337,10 +345,42 @@ impl World {
         self.inner.remove(object.of(&self.inner)?).map_err(raised::world)
     }
 
-    /// Begins files of moments for other programs: MCAP for Foxglove, Lichtblick and Rerun, a folder with a VTK series for ParaView.
-    #[pyo3(signature = (*, mcap = None, vtk = None))]
-    fn export(&self, mcap: Option<PathBuf>, vtk: Option<PathBuf>) -> PyResult<Export> {
-        Export::create(&self.inner, &self.fixed_surface, mcap, vtk)
+    /// Begins files for other programs: moments as MCAP for Foxglove, Lichtblick and Rerun, or in a folder as a VTK series for ParaView; for
+    /// ui.perfetto.dev when each object stepped.
+    #[pyo3(signature = (*, mcap = None, vtk = None, perfetto = None))]
+    fn export(&self, mcap: Option<PathBuf>, vtk: Option<PathBuf>, perfetto: Option<PathBuf>) -> PyResult<Export> {
+        Export::create(&self.inner, &self.fixed_surface, Paths { mcap, vtk, perfetto })
+    }
+
+    /// Writes the surfaces of all objects, as they are now, as binary glTF (.glb). Raises `OSError`.
+    fn write_glb(&self, py: Python<'_>, path: PathBuf) -> PyResult<()> {
+        let write = || write_glb(&path, &Moments::default().take(&self.inner), &self.fixed_surface);
+        py.detach(write).map_err(raised::export)
+    }
+
+    /// Writes down from now on, in lockstep, what is done to it, so that `replay` repeats it to the bit. Raises `OSError`; `RuntimeError` on
+    /// other executors.
+    fn record(&self, py: Python<'_>, path: PathBuf) -> PyResult<()> {
+        py.detach(|| match &self.text {
+            Some(text) if self.inner.executor() == ExecutorKind::Lockstep => {
+                let file = File::create(&path).map_err(|error| RecordError::File { path, error })?;
+                self.inner.record_to(Box::new(file), Some(text.clone()))
+            }
+            _ => self.inner.record(&path),
+        })
+        .map_err(raised::record)
+    }
+
+    /// Ends the recording, as `stop` does; whether there was one. Raises `OSError` if not all of it could be written.
+    fn end_recording(&self, py: Python<'_>) -> PyResult<bool> {
+        py.detach(|| self.inner.end_recording()).map_err(raised::record)
+    }
+
+    /// The share of its recording that it has played, 0 ... 1; `None` of a world that is no replay. Raises `RuntimeError` where the replay
+    /// came to something that the recorded world did not.
+    #[getter]
+    fn replayed(&self, py: Python<'_>) -> PyResult<Option<f64>> {
+        py.detach(|| self.inner.replayed()).transpose().map_err(PyRuntimeError::new_err)
     }
 
     /// Listens from now on: to contacts of at least `above` newtons, to changes of state, of all objects or one.

@@ -1,6 +1,7 @@
 """Files of moments, opened by readers that are not ours."""
 
 import json
+import struct
 from pathlib import Path
 
 import meshio
@@ -53,12 +54,44 @@ def test_meshio_reads_the_surfaces(tmp_path: Path) -> None:
         assert np.ptp(mesh.point_data["velocity"], axis=0) == pytest.approx([0.0, 0.0, 0.0])
 
 
+def test_a_trace_has_every_step(tmp_path: Path) -> None:
+    file = tmp_path / "trace.json"
+    with scenes.falling().start() as world, world.export(perfetto=file) as export:
+        for _ in range(MOMENTS):
+            world.advance(0.05)
+            export.write()
+        end = world.state("ball").time
+    events = json.loads(file.read_text())
+    lanes = {event["tid"]: event["args"]["name"] for event in events if event["name"] == "thread_name" and event["pid"] == 2}
+    assert list(lanes.values()) == ["ball"]
+    steps = [event for event in events if event["ph"] == "X"]
+    assert {event["name"] for event in steps} == {"step"}
+    assert sum(step["args"]["dt_ms"] for step in steps) == pytest.approx(1e3 * end)
+    assert all(left["ts"] + left["dur"] <= right["ts"] for left, right in zip(steps, steps[1:], strict=False))
+
+
+def test_glb_has_its_tables(tmp_path: Path) -> None:
+    world = scenes.tube().start()
+    world.advance(0.05)
+    world.write_glb(tmp_path / "now.glb")
+    data = (tmp_path / "now.glb").read_bytes()
+    magic, version, length, tables_length, kind = struct.unpack_from("<4sIII4s", data)
+    assert (magic, version, length, kind) == (b"glTF", 2, len(data), b"JSON")
+    tables = json.loads(data[20 : 20 + tables_length])
+    assert [node["name"] for node in tables["nodes"]] == ["fixed", "gut", "metachron"]
+    top = max(tables["accessors"][0]["max"][2], tables["accessors"][3]["max"][2])
+    gut = world.state("gut").positions
+    assert top == pytest.approx(gut[:, 2].max() + 0.015, abs=1e-3)
+    with pytest.raises(OSError, match="cannot be written"):
+        world.write_glb(tmp_path / "no" / "now.glb")
+
+
 def test_bad_files_are_told(tmp_path: Path) -> None:
     write(tmp_path)
     world = scenes.falling().start()
     with pytest.raises(ValueError, match="nothing would be written"):
         world.export()
-    with pytest.raises(ValueError, match="already holds a series"):
+    with pytest.raises(ValueError, match="would overwrite"):
         world.export(vtk=tmp_path / "vtk")
     with pytest.raises(OSError, match="cannot be written"):
         world.export(mcap=tmp_path / "no" / "run.mcap")

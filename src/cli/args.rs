@@ -202,9 +202,14 @@ pub struct ImportArgs {
 }
 
 impl OutputArgs {
-    /// Where the moments of the run are written.
+    /// Where files of the run for other programs are written.
     pub(super) fn exports(&self) -> ExportPaths {
-        ExportPaths { mcap: self.mcap.clone(), vtk: self.vtk.clone() }
+        ExportPaths {
+            mcap: self.mcap.clone(),
+            vtk: self.vtk.clone(),
+            glb: self.glb.clone(),
+            perfetto: self.perfetto.clone(),
+        }
     }
 }
 
@@ -298,9 +303,16 @@ pub struct OutputArgs {
     /// Write every frame's states and surfaces here as MCAP, which Foxglove, Lichtblick and Rerun open. Needs --headless
     #[arg(long, value_name = "FILE", value_hint = ValueHint::FilePath)]
     pub mcap: Option<PathBuf>,
-    /// Write every frame's surfaces into this folder as a VTK series, which ParaView opens (series.pvd). Needs --headless
+    /// Write every frame's surfaces into this folder as a VTK series, which ParaView opens (series.pvd); nothing is overwritten. Needs --headless
     #[arg(long, value_name = "FOLDER", value_hint = ValueHint::DirPath)]
     pub vtk: Option<PathBuf>,
+    /// Write the last moment's surfaces here as binary glTF, which Blender, browsers and game engines open. Needs --headless
+    #[arg(long, value_name = "FILE", value_hint = ValueHint::FilePath)]
+    pub glb: Option<PathBuf>,
+    /// Write here when each object stepped and waited, the frames and their parts, and events (JSON, which ui.perfetto.dev opens); 256 MiB at
+    /// most. Needs --headless
+    #[arg(long, value_name = "FILE", value_hint = ValueHint::FilePath)]
+    pub perfetto: Option<PathBuf>,
     /// Style of headless pictures: wireframe, or contact forces, or colours by resolution, age, detail or depth; several are separated by commas
     #[arg(long, value_name = "STYLE", value_delimiter = ',')]
     pub style: Vec<StyleWord>,

@@ -28,7 +28,7 @@ pub(super) fn command(args: &ImportArgs) -> anyhow::Result<Exit> {
     }
     // a model may have numbers that are beyond those of scenes, and a mesh that is none
     let name = scene_folder.join("imported.toml");
-    let checked = Source::recorded(&name.to_string_lossy(), &toml).and_then(|source| load(&source, &[]));
+    let checked = Source::recorded(&name.to_string_lossy(), &toml, name.parent()).and_then(|source| load(&source, &[]));
     if let Err(error) = checked {
         message(&rendered(&error));
         return Ok(Exit::BadInput);

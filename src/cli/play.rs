@@ -6,6 +6,7 @@ use super::devices;
 use super::exports::Exports;
 use super::run::{Played, Request, RunLength, Step};
 use anyhow::Context;
+use metachron_console::output::BadInput;
 use metachron_core::{AgentId, AttachmentEvent, ClusterState, ContactPartner, SensorTouch};
 use metachron_lod::Bound;
 use metachron_render::Size;
@@ -33,8 +34,13 @@ use std::path::{Path, PathBuf};
 /// Begins to write down what is done to the run.
 fn record(session: &Session, path: &Path, request: &Request) -> anyhow::Result<()> {
     let file = File::create(path).with_context(|| format!("the recording {} cannot be written", path.display()))?;
-    let (name, text) = (request.source.name().to_owned(), request.source.text().to_owned());
-    Ok(session.begin_recording(Box::new(file), SceneText { name, text, overrides: request.overrides.clone() })?)
+    let scene = SceneText {
+        name: request.source.name().to_owned(),
+        text: request.source.text().to_owned(),
+        folder: request.source.folder().map(|folder| folder.to_string_lossy().into_owned()),
+        overrides: request.overrides.clone(),
+    };
+    Ok(session.begin_recording(Box::new(file), scene)?)
 }
 
 /// Called for every frame; returns whether to go on.
@@ -83,7 +89,7 @@ fn in_window(mut session: Session, request: &Request, go_on: GoOn<'_>) -> anyhow
         Ok(outcome) => Ok(played(&request.scene, outcome, None)),
         Err(WindowFailure::NoWindow(session, why)) => without_window(*session, &why, request, go_on),
         Err(WindowFailure::Gone(outcome, why)) => {
-            Ok(Played { window_gone: Some(why.to_string()), ..played(&request.scene, *outcome, None) })
+            Ok(Played { failure: Some(why.to_string()), ..played(&request.scene, *outcome, None) })
         }
         Err(WindowFailure::Session(error)) => Err(error.into()),
     }
@@ -148,11 +154,13 @@ pub(super) fn headless(
     // the second run takes about as long as the first, so each is half of the whole
     let half = if request.oracle { 0.5 } else { 1.0 };
     let mut exports = Exports::create(&request.exports, &request.scene, session.world())?;
-    let outcome =
-        play_headless(session, plan, &mut |record, done| exports.take() && go_on(step(record, Some(half * done))))?;
-    exports.finish()?;
-    if !request.oracle || outcome.interrupted {
-        return Ok(Played { oracle: request.oracle, ..played(&request.scene, outcome, picture) });
+    let outcome = play_headless(session, plan, &mut |record, done| {
+        exports.take(record) && go_on(step(record, Some(half * done)))
+    })?;
+    let unwritten = exports.finish().err().map(|error| error.to_string());
+    if !request.oracle || outcome.interrupted || outcome.unwritten.is_some() {
+        let played = played(&request.scene, outcome, picture);
+        return Ok(Played { oracle: request.oracle, failure: played.failure.clone().or(unwritten), ..played });
     }
     let last = outcome.frames.last().copied().unwrap_or_default();
     let oracle =
@@ -204,6 +212,12 @@ fn drawing(session: &Session, request: &Request, picture: bool, size: Size) -> a
     }
     let options = RendererOptions::for_adapter(&gpu.info);
     Ok(Drawing::Every(Box::new(Offscreen::new(gpu, size, options)?)))
+}
+
+/// An error with what caused it, in a line.
+fn shown_with_causes(error: &dyn std::error::Error) -> String {
+    let causes = std::iter::successors(error.source(), |cause| cause.source());
+    causes.fold(error.to_string(), |text, cause| format!("{text}: {cause}"))
 }
 
 fn step(record: &FrameRecord, done: Option<f64>) -> Step {
@@ -259,7 +273,7 @@ fn played(scene: &Scene, outcome: Outcome, picture: Option<PathBuf>) -> Played {
         report,
         frames: outcome.frames,
         no_window: None,
-        window_gone: None,
+        failure: outcome.unwritten.map(|error| shown_with_causes(&*error)),
         picture,
         unpriced,
         oracle: false,

@@ -12,6 +12,7 @@ use metachron_core::{SimSpan, SimTime};
 use metachron_scene::{Source, load};
 use metachron_session::Session;
 use metachron_world::{RecordError, Recording};
+use std::path::Path;
 
 /// Repeats a recording.
 pub(super) fn command(args: &ReplayArgs) -> anyhow::Result<Exit> {
@@ -22,11 +23,15 @@ pub(super) fn command(args: &ReplayArgs) -> anyhow::Result<Exit> {
         let why = "it was recorded by a program that has built its scene, which only that program can start";
         BadInput(format!("{path}: {why} (World::replay)"))
     })?;
-    let source = Source::recorded(&scene.name, &scene.text)?;
+    let source = Source::recorded(&scene.name, &scene.text, scene.folder.as_deref().map(Path::new))?;
     let overrides = scene.overrides.clone();
     if !args.output.quiet && !recording.is_complete() {
-        let lost = recording.lost_bytes();
-        message(&format!("{path} was cut short: it is repeated to its last whole chunk; {lost} bytes are left out"));
+        let what = if recording.is_damaged() { "is damaged" } else { "was cut short" };
+        let left_out = match recording.lost_bytes() {
+            0 => String::new(),
+            lost => format!("; {lost} bytes are left out"),
+        };
+        message(&format!("{path} {what}: it is repeated to its last whole chunk{left_out}"));
     }
     let request = Request {
         scene: load(&source, &overrides)?,

@@ -13,6 +13,7 @@ use clap::parser::ValueSource;
 use metachron_console::exit::Exit;
 use metachron_console::output::{BadInput, data, message, print_overlaps, warn_priority};
 use metachron_console::progress::Bar;
+use metachron_export::VtkSeries;
 use metachron_render::{Colouring, Style};
 use metachron_scene::{Source, load};
 use metachron_session::FrameRecord;
@@ -87,8 +88,8 @@ pub struct Played {
     pub frames: Vec<FrameRecord>,
     /// Why a requested window could not be opened.
     pub no_window: Option<String>,
-    /// Why the open window was lost; the run ended there.
-    pub window_gone: Option<String>,
+    /// Why the run ended early: the open window was lost, or a file could not be written. What was done until then counts.
+    pub failure: Option<String>,
     /// The file of the picture.
     pub picture: Option<PathBuf>,
     /// Whether levels were chosen by default prices of drawing, because there was no time to measure the adapter's.
@@ -152,7 +153,7 @@ pub(super) fn finish(
     })?;
     drop(bar);
     write_all(output, &played)?;
-    match &played.window_gone {
+    match &played.failure {
         Some(why) => Err(anyhow::anyhow!("{why}")),
         None => judge(output, &played),
     }
@@ -228,8 +229,14 @@ fn check_inputs(args: &RunArgs) -> anyhow::Result<()> {
         return Err(BadInput(why.to_owned()).into());
     }
     let output = &args.output;
-    let files =
-        [("--depth", &output.depth), ("--video", &output.video), ("--mcap", &output.mcap), ("--vtk", &output.vtk)];
+    let files = [
+        ("--depth", &output.depth),
+        ("--video", &output.video),
+        ("--mcap", &output.mcap),
+        ("--vtk", &output.vtk),
+        ("--glb", &output.glb),
+        ("--perfetto", &output.perfetto),
+    ];
     if let Some((flag, _)) = files.iter().find(|(_, path)| path.is_some() && !args.headless) {
         return Err(BadInput(format!("{flag} needs a run without a window; add --headless")).into());
     }
@@ -252,6 +259,8 @@ pub(super) fn check_outputs(
         ("--depth", args.depth.as_deref()),
         ("--video", args.video.as_deref()),
         ("--mcap", args.mcap.as_deref()),
+        ("--glb", args.glb.as_deref()),
+        ("--perfetto", args.perfetto.as_deref()),
         ("--frames-csv", args.frames_csv.as_deref()),
         ("--record", record),
     ];
@@ -263,6 +272,10 @@ pub(super) fn check_outputs(
             .into());
         }
     }
+    if args.vtk.as_deref() == Some(Path::new("-")) {
+        return Err(BadInput("--vtk - would be a folder called -; name another".to_owned()).into());
+    }
+    args.vtk.as_deref().map_or(Ok(()), check_series)?;
     let report = ("--report", args.report.as_deref().filter(|path| *path != Path::new("-")));
     let outputs = [report].into_iter().chain(files);
     for path in outputs.clone().filter_map(|(_, path)| path) {
@@ -274,16 +287,28 @@ pub(super) fn check_outputs(
             return Err(BadInput(format!("{} is a folder; expected a file", path.display())).into());
         }
     }
-    check_distinct(inputs.iter().copied().chain(outputs), inputs.len())?;
+    let series: Vec<_> = args.vtk.iter().flat_map(|folder| VtkSeries::FILES.map(|name| folder.join(name))).collect();
+    let series = series.iter().map(|path| ("--vtk", Some(path.as_path())));
+    check_distinct(inputs.iter().copied().chain(outputs).chain(series), inputs.len())?;
     check_extension(args)
 }
 
-/// Refuses a picture or film whose file has the ending of something else.
+/// Refuses a folder for a series that holds files of its names, or cannot be one.
+fn check_series(folder: &Path) -> anyhow::Result<()> {
+    let there = folder.ancestors().find(|path| path.exists());
+    if let Some(file) = there.filter(|path| !path.is_dir()) {
+        return Err(BadInput(format!("{} is a file; --vtk expects a folder", file.display())).into());
+    }
+    VtkSeries::check(folder).map_err(|error| BadInput(error.to_string()).into())
+}
+
+/// Refuses a picture, film or mesh whose file has the ending of something else.
 fn check_extension(args: &OutputArgs) -> anyhow::Result<()> {
     let outputs = [
         ("--png", &args.png, "PNG picture", "png"),
         ("--depth", &args.depth, "PNG picture", "png"),
         ("--video", &args.video, "YUV4MPEG2 film", "y4m"),
+        ("--glb", &args.glb, "binary glTF", "glb"),
     ];
     for (flag, path, what, ending) in outputs {
         let other = |path: &&PathBuf| path.extension().is_some_and(|found| !found.eq_ignore_ascii_case(ending));

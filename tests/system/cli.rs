@@ -220,6 +220,9 @@ fn wrong_usage_ends_with_two_and_says_what_is_right() {
         (&["run", "--headless", "--report", "a.png", "--png", "./a.png"], "--png ./a.png would overwrite --report"),
         (&["run", "--headless", "--png", "a.png", "--frames-csv", "a.png"], "would overwrite --png"),
         (&["run", "--headless", "--png", "a.jpg"], "ends in .png"),
+        (&["run", "--headless", "--vtk", "-"], "--vtk -"),
+        (&["run", "--headless", "--vtk", "Cargo.toml/series"], "expects a folder"),
+        (&["run", "--headless", "--vtk", "a", "--frames-csv", "a/objects.csv"], "the folder of a/objects.csv"),
         (&["bench", "agents", "--agents", "0", "--out", "target"], "no case"),
         (&["check"], "SCENE"),
     ] {
@@ -289,12 +292,55 @@ fn a_recorded_run_is_repeated_to_the_same_state_and_a_cut_file_as_far_as_it_goes
     assert!((until_s - 1.5).abs() < 1e-6, "{until_s} s");
     let bytes = std::fs::read(&record).unwrap();
     std::fs::write(&cut, &bytes[..bytes.len() - 5]).unwrap();
-    let (_, cut_s) = hash(&metachron(&["replay", &cut, "--report", "-", "--quiet"]));
-    assert!(cut_s > 0.0 && cut_s < 3.0, "{cut_s} s");
+    let shorter = metachron(&["replay", &cut, "--report", "-"]);
+    let (_, cut_s) = hash(&shorter);
+    assert!(cut_s > 0.0 && cut_s < 3.0 && err(&shorter).contains("cut short"), "{cut_s} s: {}", err(&shorter));
+    let mut damaged = bytes;
+    *damaged.last_mut().unwrap() ^= 1;
+    std::fs::write(&cut, damaged).unwrap();
+    let said = err(&metachron(&["replay", &cut]));
+    assert!(said.contains("is damaged") && !said.contains("cut short"), "{said}");
     std::fs::write(&cut, b"something else").unwrap();
     assert_eq!(code(&metachron(&["replay", &cut])), 2);
     let threads = ["run", "pendulum", "--headless", "--executor", "threads", "--seconds", "0.5", "--record", &cut];
     hash(&metachron(&[&threads[..], &["--report", "-", "--quiet"]].concat()));
     // it ends with an error where a state is another one than in the recording
     hash(&metachron(&["replay", &cut, "--report", "-", "--quiet"]));
+}
+
+/// A file may have 400 blocks, some 200 or 400 kB: it is as if the disk were full where it would have more.
+#[cfg(unix)]
+#[test]
+fn a_disk_that_is_full_ends_the_run_which_is_reported_up_to_there() {
+    let folder = tempfile::tempdir().unwrap();
+    let run = "ulimit -f 400; trap '' XFSZ; exec \"$0\" run pendulum --headless --executor lockstep --seconds 600 \
+               --mcap run.mcap --report report.json --frames-csv frames.csv";
+    let mut shell = std::process::Command::new("sh");
+    shell.args(["-c", run, env!("CARGO_BIN_EXE_metachron")]).current_dir(folder.path());
+    let done = shell.output().unwrap();
+    let said = err(&done);
+    assert_eq!((code(&done), said.matches("os error").count()), (1, 1), "{said}");
+    assert!(said.contains("run.mcap cannot be written"), "{said}");
+    let report = std::fs::read_to_string(folder.path().join("report.json")).unwrap();
+    let report: serde_json::Value = serde_json::from_str(&report).unwrap();
+    let frames = report["frames"].as_u64().unwrap();
+    assert!(frames > 0 && frames < 1000, "{frames}");
+    let rows = std::fs::read_to_string(folder.path().join("frames.csv")).unwrap();
+    assert_eq!(rows.lines().count() as u64, 1 + frames);
+}
+
+#[test]
+fn a_replay_finds_the_meshes_of_its_scene_from_any_folder() {
+    let folder = tempfile::tempdir().unwrap();
+    let scene = "format = 1\nexecutor = \"lockstep\"\nobject = [{ name = \"a\", model = \"rigid\", shape = \"mesh\", file = \"a.obj\" }]\n";
+    let mesh = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 1 4 3\nf 2 3 4\n";
+    for (name, text) in [("a.toml", scene), ("a.obj", mesh)] {
+        std::fs::write(folder.path().join(name), text).unwrap();
+    }
+    let arguments = ["run", "a.toml", "--headless", "--frames", "3", "--record", "a.rec", "--quiet"];
+    let mut run = std::process::Command::new(env!("CARGO_BIN_EXE_metachron"));
+    let recorded = run.args(arguments).current_dir(folder.path()).output().unwrap();
+    assert_eq!(code(&recorded), 0, "{}", err(&recorded));
+    let again = metachron(&["replay", folder.path().join("a.rec").to_str().unwrap(), "--quiet"]);
+    assert_eq!(code(&again), 0, "{}", err(&again));
 }

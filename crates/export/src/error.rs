@@ -6,17 +6,17 @@ use std::path::{Path, PathBuf};
 #[derive(Debug, thiserror::Error)]
 pub enum ExportError {
     /// A file or folder that cannot be made or written.
-    #[error("{} cannot be written: {source}", path.display())]
+    #[error("{} cannot be written: {error}", path.display())]
     File {
         /// The file or folder.
         path: PathBuf,
         /// Why.
-        source: std::io::Error,
+        error: std::io::Error,
     },
-    /// A folder for a series that already holds one, which would be mixed with the new one.
-    #[error("the folder {} already holds a series (series.pvd); name another, or remove it", path.display())]
+    /// A folder for a series that already holds a file of the names that a series has.
+    #[error("the series would overwrite {}; name another folder, or remove what is in this one", path.display())]
     Taken {
-        /// The folder.
+        /// The file.
         path: PathBuf,
     },
 }
@@ -24,6 +24,6 @@ pub enum ExportError {
 impl ExportError {
     /// For `map_err` of a call that concerns `path`.
     pub(super) fn at(path: &Path) -> impl Fn(std::io::Error) -> Self {
-        move |source| Self::File { path: path.to_owned(), source }
+        move |error| Self::File { path: path.to_owned(), error }
     }
 }

@@ -1,16 +1,18 @@
 //! MCAP files with Foxglove's scenes: opened by Foxglove, Lichtblick and Rerun.
 //!
-//! In: moments. Out: `/scene` (foxglove.SceneUpdate), `/tf` (foxglove.FrameTransform), `/state` (metachron.State), all in JSON.
-//! Never here: compression, other encodings.
+//! In: moments. Out: `/scene` (foxglove.SceneUpdate), `/tf` (foxglove.FrameTransform), `/state` (metachron.State), all in JSON,
+//! in chunks that LZ4 makes smaller.
+//! Never here: other encodings.
 
 use super::moment::ObjectMoment;
 use super::surface::Surface;
-use super::{ExportError, Moment, MomentWriter};
+use super::{ExportError, Moment, MomentWriter, colour};
 use glam::{DQuat, DVec3};
 use mcap::records::MessageHeader;
-use mcap::{McapError, WriteOptions, Writer};
+use mcap::{Compression, McapError, WriteOptions, Writer};
 use metachron_core::{AgentId, Body, SimTime};
 use serde_json::{Value, json};
+use std::borrow::Cow;
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs::File;
 use std::io::BufWriter;
@@ -18,13 +20,19 @@ use std::path::{Path, PathBuf};
 
 /// A chunk is closed, and what came before is safe from a crash, after so much simulated time.
 const CHUNK_S: f64 = 1.0;
+/// Points of surfaces are given to this part of a metre: a micrometre.
+const SHOWN_PER_M: f64 = 1e6;
 /// The frame that all others are in.
 const WORLD: &str = "world";
+/// The entity of what never moves.
+const FIXED: &str = "fixed";
 
 /// A file in MCAP.
 ///
 /// Times are simulated time since the start of the run.
-/// `/scene`: every object as a list of triangles; a rigid body's once, in a frame of its name, which `/tf` moves.
+/// `/scene`: every object as a list of triangles, its points to a micrometre; a rigid body's once, in a frame of its name, which `/tf` moves, and
+/// those of what bends whenever it has a new state.
+/// The frame and the entity of an object are called as it is; one called `world` or `fixed`, as ours are, has `_` behind its name there.
 /// `/state`: `{"name", "time", "snapshot"}` for every object that has a new state, the snapshot with all its fields
 /// (`metachron_core::Snapshot`). A file that was cut short opens up to about its last second.
 pub struct McapFile {
@@ -37,7 +45,7 @@ pub struct McapFile {
     rigid: BTreeSet<AgentId>,
     steps: BTreeMap<AgentId, u64>,
     /// What was in the scene a moment ago.
-    shown: BTreeMap<AgentId, std::sync::Arc<str>>,
+    shown: BTreeMap<AgentId, String>,
 }
 
 #[derive(Debug, Clone, Copy)]
@@ -60,7 +68,9 @@ impl McapFile {
     /// [`ExportError`] where it cannot be written.
     pub fn create(path: &Path, fixed: &Surface) -> Result<Self, ExportError> {
         let file = BufWriter::new(File::create(path).map_err(ExportError::at(path))?);
-        let options = WriteOptions::new().compression(None).library(concat!("metachron ", env!("CARGO_PKG_VERSION")));
+        let options = WriteOptions::new()
+            .compression(Some(Compression::Lz4))
+            .library(concat!("metachron ", env!("CARGO_PKG_VERSION")));
         let at = failed(path);
         let mut writer = options.create(file).map_err(&at)?;
         let mut channel = |topic: &str, name: &str, schema: &Value| {
@@ -76,7 +86,7 @@ impl McapFile {
         let path = path.to_owned();
         let mut it = Self { path, writer, channels, sequence: 0, flushed: SimTime::ZERO, rigid, steps, shown };
         let start = SimTime::ZERO;
-        let entity = entity("fixed", WORLD, start, fixed);
+        let entity = entity(FIXED, WORLD, start, fixed);
         it.put(channels.scene, start, &json!({ "deletions": [], "entities": [entity] }))?;
         Ok(it)
     }
@@ -92,25 +102,32 @@ impl McapFile {
         self.writer.write_to_known_channel(&header, message.to_string().as_bytes()).map_err(failed(&self.path))
     }
 
-    /// The entities of a moment: what bends is sent anew, a rigid body once.
+    /// The entities of a moment: what bends is sent anew with every new state, a rigid body once.
     fn scene(&mut self, moment: &Moment) -> Value {
         let mut entities = Vec::new();
         for object in moment.objects.iter().filter(|object| !object.surface.triangles.is_empty()) {
             if let Body::Rigid(body) = &object.state.body {
                 if self.rigid.insert(object.id) {
-                    let local = in_axes_of(&object.surface, body.position, body.rotation);
-                    entities.push(entity(&object.name, &object.name, moment.time, &local));
+                    let local = object.surface.in_axes_of(body.position, body.rotation);
+                    let name = name_of(object);
+                    entities.push(entity(&name, &name, moment.time, &local));
                 }
-            } else {
-                entities.push(entity(&object.name, WORLD, moment.time, &object.surface));
+            } else if self.is_new(object) {
+                entities.push(entity(&name_of(object), WORLD, moment.time, &object.surface));
             }
         }
-        let now: BTreeMap<_, _> = moment.objects.iter().map(|object| (object.id, object.name.clone())).collect();
+        let now: BTreeMap<_, _> =
+            moment.objects.iter().map(|object| (object.id, name_of(object).into_owned())).collect();
         let gone = self.shown.iter().filter(|(id, _)| !now.contains_key(id));
         let deletions: Vec<_> =
-            gone.map(|(_, name)| json!({ "timestamp": stamp(moment.time), "type": 0, "id": **name })).collect();
+            gone.map(|(_, name)| json!({ "timestamp": stamp(moment.time), "type": 0, "id": name })).collect();
         self.shown = now;
         json!({ "deletions": deletions, "entities": entities })
+    }
+
+    /// Whether the file does not hold the newest state of an object.
+    fn is_new(&self, object: &ObjectMoment) -> bool {
+        self.steps.get(&object.id) != Some(&object.state.steps)
     }
 
     fn transform(&mut self, time: SimTime, object: &ObjectMoment) -> Result<(), ExportError> {
@@ -118,7 +135,7 @@ impl McapFile {
         let message = json!({
             "timestamp": stamp(time),
             "parent_frame_id": WORLD,
-            "child_frame_id": *object.name,
+            "child_frame_id": name_of(object),
             "translation": vector(body.position),
             "rotation": rotation(body.rotation),
         });
@@ -126,9 +143,10 @@ impl McapFile {
     }
 
     fn state(&mut self, time: SimTime, object: &ObjectMoment) -> Result<(), ExportError> {
-        if self.steps.insert(object.id, object.state.steps) == Some(object.state.steps) {
+        if !self.is_new(object) {
             return Ok(());
         }
+        self.steps.insert(object.id, object.state.steps);
         let message =
             json!({ "name": *object.name, "time": object.state.time.as_secs_f64(), "snapshot": *object.state });
         self.put(self.channels.states, time, &message)
@@ -158,12 +176,18 @@ impl MomentWriter for McapFile {
 fn failed(path: &Path) -> impl Fn(McapError) -> ExportError {
     let path = path.to_owned();
     move |error| {
-        let source = match error {
-            McapError::Io(source) => source,
+        let error = match error {
+            McapError::Io(error) => error,
             other => std::io::Error::other(other),
         };
-        ExportError::File { path: path.clone(), source }
+        ExportError::File { path: path.clone(), error }
     }
+}
+
+/// The name of an object's frame and entity: its own, with one `_` more where that, but for any `_` at its end, is one of ours.
+fn name_of(object: &ObjectMoment) -> Cow<'_, str> {
+    let name = &*object.name;
+    if [WORLD, FIXED].contains(&name.trim_end_matches('_')) { format!("{name}_").into() } else { name.into() }
 }
 
 fn stamp(time: SimTime) -> Value {
@@ -175,13 +199,13 @@ fn vector(v: DVec3) -> Value {
     json!({ "x": v.x, "y": v.y, "z": v.z })
 }
 
-fn rotation(q: DQuat) -> Value {
-    json!({ "x": q.x, "y": q.y, "z": q.z, "w": q.w })
+/// A point as exactly as pictures show it: `/state` has all digits, and those of many points take most of a file.
+fn shown(point: DVec3) -> DVec3 {
+    (point * SHOWN_PER_M).round() / SHOWN_PER_M
 }
 
-fn in_axes_of(surface: &Surface, position: DVec3, rotation: DQuat) -> Surface {
-    let back = rotation.inverse();
-    Surface { points: surface.points.iter().map(|p| back * (*p - position)).collect(), ..surface.clone() }
+fn rotation(q: DQuat) -> Value {
+    json!({ "x": q.x, "y": q.y, "z": q.z, "w": q.w })
 }
 
 /// An entity that stays until another of its id comes.
@@ -196,7 +220,7 @@ fn entity(id: &str, frame: &str, time: SimTime, surface: &Surface) -> Value {
         "arrows": [], "cubes": [], "spheres": [], "cylinders": [], "lines": [], "texts": [], "models": [],
         "triangles": [{
             "pose": { "position": vector(DVec3::ZERO), "orientation": rotation(DQuat::IDENTITY) },
-            "points": surface.points.iter().map(|p| vector(*p)).collect::<Vec<_>>(),
+            "points": surface.points.iter().map(|p| vector(shown(*p))).collect::<Vec<_>>(),
             "color": colour(id),
             "colors": [],
             "indices": surface.triangles.iter().flatten().collect::<Vec<_>>(),
@@ -204,15 +228,9 @@ fn entity(id: &str, frame: &str, time: SimTime, surface: &Surface) -> Value {
     })
 }
 
-/// A colour that goes with a name: a hue from its bytes.
-fn colour(name: &str) -> Value {
-    if name == "fixed" {
-        return json!({ "r": 0.6, "g": 0.6, "b": 0.6, "a": 1.0 });
-    }
-    let hash = name.bytes().fold(0_u32, |hash, byte| hash.wrapping_mul(31).wrapping_add(u32::from(byte)));
-    let hue = f64::from(hash % 360) / 60.0;
-    let channel = |shift: f64| 0.35 + 0.55 * (((hue + shift) % 6.0 - 3.0).abs() - 1.0).clamp(0.0, 1.0);
-    json!({ "r": channel(0.0), "g": channel(4.0), "b": channel(2.0), "a": 1.0 })
+fn colour(id: &str) -> Value {
+    let [r, g, b] = if id == FIXED { colour::OF_FIXED } else { colour::of_name(id) };
+    json!({ "r": r, "g": g, "b": b, "a": 1.0 })
 }
 
 fn object_of(properties: &Value) -> Value {

@@ -1,17 +1,23 @@
-//! Runs as files that other programs open: MCAP (Foxglove, Lichtblick, Rerun) and VTK series (ParaView).
+//! Runs as files that other programs open: MCAP (Foxglove, Lichtblick, Rerun), VTK series (ParaView), one moment as binary glTF, a trace
+//! of what ran when (Perfetto).
 //!
-//! In: [`Moment`]s of a world, which hold every object's newest state and its surface. Out: files.
+//! In: [`Moment`]s of a world, which hold every object's newest state and its surface; its turns and events. Out: files.
 //! Never here: running a world, choosing the moments, drawing.
 
+mod colour;
 mod error;
 mod foxglove;
+mod glb;
 mod moment;
+mod perfetto;
 mod surface;
 mod vtk;
 
 pub use error::ExportError;
 pub use foxglove::McapFile;
+pub use glb::{glb, write_glb};
 pub use moment::{Moment, Moments, ObjectMoment};
+pub use perfetto::{Frame, PerfettoFile};
 pub use surface::Surface;
 pub use vtk::VtkSeries;
 

@@ -71,6 +71,12 @@ impl Surface {
         }
     }
 
+    /// The same in the axes of a body that is at `position` and turned by `rotation`.
+    pub(super) fn in_axes_of(&self, position: DVec3, rotation: DQuat) -> Self {
+        let back = rotation.inverse();
+        Self { points: self.points.iter().map(|p| back * (*p - position)).collect(), ..self.clone() }
+    }
+
     /// The vertices that triangles use, in the order of their numbers.
     fn skin(skin: &SurfaceShape, state: &SoftState) -> Self {
         let mut place = vec![u32::MAX; state.positions.len()];

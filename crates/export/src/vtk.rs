@@ -13,6 +13,12 @@ use std::path::{Path, PathBuf};
 
 /// The number that VTK gives a triangle among its cells.
 const VTK_TRIANGLE: u8 = 5;
+/// The index of a series, the names of its objects, and its solids that never move.
+const INDEX: &str = "series.pvd";
+const NAMES: &str = "objects.csv";
+const FIXED: &str = "fixed.vtu";
+/// The ending of the files of surfaces.
+const SURFACES: &str = ".vtu";
 const INDEX_HEAD: &str = "<?xml version=\"1.0\"?>\n<VTKFile type=\"Collection\" version=\"0.1\">\n<Collection>\n";
 const INDEX_FOOT: &str = "</Collection>\n</VTKFile>\n";
 
@@ -31,22 +37,44 @@ pub struct VtkSeries {
 }
 
 impl VtkSeries {
+    /// Files of every series but those of its moments, which are called by their numbers, [`VtkSeries::MOMENT_DIGITS`] digits or more.
+    pub const FILES: [&str; 3] = [INDEX, NAMES, FIXED];
+    /// Digits of the number of a moment, at least.
+    pub const MOMENT_DIGITS: usize = 6;
+
+    /// Whether a series may begin in this folder: it does not exist, or holds nothing that would be overwritten. Nothing is made.
+    ///
+    /// # Errors
+    /// [`ExportError::Taken`] names a file that would be overwritten; [`ExportError::File`] where it or what it is in is no folder.
+    pub fn check(folder: &Path) -> Result<(), ExportError> {
+        let entries = match std::fs::read_dir(folder) {
+            Ok(entries) => entries,
+            Err(error) if error.kind() == std::io::ErrorKind::NotFound => return Ok(()),
+            Err(error) => return Err(ExportError::at(folder)(error)),
+        };
+        for entry in entries {
+            let name = entry.map_err(ExportError::at(folder))?.file_name();
+            if is_of_a_series(&name.to_string_lossy()) {
+                return Err(ExportError::Taken { path: folder.join(name) });
+            }
+        }
+        Ok(())
+    }
+
     /// Begins a series in a folder, which is made where it does not exist; `fixed` are the solids that never move.
     ///
     /// # Errors
-    /// [`ExportError`]: the folder cannot be made or written, or holds a series already.
+    /// Those of [`VtkSeries::check`]; [`ExportError::File`] where the folder cannot be made or written.
     pub fn create(folder: &Path, fixed: &Surface) -> Result<Self, ExportError> {
+        Self::check(folder)?;
         std::fs::create_dir_all(folder).map_err(ExportError::at(folder))?;
-        let path = folder.join("series.pvd");
-        if path.exists() {
-            return Err(ExportError::Taken { path: folder.to_owned() });
-        }
+        let path = folder.join(INDEX);
         let mut index = File::create(&path).map_err(ExportError::at(&path))?;
         index.write_all(format!("{INDEX_HEAD}{INDEX_FOOT}").as_bytes()).map_err(ExportError::at(&path))?;
-        let names = folder.join("objects.csv");
+        let names = folder.join(NAMES);
         let mut names = BufWriter::new(File::create(&names).map_err(ExportError::at(&names))?);
         writeln!(names, "object,name").map_err(ExportError::at(folder))?;
-        let path = folder.join("fixed.vtu");
+        let path = folder.join(FIXED);
         write_file(&path, &[Part { object: -1, eps_m: f64::NAN, residual_m: 0.0, surface: fixed }])?;
         Ok(Self { folder: folder.to_owned(), index, names, named: BTreeSet::new(), moments: 0 })
     }
@@ -68,7 +96,7 @@ impl VtkSeries {
 
 impl MomentWriter for VtkSeries {
     fn write(&mut self, moment: &Moment) -> Result<(), ExportError> {
-        let file = format!("{:06}.vtu", self.moments);
+        let file = format!("{:0width$}{SURFACES}", self.moments, width = Self::MOMENT_DIGITS);
         let parts = moment.objects.iter().map(|object| Part {
             object: object.id.0.cast_signed(),
             eps_m: object.state.resolution.map_or(f64::NAN, |resolution| resolution.eps_m),
@@ -86,6 +114,13 @@ impl MomentWriter for VtkSeries {
     fn finish(&mut self) -> Result<(), ExportError> {
         self.names.flush().map_err(ExportError::at(&self.folder))
     }
+}
+
+/// Whether a series may have a file of this name.
+fn is_of_a_series(name: &str) -> bool {
+    let is_moment =
+        |number: &str| number.len() >= VtkSeries::MOMENT_DIGITS && number.bytes().all(|digit| digit.is_ascii_digit());
+    VtkSeries::FILES.contains(&name) || name.strip_suffix(SURFACES).is_some_and(is_moment)
 }
 
 /// The triangles of one object, and what is said of all of them.

@@ -20,6 +20,7 @@ use super::metrics::{MetricsWriter, SMOOTHING};
 use super::nobody::Nobody;
 use super::observation::{Observer, Peers};
 use super::slot::SlotWriter;
+use super::turns::Took;
 use metachron_contact::{Agent, Carving, Link};
 use metachron_core::{AgentId, Resolution, ResolutionRange, SimSpan, SimTime, Snapshot, StepReport};
 use std::panic::{AssertUnwindSafe, catch_unwind};
@@ -136,7 +137,7 @@ impl AgentRunner {
 
     /// Tells readers of its events what happens to it now.
     pub fn tell(&self, kind: EventKind) {
-        self.shared.events.push(&AgentEvent { at: self.pace.time(), kind });
+        self.shared.streams.event(&AgentEvent { at: self.pace.time(), kind });
     }
 
     /// Whether the agent is parked.
@@ -156,16 +157,24 @@ impl AgentRunner {
         self.metrics.pace(&self.shared.gauges, &self.pace);
     }
 
-    /// Ends the turn that began: it took `turn_s` seconds of the caller, those it leads included, and it is wall time `wall`.
-    pub fn finish(&mut self, timeline: &Timeline, wall: Duration, turn_s: f64) -> Next {
+    /// Ends the turn that `took` so long: `turn_s` seconds of the caller, those it leads included.
+    pub fn finish(&mut self, timeline: &Timeline, took: Took, turn_s: f64) -> Next {
+        let wall = took.ended;
         let work_s = self.cluster.as_ref().map_or(turn_s, |seat| seat.helped().core_s(turn_s));
         // it waited, or another agent leads it from now on
-        let Some(open) = self.open.take() else { return self.seek_leader().map_or(Next::Due, Next::Join) };
+        let Some(open) = self.open.take() else {
+            let next = self.seek_leader().map_or(Next::Due, Next::Join);
+            if next == Next::Due {
+                self.tell_wait(Took { ended: self.pace.due(timeline).unwrap_or(wall).max(wall), ..took });
+            }
+            return next;
+        };
         let now = timeline.sim_at(wall);
         let work_s = self.share_work(work_s);
         self.metrics.time_turn(&self.shared.gauges, turn_s);
         let mut published = self.record_step(&open, timeline, wall, work_s);
-        published &= self.conclude_led(timeline, wall);
+        self.tell_turn(&open, self.id(), took);
+        published &= self.conclude_led(timeline, took);
         if let Err(reason) = contained(|| self.run_governor(timeline, &open, work_s)) {
             self.park(reason);
             self.disband(timeline, wall);
@@ -193,7 +202,7 @@ impl AgentRunner {
         if self.is_parked() {
             Next::Parked
         } else if self.open.is_some() {
-            self.finish(timeline, wall, 0.0)
+            self.finish(timeline, Took { begun: wall, ended: wall }, 0.0)
         } else if self.shared.gauges.is_resting() {
             Next::Rest
         } else {

@@ -559,7 +559,7 @@ impl AgentRunner {
             let own = stepper.efforts().iter().filter(|total| total.member == me);
             seat.efforts.clear();
             seat.efforts.extend(own.map(|total| JointEffort { joint: total.joint, effort: total.impulse / dt_s }));
-            seat.note_contacts(stepper.totals_of(me), dt, now, &actor.shared.events);
+            seat.note_contacts(stepper.totals_of(me), dt, now, &actor.shared.streams);
             seat.work = stepper.work_of(me);
             let done = &actor.shared.gauges.work;
             done.set(done.get() + seat.work);

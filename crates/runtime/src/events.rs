@@ -1,16 +1,10 @@
-//! What happens to an agent, for those who ask: a bounded ring that the agent writes and any number of readers follow.
+//! What happens to an agent, for those who ask.
 //!
-//! In: events, from the thread that steps the agent. Out: the same in their order to each reader, and how many a reader was too slow for.
-//! The agent never waits and allocates nothing; without a reader it writes nothing. Never here: which events a reader wants.
+//! In: events, from the thread that steps the agent. Out: the same to each reader ([`super::ring`]). Never here: which events a reader wants.
 
-use super::seqlock::{ReadOutcome, Seqlock};
-use super::sync::atomic::{
-    AtomicU64,
-    Ordering::{Acquire, Relaxed, Release},
-};
+use super::ring::{RingEntry, WORDS};
 use glam::DVec3;
 use metachron_core::{AgentId, ContactPartner, Removed, SimTime};
-use std::sync::OnceLock;
 
 /// How many events of one agent are kept for readers.
 pub const EVENTS_KEPT: usize = 128;
@@ -67,56 +61,15 @@ pub struct ContactEvent {
     pub force_n: DVec3,
 }
 
-/// How many words an event takes.
-const WORDS: usize = 11;
+impl RingEntry for AgentEvent {
+    const KEPT: usize = EVENTS_KEPT;
 
-/// The newest events of an agent.
-#[derive(Debug, Default)]
-pub(super) struct EventRing(OnceLock<Box<Ring>>);
-
-/// What the first reader makes.
-#[derive(Debug)]
-struct Ring {
-    /// How many were written. Only the agent writes.
-    written: AtomicU64,
-    places: Box<[Seqlock<WORDS>]>,
-}
-
-impl EventRing {
-    /// Begins to keep events; the number of the next one.
-    pub fn listen(&self) -> u64 {
-        let ring = self.0.get_or_init(|| {
-            let places = (0..EVENTS_KEPT).map(|_| Seqlock::new()).collect();
-            Box::new(Ring { written: AtomicU64::new(0), places })
-        });
-        ring.written.load(Acquire)
+    fn words(&self) -> [u64; WORDS] {
+        words(self)
     }
 
-    /// Writes an event, from one thread at a time; nothing where nobody listens.
-    pub fn push(&self, event: &AgentEvent) {
-        let Some(Ring { written, places }) = self.0.get().map(|ring| &**ring) else { return };
-        let number = written.load(Relaxed);
-        places[number as usize % EVENTS_KEPT].write(words(event));
-        written.store(number + 1, Release);
-    }
-
-    /// Passes the events from number `next` on to `take`; the number of the next one, and how many were overwritten before they were read.
-    pub fn read(&self, next: u64, mut take: impl FnMut(AgentEvent)) -> (u64, u64) {
-        let Some(Ring { written: end, places }) = self.0.get().map(|ring| &**ring) else { return (next, 0) };
-        let written = end.load(Acquire);
-        let first = next.max(written.saturating_sub(EVENTS_KEPT as u64));
-        let mut lost = first - next;
-        for number in first..written {
-            match places[number as usize % EVENTS_KEPT].read() {
-                ReadOutcome::Complete(words) => match event(&words) {
-                    // the place may have a newer one already
-                    Some(event) if end.load(Acquire) <= number + EVENTS_KEPT as u64 => take(event),
-                    _ => lost += 1,
-                },
-                ReadOutcome::Empty | ReadOutcome::Torn => lost += 1,
-            }
-        }
-        (written, lost)
+    fn of_words(words: &[u64; WORDS]) -> Option<Self> {
+        event(words)
     }
 }
 
@@ -189,6 +142,7 @@ fn event(words: &[u64; WORDS]) -> Option<AgentEvent> {
 
 #[cfg(test)]
 mod tests {
+    use super::super::ring::Ring;
     use super::*;
 
     fn all() -> Vec<EventKind> {
@@ -209,57 +163,15 @@ mod tests {
         ]
     }
 
-    fn drain(ring: &EventRing, next: &mut u64) -> (Vec<AgentEvent>, u64) {
-        let mut taken = Vec::new();
-        let (now, lost) = ring.read(*next, |event| taken.push(event));
-        *next = now;
-        (taken, lost)
-    }
-
     #[test]
     fn every_kind_comes_out_as_it_went_in() {
-        let ring = EventRing::default();
-        let mut next = ring.listen();
+        let ring = Ring::default();
+        let next = ring.listen();
         let at = SimTime::from_nanos(17);
         all().into_iter().for_each(|kind| ring.push(&AgentEvent { at, kind }));
-        let (taken, lost) = drain(&ring, &mut next);
+        let mut taken = Vec::new();
+        let (next, lost) = ring.read(next, |event| taken.push(event));
         assert_eq!(taken, all().into_iter().map(|kind| AgentEvent { at, kind }).collect::<Vec<_>>());
-        assert_eq!((lost, drain(&ring, &mut next).0.len()), (0, 0));
-    }
-
-    #[test]
-    fn what_a_reader_was_too_slow_for_is_counted() {
-        let ring = EventRing::default();
-        ring.push(&AgentEvent { at: SimTime::ZERO, kind: EventKind::Left });
-        let mut next = ring.listen();
-        for k in 0..300 {
-            ring.push(&AgentEvent { at: SimTime::from_nanos(k), kind: EventKind::Wakes });
-        }
-        let (taken, lost) = drain(&ring, &mut next);
-        assert_eq!((taken.len(), lost), (EVENTS_KEPT, 300 - EVENTS_KEPT as u64));
-        assert_eq!(taken[0].at, SimTime::from_nanos(300 - EVENTS_KEPT as u64));
-    }
-
-    #[test]
-    fn a_reader_beside_the_writer_sees_each_event_once_or_counts_it_as_lost() {
-        let ring = EventRing::default();
-        let mut next = ring.listen();
-        let (mut seen, mut lost, all) = (0, 0, 20_000);
-        std::thread::scope(|scope| {
-            scope.spawn(|| {
-                (0..all).for_each(|k| ring.push(&AgentEvent { at: SimTime::from_nanos(k), kind: EventKind::Left }))
-            });
-            let mut last = None;
-            while seen + lost < all {
-                let (taken, missed) = drain(&ring, &mut next);
-                for event in &taken {
-                    assert!(last.is_none_or(|last| event.at > last));
-                    last = Some(event.at);
-                }
-                seen += taken.len() as u64;
-                lost += missed;
-            }
-        });
-        assert_eq!(seen + lost, all);
+        assert_eq!((lost, ring.read(next, |_| panic!("nothing is new"))), (0, (next, 0)));
     }
 }

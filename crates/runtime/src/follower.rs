@@ -16,6 +16,7 @@ use super::metrics::AgentStats;
 use super::spawn::{AgentSpawn, AssembledRun, Everyone, RunError, assemble};
 use super::turn_order::{PartKind, TurnPart};
 use super::turn_parts::{Prepared, PreparedTurn};
+use super::turns::Took;
 use metachron_core::{AgentId, Archive, ArchiveError, SimTime};
 use std::sync::Arc;
 use std::time::Duration;
@@ -161,7 +162,9 @@ impl Followed {
     }
 
     fn finish(&mut self, timeline: &Timeline, wall: Duration, took: Duration) {
-        let next = self.actor.as_mut().map(|actor| actor.finish(timeline, wall, took.as_secs_f64()));
+        let took_s = took.as_secs_f64();
+        let took = Took { begun: wall.saturating_sub(took), ended: wall };
+        let next = self.actor.as_mut().map(|actor| actor.finish(timeline, took, took_s));
         self.joins = if let Some(Next::Join(leader)) = next { Some(leader) } else { None };
     }
 

@@ -3,18 +3,20 @@
 //! Out: snapshots and numbers, without ever waiting for the agent. In: commands. Never here: the agent itself.
 
 use super::cluster::Handover;
-use super::events::{AgentEvent, EventRing};
+use super::events::AgentEvent;
 use super::form_slot::FormSlot;
 use super::histogram::Histogram;
 use super::mailbox::{Command, Keyed, Mailbox, SendError};
 use super::metrics::{AgentState, AgentStats, Metrics};
 use super::probe::{Sample, Trace};
+use super::ring::Ring;
 use super::sleep::SleepRegistry;
 use super::slot::LatestSlot;
+use super::turns::Turn;
 use metachron_core::{AgentId, Body, HASH_START, SimSpan, SimTime, Snapshot};
 use metachron_geometry::CollisionShape;
 use std::sync::atomic::Ordering::Relaxed;
-use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::sync::{Arc, Mutex, MutexGuard, OnceLock, PoisonError};
 use std::time::Duration;
 
 /// Data shared by an agent and its observers.
@@ -32,7 +34,7 @@ pub(super) struct Shared {
     /// Its contact shape; `None` where nothing can touch it.
     pub form: FormSlot,
     pub mail: Mailbox,
-    pub events: EventRing,
+    pub streams: EventStreams,
     pub slot: Arc<LatestSlot<Snapshot>>,
     pub sleep: Arc<SleepRegistry>,
     /// Entry for agents that it is to lead, and the place to which it returns from a leader; `None` where no agent can be led.
@@ -41,6 +43,34 @@ pub(super) struct Shared {
     pub ages: Mutex<Histogram>,
     /// Empty for most agents. Only the agent writes, so that it never waits during the run; readers read at the end.
     pub traces: Vec<Mutex<Trace>>,
+}
+
+/// What an agent tells readers; there is nothing of it before the first of them.
+#[derive(Debug, Default)]
+pub(super) struct EventStreams(OnceLock<Box<Rings>>);
+
+#[derive(Debug, Default)]
+struct Rings {
+    events: Ring<AgentEvent>,
+    turns: Ring<Turn>,
+}
+
+impl EventStreams {
+    fn rings(&self) -> &Rings {
+        self.0.get_or_init(Box::default)
+    }
+
+    /// Tells of an event, from one thread at a time.
+    pub fn event(&self, event: &AgentEvent) {
+        self.0.get().into_iter().for_each(|rings| rings.events.push(event));
+    }
+
+    /// Tells of a turn, from one thread at a time.
+    pub fn turn(&self, turn: impl FnOnce() -> Turn) {
+        if let Some(rings) = self.0.get().filter(|rings| rings.turns.is_heard()) {
+            rings.turns.push(&turn());
+        }
+    }
 }
 
 /// A running agent, seen from outside. Copies refer to the same agent; they outlive the run and then show its final state.
@@ -167,13 +197,24 @@ impl AgentHandle {
 
     /// Begins to keep its events for readers; the number of the next one.
     pub fn listen(&self) -> u64 {
-        self.shared.events.listen()
+        self.shared.streams.rings().events.listen()
     }
 
     /// Passes its events from number `next` on to `take`; returns the number of the next one, and how many were lost: an agent keeps the
     /// newest [`crate::EVENTS_KEPT`].
     pub fn events_from(&self, next: u64, take: impl FnMut(AgentEvent)) -> (u64, u64) {
-        self.shared.events.read(next, take)
+        self.shared.streams.rings().events.read(next, take)
+    }
+
+    /// Begins to keep its turns for readers; the number of the next one.
+    pub fn listen_to_turns(&self) -> u64 {
+        self.shared.streams.rings().turns.listen()
+    }
+
+    /// Passes its turns from number `next` on to `take`; returns the number of the next one, and how many were lost: an agent keeps the
+    /// newest [`crate::TURNS_KEPT`].
+    pub fn turns_from(&self, next: u64, take: impl FnMut(Turn)) -> (u64, u64) {
+        self.shared.streams.rings().turns.read(next, take)
     }
 
     /// CPU time of its turns so far, seconds; updated about twice a second on threads.

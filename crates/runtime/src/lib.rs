@@ -60,6 +60,7 @@ mod priority;
 mod probe;
 mod publish;
 mod reader;
+mod ring;
 mod seqlock;
 mod sleep;
 mod slot;
@@ -71,6 +72,7 @@ mod testing;
 mod threads;
 mod turn_order;
 mod turn_parts;
+mod turns;
 mod worker_wakeup;
 
 pub use agent_clock::{AgentClock, LAG_CAP, Start};
@@ -94,6 +96,7 @@ pub use slot::{LatestSlot, SlotWriter};
 pub use spawn::{AgentSpawn, RATE_MAX_HZ, RunError};
 pub use threads::{AUTO_THREADS_MAX, THREADS_MAX, Threads};
 pub use turn_order::{Held, OrderLog, PartKind, TurnOrder, TurnPart};
+pub use turns::{TURNS_KEPT, Turn};
 
 use metachron_core::{AgentId, Archive, ArchiveError, SimTime};
 use std::sync::Arc;

@@ -19,6 +19,7 @@ use super::machine::{Machine, duration};
 use super::mailbox::SendError;
 use super::metrics::AgentStats;
 use super::spawn::{AgentSpawn, AssembledRun, Everyone, RunError, assemble};
+use super::turns::Took;
 use cores::Cores;
 use metachron_core::{AgentId, Archive, ArchiveError};
 use std::cmp::Reverse;
@@ -214,7 +215,7 @@ impl Lockstep {
         self.batch.open();
         let started = Instant::now();
         let took = (self.now - turn.since).as_secs_f64() * turn.cores;
-        let next = actor.finish(&self.timeline, self.now, took);
+        let next = actor.finish(&self.timeline, Took { begun: turn.since, ended: self.now }, took);
         entry.phase = match next {
             Next::Due | Next::Join(_) => Phase::Waiting,
             Next::Rest => Phase::Resting,

@@ -84,7 +84,7 @@ impl Pool {
         patience: Duration,
         priority: Priority,
     ) -> Result<(Sender<Message>, JoinHandle<()>), RunError> {
-        let no_thread = |source| RunError::NoThread { name: "the pool's workers".to_owned(), source };
+        let no_thread = |error| RunError::NoThread { name: "the pool's workers".to_owned(), error };
         let supervisor = Supervisor::start(Arc::clone(state), workers, patience, priority).map_err(no_thread)?;
         let messages = supervisor.sender();
         let watch =

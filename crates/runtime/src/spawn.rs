@@ -8,11 +8,10 @@ use super::agent_runner::{AgentRunner, TurnPeriod};
 use super::agents::Agents;
 use super::broad_phase::BroadPhase;
 use super::cluster::{ClusterSeat, Handover, JointedTo, Led, assign_leaders};
-use super::events::EventRing;
 use super::faults::Faults;
 use super::form_slot::FormSlot;
 use super::governor::Governor;
-use super::handle::{AgentHandle, Shared};
+use super::handle::{AgentHandle, EventStreams, Shared};
 use super::helpers::Helpers;
 use super::histogram::Histogram;
 use super::mailbox::{Mailbox, SendError};
@@ -143,12 +142,12 @@ pub enum RunError {
         loss: f64,
     },
     /// The system gave no thread.
-    #[error("the operating system refused a thread for {name}: {source}")]
+    #[error("the operating system refused a thread for {name}: {error}")]
     NoThread {
         /// The purpose of the thread.
         name: String,
         /// The system's error.
-        source: std::io::Error,
+        error: std::io::Error,
     },
 }
 
@@ -354,7 +353,7 @@ fn shared(
         gauges: Metrics::default(),
         form: FormSlot::new(spawn.agent.form()),
         mail: Mailbox::default(),
-        events: EventRing::default(),
+        streams: EventStreams::default(),
         slot: writer.slot(),
         sleep: Arc::clone(sleep),
         handover: moves.then(Handover::default),

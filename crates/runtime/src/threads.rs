@@ -21,6 +21,7 @@ use super::sleep::Halt;
 use super::spawn::{AgentSpawn, AssembledRun, Everyone, RunError, assemble};
 use super::turn_order::{Held, PartKind, TurnOrder, in_force};
 use super::turn_parts::Begun;
+use super::turns::Took;
 use metachron_core::{AgentId, Archive, ArchiveError};
 use std::sync::Arc;
 use std::sync::mpsc::{Receiver, Sender, channel};
@@ -101,7 +102,7 @@ impl Threads {
             drop(priority.take());
             stage.run(actor, &shared)
         };
-        builder.spawn(body).map_err(|source| RunError::NoThread { name, source })
+        builder.spawn(body).map_err(|error| RunError::NoThread { name, error })
     }
 
     /// Ends all threads and waits for them: at the end of the run until a timeout, where a step that takes longer counts as hung, and its thread
@@ -362,7 +363,10 @@ impl AgentThread {
         held.iter_mut().for_each(|held| held.note_end(now));
         let next = match effort {
             None => Next::Parked,
-            Some(_) => actor.finish(timeline, now, now.saturating_sub(began).as_secs_f64()),
+            Some(_) => {
+                let turn_s = now.saturating_sub(began).as_secs_f64();
+                actor.finish(timeline, Took { begun: began, ended: now }, turn_s)
+            }
         };
         drop(held);
         let wall = started.elapsed();

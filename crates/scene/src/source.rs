@@ -2,8 +2,10 @@
 //!
 //! In: a name or a path. Out: text and bytes. Never here: their meaning. No other module of this crate reads files.
 
+use super::build::triangles;
 use super::builtin;
 use super::diagnostic::{SceneError, did_you_mean};
+use metachron_geometry::Triangles;
 use std::fs::File;
 use std::io::Read;
 use std::path::{Component, Path, PathBuf};
@@ -57,15 +59,13 @@ impl Source {
         Self::from_bytes(name, bytes.to_vec(), SiblingFiles::Unavailable)
     }
 
-    /// The scene `name`, built in or a path, with the text that it had when it was recorded; files next to it are read where they were then.
+    /// The scene `name` with the text that it had when it was recorded; files next to it are read from the `folder` that it was in, or are those
+    /// that are built in.
     ///
     /// # Errors
     /// [`SceneError`] when the text is too long.
-    pub fn recorded(name: &str, text: &str) -> Result<Self, SceneError> {
-        let siblings = match builtin::find(name) {
-            Some(_) => SiblingFiles::BuiltIn,
-            None => SiblingFiles::Folder(Path::new(name).parent().map_or_else(PathBuf::new, Path::to_path_buf)),
-        };
+    pub fn recorded(name: &str, text: &str, folder: Option<&Path>) -> Result<Self, SceneError> {
+        let siblings = folder.map_or(SiblingFiles::BuiltIn, |folder| SiblingFiles::Folder(folder.to_owned()));
         Ok(Self { siblings, ..Self::memory(name, text.as_bytes())? })
     }
 
@@ -89,10 +89,29 @@ impl Source {
         &self.name
     }
 
+    /// The folder that files next to the scene are read from, whatever the working directory; `None` of a scene that is no file.
+    #[must_use]
+    pub fn folder(&self) -> Option<PathBuf> {
+        let SiblingFiles::Folder(folder) = &self.siblings else { return None };
+        std::env::current_dir().map_or_else(|_| Some(folder.clone()), |here| Some(here.join(folder)))
+    }
+
     /// The text.
     #[must_use]
     pub fn text(&self) -> &str {
         &self.text
+    }
+
+    /// The mesh in a file, which a program gives to a body that it builds; its coordinates are multiplied by `scale` to be metres.
+    ///
+    /// # Errors
+    /// [`SceneError`] where the file cannot be read, or is no sound mesh: STL, OBJ or binary glTF.
+    pub fn mesh(path: &Path, scale: f64) -> Result<Triangles, SceneError> {
+        let mesh = read_plain(path, SIBLING_BYTES_MAX).and_then(|bytes| triangles(&bytes, scale));
+        mesh.map_err(|why| {
+            let why = format!("the mesh cannot be used: {why}");
+            SceneError::unreadable(&path.to_string_lossy(), why, Some("expected STL, OBJ or .glb".to_owned()))
+        })
     }
 
     /// The bytes of a file next to the scene, or why there are none.

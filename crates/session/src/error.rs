@@ -32,11 +32,11 @@ pub enum SessionError {
     Picture(GpuError),
     /// The film could not be written.
     #[cfg(feature = "picture")]
-    #[error("the film could not be written to {path}")]
+    #[error("the film could not be written to {path}: {error}")]
     Film {
         /// The intended path.
         path: PathBuf,
         /// The reason.
-        source: std::io::Error,
+        error: std::io::Error,
     },
 }

@@ -32,7 +32,7 @@ impl Film {
             file.write_all(head.as_bytes())?;
             Ok(file)
         };
-        let file = open().map_err(|source| SessionError::Film { path: path.to_owned(), source })?;
+        let file = open().map_err(|error| SessionError::Film { path: path.to_owned(), error })?;
         Ok(Self { file, path: path.to_owned(), period, begun, shown: None, written: 0 })
     }
 
@@ -46,7 +46,7 @@ impl Film {
     /// Ends the film at the time `at`.
     pub fn finish(mut self, at: Duration) -> Result<(), SessionError> {
         self.run_until(|tick| tick <= at)?;
-        self.file.flush().map_err(|source| SessionError::Film { path: self.path, source })
+        self.file.flush().map_err(|error| SessionError::Film { path: self.path, error })
     }
 
     /// Writes what is shown at the ticks that `are_past`, as soon as there is anything to show.
@@ -55,7 +55,7 @@ impl Film {
         let planes = planes(picture);
         while are_past(self.begun + self.period * (self.written + 1)) {
             let frame = self.file.write_all(b"FRAME\n").and_then(|()| self.file.write_all(&planes));
-            frame.map_err(|source| SessionError::Film { path: self.path.clone(), source })?;
+            frame.map_err(|error| SessionError::Film { path: self.path.clone(), error })?;
             self.written += 1;
         }
         Ok(())

@@ -12,6 +12,7 @@ use metachron_render::{Camera, Size, Style};
 #[cfg(feature = "picture")]
 use metachron_render::{Offscreen, PictureFile, RendererOptions};
 use std::path::PathBuf;
+use std::sync::Arc;
 #[cfg(feature = "picture")]
 use std::time::Duration;
 
@@ -80,7 +81,8 @@ pub struct Headless {
 /// ends.
 ///
 /// # Errors
-/// [`SessionError::Draw`] where the adapter fails, [`SessionError::Picture`] and [`SessionError::Film`] where a file cannot be written.
+/// [`SessionError::Draw`] where the adapter fails, [`SessionError::Film`] where a film cannot begin, [`SessionError::Diverged`]. A file that
+/// takes no more ends the run: its outcome says why ([`Outcome::unwritten`]).
 pub fn play_headless(
     mut session: Session,
     mut plan: Headless,
@@ -95,10 +97,12 @@ pub fn play_headless(
     #[cfg(feature = "picture")]
     let mut film = film(&plan, period, due)?;
     let mut interrupted = false;
+    #[cfg_attr(not(feature = "picture"), expect(unused_mut, reason = "only films and pictures fail on the way"))]
+    let mut unwritten: Option<SessionError> = None;
     loop {
         session.wait_until(due);
         let done = share_done(&session, plan.end)?;
-        if done >= 1.0 || interrupted {
+        if done >= 1.0 || interrupted || unwritten.is_some() || session.recording_failed() {
             break;
         }
         let format = PictureFormat { size: plan.size, style: plan.style };
@@ -106,7 +110,7 @@ pub fn play_headless(
         let record = frame_seen_by(&mut session, &camera, format, &mut plan.drawing, false)?;
         #[cfg(feature = "picture")]
         if let Some(film) = &mut film {
-            film.push(session.now(), pictured(&session, &camera, &mut plan.drawing)?)?;
+            unwritten = film.push(session.now(), pictured(&session, &camera, &mut plan.drawing)?).err();
         }
         interrupted = !go_on(&record, done);
         due = (due + period).max(session.now());
@@ -114,12 +118,26 @@ pub fn play_headless(
     // the picture shows the state at the end of the run, however long drawing takes
     session.hold();
     #[cfg(feature = "picture")]
-    film.map_or(Ok(()), |film| film.finish(session.now()))?;
-    #[cfg(feature = "picture")]
-    write_picture(&mut session, &mut plan)?;
+    {
+        unwritten = unwritten.or(film.and_then(|film| film.finish(session.now()).err()));
+        unwritten = keep_unwritten(unwritten, write_picture(&mut session, &mut plan))?;
+    }
     let adapter = plan.drawing.adapter();
-    session.end_recording()?;
-    Ok(session.end(adapter, interrupted))
+    let unwritten = unwritten.or(session.end_recording().err().map(SessionError::from));
+    Ok(Outcome { unwritten: unwritten.map(Arc::new), ..session.end(adapter, interrupted) })
+}
+
+/// The first file that could not be written: `before`, or the picture. Other errors end the run without an outcome.
+#[cfg(feature = "picture")]
+fn keep_unwritten(
+    before: Option<SessionError>,
+    picture: Result<(), SessionError>,
+) -> Result<Option<SessionError>, SessionError> {
+    match picture {
+        Ok(()) => Ok(before),
+        Err(error @ SessionError::Picture(_)) => Ok(before.or(Some(error))),
+        Err(error) => Err(error),
+    }
 }
 
 /// Makes drawing ready while time is held: prices are known and a first picture, which creates pipelines and buffers, is finished. Virtual

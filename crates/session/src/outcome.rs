@@ -3,6 +3,7 @@
 //! In: a session that has ended. Out: an [`Outcome`]. Never here: statistics (the report makes them), files.
 
 use super::coupling_record::Coupling;
+use super::error::SessionError;
 use super::error_control::ToleranceStatus;
 use super::event_record::{Event, Sensing};
 use super::trace::Trace;
@@ -11,6 +12,7 @@ use metachron_core::{ClusterState, Resolution};
 use metachron_runtime::{AgentStats, Sample};
 use metachron_world::Reading;
 use serde::Serialize;
+use std::sync::Arc;
 
 /// One frame: a row of `--frames-csv`.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize)]
@@ -144,4 +146,6 @@ pub struct Outcome {
     pub unpriced: bool,
     /// Whether the user ended the run before its end.
     pub interrupted: bool,
+    /// Why a recording, film or picture could not be written; the run ended there.
+    pub unwritten: Option<Arc<SessionError>>,
 }

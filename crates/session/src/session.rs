@@ -467,6 +467,7 @@ impl Session {
             clamp,
             unpriced: self.unpriced,
             interrupted,
+            unwritten: None,
         }
     }
 

@@ -80,12 +80,12 @@ pub enum CheckpointError {
     #[error(transparent)]
     Start(#[from] WorldError),
     /// A file could not be read or written.
-    #[error("{}: {source}", path.display())]
+    #[error("{}: {error}", path.display())]
     File {
         /// Its path.
         path: PathBuf,
         /// The system's error.
-        source: std::io::Error,
+        error: std::io::Error,
     },
     /// A file is no checkpoint that this program reads.
     #[error("{}: {reason}", path.display())]
@@ -168,7 +168,7 @@ impl Checkpoint {
     /// [`CheckpointError::File`].
     pub fn write(&self, path: impl AsRef<Path>) -> Result<(), CheckpointError> {
         let path = path.as_ref();
-        std::fs::write(path, self.to_bytes()).map_err(|source| CheckpointError::File { path: path.to_owned(), source })
+        std::fs::write(path, self.to_bytes()).map_err(|error| CheckpointError::File { path: path.to_owned(), error })
     }
 
     /// Reads the one that a file holds.
@@ -177,7 +177,7 @@ impl Checkpoint {
     /// [`CheckpointError::File`]; [`CheckpointError::BadFile`] for any file that [`Self::write`] of this version has not written.
     pub fn read(path: impl AsRef<Path>) -> Result<Self, CheckpointError> {
         let path = path.as_ref();
-        let bytes = std::fs::read(path).map_err(|source| CheckpointError::File { path: path.to_owned(), source })?;
+        let bytes = std::fs::read(path).map_err(|error| CheckpointError::File { path: path.to_owned(), error })?;
         Self::from_bytes(&bytes).map_err(|reason| CheckpointError::BadFile { path: path.to_owned(), reason })
     }
 

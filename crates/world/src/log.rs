@@ -95,6 +95,11 @@ impl Log {
         matches!(*self.mode(), Mode::Recorded(..))
     }
 
+    /// Whether it is recorded no further, because something could not be written.
+    pub fn recording_failed(&self) -> bool {
+        matches!(&*self.mode(), Mode::Recorded(recorder, _) if recorder.has_failed())
+    }
+
     pub fn is_replayed(&self) -> bool {
         matches!(*self.mode(), Mode::Replayed(_))
     }

@@ -3,7 +3,6 @@
 //! In: a world, a place to write to; a recording. Out: a recording; a world that does what it says.
 //! Never here: the file ([`super::recording`]), what is written down where ([`super::world`]).
 
-use super::Scene;
 use super::assemble;
 use super::assemble::Govern;
 use super::checkpoint::{CheckpointError, SceneIdentity};
@@ -13,12 +12,22 @@ use super::log::{Log, TurnsToLog, logged};
 use super::recording::{Entry, RecordError, Recorder, Recording, SceneText};
 use super::replay::{Followed, Player};
 use super::world::{Setting, Shared, State, World, WorldError};
+use super::{Member, Scene};
 use metachron_core::{Archive, SimTime};
-use metachron_runtime::{Follower, Lockstep, Run, SystemClock, TurnOrder};
+use metachron_runtime::{Demand, Follower, Governor, Lockstep, Run, SystemClock, TurnMeasure, TurnOrder};
 use std::collections::VecDeque;
 use std::io::Write;
 use std::path::Path;
 use std::sync::Arc;
+
+/// Stands for the governor of an agent in a replay, which has the answers.
+struct Silent;
+
+impl Governor for Silent {
+    fn after_step(&mut self, _: &TurnMeasure) -> Demand {
+        Demand::default()
+    }
+}
 
 impl World {
     /// Writes down from now on, to the file at `path`, what is done to the world, so that [`World::replay`] can do it again, to the bit: of a
@@ -102,16 +111,26 @@ impl World {
         recorder.map_or(Ok(false), |recorder| recorder.end(self.hash()).map(|()| true))
     }
 
+    /// Whether something of the recording could not be written, so that it ends there; [`World::end_recording`] says why.
+    #[must_use]
+    pub fn recording_failed(&self) -> bool {
+        self.shared.log.recording_failed()
+    }
+
     /// Starts `scene` on one thread and does again what `recording` says, as far as time is let pass, but no further than to `until`: the
     /// same bits. As in lockstep its clock is virtual, and reads what the recorded one did. It takes no commands. A call that let time pass is repeated whole: time may pass further than it was let, until the last.
     ///
     /// # Errors
     /// [`CheckpointError::OtherScene`] where the recording is of another scene; those of [`World::start`].
     pub fn replay(scene: &Scene, recording: Recording, until: Option<SimTime>) -> Result<Self, CheckpointError> {
-        Self::replay_governed(scene, &mut |_| None, recording, until)
+        let answered = recording.governed();
+        let govern =
+            &mut |member: &Member| answered.contains(&member.id).then(|| Box::new(Silent) as Box<dyn Governor>);
+        Self::replay_governed(scene, govern, recording, until)
     }
 
-    /// As [`World::replay`], with the governors of the world that was recorded; the recording has what they answered.
+    /// As [`World::replay`], with the governors of the world that was recorded, where a checkpoint within the recording has their state too; the
+    /// recording has what they answered.
     ///
     /// # Errors
     /// Those of [`World::replay`].

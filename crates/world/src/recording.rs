@@ -4,14 +4,15 @@
 //! from one.
 //! Never here: how they are made again ([`super::replay`]), the state of an object.
 //!
-//! A file: [`MAGIC`], the version of the format, then chunks, each with its length and checksum, so that a file that was cut short is read to its
-//! last whole chunk. The first chunk says whose calls follow. All numbers outside of chunks are little-endian.
+//! A file: [`MAGIC`], the version of the format, then chunks, each with its length, twice, and its checksum, so that a file that was cut short is
+//! read to its last whole chunk, and a damaged one is known from it. The first chunk says whose calls follow. All numbers outside of chunks are
+//! little-endian.
 
 use super::builder::{Part, Rigid, Soft, Tube};
 use super::checkpoint::{CheckpointError, SceneIdentity, checksum};
 use metachron_core::{AgentId, Archive, ArchiveError, Body, SimTime, archive_values};
 use metachron_runtime::{Command, Demand, PartKind, Timeline, TimelineCommand, TurnPart};
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
@@ -20,8 +21,8 @@ use std::time::Duration;
 const MAGIC: [u8; 8] = *b"METACREC";
 /// The version of the format: it changes with what the bytes mean.
 const FORMAT: u32 = 2;
-/// Bytes of a chunk before its contents: length and checksum.
-const CHUNK_HEAD: usize = 4 + 8;
+/// Bytes of a chunk before its contents: length, its complement and checksum.
+const CHUNK_HEAD: usize = 4 + 4 + 8;
 /// So many entries are written at once: a process that is killed loses the newest ones, about a second of a frame loop.
 const CHUNK_ENTRIES: usize = 128;
 /// As many parts of turns leave the process at once, and none is kept from it longer than this, of the run's time.
@@ -39,6 +40,8 @@ pub struct SceneText {
     pub name: String,
     /// The text of the scene.
     pub text: String,
+    /// The folder of the files next to it; `None` of a scene that has none but built-in ones.
+    pub folder: Option<String>,
     /// Keys that were changed, and their values, in rising precedence.
     pub overrides: Vec<(String, String)>,
 }
@@ -139,16 +142,16 @@ pub enum RecordError {
     #[error("a recording that does not begin at the start begins with a checkpoint: {0}")]
     Begun(CheckpointError),
     /// A file could not be read or written.
-    #[error("{}: {source}", path.display())]
+    #[error("{}: {error}", path.display())]
     File {
         /// Its path.
         path: PathBuf,
         /// The system's error.
-        source: std::io::Error,
+        error: std::io::Error,
     },
     /// What it was written to took no more: it is complete up to there.
     #[error("the recording could not be written on: {0}")]
-    Write(#[from] std::io::Error),
+    Write(std::io::Error),
     /// A file is no recording that this program repeats.
     #[error("{}: {reason}", path.display())]
     BadFile {
@@ -178,6 +181,9 @@ pub enum BadRecording {
         /// The version that has written it.
         found: String,
     },
+    /// The chunk that says which scene it is of has other bytes than were written.
+    #[error("it is damaged: what it says of its scene does not have its checksum")]
+    Damaged,
     /// It ends within its first chunk.
     #[error("it ends before it says which scene it is of")]
     NoHead,
@@ -197,6 +203,7 @@ pub struct Recording {
     head: Head,
     pub(super) entries: Vec<Entry>,
     lost_bytes: usize,
+    is_damaged: bool,
 }
 
 impl Recording {
@@ -206,7 +213,7 @@ impl Recording {
     /// [`RecordError::File`]; [`RecordError::BadFile`] for any file that a recording of this version has not begun.
     pub fn read(path: impl AsRef<Path>) -> Result<Self, RecordError> {
         let path = path.as_ref();
-        let bytes = std::fs::read(path).map_err(|source| RecordError::File { path: path.to_owned(), source })?;
+        let bytes = std::fs::read(path).map_err(|error| RecordError::File { path: path.to_owned(), error })?;
         Self::from_bytes(&bytes).map_err(|reason| RecordError::BadFile { path: path.to_owned(), reason })
     }
 
@@ -222,7 +229,11 @@ impl Recording {
             return Err(BadRecording::OtherFormat { found });
         }
         let malformed = |chunk: usize| move |reason: ArchiveError| BadRecording::Malformed { chunk, reason };
-        let first = take_chunk(&mut rest).ok_or(BadRecording::NoHead)?;
+        let first = match take_chunk(&mut rest) {
+            Chunk::Whole(first) => first,
+            Chunk::Cut => return Err(BadRecording::NoHead),
+            Chunk::Damaged => return Err(BadRecording::Damaged),
+        };
         let (mut found, mut head) = (String::new(), Head::default());
         let mut archive = Archive::reader(first);
         archive.value(&mut found).map_err(malformed(0))?;
@@ -232,14 +243,19 @@ impl Recording {
         archive.value(&mut head).and_then(|()| archive.finish()).map_err(malformed(0))?;
         let mut entries = Vec::new();
         let mut chunk = 1;
-        while let Some(bytes) = take_chunk(&mut rest) {
+        let is_damaged = loop {
+            let bytes = match take_chunk(&mut rest) {
+                Chunk::Whole(bytes) => bytes,
+                Chunk::Cut => break false,
+                Chunk::Damaged => break true,
+            };
             let mut some: Vec<Entry> = Vec::new();
             let mut archive = Archive::reader(bytes);
             archive.value(&mut some).and_then(|()| archive.finish()).map_err(malformed(chunk))?;
             entries.append(&mut some);
             chunk += 1;
-        }
-        Ok(Self { head, entries, lost_bytes: rest.len() })
+        };
+        Ok(Self { head, entries, lost_bytes: rest.len(), is_damaged })
     }
 
     /// The scene as it was given; `None` of a scene that a program has built.
@@ -252,6 +268,12 @@ impl Recording {
     #[must_use]
     pub fn is_complete(&self) -> bool {
         self.lost_bytes == 0 && matches!(self.entries.last(), Some(Entry::End(_)))
+    }
+
+    /// Whether what follows its last whole chunk has other bytes than were written, and is not just a missing end.
+    #[must_use]
+    pub const fn is_damaged(&self) -> bool {
+        self.is_damaged
     }
 
     /// Bytes behind its last whole chunk, which mean nothing.
@@ -275,22 +297,42 @@ impl Recording {
         self.head.real_time
     }
 
+    /// The agents whose governors have asked for something.
+    pub(super) fn governed(&self) -> BTreeSet<AgentId> {
+        let asked = |entry: &Entry| if let Entry::Demand(agent, ..) = entry { Some(*agent) } else { None };
+        self.entries.iter().filter_map(asked).collect()
+    }
+
     pub(super) const fn identity(&self) -> &SceneIdentity {
         &self.head.of
     }
 }
 
-/// The contents of the next chunk if that is whole.
-fn take_chunk<'a>(rest: &mut &'a [u8]) -> Option<&'a [u8]> {
-    let (head, bytes) = rest.split_first_chunk::<CHUNK_HEAD>()?;
-    let length = u32::from_le_bytes(std::array::from_fn(|at| head[at])) as usize;
-    let sum = u64::from_le_bytes(std::array::from_fn(|at| head[4 + at]));
-    let (contents, after) = bytes.split_at_checked(length)?;
+/// What the next bytes of a file are.
+enum Chunk<'a> {
+    /// The contents of a chunk.
+    Whole(&'a [u8]),
+    /// Nothing, or the first bytes of a chunk.
+    Cut,
+    /// Other bytes than were written.
+    Damaged,
+}
+
+/// Takes the next chunk if that is whole.
+fn take_chunk<'a>(rest: &mut &'a [u8]) -> Chunk<'a> {
+    let Some((head, bytes)) = rest.split_first_chunk::<CHUNK_HEAD>() else { return Chunk::Cut };
+    let number = |at: usize| u32::from_le_bytes(std::array::from_fn(|k| head[at + k]));
+    let (length, complement) = (number(0), number(4));
+    let sum = u64::from_le_bytes(std::array::from_fn(|k| head[8 + k]));
+    if complement != !length {
+        return Chunk::Damaged;
+    }
+    let Some((contents, after)) = bytes.split_at_checked(length as usize) else { return Chunk::Cut };
     if checksum(contents) != sum {
-        return None;
+        return Chunk::Damaged;
     }
     *rest = after;
-    Some(contents)
+    Chunk::Whole(contents)
 }
 
 /// Writes a recording.
@@ -318,10 +360,10 @@ impl Recorder {
         scene: Option<SceneText>,
         real_time: bool,
     ) -> Result<Self, RecordError> {
-        out.write_all(&MAGIC)?;
-        out.write_all(&FORMAT.to_le_bytes())?;
         let (mut program, mut head) = (PROGRAM.to_owned(), Head { of, scene, real_time });
-        write_chunk(&mut *out, |archive| archive_values!(archive, program, head))?;
+        let begun = out.write_all(&MAGIC).and_then(|()| out.write_all(&FORMAT.to_le_bytes()));
+        let begun = begun.and_then(|()| write_chunk(&mut *out, |archive| archive_values!(archive, program, head)));
+        begun.map_err(RecordError::Write)?;
         let (entries, silent_turns) = (Vec::new(), BTreeMap::new());
         Ok(Self { out, entries, silent_turns, written: Duration::ZERO, hashed: Duration::ZERO, failed: None })
     }
@@ -332,7 +374,7 @@ impl Recorder {
     /// [`RecordError::File`].
     pub fn file(path: &Path) -> Result<Box<dyn Write + Send>, RecordError> {
         let file = std::fs::File::create(path);
-        let file = file.map_err(|source| RecordError::File { path: path.to_owned(), source })?;
+        let file = file.map_err(|error| RecordError::File { path: path.to_owned(), error })?;
         Ok(Box::new(file))
     }
 
@@ -367,6 +409,11 @@ impl Recorder {
             let before = std::mem::take(silent_turns);
             self.entries.push(Entry::Demand(agent, before, demand));
         }
+    }
+
+    /// Whether something could not be written, so that nothing is written any more.
+    pub const fn has_failed(&self) -> bool {
+        self.failed.is_some()
     }
 
     /// Ends it.
@@ -408,6 +455,7 @@ fn write_chunk(
     // in one piece, so that a process that is killed leaves whole chunks
     let mut chunk = Vec::with_capacity(CHUNK_HEAD + bytes.len());
     chunk.extend_from_slice(&length.to_le_bytes());
+    chunk.extend_from_slice(&(!length).to_le_bytes());
     chunk.extend_from_slice(&checksum(&bytes).to_le_bytes());
     chunk.extend_from_slice(&bytes);
     out.write_all(&chunk)

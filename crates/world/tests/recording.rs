@@ -131,7 +131,7 @@ fn a_recording_that_was_cut_anywhere_is_read_to_its_last_whole_chunk() {
     for length in (0..whole.len()).step_by(7) {
         match Recording::from_bytes(&whole[..length]) {
             Ok(recording) => {
-                assert!(!recording.is_complete());
+                assert!(!recording.is_complete() && !recording.is_damaged());
                 counts.insert(length - recording.lost_bytes());
             }
             Err(BadRecording::NoRecording | BadRecording::NoHead) => assert!(length < 400, "{length}"),
@@ -143,11 +143,56 @@ fn a_recording_that_was_cut_anywhere_is_read_to_its_last_whole_chunk() {
     let last = changed.len() - 1;
     changed[last] ^= 1;
     let recording = Recording::from_bytes(&changed).unwrap();
-    assert!(recording.lost_bytes() > 0 && recording.hash().is_none());
+    assert!(recording.lost_bytes() > 0 && recording.hash().is_none() && recording.is_damaged());
     let cut = replayed(recording);
     let plain = start();
     plain.advance(cut.time().since(SimTime::ZERO));
     assert_eq!(cut.hash(), plain.hash());
+}
+
+#[test]
+fn a_flipped_bit_is_damage_wherever_it_is_and_no_missing_end() {
+    let world = start();
+    let kept = recorded(&world);
+    (0..150).for_each(|_| world.advance(ms(1)));
+    world.end_recording().unwrap();
+    let whole = kept.0.lock().unwrap().clone();
+    for at in 12..whole.len() {
+        let mut changed = whole.clone();
+        changed[at] ^= 0x10;
+        match Recording::from_bytes(&changed) {
+            Ok(recording) => assert!(recording.is_damaged() && !recording.is_complete(), "byte {at}"),
+            Err(error) => assert_eq!(error, BadRecording::Damaged, "byte {at}"),
+        }
+    }
+}
+
+/// Takes so many bytes and no more.
+struct FullAfter(usize);
+
+impl Write for FullAfter {
+    fn write(&mut self, bytes: &[u8]) -> std::io::Result<usize> {
+        let Some(left) = self.0.checked_sub(bytes.len()) else { return Err(std::io::ErrorKind::StorageFull.into()) };
+        self.0 = left;
+        Ok(bytes.len())
+    }
+
+    fn flush(&mut self) -> std::io::Result<()> {
+        Ok(())
+    }
+}
+
+#[test]
+fn a_recording_that_cannot_be_written_on_is_known_meanwhile_and_says_once_why() {
+    let world = start();
+    world.record_to(Box::new(FullAfter(1000)), None).unwrap();
+    let failed_after = (0..1000).find(|_| {
+        world.advance(ms(1));
+        world.recording_failed()
+    });
+    assert!(failed_after.is_some_and(|calls| calls < 300), "{failed_after:?}");
+    let error = world.end_recording().unwrap_err();
+    assert!(error.to_string().contains("no storage space") && std::error::Error::source(&error).is_none(), "{error}");
 }
 
 #[test]
@@ -193,6 +238,10 @@ fn a_replay_takes_what_governors_answered_from_the_recording() {
     world.end_recording().unwrap();
     let others = &mut |_: &metachron_world::Member| Some(Box::new(Moody(7)) as Box<dyn Governor>);
     let again = World::replay_governed(&scene, others, kept.read().unwrap(), None).unwrap();
+    again.advance(ms(300));
+    assert_eq!((again.replayed(), again.hash()), (Some(Ok(1.0)), world.hash()));
+    // without any governor too: a program that repeats a run of another does not have them
+    let again = World::replay(&scene, kept.read().unwrap(), None).unwrap();
     again.advance(ms(300));
     assert_eq!((again.replayed(), again.hash()), (Some(Ok(1.0)), world.hash()));
 }

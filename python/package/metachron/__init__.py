@@ -4,8 +4,24 @@ A scene is built of parts, or read from TOML; started, it is a world whose objec
 Units are SI: metres, seconds, kilograms, newtons, radians. Rotations are unit quaternions (x, y, z, w).
 """
 
-from ._metachron import Checkpoint, Contact, Event, Events, Export, Hit, Object, Rollout, Scene, State, World, rollout
-from .parts import Ball, Box, Capsule, Cylinder, Plane, Prismatic, Revolute, Spherical, Tube, Weld
+from ._metachron import Checkpoint, Contact, Event, Events, Export, Hit, Object, Rollout, Scene, State, World, replay, rollout
+from .parts import (
+    Ball,
+    Box,
+    Capsule,
+    Cylinder,
+    Plane,
+    Prismatic,
+    Revolute,
+    Rope,
+    Sheet,
+    SoftBall,
+    SoftBox,
+    SoftMesh,
+    Spherical,
+    Tube,
+    Weld,
+)
 
 __all__ = [
     "Ball",
@@ -23,11 +39,17 @@ __all__ = [
     "Prismatic",
     "Revolute",
     "Rollout",
+    "Rope",
     "Scene",
+    "Sheet",
+    "SoftBall",
+    "SoftBox",
+    "SoftMesh",
     "Spherical",
     "State",
     "Tube",
     "Weld",
     "World",
+    "replay",
     "rollout",
 ]

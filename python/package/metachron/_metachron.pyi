@@ -11,7 +11,7 @@ from typing_extensions import Self, Unpack
 from .parts import JointKind, Part, Solid
 from .typing import Array, Numbers
 
-__all__ = ["Checkpoint", "Contact", "Event", "Events", "Export", "Hit", "Object", "Rollout", "Scene", "State", "World", "rollout"]
+__all__ = ["Checkpoint", "Contact", "Event", "Events", "Export", "Hit", "Object", "Rollout", "Scene", "State", "World", "replay", "rollout"]
 
 _Executor = Literal["lockstep", "threads", "pool", "auto"]
 
@@ -93,7 +93,7 @@ class Scene:
         """Adds a solid that never moves."""
 
     def add(self, name: str, what: Part) -> Self:
-        """Adds a rigid body or a tube."""
+        """Adds what moves: a rigid body, a tube, a sheet, a solid or a rope."""
 
     def joint(self, name: str, kind: JointKind, a: str, b: str | None = None) -> Self:
         """Joins the rigid bodies `a` and `b`, or `a` and the world."""
@@ -211,9 +211,32 @@ class World:
         """Listens from now on: to contacts of at least `above` newtons, to changes of state, of all objects or one."""
 
     def export(
-        self, *, mcap: str | PathLike[str] | None = None, vtk: str | PathLike[str] | None = None
+        self,
+        *,
+        mcap: str | PathLike[str] | None = None,
+        vtk: str | PathLike[str] | None = None,
+        perfetto: str | PathLike[str] | None = None,
     ) -> Export:
-        """Begins files of moments for other programs: MCAP for Foxglove, Lichtblick and Rerun, a folder with a VTK series for ParaView."""
+        """Begins files for other programs: moments as MCAP for Foxglove, Lichtblick and Rerun, or in a folder as a VTK series for ParaView; for
+        ui.perfetto.dev when each object stepped.
+        """
+
+    def write_glb(self, path: str | PathLike[str]) -> None:
+        """Writes the surfaces of all objects, as they are now, as binary glTF (.glb). Raises `OSError`."""
+
+    def record(self, path: str | PathLike[str]) -> None:
+        """Writes down from now on, in lockstep, what is done to it, so that `replay` repeats it to the bit. Raises `OSError`; `RuntimeError` on
+        other executors.
+        """
+
+    def end_recording(self) -> bool:
+        """Ends the recording, as `stop` does; whether there was one. Raises `OSError` if not all of it could be written."""
+
+    @property
+    def replayed(self) -> float | None:
+        """The share of its recording that it has played, 0 ... 1; `None` of a world that is no replay. Raises `RuntimeError` where the replay
+        came to something that the recorded world did not.
+        """
 
     def contacts(self, object: str | Object) -> list[Contact]:
         """What an object touches now."""
@@ -407,6 +430,13 @@ class Rollout:
     @property
     def hashes(self) -> NDArray[np.uint64]:
         """(worlds,): as `World.hash`, at the end."""
+
+def replay(path: str | PathLike[str], scene: Scene | None = None, *, until: float | None = None) -> World:
+    """A world in lockstep that does again what a recording says, as far as time is let pass, and no further than `until`, s; it takes no commands.
+
+    `scene` is what was recorded, unless that was read from TOML: then the recording has it. Raises `OSError`, and `ValueError` for a file
+    that is no recording of this version, or is of another scene.
+    """
 
 def rollout(scene: Scene, on: str, actions: ArrayLike, **keywords: Unpack[_Rollout]) -> Rollout:
     """Plays a world in lockstep for each row of `actions`: forces on one object, N, (worlds, steps, 3).

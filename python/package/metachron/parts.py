@@ -1,4 +1,4 @@
-"""Parts of a scene: solids, bodies and tubes, and the kinds of joints. They hold numbers and nothing else.
+"""Parts of a scene: solids, bodies, tubes, soft bodies, and the kinds of joints. They hold numbers and nothing else.
 
 What is `None` is as the engine has it by default. Units are SI; a rotation is a unit quaternion (x, y, z, w).
 """
@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from os import PathLike
 from typing import Literal, final
 
 from .typing import Numbers
@@ -116,6 +117,107 @@ class Tube:
 
 
 @dataclass(frozen=True, kw_only=True)
+class _Soft:
+    """What bends: by default of soft tissue, free, without damping."""
+
+    at: Numbers | None = None
+    """Position of its middle at the start, m; of a rope or a mesh of the origin of its points."""
+    rotation: Numbers | None = None
+    """From its own axes to the world's."""
+    velocity: Numbers | None = None
+    """Velocity at the start, m/s; default at rest."""
+    young: float | None = None
+    """Young's modulus, Pa, 1 ... 1e11; default 1e5."""
+    poisson: float | None = None
+    """Poisson's ratio, 0 ... 0.499; default 0.4."""
+    density: float | None = None
+    """kg/m3, 1 ... 1e5; default 1050."""
+    damping: tuple[float, float] | None = None
+    """Of its motion, 1/s, 0 ... 1e4, and of its strains, s, 0 ... 10; default none."""
+    law: Literal["corotational", "neo-hookean", "ogden"] | None = None
+    """How the stress of a solid follows from its strain; default corotational."""
+    exponent: float | None = None
+    """Of the law of Ogden, 1 ... 20 or -20 ... -1."""
+    hold: Sequence[Literal["left", "right", "near", "far", "bottom", "top"]] = ()
+    """Sides that never move, in its own axes: least and largest x, y, z; of a rope left is its start and right its end."""
+    friction: float | None = None
+    """Coulomb friction coefficient, >= 0; default 0.3."""
+    self_contact: bool | None = None
+    """Whether it touches itself; by default sheets and ropes do."""
+    rate: float | None = None
+    """Steps a simulated second, 1 ... 100000; default 240."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Celled(_Soft):
+    """What is divided into cells of its own."""
+
+    eps: tuple[float, float] | None = None
+    """The finest and the coarsest spacing of its nodes, m, instead of a fixed number of cells: it begins with the finest."""
+
+
+@final
+@dataclass(frozen=True)
+class Sheet(_Celled):
+    """A flat sheet in its x and y."""
+
+    size: tuple[float, float]
+    """Its lengths, m, > 0."""
+    thickness: float
+    """m, > 0."""
+    segments: tuple[int, int]
+    """Number of cells along both."""
+
+
+@final
+@dataclass(frozen=True)
+class SoftBox(_Celled):
+    """A soft box."""
+
+    size: tuple[float, float, float]
+    """Its lengths, m, > 0."""
+    segments: tuple[int, int, int]
+    """Number of cells along each."""
+
+
+@final
+@dataclass(frozen=True)
+class SoftBall(_Celled):
+    """A soft ball."""
+
+    radius: float
+    """m, > 0."""
+    segments: int
+    """Number of cells across it."""
+
+
+@final
+@dataclass(frozen=True)
+class Rope(_Celled):
+    """A rope, which does not resist bending."""
+
+    points: Sequence[Numbers] | Numbers
+    """At least two, m; an array of shape (n, 3) or a list of triples."""
+    radius: float
+    """m, > 0."""
+    segments: int
+    """Number of equal pieces."""
+
+
+@final
+@dataclass(frozen=True)
+class SoftMesh(_Soft):
+    """What the closed surface in a file encloses: STL, OBJ or .glb."""
+
+    file: str | PathLike[str]
+    """Its path."""
+    eps: tuple[float, float]
+    """The finest and the coarsest cells of the cage around it, m: it begins with the finest."""
+    scale: float = 1.0
+    """Metres in a unit of the file."""
+
+
+@dataclass(frozen=True, kw_only=True)
 class _Joint:
     """A joint between two bodies, or of one with the world."""
 
@@ -158,5 +260,5 @@ class Weld(_Joint):
 
 
 Solid = Plane | Ball | Box | Capsule | Cylinder
-Part = Ball | Box | Capsule | Cylinder | Tube
+Part = Ball | Box | Capsule | Cylinder | Tube | Sheet | SoftBox | SoftBall | SoftMesh | Rope
 JointKind = Revolute | Prismatic | Spherical | Weld

@@ -77,7 +77,7 @@ impl AgentRunner {
                 };
                 let with = other.map(|other| ids[other]);
                 seat.events.push(AttachmentEvent { attachment, kind, with, at, force_n });
-                actor.shared.events.push(&AgentEvent { at: actor.pace.time() + dt, kind: EventKind::AttachmentGave });
+                actor.shared.streams.event(&AgentEvent { at: actor.pace.time() + dt, kind: EventKind::AttachmentGave });
             }
         });
     }

@@ -4,7 +4,8 @@
 //! with the next. Never here: contacts that only sense.
 
 use super::ClusterSeat;
-use crate::events::{AgentEvent, ContactEvent, EventKind, EventRing};
+use crate::events::{AgentEvent, ContactEvent, EventKind};
+use crate::handle::EventStreams;
 use metachron_contact::stepper::{PairTotal, Partner};
 use metachron_core::{ContactPartner, ContactState, SimSpan, SimTime};
 
@@ -13,7 +14,7 @@ const GREW_BY: f64 = 1.25;
 
 impl ClusterSeat {
     /// Takes in what pairs gave in a step of `dt` that ends `now`.
-    pub(super) fn note_contacts(&mut self, totals: &[PairTotal], dt: SimSpan, now: SimTime, events: &EventRing) {
+    pub(super) fn note_contacts(&mut self, totals: &[PairTotal], dt: SimSpan, now: SimTime, streams: &EventStreams) {
         let dt_s = dt.as_secs_f64();
         // those that nothing is said of any more have ended
         self.contacts.iter_mut().for_each(|contact| contact.depth_m = f64::NAN);
@@ -46,21 +47,21 @@ impl ClusterSeat {
                     let here = if total.contacts > 0 { seen } else { ContactState { places: 0, force_n, ..*before } };
                     *before = ContactState { since: before.since, greatest_n, told_n, depth_m: total.depth_m, ..here };
                     if grew {
-                        events.push(&AgentEvent { at: now, kind: EventKind::ContactGrew(event(before)) });
+                        streams.event(&AgentEvent { at: now, kind: EventKind::ContactGrew(event(before)) });
                     }
                 }
                 // what only touches has not begun to press
                 Err(_) if total.contacts == 0 => {}
                 Err(at) => {
                     self.contacts.insert(at, seen);
-                    events.push(&AgentEvent { at: now, kind: EventKind::ContactBegan(event(&seen)) });
+                    streams.event(&AgentEvent { at: now, kind: EventKind::ContactBegan(event(&seen)) });
                 }
             }
         }
         self.contacts.retain(|contact| {
             let goes_on = !contact.depth_m.is_nan();
             if !goes_on {
-                events.push(&AgentEvent { at: now, kind: EventKind::ContactEnded(event(contact)) });
+                streams.event(&AgentEvent { at: now, kind: EventKind::ContactEnded(event(contact)) });
             }
             goes_on
         });

@@ -10,6 +10,7 @@ use super::super::agent_runner::AgentRunner;
 use super::super::agents::Agents;
 use super::super::events::EventKind;
 use super::super::handle::Shared;
+use super::super::turns::Took;
 use super::membership::Membership;
 use crossbeam::atomic::AtomicCell;
 use metachron_core::{AgentId, Archive, ArchiveError, DisjointSets, SimTime};
@@ -188,7 +189,7 @@ impl AgentRunner {
 
     /// Shows the last states of those it leads and lets them return: it makes no more turns.
     pub fn disband(&mut self, timeline: &Timeline, wall: Duration) {
-        self.conclude_led(timeline, wall);
+        self.conclude_led(timeline, Took { begun: wall, ended: wall });
         self.release_all();
     }
 

@@ -13,6 +13,7 @@
 use super::super::agent_clock::{Start, Timeline};
 use super::super::agent_runner::{AgentRunner, PendingTurn, StepOutcome, contained};
 use super::super::metrics::Entry;
+use super::super::turns::Took;
 use super::Span;
 use metachron_core::{DT_MAX_S, SimSpan, SimTime};
 use std::time::Duration;
@@ -142,12 +143,13 @@ impl AgentRunner {
     }
 
     /// Accounts for the steps of those that stepped with it, lets their governors answer and shows their states; whether all can be seen.
-    pub fn conclude_led(&mut self, timeline: &Timeline, wall: Duration) -> bool {
-        let mut published = true;
+    pub fn conclude_led(&mut self, timeline: &Timeline, took: Took) -> bool {
+        let (mut published, leader) = (true, self.id());
         self.led.each(|actor| {
             let Some(open) = actor.open.take() else { return };
             let work_s = actor.cluster.as_ref().map_or(0.0, |seat| seat.work_s);
-            published &= actor.record_step(&open, timeline, wall, work_s);
+            published &= actor.record_step(&open, timeline, took.ended, work_s);
+            actor.tell_turn(&open, leader, took);
             if let Err(reason) = contained(|| actor.run_governor(timeline, &open, work_s)) {
                 actor.park(reason);
             }

@@ -9,6 +9,7 @@ use super::super::cluster::hand_over;
 use super::super::cpu::CpuShare;
 use super::super::turn_order::{PartKind, TurnOrder, in_force};
 use super::super::turn_parts::Begun;
+use super::super::turns::Took;
 use super::shared::PoolState;
 use super::watchdog::WatchdogWord;
 use metachron_core::AgentId;
@@ -111,7 +112,7 @@ impl Worker {
         held.iter_mut().for_each(|held| held.note_end(self.now));
         let next = match effort {
             None => Next::Parked,
-            Some(_) => actor.finish(timeline, self.now, wall.as_secs_f64()),
+            Some(_) => actor.finish(timeline, Took { begun: began, ended: self.now }, wall.as_secs_f64()),
         };
         actor.count(wall);
         actor.settle(self.cpu.count(wall));
@@ -277,22 +278,5 @@ mod tests {
         let steps: u64 = worker.state.handles.iter().map(|agent| agent.steps()).sum();
         // 5.6 s of simulated time
         assert!((62_000..64_000).contains(&steps), "{steps}");
-    }
-}
-#[cfg(test)]
-mod dbg {
-    #[test]
-    fn sizes() {
-        use super::super::super::*;
-        println!(
-            "runner {} shared {} seat {} mailbox {} events {} metrics {}",
-            size_of::<agent_runner::AgentRunner>(),
-            size_of::<handle::Shared>(),
-            size_of::<cluster::ClusterSeat>(),
-            size_of::<mailbox::Mailbox>(),
-            size_of::<events::EventRing>(),
-            size_of::<metrics::Metrics>()
-        );
-        println!("bc {}", size_of::<boxcar::Vec<u64>>());
     }
 }

@@ -9,6 +9,7 @@
 
 use super::{POSITION_MAX_M, glb, obj, stl};
 use glam::{DVec3, Vec2};
+use metachron_geometry::Triangles;
 
 /// Most triangles of a mesh: past it a body would not step in real time.
 pub(super) const TRIANGLES_MAX: usize = 1_000_000;
@@ -41,6 +42,12 @@ pub(super) fn read(bytes: &[u8], scale: f64) -> Result<Mesh, String> {
         within(far(point), scale).map_err(|why| format!("{why}: a point of it is at ({at})"))?;
     }
     Ok(Mesh { points, uvs, triangles })
+}
+
+/// Reads a file as [`read`] does: its triangles in metres.
+pub fn triangles(bytes: &[u8], scale: f64) -> Result<Triangles, String> {
+    let Mesh { points, triangles, .. } = read(bytes, scale)?;
+    Ok(Triangles { points: points.iter().map(|point| *point * scale).collect(), triangles })
 }
 
 /// Checks that a mesh whose coordinates go up to `reach` in its own unit stays within the bounds of a scene.

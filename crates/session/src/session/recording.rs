@@ -34,6 +34,12 @@ impl Session {
         self.world.end_recording()
     }
 
+    /// Whether something of the recording could not be written; [`Session::end_recording`] says why.
+    #[must_use]
+    pub fn recording_failed(&self) -> bool {
+        self.world.recording_failed()
+    }
+
     /// The share of its recording that a replay has played, 0 … 1, or why it plays no more of it; `None` of other sessions.
     #[must_use]
     pub fn replayed(&self) -> Option<Result<f64, String>> {

@@ -1,0 +1,42 @@
+//! A world's recording, played again.
+//!
+//! In: a file that `World.record` or `metachron run --record` has written. Out: a world that does what it says, to the bit.
+//! Never here: what is written down.
+
+use crate::numbers::span;
+use crate::raised;
+use crate::scene::Scene;
+use crate::world::World;
+use metachron::core::SimTime;
+use metachron::scene::{Source, load};
+use metachron::world::{self, Recording, SceneText};
+use pyo3::exceptions::PyValueError;
+use pyo3::prelude::*;
+use std::path::{Path, PathBuf};
+
+/// A world in lockstep that does again what a recording says, as far as time is let pass, and no further than `until`, s; it takes no commands.
+///
+/// `scene` is what was recorded, unless that was read from TOML: then the recording has it. Raises `OSError`, and `ValueError` for a file
+/// that is no recording of this version, or is of another scene.
+#[pyfunction]
+#[pyo3(signature = (path, scene = None, *, until = None))]
+pub fn replay(py: Python<'_>, path: PathBuf, scene: Option<PyRef<'_, Scene>>, until: Option<f64>) -> PyResult<World> {
+    let recording = Recording::read(&path).map_err(raised::record)?;
+    let until = until.map(|seconds| span("until", seconds)).transpose()?.map(|span| SimTime::ZERO + span);
+    let scene = match (scene, recording.scene()) {
+        (Some(scene), _) => scene.resolved()?,
+        (None, Some(text)) => read(text)?,
+        (None, None) => {
+            let why = "it has no scene, because that was built of parts; give the same one to replay";
+            return Err(PyValueError::new_err(format!("{}: {why}", path.display())));
+        }
+    };
+    let inner = py.detach(|| world::World::replay(&scene, recording, until)).map_err(raised::checkpoint)?;
+    World::of(inner, &scene, None)
+}
+
+/// The scene of a recording.
+fn read(scene: &SceneText) -> PyResult<world::Scene> {
+    let source = Source::recorded(&scene.name, &scene.text, scene.folder.as_deref().map(Path::new));
+    source.and_then(|source| load(&source, &scene.overrides)).map_err(|error| raised::scene(&error))
+}
