@@ -147,6 +147,11 @@ impl<T: Default> SlotWriter<T> {
         self.made
     }
 
+    /// Frees the values that no reader holds and that are not to be published.
+    pub(super) fn forget_spares(&mut self) {
+        self.spare = Vec::new();
+    }
+
     fn take_spare(&mut self) -> Arc<T> {
         self.unread().unwrap_or_else(|| {
             self.slot.sweep(&mut self.spare);

@@ -45,13 +45,12 @@ pub fn still_life() -> (SceneView, Camera) {
     };
     let tool = |tip: DVec3, from: DVec3, jaw, grasp| {
         let rotation = DQuat::from_rotation_arc(DVec3::Z, (tip - from).normalize());
-        let still = DVec3::ZERO;
         Body::Tool(ToolState {
             tip,
             led: tip,
             rotation,
-            velocity: still,
-            spin: still,
+            velocity: DVec3::ZERO,
+            spin: DVec3::ZERO,
             jaw,
             grasp,
             admits: None,

@@ -191,6 +191,19 @@ impl AgentRunner {
     pub fn disband(&mut self, timeline: &Timeline, wall: Duration) {
         self.conclude_led(timeline, Took { begun: wall, ended: wall });
         self.release_all();
+        if self.shared.gauges.has_left() {
+            self.forget();
+        }
+    }
+
+    /// Frees what it made turns with: who has left makes none, and its number is not given again.
+    fn forget(&mut self) {
+        (self.cluster, self.governor, self.loads) = (None, None, None);
+        (self.links, self.announced) = (Vec::new(), Vec::new());
+        self.led = Led::default();
+        self.observer = self.peers.observer(self.id(), &[]);
+        self.writer.forget_spares();
+        self.shared.form.publish(None);
     }
 
     /// Lets all it leads return, each by itself: those that belong together find together again.
