@@ -91,7 +91,6 @@ fn in_window(mut session: Session, request: &Request, go_on: GoOn<'_>) -> anyhow
         Err(WindowFailure::Gone(outcome, why)) => {
             Ok(Played { failure: Some(why.to_string()), ..played(&request.scene, *outcome, None) })
         }
-        Err(WindowFailure::Session(error)) => Err(error.into()),
     }
 }
 

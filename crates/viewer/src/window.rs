@@ -21,9 +21,10 @@ use metachron_lod::control::Policy;
 use metachron_render::{Camera, Gpu, Hand, Hit, Picture, Ray};
 use metachron_runtime::TimelineCommand;
 use metachron_scene::Source;
-use metachron_session::{Finished, FrameRecord, Outcome, REWIND_BYTES, Session, SessionError};
+use metachron_session::{Finished, FrameRecord, Outcome, REWIND_BYTES, Session};
 use scene_file::WatchedFile;
 use std::path::PathBuf;
+use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 /// A run in a window.
@@ -48,8 +49,6 @@ pub enum WindowFailure {
     NoWindow(Box<Session>, WindowError),
     /// The window was open, and its display is gone: the outcome of the run until then.
     Gone(Box<Outcome>, WindowError),
-    /// A scene could not be restarted, or its recording not be completed.
-    Session(SessionError),
 }
 
 /// Shows `session` in a window until it is closed, or until `go_on`, called many times a second whether or not anything is drawn, returns
@@ -65,8 +64,8 @@ pub fn play_in_window(session: Session, plan: WindowPlan, go_on: GoOn<'_>) -> Re
     let mut simulation = WindowSimulation::new(session, plan, go_on);
     match run_window(&mut simulation, &options) {
         Ok(_) => {
-            simulation.session.end_recording().map_err(|error| WindowFailure::Session(error.into()))?;
-            Ok(simulation.session.end(simulation.adapter, simulation.stopped))
+            let unwritten = simulation.session.end_recording().err().map(|error| Arc::new(error.into()));
+            Ok(Outcome { unwritten, ..simulation.session.end(simulation.adapter, simulation.stopped) })
         }
         Err(error @ WindowError::Gone(_)) => {
             Err(WindowFailure::Gone(Box::new(simulation.session.end(simulation.adapter, true)), error))
