@@ -69,16 +69,16 @@ impl<E: RingEntry> Ring<E> {
 
     /// Passes the entries from number `next` on to `take`; the number of the next one, and how many were overwritten before they were read.
     pub fn read(&self, next: u64, mut take: impl FnMut(E)) -> (u64, u64) {
-        let Some(Places { written: end, places }) = self.0.get().map(|ring| &**ring) else { return (next, 0) };
-        let written = end.load(Acquire);
+        let Some(Places { written, places }) = self.0.get().map(|ring| &**ring) else { return (next, 0) };
+        let written = written.load(Acquire);
         let first = next.max(written.saturating_sub(E::KEPT as u64));
         let mut lost = first - next;
         for number in first..written {
-            match places[number as usize % E::KEPT].read() {
+            // the place may have a newer one already, and before that is counted
+            match places[number as usize % E::KEPT].read_write(number / E::KEPT as u64 + 1) {
                 ReadOutcome::Complete(words) => match E::of_words(&words) {
-                    // the place may have a newer one already
-                    Some(entry) if end.load(Acquire) <= number + E::KEPT as u64 => take(entry),
-                    _ => lost += 1,
+                    Some(entry) => take(entry),
+                    None => lost += 1,
                 },
                 ReadOutcome::Empty | ReadOutcome::Torn => lost += 1,
             }
@@ -111,6 +111,18 @@ mod tests {
         let (taken, lost) = drain(&ring, &mut next);
         assert_eq!((taken.len(), lost), (AgentEvent::KEPT, 300 - AgentEvent::KEPT as u64));
         assert_eq!(taken[0].at, SimTime::from_nanos(300 - AgentEvent::KEPT as u64));
+    }
+
+    #[test]
+    fn an_entry_in_whose_place_a_newer_one_is_already_counts_as_lost() {
+        let ring = Ring::default();
+        let mut next = ring.listen();
+        let event = |k| AgentEvent { at: SimTime::from_nanos(k), kind: EventKind::Left };
+        (0..AgentEvent::KEPT as u64).for_each(|k| ring.push(&event(k)));
+        // as a writer leaves it that is interrupted before it counts
+        ring.0.get().unwrap().places[0].write(event(1000).words());
+        let (taken, lost) = drain(&ring, &mut next);
+        assert_eq!((taken.len(), taken[0].at, lost), (AgentEvent::KEPT - 1, SimTime::from_nanos(1), 1));
     }
 
     #[test]

@@ -58,7 +58,17 @@ impl<const N: usize> Seqlock<N> {
 
     /// Tries to read once.
     pub fn read(&self) -> ReadOutcome<N> {
+        self.read_at(self.version.load(Ordering::Acquire))
+    }
+
+    /// Tries to read the write of this number, counted from 1: [`ReadOutcome::Torn`] where it is gone, or not there yet.
+    pub fn read_write(&self, number: u64) -> ReadOutcome<N> {
         let version = self.version.load(Ordering::Acquire);
+        if version == number.wrapping_mul(2) { self.read_at(version) } else { ReadOutcome::Torn }
+    }
+
+    /// Reads, where the version was this before.
+    fn read_at(&self, version: u64) -> ReadOutcome<N> {
         if version == 0 {
             return ReadOutcome::Empty;
         }
