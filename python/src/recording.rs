@@ -14,7 +14,7 @@ use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use std::path::{Path, PathBuf};
 
-/// A world in lockstep that does again what a recording says, as far as time is let pass, and no further than `until`, s; it takes no commands.
+/// A world on one thread that does again what a recording says, as far as time is let pass, and no further than `until`, s; it takes no commands.
 ///
 /// `scene` is what was recorded, unless that was read from TOML: then the recording has it. Raises `OSError`, and `ValueError` for a file
 /// that is no recording of this version, or is of another scene.

@@ -358,15 +358,15 @@ impl World {
         py.detach(write).map_err(raised::export)
     }
 
-    /// Writes down from now on, in lockstep, what is done to it, so that `replay` repeats it to the bit. Raises `OSError`; `RuntimeError` on
-    /// other executors.
+    /// Writes down from now on what is done to it, so that `replay` repeats it to the bit. Raises `OSError`; `RuntimeError` on
+    /// a world that has stopped, is recorded already or repeats a recording.
     fn record(&self, py: Python<'_>, path: PathBuf) -> PyResult<()> {
         py.detach(|| match &self.text {
-            Some(text) if self.inner.executor() == ExecutorKind::Lockstep => {
+            Some(text) => {
                 let file = File::create(&path).map_err(|error| RecordError::File { path, error })?;
                 self.inner.record_to(Box::new(file), Some(text.clone()))
             }
-            _ => self.inner.record(&path),
+            None => self.inner.record(&path),
         })
         .map_err(raised::record)
     }

@@ -225,8 +225,8 @@ class World:
         """Writes the surfaces of all objects, as they are now, as binary glTF (.glb). Raises `OSError`."""
 
     def record(self, path: str | PathLike[str]) -> None:
-        """Writes down from now on, in lockstep, what is done to it, so that `replay` repeats it to the bit. Raises `OSError`; `RuntimeError` on
-        other executors.
+        """Writes down from now on what is done to it, so that `replay` repeats it to the bit. Raises `OSError`; `RuntimeError` on
+        a world that has stopped, is recorded already or repeats a recording.
         """
 
     def end_recording(self) -> bool:
@@ -432,7 +432,7 @@ class Rollout:
         """(worlds,): as `World.hash`, at the end."""
 
 def replay(path: str | PathLike[str], scene: Scene | None = None, *, until: float | None = None) -> World:
-    """A world in lockstep that does again what a recording says, as far as time is let pass, and no further than `until`, s; it takes no commands.
+    """A world on one thread that does again what a recording says, as far as time is let pass, and no further than `until`, s; it takes no commands.
 
     `scene` is what was recorded, unless that was read from TOML: then the recording has it. Raises `OSError`, and `ValueError` for a file
     that is no recording of this version, or is of another scene.
