@@ -1,34 +1,15 @@
 //! A recording repeats a world in lockstep to the bit, whatever was done to it, and says why it cannot.
 
+mod kept;
+
 use glam::{DQuat, DVec3};
+use kept::recorded;
 use metachron_core::{Anchor, Resolution, SimSpan, SimTime};
 use metachron_geometry::Solid;
 use metachron_runtime::{Demand, Governor, TurnMeasure};
 use metachron_world::kinds::ExecutorKind;
 use metachron_world::{BadRecording, Command, Custom, RecordError, Recording, Rigid, Scene, Tube, World, WorldError};
 use std::io::Write;
-use std::sync::{Arc, Mutex};
-
-/// Bytes that are written while they are kept.
-#[derive(Clone, Default)]
-struct Kept(Arc<Mutex<Vec<u8>>>);
-
-impl Write for Kept {
-    fn write(&mut self, bytes: &[u8]) -> std::io::Result<usize> {
-        self.0.lock().unwrap().extend_from_slice(bytes);
-        Ok(bytes.len())
-    }
-
-    fn flush(&mut self) -> std::io::Result<()> {
-        Ok(())
-    }
-}
-
-impl Kept {
-    fn read(&self) -> Result<Recording, BadRecording> {
-        Recording::from_bytes(&self.0.lock().unwrap())
-    }
-}
 
 const fn ms(count: u64) -> SimSpan {
     SimSpan::from_millis(count)
@@ -42,12 +23,6 @@ fn scene() -> Scene {
 
 fn start() -> World {
     World::start(&scene(), ExecutorKind::Lockstep).unwrap()
-}
-
-fn recorded(world: &World) -> Kept {
-    let kept = Kept::default();
-    world.record_to(Box::new(kept.clone()), None).unwrap();
-    kept
 }
 
 /// Plays all of a recording.

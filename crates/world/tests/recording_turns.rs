@@ -1,46 +1,18 @@
 //! A recording of a world on threads or in a pool repeats it on one thread, to the bit.
 
+mod kept;
+
 use glam::{DQuat, DVec3};
+use kept::recorded;
 use metachron_contact::joint::JointKind;
 use metachron_core::{Anchor, SimSpan, SimTime};
 use metachron_geometry::Solid;
 use metachron_runtime::{Demand, Governor, TurnMeasure};
 use metachron_world::kinds::ExecutorKind;
-use metachron_world::{
-    BadRecording, Command, EventFilter, Happening, Member, Pace, Recording, Rigid, Scene, Tube, World,
-};
-use std::io::Write;
-use std::sync::{Arc, Mutex};
-
-/// Bytes that are written while they are kept.
-#[derive(Clone, Default)]
-struct Kept(Arc<Mutex<Vec<u8>>>);
-
-impl Write for Kept {
-    fn write(&mut self, bytes: &[u8]) -> std::io::Result<usize> {
-        self.0.lock().unwrap().extend_from_slice(bytes);
-        Ok(bytes.len())
-    }
-
-    fn flush(&mut self) -> std::io::Result<()> {
-        Ok(())
-    }
-}
-
-impl Kept {
-    fn read(&self) -> Result<Recording, BadRecording> {
-        Recording::from_bytes(&self.0.lock().unwrap())
-    }
-}
+use metachron_world::{Command, EventFilter, Happening, Member, Pace, Recording, Rigid, Scene, Tube, World};
 
 const fn ms(count: u64) -> SimSpan {
     SimSpan::from_millis(count)
-}
-
-fn recorded(world: &World) -> Kept {
-    let kept = Kept::default();
-    world.record_to(Box::new(kept.clone()), None).unwrap();
-    kept
 }
 
 /// Plays all of a recording.
