@@ -172,9 +172,10 @@ impl AgentRunner {
         let now = timeline.sim_at(wall);
         let work_s = self.share_work(work_s);
         self.metrics.time_turn(&self.shared.gauges, turn_s);
-        let mut published = self.record_step(&open, timeline, wall, work_s);
+        // its own state comes last: where that is to be seen, those of all it leads are too
+        let mut published = self.conclude_led(timeline, took);
+        published &= self.record_step(&open, timeline, wall, work_s);
         self.tell_turn(&open, self.id(), took);
-        published &= self.conclude_led(timeline, took);
         if let Err(reason) = contained(|| self.run_governor(timeline, &open, work_s)) {
             self.park(reason);
             self.disband(timeline, wall);

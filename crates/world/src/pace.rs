@@ -94,8 +94,11 @@ impl World {
             if self.time() >= end && !agents.iter().any(|agent| behind(&agent)) {
                 return;
             }
-            let mut leaders = agents.iter().filter(behind).filter_map(|agent| agents.of(agent.led_by()?));
-            let idle = leaders.find(|leader| leader.latest().moment() >= asked);
+            // a turn shows its leader's state last: who is still behind after that was looked at is not in a turn that is being shown
+            let idle = agents.iter().filter(behind).find_map(|agent| {
+                let leader = agents.of(agent.led_by()?)?;
+                (leader.latest().moment() >= asked && behind(&agent)).then_some(leader)
+            });
             // where another thread has stopped time, or lets it run, it is not ours to let it go on
             if let Some(leader) = idle.filter(|_| self.timeline().until() == Some(asked)) {
                 self.drive(further(leader.stats().dt));
