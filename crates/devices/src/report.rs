@@ -11,6 +11,8 @@ pub struct DeviceReport {
     pub object: String,
     /// How often it was read.
     pub ticks: u64,
+    /// Whether the system gave its thread real-time priority. Where it did not, ticks are late by what others take of the cores.
+    pub realtime: bool,
     /// By how much ticks were late, milliseconds.
     pub late_ms: Quantiles,
     /// Age of the state that the force followed, in steps of that state: at most two, as older ones are not used.

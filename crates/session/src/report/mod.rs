@@ -465,6 +465,7 @@ mod tests {
         "/couplings/0/penetration_m",
         "/events/0/at_s",
         "/devices/0/object",
+        "/devices/0/realtime",
         "/devices/0/late_ms/p99",
         "/devices/0/age_steps/max",
         "/devices/0/force_max_n",
