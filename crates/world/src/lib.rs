@@ -45,6 +45,7 @@ mod recording;
 mod replay;
 mod scene;
 mod sensors;
+mod set_state;
 mod spec;
 mod ties;
 mod world;
