@@ -44,7 +44,8 @@ impl<'py> FromPyObject<'_, 'py> for Viewpoint {
         let fov: f64 = field(&given, "fov")?;
         let distance = eye.distance(look_at);
         if !(distance.is_finite() && distance > 0.0) {
-            let message = format!("the camera is at {eye} and looks at {look_at}; expected two different finite points");
+            let message =
+                format!("the camera is at {eye} and looks at {look_at}; expected two different finite points");
             return Err(PyValueError::new_err(message));
         }
         if !(0.01..=3.0).contains(&fov) {

@@ -161,7 +161,11 @@ impl Scene {
     }
 
     /// Adds a sensor, which `World.sensor` reads.
-    fn sensor<'py>(mut slf: PyRefMut<'py, Self>, name: String, on: &Bound<'py, PyAny>) -> PyResult<PyRefMut<'py, Self>> {
+    fn sensor<'py>(
+        mut slf: PyRefMut<'py, Self>,
+        name: String,
+        on: &Bound<'py, PyAny>,
+    ) -> PyResult<PyRefMut<'py, Self>> {
         let on = mount(on)?;
         slf.build(|builder| builder.sensor(name, on))?;
         Ok(slf)

@@ -301,12 +301,7 @@ impl World {
     /// Puts the nodes of a soft body to these places, m, (n, 3), with these velocities, m/s; at rest where there are none. How many nodes it has,
     /// `State.nodes` says.
     #[pyo3(signature = (object, positions, velocities = None))]
-    fn set_nodes(
-        &self,
-        object: Named<'_>,
-        positions: Vec<Vector>,
-        velocities: Option<Vec<Vector>>,
-    ) -> PyResult<()> {
+    fn set_nodes(&self, object: Named<'_>, positions: Vec<Vector>, velocities: Option<Vec<Vector>>) -> PyResult<()> {
         let object = object.of(&self.inner)?;
         let plain = |vectors: Vec<Vector>| vectors.into_iter().map(|Vector(vector)| vector).collect::<Vec<_>>();
         let velocities = velocities.map_or_else(|| vec![DVec3::ZERO; positions.len()], plain);
