@@ -65,6 +65,14 @@ pub enum SceneBuildError {
         /// What it can be on.
         what: &'static str,
     },
+    /// A sensor sits where nothing can.
+    #[error("the sensor \"{sensor}\" is at {found}; expected finite numbers and a quaternion of a length above 0")]
+    BadSite {
+        /// The sensor.
+        sensor: String,
+        /// The site as given.
+        found: String,
+    },
     /// A joint cannot be.
     #[error("the joint of \"{name}\" cannot be: {reason}")]
     BadJoint {

@@ -45,6 +45,7 @@ mod recording;
 mod replay;
 mod scene;
 mod sensors;
+mod set_state;
 mod spec;
 mod ties;
 mod world;
@@ -65,6 +66,6 @@ pub use scene::{
     Appearance, Camera, Factors, GROUP_LEVELS_MAX, Gains, Group, Machine, Member, NamedCamera, ObjectCost, PaceWish,
     Probe, RENDER_SCALE, Scene, Scenery, Spec, Target, View,
 };
-pub use sensors::{JointRef, Reading, Sensor, SensorKind};
+pub use sensors::{JointRef, Reading, Sensor, SensorKind, Site};
 pub use spec::Division;
 pub use world::{World, WorldError};

@@ -181,7 +181,7 @@ pub(super) struct Setting {
 }
 
 /// Why a replay refuses what is asked of it.
-const REPLAYED: &str = "a replay does what its recording says, and nothing else";
+pub(super) const REPLAYED: &str = "a replay does what its recording says, and nothing else";
 
 impl World {
     /// Starts the agents of `scene` on `executor`, each with the step and the resolution that the scene gives it.
@@ -384,52 +384,6 @@ impl World {
         };
         let send = || agent.send(command).map_err(|error| error.to_string());
         self.shared.log.in_order(|| self.between_calls(), send, note).map_err(refused)
-    }
-
-    /// Puts an object into another state before its next step: one that [`World::latest`] gave before, or of as many nodes. A rigid body takes its
-    /// place and motion, a tube its nodes and frames, a soft body without ε its vertices; what a tube's parts turn with is zero.
-    ///
-    /// # Errors
-    /// [`WorldError::Foreign`]; [`WorldError::Refused`] for a state of another kind or length and for numbers that are not finite. Nothing was
-    /// done then; nor where the object divides itself otherwise before it hears of it.
-    pub fn set_state(&self, object: Object, state: &Body) -> Result<(), WorldError> {
-        let agent = self.agent(object)?;
-        let refused = |reason: String| Err(WorldError::Refused { name: agent.name().to_owned(), reason });
-        let lengths = |body: &Body| match body {
-            Body::Curve(curve) => vec![curve.positions.len(), curve.velocities.len(), curve.frames.len()],
-            Body::Soft(soft) => vec![soft.positions.len(), soft.velocities.len()],
-            _ => Vec::new(),
-        };
-        let now = agent.latest();
-        let is_alike = std::mem::discriminant(state) == std::mem::discriminant(&now.body);
-        if !is_alike || matches!(state, Body::Nothing | Body::Tool(_)) || agent.takes_poses() {
-            return refused(
-                "it takes states of rigid bodies, tubes and soft bodies that are of its own kind".to_owned(),
-            );
-        }
-        let (found, wanted) = (lengths(state), lengths(&now.body));
-        if found != wanted {
-            return refused(format!(
-                "the lists of the state have {found:?} entries; those of the object have {wanted:?}"
-            ));
-        }
-        if let (Body::Soft(soft), Some(nodes)) = (state, now.nodes)
-            && nodes as usize != soft.positions.len()
-        {
-            return refused(format!(
-                "its {} vertices are carried by {nodes} nodes, which their places do not tell; restore a checkpoint instead",
-                soft.positions.len()
-            ));
-        }
-        if !state.is_finite() {
-            return refused("every number of a state must be finite".to_owned());
-        }
-        if self.shared.log.is_replayed() {
-            return refused(REPLAYED.to_owned());
-        }
-        let note = |log: &mut Mode, (): &()| log.note(|| Entry::SetState(object.id(), Box::new(state.clone())));
-        self.shared.log.in_order(|| self.between_calls(), || agent.set_state(state.clone()), note);
-        Ok(())
     }
 
     /// Takes up another object: it lives from its first step on, and touches what it meets. No other object waits for it.
@@ -671,7 +625,7 @@ impl World {
     }
 
     /// Waits in lockstep until no call lets time pass: a recording there has the order of calls alone.
-    fn between_calls(&self) -> Option<MutexGuard<'_, State>> {
+    pub(super) fn between_calls(&self) -> Option<MutexGuard<'_, State>> {
         (self.executor() == ExecutorKind::Lockstep).then(|| self.state())
     }
 

@@ -8,6 +8,7 @@
 use super::super::cpu_budget::CpuBudget;
 use super::super::visible_resolution::VisibleResolution;
 use super::{Chosen, Session};
+use glam::DVec3;
 use metachron_core::{Body, SimTime, Snapshot};
 use metachron_lod::control::{ObjectView, PictureControl};
 use metachron_render::{Camera, History, Level};
@@ -362,7 +363,11 @@ fn size_bytes(state: &Snapshot) -> usize {
                 + size_of_val(&curve.radii_m[..])
                 + size_of_val(&curve.flattening_m[..])
         }
-        Body::Soft(soft) => size_of_val(&soft.positions[..]) + size_of_val(&soft.velocities[..]),
+        Body::Soft(soft) => {
+            let of = |lists: [&[DVec3]; 2]| size_of_val(lists[0]) + size_of_val(lists[1]);
+            let nodes = soft.nodes.as_ref().map_or(0, |nodes| of([&nodes.positions, &nodes.velocities]));
+            of([&soft.positions, &soft.velocities]) + nodes
+        }
         Body::Nothing | Body::Rigid(_) | Body::Tool(_) => 0,
     };
     size_of::<Snapshot>() + body + size_of_val(&state.contacts[..]) + size_of_val(&state.grips[..])
