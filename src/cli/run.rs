@@ -4,7 +4,7 @@
 //! Never here: the loop itself.
 
 use super::args::{OutputArgs, RunArgs, StyleWord};
-use super::devices::DeviceWish;
+use super::devices::{self, DeviceWish};
 use super::exports::ExportPaths;
 use super::play::{GoOn, play};
 use anyhow::Context;
@@ -240,6 +240,7 @@ fn check_inputs(args: &RunArgs) -> anyhow::Result<()> {
     if let Some((flag, _)) = files.iter().find(|(_, path)| path.is_some() && !args.headless) {
         return Err(BadInput(format!("{flag} needs a run without a window; add --headless")).into());
     }
+    devices::check(&args.device)?;
     let scene = Path::new(&args.scene);
     let inputs = [("the scene", Some(scene).filter(|path| path.is_file())), ("--gains", args.gains.as_deref())];
     check_outputs(&args.output, &inputs, args.record.as_deref())
