@@ -46,7 +46,8 @@ Examples:
   metachron replay tube.rec                            ends with the same state hash, or says where it differs
   metachron replay tube.rec --until 2.5 --png then.png
 
-A recording has the scene, what was changed in it, and all that was done; one that was cut short is repeated as far as it goes.";
+A recording has the scene, what was changed in it, and all that was done; one that was cut short or
+is damaged is repeated as far as it goes, with a warning.";
 
 const CHECK_EXAMPLES: &str = "\
 Examples:
@@ -328,7 +329,7 @@ pub struct OutputArgs {
     /// Print the report as JSON on standard output, instead of the summary
     #[arg(long)]
     pub json: bool,
-    /// Print errors only: no progress, no summary, no list of the files written
+    /// Print errors and warnings only: no progress, no notes, no summary, no list of the files written
     #[arg(short, long)]
     pub quiet: bool,
 }
