@@ -27,13 +27,12 @@ use metachron_viewer::ui::WindowError;
 #[cfg(feature = "viewer")]
 use metachron_viewer::{WindowFailure, WindowPlan, play_in_window};
 use metachron_world::kinds::ExecutorKind;
-use metachron_world::{Reading, Scene, SceneText, Sensor};
-use std::fs::File;
+use metachron_world::{Reading, RecordingFile, Scene, SceneText, Sensor};
 use std::path::{Path, PathBuf};
 
 /// Begins to write down what is done to the run.
 fn record(session: &Session, path: &Path, request: &Request) -> anyhow::Result<()> {
-    let file = File::create(path).with_context(|| format!("the recording {} cannot be written", path.display()))?;
+    let file = RecordingFile::create(path).context("the recording cannot be written")?;
     let scene = SceneText {
         name: request.source.name().to_owned(),
         text: request.source.text().to_owned(),
