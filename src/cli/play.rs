@@ -76,7 +76,7 @@ pub(super) fn play(request: &Request, go_on: GoOn<'_>) -> anyhow::Result<Played>
 #[cfg(not(feature = "viewer"))]
 fn in_window(session: Session, request: &Request, go_on: GoOn<'_>) -> anyhow::Result<Played> {
     let png = cfg!(feature = "render").then(|| request.png_without_window.clone());
-    let mut played = headless(session, request, request.png.clone().or(png), go_on)?;
+    let mut played = headless(session, request, png, go_on)?;
     played.no_window = Some("this build cannot open a window: it lacks the feature `viewer`".to_owned());
     Ok(played)
 }
@@ -113,8 +113,7 @@ fn window_plan(request: &Request) -> WindowPlan {
 /// A window was requested and cannot be opened: the run goes on without it, and leaves a picture.
 #[cfg(feature = "viewer")]
 fn without_window(session: Session, why: &WindowError, request: &Request, go_on: GoOn<'_>) -> anyhow::Result<Played> {
-    let png = request.png.clone().unwrap_or_else(|| request.png_without_window.clone());
-    let mut played = headless(session, request, Some(png), go_on)?;
+    let mut played = headless(session, request, Some(request.png_without_window.clone()), go_on)?;
     played.no_window = Some(why.to_string());
     Ok(played)
 }

@@ -50,7 +50,7 @@ pub struct Request {
     pub style: Style,
     /// Whether to play the scene again under one very fine common clock; only without a window.
     pub oracle: bool,
-    /// Where to write the last picture as PNG.
+    /// Where to write the last picture as PNG; only without a window.
     pub png: Option<PathBuf>,
     /// Where to write the depths of the last frame (PNG, 16 bits); only without a window.
     pub depth: Option<PathBuf>,
@@ -64,7 +64,7 @@ pub struct Request {
     pub devices: Vec<DeviceWish>,
     /// Where to write down what is done to the run.
     pub record: Option<PathBuf>,
-    /// Where to write it when the requested window could not be opened, and `png` is `None`.
+    /// Where to write it when the requested window could not be opened.
     pub png_without_window: PathBuf,
 }
 
@@ -230,6 +230,7 @@ fn check_inputs(args: &RunArgs) -> anyhow::Result<()> {
     }
     let output = &args.output;
     let files = [
+        ("--png", &output.png),
         ("--depth", &output.depth),
         ("--video", &output.video),
         ("--mcap", &output.mcap),

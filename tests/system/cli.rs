@@ -224,6 +224,7 @@ fn wrong_usage_ends_with_two_and_says_what_is_right() {
         (&["run", "--headless", "--vtk", "Cargo.toml/series"], "expects a folder"),
         (&["run", "--headless", "--vtk", "a", "--frames-csv", "a/objects.csv"], "the folder of a/objects.csv"),
         (&["run", "--device", "simulated=a", "--device", "simulated=a"], "leads `a` twice"),
+        (&["run", "--png", "a.png"], "add --headless"),
         (&["bench", "agents", "--agents", "0", "--out", "target"], "no case"),
         (&["check"], "SCENE"),
     ] {
