@@ -5,11 +5,11 @@ use metachron_contact::{Agent, StepContext};
 use metachron_core::{Archive, ArchiveError, Body, SimSpan, Snapshot, StepError, StepReport, check_span};
 
 /// No matter, no time, nothing to save.
-pub(super) struct Nobody;
+pub(super) struct RemovedAgent;
 
-impl Agent for Nobody {
+impl Agent for RemovedAgent {
     fn model(&self) -> &'static str {
-        "nobody"
+        "removed"
     }
 
     fn step(&mut self, dt: SimSpan, _context: &StepContext<'_>) -> Result<StepReport, StepError> {
