@@ -1,6 +1,5 @@
 //! What is in the place of an agent that has left.
 
-use glam::DVec3;
 use metachron_contact::{Agent, StepContext};
 use metachron_core::{Archive, ArchiveError, Body, SimSpan, Snapshot, StepError, StepReport, check_span};
 
@@ -22,13 +21,5 @@ impl Agent for RemovedAgent {
 
     fn write_snapshot(&self, into: &mut Snapshot) {
         into.body = Body::Nothing;
-    }
-
-    fn momentum(&self) -> (DVec3, DVec3) {
-        (DVec3::ZERO, DVec3::ZERO)
-    }
-
-    fn mass_kg(&self) -> f64 {
-        0.0
     }
 }
