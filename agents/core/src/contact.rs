@@ -67,7 +67,7 @@ pub struct ContactState {
     pub reported_n: f64,
     /// The deepest overlap in the last step, metres, ≥ 0.
     pub depth_m: f64,
-    /// How much more it bears for each metre that the two are pressed together further within the next step, along the normal, N/m, ≥ 0;
-    /// 0 where that is not known, as in heaps and between two that give way to nothing (docs/theory/coupling.md, eq. 7s).
+    /// How much more it bears for each metre that a side which a user leads is led on within the next step, along the normal, N/m, ≥ 0; 0 where
+    /// a user leads neither, in heaps, and between two that give way to nothing (docs/theory/coupling.md, eq. 7s).
     pub stiffness_n_m: f64,
 }

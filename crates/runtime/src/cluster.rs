@@ -28,9 +28,7 @@ use super::helpers::Helped;
 use super::loads::{Acting, Loads};
 use super::observation::{Observer, Peer, newest};
 use metachron_contact::asynchronous::{MacroStep, Pairs, Remotes, part};
-use metachron_contact::stepper::{
-    ClusterScene, ClusterStepper, ContactMemory, Participant, Plan, Role, StepDoubling,
-};
+use metachron_contact::stepper::{ClusterScene, ClusterStepper, ContactMemory, Participant, Plan, Role, StepDoubling};
 use metachron_contact::{Link, Neighbour, StepContext};
 use metachron_core::step_doubling::DoublingSchedule;
 use metachron_core::{

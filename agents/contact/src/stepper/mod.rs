@@ -30,6 +30,7 @@ mod memory;
 mod motors;
 mod outside;
 mod own_springs;
+mod pair_total;
 mod plan;
 mod progress;
 mod remote;
@@ -38,6 +39,7 @@ mod search;
 mod solve;
 mod spin_friction;
 mod springs;
+mod stiffness;
 mod tearing;
 mod ties;
 mod weighing;
@@ -59,6 +61,7 @@ pub use memory::{ContactMemory, Partner};
 use metachron_core::parallel::for_each;
 use metachron_core::{AgentId, Archive, ArchiveError, Grip, ParallelFor, SimSpan, StepError, Wrench, check_span};
 pub use outside::{KnownImpulse, LineRow, Outside, RemoteImpulse};
+pub use pair_total::PairTotal;
 pub use plan::Plan;
 use progress::Progress;
 pub use remote::{RemoteMember, RemoteView};
@@ -153,33 +156,6 @@ pub struct ClusterReport {
     pub work: f64,
 }
 
-/// What a pair of bodies, or a link, gave in a macro step.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct PairTotal {
-    /// The participant of lower number, by its place in the list.
-    pub member: usize,
-    /// What it touched, or by which of its links it is held.
-    pub partner: Partner,
-    /// The impulse on the participant, world axes, N·s.
-    pub impulse_n_s: DVec3,
-    /// Places that bore something, or rows of the link, counted in every fine step; zero for a pair that only touches.
-    pub contacts: u32,
-    /// The deepest overlap, metres, ≥ 0.
-    pub depth_m: f64,
-    /// The most that one contact gave, N·s; zero for links and in heaps.
-    pub most_n_s: f64,
-    /// Where that contact is, metres; not a number for links and in heaps.
-    pub point_m: DVec3,
-    /// Its normal, towards the participant, of length 1; zero for links and in heaps.
-    pub normal: DVec3,
-    /// How easily the participant and its partner give way at that contact along its normal, 1/kg, ≥ 0 (coupling.md, eq. 7h).
-    pub inverse_mass_per_kg: [f64; 2],
-    /// What its places gave in the last fine step, magnitudes summed, N·s.
-    pub last_n_s: f64,
-    /// By how much the two give way at that contact under a newton that lasts for a step of theirs, m/N, ≥ 0 (coupling.md, eq. 7s).
-    pub give_m_per_n: f64,
-}
-
 /// Steps clusters one after the other, and keeps structure and storage between them.
 pub struct ClusterStepper {
     /// How deep contacts rest in the scene of the macro step that is made, metres.
@@ -204,8 +180,9 @@ pub struct ClusterStepper {
     /// The participant of each member of the problem.
     places: Vec<usize>,
     outside: Outside,
-    /// Storage of local models.
+    /// Storage of local models, and of how the sides of contacts are moved.
     local: [Vec<DVec3>; 2],
+    moved_m_s: Vec<DVec3>,
     /// The macro step that is made and its fine steps, seconds.
     macro_s: f64,
     fine_s: f64,
@@ -237,6 +214,7 @@ impl Default for ClusterStepper {
             places: Vec::new(),
             outside: Outside::default(),
             local: Default::default(),
+            moved_m_s: Vec::new(),
             macro_s: 0.0,
             fine_s: 0.0,
             joints_ask: 1,
@@ -370,7 +348,11 @@ impl ClusterStepper {
             if self.divide_blows(all) || self.divide_joints(all) || self.divide(all, h_s) {
                 return Ok(false);
             }
-            self.remember(all, h_s, fine + 1 == parts, dt);
+            let is_last = fine + 1 == parts;
+            self.remember(all, h_s, is_last, dt);
+            if is_last {
+                self.note_stiffness(all, h_s);
+            }
             self.step_heap(all, h_s, report)?;
             self.end(all, h_s, threads)?;
             self.heap.place(all);

@@ -35,7 +35,7 @@ impl ClusterSeat {
                 greatest_n: force_n,
                 reported_n: force_n.length(),
                 depth_m: total.depth_m,
-                stiffness_n_m: total.stiffness_n_m(),
+                stiffness_n_m: total.stiffness_n_m,
             };
             match self.contacts.binary_search_by_key(&with, |contact| contact.with) {
                 Ok(at) => {
@@ -45,7 +45,8 @@ impl ClusterSeat {
                     let grew = force_n.length() > GREW_BY * before.reported_n;
                     let reported_n = if grew { force_n.length() } else { before.reported_n };
                     let here = if total.contacts > 0 { seen } else { ContactState { places: 0, force_n, ..*before } };
-                    *before = ContactState { since: before.since, greatest_n, reported_n, depth_m: total.depth_m, ..here };
+                    *before =
+                        ContactState { since: before.since, greatest_n, reported_n, depth_m: total.depth_m, ..here };
                     if grew {
                         streams.event(&AgentEvent { at: now, kind: EventKind::ContactGrew(event(before)) });
                     }
