@@ -17,6 +17,7 @@
 mod arms;
 mod between_steps;
 mod blows;
+mod divide;
 mod domain;
 mod doubling;
 mod foresight;
@@ -31,6 +32,7 @@ mod motors;
 mod outside;
 mod own_springs;
 mod pair_total;
+mod participant;
 mod plan;
 mod progress;
 mod remote;
@@ -45,10 +47,9 @@ mod ties;
 mod weighing;
 mod yielding;
 
-use crate::StepContext;
 use crate::cluster::{DEPTH_DEFAULT_M, Member, Settings, Solver};
-use crate::law::Law;
 use blows::Rebounds;
+use divide::times;
 pub use doubling::StepDoubling;
 use glam::DVec3;
 use heap::{Heap, Sums};
@@ -59,9 +60,10 @@ pub use matter::Matter;
 pub use member::{ClusterMember, Drive, Locked, MaterialPoint, OwnAttachment, OwnSpring, Pose, Role, Slid};
 pub use memory::{ContactMemory, Partner};
 use metachron_core::parallel::for_each;
-use metachron_core::{AgentId, Archive, ArchiveError, Grip, ParallelFor, SimSpan, StepError, Wrench, check_span};
+use metachron_core::{Archive, ArchiveError, ParallelFor, SimSpan, StepError, Wrench, check_span};
 pub use outside::{KnownImpulse, LineRow, Outside, RemoteImpulse};
 pub use pair_total::PairTotal;
+pub use participant::Participant;
 pub use plan::Plan;
 use progress::Progress;
 pub use remote::{RemoteMember, RemoteView};
@@ -74,59 +76,11 @@ use ties::{FineStep, Ties};
 pub use yielding::Yielded;
 use yielding::Yielding;
 
-/// The most times as many steps that a member makes whose motion strains it too far.
-const DIVIDED_MAX: u32 = 64;
-
-/// A body in its cluster's step.
-pub struct Participant<'a> {
-    /// The agent's number.
-    pub id: AgentId,
-    /// The body.
-    pub member: &'a mut dyn ClusterMember,
-    /// What it sees at the start of the macro step.
-    pub context: StepContext<'a>,
-    /// The laws of its pairs other than [`Law::Cluster`], by rising numbers: a pair with one is not the cluster's.
-    pub laws: &'a [(AgentId, Law)],
-    /// What it remembers of others.
-    pub memory: &'a mut ContactMemory,
-    /// Its own steps within the macro step: a power of two, at most 16; a rigid body makes the most of its cluster.
-    pub parts: u32,
-    /// How long a step it makes alone, seconds: so far ahead it looks for others.
-    pub alone_s: f64,
-    /// The forces of springs and grasps on it in the last fine step.
-    pub grips: &'a mut Vec<Grip>,
-}
-
 /// The surroundings of a macro step, and the threads that make it.
 #[derive(Clone, Copy)]
 struct On<'a> {
     scene: &'a ClusterScene,
     threads: &'a dyn ParallelFor,
-}
-
-impl Participant<'_> {
-    /// How many blocks of three velocities it has.
-    #[must_use]
-    pub fn size(&self) -> usize {
-        self.member.velocities().len()
-    }
-
-    /// Whether it touches `other` where the two meet. An asynchronous pair whose sides have come into one cluster has one clock in it.
-    fn may_touch(&self, other: &Self) -> bool {
-        let law = self.laws.binary_search_by_key(&other.id, |(id, _)| *id).ok().map(|at| self.laws[at].1);
-        let remote = [self, other].map(|one| one.member.is_remote());
-        let off = match remote {
-            [true, true] => true,
-            [false, false] => law.is_some_and(|law| !law.is_asynchronous()),
-            _ => law != Some(Law::Ledger),
-        };
-        !(off || self.member.spares(other.id) || other.member.spares(self.id)) && self.meets(other)
-    }
-
-    /// Whether neither lets the other pass by its collision groups.
-    fn meets(&self, other: &Self) -> bool {
-        self.member.skin().zip(other.member.skin()).is_some_and(|(mine, theirs)| mine.form.meets(theirs.form))
-    }
 }
 
 /// What a macro step was.
@@ -387,48 +341,6 @@ impl ClusterStepper {
         Ok(())
     }
 
-    /// Gives shorter steps to rigid members where blows follow each other in a fine step; whether they do.
-    fn divide_blows(&mut self, all: &[Participant<'_>]) -> bool {
-        let Some(wanted) = self.rebounds.wanted_parts() else { return false };
-        for (one, state) in all.iter().zip(&mut self.progress) {
-            if one.member.role() == Role::Rigid {
-                state.parts = state.parts.max(wanted);
-            }
-        }
-        true
-    }
-
-    /// Gives shorter steps to rigid members where joints ask for them; whether it does.
-    fn divide_joints(&mut self, all: &[Participant<'_>]) -> bool {
-        if self.joints_ask <= 1 {
-            return false;
-        }
-        let mut any = false;
-        for (one, state) in all.iter().zip(&mut self.progress).filter(|(one, _)| one.member.role() == Role::Rigid) {
-            let most = one.parts * DIVIDED_MAX;
-            any |= state.parts < most;
-            state.parts = (state.parts * self.joints_ask).min(most);
-        }
-        any
-    }
-
-    /// Gives shorter steps to members that the solution strains too far; whether there are any.
-    fn divide(&mut self, all: &[Participant<'_>], h_s: f64) -> bool {
-        let mut any = false;
-        for (one, state) in all.iter().zip(&mut self.progress) {
-            let so_far = one.member.strain(&state.before, h_s * f64::from(state.part));
-            // what is too much already grows through the rest of its step
-            let more = if so_far > 1.0 { times(so_far * f64::from(state.share) / f64::from(state.part)) } else { 1 };
-            // what its free motion asked for counts
-            let most = one.parts * DIVIDED_MAX;
-            if more > 1 && state.parts < most {
-                state.parts = (state.parts * more).min(most);
-                any = true;
-            }
-        }
-        any
-    }
-
     /// Keeps what a macro step starts from.
     fn keep(&mut self, all: &mut [Participant<'_>]) {
         self.kept.resize_with(all.len(), ContactMemory::default);
@@ -564,13 +476,4 @@ impl ClusterStepper {
         }
         Ok(())
     }
-}
-
-/// How many times as many steps a member needs that this one strains so far, as a share of what it can take.
-fn times(strain: f64) -> u32 {
-    let mut times = 1;
-    while times < DIVIDED_MAX && strain > f64::from(times) {
-        times *= 2;
-    }
-    times
 }
