@@ -21,12 +21,11 @@ use metachron::core::{Body, SimSpan, SoftNodes};
 use metachron::export::{Moments, Surface, write_glb};
 use metachron::runtime::{AgentState, TimelineCommand};
 use metachron::world::kinds::ExecutorKind;
-use metachron::world::{self, Command, EventFilter, RecordError, SceneText};
+use metachron::world::{self, Command, EventFilter, RecordingFile, SceneText};
 use numpy::{PyArray1, PyArray2, PyArray3};
 use pyo3::exceptions::{PyKeyError, PyRuntimeError, PyTypeError, PyValueError};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
-use std::fs::File;
 use std::path::PathBuf;
 use std::sync::Arc;
 
@@ -410,7 +409,7 @@ impl World {
     fn record(&self, py: Python<'_>, path: PathBuf) -> PyResult<()> {
         py.detach(|| match &self.text {
             Some(text) => {
-                let file = File::create(&path).map_err(|error| RecordError::File { path, error })?;
+                let file = RecordingFile::create(path)?;
                 self.inner.record_to(Box::new(file), Some(text.clone()))
             }
             None => self.inner.record(&path),

@@ -17,8 +17,8 @@ use super::handle::Shared;
 use super::helpers::Helped;
 use super::loads::Loads;
 use super::metrics::{MetricsWriter, SMOOTHING};
-use super::nobody::Nobody;
 use super::observation::{Observer, Peers};
+use super::removed_agent::RemovedAgent;
 use super::slot::SlotWriter;
 use super::turns::Took;
 use metachron_contact::{Agent, Carving, Link};
@@ -337,7 +337,7 @@ impl AgentRunner {
     fn vanish(&mut self) {
         let time = self.pace.time();
         let nothing = Snapshot { time, steps: self.writer.slot().latest().steps, ..Snapshot::default() };
-        self.agent = Box::new(Nobody);
+        self.agent = Box::new(RemovedAgent);
         self.writer.fill(|into| {
             *into = nothing;
             true

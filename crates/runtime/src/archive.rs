@@ -9,6 +9,7 @@ use super::cluster::{Place, Placed, check_places};
 use super::handle::Shared;
 use super::lockstep::Phase;
 use super::sleep::SleepRegistry;
+use super::spawn::RunAgents;
 use super::turn_order::{PartKind, TurnOrder};
 use metachron_core::{AgentId, Archive, ArchiveError, archive_values};
 use std::cmp::Reverse;
@@ -42,6 +43,37 @@ impl AgentRunner {
         }
         archive.option(writer.filled_mut(), Arc::default, |state, archive| archive.snapshot(state))?;
         observer.archive(peers, archive)
+    }
+}
+
+/// A run in real time, which is saved and recorded between turns.
+pub(super) trait CutBetweenTurns {
+    /// Ends all turns in progress, does something with the agents and the order of their turns, and lets them go on.
+    fn cut(
+        &mut self,
+        act: impl FnOnce(&mut Cut, &mut Option<Arc<TurnOrder>>) -> Result<(), ArchiveError>,
+    ) -> Result<(), ArchiveError>;
+
+    /// What it knows of its agents.
+    fn agents_of_run(&self) -> &RunAgents;
+
+    /// [`super::Run::archive`].
+    fn archive_between_turns(&mut self, archive: &mut Archive<'_>) -> Result<(), ArchiveError> {
+        self.cut(|cut, order| cut.archive_in_order(archive, order.as_deref()))
+    }
+
+    /// [`super::Run::record`].
+    fn record_between_turns(
+        &mut self,
+        order: Arc<TurnOrder>,
+        begun: Option<&mut Archive<'_>>,
+    ) -> Result<(), ArchiveError> {
+        self.agents_of_run().set_ordered();
+        self.cut(|cut, mine| {
+            begun.map_or(Ok(()), |archive| cut.archive_in_real_time(archive))?;
+            *mine = Some(order);
+            Ok(())
+        })
     }
 }
 

@@ -13,7 +13,7 @@ use super::handle::AgentHandle;
 use super::helpers::Helpers;
 use super::mailbox::SendError;
 use super::metrics::AgentStats;
-use super::spawn::{AgentSpawn, AssembledRun, Everyone, RunError, assemble};
+use super::spawn::{AgentSpawn, AssembledRun, RunAgents, RunError, assemble};
 use super::turn_order::{PartKind, TurnPart};
 use super::turn_parts::{Prepared, PreparedTurn};
 use super::turns::Took;
@@ -26,7 +26,7 @@ pub struct Follower {
     timeline: Timeline,
     now: Duration,
     followed: Vec<Followed>,
-    all: Everyone,
+    all: RunAgents,
 }
 
 /// An agent, and where in a turn it is.

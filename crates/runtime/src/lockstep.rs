@@ -18,7 +18,7 @@ use super::helpers::Helpers;
 use super::machine::{Machine, duration};
 use super::mailbox::SendError;
 use super::metrics::AgentStats;
-use super::spawn::{AgentSpawn, AssembledRun, Everyone, RunError, assemble};
+use super::spawn::{AgentSpawn, AssembledRun, RunAgents, RunError, assemble};
 use super::turns::Took;
 use cores::Cores;
 use metachron_core::{AgentId, Archive, ArchiveError};
@@ -36,7 +36,7 @@ pub struct Lockstep {
     /// Due times of the turns of waiting agents, without those that the timeline never reaches.
     due: BinaryHeap<Reverse<(Duration, u32)>>,
     cores: Cores,
-    all: Everyone,
+    all: RunAgents,
     batch: CpuBatch,
     /// Agents that have made turns in the open batch.
     unsettled: Vec<u32>,

@@ -155,12 +155,12 @@ pub enum RunError {
 pub(super) struct AssembledRun {
     /// Agents with turns of their own; an agent that is led from the start belongs to its leader.
     pub actors: Vec<Option<Box<AgentRunner>>>,
-    pub all: Everyone,
+    pub all: RunAgents,
 }
 
 /// What all agents of a run share, and those that join it.
 #[derive(Debug, Clone)]
-pub(super) struct Everyone {
+pub(super) struct RunAgents {
     pub handles: Agents,
     pub sleep: Arc<SleepRegistry>,
     peers: Arc<Peers>,
@@ -183,10 +183,10 @@ pub(super) fn assemble(mut spawns: Vec<AgentSpawn>, helpers: Helpers) -> Result<
     let mut actors: Vec<_> = actors.collect();
     actors.iter_mut().for_each(AgentRunner::publish_initial);
     let handles = peers.all.iter().map(|(_, peer)| AgentHandle { shared: Arc::clone(&peer.shared) }).collect();
-    Ok(AssembledRun { actors: assign_leaders(actors), all: Everyone { handles, sleep, peers } })
+    Ok(AssembledRun { actors: assign_leaders(actors), all: RunAgents { handles, sleep, peers } })
 }
 
-impl Everyone {
+impl RunAgents {
     /// From now on the order of turns is noted, or followed.
     pub fn set_ordered(&self) {
         self.peers.is_ordered.store(true, Relaxed);

@@ -8,7 +8,7 @@ use super::Run;
 use super::agent_clock::{SharedTimeline, Timeline, TimelineCommand};
 use super::agent_runner::{AgentRunner, Next};
 use super::agents::Agents;
-use super::archive::Cut;
+use super::archive::{Cut, CutBetweenTurns};
 use super::clock::{Clock, wait_until};
 use super::cluster::{Handover, close_remaining, hand_over, put_back, take_apart};
 use super::cpu::CpuBatch;
@@ -18,7 +18,7 @@ use super::mailbox::SendError;
 use super::metrics::AgentStats;
 use super::priority::Priority;
 use super::sleep::Halt;
-use super::spawn::{AgentSpawn, AssembledRun, Everyone, RunError, assemble};
+use super::spawn::{AgentSpawn, AssembledRun, RunAgents, RunError, assemble};
 use super::turn_order::{Held, PartKind, TurnOrder, in_force};
 use super::turn_parts::Begun;
 use super::turns::Took;
@@ -42,7 +42,7 @@ type Ended = JoinHandle<Option<Box<AgentRunner>>>;
 pub struct Threads {
     clock: Arc<dyn Clock>,
     timeline: Arc<SharedTimeline>,
-    all: Everyone,
+    all: RunAgents,
     threads: Vec<Option<Ended>>,
     /// Where threads report that they have ended.
     farewells: Sender<AgentId>,
@@ -142,7 +142,25 @@ impl Threads {
         Ok(())
     }
 
-    /// Ends all threads between turns, does something with the agents and the order of their turns, and lets them go on.
+    fn end(&mut self) {
+        let homes = self.halt(Halt::End);
+        let (timeline, now) = (self.timeline.read(), self.clock.now());
+        homes.into_iter().flatten().for_each(|mut actor| actor.close_account(&timeline, now));
+        close_remaining(&self.all.handles, &timeline, now);
+    }
+}
+
+impl Drop for Threads {
+    fn drop(&mut self) {
+        self.end();
+    }
+}
+
+impl CutBetweenTurns for Threads {
+    fn agents_of_run(&self) -> &RunAgents {
+        &self.all
+    }
+
     fn cut(
         &mut self,
         act: impl FnOnce(&mut Cut, &mut Option<Arc<TurnOrder>>) -> Result<(), ArchiveError>,
@@ -158,19 +176,6 @@ impl Threads {
         let gone_on = self.go_on(put_back(cut.all, &self.all.handles));
         let no_thread = |error: RunError| ArchiveError::Refused { what: format!("a run that cannot go on ({error})") };
         outcome.and(gone_on.map_err(no_thread))
-    }
-
-    fn end(&mut self) {
-        let homes = self.halt(Halt::End);
-        let (timeline, now) = (self.timeline.read(), self.clock.now());
-        homes.into_iter().flatten().for_each(|mut actor| actor.close_account(&timeline, now));
-        close_remaining(&self.all.handles, &timeline, now);
-    }
-}
-
-impl Drop for Threads {
-    fn drop(&mut self) {
-        self.end();
     }
 }
 
@@ -214,16 +219,11 @@ impl Run for Threads {
     }
 
     fn archive(&mut self, archive: &mut Archive<'_>) -> Result<(), ArchiveError> {
-        self.cut(|cut, order| cut.archive_in_order(archive, order.as_deref()))
+        self.archive_between_turns(archive)
     }
 
     fn record(&mut self, order: Arc<TurnOrder>, begun: Option<&mut Archive<'_>>) -> Result<(), ArchiveError> {
-        self.all.set_ordered();
-        self.cut(|cut, mine| {
-            begun.map_or(Ok(()), |archive| cut.archive_in_real_time(archive))?;
-            *mine = Some(order);
-            Ok(())
-        })
+        self.record_between_turns(order, begun)
     }
 
     fn shutdown(mut self: Box<Self>) -> Vec<AgentStats> {

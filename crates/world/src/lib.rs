@@ -42,6 +42,7 @@ mod pace;
 mod queries;
 mod recorded;
 mod recording;
+mod recording_file;
 mod replay;
 mod scene;
 mod sensors;
@@ -62,6 +63,7 @@ pub use overlap::Overlap;
 pub use pace::Pace;
 pub use queries::{Cast, ContactNow, Hit};
 pub use recording::{BadRecording, RecordError, Recording, SceneText};
+pub use recording_file::RecordingFile;
 pub use scene::{
     Appearance, Camera, Factors, GROUP_LEVELS_MAX, Gains, Group, Machine, Member, NamedCamera, ObjectCost, PaceWish,
     Probe, RENDER_SCALE, Scene, Scenery, Spec, Target, View,

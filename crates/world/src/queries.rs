@@ -49,8 +49,8 @@ pub struct ContactNow {
     pub force_n: DVec3,
     /// The deepest overlap, metres, ≥ 0.
     pub depth_m: f64,
-    /// How much more it bears for each metre that the object is pressed on further within the next step, along the normal, N/m, ≥ 0; 0 where
-    /// that is not known, as in heaps.
+    /// How much more it bears for each metre that a side which a user leads (poses of a kinematic body, the spring of a tool) is led on within
+    /// the next step, along the normal, N/m, ≥ 0; 0 where a user leads neither, and in heaps.
     pub stiffness_n_m: f64,
 }
 

@@ -10,6 +10,7 @@ use super::joined::Joined;
 use super::kinds::ExecutorKind;
 use super::log::{Log, TurnsToLog, logged};
 use super::recording::{Entry, RecordError, Recorder, Recording, SceneText};
+use super::recording_file::RecordingFile;
 use super::replay::{Followed, Player};
 use super::world::{Setting, Shared, State, World, WorldError};
 use super::{Member, Scene};
@@ -38,7 +39,7 @@ impl World {
     /// # Errors
     /// [`RecordError`]; nothing is recorded then. In lockstep the file is as it was unless it is that which cannot be written.
     pub fn record(&self, path: impl AsRef<Path>) -> Result<(), RecordError> {
-        self.begin_recording(|| Recorder::file(path.as_ref()), None)
+        self.begin_recording(|| Ok(Box::new(RecordingFile::create(path.as_ref())?)), None)
     }
 
     /// As [`World::record`], to anything that takes bytes, and with the text of the scene, from which it can be started again.

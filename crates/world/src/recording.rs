@@ -368,16 +368,6 @@ impl Recorder {
         Ok(Self { out, entries, silent_turns, written: Duration::ZERO, hashed: Duration::ZERO, failed: None })
     }
 
-    /// The file at `path`, anew.
-    ///
-    /// # Errors
-    /// [`RecordError::File`].
-    pub fn file(path: &Path) -> Result<Box<dyn Write + Send>, RecordError> {
-        let file = std::fs::File::create(path);
-        let file = file.map_err(|error| RecordError::File { path: path.to_owned(), error })?;
-        Ok(Box::new(file))
-    }
-
     /// Writes down what is about to be done. What came before it is complete, and leaves the process if it is much.
     pub fn note(&mut self, entry: Entry) {
         if self.entries.len() >= CHUNK_ENTRIES {

@@ -156,12 +156,4 @@ impl metachron_contact::Agent for Broken {
     fn write_snapshot(&self, into: &mut metachron_core::Snapshot) {
         into.body = Body::Nothing;
     }
-
-    fn momentum(&self) -> (DVec3, DVec3) {
-        (DVec3::ZERO, DVec3::ZERO)
-    }
-
-    fn mass_kg(&self) -> f64 {
-        0.0
-    }
 }

@@ -170,6 +170,13 @@ fn a_recording_that_cannot_be_written_on_is_known_meanwhile_and_says_once_why() 
     assert!(error.to_string().contains("no storage space") && std::error::Error::source(&error).is_none(), "{error}");
 }
 
+#[cfg(target_os = "linux")]
+#[test]
+fn a_recording_that_finds_no_room_names_its_file() {
+    let error = start().record("/dev/full").unwrap_err().to_string();
+    assert!(error.contains("/dev/full: ") && error.contains("os error"), "{error}");
+}
+
 #[test]
 fn another_format_another_scene_and_other_worlds_are_named() {
     let world = start();
