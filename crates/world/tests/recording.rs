@@ -182,9 +182,9 @@ fn another_format_another_scene_and_other_worlds_are_named() {
     let world = start();
     let kept = recorded(&world);
     world.end_recording().unwrap();
-    kept.0.lock().unwrap()[8] = 9;
-    assert!(matches!(kept.read(), Err(BadRecording::OtherFormat { found: 9 })));
-    kept.0.lock().unwrap()[8] = 2;
+    let format = std::mem::replace(&mut kept.0.lock().unwrap()[8], 99);
+    assert!(matches!(kept.read(), Err(BadRecording::OtherFormat { found: 99 })));
+    kept.0.lock().unwrap()[8] = format;
     let other = Scene::builder().add("ball", Rigid::ball(0.05)).build().unwrap();
     let error = World::replay(&other, kept.read().unwrap(), None).unwrap_err().to_string();
     assert!(error.contains("moving objects") && error.contains("expected 1"), "{error}");
