@@ -6,12 +6,13 @@
 use super::assemble;
 use super::assemble::Govern;
 use super::checkpoint::{CheckpointError, SceneIdentity};
+use super::error::WorldError;
 use super::joined::Joined;
 use super::kinds::ExecutorKind;
 use super::log::{Log, TurnsToLog, logged};
 use super::recording::{Entry, RecordError, Recorder, Recording, SceneText};
 use super::replay::{Followed, Player};
-use super::world::{Setting, Shared, State, World, WorldError};
+use super::world::{Setting, Shared, State, World};
 use super::{Member, Scene};
 use metachron_core::{Archive, SimTime};
 use metachron_runtime::{Demand, Follower, Governor, Lockstep, Run, SystemClock, TurnMeasure, TurnOrder};

@@ -10,7 +10,7 @@ use super::joined::Joined;
 use super::kinds::ExecutorKind;
 use super::log::Log;
 use super::recording::{Entry, Recording};
-use super::world::read_state;
+use super::saved::read_state;
 use glam::DVec3;
 use metachron_contact::stepper::ClusterScene;
 use metachron_core::{AgentId, Archive, ArchiveError, SimTime};
