@@ -4,12 +4,15 @@ use glam::DVec3;
 use metachron_contact::{Agent, StepContext};
 use metachron_core::{Archive, ArchiveError, Body, SimSpan, Snapshot, StepError, StepReport, check_span};
 
+/// Its model.
+pub(super) const NOBODY: &str = "nobody";
+
 /// No matter, no time, nothing to save.
 pub(super) struct Nobody;
 
 impl Agent for Nobody {
     fn model(&self) -> &'static str {
-        "nobody"
+        NOBODY
     }
 
     fn step(&mut self, dt: SimSpan, _context: &StepContext<'_>) -> Result<StepReport, StepError> {

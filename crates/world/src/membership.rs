@@ -3,18 +3,19 @@
 //! In: a part and its name, an object. Out: an object of the world, or one less. Never here: how an agent begins or ends
 //! ([`metachron_runtime`]).
 
-use super::assemble;
-use super::builder::{Part, member};
+use super::builder::Part;
 use super::commands::REPLAYED;
 use super::error::WorldError;
+use super::joined::{JoinedPart, Joining};
 use super::kinds::ExecutorKind;
 use super::log::Mode;
 use super::object::Object;
 use super::recording::{Entry, added};
 use super::scene::Member;
-use super::world::{State, World};
+use super::world::{Shared, State, World};
 use metachron_core::AgentId;
 use metachron_runtime::{AgentHandle, RunError};
+use std::sync::Arc;
 
 impl World {
     /// Takes up another object: it lives from its first step on, and touches what it meets. No other object waits for it.
@@ -39,8 +40,7 @@ impl World {
             return Err(WorldError::Refused { name, reason });
         }
         let id = AgentId(self.agents().len() as u32);
-        let member = member(id, name, part, self.shared.gravity)?;
-        let spawn = assemble::lone(&member, &self.shared.surroundings, self.executor())?;
+        let spawn = self.joining().spawn(id, &name, &part)?;
         let note = |log: &mut Mode, joined: &Result<AgentHandle, RunError>| {
             let (Ok(joined), Some(entry)) = (joined, entry) else { return log.note_begun() };
             if self.executor() != ExecutorKind::Lockstep {
@@ -49,8 +49,9 @@ impl World {
             log.note(|| entry);
         };
         // who sees the agent can ask for its member
-        self.shared.joined.push(member);
-        let joined = self.in_order(|| run.add(spawn), note).inspect_err(|_| self.shared.joined.pop())?;
+        let kept = &self.shared.joined;
+        kept.add(id, JoinedPart { name, part: Some(Arc::new(part)) }, self.agents());
+        let joined = self.in_order(|| run.add(spawn), note).inspect_err(|_| kept.take_back(id))?;
         Ok(self.tag().object(joined.id()))
     }
 
@@ -81,10 +82,21 @@ impl World {
         self.shared.of_scene
     }
 
-    /// What an agent that joined since the start was built from, as a scene has it of its own; `None` of agents of the scene.
+    /// What an agent that joined since the start was built from, as a scene has it of its own; of one that has left a member without matter, once
+    /// it is forgotten. `None` of agents of the scene and of numbers without an agent.
     #[must_use]
     pub fn joined(&self, id: AgentId) -> Option<Member> {
-        let at = (id.0 as usize).checked_sub(self.shared.of_scene)?;
-        self.shared.joined.get(at)
+        let agent = self.agents().of(id).filter(|_| id.0 as usize >= self.shared.of_scene);
+        let kept = self.shared.joined.get(id);
+        match kept.and_then(|JoinedPart { name, part }| Some((name, part?))) {
+            Some((name, part)) => self.joining().member(id, &name, &part).ok(),
+            None => Member::without_matter(id, agent?.name()).ok(),
+        }
+    }
+
+    /// What agents that join it are made with.
+    pub(super) fn joining(&self) -> Joining {
+        let Shared { gravity, surroundings, .. } = &*self.shared;
+        Joining { gravity: *gravity, surroundings: Arc::clone(surroundings), executor: self.executor() }
     }
 }

@@ -6,11 +6,12 @@
 use super::Scene;
 use super::assemble::Govern;
 use super::checkpoint::{Checkpoint, CheckpointError};
+use super::joined::Joining;
 use super::kinds::ExecutorKind;
 use super::recording::Entry;
-use super::world::{State, World};
+use super::world::{Shared, State, World};
 use metachron_core::{Archive, ArchiveError};
-use metachron_runtime::Run;
+use metachron_runtime::{AgentHandle, AgentState, Run};
 use std::panic::{AssertUnwindSafe, catch_unwind};
 
 impl World {
@@ -52,29 +53,37 @@ impl World {
 
     /// The state of its run now.
     pub(super) fn cut(&self, run: &mut dyn Run) -> Result<Checkpoint, CheckpointError> {
+        let joined = self.shared.joined.present(self.agents());
         let mut archive = Archive::writer();
-        run.archive(&mut archive).map_err(CheckpointError::Refused)?;
-        let of = self.shared.identity.now(self.agents());
-        let times = self.agents().iter().map(|agent| agent.latest().moment()).collect();
-        Ok(Checkpoint { of, time: run.sim_now(), times, state: archive.into_bytes() })
+        run.save(&mut archive).map_err(CheckpointError::Refused)?;
+        Ok(Checkpoint::of_run(self.shared.identity.clone(), run, joined, archive.into_bytes()))
     }
 
     /// Puts the world back into the state of `checkpoint`, of this world or of another of the same scene: what it would have done after, it does
-    /// again, in lockstep to the bit. Objects and agents stay valid.
+    /// again, in lockstep to the bit. Objects that joined since are taken out, and tell of it by an event as others do that leave; those that left
+    /// since are there again. An [`Object`](super::Object) is valid where what it names is there: of one that came back again.
     ///
     /// # Errors
-    /// [`CheckpointError::OtherScene`], also where objects have joined or left since, [`CheckpointError::Refused`] and [`CheckpointError::Stopped`] leave the world as it was. After
+    /// [`CheckpointError::OtherScene`], also where an object of this world has the number of another that joined the checkpoint's,
+    /// [`CheckpointError::Own`], [`CheckpointError::Refused`] and [`CheckpointError::Stopped`] leave the world as it was. After
     /// [`CheckpointError::Unusable`] it is stopped.
     pub fn restore(&self, checkpoint: &Checkpoint) -> Result<(), CheckpointError> {
-        self.shared.identity.now(self.agents()).check(&checkpoint.of)?;
+        let Shared { identity, joined, log, .. } = &*self.shared;
+        identity.check(&checkpoint.of)?;
         let mut state = self.state();
         let State::Running(run) = &mut *state else { return Err(CheckpointError::Stopped) };
-        if self.shared.log.is_replayed() {
+        if log.is_replayed() {
             return Err(CheckpointError::Refused(ArchiveError::Refused { what: "a replay".to_owned() }));
         }
+        if log.is_recorded() {
+            checkpoint.check_saved()?;
+        }
+        self.check_joined(checkpoint)?;
         // in real time the turns in progress end before it is read
         self.in_order(|| (), |log, ()| log.note(|| Entry::Restore(checkpoint.to_bytes())));
-        let outcome = read_state(run.as_mut(), &checkpoint.state);
+        joined.expect(&checkpoint.joined);
+        let outcome = read_state(run.as_mut(), checkpoint, &self.joining());
+        joined.keep(&checkpoint.joined);
         self.see(run.as_ref());
         let Err(reason) = outcome else { return Ok(()) };
         let (now, time, timeline) = (run.now(), run.sim_now(), run.timeline());
@@ -83,13 +92,30 @@ impl World {
         let _ = catch_unwind(AssertUnwindSafe(|| drop(broken)));
         Err(CheckpointError::Unusable { reason })
     }
+
+    /// Checks that what joined the world of a checkpoint is in this one, or can be made, under the numbers that it had.
+    fn check_joined(&self, checkpoint: &Checkpoint) -> Result<(), CheckpointError> {
+        for (id, there) in &checkpoint.joined {
+            let here = self.agents().of(*id);
+            let other = here.filter(|agent| !agent.name().is_empty() && agent.name() != there.name);
+            let kept = self.shared.joined.get(*id).filter(|kept| there.part.is_some() && kept != there);
+            if let Some(name) = other.map(AgentHandle::name).or(kept.as_ref().map(|kept| &*kept.name)) {
+                let (found, expected) = (format!("\"{}\"", there.name), format!("\"{name}\" as it joined this world"));
+                return Err(CheckpointError::OtherScene { what: format!("agent {}", id.0), found, expected });
+            }
+            if there.part.is_none() && here.is_none_or(|agent| agent.state() == AgentState::Gone) {
+                return Err(CheckpointError::Own { name: there.name.clone() });
+            }
+        }
+        Ok(())
+    }
 }
 
 /// Reads the state of a run; a broken one may break any promise of those that read it.
-pub(super) fn read_state(run: &mut dyn Run, state: &[u8]) -> Result<(), String> {
+pub(super) fn read_state(run: &mut dyn Run, from: &Checkpoint, joining: &Joining) -> Result<(), String> {
     let read = catch_unwind(AssertUnwindSafe(|| {
-        let mut archive = Archive::reader(state);
-        run.archive(&mut archive)?;
+        let mut archive = Archive::reader(&from.state);
+        run.archive(&mut archive, &mut |id| joining.absent(id, &from.joined))?;
         archive.finish()
     }));
     match read {
