@@ -42,11 +42,6 @@ pub(super) struct AgentRunner {
     pub writer: SlotWriter<Snapshot>,
     /// Matter was taken out of it since its cluster last stepped.
     pub carved: bool,
-    /// Whether it is of those that the run began with. Nothing outside can make one again as it was, with its governor and its ties: what has
-    /// left keeps that, and comes back with a state that is read.
-    pub is_first: bool,
-    /// What it was before it left, of those that keep it.
-    pub former: Option<Box<dyn Agent>>,
     pub observer: Observer,
     pub links: Vec<Link>,
     /// What users do to it; `None` of an agent to which nothing was ever done.
@@ -343,8 +338,9 @@ impl AgentRunner {
     fn vanish(&mut self) {
         let time = self.pace.time();
         let nothing = Snapshot { time, steps: self.writer.slot().latest().steps, ..Snapshot::default() };
-        let former = std::mem::replace(&mut self.agent, Box::new(Nobody));
-        self.former = Some(former).filter(|_| self.is_first);
+        if !self.shared.is_first() {
+            self.agent = Box::new(Nobody);
+        }
         self.writer.fill(|into| {
             *into = nothing;
             true

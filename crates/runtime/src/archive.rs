@@ -98,7 +98,7 @@ impl Cut {
         let mut made = BTreeMap::new();
         for (at, _) in present.iter().enumerate().filter(|(_, present)| **present) {
             let here = all.get(at);
-            if here.is_some_and(|placed| !placed.has_left() || placed.runner.is_first) {
+            if here.is_some_and(|placed| !placed.has_left() || placed.runner.shared.is_first()) {
                 continue;
             }
             let spawn = absent(AgentId(at as u32))?;

@@ -15,6 +15,7 @@ use super::sleep::SleepRegistry;
 use super::slot::LatestSlot;
 use super::spawn::AgentSpawn;
 use super::turns::Turn;
+use metachron_contact::stepper::ClusterScene;
 use metachron_core::{AgentId, Body, HASH_START, SimSpan, SimTime, Snapshot};
 use metachron_geometry::CollisionShape;
 use std::sync::atomic::Ordering::Relaxed;
@@ -46,26 +47,28 @@ pub(super) struct Identity {
     pub name: Arc<str>,
     pub model: &'static str,
     pub wanted_hz: f64,
-    /// The joints whose first body it is and that can have a motor.
-    pub motored: Box<[u32]>,
+    /// Where its joints are, if there is one whose first body it is and that can have a motor.
+    pub motored: Option<Arc<ClusterScene>>,
     /// Whether poses lead it ([`metachron_contact::Agent::takes_poses`]).
     pub takes_poses: bool,
+    /// Whether the run began with it. Nothing outside can make such an agent again as it was, with its governor and its ties: where it leaves it
+    /// keeps them and its model, and comes back with a state that is read.
+    pub is_first: bool,
     /// Entry for agents that it is to lead, and the place to which it returns from a leader; `None` where no agent can be led.
     pub handover: Option<Handover>,
 }
 
 impl Identity {
     /// That of the agent that is to be started, whose name it takes.
-    pub fn of(id: AgentId, spawn: &mut AgentSpawn) -> Self {
-        // the joints of which it is the first agent and that can have a motor
-        let joints = spawn.scene.joints_of(id).filter(|(_, joint)| joint.takes_motor());
-        let motored = joints.map(|(number, _)| number).collect();
+    pub fn of(id: AgentId, spawn: &mut AgentSpawn, is_first: bool) -> Self {
+        let is_motored = spawn.scene.joints_of(id).any(|(_, joint)| joint.takes_motor());
         Self {
             name: std::mem::take(&mut spawn.name).into(),
             model: spawn.agent.model(),
             wanted_hz: spawn.rate_hz,
-            motored,
+            motored: is_motored.then(|| Arc::clone(&spawn.scene)),
             takes_poses: spawn.agent.takes_poses(),
+            is_first,
             handover: spawn.agent.member().is_some().then(Handover::default),
         }
     }
@@ -89,8 +92,15 @@ impl Shared {
         self.identity.get().is_some_and(|identity| identity.takes_poses)
     }
 
+    /// Whether the run began with it.
+    pub fn is_first(&self) -> bool {
+        self.identity.get().is_some_and(|identity| identity.is_first)
+    }
+
     fn has_motor(&self, joint: u32) -> bool {
-        self.identity.get().is_some_and(|identity| identity.motored.contains(&joint))
+        let scene = self.identity.get().and_then(|identity| identity.motored.as_ref());
+        let mut joints = scene.into_iter().flat_map(|scene| scene.joints_of(self.id));
+        joints.any(|(number, it)| number == joint && it.takes_motor())
     }
 
     pub fn handover(&self) -> Option<&Handover> {

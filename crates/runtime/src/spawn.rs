@@ -180,7 +180,7 @@ pub(super) fn assemble(mut spawns: Vec<AgentSpawn>, helpers: Helpers) -> Result<
         let jointed = std::mem::take(&mut jointed[id.0 as usize]);
         actor(id, Seated { spawn, jointed, writer }, &peers)
     });
-    let mut actors: Vec<_> = actors.map(|actor| AgentRunner { is_first: true, ..actor }).collect();
+    let mut actors: Vec<_> = actors.collect();
     actors.iter_mut().for_each(AgentRunner::publish_initial);
     let handles = peers.all.iter().map(|(_, peer)| AgentHandle { shared: Arc::clone(&peer.shared) }).collect();
     Ok(AssembledRun { actors: assign_leaders(actors), all: Everyone { handles, sleep, peers } })
@@ -220,7 +220,7 @@ impl Everyone {
         self.check_joining(&spawn)?;
         let id = AgentId(handles.len() as u32);
         let writer = SlotWriter::new(Snapshot::default());
-        let shared = Arc::new(shared(id, &mut spawn, &self.sleep, &writer));
+        let shared = Arc::new(shared(id, &mut spawn, &self.sleep, &writer, false));
         self.reserve(&shared);
         if peers.broad_phase.get().is_none() && peers.all.get(id.0 as usize).is_some_and(|new| peers.may_meet(new)) {
             peers.begin_broad_phase();
@@ -239,7 +239,7 @@ impl Everyone {
             let id = AgentId(number as u32);
             let mut spawn = AgentSpawn::alone("", Box::new(Nobody), 1.0);
             let writer = SlotWriter::new(Snapshot::default());
-            let shared = Shared { identity: OnceLock::new(), ..shared(id, &mut spawn, &self.sleep, &writer) };
+            let shared = Shared { identity: OnceLock::new(), ..shared(id, &mut spawn, &self.sleep, &writer, false) };
             let shared = Arc::new(shared);
             shared.gauges.leave();
             self.reserve(&shared);
@@ -271,14 +271,11 @@ impl Everyone {
 }
 
 impl AgentRunner {
-    /// Puts an agent into the place of one that has left, whose state is read next: what it was, or what `spawn` says that joined the run.
+    /// Puts an agent into the place of one that has left, whose state is read next: what it was and has kept, or what `spawn` says that joined the run.
     pub fn revive(&mut self, spawn: Option<AgentSpawn>) {
-        let Some(mut spawn) = spawn else {
-            self.former.take().into_iter().for_each(|agent| self.agent = agent);
-            return;
-        };
+        let Some(mut spawn) = spawn else { return };
         let (id, shared, peers) = (self.id(), Arc::clone(&self.shared), Arc::clone(&self.peers));
-        shared.identity.get_or_init(|| Identity::of(id, &mut spawn));
+        shared.identity.get_or_init(|| Identity::of(id, &mut spawn, false));
         shared.form.publish(spawn.agent.form());
         let writer = std::mem::replace(&mut self.writer, SlotWriter::new(Snapshot::default()));
         *self = actor(id, Seated { spawn, jointed: Vec::new(), writer }, &peers);
@@ -333,7 +330,7 @@ fn peers(
     let mut all = Vec::with_capacity(spawns.len());
     for (spawn, id) in spawns.iter_mut().zip((0..).map(AgentId)) {
         let writer = SlotWriter::new(Snapshot::default());
-        let shared = Arc::new(shared(id, spawn, sleep, &writer));
+        let shared = Arc::new(shared(id, spawn, sleep, &writer, true));
         writers.push(writer);
         all.push(Peer { shared, laws: Vec::new() });
     }
@@ -379,10 +376,16 @@ fn store_laws(spawns: &[AgentSpawn], all: &mut [Peer]) {
     }
 }
 
-fn shared(id: AgentId, spawn: &mut AgentSpawn, sleep: &Arc<SleepRegistry>, writer: &SlotWriter<Snapshot>) -> Shared {
+fn shared(
+    id: AgentId,
+    spawn: &mut AgentSpawn,
+    sleep: &Arc<SleepRegistry>,
+    writer: &SlotWriter<Snapshot>,
+    is_first: bool,
+) -> Shared {
     Shared {
         id,
-        identity: Identity::of(id, spawn).into(),
+        identity: Identity::of(id, spawn, is_first).into(),
         gauges: Metrics::default(),
         form: FormSlot::new(spawn.agent.form()),
         mail: Mailbox::default(),
@@ -428,8 +431,6 @@ fn actor(id: AgentId, parts: Seated, peers: &Arc<Peers>) -> AgentRunner {
         faults,
         writer,
         carved: false,
-        former: None,
-        is_first: false,
         observer: peers.observer(id, &links),
         links: spawn.attached,
         loads: None,

@@ -133,7 +133,12 @@ impl Led {
 
     /// Lets those that are parked return.
     pub fn release_parked(&mut self) {
-        self.seats.extract_if(.., |seat| seat.actor.is_parked()).for_each(|seat| seat.actor.return_turns());
+        self.seats.extract_if(.., |seat| seat.actor.is_parked()).for_each(|mut seat| {
+            if seat.actor.shared.gauges.has_left() {
+                seat.actor.forget();
+            }
+            seat.actor.return_turns();
+        });
     }
 
     /// Adds `actor` and all it leads.
@@ -198,7 +203,7 @@ impl AgentRunner {
 
     /// Frees what it made turns with: an agent that has left makes none.
     pub fn forget(&mut self) {
-        if !self.is_first {
+        if !self.shared.is_first() {
             (self.cluster, self.governor, self.links) = (None, None, Vec::new());
         }
         (self.loads, self.announced) = (None, Vec::new());
