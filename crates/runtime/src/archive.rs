@@ -109,7 +109,7 @@ impl Cut {
             })?;
             made.insert(at, spawn);
         }
-        all.extend(everyone.reach(present.len()).into_iter().map(|runner| Placed { runner, place: Place::Home }));
+        all.extend(everyone.reach(present.len()).map(|runner| Placed { runner, place: Place::Home }));
         let present = present.iter().copied().chain(std::iter::repeat(false));
         for (at, (placed, present)) in all.iter_mut().zip(present).enumerate() {
             match (placed.has_left(), present) {

@@ -232,10 +232,10 @@ impl Everyone {
         Ok(Box::new(actor))
     }
 
-    /// Adds numbers of agents that have left, until there are `count`: nothing more is known of them.
-    pub fn reach(&self, count: usize) -> Vec<Box<AgentRunner>> {
+    /// Adds numbers of agents that have left, as they are taken, until there are `count`: nothing more is known of them.
+    pub fn reach(&self, count: usize) -> impl Iterator<Item = Box<AgentRunner>> + '_ {
         let numbers = self.handles.len()..count;
-        let left = numbers.map(|number| {
+        numbers.map(|number| {
             let id = AgentId(number as u32);
             let mut spawn = AgentSpawn::alone("", Box::new(Nobody), 1.0);
             let writer = SlotWriter::new(Snapshot::default());
@@ -246,8 +246,7 @@ impl Everyone {
             self.sleep.close(id);
             self.handles.push(AgentHandle { shared });
             Box::new(actor(id, Seated { spawn, jointed: Vec::new(), writer }, &self.peers))
-        });
-        left.collect()
+        })
     }
 
     /// Checks that an agent can join a run that goes on.
