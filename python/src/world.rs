@@ -172,13 +172,14 @@ impl World {
         self.inner.hash()
     }
 
-    /// All that the next bit of it needs, in lockstep. Raises `RuntimeError` on other executors.
+    /// All that the next bit of it needs, with whoever joined it.
     fn checkpoint(&self, py: Python<'_>) -> PyResult<Checkpoint> {
         let inner = py.detach(|| self.inner.checkpoint()).map_err(raised::checkpoint)?;
         Ok(Checkpoint { inner })
     }
 
-    /// Goes back to a checkpoint of this world, or of one of the same scene with the same objects: what comes after is the same to the bit.
+    /// Goes back to a checkpoint of this world, or of another of the same scene: what comes after is the same, in lockstep to the bit. Objects that
+    /// joined since are taken out, those that left since are there again.
     fn restore(&self, py: Python<'_>, checkpoint: &Checkpoint) -> PyResult<()> {
         py.detach(|| self.inner.restore(&checkpoint.inner)).map_err(raised::checkpoint)
     }

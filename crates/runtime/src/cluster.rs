@@ -473,7 +473,7 @@ impl AgentRunner {
     pub fn member_costs(&self) -> impl Iterator<Item = MemberCost> + '_ {
         std::iter::once(self)
             .chain(self.led.all())
-            .filter_map(|actor| Some(MemberCost { model: actor.shared.model, work: actor.cluster.as_ref()?.work }))
+            .filter_map(|actor| Some(MemberCost { model: actor.shared.model(), work: actor.cluster.as_ref()?.work }))
     }
 
     /// Stops all that step with it: they rest.

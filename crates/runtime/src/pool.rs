@@ -14,7 +14,7 @@ mod worker;
 use super::Run;
 use super::agent_clock::{Timeline, TimelineCommand};
 use super::agents::Agents;
-use super::archive::{Cut, CutBetweenTurns};
+use super::archive::{Absent, Cut, CutBetweenTurns};
 use super::clock::Clock;
 use super::cluster::{close_remaining, put_back, take_apart};
 use super::handle::AgentHandle;
@@ -138,8 +138,8 @@ impl CutBetweenTurns for Pool {
         let mut homes = Vec::new();
         self.state.clear(|actor| homes.push(Some(actor)));
         let all = take_apart(homes.into_iter(), &self.all.handles);
-        let (agents, timeline) = (self.all.handles.len(), self.state.timeline.read());
-        let mut cut = Cut { all, agents, timeline, now: self.state.clock.now() };
+        let timeline = self.state.timeline.read();
+        let mut cut = Cut::new(all, self.all.clone(), timeline, self.state.clock.now());
         let outcome = act(&mut cut, &mut self.state.order.lock().unwrap_or_else(PoisonError::into_inner));
         if cut.timeline != timeline {
             self.state.timeline.set(cut.timeline);
@@ -187,8 +187,8 @@ impl Run for Pool {
         self.all.leave(id)
     }
 
-    fn archive(&mut self, archive: &mut Archive<'_>) -> Result<(), ArchiveError> {
-        self.archive_between_turns(archive)
+    fn archive(&mut self, archive: &mut Archive<'_>, absent: Absent<'_>) -> Result<(), ArchiveError> {
+        self.archive_between_turns(archive, absent)
     }
 
     fn record(&mut self, order: Arc<TurnOrder>, begun: Option<&mut Archive<'_>>) -> Result<(), ArchiveError> {

@@ -3,12 +3,15 @@
 use metachron_contact::{Agent, StepContext};
 use metachron_core::{Archive, ArchiveError, Body, SimSpan, Snapshot, StepError, StepReport, check_span};
 
+/// Its model.
+pub(super) const REMOVED: &str = "removed";
+
 /// No matter, no time, nothing to save.
 pub(super) struct RemovedAgent;
 
 impl Agent for RemovedAgent {
     fn model(&self) -> &'static str {
-        "removed"
+        REMOVED
     }
 
     fn step(&mut self, dt: SimSpan, _context: &StepContext<'_>) -> Result<StepReport, StepError> {

@@ -8,7 +8,7 @@ use super::Run;
 use super::agent_clock::{SharedTimeline, Timeline, TimelineCommand};
 use super::agent_runner::{AgentRunner, Next};
 use super::agents::Agents;
-use super::archive::{Cut, CutBetweenTurns};
+use super::archive::{Absent, Cut, CutBetweenTurns};
 use super::clock::{Clock, wait_until};
 use super::cluster::{Handover, close_remaining, hand_over, put_back, take_apart};
 use super::cpu::CpuBatch;
@@ -86,7 +86,7 @@ impl Threads {
     }
 
     fn spawn(&self, actor: Option<Box<AgentRunner>>, shared: Arc<Shared>) -> Result<Ended, RunError> {
-        let name = format!("agent:{}", shared.name.replace('\0', ""));
+        let name = format!("agent:{}", shared.name().replace('\0', ""));
         let stage = AgentThread {
             clock: Arc::clone(&self.clock),
             timeline: Arc::clone(&self.timeline),
@@ -167,8 +167,7 @@ impl CutBetweenTurns for Threads {
     ) -> Result<(), ArchiveError> {
         let homes = self.halt(Halt::Cut);
         let all = take_apart(homes.into_iter(), &self.all.handles);
-        let agents = self.all.handles.len();
-        let mut cut = Cut { all, agents, timeline: self.timeline.read(), now: self.clock.now() };
+        let mut cut = Cut::new(all, self.all.clone(), self.timeline.read(), self.clock.now());
         let outcome = act(&mut cut, &mut self.order);
         if cut.timeline != self.timeline.read() {
             self.timeline.set(cut.timeline);
@@ -218,8 +217,8 @@ impl Run for Threads {
         self.all.leave(id)
     }
 
-    fn archive(&mut self, archive: &mut Archive<'_>) -> Result<(), ArchiveError> {
-        self.archive_between_turns(archive)
+    fn archive(&mut self, archive: &mut Archive<'_>, absent: Absent<'_>) -> Result<(), ArchiveError> {
+        self.archive_between_turns(archive, absent)
     }
 
     fn record(&mut self, order: Arc<TurnOrder>, begun: Option<&mut Archive<'_>>) -> Result<(), ArchiveError> {
@@ -262,7 +261,7 @@ impl AgentThread {
                     Some(actor) if actor.is_parked() => return Some(actor),
                     moved => moved,
                 },
-                None => self.wait_for(shared.handover.as_ref()),
+                None => self.wait_for(shared.handover()),
             };
         }
         here.iter_mut().for_each(|actor| self.settle(actor));

@@ -112,8 +112,8 @@ struct Joined {
     at_m: DVec3,
 }
 
-/// What can be added to a scene: a [`Rigid`] body, a [`Tube`], a [`Soft`] body, or an agent of your own ([`Custom`]).
-#[derive(Debug, Clone)]
+/// What can be added to a scene: a [`Rigid`] body, a [`Tube`], a [`Soft`] body, or an agent of your own ([`Custom`]), which no file can have.
+#[derive(Debug, Clone, serde::Serialize, serde::Deserialize)]
 pub enum Part {
     /// A rigid body.
     Rigid(Rigid),
@@ -122,6 +122,7 @@ pub enum Part {
     /// A sheet, solid or rope.
     Soft(Soft),
     /// An agent of somebody else's.
+    #[serde(skip)]
     Custom(Custom),
 }
 

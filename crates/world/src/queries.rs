@@ -3,9 +3,10 @@
 //! In: the newest states. Out: hits. A ray or a shape goes on by what is certainly free until it is within a hundredth of a millimetre of
 //! something: exact for every kind of object, and no faster where it grazes one. Never here: forces, steps.
 
+use super::error::WorldError;
 use super::events::touched;
 use super::object::{Object, Touched};
-use super::world::{World, WorldError};
+use super::world::World;
 use glam::{DQuat, DVec3};
 use metachron_contact::stepper::Matter;
 use metachron_core::{ContactPartner, ContactState, SimTime};

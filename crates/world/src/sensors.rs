@@ -2,8 +2,9 @@
 //!
 //! In: the newest states. Out: numbers, with the time that they are of. Never here: noise, delays, stored readings.
 
+use super::error::WorldError;
 use super::object::Object;
-use super::world::{World, WorldError};
+use super::world::World;
 use glam::{DQuat, DVec3};
 use metachron_contact::joint::{Joint, JointKind, Motor};
 use metachron_contact::stepper::Pose;

@@ -2,9 +2,11 @@
 //!
 //! In: a [`Body`] as [`World::latest`] gives it. Out: the same to the agent, or why it does not fit. Never here: what a model makes of it.
 
+use super::commands::REPLAYED;
+use super::error::WorldError;
 use super::object::Object;
 use super::recording::Entry;
-use super::world::{REPLAYED, World, WorldError};
+use super::world::World;
 use metachron_core::Body;
 
 /// A list of a state that has as many entries as the object has parts.

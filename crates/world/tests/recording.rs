@@ -94,6 +94,31 @@ fn a_recording_that_begins_later_begins_with_the_state_of_then() {
 }
 
 #[test]
+fn a_recording_begins_with_whoever_is_there() {
+    let world = start();
+    let ball = world.object("ball").unwrap();
+    let crate_ = world.add("crate", Rigid::cuboid([0.02; 3]).at([0.05, 0.0, 0.4])).unwrap();
+    world.advance(ms(40));
+    let before = world.checkpoint().unwrap();
+    [ball, crate_].into_iter().for_each(|object| world.remove(object).unwrap());
+    world.advance(ms(40));
+    world.add("ball", Rigid::ball(0.03).at([0.0, 0.0, 0.5])).unwrap();
+    let kept = recorded(&world);
+    world.advance(ms(60));
+    // one whom the replay has never seen
+    world.restore(&before).unwrap();
+    world.advance(ms(40));
+    world.add("late", Rigid::ball(0.03).at([0.0, 0.0, 0.5])).unwrap();
+    world.advance(ms(40));
+    world.remove(crate_).unwrap();
+    world.advance(ms(40));
+    world.end_recording().unwrap();
+    let again = replayed(kept.read().unwrap());
+    assert_eq!((again.hash(), again.time()), (world.hash(), world.time()));
+    assert!(again.object("ball").is_ok() && again.object("crate").is_err());
+}
+
+#[test]
 fn a_recording_that_was_cut_anywhere_is_read_to_its_last_whole_chunk() {
     let world = start();
     let kept = recorded(&world);

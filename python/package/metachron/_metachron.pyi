@@ -148,10 +148,11 @@ class World:
         """Equal numbers mean the same states of all objects, bit for bit."""
 
     def checkpoint(self) -> Checkpoint:
-        """All that the next bit of it needs, in lockstep. Raises `RuntimeError` on other executors."""
+        """All that the next bit of it needs, with whoever joined it."""
 
     def restore(self, checkpoint: Checkpoint) -> None:
-        """Goes back to a checkpoint of this world, or of one of the same scene with the same objects: what comes after is the same to the bit."""
+        """Goes back to a checkpoint of this world, or of another of the same scene: what comes after is the same, in lockstep to the bit. Objects that
+        joined since are taken out, those that left since are there again."""
 
     def advance(self, seconds: float) -> None:
         """Lets so much simulated time pass: at once in lockstep, in real time on other executors. Other threads of Python run meanwhile."""

@@ -57,8 +57,6 @@ pub(super) struct Rewind {
     /// The last time that one was kept, and how long that takes, smoothed.
     kept: Option<Instant>,
     cost_s: f64,
-    /// Agents that there were when the newest was kept, and those of them that had left.
-    members: (usize, usize),
 }
 
 /// One of them.
@@ -111,11 +109,6 @@ impl Rewind {
         }
     }
 
-    fn clear(&mut self) {
-        (self.bytes, self.shown) = (0, None);
-        self.moments.clear();
-    }
-
     /// Whether so little wall time has passed since the last one that another would cost too much of it.
     fn is_too_soon(&self) -> bool {
         let rests = Duration::try_from_secs_f64(self.cost_s).unwrap_or_default() * COST_PARTS;
@@ -126,15 +119,8 @@ impl Rewind {
 impl Session {
     /// Keeps moments from now on, in at most so many bytes.
     pub fn keep_moments(&mut self, bytes_max: usize) {
-        self.rewind = Some(Rewind {
-            moments: VecDeque::new(),
-            bytes: 0,
-            bytes_max,
-            shown: None,
-            kept: None,
-            cost_s: 0.0,
-            members: (0, 0),
-        });
+        self.rewind =
+            Some(Rewind { moments: VecDeque::new(), bytes: 0, bytes_max, shown: None, kept: None, cost_s: 0.0 });
     }
 
     /// What is kept; `None` before there is anything.
@@ -169,13 +155,6 @@ impl Session {
         let begun = Instant::now();
         let going_on = if self.is_virtual() { self.going_on().inspect_err(|_| self.rewind = None)? } else { None };
         let Some(rewind) = &mut self.rewind else { return Ok(()) };
-        let gone = self.world.agents().iter().filter(|agent| agent.state() == metachron_runtime::AgentState::Gone);
-        let members = (self.scene.agents.len(), gone.count());
-        if going_on.is_some() && rewind.members != members {
-            // no world goes back to when it had others in it
-            rewind.clear();
-        }
-        rewind.members = members;
         let mut histories = self.scene_view.histories(self.scene.agents.len());
         let copied = copy(&mut histories, rewind.moments.back().map_or(&[], |last| &last.histories));
         let checkpoint = going_on.as_ref().map_or(0, |it| it.world.size_bytes() + OBJECT_BYTES * it.views.len());
@@ -306,6 +285,12 @@ impl Session {
         self.visible_resolution = there.visible_resolution.clone();
         self.views.clone_from(&there.views);
         self.levels.clone_from(&there.levels);
+        // those that joined after it keep their places in the picture, unseen
+        let later = moment.map_or(0, |moment| self.scene.agents.len().saturating_sub(moment.histories.len()));
+        (0..later).for_each(|_| self.visible_resolution.join());
+        if later > 0 {
+            self.levels.clear();
+        }
         self.chosen = there.chosen;
         self.frame_cpu_s = there.frame_cpu_s;
         (self.last_start, self.lag_s, self.finished) = (there.last_start, there.lag_s, there.finished);
