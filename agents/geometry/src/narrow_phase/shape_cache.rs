@@ -20,11 +20,16 @@ const JAW_LEVEL: u8 = 2;
 pub(super) struct ShapeCache {
     fields: Vec<(Solid, Option<Field>)>,
     hulls: Vec<(Solid, Option<SharedShape>)>,
-    /// The shapes of the parts of compounds.
-    compounds: Vec<(Arc<[CompoundPart]>, Box<[Option<SharedShape>]>)>,
+    compounds: Vec<CompoundShapes>,
     tools: Vec<(ToolShape, Option<[ToolSolid; TOOL_PARTS]>)>,
     /// Skins where they were last.
     pub skins: SkinCache,
+}
+
+/// The shapes of the parts of a compound, `None` of a part that has none.
+struct CompoundShapes {
+    parts: Arc<[CompoundPart]>,
+    shapes: Box<[Option<SharedShape>]>,
 }
 
 /// A part of a tool as a solid.
@@ -82,9 +87,9 @@ impl ShapeCache {
     }
 
     fn prepare_compound(&mut self, parts: &Arc<[CompoundPart]>) {
-        if !self.compounds.iter().any(|(known, _)| Arc::ptr_eq(known, parts)) {
+        if self.compound(parts).is_none() {
             let shapes = parts.iter().map(|part| part.solid.to_moving_shape().ok()).collect();
-            self.compounds.push((Arc::clone(parts), shapes));
+            self.compounds.push(CompoundShapes { parts: Arc::clone(parts), shapes });
         }
     }
 
@@ -108,7 +113,7 @@ impl ShapeCache {
 
     /// The cached shapes of the parts of a compound, `None` of a part that has none.
     pub fn compound(&self, parts: &Arc<[CompoundPart]>) -> Option<&[Option<SharedShape>]> {
-        Some(&self.compounds.iter().find(|(known, _)| Arc::ptr_eq(known, parts))?.1)
+        Some(&self.compounds.iter().find(|known| Arc::ptr_eq(&known.parts, parts))?.shapes)
     }
 
     /// The cached solids of a tool.
