@@ -27,6 +27,6 @@ impl Pictures {
 
 fn refused() -> PyErr {
     PyRuntimeError::new_err(
-        "this module was built without its feature `view`, which draws: build it again without --no-default-features",
+        "this module was built without its feature `view`, which draws: build it again with `pip install ./python --config-settings=build-args=--features=view`",
     )
 }
