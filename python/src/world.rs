@@ -172,7 +172,7 @@ impl World {
         self.inner.hash()
     }
 
-    /// All that the next bit of it needs, with whoever joined it.
+    /// All that the next bit of it needs, objects that joined it included.
     fn checkpoint(&self, py: Python<'_>) -> PyResult<Checkpoint> {
         let inner = py.detach(|| self.inner.checkpoint()).map_err(raised::checkpoint)?;
         Ok(Checkpoint { inner })

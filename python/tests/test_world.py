@@ -283,7 +283,7 @@ def test_a_world_goes_back_to_a_checkpoint_also_from_a_file(tmp_path: Path) -> N
     again.restore(mc.Checkpoint.read(tmp_path / "mark"))
     again.advance(0.4)
     assert again.hash() == after
-    # whoever was there is there again, in another world too
+    # objects that were there are there again, in another world too
     world.add("box", mc.Box([0.1, 0.1, 0.1], at=[0, 0, 1.0]))
     world.advance(0.1)
     mark, seen = world.checkpoint(), world.state("ball").time

@@ -73,7 +73,7 @@ pub(super) trait CutBetweenTurns {
     ) -> Result<(), ArchiveError> {
         self.agents_of_run().set_ordered();
         self.cut(|cut, mine| {
-            begun.map_or(Ok(()), |archive| cut.archive_in_real_time(archive, &mut nobody_is_absent))?;
+            begun.map_or(Ok(()), |archive| cut.archive_in_real_time(archive, &mut refuse_absent))?;
             *mine = Some(order);
             Ok(())
         })
@@ -207,7 +207,7 @@ impl VirtualEvents {
 ///
 /// # Errors
 /// [`ArchiveError::Mismatch`].
-pub(super) fn nobody_is_absent(id: AgentId) -> Result<AgentSpawn, ArchiveError> {
+pub(super) fn refuse_absent(id: AgentId) -> Result<AgentSpawn, ArchiveError> {
     let (found, expected) = (format!("in agent {}", id.0), "one of this run".to_owned());
     Err(ArchiveError::Mismatch { what: "what joined", found, expected })
 }

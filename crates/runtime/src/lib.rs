@@ -99,7 +99,7 @@ pub use threads::{AUTO_THREADS_MAX, THREADS_MAX, Threads};
 pub use turn_order::{Held, OrderLog, PartKind, TurnOrder, TurnPart};
 pub use turns::{TURNS_KEPT, Turn};
 
-use archive::nobody_is_absent;
+use archive::refuse_absent;
 use metachron_core::{AgentId, Archive, ArchiveError, SimTime};
 use std::sync::Arc;
 use std::time::Duration;
@@ -157,7 +157,7 @@ pub trait Run: Send {
     /// # Errors
     /// Those of [`Run::archive`].
     fn save(&mut self, archive: &mut Archive<'_>) -> Result<(), ArchiveError> {
-        self.archive(archive, &mut nobody_is_absent)
+        self.archive(archive, &mut refuse_absent)
     }
 
     /// Makes the parts of its turns in `order` from now on, which begins between two turns; before it does, writes its state to `begun` if

@@ -200,7 +200,7 @@ fn a_cut_on_threads_loses_no_momentum_that_is_in_flight_between_two_clocks() {
         let bytes = archive.into_bytes();
         let hashes = [0, 1].map(|_| {
             let mut lockstep = Lockstep::start(two_balls(), machine()).unwrap();
-            let absent = &mut |_| unreachable!("nobody joined");
+            let absent = &mut |_| unreachable!("no agent joined");
             lockstep.archive(&mut Archive::reader(&bytes), absent).unwrap();
             lockstep.drive(TimelineCommand::Run);
             lockstep.wait_until(lockstep.now() + Duration::from_secs(1));

@@ -37,17 +37,17 @@ fn main() -> Result<(), Box<dyn Error>> {
         );
     }
     let mut times: [Vec<f64>; 2] = Default::default();
-    let mut told = 0;
+    let mut received = 0;
     for _ in 0..REPEATS {
         for (times, listens) in times.iter_mut().zip([false, true]) {
             let (taken, events) = bounce(listens)?;
             times.push(1e3 * taken.as_secs_f64());
-            told = told.max(events);
+            received = received.max(events);
         }
     }
     let [without, with] = times.map(|times| times.into_iter().fold(f64::INFINITY, f64::min));
     println!(
-        "events, {BALLS} balls: {without:.1} ms without a reader, {with:.1} ms with one, which was told of {told}"
+        "events, {BALLS} balls: {without:.1} ms without a reader, {with:.1} ms with one, which received {received}"
     );
     Ok(())
 }
@@ -125,7 +125,7 @@ fn misses(world: &World) -> u64 {
     world.agents().iter().map(|agent| agent.stats().misses).sum()
 }
 
-/// How long bouncing balls take in lockstep, and how many events a reader was told of.
+/// How long bouncing balls take in lockstep, and how many events a reader received.
 fn bounce(listens: bool) -> Result<(Duration, u64), Box<dyn Error>> {
     let floor = Scene::builder().fixed("floor", Solid::Plane);
     let scene = (0..BALLS).fold(floor, |scene, k| {
@@ -134,11 +134,11 @@ fn bounce(listens: bool) -> Result<(Duration, u64), Box<dyn Error>> {
     });
     let world = World::start(&scene.build()?, ExecutorKind::Lockstep)?;
     let mut events = listens.then(|| world.events(EventFilter::all()));
-    let mut told = 0;
+    let mut received = 0;
     let begun = Instant::now();
     for _ in 0..BOUNCES_MS / 20 {
         world.advance(SimSpan::from_millis(20));
-        told += events.as_mut().map_or(0, |events| events.drain().count() as u64);
+        received += events.as_mut().map_or(0, |events| events.drain().count() as u64);
     }
-    Ok((begun.elapsed(), told))
+    Ok((begun.elapsed(), received))
 }

@@ -45,8 +45,8 @@ fn what_joins_lies_on_what_is_there_and_what_leaves_lets_it_fall() {
         world.advance(SimSpan::from_millis(1200));
         assert!((position(&world, ball).z - 0.05).abs() < 1e-3, "{executor:?}: {}", position(&world, ball));
         assert!(matches!(world.latest(stone), Err(WorldError::Gone { .. })), "{executor:?}");
-        let told: Vec<_> = events.drain().filter(|event| event.object == stone).map(|event| event.what).collect();
-        assert!(told.contains(&Happening::Gone), "{executor:?}: {told:?}");
+        let received: Vec<_> = events.drain().filter(|event| event.object == stone).map(|event| event.what).collect();
+        assert!(received.contains(&Happening::Gone), "{executor:?}: {received:?}");
     }
 }
 
@@ -148,8 +148,8 @@ fn a_world_goes_back_to_those_that_were_in_it() {
             assert_eq!(world.hash(), hash, "{executor:?}");
             assert!(matches!(world.latest(newer), Err(WorldError::Gone { .. })), "{executor:?}");
         }
-        let told: Vec<_> = events.drain().filter(|event| event.what == Happening::Gone).collect();
-        assert!(told.iter().map(|event| event.object).eq([newer]), "{executor:?}: {told:?}");
+        let received: Vec<_> = events.drain().filter(|event| event.what == Happening::Gone).collect();
+        assert!(received.iter().map(|event| event.object).eq([newer]), "{executor:?}: {received:?}");
         world.advance(ms(1200));
         assert!((position(&world, ball).z - 0.25).abs() < 1e-3, "{executor:?}: it lies on the stone again");
         world.remove(ball).unwrap();

@@ -148,7 +148,7 @@ class World:
         """Equal numbers mean the same states of all objects, bit for bit."""
 
     def checkpoint(self) -> Checkpoint:
-        """All that the next bit of it needs, with whoever joined it."""
+        """All that the next bit of it needs, objects that joined it included."""
 
     def restore(self, checkpoint: Checkpoint) -> None:
         """Goes back to a checkpoint of this world, or of another of the same scene: what comes after is the same, in lockstep to the bit. Objects that
