@@ -304,9 +304,9 @@ impl AgentClock {
         (self.held_until_ms, self.begun) = (0, ticks(wall));
     }
 
-    /// The agent wakes at wall time `wall`: its time skips the sleep.
-    pub fn wake(&mut self, timeline: &Timeline, wall: Duration) {
-        let slept = timeline.sim_at(wall).since(self.scene_time());
+    /// The agent wakes at the scene time `now`: its time skips the sleep.
+    pub fn wake(&mut self, now: SimTime) {
+        let slept = now.since(self.scene_time());
         self.rested += slept;
         self.time += slept;
     }

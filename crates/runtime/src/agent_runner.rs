@@ -260,8 +260,9 @@ impl AgentRunner {
     pub fn close_account(&mut self, timeline: &Timeline, wall: Duration) {
         self.show_withheld();
         if self.shared.gauges.is_resting() {
-            self.hold_watched(timeline.sim_at(wall));
-            self.pace.wake(timeline, wall);
+            let now = timeline.sim_at(wall);
+            self.hold_watched(now);
+            self.pace.wake(now);
             self.metrics.pace(&self.shared.gauges, &self.pace);
         }
         self.metrics.flush(&self.shared.gauges);
@@ -431,13 +432,15 @@ impl AgentRunner {
 
     /// Continues after a rest, at the timeline's present, with all agents it leads.
     fn resume(&mut self, timeline: &Timeline, wall: Duration) {
-        self.hold_watched(timeline.sim_at(wall));
-        self.pace.wake(timeline, wall);
+        let now = timeline.wakes_at(wall);
+        self.hold_watched(now);
+        self.pace.wake(now);
         // as an agent that newly comes near its peers: while it slept their time went on
         self.was_near = Some(false);
         self.turn_period = TurnPeriod::default();
-        self.metrics.restart(timeline.sim_at(wall));
+        self.metrics.restart(now);
         self.metrics.pace(&self.shared.gauges, &self.pace);
+        self.shared.gauges.woken_at.store(self.pace.scene_time().as_nanos(), Relaxed);
         self.shared.gauges.set_resting(false);
         self.tell(EventKind::Wakes);
         self.notify_reader();

@@ -173,6 +173,12 @@ impl AgentHandle {
         self.shared.slot.latest()
     }
 
+    /// The scene time up to which it has lived: that of its newest state, or of its last waking, if that is later.
+    #[must_use]
+    pub fn lived_to(&self) -> SimTime {
+        self.latest().moment().max(SimTime::from_nanos(self.shared.gauges.woken_at.load(Relaxed)))
+    }
+
     /// Age of `snapshot` at the simulated time `now`, seconds, ≥ 0.
     ///
     /// Zero for a state that covers `now` (one that is on time does), and for the state of an agent at rest: it is still valid.

@@ -117,6 +117,8 @@ pub(super) struct Metrics {
     pub dropped: AtomicU64,
     pub rested: AtomicU64,
     pub cpu_nanos: AtomicU64,
+    /// The scene time at which it woke last.
+    pub woken_at: AtomicU64,
     pub rate_hz: Gauge,
     pub mean_hz: Gauge,
     pub work_s: Gauge,

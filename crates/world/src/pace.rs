@@ -110,11 +110,11 @@ impl World {
     }
 }
 
-/// Whether nothing more is to be waited for: the agent has reached `end`, rests on, or has failed. One that wakes at the end is to step only
-/// after it.
+/// Whether nothing more is to be waited for: the agent has reached `end`, rests on, or has failed. One that wakes at
+/// the end is to step only after it.
 fn has_reached(agent: &AgentHandle, end: SimTime) -> bool {
     match agent.state() {
-        AgentState::Running => agent.latest().moment() >= end,
+        AgentState::Running => agent.lived_to() >= end,
         AgentState::Resting => !agent.is_woken(),
         AgentState::Parked(_) | AgentState::Gone => true,
     }

@@ -1,9 +1,9 @@
 //! Worlds in real time: how much their objects live, at which pace, and cuts of them that go on anywhere.
 
 use glam::DVec3;
-use metachron_core::{Anchor, SimSpan, SimTime};
+use metachron_core::{Anchor, Body, SimSpan, SimTime};
 use metachron_geometry::Solid;
-use metachron_runtime::TimelineCommand;
+use metachron_runtime::{AgentState, TimelineCommand};
 use metachron_world::kinds::ExecutorKind;
 use metachron_world::{Checkpoint, Command, Pace, Rigid, Scene, Tube, World, WorldError};
 
@@ -157,4 +157,24 @@ fn a_cut_is_as_large_after_a_minute_as_after_a_second() {
     let late = world.checkpoint().unwrap().size_bytes();
     // counters of more digits take a byte more each
     assert!(late.abs_diff(early) < 100, "{early} and {late} bytes");
+}
+
+/// A ball that rests on a column: where the column goes, it falls.
+#[test]
+fn what_is_woken_between_two_advances_lives_through_the_next_one_whole() {
+    let column = Rigid::cuboid([0.2, 0.2, 0.5]).mass_kg(10.0).at([0.0, 0.0, 0.5]);
+    let scene = Scene::builder().fixed("floor", Solid::Plane).add("column", column);
+    let scene = scene.add("ball", Rigid::ball(0.05).mass_kg(0.1).at([0.0, 0.0, 1.05]).rate_hz(1000.0)).build().unwrap();
+    for executor in REAL {
+        let world = free(&scene, executor);
+        world.advance(ms(3000));
+        let (ball, column) = (world.object("ball").unwrap(), world.object("column").unwrap());
+        assert_eq!(world.agents().of(ball.id()).unwrap().state(), AgentState::Resting, "{executor:?}");
+        world.remove(column).unwrap();
+        world.advance(ms(400));
+        let Body::Rigid(state) = world.latest(ball).unwrap().body else { panic!("a rigid body") };
+        let height_m = state.position.z;
+        let fallen_m = 0.5 * 9.81 * 0.4 * 0.4;
+        assert!((1.05 - height_m - fallen_m).abs() < 0.01, "{executor:?}: {height_m} m");
+    }
 }

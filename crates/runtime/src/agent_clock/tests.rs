@@ -173,15 +173,24 @@ fn a_shorter_step_than_is_wanted_is_the_step_until_the_next() {
 fn time_at_rest_is_not_dropped() {
     let line = Timeline::new();
     let mut pace = pace(4);
-    pace.wake(&line, ms(900));
+    pace.wake(line.wakes_at(ms(900)));
     assert_eq!((pace.rested(), pace.dropped()), (span_ms(900), SimSpan::ZERO));
     assert_eq!(pace.due(&line), Some(ms(900)));
+}
+
+#[test]
+fn who_wakes_in_a_span_that_waits_for_agents_takes_part_from_its_start() {
+    let line = Timeline::new().after(ms(100), TimelineCommand::Pause).after(ms(150), TimelineCommand::Leap(span_ms(10)));
+    let mut pace = pace(4);
+    pace.wake(line.wakes_at(ms(200)));
+    assert_eq!(pace.time(), SimTime::from_nanos(100_000_000));
+    assert!(pace.due(&line).is_some(), "it steps through the span");
 }
 
 #[test]
 fn waking_never_turns_an_agent_back() {
     let line = Timeline::new();
     let mut pace = AgentClock::new(SimTime::from_nanos(7_000_000), span_ms(4));
-    pace.wake(&line, ms(5));
+    pace.wake(line.wakes_at(ms(5)));
     assert_eq!(pace.time(), SimTime::from_nanos(7_000_000));
 }

@@ -24,8 +24,8 @@ pub struct Timeline {
     sim: SimTime,
     speed: f64,
     until: Option<SimTime>,
-    /// Simulated time waits for agents, and no step is late.
-    is_free: bool,
+    /// Since when simulated time waits for agents, so that no step is late; `None` where it does not.
+    free_since: Option<SimTime>,
     piece: u64,
 }
 
@@ -49,7 +49,7 @@ impl Timeline {
     /// A timeline at wall speed, both times from zero.
     #[must_use]
     pub const fn new() -> Self {
-        Self { wall: Duration::ZERO, sim: SimTime::ZERO, speed: 1.0, until: None, is_free: false, piece: 0 }
+        Self { wall: Duration::ZERO, sim: SimTime::ZERO, speed: 1.0, until: None, free_since: None, piece: 0 }
     }
 
     /// The simulated time at wall time `wall`.
@@ -61,6 +61,12 @@ impl Timeline {
             self.sim - scaled(self.wall - wall, self.speed)
         };
         self.until.map_or(free, |end| free.min(end))
+    }
+
+    /// The simulated time at which an agent goes on that wakes at wall time `wall`: where time waits for agents, it takes part from its start.
+    #[must_use]
+    pub fn wakes_at(&self, wall: Duration) -> SimTime {
+        self.free_since.unwrap_or_else(|| self.sim_at(wall))
     }
 
     /// The wall time at which simulated time reaches `sim`; `None` if it stops before.
@@ -114,7 +120,7 @@ impl Timeline {
     /// Whether simulated time waits for agents ([`TimelineCommand::Leap`]): no step is late then.
     #[must_use]
     pub const fn is_free(&self) -> bool {
-        self.is_free
+        self.free_since.is_some()
     }
 
     /// The piece that begins at wall time `to` with the simulated time `sim`, and runs, stands or has as far to go as this one at wall time
@@ -122,7 +128,8 @@ impl Timeline {
     #[must_use]
     pub fn set_to(&self, from: Duration, to: Duration, sim: SimTime, other: &Self) -> Self {
         let until = self.until.map(|end| sim + end.since(self.sim_at(from)));
-        Self { wall: to, sim, until, piece: self.piece.max(other.piece) + 1, ..*self }
+        let free_since = self.free_since.map(|_| sim);
+        Self { wall: to, sim, until, free_since, piece: self.piece.max(other.piece) + 1, ..*self }
     }
 
     /// The number of this piece: it changes with every change to the timeline.
@@ -138,15 +145,16 @@ impl Timeline {
         let mut next = Self { wall, sim, piece: self.piece + 1, ..*self };
         match drive {
             TimelineCommand::Pause => next.until = Some(sim),
-            TimelineCommand::Run => (next.until, next.is_free) = (None, false),
+            TimelineCommand::Run => (next.until, next.free_since) = (None, None),
             TimelineCommand::Speed(speed) if speed.is_nan() => return *self,
             TimelineCommand::Speed(speed) => next.speed = speed.clamp(SPEED_RANGE.0, SPEED_RANGE.1),
             TimelineCommand::Step(span) => {
-                (next.until, next.is_free) = (Some(self.until.unwrap_or(sim) + span), false);
+                (next.until, next.free_since) = (Some(self.until.unwrap_or(sim) + span), None);
             }
             TimelineCommand::Leap(span) => {
-                next.sim = self.until.unwrap_or(sim) + span;
-                (next.until, next.is_free) = (Some(next.sim), true);
+                let since = self.until.unwrap_or(sim);
+                next.sim = since + span;
+                (next.until, next.free_since) = (Some(next.sim), Some(since));
             }
         }
         next
