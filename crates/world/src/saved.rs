@@ -62,8 +62,8 @@ impl World {
     }
 
     /// Puts the world back into the state of `checkpoint`, of this world or of another of the same scene: what it would have done after, it does
-    /// again, in lockstep to the bit. Objects that joined since are taken out, and tell of it by an event as others do that leave; those that left
-    /// since are there again. An [`Object`](super::Object) is valid where what it names is there: of one that came back again.
+    /// again, in lockstep to the bit. Objects that joined since are taken out, with the event [`Gone`](super::Happening::Gone); those that left since
+    /// are there again. An [`Object`](super::Object) is valid where what it names is there: of one that came back again.
     ///
     /// # Errors
     /// [`CheckpointError::OtherScene`], also where an object of this world has the number of another that joined the checkpoint's,
