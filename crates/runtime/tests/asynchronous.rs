@@ -129,21 +129,9 @@ fn an_asynchronous_link_joins_no_clusters_and_keeps_its_length_in_a_fall() {
                 body("above", Solid::Ball { radius_m: 0.02 }, 1.0, 0.1, rates[0]),
                 body("below", Solid::Ball { radius_m: 0.02 }, 0.9, 0.1, rates[1]),
             ];
-            let anchor = Anchor::Local(DVec3::ZERO);
-            let (other, here, there, rest_m) = (AgentId(1), anchor, anchor, 0.1);
-            let (number, tears_above_n, yields_above_n) = (0, f64::INFINITY, f64::INFINITY);
-            spawns[0].attached = vec![Link {
-                other,
-                here,
-                there,
-                stiffness_n_m,
-                damping_n_s_m,
-                rest_m,
-                law,
-                number,
-                tears_above_n,
-                yields_above_n,
-            }];
+            let middle = Anchor::Local(DVec3::ZERO);
+            let spring = Link::new(AgentId(1), middle, middle, stiffness_n_m);
+            spawns[0].attached = vec![Link { damping_n_s_m, rest_m: 0.1, law, ..spring }];
             spawns[0].laws = vec![(AgentId(1), Law::Off)];
             let run = play(spawns, 0.3);
             let all = states(&run);

@@ -70,10 +70,8 @@ pub struct Findings {
 
 /// A spring whose ends are still to be named.
 pub fn spring(stiffness_n_m: f64, damping_n_s_m: f64, rest_m: f64) -> Link {
-    let (other, here, there) = (AgentId(0), Anchor::Local(DVec3::ZERO), Anchor::Local(DVec3::ZERO));
-    let (number, tears_above_n, yields_above_n) = (0, f64::INFINITY, f64::INFINITY);
-    let law = Law::Cluster;
-    Link { other, here, there, stiffness_n_m, damping_n_s_m, rest_m, law, number, tears_above_n, yields_above_n }
+    let middle = Anchor::Local(DVec3::ZERO);
+    Link { damping_n_s_m, rest_m, ..Link::new(AgentId(0), middle, middle, stiffness_n_m) }
 }
 
 /// A body with its rate.
