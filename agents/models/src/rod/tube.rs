@@ -306,7 +306,7 @@ impl Tube {
 }
 
 impl Tube {
-    /// Begins from a state that it was set to: what steps before it said is of another.
+    /// Begins from a state that it was set to, or divided anew: what steps before it said is of another.
     pub(super) fn begin_anew(&mut self) {
         self.stepper.forget();
         self.present_velocities();

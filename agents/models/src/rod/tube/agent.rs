@@ -165,10 +165,7 @@ impl Agent for Tube {
         next.strain(&self.matter, &self.division);
         self.now = next;
         self.lay_out_springs();
-        self.stepper.forget();
-        self.present_velocities();
-        self.rest.wake();
-        self.at_rest = false;
+        self.begin_anew();
     }
 
     fn write_snapshot(&self, into: &mut Snapshot) {
