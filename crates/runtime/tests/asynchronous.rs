@@ -1,10 +1,10 @@
 //! Asynchronous pairs in runs: each side in a cluster of its own, the same bits on every run, faults on them alone.
 
-use glam::{DQuat, DVec3};
+use glam::DVec3;
 use metachron_contact::stepper::ClusterScene;
 use metachron_contact::{Law, Link};
 use metachron_core::{AgentId, Anchor, Archive, Body, PairKind, SimSpan, Snapshot};
-use metachron_geometry::{ContactTraits, Obstacle, Solid};
+use metachron_geometry::{Obstacle, Solid};
 use metachron_models::rigid::{RigidBody, RigidSpec};
 use metachron_runtime::{
     AgentSpawn, DrawPrice, Faults, Lockstep, Machine, Priority, Run, StepPrice, SystemClock, Threads, TimelineCommand,
@@ -28,16 +28,7 @@ fn machine() -> Machine {
 
 fn body(name: &str, solid: Solid, height_m: f64, mass_kg: f64, rate_hz: f64) -> AgentSpawn {
     let spec = RigidSpec { gravity: GRAVITY, friction: 0.5, ..RigidSpec::free(solid, DVec3::Z * height_m, mass_kg) };
-    let floor = Obstacle {
-        name: "floor".into(),
-        solid: Solid::Plane,
-        position: DVec3::ZERO,
-        rotation: DQuat::IDENTITY,
-        friction: 0.5,
-        restitution: 0.0,
-        traits: ContactTraits::default(),
-    };
-    let scene = Arc::new(ClusterScene::new(&[floor]).unwrap());
+    let scene = Arc::new(ClusterScene::new(&[Obstacle::new("floor", Solid::Plane)]).unwrap());
     AgentSpawn { scene, ..AgentSpawn::alone(name, Box::new(RigidBody::new(spec).unwrap()), rate_hz) }
 }
 

@@ -8,7 +8,7 @@ use metachron_contact::stepper::{
 };
 use metachron_contact::{Agent, AnchorSpring, Law, Link, Neighbour, StepContext};
 use metachron_core::{AgentId, Anchor, Grip, PlainLoop, SensorTouch, SimSpan, SimTime, Snapshot};
-use metachron_geometry::{ContactTraits, Obstacle, Solid};
+use metachron_geometry::{Obstacle, Solid};
 use std::sync::Arc;
 
 /// Gravity, m/s².
@@ -82,8 +82,7 @@ pub fn placed(agent: impl Agent + 'static, held: bool) -> Placed {
 
 /// A plane through the origin whose normal is the z that `rotation` leads to.
 pub fn plane(rotation: DQuat, friction: f64) -> Obstacle {
-    let (name, solid, position) = ("floor".into(), Solid::Plane, DVec3::ZERO);
-    Obstacle { name, solid, position, rotation, friction, restitution: 0.0, traits: ContactTraits::default() }
+    Obstacle { rotation, friction, ..Obstacle::new("floor", Solid::Plane) }
 }
 
 impl Table {
