@@ -2,6 +2,15 @@
 
 import metachron as mc
 
+# the text of a scene with a ball, whose table goes on
+BALL = """format = 1
+[[object]]
+name = "ball"
+model = "rigid"
+shape = "ball"
+radius_m = 0.1
+"""
+
 
 def falling(height: float = 10.0) -> mc.Scene:
     """A ball of 0.2 kg in free fall."""

@@ -8,14 +8,7 @@ import numpy as np
 import pytest
 import scenes
 
-TOML = """format = 1
-[[object]]
-name = "ball"
-model = "rigid"
-shape = "ball"
-radius_m = 0.1
-mass_kg = 2.0
-"""
+TOML = scenes.BALL + "mass_kg = 2.0\n"
 
 
 def test_a_scene_is_read_from_a_text_a_path_and_a_name(tmp_path: Path) -> None:

@@ -7,14 +7,9 @@ import sys
 import metachron as mc
 import numpy as np
 import pytest
+import scenes
 
-RED = """format = 1
-[[object]]
-name = "ball"
-model = "rigid"
-shape = "ball"
-radius_m = 0.1
-position_m = [0.0, 0.0, 1.0]
+RED = scenes.BALL + """position_m = [0.0, 0.0, 1.0]
 colour = "#e01010"
 [[camera]]
 name = "front"

@@ -1,12 +1,11 @@
 //! Scenes as users write them: what loads, and what an error shows.
 
+use metachron_scene::{SceneError, Source, load};
 use metachron_world::Scene;
-
-use metachron_scene::{SceneError, Source, json_schema, load};
 use proptest::prelude::*;
 
 /// The least scene with a tube, for the tests to change.
-const TUBE: &str = r#"format = 1
+pub const TUBE: &str = r#"format = 1
 
 [[object]]
 name = "intestine"
@@ -396,92 +395,6 @@ fn a_scene_that_does_not_exist_lists_the_built_in_ones() {
     let error = Source::open("tubee").unwrap_err();
     let help = error.problems[0].help.clone().unwrap();
     assert!(help.contains("did you mean `tube`?") && help.contains("overload"), "{help}");
-}
-
-/// Whether `value` keeps the parts of JSON Schema that ours uses; says where it does not.
-fn keeps(schema: &serde_json::Value, root: &serde_json::Value, value: &serde_json::Value) -> Result<(), String> {
-    use serde_json::Value;
-    if let Some(name) = schema.get("$ref").and_then(Value::as_str) {
-        let found = root.pointer(name.trim_start_matches('#')).ok_or(format!("no {name}"))?;
-        return keeps(found, root, value);
-    }
-    for choice in ["anyOf", "oneOf"] {
-        if let Some(list) = schema.get(choice).and_then(Value::as_array) {
-            let all: Vec<_> = list.iter().map(|s| keeps(s, root, value)).collect();
-            let sound = all.iter().filter(|r| r.is_ok()).count();
-            if sound == 0 || (choice == "oneOf" && sound > 1) {
-                return Err(format!("{sound} of {choice} for {value}: {all:?}"));
-            }
-        }
-    }
-    if schema.get("const").is_some_and(|c| c != value) {
-        return Err(format!("{value} is not {}", schema["const"]));
-    }
-    if schema.get("enum").and_then(Value::as_array).is_some_and(|e| !e.contains(value)) {
-        return Err(format!("{value} is not one of {}", schema["enum"]));
-    }
-    let kinds: Vec<&str> = match schema.get("type") {
-        Some(Value::String(kind)) => vec![kind],
-        Some(Value::Array(kinds)) => kinds.iter().filter_map(Value::as_str).collect(),
-        _ => vec![],
-    };
-    let is = |kind: &&str| match *kind {
-        "object" => value.is_object(),
-        "array" => value.is_array(),
-        "string" => value.is_string(),
-        "boolean" => value.is_boolean(),
-        "integer" => value.is_i64(),
-        "number" => value.is_number(),
-        _ => value.is_null(),
-    };
-    if !kinds.is_empty() && !kinds.iter().any(is) {
-        return Err(format!("{value} is no {kinds:?}"));
-    }
-    if let Some(table) = value.as_object() {
-        let properties = schema.get("properties").and_then(Value::as_object);
-        for (key, inner) in table {
-            match properties.and_then(|p| p.get(key)) {
-                Some(schema) => keeps(schema, root, inner).map_err(|e| format!("{key}: {e}"))?,
-                None if schema["additionalProperties"] == false => return Err(format!("unknown key {key}")),
-                None => {}
-            }
-        }
-        let required = schema.get("required").and_then(Value::as_array);
-        if let Some(missing) = required.into_iter().flatten().find(|k| !table.contains_key(k.as_str().unwrap())) {
-            return Err(format!("{missing} is missing"));
-        }
-    }
-    if let (Some(items), Some(list)) = (schema.get("items"), value.as_array()) {
-        list.iter().try_for_each(|item| keeps(items, root, item))?;
-    }
-    Ok(())
-}
-
-#[test]
-fn the_schema_accepts_every_built_in_scene_and_refuses_what_the_program_refuses() {
-    let schema = json_schema();
-    for scene in &metachron::scenes::ALL {
-        let value: serde_json::Value = toml::from_str(scene.text).unwrap();
-        keeps(&schema, &schema, &value).unwrap_or_else(|e| panic!("{}: {e}", scene.name));
-    }
-    for bad in ["radus_m = 0.1", "model = \"blob\"", "n = \"x\""] {
-        let key = bad.split(' ').next().unwrap();
-        let lines = TUBE.lines().filter(|l| !l.starts_with(&format!("{key} "))).collect::<Vec<_>>().join("\n");
-        let value: serde_json::Value = toml::from_str(&format!("{lines}\n{bad}\n")).unwrap();
-        assert!(keeps(&schema, &schema, &value).is_err(), "{bad}");
-    }
-}
-
-#[test]
-fn the_schema_explains_every_key() {
-    let schema = json_schema();
-    let objects = schema["properties"]["object"]["description"].as_str().unwrap();
-    assert!(objects.contains("at most 10000"), "{objects}");
-    for model in metachron_scene::format::MODELS {
-        for (key, inner) in schema["$defs"][model]["properties"].as_object().unwrap() {
-            assert!(key == "model" || inner["description"].is_string(), "{model}.{key}");
-        }
-    }
 }
 
 proptest! {

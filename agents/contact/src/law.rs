@@ -55,3 +55,23 @@ pub struct Link {
     /// lengthens it. Infinite where it never yields; an asynchronous link never does.
     pub yields_above_n: f64,
 }
+
+impl Link {
+    /// A spring from `here` to a point `there` of `other` with this stiffness, N/m, > 0: number 0, without damping or a length at rest, in one
+    /// problem with all that touches, which neither tears nor yields.
+    #[must_use]
+    pub const fn new(other: AgentId, here: Anchor, there: Anchor, stiffness_n_m: f64) -> Self {
+        Self {
+            other,
+            here,
+            there,
+            stiffness_n_m,
+            damping_n_s_m: 0.0,
+            rest_m: 0.0,
+            law: Law::Cluster,
+            number: 0,
+            tears_above_n: f64::INFINITY,
+            yields_above_n: f64::INFINITY,
+        }
+    }
+}

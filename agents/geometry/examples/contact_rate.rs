@@ -7,8 +7,8 @@ use metachron_geometry::narrow_phase::{
     NarrowPhaseScratch, RestShape, SweptReach, SweptShape, VoronoiRegions, first_touch, self_touches, touches,
 };
 use metachron_geometry::{
-    CollisionShape, ContactTraits, Obstacle, PlacedShape, ShapeError, ShapeKind, ShapePose, Solid, SolidShape,
-    StaticSolid, SurfaceShape, Touch,
+    CollisionShape, Obstacle, PlacedShape, ShapeError, ShapeKind, ShapePose, Solid, SolidShape, StaticSolid,
+    SurfaceShape, Touch,
 };
 use std::error::Error;
 use std::time::Instant;
@@ -119,17 +119,7 @@ fn square(cells: u32) -> (Vec<DVec3>, Vec<[u32; 3]>) {
 fn ground(cells: u32) -> Result<StaticSolid, Box<dyn Error>> {
     let (points, triangles) = square(cells);
     let solid = Solid::Mesh { points_m: points.into(), triangles: triangles.into() };
-    let (position, rotation) = (DVec3::ZERO, DQuat::IDENTITY);
-    let ground = Obstacle {
-        name: "ground".to_owned(),
-        solid,
-        position,
-        rotation,
-        friction: 0.5,
-        restitution: 0.0,
-        traits: ContactTraits::default(),
-    };
-    Ok(StaticSolid::new(&ground)?)
+    Ok(StaticSolid::new(&Obstacle::new("ground", solid))?)
 }
 
 /// A flat sheet of so many cells a side, and its vertices.

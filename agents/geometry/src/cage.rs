@@ -1,7 +1,7 @@
 //! A cage of box-shaped cells around a closed surface: which cells hold volume, how much of it, and how points move with the cells.
 //!
 //! In: a closed surface and a spacing. Out: nodes, cells with the volume inside the surface that belongs to each corner, and the four
-//! nodes that carry any point. Never here: masses, forces, what the cells are made of. Theory: docs/theory/soft.md, eq. 17, 18.
+//! nodes that carry any point. Never here: masses, forces, what the cells are made of. Theory: docs/theory/soft.md, eq. 15, 16.
 
 use crate::{Aabb, Triangles};
 use glam::DVec3;
@@ -99,7 +99,7 @@ impl Cage {
         (cage.nodes_m.len() <= nodes_max).then_some(cage)
     }
 
-    /// The volume inside that belongs to each corner of each cell of the lattice, m³ (eq. 17).
+    /// The volume inside that belongs to each corner of each cell of the lattice, m³ (eq. 15).
     fn volumes(&self, surface: &Triangles, places: usize) -> Vec<[f64; 8]> {
         let mut volumes = vec![[0.0; 8]; places];
         let [nx, ny, nz] = self.counts;
@@ -311,7 +311,7 @@ impl Cage {
     }
 
     /// How a point of the surface at rest moves with the cage: linear in one of the six tetrahedra of its cell, continuous from cell to cell
-    /// (eq. 18). The cell is the one on the side of the unit vector `inward`: a surface may lie between two cells.
+    /// (eq. 16). The cell is the one on the side of the unit vector `inward`: a surface may lie between two cells.
     #[must_use]
     pub fn carry(&self, at_m: DVec3, inward: DVec3) -> Carried {
         let cell = &self.cells[self.cell_under(at_m, inward)];

@@ -3,22 +3,13 @@
 use super::closest_points::{near_segments, near_triangle};
 use super::signed_distance::{Ball, Field};
 use super::{Aabb, Obstacle, Solid};
-use crate::ContactTraits;
+
 use glam::{DQuat, DVec3};
 use proptest::prelude::*;
 
 fn place(solid: Solid) -> Field {
     let (position, rotation) = (DVec3::new(0.3, -0.2, 0.1), DQuat::from_euler(glam::EulerRot::XYZ, 0.4, -0.7, 1.1));
-    Field::new(&Obstacle {
-        name: String::new(),
-        solid,
-        position,
-        rotation,
-        friction: 0.0,
-        restitution: 0.0,
-        traits: ContactTraits::default(),
-    })
-    .unwrap()
+    Field::new(&Obstacle { position, rotation, ..Obstacle::new("", solid) }).unwrap()
 }
 
 fn corners(half: DVec3) -> Vec<DVec3> {
@@ -140,16 +131,8 @@ fn quads(quads: &[[DVec3; 4]]) -> Field {
     let points: Vec<DVec3> = quads.iter().flatten().copied().collect();
     let triangles: Vec<[u32; 3]> =
         (0..quads.len() as u32).flat_map(|q| [[4 * q, 4 * q + 1, 4 * q + 2], [4 * q, 4 * q + 2, 4 * q + 3]]).collect();
-    Field::new(&Obstacle {
-        name: String::new(),
-        solid: Solid::Mesh { points_m: points.into(), triangles: triangles.into() },
-        position: DVec3::ZERO,
-        rotation: DQuat::IDENTITY,
-        friction: 0.0,
-        restitution: 0.0,
-        traits: ContactTraits::default(),
-    })
-    .unwrap()
+    let solid = Solid::Mesh { points_m: points.into(), triangles: triangles.into() };
+    Field::new(&Obstacle::new("", solid)).unwrap()
 }
 
 fn quad(corners: [[f64; 3]; 4]) -> [DVec3; 4] {
@@ -190,16 +173,7 @@ fn a_floor_of_many_triangles_gives_one_contact() {
 
 #[test]
 fn a_thin_plate_touches_on_the_near_side_only() {
-    let plate = Field::new(&Obstacle {
-        name: String::new(),
-        solid: hull(DVec3::new(1.0, 1.0, 0.001)),
-        position: DVec3::ZERO,
-        rotation: DQuat::IDENTITY,
-        friction: 0.0,
-        restitution: 0.0,
-        traits: ContactTraits::default(),
-    })
-    .unwrap();
+    let plate = Field::new(&Obstacle::new("", hull(DVec3::new(1.0, 1.0, 0.001)))).unwrap();
     for (z, normal, distance) in [(0.01, DVec3::Z, 0.009), (-0.01, DVec3::NEG_Z, 0.009), (0.0005, DVec3::Z, -0.0005)] {
         let touches: Vec<_> = plate.touches(DVec3::new(0.1, 0.2, z), 0.1).iter().collect();
         assert_eq!(touches.len(), 1, "at z = {z} m");

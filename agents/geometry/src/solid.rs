@@ -133,3 +133,12 @@ pub struct Obstacle {
     /// What else it says about its contacts.
     pub traits: ContactTraits,
 }
+
+impl Obstacle {
+    /// A solid with its axes at the origin, unturned, with a friction of 0.5 and no rebound, which touches everything.
+    #[must_use]
+    pub fn new(name: impl Into<String>, solid: Solid) -> Self {
+        let (position, rotation, traits) = (DVec3::ZERO, DQuat::IDENTITY, ContactTraits::NONE);
+        Self { name: name.into(), solid, position, rotation, friction: 0.5, restitution: 0.0, traits }
+    }
+}

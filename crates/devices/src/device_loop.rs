@@ -9,8 +9,8 @@
 //! In: ticks, whoever makes them. Out: a report. Never here: threads, waiting.
 
 use super::contact_model::ContactModel;
-use super::counts::Counts;
 use super::device::{Device, DeviceState};
+use super::histogram::Histogram;
 use super::report::DeviceReport;
 use super::tank::{EnergyTank, Handle};
 use glam::DVec3;
@@ -51,12 +51,12 @@ pub struct DeviceLoop {
     period_s: f64,
     model: ContactModel,
     /// The scene's time when the newest state came.
-    came: SimTime,
+    received_at: SimTime,
     tank: EnergyTank,
     before: Option<DeviceState>,
     report: DeviceReport,
-    late_ms: Counts,
-    age_steps: Counts,
+    late_ms: Histogram,
+    age_steps: Histogram,
     force_sum_n: f64,
 }
 
@@ -82,7 +82,10 @@ impl DeviceLoop {
         }
         let LoopOptions { rate_hz, tank_j } = options;
         if !((1.0..=1e4).contains(&rate_hz) && tank_j > 0.0 && tank_j.is_finite()) {
-            return Err(refused("a device is served 1 to 10000 times a second, from a tank above 0 J"));
+            let reason = format!(
+                "the rate is {rate_hz} Hz and the tank {tank_j} J; expected 1 to 10000 Hz, and a tank above 0 J"
+            );
+            return Err(refused(&reason));
         }
         let report = DeviceReport {
             device: device.name().to_owned(),
@@ -97,12 +100,12 @@ impl DeviceLoop {
             is_tool,
             period_s: rate_hz.recip(),
             model: ContactModel::default(),
-            came: SimTime::ZERO,
+            received_at: SimTime::ZERO,
             tank: EnergyTank::new(tank_j),
             before: None,
             report,
-            late_ms: Counts::new(0.005),
-            age_steps: Counts::new(0.005),
+            late_ms: Histogram::new(0.005),
+            age_steps: Histogram::new(0.005),
             force_sum_n: 0.0,
         })
     }
@@ -116,7 +119,7 @@ impl DeviceLoop {
     /// One tick, `elapsed` after the one before and by so much too late. A failure is counted in the report; the next tick follows.
     pub fn tick(&mut self, elapsed: Duration, late: Duration) {
         self.report.ticks += 1;
-        self.late_ms.note(late.as_secs_f64() * 1e3);
+        self.late_ms.record(late.as_secs_f64() * 1e3);
         if let Err(why) = self.serve(elapsed.as_secs_f64()) {
             self.report.failures += 1;
             self.report.first_failure.get_or_insert(why);
@@ -175,17 +178,17 @@ impl DeviceLoop {
         self.world.command(self.object, command.lasting(LEADS))
     }
 
-    /// What the object would feel where the handle is; less and less by a state after which none came.
+    /// What the object would feel where the handle is, by the newest state; it fades where no other state comes.
     fn feel(&mut self, state: &DeviceState) -> Result<Wrench, WorldError> {
         let now = self.world.time();
         if self.model.refresh(&self.world, self.object)? {
-            self.came = now;
+            self.received_at = now;
         }
-        // an object that its machine cannot keep up with is behind the scene, and answers the newest pose all the same: its clock tells nothing
-        let age_s = now.secs_after(self.came).max(0.0);
+        // where a machine is loaded an object's clock is behind the scene's, and its state answers the newest pose all the same: the age is by arrival
+        let age_s = now.secs_after(self.received_at).max(0.0);
         // before the first step nothing has been felt, and what rests is as it was
         let age_steps = if self.model.step_s > 0.0 && !self.model.at_rest { age_s / self.model.step_s } else { 0.0 };
-        self.age_steps.note(age_steps);
+        self.age_steps.record(age_steps);
         self.report.stale += u64::from(age_steps > WHOLE_STEPS);
         let late_s = (age_steps - WHOLE_STEPS).max(0.0) * self.model.step_s;
         let share = (1.0 - late_s / LEADS.as_secs_f64()).max(0.0);

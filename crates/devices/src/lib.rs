@@ -9,11 +9,11 @@
 //! [`World`]: metachron_world::World
 
 mod contact_model;
-mod counts;
 mod device;
 mod device_loop;
 #[cfg(feature = "gamepad")]
 mod gamepad;
+mod histogram;
 mod report;
 mod served;
 mod simulated;

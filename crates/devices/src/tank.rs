@@ -87,7 +87,7 @@ impl EnergyTank {
     pub fn admit(&mut self, wanted: &Wrench, handle: &Handle) -> Wrench {
         let forces_n = self.sent.iter().map(|wrench| wrench.force_n.length()).sum::<f64>() + wanted.force_n.length();
         let most_j = |wrench: &Wrench| handle.most_work_j(wrench, forces_n);
-        // until all have acted any one may act in the place of those that come late
+        // of the wrenches on their way any one may act in the place of those that come late (coupling.md, eq. 7u)
         let periods = self.sent.len() as f64;
         let on_the_way_j = periods * self.sent.iter().map(most_j).fold(0.0, f64::max);
         let free_j = (self.level_j - on_the_way_j).max(0.0).min(self.level_j / (periods + 1.0));

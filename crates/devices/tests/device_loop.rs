@@ -9,7 +9,7 @@ use metachron_devices::{
 use metachron_geometry::{ContactTraits, Solid};
 use metachron_models::soft::Side;
 use metachron_models::tool::{Keyframe, Tool, ToolSpec};
-use metachron_world::{Command, Custom, Part, Rigid, Scene, SceneBuilder, Soft, World, kinds::ExecutorKind};
+use metachron_world::{Command, Custom, Rigid, Scene, SceneBuilder, Soft, World, kinds::ExecutorKind};
 use std::sync::{Arc, Mutex};
 use std::time::Duration;
 
@@ -99,9 +99,17 @@ fn the_force_at_rest_is_that_of_the_spring_that_is_pressed() {
 /// One step of all in the scenes below.
 const STEP: SimSpan = SimSpan::from_millis(10);
 
-/// By how much the force in z grows on an object that is led down by 6 mm, rests there, and is led on: in the step in which it is, or, of a tool,
-/// which gets there in several, once it rests; and by how much the local model before says that it does, N/m.
-fn led_on(scene: &Scene, lead: &dyn Fn(f64) -> Command, on_m: f64) -> [f64; 2] {
+/// By how much a force grows on the way on which its object is led, N/m.
+struct Stiffness {
+    /// As the world's states have it.
+    solved_n_m: f64,
+    /// As the local model of the state before says.
+    model_n_m: f64,
+}
+
+/// Leads an object down by 6 mm, where it rests, and on: the force in z grows in the step in which it is led on, or, of a tool, which gets there in
+/// several, once it rests.
+fn led_on(scene: &Scene, lead: &dyn Fn(f64) -> Command, on_m: f64) -> Stiffness {
     let (name, depth_m) = ("led", 0.006);
     let pressed = |on_m: f64| {
         let world = World::start(scene, ExecutorKind::Lockstep).unwrap();
@@ -133,7 +141,7 @@ fn led_on(scene: &Scene, lead: &dyn Fn(f64) -> Command, on_m: f64) -> [f64; 2] {
     let felt_n = |by_m: f64| model.wrench(place_m - DVec3::Z * by_m, rotation).force_n.z;
     assert!(*still_n > 0.05, "{name} presses on nothing: {still_n} N");
     assert_eq!(felt_n(-0.05), 0.0, "a contact never pulls");
-    [further_n - still_n, felt_n(on_m) - felt_n(0.0)].map(|more_n| more_n / on_m)
+    Stiffness { solved_n_m: (further_n - still_n) / on_m, model_n_m: (felt_n(on_m) - felt_n(0.0)) / on_m }
 }
 
 fn jelly(cells: u32) -> Soft {
@@ -160,54 +168,54 @@ fn probe() -> Custom {
 }
 
 /// An object `led` in a scene, and how it is led to a depth.
-struct Case<'a> {
+struct Case {
     what: &'static str,
     scene: Scene,
-    lead: &'a dyn Fn(f64) -> Command,
+    lead: Box<dyn Fn(f64) -> Command>,
+    /// How far it is led on, metres.
+    on_m: f64,
+}
+
+impl Case {
+    /// A kinematic body that begins at `from_m`.
+    fn body(what: &'static str, builder: SceneBuilder, part: Rigid, from_m: f64) -> Self {
+        let lead = Box::new(move |depth_m| Command::pose(DVec3::Z * (from_m - depth_m), DQuat::IDENTITY));
+        Self { what, scene: builder.add("led", part).build().unwrap(), lead, on_m: 1e-6 }
+    }
+
+    fn tool(what: &'static str, builder: SceneBuilder) -> Self {
+        let at = |depth_m: f64| DVec3::Z * (SIDE_M + 0.004 - depth_m);
+        let lead = Box::new(move |depth_m| Command::spring(Anchor::Local(DVec3::ZERO), at(depth_m), 0.0, 0.0));
+        Self { what, scene: builder.add("led", probe().rate_hz(100.0)).build().unwrap(), lead, on_m: 1e-4 }
+    }
 }
 
 #[test]
 fn the_local_model_has_the_stiffness_of_the_force_whatever_bears() {
-    let down = |from_m: f64| move |depth_m: f64| Command::pose(DVec3::Z * (from_m - depth_m), DQuat::IDENTITY);
-    let tip =
-        |depth_m: f64| Command::spring(Anchor::Local(DVec3::ZERO), DVec3::Z * (SIDE_M + 0.004 - depth_m), 0.0, 0.0);
-    let scene = |builder: SceneBuilder, name: &str, part: Part| builder.add(name, part).build().unwrap();
-    let soft = |cells: u32| Scene::builder().gravity([0.0; 3]).add("jelly", jelly(cells).rate_hz(100.0));
-    let slow = Scene::builder().gravity([0.0; 3]).add("jelly", jelly(1).rate_hz(50.0));
+    let weightless = || Scene::builder().gravity([0.0; 3]);
+    let soft = |cells: u32| weightless().add("jelly", jelly(cells).rate_hz(100.0));
+    let slow = weightless().add("jelly", jelly(1).rate_hz(50.0));
     let lid = || Rigid::cuboid([0.2, 0.2, 0.01]).kinematic().at([0.0, 0.0, SIDE_M + 0.02]).rate_hz(100.0);
     let ball = Rigid::ball(0.02).kinematic().at([0.0, 0.0, SIDE_M + 0.03]).rate_hz(100.0);
     let apart = |x_m: f64| jelly(1).at([x_m, 0.0, 0.5 * SIDE_M]).rate_hz(100.0);
-    let two = Scene::builder().gravity([0.0; 3]).add("left", apart(-0.1)).add("right", apart(0.1));
+    let two = weightless().add("left", apart(-0.1)).add("right", apart(0.1));
     let board = Rigid::cuboid([0.1, 0.1, 0.01]).at([0.0, 0.0, SIDE_M + 0.01]).mass_kg(0.1).rate_hz(100.0);
-    let loaded = soft(2).add("board", board);
     // nothing but its stiffness resists for long
     let light = jelly(4).damping(2.0, 0.0).density_kg_m3(1.0).rate_hz(100.0);
-    let light = Scene::builder().gravity([0.0; 3]).add("jelly", light);
     let plate = Rigid::cuboid([0.1, 0.1, 0.5 * SIDE_M]).at([0.0, 0.0, 0.5 * SIDE_M]).rate_hz(100.0);
-    let rigid = || Scene::builder().fixed("floor", Solid::Plane).add("plate", plate.clone());
     let cases = [
-        Case { what: "a ball on jelly", scene: scene(soft(4), "led", ball.into()), lead: &down(SIDE_M + 0.02) },
-        Case { what: "four corners", scene: scene(soft(1), "led", lid().into()), lead: &down(SIDE_M + 0.01) },
-        Case {
-            what: "four corners of slower steps",
-            scene: scene(slow, "led", lid().into()),
-            lead: &down(SIDE_M + 0.01),
-        },
-        Case { what: "twenty-five places", scene: scene(soft(4), "led", lid().into()), lead: &down(SIDE_M + 0.01) },
-        Case { what: "two bodies", scene: scene(two, "led", lid().into()), lead: &down(SIDE_M + 0.01) },
-        Case {
-            what: "a plate that lies on jelly",
-            scene: scene(loaded, "led", lid().into()),
-            lead: &down(SIDE_M + 0.03),
-        },
-        Case { what: "a tool on jelly", scene: scene(light, "led", probe().rate_hz(100.0).into()), lead: &tip },
-        Case { what: "a tool on a plate", scene: scene(rigid(), "led", probe().rate_hz(100.0).into()), lead: &tip },
+        Case::body("a ball on jelly", soft(4), ball, SIDE_M + 0.02),
+        Case::body("four corners", soft(1), lid(), SIDE_M + 0.01),
+        Case::body("four corners of slower steps", slow, lid(), SIDE_M + 0.01),
+        Case::body("twenty-five places", soft(4), lid(), SIDE_M + 0.01),
+        Case::body("two bodies", two, lid(), SIDE_M + 0.01),
+        Case::body("a board that rests on jelly", soft(2).add("board", board), lid(), SIDE_M + 0.03),
+        Case::tool("a tool on jelly", weightless().add("jelly", light)),
+        Case::tool("a tool on a plate", Scene::builder().fixed("floor", Solid::Plane).add("plate", plate)),
     ];
-    for Case { what, scene, lead } in cases {
-        let on_m = if what.contains("tool") { 1e-4 } else { 1e-6 };
-        let [true_n_m, felt_n_m] = led_on(&scene, lead, on_m);
-        println!("{what}: {felt_n_m:.1} N/m of {true_n_m:.1} N/m");
-        assert!((felt_n_m / true_n_m - 1.0).abs() < 0.1, "{what}: {felt_n_m} N/m of {true_n_m} N/m");
+    for Case { what, scene, lead, on_m } in cases {
+        let Stiffness { solved_n_m, model_n_m } = led_on(&scene, &lead, on_m);
+        assert!((model_n_m / solved_n_m - 1.0).abs() < 0.1, "{what}: {model_n_m} N/m of {solved_n_m} N/m");
     }
 }
 

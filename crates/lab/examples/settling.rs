@@ -3,7 +3,7 @@
 //! `cargo run -p metachron-lab --example settling` prints a table; with `-- --write` it also writes `docs/figures/settling.{csv,svg}`.
 //! Nothing is measured: a frame takes setup + fill + c · triangles, so every run gives the same numbers on any computer.
 
-use metachron_core::{AgentId, ResolutionRange};
+use metachron_core::ResolutionRange;
 use metachron_lod::control::{FrameWork, Kind, Law, ObjectView, PRIMITIVE_LEVELS, PictureControl, Policy, Status};
 use plotters::prelude::*;
 use plotters::style::register_font;
@@ -58,22 +58,7 @@ struct Run {
 
 /// A tube of 1.6 m, three balls and two tools, as in the demo.
 fn stage() -> Vec<ObjectView> {
-    let object = |id, kind, range, pixels| ObjectView {
-        id: AgentId(id),
-        kind,
-        range,
-        shading: Default::default(),
-        pixels,
-        distance_m: 0.6,
-        speed_px_s: 0.0,
-        importance: 1.0,
-        off_centre: 0.0,
-        from_focus_m: 0.0,
-        visible: true,
-        group: None,
-        may_vanish: false,
-        pieces: None,
-    };
+    let object = |id, kind, range, pixels| ObjectView { range, pixels, distance_m: 0.6, ..ObjectView::plain(id, kind) };
     let tube = Kind::Tube { length_m: 1.6, radius_m: 0.015 };
     let mut stage = vec![object(0, tube, ResolutionRange { eps_m: (5e-4, 0.04), n: (0, 5) }, 1e9)];
     let one_spacing = ResolutionRange { eps_m: (1.0, 1.0), n: (0, 6) };

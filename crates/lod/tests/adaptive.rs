@@ -143,8 +143,8 @@ proptest! {
             let sound = target.is_finite() && target > 0.0;
             prop_assert!(sound || !plan.feasible || plan.predicted <= 1.0);
             prop_assert!(!plan.feasible || plan.held || plan.predicted <= target.max(1.0) * (1.0 + 1e-9));
-            let kappa = adaptive.estimator(0).kappa();
-            prop_assert!(kappa.is_finite() && kappa > 0.0 && adaptive.margin() <= 0.75);
+            let slowness = adaptive.estimator(0).slowness();
+            prop_assert!(slowness.is_finite() && slowness > 0.0 && adaptive.margin() <= 0.75);
         }
     }
 }
@@ -209,7 +209,7 @@ fn play(adaptive: &mut Adaptive, frames: u64, machine: impl Fn(u64) -> f64) -> (
         let now = levels(adaptive, 200);
         changes += usize::from(frame > 0 && now != last);
         last = now;
-        let took = (plan.predicted / kappa(adaptive)) * machine(frame);
+        let took = (plan.predicted / slowness(adaptive)) * machine(frame);
         adaptive.observe(frame, 0, took);
         adaptive.finished(frame, took);
         plans.push(plan);
@@ -217,9 +217,9 @@ fn play(adaptive: &mut Adaptive, frames: u64, machine: impl Fn(u64) -> f64) -> (
     (plans, changes)
 }
 
-/// κ as a plan was made with: what it predicts for one tick of the table.
-fn kappa(adaptive: &Adaptive) -> f64 {
-    adaptive.planned_kappa(0)
+/// γ as a plan was made with: what it predicts for one tick of the table.
+fn slowness(adaptive: &Adaptive) -> f64 {
+    adaptive.planned_slowness(0)
 }
 
 #[test]
@@ -256,7 +256,7 @@ fn still_picture_on_a_noisy_machine_never_changes_once_the_noise_is_known() {
     let before = levels(&adaptive, 200);
     for frame in 30..600 {
         let plan = adaptive.choose(frame, time(T));
-        adaptive.observe(frame, 0, plan.predicted / kappa(&adaptive) * tremble(frame));
+        adaptive.observe(frame, 0, plan.predicted / slowness(&adaptive) * tremble(frame));
         assert_eq!(levels(&adaptive, 200), before, "frame {frame}");
     }
 }
@@ -279,7 +279,7 @@ fn still_picture_on_a_drifting_machine_changes_ever_less_often_and_is_not_late()
             changed.push(frame);
         }
         last = now;
-        let took = plan.predicted / kappa(&adaptive) * (1.0 + slower[frame as usize]);
+        let took = plan.predicted / slowness(&adaptive) * (1.0 + slower[frame as usize]);
         late += usize::from(frame >= 30 && took > 1.05 * T);
         adaptive.observe(frame, 0, took);
         adaptive.finished(frame, took);
@@ -310,8 +310,8 @@ fn table_that_is_wrong_is_corrected_within_ten_frames() {
     for wrong in [0.5, 0.8, 1.25, 2.0] {
         let mut adaptive = scene(200, Settings::default());
         play(&mut adaptive, 13, |_| wrong); // three frames teach nothing
-        let kappa = adaptive.estimator(0).kappa();
-        assert!((kappa / wrong - 1.0).abs() < 0.02, "{kappa} for {wrong}");
+        let slowness = adaptive.estimator(0).slowness();
+        assert!((slowness / wrong - 1.0).abs() < 0.02, "{slowness} for {wrong}");
     }
 }
 
@@ -319,15 +319,15 @@ fn table_that_is_wrong_is_corrected_within_ten_frames() {
 fn one_spike_is_an_outlier_and_three_are_a_new_regime() {
     let mut estimator = SpeedEstimator::default();
     (0..20).for_each(|_| assert_eq!(estimator.observe(0.9, 0.9), FilterUpdate::Accepted));
-    let before = estimator.kappa();
+    let before = estimator.slowness();
     assert_eq!(estimator.observe(0.9, 1.8), FilterUpdate::Outlier);
-    assert_eq!((estimator.kappa(), estimator.observe(0.9, 0.9)), (before, FilterUpdate::Accepted));
+    assert_eq!((estimator.slowness(), estimator.observe(0.9, 0.9)), (before, FilterUpdate::Accepted));
     assert_eq!(estimator.observe(0.9, 1.8), FilterUpdate::Outlier);
     assert_eq!(estimator.observe(0.9, 0.1), FilterUpdate::Outlier, "on the other side, so not the second in a row");
     assert_eq!(estimator.observe(0.9, 1.8), FilterUpdate::Outlier);
     assert_eq!(estimator.observe(0.9, 1.8), FilterUpdate::Outlier);
     assert_eq!(estimator.observe(0.9, 1.8), FilterUpdate::NewRegime);
-    assert!((estimator.kappa() - 2.0).abs() < 0.01, "{}", estimator.kappa());
+    assert!((estimator.slowness() - 2.0).abs() < 0.01, "{}", estimator.slowness());
 }
 
 #[test]
@@ -412,7 +412,7 @@ fn stages_share_one_price() {
         let fast: f64 = (0..200).step_by(2).map(cost).sum();
         let slow: f64 = (1..200).step_by(2).map(cost).sum();
         if frame == 39 {
-            // gain √l at 100 κ l ticks: l is ∝ 1/κ², a fourth where κ is 2; a step to l has the slope of √ at l − ½
+            // gain √l at 100 γ l ticks: l is ∝ 1/γ², a fourth where γ is 2; a step to l has the slope of √ at l − ½
             let (fast, slow) = (fast / 1e4 - 0.5, slow / 1e4 - 0.5);
             assert!((fast / slow - 4.0).abs() < 0.8, "{fast} {slow}: levels are whole");
         }

@@ -2,7 +2,7 @@
 
 mod plant;
 
-use metachron_core::{AgentId, ResolutionRange};
+use metachron_core::ResolutionRange;
 use metachron_lod::adaptive::Settings;
 use metachron_lod::control::{FrameWork, Kind, Law, ObjectView, PictureControl, Shading};
 use plant::{AdaptivePolicy, Feedback, Full, Greedy, Machine, Policy, Run, Static, WALK, run, spread};
@@ -113,22 +113,7 @@ fn levels_of_a_tube(start: f64, load: impl Fn(f64, u32) -> f64) -> Vec<u8> {
     let range = ResolutionRange { eps_m: (5e-4, 0.02), n: (0, 6) };
     let kind = Kind::Tube { length_m: 1.5, radius_m: 0.015 };
     let shading = (Shading::PerPixel, Shading::PerPixel);
-    let view = ObjectView {
-        id: AgentId(0),
-        kind,
-        range,
-        shading,
-        pixels: 1e9,
-        distance_m: 0.5,
-        speed_px_s: 0.0,
-        importance: 1.0,
-        off_centre: 0.0,
-        from_focus_m: 0.0,
-        visible: true,
-        group: None,
-        may_vanish: false,
-        pieces: None,
-    };
+    let view = ObjectView { range, shading, pixels: 1e9, distance_m: 0.5, ..ObjectView::plain(0, kind) };
     let polygon_s = 0.6 / hz / start;
     let frame = |k: u32| {
         let plan = control.plan(&[view]);

@@ -225,17 +225,17 @@ fn printed_overlap_gives_953_of_1000_where_it_says_two_thirds() {
 #[test]
 fn fitted_overlap_inverts_its_own_prediction() {
     let mut random = Random(5);
-    for kappa in [0.0, 0.3, 0.8, 1.0] {
+    for serial in [0.0, 0.3, 0.8, 1.0] {
         let frames: Vec<_> = (0..50)
             .map(|_| (random.between(0.1, 10.0), random.between(0.1, 10.0)))
-            .map(|(l, r)| (l, r, Overlap::frame(kappa, l, r)))
+            .map(|(l, r)| (l, r, Overlap::frame(serial, l, r)))
             .collect();
         let Overlap::Fitted(found) = Overlap::fit(&frames) else { panic!("the fit is fitted") };
-        assert!((found - kappa).abs() < 1e-9);
+        assert!((found - serial).abs() < 1e-9);
         for (logic, drawing, frame) in frames {
-            let got = Overlap::Fitted(kappa).drawing(frame, logic);
-            // with κ = 0 any drawing shorter than the logic takes the same frame
-            let want = if kappa == 0.0 && drawing < logic { got } else { drawing };
+            let got = Overlap::Fitted(serial).drawing(frame, logic);
+            // with z = 0 any drawing shorter than the logic takes the same frame
+            let want = if serial == 0.0 && drawing < logic { got } else { drawing };
             assert!((got - want).abs() < 1e-9, "{got} for {drawing}");
         }
     }

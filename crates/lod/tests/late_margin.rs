@@ -47,7 +47,7 @@ fn play(settings: Settings, moves: bool, mut machine: impl FnMut(usize) -> f64) 
         let weight = |id: u64| if moves { 1.0 + 0.5 * (0.01 * frame as f64 + id as f64).sin() } else { 1.0 };
         (0..40).for_each(|id| _ = adaptive.weigh(id, weight(id)));
         let plan = adaptive.choose(frame as u64, Time { target: T, fixed: 0.2 * T, reserved: 0.0 });
-        let drawn = (plan.predicted - 0.2 * T) / adaptive.planned_kappa(0);
+        let drawn = (plan.predicted - 0.2 * T) / adaptive.planned_slowness(0);
         let slower = machine(frame);
         adaptive.observe(frame as u64, 0, slower * (drawn + 0.2 * T) - 0.2 * T);
         adaptive.finished(frame as u64, slower * (drawn + 0.2 * T));
@@ -72,7 +72,7 @@ fn left_by_the_quantile(scatter: f64) -> f64 {
 
 #[test]
 fn log_normal_times_are_late_as_seldom_as_promised_and_use_what_their_quantile_leaves() {
-    // κ is the mean of such times, residuals are over their median, which is less the more they scatter; and a still picture falls with
+    // γ is the mean of such times, residuals are over their median, which is less the more they scatter; and a still picture falls with
     // the machine at its slowest and is slow to rise again
     for (scatter, moves, part) in [(0.15, true, 0.95), (0.4, true, 0.88), (0.15, false, 0.85)] {
         let mut noise = normal(5);

@@ -150,7 +150,7 @@ pub fn device_descriptor(adapter: &wgpu::Adapter) -> wgpu::DeviceDescriptor<'sta
 
 async fn choose(instance: &wgpu::Instance) -> Result<wgpu::Adapter, GpuError> {
     if let Ok(wanted) = std::env::var("WGPU_ADAPTER_NAME") {
-        return named(instance, &wanted).await;
+        return adapter_named(instance, &wanted).await;
     }
     let options = wgpu::RequestAdapterOptions {
         power_preference: wgpu::PowerPreference::from_env().unwrap_or(wgpu::PowerPreference::HighPerformance),
@@ -161,7 +161,7 @@ async fn choose(instance: &wgpu::Instance) -> Result<wgpu::Adapter, GpuError> {
 }
 
 /// The first adapter that has `wanted` in its name, in letters of any case. The function of wgpu for this panics where there is none.
-async fn named(instance: &wgpu::Instance, wanted: &str) -> Result<wgpu::Adapter, GpuError> {
+async fn adapter_named(instance: &wgpu::Instance, wanted: &str) -> Result<wgpu::Adapter, GpuError> {
     let adapters = instance.enumerate_adapters(wgpu::Backends::all()).await;
     let names: Vec<String> = adapters.iter().map(|adapter| adapter.get_info().name).collect();
     let at = names.iter().position(|name| name.to_lowercase().contains(&wanted.to_lowercase()));
@@ -194,7 +194,7 @@ pub struct Offscreen {
     /// The texture of pictures of fewer pixels.
     reduced: Option<Reduced>,
     /// What draws depths, once they were asked for: those of several samples a pixel cannot be read.
-    of_depths: Option<Box<Self>>,
+    depth_target: Option<Box<Self>>,
 }
 
 /// A texture of fewer pixels than the target's.
@@ -238,7 +238,7 @@ impl Offscreen {
             let view = texture.create_view(&wgpu::TextureViewDescriptor::default());
             (texture, view)
         });
-        Ok(Self { gpu, renderer, size, texture, upscaler, reduced: None, of_depths: None })
+        Ok(Self { gpu, renderer, size, texture, upscaler, reduced: None, depth_target: None })
     }
 
     /// The device that draws.
@@ -313,7 +313,7 @@ impl Offscreen {
     /// # Errors
     /// As [`Renderer::render`], and [`GpuError::ReadBack`].
     pub fn depths(&mut self, picture: &Picture, camera: &Camera) -> Result<DepthImage, GpuError> {
-        let mut screen = match self.of_depths.take() {
+        let mut screen = match self.depth_target.take() {
             Some(screen) => screen,
             None => {
                 let options = RendererOptions { samples: 1, ..self.renderer.options() };
@@ -323,7 +323,7 @@ impl Offscreen {
         let style = Style { colouring: Colouring::Depth, wireframe: false, forces: false };
         screen.render(&Picture { style, scale: 1.0, ..picture.clone() }, camera)?;
         let depths_m = screen.renderer.read_depths(&self.gpu, camera, screen.renderer.lost())?;
-        self.of_depths = Some(screen);
+        self.depth_target = Some(screen);
         Ok(DepthImage { size: self.size, depths_m })
     }
 

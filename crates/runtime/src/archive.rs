@@ -208,8 +208,8 @@ impl VirtualEvents {
 /// # Errors
 /// [`ArchiveError::Mismatch`].
 pub(super) fn refuse_absent(id: AgentId) -> Result<AgentSpawn, ArchiveError> {
-    let (found, expected) = (format!("in agent {}", id.0), "one of this run".to_owned());
-    Err(ArchiveError::Mismatch { what: "what joined", found, expected })
+    let (found, expected) = (format!("number {}", id.0), "one of this run".to_owned());
+    Err(ArchiveError::Mismatch { what: "an agent that joined", found, expected })
 }
 
 impl Placed {

@@ -87,15 +87,7 @@ fn quick_machine() -> Machine {
 }
 
 fn spawn(name: &str, agent: impl Agent + 'static, rate_hz: f64, floor: bool) -> AgentSpawn {
-    let floor = floor.then(|| Obstacle {
-        name: "floor".into(),
-        solid: Solid::Plane,
-        position: DVec3::ZERO,
-        rotation: DQuat::IDENTITY,
-        friction: 0.5,
-        restitution: 0.0,
-        traits: metachron_geometry::ContactTraits::default(),
-    });
+    let floor = floor.then(|| Obstacle::new("floor", Solid::Plane));
     let scene = Arc::new(ClusterScene::new(floor.as_slice()).unwrap());
     AgentSpawn { scene, ..AgentSpawn::alone(name, Box::new(agent), rate_hz) }
 }

@@ -142,14 +142,15 @@ pub trait Run: Send {
     /// the last states.
     fn shutdown(self: Box<Self>) -> Vec<AgentStats>;
 
-    /// Writes the state of the run and of all its agents to an archive, or reads it from one into a run of the same first agents; it then goes on
-    /// as it did then; in lockstep to the bit. Agents that joined since are taken out, those that left since are put back: what joined the run
-    /// of the state and is not in this one is made by `absent`. In real time all turns in progress end first, each agent at a time of its own, and the clock
-    /// goes on from where it is. Watched points keep their samples. A state that one executor has written another can read.
+    /// Writes the state of the run and of all its agents to an archive, or reads it from one into a run of the same first agents, which then
+    /// goes on as that run did; in lockstep to the bit. Agents that joined since are taken out, those that left since are put back: an agent
+    /// that joined the run of the state and is not in this one is made by `absent`. In real time all turns in progress end first, each agent at
+    /// a time of its own, and the clock goes on from where it is. Watched points keep their samples. A state that one executor has written
+    /// another can read.
     ///
     /// # Errors
-    /// [`ArchiveError::Refused`] where a step does not end, and by agents and governors that do not save their state: nothing is changed then. Any error
-    /// while reading leaves a run that is not usable any more.
+    /// [`ArchiveError::Refused`] where a step does not end, and by agents and governors that do not save their state: nothing is changed then.
+    /// Any error while reading leaves a run that is not usable any more.
     fn archive(&mut self, archive: &mut Archive<'_>, absent: Absent<'_>) -> Result<(), ArchiveError>;
 
     /// Writes the state of the run ([`Run::archive`]).

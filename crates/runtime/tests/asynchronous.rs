@@ -1,10 +1,10 @@
 //! Asynchronous pairs in runs: each side in a cluster of its own, the same bits on every run, faults on them alone.
 
-use glam::{DQuat, DVec3};
+use glam::DVec3;
 use metachron_contact::stepper::ClusterScene;
 use metachron_contact::{Law, Link};
 use metachron_core::{AgentId, Anchor, Archive, Body, PairKind, SimSpan, Snapshot};
-use metachron_geometry::{ContactTraits, Obstacle, Solid};
+use metachron_geometry::{Obstacle, Solid};
 use metachron_models::rigid::{RigidBody, RigidSpec};
 use metachron_runtime::{
     AgentSpawn, DrawPrice, Faults, Lockstep, Machine, Priority, Run, StepPrice, SystemClock, Threads, TimelineCommand,
@@ -28,16 +28,7 @@ fn machine() -> Machine {
 
 fn body(name: &str, solid: Solid, height_m: f64, mass_kg: f64, rate_hz: f64) -> AgentSpawn {
     let spec = RigidSpec { gravity: GRAVITY, friction: 0.5, ..RigidSpec::free(solid, DVec3::Z * height_m, mass_kg) };
-    let floor = Obstacle {
-        name: "floor".into(),
-        solid: Solid::Plane,
-        position: DVec3::ZERO,
-        rotation: DQuat::IDENTITY,
-        friction: 0.5,
-        restitution: 0.0,
-        traits: ContactTraits::default(),
-    };
-    let scene = Arc::new(ClusterScene::new(&[floor]).unwrap());
+    let scene = Arc::new(ClusterScene::new(&[Obstacle::new("floor", Solid::Plane)]).unwrap());
     AgentSpawn { scene, ..AgentSpawn::alone(name, Box::new(RigidBody::new(spec).unwrap()), rate_hz) }
 }
 
@@ -129,21 +120,9 @@ fn an_asynchronous_link_joins_no_clusters_and_keeps_its_length_in_a_fall() {
                 body("above", Solid::Ball { radius_m: 0.02 }, 1.0, 0.1, rates[0]),
                 body("below", Solid::Ball { radius_m: 0.02 }, 0.9, 0.1, rates[1]),
             ];
-            let anchor = Anchor::Local(DVec3::ZERO);
-            let (other, here, there, rest_m) = (AgentId(1), anchor, anchor, 0.1);
-            let (number, tears_above_n, yields_above_n) = (0, f64::INFINITY, f64::INFINITY);
-            spawns[0].attached = vec![Link {
-                other,
-                here,
-                there,
-                stiffness_n_m,
-                damping_n_s_m,
-                rest_m,
-                law,
-                number,
-                tears_above_n,
-                yields_above_n,
-            }];
+            let middle = Anchor::Local(DVec3::ZERO);
+            let spring = Link::new(AgentId(1), middle, middle, stiffness_n_m);
+            spawns[0].attached = vec![Link { damping_n_s_m, rest_m: 0.1, law, ..spring }];
             spawns[0].laws = vec![(AgentId(1), Law::Off)];
             let run = play(spawns, 0.3);
             let all = states(&run);

@@ -188,17 +188,25 @@ pub(super) fn frame_seen_by(
     drawing: &mut Drawing,
     skip: bool,
 ) -> Result<FrameRecord, SessionError> {
-    #[cfg(feature = "picture")]
-    if let Drawing::Every(screen) = drawing {
-        return draw_frame(session, camera, format, screen, skip);
+    match drawing {
+        #[cfg(feature = "picture")]
+        Drawing::Every(screen) => draw_frame(session, camera, format, screen, skip),
+        #[cfg(feature = "picture")]
+        Drawing::Last(_) => Ok(undrawn_frame(session, camera, format, skip)),
+        Drawing::Nothing => Ok(undrawn_frame(session, camera, format, skip)),
     }
+}
+
+/// Gathers and chooses a frame, whose drawing takes its declared time, and updates the controller, unless it must not learn from this frame
+/// (`skip`).
+fn undrawn_frame(session: &mut Session, camera: &Camera, format: PictureFormat, skip: bool) -> FrameRecord {
     let PictureFormat { size, style } = format;
     let started = session.now();
     session.compose(camera, size, style, None);
     session.choose_next_frame(camera, size);
     let draw = session.spend_declared(size);
     let work = session.now().saturating_sub(started);
-    Ok(session.finish(started, Finished { work, draw, gpu: None, skip }))
+    session.finish(started, Finished { work, draw, gpu: None, skip })
 }
 
 /// Gathers, chooses and draws a frame on `screen`, chooses the next one meanwhile, and updates the controller, unless it must not learn

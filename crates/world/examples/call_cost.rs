@@ -24,7 +24,7 @@ const REPEATS: usize = 5;
 
 fn main() -> Result<(), Box<dyn Error>> {
     for executor in [ExecutorKind::Lockstep, ExecutorKind::Threads] {
-        let (still_ns, stepping_ns) = read(executor)?;
+        let Reads { still_ns, stepping_ns } = read(executor)?;
         println!("read, {executor:?}: {still_ns:.1} ns while nothing steps, {stepping_ns:.1} ns while it steps");
     }
     for rate_hz in [30.0, 60.0] {
@@ -40,9 +40,9 @@ fn main() -> Result<(), Box<dyn Error>> {
     let mut received = 0;
     for _ in 0..REPEATS {
         for (times, listens) in times.iter_mut().zip([false, true]) {
-            let (taken, events) = bounce(listens)?;
-            times.push(1e3 * taken.as_secs_f64());
-            received = received.max(events);
+            let bounced = bounce(listens)?;
+            times.push(1e3 * bounced.taken.as_secs_f64());
+            received = received.max(bounced.events);
         }
     }
     let [without, with] = times.map(|times| times.into_iter().fold(f64::INFINITY, f64::min));
@@ -52,8 +52,13 @@ fn main() -> Result<(), Box<dyn Error>> {
     Ok(())
 }
 
-/// Nanoseconds of a read of the newest state: while its time stands, and while it passes.
-fn read(executor: ExecutorKind) -> Result<(f64, f64), Box<dyn Error>> {
+/// Nanoseconds of a read of the newest state, while time stands and while it passes.
+struct Reads {
+    still_ns: f64,
+    stepping_ns: f64,
+}
+
+fn read(executor: ExecutorKind) -> Result<Reads, Box<dyn Error>> {
     let scene = Scene::builder().gravity([0.0; 3]).add("ball", Rigid::ball(0.05).rate_hz(1000.0)).build()?;
     let world = World::start(&scene, executor)?;
     let ball = world.object("ball")?;
@@ -65,12 +70,12 @@ fn read(executor: ExecutorKind) -> Result<(f64, f64), Box<dyn Error>> {
         let stepping_ns = reads_ns(&world, ball)?;
         world.stop();
         passing.join().map_err(|_| "the thread that lets time pass has failed")?;
-        return Ok((still_ns, stepping_ns));
+        return Ok(Reads { still_ns, stepping_ns });
     }
     world.drive(TimelineCommand::Run);
     let stepping_ns = reads_ns(&world, ball)?;
     world.stop();
-    Ok((still_ns, stepping_ns))
+    Ok(Reads { still_ns, stepping_ns })
 }
 
 fn reads_ns(world: &World, ball: Object) -> Result<f64, WorldError> {
@@ -126,7 +131,12 @@ fn misses(world: &World) -> u64 {
 }
 
 /// How long bouncing balls take in lockstep, and how many events a reader received.
-fn bounce(listens: bool) -> Result<(Duration, u64), Box<dyn Error>> {
+struct Bounced {
+    taken: Duration,
+    events: u64,
+}
+
+fn bounce(listens: bool) -> Result<Bounced, Box<dyn Error>> {
     let floor = Scene::builder().fixed("floor", Solid::Plane);
     let scene = (0..BALLS).fold(floor, |scene, k| {
         let at = [0.3 * f64::from(k % 20), 0.3 * f64::from(k / 20), 0.2 + 0.01 * f64::from(k % 7)];
@@ -140,5 +150,5 @@ fn bounce(listens: bool) -> Result<(Duration, u64), Box<dyn Error>> {
         world.advance(SimSpan::from_millis(20));
         received += events.as_mut().map_or(0, |events| events.drain().count() as u64);
     }
-    Ok((begun.elapsed(), received))
+    Ok(Bounced { taken: begun.elapsed(), events: received })
 }

@@ -17,7 +17,7 @@ use glam::{DQuat, DVec3};
 use metachron_contact::Agent;
 use metachron_contact::cluster::DEPTH_DEFAULT_M;
 use metachron_core::{AgentId, N_MAX, Resolution, ResolutionRange, SimSpan};
-use metachron_geometry::{Cells, ContactTraits, Obstacle, Solid};
+use metachron_geometry::{Cells, Obstacle, Solid};
 use metachron_models::rigid::{Joint, JointError, JointKind, RigidSpec};
 pub use rigid::Rigid;
 pub use sensors::SensorOn;
@@ -371,8 +371,7 @@ impl Joined {
 #[must_use]
 pub fn static_solid(name: impl Into<String>, solid: Solid) -> Obstacle {
     let (friction, restitution) = SURFACE;
-    let (position, rotation, traits) = (DVec3::ZERO, DQuat::IDENTITY, ContactTraits::NONE);
-    Obstacle { name: name.into(), solid, position, rotation, friction, restitution, traits }
+    Obstacle { friction, restitution, ..Obstacle::new(name, solid) }
 }
 
 /// Appearance of parts that declare none.

@@ -32,7 +32,8 @@ pub struct Checkpoint {
     pub(super) state: Vec<u8>,
 }
 
-/// By what a scene is known again: its objects, and how many of everything else there are.
+/// By what a scene is known again: its objects, and how many of everything else there are. Values (masses, stiffnesses, what `--set` changes) are
+/// not compared: a state may go on under other ones.
 #[derive(Debug, Clone, PartialEq, Default, serde::Serialize, serde::Deserialize)]
 pub(super) struct SceneIdentity {
     name: String,

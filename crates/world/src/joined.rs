@@ -110,11 +110,11 @@ impl Joining {
     pub fn absent(&self, id: AgentId, parts: &JoinedParts) -> Result<AgentSpawn, ArchiveError> {
         let known = parts.get(&id).and_then(|joined| Some((&joined.name, joined.part.as_ref()?)));
         let wrong = |found: String| {
-            let expected = "a part that can be built".to_owned();
-            ArchiveError::Mismatch { what: "what joined", found, expected }
+            let expected = "one that can be built".to_owned();
+            ArchiveError::Mismatch { what: "an agent that joined", found, expected }
         };
-        let (name, part) = known.ok_or_else(|| wrong(format!("unknown of agent {}", id.0)))?;
-        self.spawn(id, name, part).map_err(|error| wrong(error.to_string()))
+        let (name, part) = known.ok_or_else(|| wrong(format!("number {}, of which nothing more is known,", id.0)))?;
+        self.spawn(id, name, part).map_err(|error| wrong(format!("\"{name}\", which cannot be built ({error}),")))
     }
 }
 
@@ -171,7 +171,7 @@ impl Joined {
         kept.parts.clone()
     }
 
-    /// Adds those of a checkpoint that is about to be read: who sees an agent can ask for its part.
+    /// Adds those of a checkpoint that is about to be read: a reader that sees an agent can ask for its part.
     pub fn expect(&self, parts: &JoinedParts) {
         let mut kept = self.kept();
         for (id, joined) in parts.iter().filter(|(_, joined)| joined.part.is_some()) {

@@ -15,7 +15,9 @@ use metachron_runtime::{AgentHandle, AgentState, Run};
 use std::panic::{AssertUnwindSafe, catch_unwind};
 
 impl World {
-    /// Starts `scene` and puts it into the state of `checkpoint`: it goes on as the world did that was saved, to the bit.
+    /// Starts `scene` and puts it into the state of `checkpoint`: it goes on as the world did that was saved, to the bit. The scene is known by
+    /// the names, models and rates of its objects and the numbers of its fixed solids, joints and couplings; with other masses, stiffnesses or
+    /// sizes than the world had that was saved, its state goes on under those.
     ///
     /// # Errors
     /// Those of [`World::start`] and [`World::restore`].
@@ -39,8 +41,8 @@ impl World {
     }
 
     /// The state of the world now: all that the next bit of it needs, but samples of watched points and CPU times. On threads and in a pool
-    /// turns in progress end first, however long they take, and each object is saved at the end of its own step ([`Checkpoint::times`]): what it has given others is
-    /// either in their states or still in its own. Any executor goes on from it.
+    /// turns in progress end first, however long they take, and each object is saved at the end of its own step ([`Checkpoint::times`]): what
+    /// it has given others is either in their states or still in its own. Any executor goes on from it.
     ///
     /// # Errors
     /// [`CheckpointError::Refused`] where a model or a governor does not save its state, [`CheckpointError::Stopped`]. The world goes on as it
@@ -60,8 +62,8 @@ impl World {
     }
 
     /// Puts the world back into the state of `checkpoint`, of this world or of another of the same scene: what it would have done after, it does
-    /// again, in lockstep to the bit. Objects that joined since are taken out, and tell of it by an event as others do that leave; those that left
-    /// since are there again. An [`Object`](super::Object) is valid where what it names is there: of one that came back again.
+    /// again, in lockstep to the bit. Objects that joined since are taken out, with the event [`Gone`](super::Happening::Gone); those that left since
+    /// are there again. An [`Object`](super::Object) is valid where what it names is there: of one that came back again.
     ///
     /// # Errors
     /// [`CheckpointError::OtherScene`], also where an object of this world has the number of another that joined the checkpoint's,

@@ -206,11 +206,11 @@ impl World {
     fn read_imu(&self, id: AgentId, gravity_m_s2: DVec3, site: Site) -> Result<Reading, WorldError> {
         let Placed { pose, spin, state, .. } = self.placed(id)?;
         let arm_m = site.at_m.map_or(DVec3::ZERO, |at_m| pose.place(at_m) - pose.centre_m);
-        let beside_m_s2 = state.angular_acceleration.cross(arm_m) + spin.cross(spin.cross(arm_m));
+        let about_centre_m_s2 = state.angular_acceleration.cross(arm_m) + spin.cross(spin.cross(arm_m));
         let to_site = (pose.rotation * site.rotation).conjugate();
         // what rests is held: gravity alone is missing
-        let felt_m_s2 = state.acceleration + beside_m_s2 - gravity_m_s2;
-        let values = [felt_m_s2, spin].map(|v| (to_site * v).to_array()).concat();
+        let specific_force_m_s2 = state.acceleration + about_centre_m_s2 - gravity_m_s2;
+        let values = [specific_force_m_s2, spin].map(|v| (to_site * v).to_array()).concat();
         Ok(Reading { time: state.time, values })
     }
 

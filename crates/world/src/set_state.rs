@@ -9,9 +9,9 @@ use super::recording::Entry;
 use super::world::World;
 use metachron_core::Body;
 
-/// A list of a state that has as many entries as the object has parts.
+/// How many entries a list of a state has.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-struct Listed {
+struct ListLength {
     what: &'static str,
     count: usize,
 }
@@ -28,7 +28,7 @@ impl World {
     ///
     /// # Errors
     /// [`WorldError::Foreign`]; [`WorldError::Refused`] for a state of another kind or length, with the numbers expected, and for numbers that are
-    /// not finite. Nothing was done then; nor where the object divides itself otherwise before it hears of it.
+    /// not finite. The object stays as it is then, and where it has divided itself otherwise before it takes the state up.
     pub fn set_state(&self, object: Object, state: &Body) -> Result<(), WorldError> {
         let agent = self.agent(object)?;
         let refused = |reason: String| Err(WorldError::Refused { name: agent.name().to_owned(), reason });
@@ -40,9 +40,9 @@ impl World {
             );
         }
         let is_carried = matches!(&now.body, Body::Soft(soft) if soft.nodes.is_some());
-        let (found, wanted) = (lists(state, is_carried), lists(&now.body, is_carried));
+        let (found, wanted) = (list_lengths(state, is_carried), list_lengths(&now.body, is_carried));
         if found != wanted {
-            return refused(format!("the state has {}; expected {}", said(&found), said(&wanted)));
+            return refused(format!("the state has {}; expected {}", enumerate(&found), enumerate(&wanted)));
         }
         if !state.is_finite() {
             return refused("every number of a state must be finite".to_owned());
@@ -60,8 +60,8 @@ impl World {
 }
 
 /// The lists of a state that an object takes, of which a cage or a lattice carries the vertices if `is_carried`.
-fn lists(body: &Body, is_carried: bool) -> Vec<Listed> {
-    let of = |what, count| Listed { what, count };
+fn list_lengths(body: &Body, is_carried: bool) -> Vec<ListLength> {
+    let of = |what, count| ListLength { what, count };
     match body {
         Body::Curve(curve) => vec![
             of("positions", curve.positions.len()),
@@ -77,6 +77,6 @@ fn lists(body: &Body, is_carried: bool) -> Vec<Listed> {
     }
 }
 
-fn said(lists: &[Listed]) -> String {
+fn enumerate(lists: &[ListLength]) -> String {
     lists.iter().map(|list| format!("{} {}", list.count, list.what)).collect::<Vec<_>>().join(", ")
 }

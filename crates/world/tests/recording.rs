@@ -94,7 +94,7 @@ fn a_recording_that_begins_later_begins_with_the_state_of_then() {
 }
 
 #[test]
-fn a_recording_begins_with_whoever_is_there() {
+fn a_recording_begins_with_the_objects_that_are_there() {
     let world = start();
     let ball = world.object("ball").unwrap();
     let crate_ = world.add("crate", Rigid::cuboid([0.02; 3]).at([0.05, 0.0, 0.4])).unwrap();
@@ -105,7 +105,7 @@ fn a_recording_begins_with_whoever_is_there() {
     world.add("ball", Rigid::ball(0.03).at([0.0, 0.0, 0.5])).unwrap();
     let kept = recorded(&world);
     world.advance(ms(60));
-    // one whom the replay has never seen
+    // the replay has never seen one of these
     world.restore(&before).unwrap();
     world.advance(ms(40));
     world.add("late", Rigid::ball(0.03).at([0.0, 0.0, 0.5])).unwrap();

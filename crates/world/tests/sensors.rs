@@ -98,8 +98,21 @@ fn contact_sensors_tell_one_partner_from_all() {
     assert!(DVec3::from_slice(&values(&world, "fall")[..3]).length() < 1e-9, "{:?}", values(&world, "fall"));
 }
 
-/// A lopsided body with an IMU at a site, that floats: started, with what the site reads in the closed form. World axes of the arm at first.
-fn floating(rate_hz: f64) -> (World, Site, DVec3) {
+/// A lopsided body with an IMU at a site, that floats.
+struct Floating {
+    world: World,
+    site: Site,
+    /// From the centre of mass to the site, metres, in the axes of the body.
+    arm_m: DVec3,
+}
+
+/// What an IMU reads, in the axes of its site.
+struct Imu {
+    specific_force_m_s2: DVec3,
+    spin: DVec3,
+}
+
+fn floating(rate_hz: f64) -> Floating {
     let com_m = DVec3::new(0.02, -0.01, 0.0);
     let about_com_kg_m2 = DMat3::from_diagonal(DVec3::new(0.01, 0.02, 0.025));
     let site = Site { at_m: Some(DVec3::new(0.15, 0.08, 0.03)), rotation: DQuat::from_rotation_y(0.7) };
@@ -109,39 +122,51 @@ fn floating(rate_hz: f64) -> (World, Site, DVec3) {
         .add("body", body.rate_hz(rate_hz))
         .sensor("imu", SensorOn::ImuAt("body".into(), site));
     let world = World::start(&scene.build().unwrap(), ExecutorKind::Lockstep).unwrap();
-    (world, site, site.at_m.unwrap() - com_m)
+    Floating { world, site, arm_m: site.at_m.unwrap() - com_m }
 }
 
-/// What the IMU reads, and what a body that turns about its own z with this spin and angular acceleration has there.
-fn read_and_expected(world: &World, site: Site, arm_m: DVec3, [spin, angular]: [f64; 2]) -> [DVec3; 4] {
-    let (spin, angular) = (DVec3::Z * spin, DVec3::Z * angular);
-    let there = angular.cross(arm_m) + spin.cross(spin.cross(arm_m));
-    let read = values(world, "imu");
-    let to_site = site.rotation.conjugate();
-    [DVec3::from_slice(&read[..3]), DVec3::from_slice(&read[3..]), to_site * there, to_site * spin]
+impl Floating {
+    fn read(&self) -> Imu {
+        let read = values(&self.world, "imu");
+        Imu { specific_force_m_s2: DVec3::from_slice(&read[..3]), spin: DVec3::from_slice(&read[3..]) }
+    }
+
+    /// What a body has at the site that turns about its own z, rad/s and rad/s².
+    fn closed_form(&self, spin: f64, angular_acceleration: f64) -> Imu {
+        let (spin, angular, to_site) =
+            (DVec3::Z * spin, DVec3::Z * angular_acceleration, self.site.rotation.conjugate());
+        let there = angular.cross(self.arm_m) + spin.cross(spin.cross(self.arm_m));
+        Imu { specific_force_m_s2: to_site * there, spin: to_site * spin }
+    }
+}
+
+fn check_imu(read: &Imu, expected: &Imu, tolerance_m_s2: f64) {
+    let (a, b) = (read.specific_force_m_s2, expected.specific_force_m_s2);
+    assert!(a.distance(b) < tolerance_m_s2, "{a} m/s² of {b} m/s²");
+    assert!(read.spin.distance(expected.spin) < 1e-9, "{} rad/s of {} rad/s", read.spin, expected.spin);
 }
 
 #[test]
 fn a_site_on_a_body_that_spins_steadily_feels_its_centripetal_acceleration() {
-    let (world, site, arm_m) = floating(240.0);
+    let floating = floating(240.0);
+    let world = &floating.world;
     world.command(world.object("body").unwrap(), Command::velocity(DVec3::X, DVec3::Z * 5.0)).unwrap();
     world.advance(SimSpan::from_millis(300));
-    let [felt, spin, there, turned] = read_and_expected(&world, site, arm_m, [5.0, 0.0]);
-    assert!(felt.distance(there) < 1e-9 && spin.distance(turned) < 1e-9, "{felt} {there}, {spin} {turned}");
+    check_imu(&floating.read(), &floating.closed_form(5.0, 0.0), 1e-9);
 }
 
 #[test]
 fn a_site_on_a_body_that_spins_up_feels_the_tangential_acceleration_too() {
-    let (world, site, arm_m) = floating(1000.0);
+    let floating = floating(1000.0);
+    let world = &floating.world;
     let body = world.object("body").unwrap();
     let torque = Command::torque(Anchor::Local(DVec3::ZERO), DVec3::Z * 0.05);
     world.command(body, torque).unwrap();
     world.advance(SimSpan::from_millis(500));
     // α = τ / I, and the spin is what it has made by then
     let Body::Rigid(state) = world.latest(body).unwrap().body else { panic!("rigid") };
-    let [felt, spin, there, turned] = read_and_expected(&world, site, arm_m, [state.spin.z, 0.05 / 0.025]);
     assert!((state.spin.z - 1.0).abs() < 5e-3, "{}", state.spin);
-    assert!(felt.distance(there) < 1e-6 && spin.distance(turned) < 1e-9, "{felt} {there}, {spin} {turned}");
+    check_imu(&floating.read(), &floating.closed_form(state.spin.z, 0.05 / 0.025), 1e-6);
 }
 
 #[test]

@@ -147,15 +147,8 @@ fn a_sensor_a_motor_and_groups_are_said_in_code_as_in_scenes() {
         ContactTraits { groups: CollisionGroups { member_of: 0b01, collides_with: 0b01 }, ..ContactTraits::NONE };
     let grounded =
         ContactTraits { groups: CollisionGroups { member_of: 0b10, collides_with: 0b10 }, ..ContactTraits::NONE };
-    let still = |name: &str, solid, z: f64, traits| Obstacle {
-        name: name.to_owned(),
-        solid,
-        position: DVec3::Z * z,
-        rotation: DQuat::IDENTITY,
-        friction: 0.5,
-        restitution: 0.0,
-        traits,
-    };
+    let still =
+        |name: &str, solid, z: f64, traits| Obstacle { position: DVec3::Z * z, traits, ..Obstacle::new(name, solid) };
     let motor = Some(Motor { goal: MotorGoal::Velocity(2.0), max_effort: f64::INFINITY });
     let hinge = JointKind::Revolute { axis: DVec3::Z, range_rad: None, motor };
     let gate = Solid::Box { half_extents_m: DVec3::splat(0.1) };

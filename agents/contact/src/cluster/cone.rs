@@ -5,6 +5,9 @@
 
 use glam::{DMat3, DVec3};
 
+/// A contact sticks while its friction is below this share of the most that Coulomb allows, a row while its impulse is of the most it may give.
+pub(super) const STICK_SHARE: f64 = 0.999;
+
 /// What impulses a row may give.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) enum Law {

@@ -293,7 +293,7 @@ impl Cholesky {
             more: &more,
             threads,
         };
-        let made = pass.make(&mut all);
+        let made = pass.factor(&mut all);
         self.stale.fill(made.is_err());
         made.map_err(|rank| self.fronts.rank.iter().position(|&r| r == rank).unwrap_or_default())
     }

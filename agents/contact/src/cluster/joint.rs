@@ -3,7 +3,7 @@
 //! In: sides, directions, bounds. Out: the same with names. Never here: which rows make up a joint of a model, its state.
 //! Theory: `docs/theory/clusters.md`, section 2.
 
-use super::problem::STICK_SHARE;
+use super::cone::STICK_SHARE;
 use super::side::Side;
 use crate::push_out::push_out_m_s;
 use glam::{DMat3, DVec3};

@@ -10,6 +10,15 @@ use super::{ClusterStepper, Drive, Participant, Role};
 use crate::cluster::Side;
 use glam::DVec3;
 
+/// The steps in which a pair is resisted.
+#[derive(Clone, Copy)]
+struct Steps {
+    /// The step of the problem, seconds.
+    problem_s: f64,
+    /// The step of the side that makes longer ones, seconds.
+    longer_s: f64,
+}
+
 impl Participant<'_> {
     /// Whether a user leads it in this step.
     fn is_led_by_user(&self) -> bool {
@@ -19,11 +28,11 @@ impl Participant<'_> {
 
     /// A stiffness within a step along `normal`, with the drive's spring alone where mass and damping of a driven tip resist too: a hand that
     /// goes on evenly is followed without them.
-    fn drive_settled(&self, within_n_m: f64, normal: DVec3, [h_s, own_s]: [f64; 2]) -> f64 {
+    fn drive_settled(&self, within_n_m: f64, normal: DVec3, steps: Steps) -> f64 {
         let Some((drive, tip)) = self.member.drive().zip(self.member.blocks().first()) else { return within_n_m };
-        let Drive { stiffness_n_m, damping_n_s_m, .. } = drive;
-        let given_kg = normal.dot(tip.value * normal) + h_s * (damping_n_s_m + h_s * stiffness_n_m);
-        let give_m_per_n = (within_n_m.recip() - h_s * own_s / given_kg).max(0.0);
+        let (Drive { stiffness_n_m, damping_n_s_m, .. }, Steps { problem_s, longer_s }) = (drive, steps);
+        let given_kg = normal.dot(tip.value * normal) + problem_s * (damping_n_s_m + problem_s * stiffness_n_m);
+        let give_m_per_n = (within_n_m.recip() - problem_s * longer_s / given_kg).max(0.0);
         (give_m_per_n + stiffness_n_m.recip()).recip()
     }
 }
@@ -42,7 +51,7 @@ impl ClusterStepper {
     }
 
     /// The stiffness of a pair; `None` where nothing presses it, or where a user leads neither side.
-    fn stiffness_of(&mut self, all: &[Participant<'_>], total: &PairTotal, h_s: f64) -> Option<f64> {
+    fn stiffness_of(&mut self, all: &[Participant<'_>], total: &PairTotal, problem_s: f64) -> Option<f64> {
         if self.search.contacts.is_empty() {
             return None;
         }
@@ -55,27 +64,36 @@ impl ClusterStepper {
         let led = both().find(|&member| all[member].is_led_by_user())?;
         // side 0 is pressed against side 1
         let towards = if led == total.member { -total.normal } else { total.normal };
+        self.move_sides(all, led, towards);
         let Self { solver, search, moved_m_s, progress, .. } = self;
-        moved_m_s.clear();
-        moved_m_s.extend(search.contacts.iter().zip(&search.owners).map(|(contact, owner)| {
-            let [here, there] = &contact.sides;
-            let moved = |side: &Side| match all[led].member.role() {
-                Role::Kinematic => towards,
-                Role::Rigid | Role::Deformable => side.velocity(&[towards, DVec3::ZERO]),
-            };
-            match led {
-                _ if owner.member == led => moved(here),
-                _ if owner.other == Some(led) => -moved(there),
-                _ => DVec3::ZERO,
-            }
-        }));
         let given = solver.resistance(moved_m_s)?;
         let of_pair =
             search.owners.iter().zip(given).filter(|(owner, _)| owner.pair() == (total.member, total.partner));
         let impulse_n_s = of_pair.map(|(_, given)| given.dot(total.normal)).sum::<f64>();
-        let own_s = both().map(|member| h_s * f64::from(progress[member].share)).fold(h_s, f64::max);
-        let within_n_m = impulse_n_s / (h_s * own_s);
-        let stiffness_n_m = all[led].drive_settled(within_n_m, total.normal, [h_s, own_s]);
+        let longer_s = both().map(|member| problem_s * f64::from(progress[member].share)).fold(problem_s, f64::max);
+        let within_n_m = impulse_n_s / (problem_s * longer_s);
+        let stiffness_n_m = all[led].drive_settled(within_n_m, total.normal, Steps { problem_s, longer_s });
         (stiffness_n_m > 0.0 && stiffness_n_m.is_finite()).then_some(stiffness_n_m)
+    }
+
+    /// Sets by which velocities side 0 of each contact moves against side 1 where the member `led` moves by `towards`, m/s, world axes.
+    fn move_sides(&mut self, all: &[Participant<'_>], led: usize, towards: DVec3) {
+        let role = all[led].member.role();
+        let moved = |side: &Side| match role {
+            Role::Kinematic => towards,
+            Role::Rigid | Role::Deformable => side.velocity(&[towards, DVec3::ZERO]),
+        };
+        let Self { search, moved_m_s, .. } = self;
+        moved_m_s.clear();
+        moved_m_s.extend(search.contacts.iter().zip(&search.owners).map(|(contact, owner)| {
+            let [here, there] = &contact.sides;
+            if owner.member == led {
+                moved(here)
+            } else if owner.other == Some(led) {
+                -moved(there)
+            } else {
+                DVec3::ZERO
+            }
+        }));
     }
 }

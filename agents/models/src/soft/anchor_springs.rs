@@ -1,7 +1,7 @@
 //! External springs at vertices of a soft body: the user's and those of tools. Implicit in the step.
 //!
 //! In: pulls. Out: forces and stiffness in the system, and the impulse of each spring. Never here: vertices that never move.
-//! Theory: docs/theory/soft.md, eq. 3.
+//! Theory: docs/theory/soft.md, eq. 4.
 
 use super::system::System;
 use glam::DVec3;
@@ -55,7 +55,7 @@ impl VertexSpring {
         })
     }
 
-    /// Adds its force and stiffness in a substep of `h` seconds to a system whose unknown is the velocity at its end (eq. 3).
+    /// Adds its force and stiffness in a substep of `h` seconds to a system whose unknown is the velocity at its end (eq. 4).
     pub fn add(&mut self, positions: &[DVec3], h: f64, system: &mut System) {
         self.resistance_kg = self.stiffness_n_m * (h * h) + self.damping_n_s_m * h;
         let apart = self.target + self.target_velocity * h - self.at.mean(positions);

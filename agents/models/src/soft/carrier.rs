@@ -1,7 +1,7 @@
 //! What carries a skin: the cage of a closed surface, or the lattice of a sheet or a rope.
 //!
 //! In: a specification and an ε. Out: nodes in material coordinates, the mesh between them, the nodes that carry any material point.
-//! Never here: where anything is now, when ε changes. Theory: docs/theory/soft.md, eq. 18, 19, 24.
+//! Never here: where anything is now, when ε changes. Theory: docs/theory/soft.md, eq. 16, 17, 23.
 //!
 //! Material coordinates are positions at rest in the body's own axes; of a rope, the length from its start.
 

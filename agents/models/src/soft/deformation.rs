@@ -1,6 +1,6 @@
 //! The deformation of an element: its rotation, its principal stretches, and what a material makes of them.
 //!
-//! In: the gradient F. Out: stresses and stiffness. Never here: elements, material laws. Theory: docs/theory/soft.md, eq. 12, 29–31.
+//! In: the gradient F. Out: stresses and stiffness. Never here: elements, material laws. Theory: docs/theory/soft.md, eq. 12, 28–30.
 
 use super::material::{Material, StretchResponse};
 use crate::symmetric::principal_axes;
@@ -68,12 +68,12 @@ impl Deformation {
         Self { left: turn * axes.axes, right: axes.axes, stretches: axes.values.to_array() }
     }
 
-    /// The stress of Piola and Kirchhoff, Pa (eq. 29).
+    /// The stress of Piola and Kirchhoff, Pa (eq. 28).
     pub fn stress(&self, response: &StretchResponse) -> DMat3 {
         self.left * DMat3::from_diagonal(DVec3::from_array(response.slope)) * self.right.transpose()
     }
 
-    /// The stiffness of a unit of volume: how much stress changes with F, without what is negative of it (eq. 30, 31).
+    /// The stiffness of a unit of volume: how much stress changes with F, without what is negative of it (eq. 29, 30).
     pub fn stiffness(&self, response: &StretchResponse) -> [Mode; 9] {
         let StretchResponse { slope, curvature, .. } = response;
         let [l, r] = [&self.left, &self.right];

@@ -1,7 +1,7 @@
 //! Conjugate gradients for large solids: what a factor would take N² for, some tens of products do.
 //!
 //! In: the lower half of a symmetric positive definite matrix in 3 × 3 blocks, a right side, a start. Out: a solution. Never here: elements.
-//! Theory: docs/theory/soft.md, eq. 4.
+//! Theory: docs/theory/soft.md, eq. 2.
 
 use super::system::{NOT_POSITIVE, UNENDED};
 use glam::{DMat3, DVec3};

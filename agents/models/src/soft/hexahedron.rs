@@ -1,6 +1,6 @@
 //! A cell of a solid: eight vertices, linear elasticity in corotated axes, or another law of its mean deformation.
 //!
-//! In: corners at rest and now. Out: forces and stiffness. Theory: docs/theory/soft.md, eq. 10–14, 32: the incompatible modes of (TBW76)
+//! In: corners at rest and now. Out: forces and stiffness. Theory: docs/theory/soft.md, eq. 10–14, 31: the incompatible modes of (TBW76)
 //! let the cell bend without locking, and its forces are the exact gradient of its energy, so that they exert no net torque.
 
 use super::deformation::{ConstantStrain, Deformation, first_turn, follow_turn, outer};
@@ -235,7 +235,7 @@ impl Hexahedron {
         Bent { turn, by, force }
     }
 
-    /// Adds its forces and stiffness at these positions; `mean` is the result of [`Self::follow`] (eq. 13, 14, 32).
+    /// Adds its forces and stiffness at these positions; `mean` is the result of [`Self::follow`] (eq. 13, 14, 31).
     pub fn add(&self, kind: &HexahedronKind, positions: &[DVec3], mean: &MeanDeformation, system: &mut System) {
         let Bent { turn, force, .. } = self.bent(kind, positions);
         let origin = positions[self.vertices[0] as usize];

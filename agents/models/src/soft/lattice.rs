@@ -1,7 +1,7 @@
 //! The lattice of a sheet or a rope as what carries a skin: which nodes move a material point.
 //!
 //! In: a shape and a spacing. Out: nodes in material coordinates, and the nodes that carry any point: a triangle's three, a piece's two.
-//! Never here: masses, elements, where anything is now. Theory: docs/theory/soft.md, eq. 24.
+//! Never here: masses, elements, where anything is now. Theory: docs/theory/soft.md, eq. 23.
 
 use super::grid::Grid;
 use super::spec::SoftShape;
@@ -95,7 +95,7 @@ impl Lattice {
         self.cell_m.max_element()
     }
 
-    /// How the point with these material coordinates moves with the nodes: linear in a triangle or a piece of the lattice (eq. 24).
+    /// How the point with these material coordinates moves with the nodes: linear in a triangle or a piece of the lattice (eq. 23).
     pub fn carry(&self, at_m: DVec3) -> Carried {
         let x = Share::of(at_m.x, self.cell_m.x, self.grid.cells[0]);
         if self.grid.cells[1] == 0 {

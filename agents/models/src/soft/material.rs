@@ -1,6 +1,6 @@
 //! Laws of isotropic elastic materials, in terms of their principal stretches.
 //!
-//! In: three stretches. Out: the energy of a volume and its derivatives. Never here: elements. Theory: docs/theory/soft.md, eq. 26–28.
+//! In: three stretches. Out: the energy of a volume and its derivatives. Never here: elements. Theory: docs/theory/soft.md, eq. 25–27.
 
 use super::spec::{MaterialLaw, SoftMatter};
 
@@ -63,7 +63,7 @@ impl Material for Law {
     }
 }
 
-/// Linear in the stretches (eq. 26).
+/// Linear in the stretches (eq. 25).
 impl Material for Lame {
     fn respond(&self, stretches: [f64; 3]) -> StretchResponse {
         let Self { mu, lambda } = *self;
@@ -78,7 +78,7 @@ impl Material for Lame {
     }
 }
 
-/// Ogden's law of one term for what may be compressed and turned inside out (eq. 27); with the exponent 2 the stable Neo-Hookean one.
+/// Ogden's law of one term for what may be compressed and turned inside out (eq. 26); with the exponent 2 the stable Neo-Hookean one.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Ogden {
     lame: Lame,

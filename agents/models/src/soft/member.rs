@@ -1,7 +1,7 @@
 //! A soft body in a contact cluster: one block for each vertex that is not held.
 //!
 //! In: steps and velocities. Out: the matrix of linearly implicit Euler, velocities without contact, its skin. Never here: contacts.
-//! Theory: docs/theory/soft.md, eq. 1–3; docs/theory/clusters.md, section 9.
+//! Theory: docs/theory/soft.md, eq. 1, 3, 4; docs/theory/clusters.md, section 9.
 
 use super::body::SoftBody;
 use super::skin::Apart;

@@ -1,7 +1,7 @@
 //! Transfers the state of a soft body with a skin from one cage or lattice to another.
 //!
 //! In: a body and another ε. Out: the same body on other nodes: the same mass and linear momentum to rounding, angular momentum and shape
-//! to O(ε²), no more energy; its skin where it was. Never here: when to do it. Theory: docs/theory/soft.md, eq. 19–21, 24, 24a.
+//! to O(ε²), no more energy; its skin where it was. Never here: when to do it. Theory: docs/theory/soft.md, eq. 17–20, 23.
 
 use super::body::SoftBody;
 use super::carrier::Carrier;
@@ -86,7 +86,7 @@ impl SoftBody {
         Kept { energy_j: self.energy_j(), momentum: self.linear_momentum(), centre, whole, inertia }
     }
 
-    /// Where the present carrier has the nodes of another one, and how fast (eq. 19, 24).
+    /// Where the present carrier has the nodes of another one, and how fast (eq. 17, 23).
     fn at_nodes(&self, carrier: &Carrier, mesh: &FeMesh) -> (Vec<DVec3>, Vec<DVec3>) {
         let rotation = self.spec.rotation.normalize();
         let spread = |at_m: DVec3, list: &[DVec3]| {
@@ -148,7 +148,7 @@ impl SoftBody {
     }
 
     /// Moves the nodes that are not held so that linear momentum is what it was, and the centre of mass and angular momentum too where none is
-    /// (eq. 20).
+    /// (eq. 18).
     fn keep_momentum(&mut self, before: &Kept) {
         if self.mesh.held.contains(&true) {
             // what holds it takes up the difference of the centre, and gives that of momentum
@@ -214,7 +214,7 @@ impl SoftBody {
     }
 
     /// Slows what moves beside the motion of the whole, and then what moves beside its centre, until there is no more energy than `most_j`;
-    /// where nodes are held, beside the mean of the others, and then all of it (eq. 21).
+    /// where nodes are held, beside the mean of the others, and then all of it (eq. 19).
     fn slow(&mut self, most_j: f64) {
         let held = self.mesh.held.contains(&true);
         let whole = if held { self.mean_motion() } else { self.kept().whole };

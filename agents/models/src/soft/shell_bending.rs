@@ -1,7 +1,7 @@
 //! Bending of a sheet of triangles of any shape at rest: the shape operator of a triangle from the angles over its edges.
 //!
 //! In: a triangle and the vertices across its edges. Out: forces and stiffness. Never here: stretching ([`super::membrane`]).
-//! Theory: docs/theory/soft.md, eq. 33, 34 (GGRZ06): as functions of angles, forces have no sum and no torque.
+//! Theory: docs/theory/soft.md, eq. 32, 33 (GGRZ06): as functions of angles, forces have no sum and no torque.
 
 use super::deformation::outer;
 use super::spec::SoftMatter;
@@ -102,7 +102,7 @@ impl ShellBending {
         })
     }
 
-    /// Adds its forces and stiffness at these positions (eq. 33, 34).
+    /// Adds its forces and stiffness at these positions (eq. 32, 33).
     pub fn add(&self, positions: &[DVec3], system: &mut System) {
         let folds = self.folds(positions);
         let bent = self.bent(&folds);

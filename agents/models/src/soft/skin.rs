@@ -1,7 +1,7 @@
 //! The skin of a soft body: a surface or a line that moves with the nodes that carry it, and stays the same when they change.
 //!
 //! In: points, what carries them, where its nodes are. Out: where the skin is, and which nodes carry a point of it. Never here: elements,
-//! steps. Theory: docs/theory/soft.md, eq. 18, 24, 24a.
+//! steps. Theory: docs/theory/soft.md, eq. 16, 20, 23.
 
 use super::carrier::{Carrier, SkinPoints, into_body};
 use super::deformation::{follow_turn, outer};
@@ -121,7 +121,7 @@ impl Skin {
         self.apart = Apart::default();
     }
 
-    /// Moves it on to where its nodes carry it, by what goes in `h` seconds (eq. 24a).
+    /// Moves it on to where its nodes carry it, by what goes in `h` seconds (eq. 20).
     pub fn ease(&mut self, h: f64) {
         let left = libm::exp(-h / EASE_S);
         self.apart.by.iter_mut().for_each(|apart| *apart *= left);

@@ -41,7 +41,7 @@ impl SoftBody {
         Ok((done, doubled))
     }
 
-    /// Solves for the velocities at the end of a substep of `h` seconds (eq. 1–3).
+    /// Solves for the velocities at the end of a substep of `h` seconds (eq. 1–4).
     pub(super) fn predict(&mut self, h: f64, purpose: Purpose) -> Result<(), &'static str> {
         self.assemble(h);
         self.solve_for_velocities(h, purpose)

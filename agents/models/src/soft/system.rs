@@ -1,7 +1,7 @@
 //! The linear system of one substep: forces, stiffness and mass of all vertices, and how it is solved.
 //!
 //! In: the contributions of each element, always in the same order. Out: velocities. Never here: the elements themselves.
-//! Theory: docs/theory/soft.md, eq. 1, 2, 4.
+//! Theory: docs/theory/soft.md, eq. 1–3.
 
 use super::gradients::Gradients;
 use glam::{DMat3, DVec3};

@@ -16,8 +16,7 @@ const SPRING_N_M: f64 = 2000.0;
 const PRESS_M: f64 = 0.005;
 
 pub fn floor() -> Obstacle {
-    let (name, solid, position, rotation) = ("floor".into(), Solid::Plane, DVec3::ZERO, DQuat::IDENTITY);
-    Obstacle { name, solid, position, rotation, friction: 0.5, restitution: 0.0, traits: ContactTraits::default() }
+    Obstacle::new("floor", Solid::Plane)
 }
 
 /// The force of the tip on the column, N.

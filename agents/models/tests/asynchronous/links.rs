@@ -29,20 +29,8 @@ pub fn hand(target: DVec3, stiffness_n_m: f64) -> AnchorSpring {
 }
 
 fn link(stiffness_n_m: f64, rest_m: f64, law: Law) -> Link {
-    let (anchor, damping_n_s_m) = (Anchor::Local(DVec3::ZERO), 2.0);
-    let (number, tears_above_n, yields_above_n) = (0, f64::INFINITY, f64::INFINITY);
-    Link {
-        other: AgentId(1),
-        here: anchor,
-        there: anchor,
-        stiffness_n_m,
-        damping_n_s_m,
-        rest_m,
-        law,
-        number,
-        tears_above_n,
-        yields_above_n,
-    }
+    let middle = Anchor::Local(DVec3::ZERO);
+    Link { damping_n_s_m: 2.0, rest_m, law, ..Link::new(AgentId(1), middle, middle, stiffness_n_m) }
 }
 
 #[test]

@@ -84,6 +84,20 @@ pub fn hung(held: Held, limits: Limits) -> Table {
     }
 }
 
+/// Lets a weight hang for two seconds, by each way to hold it, that is below these limits: nothing gives way.
+pub fn check_hangs(limits: Limits) {
+    for held in ALL {
+        let mut table = hung(held, limits);
+        while table.time.as_secs_f64() < 2.0 {
+            table.step();
+            assert!(table.torn().is_empty() && table.yielded().is_empty(), "{held:?}");
+        }
+        // the springs' first step, which is exact to first order, makes them swing by that
+        let height_m = table.middle(0).0.z;
+        assert!(height_m.abs() < 1e-3, "{held:?}: {height_m} m");
+    }
+}
+
 /// A tube of 0.2 m that hangs along all of its length, begins at rest with its attachment slack by this much, and sags by 1 mm below that; what
 /// its attachment bears follows from its weight.
 pub fn mesentery(slack_m: f64, limits: impl Fn(f64) -> Limits) -> Table {

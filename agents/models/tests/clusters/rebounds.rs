@@ -3,22 +3,14 @@
 use crate::bodies::rigid;
 use crate::table::{GRAVITY, Table, placed};
 use glam::{DQuat, DVec3};
-use metachron_geometry::{ContactTraits, Obstacle, Solid};
+use metachron_geometry::{Obstacle, Solid};
 use metachron_models::rigid::{RigidBody, RigidSpec};
 
 const RADIUS_M: f64 = 0.05;
 const HEIGHT_M: f64 = 1.0;
 
 fn floor(restitution: f64) -> Obstacle {
-    Obstacle {
-        name: "floor".into(),
-        solid: Solid::Plane,
-        position: DVec3::ZERO,
-        rotation: DQuat::IDENTITY,
-        friction: 0.5,
-        restitution,
-        traits: ContactTraits::default(),
-    }
+    Obstacle { restitution, ..Obstacle::new("floor", Solid::Plane) }
 }
 
 /// Heights of the first tops of a ball after its bounces, metres above the floor.

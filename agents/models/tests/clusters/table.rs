@@ -8,7 +8,7 @@ use metachron_contact::stepper::{
 };
 use metachron_contact::{Agent, AnchorSpring, Law, Link, Neighbour, StepContext};
 use metachron_core::{AgentId, Anchor, Grip, PlainLoop, SensorTouch, SimSpan, SimTime, Snapshot};
-use metachron_geometry::{ContactTraits, Obstacle, Solid};
+use metachron_geometry::{Obstacle, Solid};
 use std::sync::Arc;
 
 /// Gravity, m/s².
@@ -70,10 +70,8 @@ pub struct Findings {
 
 /// A spring whose ends are still to be named.
 pub fn spring(stiffness_n_m: f64, damping_n_s_m: f64, rest_m: f64) -> Link {
-    let (other, here, there) = (AgentId(0), Anchor::Local(DVec3::ZERO), Anchor::Local(DVec3::ZERO));
-    let (number, tears_above_n, yields_above_n) = (0, f64::INFINITY, f64::INFINITY);
-    let law = Law::Cluster;
-    Link { other, here, there, stiffness_n_m, damping_n_s_m, rest_m, law, number, tears_above_n, yields_above_n }
+    let middle = Anchor::Local(DVec3::ZERO);
+    Link { damping_n_s_m, rest_m, ..Link::new(AgentId(0), middle, middle, stiffness_n_m) }
 }
 
 /// A body with its rate.
@@ -84,8 +82,7 @@ pub fn placed(agent: impl Agent + 'static, held: bool) -> Placed {
 
 /// A plane through the origin whose normal is the z that `rotation` leads to.
 pub fn plane(rotation: DQuat, friction: f64) -> Obstacle {
-    let (name, solid, position) = ("floor".into(), Solid::Plane, DVec3::ZERO);
-    Obstacle { name, solid, position, rotation, friction, restitution: 0.0, traits: ContactTraits::default() }
+    Obstacle { rotation, friction, ..Obstacle::new("floor", Solid::Plane) }
 }
 
 impl Table {

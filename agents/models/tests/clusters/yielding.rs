@@ -17,16 +17,7 @@ fn hung(held: Held, yields_above_n: f64) -> Table {
 
 #[test]
 fn a_weight_below_the_yield_force_hangs() {
-    for held in ALL {
-        let mut table = hung(held, 1.1 * WEIGHT_N);
-        while table.time.as_secs_f64() < 2.0 {
-            table.step();
-            assert_eq!(table.yielded(), [], "{held:?}");
-        }
-        // the springs' first step, which is exact to first order, makes them swing by that
-        let height_m = table.middle(0).0.z;
-        assert!(height_m.abs() < 1e-3, "{held:?}: {height_m} m");
-    }
+    hung::check_hangs(Limits { yields_above_n: 1.1 * WEIGHT_N, tears_above_n: f64::INFINITY });
 }
 
 #[test]

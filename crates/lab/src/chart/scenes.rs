@@ -4,10 +4,10 @@
 
 use super::energy_bench::Play;
 use super::stability::common::{GRAVITY, TUBE_RADIUS_M, plain_body, plain_tube};
-use glam::{DQuat, DVec3};
+use glam::DVec3;
 use metachron_contact::AnchorSpring;
 use metachron_core::{AgentId, Anchor};
-use metachron_geometry::{ContactTraits, Obstacle, Solid};
+use metachron_geometry::{Obstacle, Solid};
 use metachron_models::rigid::RigidSpec;
 use metachron_models::rod::TubeSpec;
 
@@ -40,15 +40,7 @@ fn gravity() -> DVec3 {
 }
 
 fn floor() -> Obstacle {
-    Obstacle {
-        name: "floor".to_owned(),
-        solid: Solid::Plane,
-        position: DVec3::ZERO,
-        rotation: DQuat::IDENTITY,
-        friction: 0.5,
-        restitution: 0.0,
-        traits: ContactTraits::default(),
-    }
+    Obstacle::new("floor", Solid::Plane)
 }
 
 /// A soft tube along `path_m` under gravity, with friction and a damping of 2/s.

@@ -51,7 +51,7 @@ impl ChoiceHold {
     }
 }
 
-/// A slow correction of the budget by the time that frames lacked or left over; off by default, since κ does the same sooner.
+/// A slow correction of the budget by the time that frames lacked or left over; off by default, since γ does the same sooner.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Trim {
     part: f64,

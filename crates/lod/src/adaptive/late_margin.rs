@@ -14,7 +14,7 @@ const EXCEEDING_LEAST: usize = 2;
 /// A frame that took more than this many times what those around it took is a stall: no margin that leaves a picture would have prevented it.
 const STALL: f64 = 4.0;
 /// Frames around a frame, itself among them, whose median stands for the speed of the machine: half of them in a row that are slow are a
-/// change of the load, fewer are scatter. With 9 a slow wander of the machine, which κ follows only in part, was half missed; with 25
+/// change of the load, fewer are scatter. With 9 a slow wander of the machine, which γ follows only in part, was half missed; with 25
 /// nothing was gained. The residual of a frame is known half of them later.
 const AROUND: usize = 17;
 
@@ -46,7 +46,7 @@ impl LateMargin {
         Self { share, ratios: [0.0; AROUND], known: 0, residuals: [0.0; FRAMES], next: 0, margin: 0.0 }
     }
 
-    /// Reports the time of a frame that was predicted by the table alone, without κ, and its measured time, in one unit, > 0; others are
+    /// Reports the time of a frame that was predicted by the table alone, without γ, and its measured time, in one unit, > 0; others are
     /// ignored. Frames are reported in the order in which they were drawn.
     pub fn observe(&mut self, predicted: f64, took: f64) {
         let ratio = took / predicted;

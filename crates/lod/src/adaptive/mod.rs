@@ -41,7 +41,7 @@ use pick::{Picker, Terms};
 pub const DEFAULT_MARGIN: f64 = 0.02;
 /// The greatest margin that may be asked for, as a fraction of T.
 pub const MARGIN_MAX: f64 = 0.5;
-/// Stages with a κ of their own: drawing, culling, classes of simulation.
+/// Stages with a γ of their own: drawing, culling, classes of simulation.
 pub const STAGES: usize = 4;
 /// Frames whose measurement may still arrive: later measurements are ignored.
 const IN_FLIGHT: usize = 8;
@@ -49,7 +49,7 @@ const IN_FLIGHT: usize = 8;
 const UNSETTLED: u8 = 3;
 /// A relative change up to this counts as none: positions and times are rounded.
 const ROUNDING: f64 = 1e-9;
-/// Greatest fall of the planned κ from one frame to the next: lateness is corrected immediately, spare time is used slowly.
+/// Greatest fall of the planned γ from one frame to the next: lateness is corrected immediately, spare time is used slowly.
 const EASING: f64 = 0.95;
 
 /// The settings of [`Adaptive`].
@@ -139,8 +139,8 @@ pub struct Adaptive {
     options: Options,
     picker: Picker,
     estimators: [SpeedEstimator; STAGES],
-    /// κ used in plans: follows the estimators up immediately and down slowly.
-    kappa: [f64; STAGES],
+    /// γ used in plans: follows the estimators up immediately and down slowly.
+    slowness: [f64; STAGES],
     late: LateMargin,
     hold: ChoiceHold,
     trim: Trim,
@@ -164,7 +164,7 @@ impl Adaptive {
             options: Options::default(),
             picker: Picker::default(),
             estimators: [SpeedEstimator::default(); STAGES],
-            kappa: [1.0; STAGES],
+            slowness: [1.0; STAGES],
             late: LateMargin::new(settings.late),
             hold: ChoiceHold::default(),
             trim: Trim::default(),
@@ -211,12 +211,12 @@ impl Adaptive {
         fixed = if fixed > 0.0 { fixed } else { 0.0 };
         let reserved = crate::within(time.reserved, 0.0, fixed);
         self.reserved = reserved / target;
-        for (planned, estimator) in self.kappa.iter_mut().zip(&self.estimators) {
-            *planned = estimator.kappa().max(EASING * *planned);
+        for (planned, estimator) in self.slowness.iter_mut().zip(&self.estimators) {
+            *planned = estimator.slowness().max(EASING * *planned);
         }
         let trim = if self.settings.trim { self.trim.part() } else { 0.0 };
         let budget = target * (1.0 - self.margin() + trim) - fixed;
-        let terms = Terms::new(budget, self.kappa, 1.0 + self.settings.hysteresis);
+        let terms = Terms::new(budget, self.slowness, 1.0 + self.settings.hysteresis);
         if self.may_keep(time, &terms, target, fixed) {
             self.options.objects_mut().iter_mut().for_each(|o| o.dwell = o.dwell.saturating_sub(1));
         } else {
@@ -281,10 +281,10 @@ impl Adaptive {
         &self.estimators[stage.min(STAGES - 1)]
     }
 
-    /// κ of a stage in the last plan: follows the estimator up immediately, and down by 5 % a frame at most.
+    /// γ of a stage in the last plan: follows the estimator up immediately, and down by 5 % a frame at most.
     #[must_use]
-    pub fn planned_kappa(&self, stage: usize) -> f64 {
-        self.kappa[stage.min(STAGES - 1)]
+    pub fn planned_slowness(&self, stage: usize) -> f64 {
+        self.slowness[stage.min(STAGES - 1)]
     }
 
     /// The present margin, as a fraction of T: what the scatter requires, as far as it is not reserved for others, who may be made to wait.
@@ -294,7 +294,7 @@ impl Adaptive {
     }
 
     fn cost(&self, terms: &Terms) -> f64 {
-        self.table.iter().zip(&terms.kappa).map(|(&t, k)| t as f64 * k).sum()
+        self.table.iter().zip(&terms.slowness).map(|(&t, k)| t as f64 * k).sum()
     }
 
     /// Whether nothing has moved and the last choice still holds.

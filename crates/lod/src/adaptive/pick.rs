@@ -1,6 +1,6 @@
 //! The choice of a frame: hull steps in falling gain per time, in linear time.
 //!
-//! In: the options, κ of every stage, a budget. Out: steps taken for every object, λ, and a bound.
+//! In: the options, γ of every stage, a budget. Out: steps taken for every object, λ, and a bound.
 //! Never here: where the budget comes from. Theory: `docs/theory/budget.md`, eq. 32 and 33.
 //!
 //! Steps whose gain per time is far above the last price are taken, steps far below it are not; those near it fall into buckets by the
@@ -61,28 +61,28 @@ pub(crate) struct Terms {
     /// Measured ticks that may be spent.
     pub budget: f64,
     /// Measured ticks per tick of the table, for each stage; > 0.
-    pub kappa: [f64; STAGES],
+    pub slowness: [f64; STAGES],
     /// Factor for a step that was taken last time: 1 + h.
     pub stay_factor: f64,
-    /// 1/κ of each stage: a division per object would dominate the time.
-    pub per_kappa: [f64; STAGES],
+    /// 1/γ of each stage: a division per object would dominate the time.
+    pub per_slowness: [f64; STAGES],
     /// Most ticks that one object can take above its least, by the table of each stage: a more expensive object can never fit.
     pub reach: [u64; STAGES],
 }
 
 impl Terms {
     /// Terms without the options: `reach` is set once there is one.
-    pub(crate) fn new(budget: f64, kappa: [f64; STAGES], stay_factor: f64) -> Self {
-        Self { budget, kappa, stay_factor, per_kappa: kappa.map(|k| 1.0 / k), reach: [0; STAGES] }
+    pub(crate) fn new(budget: f64, slowness: [f64; STAGES], stay_factor: f64) -> Self {
+        Self { budget, slowness, stay_factor, per_slowness: slowness.map(|k| 1.0 / k), reach: [0; STAGES] }
     }
 
     fn cost(&self, table: &[u64; STAGES]) -> f64 {
-        table.iter().zip(&self.kappa).map(|(&t, k)| t as f64 * k).sum()
+        table.iter().zip(&self.slowness).map(|(&t, k)| t as f64 * k).sum()
     }
 
     /// Factors from gain per tick of the table to gain per measured tick, for an object's steps: new ones, and those taken last time.
     fn worth(&self, object: &Object) -> [f64; 2] {
-        let worth = object.weight * self.per_kappa[usize::from(object.stage)];
+        let worth = object.weight * self.per_slowness[usize::from(object.stage)];
         [worth, worth * if object.just_rose() { JUST_ROSE_FACTOR.max(self.stay_factor) } else { self.stay_factor }]
     }
 
@@ -155,7 +155,7 @@ impl Picker {
     pub(crate) fn pick(&mut self, options: &mut Options, mut terms: Terms, dwell: u8) -> PickResult {
         let mut result = PickResult { table: options.least, ..PickResult::default() };
         let spare = terms.budget - terms.cost(&options.least);
-        terms.reach = terms.kappa.map(|k| (spare / k) as u64);
+        terms.reach = terms.slowness.map(|k| (spare / k) as u64);
         if spare < 0.0 || spare.is_nan() {
             self.taken.clear();
             self.taken.resize(options.objects().len(), 0);
@@ -299,8 +299,8 @@ impl Picker {
             let object = &options.objects()[i];
             result.value += object.weight * options.gain(object, taken);
             let (steps, worth) = (options.steps_of(object), terms.worth(object)[0]);
-            let kappa = terms.kappa[usize::from(object.stage)];
-            let net = |step: &Step| (step.slope * worth - result.lambda) * (kappa * f64::from(step.cost));
+            let slowness = terms.slowness[usize::from(object.stage)];
+            let net = |step: &Step| (step.slope * worth - result.lambda) * (slowness * f64::from(step.cost));
             let (had, rest) = steps.split_at(usize::from(taken));
             missed_gain -= had.iter().rev().take_while(|s| s.slope * worth < result.lambda).map(net).sum::<f64>();
             missed_gain += rest.iter().take_while(|s| s.slope * worth > result.lambda).map(net).sum::<f64>();

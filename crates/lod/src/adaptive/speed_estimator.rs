@@ -1,11 +1,11 @@
 //! How much slower the machine is than its cost table, as one number: a Kalman filter with outlier rejection.
 //!
-//! In: the time predicted by the table, and the time measured. Out: κ = measured / predicted, and how far it can be trusted.
+//! In: the time predicted by the table, and the time measured. Out: γ = measured / predicted, and how far it can be trusted.
 //! Never here: clocks, or which frame a measurement belongs to ([`super::Adaptive`] knows). Theory: `docs/theory/budget.md`, eq. 34 … 36.
 
 use crate::within;
 
-/// Least and greatest process noise: growth of the variance of κ between measurements. κ may drift by 1.4 to 14 % a frame.
+/// Least and greatest process noise: growth of the variance of γ between measurements. γ may drift by 1.4 to 14 % a frame.
 pub(crate) const WANDER: (f64, f64) = (2e-4, 2e-2);
 /// Initial process noise, 4.5 % a frame: on an unknown machine measurements count much until they turn out to be noisy.
 const WANDER_START: f64 = 2e-3;
@@ -13,9 +13,9 @@ const WANDER_START: f64 = 2e-3;
 /// process noise itself would drift.
 const WANDER_RATE: f64 = 0.1;
 const CHANCE_CORRELATION: f64 = 0.1;
-/// Initial variance of κ: the table may be 14 % wrong before an error counts as an outlier.
+/// Initial variance of γ: the table may be 14 % wrong before an error counts as an outlier.
 const P_START: f64 = 0.02;
-/// Variance of κ after a change of regime: the next measurement is taken in full.
+/// Variance of γ after a change of regime: the next measurement is taken in full.
 const P_REGIME: f64 = 0.2;
 /// Least standard deviation of a measurement, as a fraction of the frame's time.
 pub(crate) const SIGMA_LEAST: f64 = 0.01;
@@ -25,26 +25,26 @@ const SIGMA_MEMORY: f64 = 0.97;
 const OUTLIER: f64 = 4.0;
 /// … unless this many in a row err on the same side: then the machine has changed.
 const IN_A_ROW: i8 = 3;
-/// Range of κ whatever is measured: a table wrong by a factor of a thousand is a mistake elsewhere.
-const KAPPA_RANGE: (f64, f64) = (1e-3, 1e3);
+/// Range of γ whatever is measured: a table wrong by a factor of a thousand is a mistake elsewhere.
+const SLOWNESS_RANGE: (f64, f64) = (1e-3, 1e3);
 
 /// The effect of a measurement.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum FilterUpdate {
-    /// κ has moved towards the measurement.
+    /// γ has moved towards the measurement.
     Accepted,
     /// The measurement was too far off and is ignored, unless more follow on its side.
     Outlier,
-    /// The measurement was the third outlier on the same side: κ has jumped.
+    /// The measurement was the third outlier on the same side: γ has jumped.
     NewRegime,
     /// Not a usable measurement: not a valid number, or nothing was predicted.
     Rejected,
 }
 
-/// κ of one stage: drawing, culling, or one class of simulation.
+/// γ of one stage: drawing, culling, or one class of simulation.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct SpeedEstimator {
-    kappa: f64,
+    slowness: f64,
     variance: f64,
     sigma2: f64,
     /// Q: growth of the variance between measurements.
@@ -59,7 +59,7 @@ pub struct SpeedEstimator {
 impl Default for SpeedEstimator {
     fn default() -> Self {
         Self {
-            kappa: 1.0,
+            slowness: 1.0,
             variance: P_START,
             sigma2: SIGMA_LEAST * SIGMA_LEAST,
             wander: WANDER_START,
@@ -73,8 +73,8 @@ impl Default for SpeedEstimator {
 impl SpeedEstimator {
     /// Measured ticks per tick of the table, 0.001 … 1000.
     #[must_use]
-    pub fn kappa(&self) -> f64 {
-        self.kappa
+    pub fn slowness(&self) -> f64 {
+        self.slowness
     }
 
     /// σ̂: standard deviation of the error of a prediction, as a fraction of the frame's time.
@@ -83,12 +83,12 @@ impl SpeedEstimator {
         libm::sqrt(self.sigma2)
     }
 
-    /// Updates κ: `took` was measured where the table, without κ, predicted `table`; both as fractions of the frame's time T.
+    /// Updates γ: `took` was measured where the table, without γ, predicted `table`; both as fractions of the frame's time T.
     pub fn observe(&mut self, table: f64, took: f64) -> FilterUpdate {
         if !(table.is_finite() && table > 0.0 && took.is_finite() && took >= 0.0) {
             return FilterUpdate::Rejected;
         }
-        let error = took - self.kappa * table;
+        let error = took - self.slowness * table;
         let is_outlier = error.abs() > OUTLIER * libm::sqrt(self.sigma2 + self.variance * table * table);
         let update = if is_outlier { self.check_outlier(error) } else { FilterUpdate::Accepted };
         if !is_outlier {
@@ -97,11 +97,12 @@ impl SpeedEstimator {
         if update == FilterUpdate::Outlier {
             return update;
         }
-        // a measurement of κ with standard deviation σ/ŷ₀
+        // a measurement of γ with standard deviation σ/ŷ₀
         let noise = self.sigma2 / (table * table);
         self.variance += self.wander;
         let gain = self.variance / (self.variance + noise);
-        self.kappa = within(self.kappa + gain * (took / table - self.kappa), KAPPA_RANGE.0, KAPPA_RANGE.1);
+        let corrected = self.slowness + gain * (took / table - self.slowness);
+        self.slowness = within(corrected, SLOWNESS_RANGE.0, SLOWNESS_RANGE.1);
         self.variance *= 1.0 - gain;
         if update == FilterUpdate::Accepted {
             self.sigma2 =
@@ -111,7 +112,7 @@ impl SpeedEstimator {
         update
     }
 
-    /// Consecutive errors that correlate show that κ follows too slowly; uncorrelated errors, that it follows fast enough (Meh70, eq. 35a).
+    /// Consecutive errors that correlate show that γ follows too slowly; uncorrelated errors, that it follows fast enough (Meh70, eq. 35a).
     fn follow(&mut self, error: f64) {
         self.error_product = SIGMA_MEMORY * self.error_product + (1.0 - SIGMA_MEMORY) * error * self.last_error;
         self.last_error = error;
@@ -136,13 +137,13 @@ impl SpeedEstimator {
 mod tests {
     use super::*;
 
-    /// Root-mean-square error of κ as the filter predicts it, over the last half of 4000 measurements with a table of 1.
+    /// Root-mean-square error of γ as the filter predicts it, over the last half of 4000 measurements with a table of 1.
     fn error_rms(mut next: impl FnMut(usize) -> f64) -> (f64, SpeedEstimator) {
         let mut estimator = SpeedEstimator::default();
         let mut square = 0.0;
         for k in 0..4000 {
             let took = next(k);
-            square += if k >= 2000 { (took - estimator.kappa()) * (took - estimator.kappa()) } else { 0.0 };
+            square += if k >= 2000 { (took - estimator.slowness()) * (took - estimator.slowness()) } else { 0.0 };
             estimator.observe(1.0, took);
         }
         (libm::sqrt(square / 2000.0), estimator)

@@ -87,7 +87,7 @@ impl AdaptiveChoice {
     /// Chooses; `levels` has one entry per object.
     pub fn choose(&mut self, query: &FrameQuery<'_>, groups: &Groups, levels: &mut [LevelDemand]) -> Promise {
         self.set_margin(query);
-        self.group_choice.decide(query, groups, self.plan.lambda, self.kappa());
+        self.group_choice.decide(query, groups, self.plan.lambda, self.slowness());
         self.update_objects(query, groups);
         (self.fixed_s, self.reserve_s) = (query.fixed_s, query.reserve_s);
         let [target, fixed, reserved] = [query.target_s, query.fixed_s, query.reserve_s].map(|s| TICKS * s);
@@ -133,9 +133,9 @@ impl AdaptiveChoice {
         self.status
     }
 
-    /// κ as planned with: how much slower the machine is than its prices.
-    pub fn kappa(&self) -> f64 {
-        self.law.planned_kappa(DRAWING)
+    /// γ as planned with: how much slower the machine is than its prices.
+    pub fn slowness(&self) -> f64 {
+        self.law.planned_slowness(DRAWING)
     }
 
     /// Gain of one more second that others leave, in the unit of the objects' gains; 0 where everything is at its finest, or where the

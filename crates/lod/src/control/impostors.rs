@@ -1,6 +1,6 @@
 //! The groups that the default policy draws by an impostor: those whose members gain less than their time costs at the present price.
 //!
-//! In: groups, λ and κ of the last plan. Out: which groups are closed. Never here: the choice of the impostor, or levels of members.
+//! In: groups, λ and γ of the last plan. Out: which groups are closed. Never here: the choice of the impostor, or levels of members.
 //! Theory: `docs/theory/control.md`, eq. 24.
 //!
 //! At a price λ of a second every part of a tree can be decided by itself: a group is closed if the best of its impostors leaves more net
@@ -50,18 +50,18 @@ pub(super) struct ImpostorChoice {
 }
 
 impl ImpostorChoice {
-    /// Decides at `lambda` (gain of a tick) and `kappa` (measured ticks per tick by the prices).
-    pub fn decide(&mut self, query: &FrameQuery<'_>, groups: &Groups, lambda: f64, kappa: f64) {
+    /// Decides at `lambda` (gain of a tick) and `slowness` (measured ticks per tick by the prices).
+    pub fn decide(&mut self, query: &FrameQuery<'_>, groups: &Groups, lambda: f64, slowness: f64) {
         self.states.resize(query.views.len(), None);
         if groups.all().is_empty() {
             return;
         }
         self.impostors.update(query, groups);
-        let now = lambda * kappa;
+        let now = lambda * slowness;
         let price = if self.price > 0.0 { self.price + PRICE_SMOOTHING * (now - self.price) } else { now };
         self.price = price;
         self.sum_leaves(query, groups, price);
-        let mut spare = self.spare(query, groups, kappa);
+        let mut spare = self.spare(query, groups, slowness);
         for &group in groups.all() {
             if !self.impostors.is_in_view(group) {
                 continue;
@@ -84,12 +84,12 @@ impl ImpostorChoice {
                 self.totals[parent].add(taken);
             }
         }
-        self.make_room(query, groups, kappa);
+        self.make_room(query, groups, slowness);
     }
 
     /// Closes groups until the least of what is open fits, those first that lose least for the time they save.
-    fn make_room(&mut self, query: &FrameQuery<'_>, groups: &Groups, kappa: f64) {
-        let mut spare = self.spare(query, groups, kappa);
+    fn make_room(&mut self, query: &FrameQuery<'_>, groups: &Groups, slowness: f64) {
+        let mut spare = self.spare(query, groups, slowness);
         while spare < 0.0 {
             let hidden = |at: usize| self.is_closed(at) || groups.is_within(at, |group| self.is_closed(group));
             let open = groups.all().iter().filter(|group| !hidden(**group));
@@ -111,8 +111,8 @@ impl ImpostorChoice {
     }
 
     /// Ticks by the prices left over when everything open or closed has its least cost; below 0 if that does not fit.
-    fn spare(&self, query: &FrameQuery<'_>, groups: &Groups, kappa: f64) -> f64 {
-        TICKS * query.budget_s() / kappa - self.least(query, groups)
+    fn spare(&self, query: &FrameQuery<'_>, groups: &Groups, slowness: f64) -> f64 {
+        TICKS * query.budget_s() / slowness - self.least(query, groups)
     }
 
     /// A group drawn by the best impostor at this price; `None` if its members in their lowest forms are cheaper than any.

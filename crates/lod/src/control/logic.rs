@@ -3,7 +3,7 @@
 //! In: measured frames. Out: seconds that are not left for drawing. Never here: logic before the drawing, which is measured as such.
 //! Theory: `docs/theory/budget.md`, eq. 50 … 53.
 //!
-//! How much of it drawing hides follows from frames: κ = 0 where a graphics processor draws, 1 where one core does both.
+//! How much of it drawing hides follows from frames: z = 0 where a graphics processor draws, 1 where one core does both.
 
 use crate::cost::overlap::{Overlap, OverlapFit};
 
@@ -45,12 +45,12 @@ impl Logic {
 mod tests {
     use super::*;
 
-    /// Seconds lost of a frame of 20 ms once frames of a machine with this κ were drawn, 10 ms by the prices.
-    fn lost_s(kappa: f64, beside_s: f64) -> f64 {
+    /// Seconds lost of a frame of 20 ms once frames of a machine with this z were drawn, 10 ms by the prices.
+    fn lost_s(serial: f64, beside_s: f64) -> f64 {
         let mut logic = Logic::default();
         for k in 0..100 {
             let priced_s = 10e-3 * (1.0 + 0.1 * f64::from(k % 3));
-            logic.observe(beside_s, priced_s, Overlap::frame(kappa, beside_s, priced_s));
+            logic.observe(beside_s, priced_s, Overlap::frame(serial, beside_s, priced_s));
         }
         logic.lost_s(20e-3)
     }

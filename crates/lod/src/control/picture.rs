@@ -239,13 +239,13 @@ impl PictureControl {
             out: &[],
         };
         // the default knows how slow the machine is, and keeps more time free where it wanders
-        let (kappa, margin) = match self.policy {
-            Policy::Adaptive => (self.adaptive.kappa(), self.adaptive.margin().max(query.margin)),
+        let (slowness, margin) = match self.policy {
+            Policy::Adaptive => (self.adaptive.slowness(), self.adaptive.margin().max(query.margin)),
             _ => (1.0, query.margin),
         };
         // what is chosen by size or by the last frame's time leaves nothing out for a cost
         if self.policy.predicts() {
-            self.vanish.update(&FrameQuery { margin, ..query }, &self.groups, kappa);
+            self.vanish.update(&FrameQuery { margin, ..query }, &self.groups, slowness);
         } else {
             self.vanish.clear();
         }

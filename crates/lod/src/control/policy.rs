@@ -136,7 +136,7 @@ impl Policy {
     }
 
     /// The prices that the policy uses: by area for Robin Hood (RH05), else two stages (FS93). The default uses the stages too: areas that
-    /// objects occlude from each other are priced in full, and its κ is fitted to the remainder (control.md, section 7).
+    /// objects occlude from each other are priced in full, and its γ is fitted to the remainder (control.md, section 7).
     pub(super) fn prices(self, known: &Prices) -> Prices {
         if self == Self::RobinHood { *known } else { known.by_lines() }
     }

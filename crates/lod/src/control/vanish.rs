@@ -22,9 +22,9 @@ pub(super) struct Vanish {
 }
 
 impl Vanish {
-    /// Finds who is left out: from everything at its coarsest those with the least benefit per cost, until the rest fits. `kappa`: how much
+    /// Finds who is left out: from everything at its coarsest those with the least benefit per cost, until the rest fits. `slowness`: how much
     /// slower the machine is than the prices.
-    pub fn update(&mut self, query: &FrameQuery<'_>, groups: &Groups, kappa: f64) {
+    pub fn update(&mut self, query: &FrameQuery<'_>, groups: &Groups, slowness: f64) {
         let before = core::mem::take(&mut self.out);
         let was_out = |at: usize| before.get(at).copied().unwrap_or(false);
         self.out.resize(query.views.len(), false);
@@ -32,11 +32,11 @@ impl Vanish {
         let mut least_s = 0.0;
         for at in query.drawable().filter(|at| groups.parent(*at).is_none()) {
             let coarsest = &query.ladders.of(at).rungs[0];
-            least_s += kappa * coarsest.cost_s;
+            least_s += slowness * coarsest.cost_s;
             if query.views[at].view.may_vanish {
                 let stays = if was_out(at) { 1.0 } else { STAY_FACTOR };
                 let worth = stays * query.weight(at) * coarsest.accuracy / coarsest.cost_s.max(1e-12);
-                self.ranked.push((at, worth, kappa * coarsest.cost_s));
+                self.ranked.push((at, worth, slowness * coarsest.cost_s));
             }
         }
         self.ranked.sort_by(|a, b| a.1.total_cmp(&b.1).then(a.0.cmp(&b.0)));

@@ -179,10 +179,10 @@ impl ObjectView {
     }
 }
 
-#[cfg(test)]
 impl ObjectView {
-    /// An object in full view at rest, a metre away, with a hundred pixels and one resolution: tests override fields.
-    pub(super) fn plain(id: u32, kind: Kind) -> Self {
+    /// An object in full view at rest, a metre away, with a hundred pixels and one resolution.
+    #[must_use]
+    pub fn plain(id: u32, kind: Kind) -> Self {
         Self {
             id: AgentId(id),
             kind,

@@ -9,7 +9,7 @@ pub enum Overlap {
     /// ℓ = (t_l/t_f)², ρ = 1 − ℓ, t_r = ρ² t_f/C (RH05, eq. 5 … 7), with this C, > 0. With C = 1 a balanced frame takes 0.953 of
     /// the sum of both, not the ⅔ that the text says.
     Printed(f64),
-    /// t_f = max(t_l, t_r) + κ min(t_l, t_r), with this κ, 0 (fully parallel) … 1 (one after the other): ours.
+    /// t_f = max(t_l, t_r) + z min(t_l, t_r), with this z, 0 (fully parallel) … 1 (one after the other): ours.
     Fitted(f64),
 }
 
@@ -28,22 +28,22 @@ impl Overlap {
                 let rho = 1.0 - part * part;
                 rho * rho * frame / c.max(f64::MIN_POSITIVE)
             }
-            Self::Fitted(kappa) => {
-                let kappa = crate::within(kappa, 0.0, 1.0);
-                let longer = frame - kappa * logic;
+            Self::Fitted(serial) => {
+                let serial = crate::within(serial, 0.0, 1.0);
+                let longer = frame - serial * logic;
                 // if drawing were the shorter of the two, it would be what lengthens the logic
-                if longer >= logic { longer } else { ((frame - logic) / kappa).min(logic) }
+                if longer >= logic { longer } else { ((frame - logic) / serial).min(logic) }
             }
         }
     }
 
     /// The time of a frame with these times of logic and drawing, by the fitted form.
     #[must_use]
-    pub fn frame(kappa: f64, logic: f64, drawing: f64) -> f64 {
-        logic.max(drawing) + kappa * logic.min(drawing)
+    pub fn frame(serial: f64, logic: f64, drawing: f64) -> f64 {
+        logic.max(drawing) + serial * logic.min(drawing)
     }
 
-    /// κ from measured frames (logic, drawing, frame), by least squares over those where both matter; 1 where none does.
+    /// z from measured frames (logic, drawing, frame), by least squares over those where both matter; 1 where none does.
     #[must_use]
     pub fn fit(frames: &[(f64, f64, f64)]) -> Self {
         let mut fit = OverlapFit::default();
@@ -52,7 +52,7 @@ impl Overlap {
     }
 }
 
-/// The least-squares fit of κ while frames are measured.
+/// The least-squares fit of z while frames are measured.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct OverlapFit {
     above: f64,

@@ -9,6 +9,7 @@ use alloc::vec::Vec;
 use core::cmp::Reverse;
 
 use super::linear::linear;
+use super::passes::{Convergence, Search, converge};
 use super::problem::{Level, Mode, Problem, Selection};
 use super::ratio::{Rank, Ratio};
 
@@ -39,14 +40,10 @@ pub fn incremental(problem: &Problem, last: &[Level], keep: Keep) -> Passes {
     if let Some(selection) = problem.infeasible() {
         return Passes { selection, passes: 0, settled: true };
     }
-    let mut search = Search::from(problem, last);
+    let mut search = ObjectSearch::from(problem, last);
     // from any start, every level of every object can rise and fall once before a state must repeat
     let most = 2 * (0..problem.len()).map(|i| problem.levels(i).len() as u32 + 1).sum::<u32>() + 8;
-    let (mut passes, mut settled) = (0, false);
-    while !settled && passes < most {
-        passes += 1;
-        settled = search.pass();
-    }
+    let Convergence { passes, settled } = converge(&mut search, most);
     let levels = match keep {
         Keep::Last if search.spent <= problem.budget() => search.levels,
         _ => search.best.1,
@@ -55,7 +52,7 @@ pub fn incremental(problem: &Problem, last: &[Level], keep: Keep) -> Passes {
     Passes { selection: problem.certified(levels, upper), passes, settled }
 }
 
-struct Search<'a> {
+struct ObjectSearch<'a> {
     problem: &'a Problem,
     levels: Vec<Level>,
     spent: u64,
@@ -67,7 +64,7 @@ struct Search<'a> {
     falls: BinaryHeap<Rank>,
 }
 
-impl<'a> Search<'a> {
+impl<'a> ObjectSearch<'a> {
     fn from(problem: &'a Problem, last: &[Level]) -> Self {
         let cheapest = problem.cheapest();
         let start = |i: usize| {
@@ -82,41 +79,6 @@ impl<'a> Search<'a> {
         (0..problem.len()).for_each(|i| search.offer(i));
         search.keep_best();
         search
-    }
-
-    /// One pass; gives whether it was the last.
-    fn pass(&mut self) -> bool {
-        let risen = self.rise();
-        let mut last = risen.is_none() && self.spent <= self.problem.budget();
-        while self.spent > self.problem.budget() {
-            let fallen = self.fall();
-            last |= fallen.is_none() || fallen == risen;
-            if fallen.is_none() {
-                break;
-            }
-        }
-        self.keep_best();
-        last
-    }
-
-    fn rise(&mut self) -> Option<u32> {
-        while let Some(Reverse(rank)) = self.rises.pop() {
-            if above(self.levels[rank.object as usize]) == rank.level {
-                self.change(rank.object as usize, Some(rank.level));
-                return Some(rank.object);
-            }
-        }
-        None
-    }
-
-    fn fall(&mut self) -> Option<u32> {
-        while let Some(rank) = self.falls.pop() {
-            if self.levels[rank.object as usize] == Some(rank.level) {
-                self.change(rank.object as usize, rank.level.checked_sub(1));
-                return Some(rank.object);
-            }
-        }
-        None
     }
 
     fn change(&mut self, object: usize, level: Level) {
@@ -143,9 +105,35 @@ impl<'a> Search<'a> {
             self.falls.push(rank(held));
         }
     }
+}
+
+impl Search for ObjectSearch<'_> {
+    fn is_over(&self) -> bool {
+        self.spent > self.problem.budget()
+    }
+
+    fn rise(&mut self) -> Option<usize> {
+        while let Some(Reverse(rank)) = self.rises.pop() {
+            if above(self.levels[rank.object as usize]) == rank.level {
+                self.change(rank.object as usize, Some(rank.level));
+                return Some(rank.object as usize);
+            }
+        }
+        None
+    }
+
+    fn fall(&mut self) -> Option<usize> {
+        while let Some(rank) = self.falls.pop() {
+            if self.levels[rank.object as usize] == Some(rank.level) {
+                self.change(rank.object as usize, rank.level.checked_sub(1));
+                return Some(rank.object as usize);
+            }
+        }
+        None
+    }
 
     fn keep_best(&mut self) {
-        if self.spent <= self.problem.budget() && self.value > self.best.0 {
+        if !self.is_over() && self.value > self.best.0 {
             self.best.0 = self.value;
             self.best.1.clone_from(&self.levels);
         }

@@ -8,6 +8,7 @@ use alloc::vec::Vec;
 use core::cmp::Reverse;
 
 use super::incremental::Keep;
+use super::passes::{Convergence, Search, converge};
 use super::problem::Level;
 use super::ratio::Rank;
 use super::tree::{Cut, Tree};
@@ -31,13 +32,9 @@ pub fn incremental(tree: &Tree, last: &[Level], keep: Keep) -> Passes {
     if let Some(cut) = infeasible(tree) {
         return Passes { cut, passes: 0, settled: true };
     }
-    let mut search = Search::from(tree, last);
+    let mut search = TreeSearch::from(tree, last);
     let most = 2 * (0..tree.len()).map(|i| tree.impostors(i).len() as u32 + 1).sum::<u32>() + 8;
-    let (mut passes, mut settled) = (0, false);
-    while !settled && passes < most {
-        passes += 1;
-        settled = search.pass();
-    }
+    let Convergence { passes, settled } = converge(&mut search, most);
     let cut = match (keep, search.best) {
         (Keep::Best, Some((_, levels))) => tree.judge(levels),
         (Keep::Last, Some((_, levels))) if search.spent > tree.budget() => tree.judge(levels),
@@ -56,7 +53,7 @@ struct Fall {
     level: Level,
 }
 
-struct Search<'a> {
+struct TreeSearch<'a> {
     tree: &'a Tree,
     levels: Vec<Level>,
     spent: u64,
@@ -70,7 +67,7 @@ struct Search<'a> {
     falls: BinaryHeap<Fall>,
 }
 
-impl<'a> Search<'a> {
+impl<'a> TreeSearch<'a> {
     fn from(tree: &'a Tree, last: &[Level]) -> Self {
         let none = || alloc::vec![None; tree.len()];
         let mut start = none();
@@ -95,53 +92,6 @@ impl<'a> Search<'a> {
         }
         search.keep_best();
         search
-    }
-
-    /// One pass; gives whether it was the last.
-    fn pass(&mut self) -> bool {
-        let risen = self.rise();
-        let mut last = risen.is_none() && self.spent <= self.tree.budget();
-        while self.spent > self.tree.budget() {
-            let fallen = self.fall();
-            last |= fallen.is_none() || fallen == risen;
-            if fallen.is_none() {
-                break;
-            }
-        }
-        self.keep_best();
-        last
-    }
-
-    fn rise(&mut self) -> Option<usize> {
-        while let Some(Reverse((_, node, level))) = self.rises.pop() {
-            if self.levels[node] != level {
-                continue;
-            }
-            let next = level.map_or(0, |l| l + 1);
-            if (next as usize) < self.tree.impostors(node).len() {
-                self.set(node, Some(next));
-            } else {
-                self.set(node, None);
-                self.open(node);
-            }
-            return Some(node);
-        }
-        None
-    }
-
-    fn fall(&mut self) -> Option<usize> {
-        while let Some(Fall { node, level, .. }) = self.falls.pop() {
-            match level {
-                Some(held) if self.levels[node] == level => self.set(node, Some(held - 1)),
-                None if self.can_close(node) => {
-                    self.clear_below(node);
-                    self.set(node, Some(self.tree.impostors(node).len() as u32 - 1));
-                }
-                _ => continue,
-            }
-            return Some(node);
-        }
-        None
     }
 
     /// Replaces a node by the lowest forms of its children.
@@ -214,9 +164,47 @@ impl<'a> Search<'a> {
             node = parent;
         }
     }
+}
+
+impl Search for TreeSearch<'_> {
+    fn is_over(&self) -> bool {
+        self.spent > self.tree.budget()
+    }
+
+    fn rise(&mut self) -> Option<usize> {
+        while let Some(Reverse((_, node, level))) = self.rises.pop() {
+            if self.levels[node] != level {
+                continue;
+            }
+            let next = level.map_or(0, |l| l + 1);
+            if (next as usize) < self.tree.impostors(node).len() {
+                self.set(node, Some(next));
+            } else {
+                self.set(node, None);
+                self.open(node);
+            }
+            return Some(node);
+        }
+        None
+    }
+
+    fn fall(&mut self) -> Option<usize> {
+        while let Some(Fall { node, level, .. }) = self.falls.pop() {
+            match level {
+                Some(held) if self.levels[node] == level => self.set(node, Some(held - 1)),
+                None if self.can_close(node) => {
+                    self.clear_below(node);
+                    self.set(node, Some(self.tree.impostors(node).len() as u32 - 1));
+                }
+                _ => continue,
+            }
+            return Some(node);
+        }
+        None
+    }
 
     fn keep_best(&mut self) {
-        if self.spent <= self.tree.budget() && self.best.as_ref().is_none_or(|b| self.value > b.0) {
+        if !self.is_over() && self.best.as_ref().is_none_or(|b| self.value > b.0) {
             self.best = Some((self.value, self.levels.clone()));
         }
     }

@@ -19,6 +19,7 @@ pub mod maciel;
 pub mod marginal;
 pub mod mason;
 pub mod mason_flat;
+mod passes;
 mod problem;
 pub mod rates;
 mod ratio;

@@ -80,7 +80,7 @@ impl Candidate {
     }
 }
 
-/// The share of an error of κ that the Kalman filter removes in a frame in the steady state (control.md, eq. 30): g² R + g Q = Q, less the
+/// The share of an error of γ that the Kalman filter removes in a frame in the steady state (control.md, eq. 30): g² R + g Q = Q, less the
 /// error reintroduced by the fixed part of a frame, which is priced for another machine.
 fn learning(plant: &Plant, set_s: f64, target_hz: f64, speed: f64) -> f64 {
     let fixed_s = plant.line.intercept.max(0.0);

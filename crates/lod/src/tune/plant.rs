@@ -182,27 +182,13 @@ fn delayed(observed: &[Observed], frames: usize) -> Vec<(f64, f64)> {
 #[cfg(test)]
 pub(super) mod tests {
     use super::*;
-    use crate::control::{Kind, Shading};
-    use metachron_core::{AgentId, ResolutionRange};
+    use crate::control::Kind;
+    use metachron_core::ResolutionRange;
 
     /// A tube of 1.6 m and a ball.
     pub fn views() -> Vec<ObjectView> {
-        let object = |id, kind, range, pixels| ObjectView {
-            id: AgentId(id),
-            kind,
-            range,
-            shading: (Shading::default(), Shading::default()),
-            pixels,
-            off_centre: 0.0,
-            from_focus_m: 0.0,
-            distance_m: 0.6,
-            speed_px_s: 0.0,
-            importance: 1.0,
-            visible: true,
-            group: None,
-            may_vanish: false,
-            pieces: None,
-        };
+        let object =
+            |id, kind, range, pixels| ObjectView { range, pixels, distance_m: 0.6, ..ObjectView::plain(id, kind) };
         let ball = Kind::Primitive { radius_m: 0.02, triangles: std::array::from_fn(|n| 48 << n) };
         vec![
             object(

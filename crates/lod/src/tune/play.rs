@@ -80,7 +80,7 @@ pub struct TrialFrame {
     pub at_end: bool,
 }
 
-/// Frames in which the predicting policy settles before a trial: κ falls by 5 % a frame at most, and by a factor of four here.
+/// Frames in which the predicting policy settles before a trial: γ falls by 5 % a frame at most, and by a factor of four here.
 const WARM_UP: usize = 80;
 /// Relative distance that counts as an end of the range: a tube has whole intervals.
 const NEAR: f64 = 0.03;
@@ -164,7 +164,7 @@ fn set_start(control: &mut PictureControl, plant: &Plant, trial: &Trial, set_s: 
         Start::Rate(rate) => rate,
     };
     if matches!(trial.candidate, Candidate::Adaptive { .. }) {
-        // its state is its κ: the start is the settled state on a machine on which this picture takes exactly its time
+        // its state is its γ: the start is the settled state on a machine on which this picture takes exactly its time
         return settle(control, plant, trial.speed / rate);
     }
     // the loop was at rest before: the first error is unconfirmed

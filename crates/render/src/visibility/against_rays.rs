@@ -189,13 +189,8 @@ fn a_wall_on_a_side_of_a_cell_is_seen_from_both_sides() {
     let cell = Cell { low_m: DVec3::ZERO, high_m: DVec3::new(4.0, 4.0, 3.0) };
     let wall = |x: f64, half_m: DVec3| StaticObject {
         obstacle: Obstacle {
-            name: String::new(),
-            solid: Solid::Box { half_extents_m: half_m },
             position: DVec3::new(x, 2.0, 1.5),
-            rotation: glam::DQuat::IDENTITY,
-            friction: 0.5,
-            restitution: 0.0,
-            traits: metachron_geometry::ContactTraits::default(),
+            ..Obstacle::new("", Solid::Box { half_extents_m: half_m })
         },
         appearance: Appearance { colour: [200; 3], material: Material::Plastic },
         throws_shadow: false,

@@ -4,7 +4,7 @@ use crate::adapter::gpu;
 use glam::{DQuat, DVec2, DVec3};
 use image::RgbaImage;
 use metachron_core::{AgentId, Body, Resolution, RigidState, SimTime, Snapshot};
-use metachron_geometry::{ContactTraits, Obstacle, Solid};
+use metachron_geometry::{Obstacle, Solid};
 use metachron_render::{
     Actor, Appearance, Camera, Environment, Form, Gpu, Level, Material, Offscreen, RendererOptions, SceneView, Shading,
     Size, States, StaticObject, Style,
@@ -70,15 +70,7 @@ fn worst(image: &RgbaImage, at: impl Fn(DVec2) -> Option<DVec3>) -> (f64, f64, u
 }
 
 fn obstacle(solid: Solid, position: DVec3, rotation: DQuat) -> Obstacle {
-    Obstacle {
-        name: String::from("still"),
-        solid,
-        position,
-        rotation,
-        friction: 0.0,
-        restitution: 0.0,
-        traits: ContactTraits::default(),
-    }
+    Obstacle { position, rotation, ..Obstacle::new("still", solid) }
 }
 
 #[test]

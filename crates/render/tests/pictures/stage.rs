@@ -2,7 +2,7 @@
 
 use glam::{DQuat, DVec3};
 use metachron_core::{AgentId, Anchor, Body, CurveState, Grasp, Resolution, RigidState, SimTime, Snapshot, ToolState};
-use metachron_geometry::{ContactTraits, Obstacle, Solid, ToolShape};
+use metachron_geometry::{Obstacle, Solid, ToolShape};
 use metachron_render::{Actor, Appearance, Camera, Form, Level, Material, SceneView, States, StaticObject};
 use std::f64::consts::{PI, TAU};
 use std::sync::Arc;
@@ -79,15 +79,7 @@ fn tray() -> Vec<StaticObject> {
     let steel = Appearance { colour: [74, 88, 94], material: Material::Skin };
     let (x, y, wall, high) = (0.36, 0.22, 0.008, 0.03);
     let side = |position, half_extents_m| StaticObject {
-        obstacle: Obstacle {
-            name: String::from("tray"),
-            solid: Solid::Box { half_extents_m },
-            position,
-            rotation: DQuat::IDENTITY,
-            friction: 0.3,
-            restitution: 0.0,
-            traits: ContactTraits::default(),
-        },
+        obstacle: Obstacle { position, ..Obstacle::new("tray", Solid::Box { half_extents_m }) },
         appearance: steel,
         throws_shadow: true,
     };

@@ -104,18 +104,7 @@ fn laws_and_attachments_are_known_on_both_sides() {
     let mut spawns: Vec<_> = (0..4).map(|_| ball(0.0, 0.0, &log).at(240.0)).collect();
     let line = Law::Tlm { stiffness_n_m: 10.0, damping_n_s_m: 1.0 };
     spawns[2].laws = vec![(AgentId(0), line), (AgentId(1), Law::Off)];
-    let link = Link {
-        other: AgentId(3),
-        here: Anchor::Arc(0.5),
-        there: Anchor::Arc(0.25),
-        stiffness_n_m: 10.0,
-        damping_n_s_m: 0.0,
-        rest_m: 0.0,
-        law: Law::Cluster,
-        number: 0,
-        tears_above_n: f64::INFINITY,
-        yields_above_n: f64::INFINITY,
-    };
+    let link = Link::new(AgentId(3), Anchor::Arc(0.5), Anchor::Arc(0.25), 10.0);
     spawns[1].attached = vec![link];
     let mut run = assemble(spawns, Helpers::none()).unwrap();
     let mut seen = |id: usize| {

@@ -18,11 +18,16 @@ pub(super) struct Pass<'a> {
     pub fronts: &'a [Front],
     pub layouts: &'a [Layout],
     pub children: &'a [Vec<usize>],
+    /// For each front the first of the tree that ends with it.
     pub trees: &'a [usize],
     pub targets: &'a [Target],
+    /// The matrix without what `more` adds.
     pub base: &'a [f64],
+    /// Which fronts are to be factored again.
     pub stale: &'a [bool],
+    /// What the stale fronts before each one cost together, in multiplications.
     pub costs: &'a [f64],
+    /// Adds to the numbers of a front.
     pub more: &'a (dyn Fn(usize, &mut Entries<'_>) + Sync),
     pub threads: &'a dyn ParallelFor,
 }
@@ -36,23 +41,23 @@ pub(super) struct Part<'a> {
 
 impl Pass<'_> {
     /// Factors a part. Fails with the first place in the order at which it is not positive definite.
-    pub(super) fn make(&self, part: &mut Part<'_>) -> Result<(), usize> {
+    pub(super) fn factor(&self, part: &mut Part<'_>) -> Result<(), usize> {
         let Range { start, end } = part.fronts;
         if self.cost(start..end) < 2.0 * JOB_MIN {
-            return (start..end).try_for_each(|front| self.make_front(front, part));
+            return (start..end).try_for_each(|front| self.factor_front(front, part));
         }
         // fronts that all others are below come last
         let mut top = end;
         while top > start && self.trees[top - 1] == start {
             top -= 1;
         }
-        if let Some(at) = self.middle(start..top) {
+        if let Some(at) = self.balanced_split(start..top) {
             let [mut first, mut second] = part.split(at, top, self.layouts);
             let [mut one, mut other] = [Ok(()); 2];
-            self.threads.join(&mut || one = self.make(&mut first), &mut || other = self.make(&mut second));
+            self.threads.join(&mut || one = self.factor(&mut first), &mut || other = self.factor(&mut second));
             one.and(other)?;
         }
-        (top..end).try_for_each(|front| self.make_front(front, part))
+        (top..end).try_for_each(|front| self.factor_front(front, part))
     }
 
     /// What the fronts cost that are to be made.
@@ -61,7 +66,7 @@ impl Pass<'_> {
     }
 
     /// Where a tree begins such that those before it cost about as much as it does with those that follow; `None` of one tree or none.
-    fn middle(&self, fronts: Range<usize>) -> Option<usize> {
+    fn balanced_split(&self, fronts: Range<usize>) -> Option<usize> {
         let Range { start, end } = fronts;
         let off = |at: usize| (self.cost(start..at) - self.cost(at..end)).abs();
         let mut best = self.trees[..end].last().copied().filter(|&at| at > start)?;
@@ -75,7 +80,7 @@ impl Pass<'_> {
         Some(best)
     }
 
-    fn make_front(&self, front: usize, part: &mut Part<'_>) -> Result<(), usize> {
+    fn factor_front(&self, front: usize, part: &mut Part<'_>) -> Result<(), usize> {
         if !self.stale[front] {
             return Ok(());
         }

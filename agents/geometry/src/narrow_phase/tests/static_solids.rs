@@ -2,18 +2,10 @@
 
 use super::surfaces::{block_skin, flat_sheet};
 use super::*;
-use crate::{ContactTraits, Obstacle, ShapeError, StaticSolid, StaticSolidError};
+use crate::{Obstacle, ShapeError, StaticSolid, StaticSolidError};
 
 fn obstacle(solid: Solid, position: DVec3, rotation: DQuat) -> Obstacle {
-    Obstacle {
-        name: "ground".to_owned(),
-        solid,
-        position,
-        rotation,
-        friction: 0.5,
-        restitution: 0.0,
-        traits: ContactTraits::default(),
-    }
+    Obstacle { position, rotation, ..Obstacle::new("ground", solid) }
 }
 
 /// A square of two triangles about the origin at z = 0, facing up: half as wide as this, metres.

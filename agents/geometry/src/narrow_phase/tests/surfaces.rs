@@ -158,12 +158,9 @@ fn a_box_s_corner_over_a_triangle_touches_inside_it() {
     assert!(matches!(nearest.on_a, Place::Surface { shares, .. } if shares.iter().all(|share| *share > 0.02)));
 }
 
-#[test]
-fn a_ball_s_middle_behind_a_closed_skin_is_pushed_out_of_it() {
-    // a tetrahedron, its outside counter-clockwise
-    let positions = [DVec3::ZERO, DVec3::X, DVec3::Y, DVec3::Z];
+/// The closed skin of a tetrahedron whose sides are counter-clockwise seen from outside.
+fn tetrahedron(triangles: [[u32; 3]; 4]) -> CollisionShape {
     let edges = [[0, 1], [0, 2], [0, 3], [1, 2], [1, 3], [2, 3]];
-    let triangles = [[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]];
     let surface = SurfaceShape {
         fans: VoronoiRegions::of(&edges, &triangles).into(),
         vertices: [0, 1, 2, 3].into(),
@@ -173,7 +170,13 @@ fn a_ball_s_middle_behind_a_closed_skin_is_pushed_out_of_it() {
         edge_m: 1.0,
         closed: true,
     };
-    let form = CollisionShape::new(ShapeKind::Surface(surface), 0.5);
+    CollisionShape::new(ShapeKind::Surface(surface), 0.5)
+}
+
+#[test]
+fn a_ball_s_middle_behind_a_closed_skin_is_pushed_out_of_it() {
+    let positions = [DVec3::ZERO, DVec3::X, DVec3::Y, DVec3::Z];
+    let form = tetrahedron([[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]]);
     let (mut scratch, mut list) = (NarrowPhaseScratch::default(), vec![]);
     let round = ball(0.02);
     for depth in [-0.015, 0.01] {
@@ -196,18 +199,7 @@ fn a_ball_s_middle_behind_a_closed_skin_is_pushed_out_of_it() {
 /// A tetrahedron with a ridge along x at z = 0 from −1 m to 1 m, and what touches it.
 fn on_a_ridge(there: &PlacedShape<'_>) -> Vec<Touch> {
     let positions = [DVec3::NEG_X, DVec3::X, DVec3::new(0.0, 1.0, -1.0), DVec3::new(0.0, -1.0, -1.0)];
-    let edges = [[0, 1], [0, 2], [0, 3], [1, 2], [1, 3], [2, 3]];
-    let triangles = [[0, 1, 2], [1, 0, 3], [0, 2, 3], [1, 3, 2]];
-    let surface = SurfaceShape {
-        fans: VoronoiRegions::of(&edges, &triangles).into(),
-        vertices: [0, 1, 2, 3].into(),
-        edges: edges.into(),
-        triangles: triangles.into(),
-        radius_m: 0.0,
-        edge_m: 1.0,
-        closed: true,
-    };
-    let form = CollisionShape::new(ShapeKind::Surface(surface), 0.5);
+    let form = tetrahedron([[0, 1, 2], [1, 0, 3], [0, 2, 3], [1, 3, 2]]);
     let (mut scratch, mut list) = (NarrowPhaseScratch::default(), vec![]);
     let here = PlacedShape { form: &form, view: ShapePose::Surface(&positions) };
     touches(&here, there, 0.01, &mut scratch, &mut list);

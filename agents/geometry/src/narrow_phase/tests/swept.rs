@@ -2,7 +2,7 @@
 
 use super::surfaces::{block_skin, flat_sheet, skin_of};
 use super::*;
-use crate::{ContactTraits, Obstacle, StaticSolid};
+use crate::{Obstacle, StaticSolid};
 
 /// As the search: a touch may be told this much early, metres.
 const EARLY_M: f64 = 1.1e-6;
@@ -219,9 +219,7 @@ fn static_solids_stop_what_falls_on_them_and_let_through_what_comes_from_behind(
         let is_mesh = matches!(solid, Solid::Mesh { .. });
         let obstacle = |rotation: DQuat| {
             let position = rotation * position;
-            let (name, solid, traits) = ("ground".to_owned(), solid.clone(), ContactTraits::NONE);
-            let (friction, restitution) = (0.0, 0.0);
-            StaticSolid::new(&Obstacle { name, solid, position, rotation, friction, restitution, traits }).unwrap()
+            StaticSolid::new(&Obstacle { position, rotation, ..Obstacle::new("ground", solid.clone()) }).unwrap()
         };
         for turn in [DQuat::IDENTITY, tilt] {
             let ground = obstacle(turn);

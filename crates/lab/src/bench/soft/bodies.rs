@@ -71,8 +71,7 @@ pub(super) fn plate() -> anyhow::Result<RigidBody> {
 
 /// The floor: a plane at z = 0.
 pub(super) fn floor() -> Obstacle {
-    let (name, solid, position, rotation) = ("floor".into(), Solid::Plane, DVec3::ZERO, DQuat::IDENTITY);
-    Obstacle { name, solid, position, rotation, friction: 0.5, restitution: 0.0, traits: ContactTraits::default() }
+    Obstacle::new("floor", Solid::Plane)
 }
 
 /// A sheet of 4 mm of so many cells along each edge that hangs from one of its sides.

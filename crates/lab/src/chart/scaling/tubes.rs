@@ -7,7 +7,7 @@ use super::super::stability::common::{GRAVITY, plain_tube};
 use glam::{DQuat, DVec3};
 use metachron_contact::Neighbour;
 use metachron_core::{AgentId, Anchor, Body, Grasp, Snapshot, ToolState};
-use metachron_geometry::{ContactTraits, Obstacle, Solid};
+use metachron_geometry::{Obstacle, Solid};
 use metachron_models::rod::Tube;
 use metachron_models::rod::TubeSpec;
 use std::sync::Arc;
@@ -61,15 +61,7 @@ pub(super) fn folded(segments: u32) -> Option<Tube> {
 
 /// A tube on the ground, alone in a cluster, with steps of `dt_s` seconds.
 pub(super) fn on_ground(tube: Tube, dt_s: f64) -> Option<StepHarness> {
-    let ground = Obstacle {
-        name: "ground".into(),
-        solid: Solid::Plane,
-        position: DVec3::ZERO,
-        rotation: DQuat::IDENTITY,
-        friction: 0.3,
-        restitution: 0.0,
-        traits: ContactTraits::default(),
-    };
+    let ground = Obstacle { friction: 0.3, ..Obstacle::new("ground", Solid::Plane) };
     let mut stage = StepHarness::among(&[ground])?;
     stage.add(Box::new(tube), 1.0 / dt_s)?;
     Some(stage)

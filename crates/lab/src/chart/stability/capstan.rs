@@ -10,7 +10,7 @@ use super::super::figure::{Axis, Colour, Figure, Layer, Mark, Panel};
 use super::super::table::Table;
 use super::common::{dead_load, plain_tube};
 use glam::{DQuat, DVec3};
-use metachron_geometry::{ContactTraits, Obstacle, Solid};
+use metachron_geometry::{Obstacle, Solid};
 use metachron_models::rod::Tube;
 use metachron_models::rod::TubeSpec;
 use serde::{Deserialize, Serialize};
@@ -150,15 +150,9 @@ fn path(wrap_rad: f64) -> Vec<DVec3> {
 }
 
 fn drum(case: &Case) -> Obstacle {
-    Obstacle {
-        name: "drum".to_owned(),
-        solid: Solid::Cylinder { radius_m: DRUM_M, half_height_m: 0.5 },
-        position: DVec3::ZERO,
-        rotation: DQuat::from_rotation_x(FRAC_PI_2),
-        friction: case.friction,
-        restitution: 0.0,
-        traits: ContactTraits::default(),
-    }
+    let solid = Solid::Cylinder { radius_m: DRUM_M, half_height_m: 0.5 };
+    let rotation = DQuat::from_rotation_x(FRAC_PI_2);
+    Obstacle { rotation, friction: case.friction, ..Obstacle::new("drum", solid) }
 }
 
 fn tube(case: &Case) -> Option<Tube> {

@@ -99,21 +99,8 @@ fn ring(turn: usize, seed: u64) -> Option<(Play, [AgentId; 5])> {
     let (ball, start, end) = (Anchor::Local(DVec3::ZERO), Anchor::Arc(0.0), Anchor::Arc(RING_TUBE_M));
     let ties = [(0, ball, 1, start), (1, end, 2, ball), (2, ball, 3, start), (3, end, 4, ball), (4, ball, 0, ball)];
     for (number, (a, here, b, there)) in (0..).zip(ties) {
-        let (other, stiffness_n_m, damping_n_s_m, rest_m) = (ids[b], SPRING_N_M, 0.0, SPRING_REST_M);
-        let (law, tears_above_n, yields_above_n) = (Law::Ledger, f64::INFINITY, f64::INFINITY);
-        let link = Link {
-            other,
-            here,
-            there,
-            stiffness_n_m,
-            damping_n_s_m,
-            rest_m,
-            law,
-            number,
-            tears_above_n,
-            yields_above_n,
-        };
-        play.link(ids[a], link);
+        let spring = Link::new(ids[b], here, there, SPRING_N_M);
+        play.link(ids[a], Link { rest_m: SPRING_REST_M, law: Law::Ledger, number, ..spring });
     }
     Some((play, ids))
 }

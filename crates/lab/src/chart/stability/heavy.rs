@@ -11,7 +11,7 @@ use super::common::{GRAVITY, plain_body};
 use glam::{DQuat, DVec3};
 use metachron_contact::stepper::ClusterScene;
 use metachron_core::{AgentId, Body, RigidState, Snapshot};
-use metachron_geometry::{ContactTraits, Obstacle, Solid};
+use metachron_geometry::{Obstacle, Solid};
 use metachron_models::rigid::RigidBody;
 use metachron_models::rigid::RigidSpec;
 use metachron_models::rigid::{Joint, JointKind};
@@ -197,16 +197,7 @@ fn rigid(snapshot: &Snapshot) -> Option<RigidState> {
 /// Stacks cubes a millimetre apart; the top one is heavier.
 fn cube_stack(case: &Case) -> Option<MassRatioResult> {
     let count: u32 = case.test.strip_prefix("stack")?.parse().ok()?;
-    let ground = Obstacle {
-        name: "floor".to_owned(),
-        solid: Solid::Plane,
-        position: DVec3::ZERO,
-        rotation: DQuat::IDENTITY,
-        friction: 0.5,
-        restitution: 0.0,
-        traits: ContactTraits::default(),
-    };
-    let scene = Arc::new(ClusterScene::new(&[ground]).ok()?);
+    let scene = Arc::new(ClusterScene::new(&[Obstacle::new("floor", Solid::Plane)]).ok()?);
     let mut spawns = Vec::new();
     for i in 0..count {
         let mass = if i + 1 == count { 1000.0 * case.ratio } else { 1000.0 };

@@ -8,7 +8,7 @@ use super::common::{GRAVITY, plain_body, plain_tube};
 use glam::{DQuat, DVec3};
 use metachron_contact::Agent;
 use metachron_core::{Body, Snapshot};
-use metachron_geometry::{ContactTraits, Obstacle, Solid};
+use metachron_geometry::{Obstacle, Solid};
 use metachron_models::rigid::RigidBody;
 use metachron_models::rigid::RigidSpec;
 use metachron_models::rod::Tube;
@@ -117,15 +117,7 @@ impl Experiment for Incline {
 /// The distance that the body slides down the slope.
 fn slid(case: &Case, angle: f64) -> Option<f64> {
     let rotation = DQuat::from_rotation_y(angle);
-    let ground = Obstacle {
-        name: "slope".to_owned(),
-        solid: Solid::Plane,
-        position: DVec3::ZERO,
-        rotation,
-        friction: FRICTION,
-        restitution: 0.0,
-        traits: ContactTraits::default(),
-    };
+    let ground = Obstacle { rotation, friction: FRICTION, ..Obstacle::new("slope", Solid::Plane) };
     let (down, up) = (rotation * DVec3::X, rotation * DVec3::Z);
     let gravity = DVec3::NEG_Z * GRAVITY;
     let agent: Box<dyn Agent> = if case.body == "box" {

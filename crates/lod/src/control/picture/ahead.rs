@@ -90,7 +90,7 @@ impl PictureControl {
         self.chosen_part = if seen_s > 0.0 { chosen_s / seen_s } else { 1.0 };
         let predicted_s = &mut self.plan.promise.predicted_s;
         if *predicted_s > 0.0 {
-            let slower = if self.policy == Policy::Adaptive { self.adaptive.kappa() } else { 1.0 };
+            let slower = if self.policy == Policy::Adaptive { self.adaptive.slowness() } else { 1.0 };
             *predicted_s = (*predicted_s + slower * (seen_s - chosen_s)).max(0.0);
         }
     }

@@ -48,7 +48,7 @@ pub(in super::super::super) struct Row {
     /// |predicted − measured| over measured, for the first drawing of each picture: the mean, and the bound that 19 of 20 keep.
     error: f64,
     error95: f64,
-    /// The same with all predictions multiplied by `factor`, the median of measured over predicted: the error that a learnt κ leaves.
+    /// The same with all predictions multiplied by `factor`, the median of measured over predicted: the error that a learnt γ leaves.
     scaled_error95: f64,
     factor: f64,
     /// Deviation from their median that 19 of 20 times of the same picture keep: no prices can predict better.

@@ -54,6 +54,6 @@ fn an_object_that_comes_into_view_is_drawn_coarsely_and_prices_are_learnt_from_t
         }
         control.observe(frame_work(Duration::from_secs_f64(took), false));
     }
-    let kappa = control.last_plan().promise.predicted_s / took_s(&control, &late);
-    assert!((kappa - 1.0).abs() < 0.05, "{kappa}");
+    let slowness = control.last_plan().promise.predicted_s / took_s(&control, &late);
+    assert!((slowness - 1.0).abs() < 0.05, "{slowness}");
 }

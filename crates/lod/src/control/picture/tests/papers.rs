@@ -11,12 +11,12 @@ fn pieces(id: u32, pixels: f64, most: u32) -> ObjectView {
     ObjectView { distance_m: 30.0, kind, ..mesh(id, pixels, most) }
 }
 
-/// Draws a frame whose work is as predicted, with `beside_s` of logic meanwhile, on a machine of this κ; its time over the target.
-fn frame(control: &mut PictureControl, views: &[ObjectView], kappa: f64, beside_s: f64) -> f64 {
+/// Draws a frame whose work is as predicted, with `beside_s` of logic meanwhile, on a machine with this z; its time over the target.
+fn frame(control: &mut PictureControl, views: &[ObjectView], serial: f64, beside_s: f64) -> f64 {
     control.plan(views);
     let backdrop = Backdrop { pixels: 921_600.0, ..Backdrop::default() };
     let alone_s = control.prices.backdrop_s(backdrop) + control.drawn_s(&control.plan.levels);
-    let work_s = Overlap::frame(kappa, beside_s, alone_s);
+    let work_s = Overlap::frame(serial, beside_s, alone_s);
     let work = Duration::from_secs_f64(work_s);
     control.observe(FrameWork { work, draw: work, beside: Duration::from_secs_f64(beside_s), skip: false });
     work_s * control.target_hz()
@@ -69,12 +69,12 @@ fn robin_hood_with_raising_uses_time_that_it_would_leave() {
 fn logic_beside_the_drawing_takes_its_part_of_the_frame_for_every_policy_that_predicts() {
     let views: Vec<_> = (0..40).map(|i| mesh(i, 1e4, 4000)).collect();
     for policy in Policy::ALL.into_iter().filter(|policy| policy.predicts()) {
-        for kappa in [0.0, 0.7] {
+        for serial in [0.0, 0.7] {
             let mut control = control(policy, 60.0);
-            let all: Vec<_> = (0..60).map(|_| frame(&mut control, &views, kappa, 4e-3)).collect();
+            let all: Vec<_> = (0..60).map(|_| frame(&mut control, &views, serial, 4e-3)).collect();
             // most of the time is used, none is missed
             let last = all[50..].iter().copied().fold(0.0, f64::max);
-            assert!((0.85..=1.0).contains(&last), "{policy:?}, {kappa}: {last}");
+            assert!((0.85..=1.0).contains(&last), "{policy:?}, {serial}: {last}");
         }
     }
 }

@@ -8,19 +8,19 @@ const BINS: usize = 2048;
 
 /// How often a number was in each of equal bins; what is beyond them counts in the last one.
 #[derive(Debug, Clone)]
-pub struct Counts {
+pub struct Histogram {
     width: f64,
     bins: Vec<u32>,
     most: f64,
 }
 
-impl Counts {
+impl Histogram {
     /// Of numbers up to `BINS` times `width`.
     pub fn new(width: f64) -> Self {
         Self { width, bins: vec![0; BINS], most: 0.0 }
     }
 
-    pub fn note(&mut self, value: f64) {
+    pub fn record(&mut self, value: f64) {
         self.bins[((value / self.width) as usize).min(BINS - 1)] += 1;
         self.most = self.most.max(value);
     }
@@ -47,9 +47,9 @@ mod tests {
 
     #[test]
     fn quantiles_are_those_of_the_sorted_numbers() {
-        let mut counts = Counts::new(0.01);
-        (0..1000).for_each(|at| counts.note(f64::from(at) * 1e-3));
-        let Quantiles { p50, p99, max } = counts.quantiles();
+        let mut histogram = Histogram::new(0.01);
+        (0..1000).for_each(|at| histogram.record(f64::from(at) * 1e-3));
+        let Quantiles { p50, p99, max } = histogram.quantiles();
         assert!((p50 - 0.5).abs() < 0.01 && (p99 - 0.99).abs() < 0.01 && max == 0.999, "{p50} {p99} {max}");
     }
 }
