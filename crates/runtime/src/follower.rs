@@ -78,6 +78,7 @@ impl Follower {
             PartKind::Join => followed.join(),
             PartKind::Restore => None,
         };
+        followed.actor = followed.actor.take().and_then(AgentRunner::kept);
         let name = handle.name();
         done.ok_or_else(|| {
             format!("at {:.6} s \"{name}\" is in no state in which it could {kind:?}", wall.as_secs_f64())
@@ -216,7 +217,8 @@ impl Run for Follower {
     }
 
     fn remove(&mut self, id: AgentId) -> Result<(), SendError> {
-        self.all.leave(id)
+        let home = self.followed.get_mut(id.0 as usize).map(|one| &mut one.actor);
+        self.all.leave(id, home.unwrap_or(&mut None))
     }
 
     /// In the middle of a turn its state cannot be written.

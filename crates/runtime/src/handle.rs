@@ -7,7 +7,7 @@ use super::events::AgentEvent;
 use super::form_slot::FormSlot;
 use super::histogram::Histogram;
 use super::mailbox::{Command, Keyed, Mailbox, SendError};
-use super::metrics::{AgentState, AgentStats, Metrics};
+use super::metrics::{AgentState, AgentStats, Metrics, Spread};
 use super::probe::{Sample, Trace};
 use super::removed_agent::REMOVED;
 use super::ring::Ring;
@@ -36,7 +36,7 @@ pub(super) struct Shared {
     pub slot: Arc<LatestSlot<Snapshot>>,
     pub sleep: Arc<SleepRegistry>,
     /// Used by readers only: the agent never waits for this lock.
-    pub ages: Mutex<Histogram>,
+    pub ages: Mutex<Option<Box<Histogram>>>,
     /// Empty for most agents. Only the agent writes, so that it never waits during the run; readers read at the end.
     pub traces: Vec<Mutex<Trace>>,
 }
@@ -95,6 +95,11 @@ impl Shared {
     /// Whether the run began with it.
     pub fn is_first(&self) -> bool {
         self.identity.get().is_some_and(|identity| identity.is_first)
+    }
+
+    /// Whether it has left and nothing of it is kept: what joined the run is made again where it comes back.
+    pub fn is_forgotten(&self) -> bool {
+        self.gauges.has_left() && !self.is_first()
     }
 
     fn has_motor(&self, joint: u32) -> bool {
@@ -184,22 +189,29 @@ impl AgentHandle {
     /// Counts the age of a state that was used, seconds ([`Self::age_s`]); invalid ages are ignored.
     pub fn record_age(&self, age_s: f64) {
         if let Ok(age) = Duration::try_from_secs_f64(age_s) {
-            self.ages().record(age);
+            self.count_ages(|ages| ages.record(age));
         }
     }
 
     /// Counts several ages.
     pub(super) fn record_ages(&self, ages: impl Iterator<Item = SimSpan>) {
-        let mut counted = self.ages();
-        ages.for_each(|age| counted.record(Duration::from_nanos(age.as_nanos())));
+        self.count_ages(|counted| ages.for_each(|age| counted.record(Duration::from_nanos(age.as_nanos()))));
     }
 
     /// Counts a state that covered the present in so many frames.
     pub(super) fn record_no_age(&self, frames: usize) {
-        self.ages().record_often(Duration::ZERO, u16::try_from(frames).unwrap_or(u16::MAX));
+        self.count_ages(|ages| ages.record_often(Duration::ZERO, u16::try_from(frames).unwrap_or(u16::MAX)));
     }
 
-    fn ages(&self) -> MutexGuard<'_, Histogram> {
+    /// Counts ages, but of an agent that has left.
+    fn count_ages(&self, count: impl FnOnce(&mut Histogram)) {
+        let mut ages = self.ages();
+        if !self.shared.gauges.has_left() {
+            count(ages.get_or_insert_default());
+        }
+    }
+
+    fn ages(&self) -> MutexGuard<'_, Option<Box<Histogram>>> {
         self.shared.ages.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
@@ -241,6 +253,9 @@ impl AgentHandle {
         if matches!(command, Command::Pose(_)) && !self.shared.takes_poses() {
             return Err(SendError::NotKinematic(self.id()));
         }
+        if self.shared.gauges.has_left() {
+            return Err(SendError::NoAgent(self.id()));
+        }
         self.shared.mail.send(command)?;
         self.shared.sleep.wake(self.shared.id);
         Ok(())
@@ -248,8 +263,10 @@ impl AgentHandle {
 
     /// Lets it take another state before its next step, and wakes it; a state that does not fit changes nothing.
     pub fn set_state(&self, state: Body) {
-        self.shared.mail.set_state(state);
-        self.shared.sleep.wake(self.shared.id);
+        if !self.shared.gauges.has_left() {
+            self.shared.mail.set_state(state);
+            self.shared.sleep.wake(self.shared.id);
+        }
     }
 
     /// Lets it leave the run at its next turn.
@@ -321,7 +338,7 @@ impl AgentHandle {
             turn_s: gauges.turn_s.get(),
             work: gauges.work.get(),
             cpu_s: self.cpu_s(),
-            age: self.ages().spread(),
+            age: self.ages().as_ref().map_or_else(Spread::default, |ages| ages.spread()),
             late: gauges.late(),
             misses: gauges.misses.load(Relaxed),
             dropped: span(&gauges.dropped),

@@ -139,7 +139,7 @@ impl Lockstep {
                     let returned = self.all.handles[agent].shared.handover().and_then(Handover::take_returned);
                     let Some(actor) = returned else { continue };
                     entry.phase = if actor.is_parked() { Phase::Parked } else { Phase::Waiting };
-                    entry.actor = Some(actor);
+                    entry.actor = actor.kept();
                 }
                 _ => continue,
             }
@@ -203,6 +203,9 @@ impl Lockstep {
             None => entry.phase = Phase::Parked,
         }
         self.count_cpu(agent, started.elapsed());
+        if self.entries[agent].phase == Phase::Parked {
+            self.release(agent);
+        }
     }
 
     fn finish(&mut self, agent: usize) {
@@ -236,6 +239,13 @@ impl Lockstep {
         if entry.actor.is_none() {
             entry.phase = Phase::Led;
         }
+    }
+
+    /// Frees the runner of an agent that has left, where it is not kept.
+    fn release(&mut self, agent: usize) {
+        self.settle();
+        let entry = &mut self.entries[agent];
+        entry.actor = entry.actor.take().and_then(AgentRunner::kept);
     }
 
     fn count_cpu(&mut self, agent: usize, wall: Duration) {
@@ -281,11 +291,11 @@ impl Lockstep {
             self.timeline = own.set_to(own_now, cut.now, cut.timeline.sim_at(cut.now), &cut.timeline);
             self.due.clear();
             self.cores = Cores::new(self.machine.cores);
-            for (entry, placed) in self.entries.iter_mut().zip(&cut.all) {
-                (entry.phase, entry.turns) = (phase_of(placed), 0);
+            for (entry, one) in self.entries.iter_mut().zip(&cut.all) {
+                (entry.phase, entry.turns) = (one.as_ref().map_or(Phase::Parked, phase_of), 0);
             }
             // some may have been notified just before
-            cut.all.iter().for_each(|placed| self.all.sleep.notify(placed.runner.id()));
+            cut.all.iter().flatten().for_each(|placed| self.all.sleep.notify(placed.runner.id()));
             return Ok(());
         };
         if phases.len() != cut.counted {
@@ -412,7 +422,8 @@ impl Run for Lockstep {
     }
 
     fn remove(&mut self, id: AgentId) -> Result<(), SendError> {
-        self.all.leave(id)
+        let home = self.entries.get_mut(id.0 as usize).map(|entry| &mut entry.actor);
+        self.all.leave(id, home.unwrap_or(&mut None))
     }
 
     fn shutdown(mut self: Box<Self>) -> Vec<AgentStats> {

@@ -184,7 +184,10 @@ impl Run for Pool {
     }
 
     fn remove(&mut self, id: AgentId) -> Result<(), SendError> {
-        self.all.leave(id)
+        let mut home = self.state.take_parked(id);
+        let left = self.all.leave(id, &mut home);
+        home.into_iter().for_each(|actor| self.state.store_parked(actor));
+        left
     }
 
     fn archive(&mut self, archive: &mut Archive<'_>, absent: Absent<'_>) -> Result<(), ArchiveError> {

@@ -145,10 +145,10 @@ impl SleepRegistry {
         self.signals.get(id.0 as usize)
     }
 
-    /// Registers the thread to unpark for `id`.
-    pub fn set_thread(&self, id: AgentId, thread: Thread) {
+    /// Registers the thread to unpark for `id`; `None` once that has ended.
+    pub fn set_thread(&self, id: AgentId, thread: Option<Thread>) {
         if let Some(signal) = self.signal(id) {
-            *signal.thread.lock().unwrap_or_else(PoisonError::into_inner) = Some(thread);
+            *signal.thread.lock().unwrap_or_else(PoisonError::into_inner) = thread;
         }
     }
 

@@ -12,14 +12,13 @@ use super::form_slot::FormSlot;
 use super::governor::Governor;
 use super::handle::{AgentHandle, EventStreams, Identity, Shared};
 use super::helpers::Helpers;
-use super::histogram::Histogram;
 use super::mailbox::{Mailbox, SendError};
 use super::metrics::{AgentState, Metrics, MetricsWriter};
 use super::observation::{BroadPhaseSlot, Peer, Peers};
 use super::probe::{Trace, WatchedPoint};
-use super::removed_agent::RemovedAgent;
+use super::removed_agent::nothing;
 use super::sleep::SleepRegistry;
-use super::slot::SlotWriter;
+use super::slot::{LatestSlot, SlotWriter};
 use metachron_contact::Agent;
 use metachron_contact::stepper::ClusterScene;
 use metachron_contact::{Law, Link};
@@ -192,17 +191,27 @@ impl RunAgents {
         self.peers.is_ordered.store(true, Relaxed);
     }
 
-    /// Takes an agent out: at its next turn, or at once where it makes no more.
+    /// Takes an agent out: at its next turn, or at once where it makes no more. `home` has its runner where that makes turns of its own, or none any
+    /// more.
     ///
     /// # Errors
     /// [`SendError::NoAgent`].
-    pub fn leave(&self, id: AgentId) -> Result<(), SendError> {
+    pub fn leave(&self, id: AgentId, home: &mut Option<Box<AgentRunner>>) -> Result<(), SendError> {
         let agent = self.handles.of(id).ok_or(SendError::NoAgent(id))?;
-        if !matches!(agent.state(), AgentState::Parked(_)) {
-            agent.leave();
+        match agent.state() {
+            AgentState::Gone => return Ok(()),
+            AgentState::Running | AgentState::Resting => {
+                agent.leave();
+                return Ok(());
+            }
+            AgentState::Parked(_) => {}
+        }
+        if let Some(mut runner) = home.take() {
+            runner.take_out();
+            *home = runner.kept();
             return Ok(());
         }
-        // no other thread publishes for it any more
+        // it is in a step that does not end
         if let Some(broad_phase) = self.peers.broad_phase.get() {
             broad_phase.publish_nowhere(id, agent.latest().moment());
         }
@@ -232,21 +241,25 @@ impl RunAgents {
         Ok(Box::new(actor))
     }
 
-    /// Adds numbers of agents that have left, as they are taken, until there are `count`: nothing more is known of them.
-    pub fn reach(&self, count: usize) -> impl Iterator<Item = Box<AgentRunner>> + '_ {
-        let numbers = self.handles.len()..count;
-        numbers.map(|number| {
+    /// Adds numbers of agents that have left until there are `count`: nothing more is known of them.
+    pub fn reach(&self, count: usize) {
+        for number in self.handles.len()..count {
             let id = AgentId(number as u32);
-            let mut spawn = AgentSpawn::alone("", Box::new(RemovedAgent), 1.0);
-            let writer = SlotWriter::new(Snapshot::default());
-            let shared = Shared { identity: OnceLock::new(), ..shared(id, &mut spawn, &self.sleep, &writer, false) };
-            let shared = Arc::new(shared);
+            let shared = Arc::new(unknown(id, Arc::new(LatestSlot::holding(nothing())), &self.sleep));
             shared.gauges.leave();
             self.reserve(&shared);
             self.sleep.close(id);
             self.handles.push(AgentHandle { shared });
-            Box::new(actor(id, Seated { spawn, jointed: Vec::new(), writer }, &self.peers))
-        })
+        }
+    }
+
+    /// An agent that joined the run as `spawn` says, has left and is not kept, again; its state is read next.
+    pub fn revive(&self, id: AgentId, mut spawn: AgentSpawn) -> Box<AgentRunner> {
+        let shared = &self.handles[id.0 as usize].shared;
+        shared.identity.get_or_init(|| Identity::of(id, &mut spawn, false));
+        shared.form.publish(spawn.agent.form());
+        let writer = SlotWriter::of(Arc::clone(&shared.slot));
+        Box::new(actor(id, Seated { spawn, jointed: Vec::new(), writer }, &self.peers))
     }
 
     /// Checks that an agent can join a run that goes on.
@@ -266,18 +279,6 @@ impl RunAgents {
         self.sleep.join();
         self.peers.broad_phase.join();
         self.peers.all.push(Peer { shared: Arc::clone(shared), laws: Vec::new() });
-    }
-}
-
-impl AgentRunner {
-    /// Puts an agent into the place of one that has left, whose state is read next: what it was and has kept, or what `spawn` says that joined the run.
-    pub fn revive(&mut self, spawn: Option<AgentSpawn>) {
-        let Some(mut spawn) = spawn else { return };
-        let (id, shared, peers) = (self.id(), Arc::clone(&self.shared), Arc::clone(&self.peers));
-        shared.identity.get_or_init(|| Identity::of(id, &mut spawn, false));
-        shared.form.publish(spawn.agent.form());
-        let writer = std::mem::replace(&mut self.writer, SlotWriter::new(Snapshot::default()));
-        *self = actor(id, Seated { spawn, jointed: Vec::new(), writer }, &peers);
     }
 }
 
@@ -383,16 +384,26 @@ fn shared(
     is_first: bool,
 ) -> Shared {
     Shared {
-        id,
         identity: Identity::of(id, spawn, is_first).into(),
-        gauges: Metrics::default(),
         form: FormSlot::new(spawn.agent.form()),
+        traces: spawn.watches.drain(..).map(|watch| Mutex::new(Trace::new(watch))).collect(),
+        ..unknown(id, writer.slot(), sleep)
+    }
+}
+
+/// What is shared of an agent of which nothing is known.
+fn unknown(id: AgentId, slot: Arc<LatestSlot<Snapshot>>, sleep: &Arc<SleepRegistry>) -> Shared {
+    Shared {
+        id,
+        identity: OnceLock::new(),
+        gauges: Metrics::default(),
+        form: FormSlot::default(),
         mail: Mailbox::default(),
         streams: EventStreams::default(),
-        slot: writer.slot(),
+        slot,
         sleep: Arc::clone(sleep),
-        ages: Mutex::new(Histogram::default()),
-        traces: spawn.watches.drain(..).map(|watch| Mutex::new(Trace::new(watch))).collect(),
+        ages: Mutex::default(),
+        traces: Vec::new(),
     }
 }
 

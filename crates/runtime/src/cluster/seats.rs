@@ -201,18 +201,6 @@ impl AgentRunner {
         }
     }
 
-    /// Frees what it made turns with: an agent that has left makes none.
-    pub fn forget(&mut self) {
-        if !self.shared.is_first() {
-            (self.cluster, self.governor, self.links) = (None, None, Vec::new());
-        }
-        (self.loads, self.announced) = (None, Vec::new());
-        self.led = Led::default();
-        self.observer.forget();
-        self.writer.forget_spares();
-        self.shared.form.publish(None);
-    }
-
     /// Lets all it leads return, each by itself: those that belong together find together again.
     pub fn release_all(&mut self) {
         self.led.seats.drain(..).for_each(|seat| seat.actor.return_turns());

@@ -14,6 +14,6 @@ fn too_many_agents_for_threads_are_refused() {
 #[test]
 fn threads_carry_the_names_of_their_agents() {
     let run = Threads::start(vec![Dummy::new(1.0).at(60.0)], Arc::new(SystemClock::new()), Priority::Normal).unwrap();
-    let names: Vec<_> = run.threads.iter().flatten().filter_map(|t| t.thread().name()).collect();
+    let names: Vec<_> = run.threads.values().filter_map(|t| t.thread().name()).collect();
     assert_eq!(names, ["agent:dummy at 60"]);
 }
