@@ -100,11 +100,11 @@ impl Cut {
     /// Writes or reads agents, places and time: what every executor has. What lockstep has besides follows.
     pub fn archive(&mut self, archive: &mut Archive<'_>, absent: Absent<'_>) -> Result<(), ArchiveError> {
         let handles = &self.run_agents.handles;
-        if self.all.iter().zip(handles).any(|(placed, agent)| placed.is_none() && !agent.shared.is_forgotten()) {
+        if self.all.iter().zip(handles).any(|(placed, agent)| placed.is_none() && agent.live().is_some()) {
             let what = "an agent whose step does not end, or whose thread panicked,";
             return Err(ArchiveError::Refused { what: what.to_owned() });
         }
-        let mut present: Vec<bool> = handles.iter().map(|agent| !agent.shared.gauges.has_left()).collect();
+        let mut present: Vec<bool> = handles.iter().map(|agent| !agent.has_left()).collect();
         archive.value(&mut present)?;
         self.counted = present.len();
         if archive.is_reading() {
@@ -228,11 +228,7 @@ impl Placed {
 }
 
 /// Writes or reads the agents of a run that are `present`, by rising numbers.
-fn archive_agents(
-    all: &mut [Option<Placed>],
-    present: &[bool],
-    archive: &mut Archive<'_>,
-) -> Result<(), ArchiveError> {
+fn archive_agents(all: &mut [Option<Placed>], present: &[bool], archive: &mut Archive<'_>) -> Result<(), ArchiveError> {
     let there = all.iter_mut().zip(present).filter(|(_, present)| **present);
     for Placed { runner, .. } in there.filter_map(|(one, _)| one.as_mut()) {
         let shared = Arc::clone(&runner.shared);

@@ -127,10 +127,11 @@ impl BroadPhase {
     pub fn call(&self, to: AgentId, from: AgentId) {
         let Some(calls) = self.calls.get(to.0 as usize) else { return };
         let (word, bit) = (from.0 as usize / 64, 1 << (from.0 % 64));
-        if calls.pages.load().is_none() && !self.is_nowhere(to) {
+        let mut pages = calls.pages.load();
+        if pages.is_none() && !self.is_nowhere(to) {
             calls.pages.rcu(|made| made.clone().or_else(|| Some(Arc::default())));
+            pages = calls.pages.load();
         }
-        let pages = calls.pages.load();
         let Some(pages) = &*pages else { return };
         while pages.count() <= word / PAGE_WORDS {
             pages.push(OnceLock::new());

@@ -11,7 +11,7 @@ use super::agent_clock::{Timeline, TimelineCommand};
 use super::agent_runner::{AgentRunner, Effort, Next};
 use super::agents::Agents;
 use super::archive::{Absent, Cut, VirtualEvents};
-use super::cluster::{Handover, Place, Placed, close_remaining, hand_over, put_back, take_apart};
+use super::cluster::{Place, Placed, close_remaining, hand_over, put_back, take_apart};
 use super::cpu::CpuBatch;
 use super::handle::AgentHandle;
 use super::helpers::Helpers;
@@ -24,7 +24,6 @@ use cores::Cores;
 use metachron_core::{AgentId, Archive, ArchiveError};
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
-use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 /// Agents in virtual time on a declared machine.
@@ -136,7 +135,7 @@ impl Lockstep {
                     entry.phase = Phase::Waiting;
                 }
                 (Phase::Led, _) => {
-                    let returned = self.all.handles[agent].shared.handover().and_then(Handover::take_returned);
+                    let returned = self.all.handles[agent].take_returned();
                     let Some(actor) = returned else { continue };
                     entry.phase = if actor.is_parked() { Phase::Parked } else { Phase::Waiting };
                     entry.actor = actor.kept();
@@ -401,7 +400,7 @@ impl Run for Lockstep {
 
     fn add(&mut self, spawn: AgentSpawn) -> Result<AgentHandle, RunError> {
         let actor = self.all.join(spawn, self.sim_now())?;
-        let (agent, handle) = (self.entries.len(), AgentHandle { shared: Arc::clone(&actor.shared) });
+        let (agent, handle) = (self.entries.len(), self.all.handles[actor.id().0 as usize].clone());
         let phase = if actor.is_parked() { Phase::Parked } else { Phase::Waiting };
         self.entries.push(AgentEntry { actor: Some(actor), phase, turns: 0 });
         self.schedule(agent);

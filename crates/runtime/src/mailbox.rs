@@ -9,7 +9,7 @@ use std::sync::atomic::{
     AtomicBool,
     Ordering::{Acquire, Release},
 };
-use std::sync::{Mutex, PoisonError};
+use std::sync::{Mutex, OnceLock, PoisonError};
 
 /// A command to an agent.
 #[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
@@ -94,7 +94,7 @@ pub(super) struct Mailbox {
     /// Whether there is any command: an agent without commands reads only this.
     full: AtomicBool,
     /// Allocated by the first command: most agents never get one.
-    pending: Mutex<Option<Box<PendingCommands>>>,
+    pending: OnceLock<Box<Mutex<PendingCommands>>>,
 }
 
 /// Contents of a mailbox.
@@ -156,8 +156,9 @@ impl Mailbox {
     }
 
     fn put(&self, what: impl FnOnce(&mut PendingCommands) -> Result<(), SendError>) -> Result<(), SendError> {
-        let mut pending = self.pending.lock().unwrap_or_else(PoisonError::into_inner);
-        what(pending.get_or_insert_default())?;
+        let pending = self.pending.get_or_init(Box::default);
+        let mut pending = pending.lock().unwrap_or_else(PoisonError::into_inner);
+        what(&mut pending)?;
         self.full.store(true, Release);
         drop(pending);
         Ok(())
@@ -168,8 +169,8 @@ impl Mailbox {
         let mut is_full = self.has_pending();
         archive.value(&mut is_full)?;
         if is_full {
-            let mut pending = self.pending.lock().unwrap_or_else(PoisonError::into_inner);
-            archive.value(&mut **pending.get_or_insert_default())?;
+            let pending = self.pending.get_or_init(Box::default);
+            archive.value(&mut *pending.lock().unwrap_or_else(PoisonError::into_inner))?;
         } else if archive.is_reading() {
             // what waits now was sent after
             self.clear();
@@ -180,9 +181,9 @@ impl Mailbox {
 
     /// Forgets what waits; called between turns.
     pub fn clear(&self) {
-        let mut pending = self.pending.lock().unwrap_or_else(PoisonError::into_inner);
         self.full.store(false, Release);
-        *pending = None;
+        let waiting = self.pending.get().map(|pending| pending.lock().unwrap_or_else(PoisonError::into_inner));
+        waiting.into_iter().for_each(|mut waiting| *waiting = PendingCommands::default());
     }
 
     /// Whether any command has arrived.
@@ -195,9 +196,11 @@ impl Mailbox {
         if !self.has_pending() {
             return PendingCommands::default();
         }
-        let Ok(mut pending) = self.pending.try_lock() else { return PendingCommands::default() };
+        let Some(Ok(mut pending)) = self.pending.get().map(|pending| pending.try_lock()) else {
+            return PendingCommands::default();
+        };
         self.full.store(false, Release);
-        pending.as_deref_mut().map(std::mem::take).unwrap_or_default()
+        std::mem::take(&mut *pending)
     }
 }
 
@@ -359,7 +362,7 @@ mod tests {
     fn a_reader_that_meets_a_writer_reads_the_command_the_next_time() {
         let mail = Mailbox::default();
         mail.send(Command::SetDt(SimSpan::from_nanos(5))).unwrap();
-        let writing = mail.pending.lock().unwrap();
+        let writing = mail.pending.get().unwrap().lock().unwrap();
         assert_eq!(mail.take().dt, None);
         drop(writing);
         assert_eq!(mail.take().dt, Some(SimSpan::from_nanos(5)));

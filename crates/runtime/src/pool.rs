@@ -178,9 +178,9 @@ impl Run for Pool {
 
     fn add(&mut self, spawn: AgentSpawn) -> Result<AgentHandle, RunError> {
         let actor = self.all.join(spawn, self.sim_now())?;
-        let shared = Arc::clone(&actor.shared);
+        let handle = self.all.handles[actor.id().0 as usize].clone();
         self.state.take_up(actor);
-        Ok(AgentHandle { shared })
+        Ok(handle)
     }
 
     fn remove(&mut self, id: AgentId) -> Result<(), SendError> {

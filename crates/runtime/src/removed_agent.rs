@@ -7,7 +7,7 @@ use super::agent_runner::AgentRunner;
 use super::cluster::Led;
 use super::events::EventKind;
 use metachron_core::Snapshot;
-use std::sync::{Arc, LazyLock, PoisonError};
+use std::sync::{Arc, LazyLock};
 
 /// The model of a number of which nothing else is known.
 pub(super) const REMOVED: &str = "removed";
@@ -31,6 +31,7 @@ impl AgentRunner {
 
     /// Takes it out at once: called between turns, of one that no other leads.
     pub fn take_out(&mut self) {
+        self.shared.mail.clear();
         self.open = None;
         self.tell(EventKind::Gone);
         self.vanish();
@@ -46,12 +47,14 @@ impl AgentRunner {
         self.led = Led::default();
         self.observer.forget();
         self.shared.form.publish(None);
-        self.shared.mail.clear();
-        *self.shared.ages.lock().unwrap_or_else(PoisonError::into_inner) = None;
     }
 
     /// It, which makes no more turns; `None` of one that has left and can be made again.
     pub fn kept(self: Box<Self>) -> Option<Box<Self>> {
-        (!self.shared.is_forgotten()).then_some(self)
+        if self.shared.is_forgotten() {
+            self.peers.all.of(self.id()).into_iter().for_each(|agent| agent.record.end());
+            return None;
+        }
+        Some(self)
     }
 }

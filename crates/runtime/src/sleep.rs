@@ -168,6 +168,11 @@ impl SleepRegistry {
         at
     }
 
+    /// The agent that makes the turns of `id`, if that is another.
+    pub fn led_by(&self, id: AgentId) -> Option<AgentId> {
+        Some(self.leader(id)).filter(|leader| *leader != id)
+    }
+
     /// How long the end of a run waits for these agents' turns before they count as hung: a turn of a cluster makes the steps of all its
     /// members.
     pub fn end_patience(&self, missing: impl Iterator<Item = AgentId>) -> Duration {

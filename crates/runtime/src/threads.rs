@@ -74,18 +74,17 @@ impl Threads {
         let mut run = Self { clock, timeline, all, threads, ended_agents, farewells, ended, priority, order };
         for (actor, id) in actors.into_iter().zip((0..).map(AgentId)) {
             // on an error the run so far is dropped, which ends its threads
-            let shared = Arc::clone(&run.all.handles[id.0 as usize].shared);
-            run.begin(actor, shared)?;
+            run.begin(id, actor)?;
         }
         Ok(run)
     }
 
     /// Gives an agent its thread.
-    fn begin(&mut self, actor: Option<Box<AgentRunner>>, shared: Arc<Shared>) -> Result<(), RunError> {
-        let id = shared.id;
-        let thread = self.spawn(actor, shared)?;
-        self.all.sleep.set_thread(id, Some(thread.thread().clone()));
-        self.threads.insert(id, thread);
+    fn begin(&mut self, id: AgentId, actor: Option<Box<AgentRunner>>) -> Result<(), RunError> {
+        let Some(shared) = self.all.handles.of(id).and_then(AgentHandle::live).map(|shared| Arc::clone(&shared)) else {
+            return Ok(());
+        };
+        self.threads.insert(id, self.spawn(actor, shared)?);
         Ok(())
     }
 
@@ -119,6 +118,8 @@ impl Threads {
             let _farewell = farewell;
             // a refusal was already reported to the caller of `Priority::ask`
             drop(priority.take());
+            // by itself: who gives the agent back before another does wakes nobody
+            shared.sleep.set_thread(shared.id, Some(thread::current()));
             stage.run(actor, &shared)
         };
         builder.spawn(body).map_err(|error| RunError::NoThread { name, error })
@@ -138,8 +139,8 @@ impl Threads {
             let Some(id) = ended else { break };
             self.join(id);
         }
-        for handle in self.threads.keys().filter_map(|id| self.all.handles.of(*id)) {
-            handle.shared.gauges.park(format!("a step did not end within {} s", patience.as_secs_f64()));
+        for shared in self.threads.keys().filter_map(|id| self.all.handles.of(*id)?.live()) {
+            shared.gauges.park(format!("a step did not end within {} s", patience.as_secs_f64()));
         }
         self.threads.clear();
         let mut homes: Vec<_> = self.all.handles.iter().map(|_| None).collect();
@@ -152,11 +153,9 @@ impl Threads {
     fn go_on(&mut self, homes: Vec<Option<Box<AgentRunner>>>) -> Result<(), RunError> {
         self.all.sleep.go_on();
         for (mut actor, id) in homes.into_iter().zip((0..).map(AgentId)) {
-            let shared = Arc::clone(&self.all.handles[id.0 as usize].shared);
-            if let Some(actor) = actor.take_if(|actor| actor.is_parked()) {
-                self.ended_agents.insert(id, actor);
-            } else if !shared.gauges.has_left() {
-                self.begin(actor, shared)?;
+            match actor.take_if(|actor| actor.is_parked()) {
+                Some(actor) => drop(self.ended_agents.insert(id, actor)),
+                None => self.begin(id, actor)?,
             }
         }
         Ok(())
@@ -229,9 +228,9 @@ impl Run for Threads {
             return Err(RunError::TooMany { agents: running + 1, most: THREADS_MAX });
         }
         let actor = self.all.join(spawn, self.sim_now())?;
-        let shared = Arc::clone(&actor.shared);
-        self.begin(Some(actor), Arc::clone(&shared))?;
-        Ok(AgentHandle { shared })
+        let id = actor.id();
+        self.begin(id, Some(actor))?;
+        Ok(self.all.handles[id.0 as usize].clone())
     }
 
     fn remove(&mut self, id: AgentId) -> Result<(), SendError> {

@@ -5,6 +5,7 @@
 
 use super::super::agent_runner::AgentRunner;
 use super::super::agents::Agents;
+use super::super::handle::AgentHandle;
 use super::seats::Seat;
 use metachron_core::{AgentId, ArchiveError};
 use std::sync::PoisonError;
@@ -36,10 +37,11 @@ pub(in super::super) fn take_apart(
 ) -> Vec<Option<Placed>> {
     let mut all: Vec<Option<Placed>> = handles.iter().map(|_| None).collect();
     home.flatten().for_each(|runner| take(runner, Place::Home, &mut all));
-    for (handle, handover) in handles.iter().filter_map(|handle| Some((handle, handle.shared.handover()?))) {
+    for shared in handles.iter().filter_map(AgentHandle::live) {
+        let Some(handover) = shared.handover() else { continue };
         let mut arrivals = handover.arrivals.lock().unwrap_or_else(PoisonError::into_inner);
         for (before, runner) in arrivals.drain(..).enumerate() {
-            take(runner, Place::Waiting { leader: handle.id(), before }, &mut all);
+            take(runner, Place::Waiting { leader: shared.id, before }, &mut all);
         }
         handover.returned.take().into_iter().for_each(|runner| take(runner, Place::Returning, &mut all));
     }
@@ -93,8 +95,8 @@ pub(in super::super) fn put_back(all: Vec<Option<Placed>>, handles: &Agents) -> 
     for Placed { runner, place } in others {
         let id = runner.id();
         let whose = if let Place::Waiting { leader, .. } = place { leader } else { id };
-        let handover = handles[whose.0 as usize].shared.handover();
-        match (place, handover) {
+        let there = handles[whose.0 as usize].live();
+        match (place, there.as_ref().and_then(|shared| shared.handover())) {
             (Place::Waiting { .. }, Some(to)) => {
                 to.arrivals.lock().unwrap_or_else(PoisonError::into_inner).push(runner);
             }

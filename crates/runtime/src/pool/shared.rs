@@ -9,7 +9,6 @@ use super::super::agent_clock::{SharedTimeline, Timeline};
 use super::super::agent_runner::{AgentRunner, Next};
 use super::super::agents::Agents;
 use super::super::clock::Clock;
-use super::super::cluster::Handover;
 use super::super::sleep::SleepRegistry;
 use super::super::table::Table;
 use super::super::turn_order::{PartKind, TurnOrder};
@@ -162,7 +161,7 @@ impl PoolState {
 
     /// The agent that has returned from a leader.
     pub fn take_returned(&self, id: AgentId) -> Option<Box<AgentRunner>> {
-        self.handles.get(id.0 as usize)?.shared.handover().and_then(Handover::take_returned)
+        self.handles.of(id)?.take_returned()
     }
 
     /// How long worker `at` may sleep from `now` on; `None`: until it is woken.
