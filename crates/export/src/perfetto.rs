@@ -6,7 +6,7 @@
 
 use super::ExportError;
 use metachron_core::{AgentId, SimSpan, SimTime};
-use metachron_runtime::{AgentHandle, Turn};
+use metachron_runtime::{AgentHandle, Heard, Turn};
 use metachron_world::{Event, EventFilter, Events, Happening, Object, Touched, World};
 use serde_json::{Map, Value, json};
 use std::fs::File;
@@ -50,7 +50,7 @@ pub struct PerfettoFile {
 
 /// What is known of an object's turns.
 struct Lane {
-    next: u64,
+    heard: Heard,
     /// A wait that may go on.
     wait: Option<Turn>,
     /// When the steps that were read last ended, by the object's own time.
@@ -136,7 +136,7 @@ impl PerfettoFile {
     fn listen(&mut self) -> Result<(), ExportError> {
         let world = self.world.clone();
         for agent in world.agents().iter().skip(self.lanes.len()) {
-            self.lanes.push(Lane { next: agent.listen_to_turns(), wait: None, ended: Vec::new() });
+            self.lanes.push(Lane { heard: agent.listen_to_turns(), wait: None, ended: Vec::new() });
             let (name, tid) = (agent.name(), lane_of(agent.id()));
             self.put(
                 &json!({ "ph": "M", "name": "thread_name", "pid": OBJECTS, "tid": tid, "args": { "name": name } }),
@@ -148,8 +148,7 @@ impl PerfettoFile {
     fn turns(&mut self, agent: &AgentHandle) -> Result<(), ExportError> {
         let at = agent.id().0 as usize;
         let mut turns = Vec::new();
-        let (next, lost) = agent.turns_from(self.lanes[at].next, |turn| turns.push(turn));
-        (self.lanes[at].next, self.lost) = (next, self.lost + lost);
+        self.lost += agent.hear_turns(&mut self.lanes[at].heard, |turn| turns.push(turn));
         let steps = turns.iter().filter(|turn| is_step(turn));
         self.lanes[at].ended = steps.map(|turn| (turn.time, turn.ended)).collect();
         turns.iter().try_for_each(|turn| self.turn(agent.id(), turn))

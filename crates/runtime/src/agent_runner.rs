@@ -18,7 +18,6 @@ use super::helpers::Helped;
 use super::loads::Loads;
 use super::metrics::{MetricsWriter, SMOOTHING};
 use super::observation::{Observer, Peers};
-use super::removed_agent::RemovedAgent;
 use super::slot::SlotWriter;
 use super::turns::Took;
 use metachron_contact::{Agent, Carving, Link};
@@ -26,7 +25,6 @@ use metachron_core::{AgentId, Resolution, ResolutionRange, SimSpan, SimTime, Sna
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::Arc;
 use std::sync::atomic::Ordering::Relaxed;
-use std::thread;
 use std::time::Duration;
 
 /// An agent with its runtime state.
@@ -333,41 +331,6 @@ impl AgentRunner {
         if self.carved {
             self.publish_form();
         }
-    }
-
-    /// Publishes that nothing of it is left, where nobody finds it.
-    fn vanish(&mut self) {
-        let time = self.pace.time();
-        let nothing = Snapshot { time, steps: self.writer.slot().latest().steps, ..Snapshot::default() };
-        if !self.shared.is_first() {
-            self.agent = Box::new(RemovedAgent);
-        }
-        self.writer.fill(|into| {
-            *into = nothing;
-            true
-        });
-        self.withheld = !self.show();
-        if let Some(broad_phase) = self.peers.broad_phase.get() {
-            broad_phase.publish_nowhere(self.id(), time);
-        }
-        self.shared.gauges.leave();
-    }
-
-    /// Takes it out at once: called between turns, of one that no other leads.
-    pub fn take_out(&mut self) {
-        self.shared.mail.clear();
-        self.open = None;
-        self.tell(EventKind::Gone);
-        self.vanish();
-        while self.writer.filled().is_some() && !self.show() {
-            // readers are in their cells for nanoseconds
-            thread::yield_now();
-        }
-        self.withheld = false;
-        self.metrics.flush(&self.shared.gauges);
-        self.notify_reader();
-        self.shared.sleep.close(self.id());
-        self.forget();
     }
 
     /// Whether no outside influence prevents the agent from resting at simulated time `now`.

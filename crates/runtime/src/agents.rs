@@ -3,31 +3,40 @@
 //! In: handles, one after the other. Out: the same by their numbers, from any thread, without waiting. Numbers are never used again.
 
 use super::handle::AgentHandle;
+use super::sleep::SleepRegistry;
 use metachron_core::AgentId;
 use std::iter::Map;
 use std::ops::Index;
 use std::sync::Arc;
 
 /// All agents of a run, in the order of their numbers; copies are the same list.
-#[derive(Debug, Clone, Default)]
-pub struct Agents(Arc<boxcar::Vec<AgentHandle>>);
+#[derive(Debug, Clone)]
+pub struct Agents {
+    all: Arc<boxcar::Vec<AgentHandle>>,
+    pub(super) sleep: Arc<SleepRegistry>,
+}
 
 impl Agents {
+    /// The first agents of a run.
+    pub(super) fn new(sleep: &Arc<SleepRegistry>, first: impl Iterator<Item = AgentHandle>) -> Self {
+        Self { all: Arc::new(first.collect()), sleep: Arc::clone(sleep) }
+    }
+
     /// Adds the agent of the next number.
     pub(super) fn push(&self, agent: AgentHandle) {
-        self.0.push(agent);
+        self.all.push(agent);
     }
 
     /// How many there are, those that have left included.
     #[must_use]
     pub fn len(&self) -> usize {
-        self.0.count()
+        self.all.count()
     }
 
     /// Whether there is none.
     #[must_use]
     pub fn is_empty(&self) -> bool {
-        self.0.is_empty()
+        self.all.is_empty()
     }
 
     /// The agent of a number.
@@ -39,7 +48,7 @@ impl Agents {
     /// The agent at a place.
     #[must_use]
     pub fn get(&self, at: usize) -> Option<&AgentHandle> {
-        self.0.get(at)
+        self.all.get(at)
     }
 
     /// The first agent.
@@ -50,7 +59,7 @@ impl Agents {
 
     /// All of them.
     pub fn iter(&self) -> Iter<'_> {
-        self.0.iter().map(|(_, agent)| agent)
+        self.all.iter().map(|(_, agent)| agent)
     }
 
     /// Copies of their handles.
@@ -69,14 +78,6 @@ impl<'a> IntoIterator for &'a Agents {
 
     fn into_iter(self) -> Iter<'a> {
         self.iter()
-    }
-}
-
-impl FromIterator<AgentHandle> for Agents {
-    fn from_iter<I: IntoIterator<Item = AgentHandle>>(all: I) -> Self {
-        let agents = Self::default();
-        all.into_iter().for_each(|agent| agents.push(agent));
-        agents
     }
 }
 

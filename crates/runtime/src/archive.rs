@@ -82,7 +82,8 @@ pub(super) trait CutBetweenTurns {
 
 /// All agents of a run, taken from their places, and the time.
 pub(super) struct Cut {
-    pub all: Vec<Placed>,
+    /// By their numbers; `None` of one that has left and is not kept.
+    pub all: Vec<Option<Placed>>,
     pub run_agents: RunAgents,
     /// How many agents the state that was read or written is of, those that had left included: all others have left.
     pub counted: usize,
@@ -92,17 +93,18 @@ pub(super) struct Cut {
 
 impl Cut {
     /// The agents of `run_agents`, taken from their places.
-    pub const fn new(all: Vec<Placed>, run_agents: RunAgents, timeline: Timeline, now: Duration) -> Self {
+    pub const fn new(all: Vec<Option<Placed>>, run_agents: RunAgents, timeline: Timeline, now: Duration) -> Self {
         Self { all, run_agents, counted: 0, timeline, now }
     }
 
     /// Writes or reads agents, places and time: what every executor has. What lockstep has besides follows.
     pub fn archive(&mut self, archive: &mut Archive<'_>, absent: Absent<'_>) -> Result<(), ArchiveError> {
-        if self.all.len() != self.run_agents.handles.len() {
+        let handles = &self.run_agents.handles;
+        if self.all.iter().zip(handles).any(|(placed, agent)| placed.is_none() && agent.live().is_some()) {
             let what = "an agent whose step does not end, or whose thread panicked,";
             return Err(ArchiveError::Refused { what: what.to_owned() });
         }
-        let mut present: Vec<bool> = self.all.iter().map(|placed| !placed.has_left()).collect();
+        let mut present: Vec<bool> = handles.iter().map(|agent| !agent.has_left()).collect();
         archive.value(&mut present)?;
         self.counted = present.len();
         if archive.is_reading() {
@@ -114,11 +116,11 @@ impl Cut {
         run_agents.peers.broad_phase.archive(*counted, all.len(), archive)?;
         let of = all[..*counted].iter();
         let mut places: Vec<Place> =
-            of.map(|placed| if placed.has_left() { Place::Home } else { placed.place }).collect();
+            of.map(|one| one.as_ref().filter(|one| !one.has_left()).map_or(Place::Home, |one| one.place)).collect();
         archive.value(&mut places)?;
         check_places(&places, &all[..*counted])?;
         let places = places.into_iter().chain(std::iter::repeat(Place::Home));
-        all.iter_mut().zip(places).for_each(|(placed, place)| placed.place = place);
+        all.iter_mut().zip(places).for_each(|(one, place)| one.iter_mut().for_each(|one| one.place = place));
         archive_values!(archive, *timeline, *now)
     }
 
@@ -128,8 +130,8 @@ impl Cut {
         let Self { all, run_agents, .. } = self;
         let mut made = BTreeMap::new();
         for (at, _) in present.iter().enumerate().filter(|(_, present)| **present) {
-            let here = all.get(at);
-            if here.is_some_and(|placed| !placed.has_left() || placed.runner.shared.is_first()) {
+            // one that is there, or that left and is kept
+            if all.get(at).is_some_and(Option::is_some) {
                 continue;
             }
             let spawn = absent(AgentId(at as u32))?;
@@ -140,14 +142,17 @@ impl Cut {
             })?;
             made.insert(at, spawn);
         }
-        all.extend(run_agents.reach(present.len()).map(|runner| Placed { runner, place: Place::Home }));
+        run_agents.reach(present.len());
+        all.resize_with(run_agents.handles.len(), || None);
+        for (at, spawn) in made {
+            all[at] = Some(Placed { runner: run_agents.revive(AgentId(at as u32), spawn), place: Place::Home });
+        }
         let present = present.iter().copied().chain(std::iter::repeat(false));
-        for (at, (placed, present)) in all.iter_mut().zip(present).enumerate() {
-            match (placed.has_left(), present) {
-                (false, false) => placed.runner.take_out(),
-                (true, true) => placed.runner.revive(made.remove(&at)),
-                _ => {}
+        for (one, _) in all.iter_mut().zip(present).filter(|(_, present)| !present) {
+            if let Some(placed) = one.as_mut().filter(|placed| !placed.has_left()) {
+                placed.runner.take_out();
             }
+            *one = one.take().and_then(Placed::kept);
         }
         Ok(())
     }
@@ -178,7 +183,7 @@ impl Cut {
         if !archive.is_reading() {
             return Ok(());
         }
-        self.all.iter_mut().for_each(|placed| placed.runner.rebase(wall));
+        self.all.iter_mut().flatten().for_each(|placed| placed.runner.rebase(wall));
         let sim = self.timeline.sim_at(self.now);
         (self.timeline, self.now) = (own.set_to(wall, wall, sim, &self.timeline), wall);
         Ok(())
@@ -216,11 +221,16 @@ impl Placed {
     fn has_left(&self) -> bool {
         self.runner.shared.gauges.has_left()
     }
+
+    fn kept(self) -> Option<Self> {
+        self.runner.kept().map(|runner| Self { runner, ..self })
+    }
 }
 
 /// Writes or reads the agents of a run that are `present`, by rising numbers.
-fn archive_agents(all: &mut [Placed], present: &[bool], archive: &mut Archive<'_>) -> Result<(), ArchiveError> {
-    for (Placed { runner, .. }, _) in all.iter_mut().zip(present).filter(|(_, present)| **present) {
+fn archive_agents(all: &mut [Option<Placed>], present: &[bool], archive: &mut Archive<'_>) -> Result<(), ArchiveError> {
+    let there = all.iter_mut().zip(present).filter(|(_, present)| **present);
+    for Placed { runner, .. } in there.filter_map(|(one, _)| one.as_mut()) {
         let shared = Arc::clone(&runner.shared);
         archive.within(format_args!("agent \"{}\"", shared.name()), |archive| {
             let Shared { gauges, mail, .. } = &*shared;

@@ -12,11 +12,12 @@ mod published_bounds;
 pub(super) use neighbour_list::NeighbourList;
 
 use super::table::Table;
+use arc_swap::ArcSwapOption;
 use glam::DVec3;
 use metachron_core::{AgentId, Archive, ArchiveError, Bounds, SimSpan, SimTime};
 use published_bounds::{MovingBox, PublishedBounds, ReadBounds};
-use std::sync::OnceLock;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering::SeqCst};
+use std::sync::{Arc, OnceLock};
 
 /// The step that an agent is about to make.
 #[derive(Debug, Clone, Copy)]
@@ -43,8 +44,10 @@ pub(super) struct BroadPhase {
 #[derive(Debug, Default)]
 struct Calls {
     any: AtomicBool,
-    pages: OnceLock<Box<boxcar::Vec<OnceLock<Page>>>>,
+    pages: ArcSwapOption<Pages>,
 }
+
+type Pages = boxcar::Vec<OnceLock<Page>>;
 
 /// The bits of some callers.
 type Page = Box<[AtomicU64; PAGE_WORDS]>;
@@ -107,18 +110,29 @@ impl BroadPhase {
         }
     }
 
-    /// Publishes that `id` is so far away that nothing comes near it.
+    /// Publishes that `id`, which has left, is so far away that nothing comes near it, and frees what has called it.
     pub fn publish_nowhere(&self, id: AgentId, time: SimTime) {
         let Some(published) = self.bounds.get(id.0 as usize) else { return };
         let nowhere = DVec3::splat(NOWHERE_M);
         published.write(&MovingBox { low: nowhere, high: nowhere, speed_m_s: 0.0, time });
+        self.calls.get(id.0 as usize).into_iter().for_each(|calls| calls.pages.store(None));
+    }
+
+    /// Whether `id` has left.
+    fn is_nowhere(&self, id: AgentId) -> bool {
+        matches!(self.bounds_of(id), ReadBounds::Known(reach) if reach.low.x >= NOWHERE_M / 2.0)
     }
 
     /// Notifies `to` that `from` has given an impulse to it, or belongs into one cluster with it: `to` lists `from` at its next turn.
     pub fn call(&self, to: AgentId, from: AgentId) {
         let Some(calls) = self.calls.get(to.0 as usize) else { return };
         let (word, bit) = (from.0 as usize / 64, 1 << (from.0 % 64));
-        let pages = calls.pages.get_or_init(Box::default);
+        let mut pages = calls.pages.load();
+        if pages.is_none() && !self.is_nowhere(to) {
+            calls.pages.rcu(|made| made.clone().or_else(|| Some(Arc::default())));
+            pages = calls.pages.load();
+        }
+        let Some(pages) = &*pages else { return };
         while pages.count() <= word / PAGE_WORDS {
             pages.push(OnceLock::new());
         }
@@ -134,7 +148,8 @@ impl BroadPhase {
         if !(calls.any.load(SeqCst) && calls.any.swap(false, SeqCst)) {
             return;
         }
-        let pages = calls.pages.get().into_iter().flat_map(|pages| pages.iter());
+        let pages = calls.pages.load();
+        let pages = pages.iter().flat_map(|pages| pages.iter());
         for (page, words) in pages.filter_map(|(at, page)| Some((at, page.get()?))) {
             for (word, bits) in words.iter().enumerate() {
                 let mut bits = bits.swap(0, SeqCst);

@@ -24,9 +24,10 @@ pub(super) use turn::Leap;
 
 use super::agent_runner::{AgentRunner, StepOutcome, contained};
 use super::broad_phase::PlannedStep;
+use super::handle::Shared;
 use super::helpers::Helped;
 use super::loads::{Acting, Loads};
-use super::observation::{Observer, Peer, newest};
+use super::observation::{Observer, newest};
 use metachron_contact::asynchronous::{MacroStep, Pairs, Remotes, part};
 use metachron_contact::stepper::{ClusterScene, ClusterStepper, ContactMemory, Participant, Plan, Role, StepDoubling};
 use metachron_contact::{Link, Neighbour, StepContext};
@@ -230,8 +231,8 @@ impl ClusterSeat {
     }
 
     /// Notes with whom it belongs into one cluster: not with partners of asynchronous pairs, which only see each other.
-    fn bond(&mut self, observer: &Observer, grasped: Option<AgentId>, links: &[Link], mine: Option<&Peer>) {
-        let is_apart = |id: AgentId| mine.is_some_and(|mine| mine.law(id).is_asynchronous());
+    fn bond(&mut self, observer: &Observer, grasped: Option<AgentId>, links: &[Link], mine: &Shared) {
+        let is_apart = |id: AgentId| mine.law(id).is_asynchronous();
         self.bonds.clear();
         self.bonds.extend(observer.near().iter().copied().filter(|id| !is_apart(*id)));
         self.bonds.extend(held_by_joints(&self.jointed, &self.memory).chain(grasped));
@@ -415,12 +416,12 @@ impl AgentRunner {
         parts: u32,
     ) -> Option<(Participant<'_>, Option<&mut Pairs>)> {
         let id = self.shared.id;
-        let Self { agent, observer, loads, links, peers, cluster, .. } = self;
+        let Self { agent, observer, loads, links, shared, cluster, .. } = self;
         let ClusterSeat { memory, grips, asynchronous, .. } = &mut **cluster.as_mut()?;
         let Acting { springs: hands, forces, motors, pose } = prepared(loads, time, dt);
         let (neighbours, pose) = (observer.neighbours(), *pose);
         let context = StepContext { me: id, time, neighbours, hands, forces, motors, pose, links };
-        let laws = peers.get(id).map_or(&[][..], |peer| &peer.laws);
+        let laws = &shared.laws;
         let (member, alone_s) = (agent.member()?, self.pace.wanted().as_secs_f64());
         let participant = Participant { id, member, context, laws, memory, parts, alone_s, grips };
         Some((participant, asynchronous.as_deref_mut()))
@@ -456,10 +457,10 @@ impl AgentRunner {
     fn look_among(&mut self, step: PlannedStep, members: &Membership) {
         self.observe(step, members);
         let now = self.pace.time();
-        let Self { observer, peers, writer, links, cluster, .. } = self;
+        let Self { shared, observer, peers, writer, links, cluster, .. } = self;
         let Some(seat) = cluster else { return };
         let grasped = newest(writer, |mine| mine.body.tool().and_then(|tool| tool.grasp)).map(|grasp| grasp.target);
-        seat.bond(observer, grasped, links, peers.get(observer.me()));
+        seat.bond(observer, grasped, links, shared);
         // who joins stays for a while: two that follow each other from cluster to cluster would never meet
         let ClusterSeat { memory, bonds, .. } = &mut **seat;
         bonds.iter().for_each(|id| memory.meet(*id, now));

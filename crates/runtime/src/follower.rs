@@ -8,7 +8,7 @@ use super::agent_clock::{Timeline, TimelineCommand};
 use super::agent_runner::{AgentRunner, Next, StepOutcome};
 use super::agents::Agents;
 use super::archive::{Absent, Cut};
-use super::cluster::{Handover, close_remaining, hand_over, put_back, take_apart};
+use super::cluster::{close_remaining, hand_over, put_back, take_apart};
 use super::handle::AgentHandle;
 use super::helpers::Helpers;
 use super::mailbox::SendError;
@@ -18,7 +18,6 @@ use super::turn_order::{PartKind, TurnPart};
 use super::turn_parts::{Prepared, PreparedTurn};
 use super::turns::Took;
 use metachron_core::{AgentId, Archive, ArchiveError, SimTime};
-use std::sync::Arc;
 use std::time::Duration;
 
 /// Agents that do what others did.
@@ -68,7 +67,7 @@ impl Follower {
         let handle = self.all.handles.of(agent).ok_or_else(unknown)?;
         let followed = self.followed.get_mut(agent.0 as usize).ok_or_else(unknown)?;
         if followed.actor.is_none() {
-            followed.actor = handle.shared.handover().and_then(Handover::take_returned);
+            followed.actor = handle.take_returned();
         }
         self.now = wall;
         let done = match kind {
@@ -78,6 +77,7 @@ impl Follower {
             PartKind::Join => followed.join(),
             PartKind::Restore => None,
         };
+        followed.actor = followed.actor.take().and_then(AgentRunner::kept);
         let name = handle.name();
         done.ok_or_else(|| {
             format!("at {:.6} s \"{name}\" is in no state in which it could {kind:?}", wall.as_secs_f64())
@@ -104,7 +104,7 @@ impl Follower {
     /// Those of [`Run::add`].
     pub fn add_at(&mut self, spawn: AgentSpawn, at: SimTime) -> Result<AgentHandle, RunError> {
         let actor = self.all.join(spawn, at)?;
-        let handle = AgentHandle { shared: Arc::clone(&actor.shared) };
+        let handle = self.all.handles[actor.id().0 as usize].clone();
         self.followed.push(Followed { actor: Some(actor), ..Followed::default() });
         Ok(handle)
     }
@@ -216,7 +216,8 @@ impl Run for Follower {
     }
 
     fn remove(&mut self, id: AgentId) -> Result<(), SendError> {
-        self.all.leave(id)
+        let home = self.followed.get_mut(id.0 as usize).map(|one| &mut one.actor);
+        self.all.leave(id, home.unwrap_or(&mut None))
     }
 
     /// In the middle of a turn its state cannot be written.

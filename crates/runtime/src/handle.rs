@@ -2,6 +2,8 @@
 //!
 //! Out: snapshots and numbers, without ever waiting for the agent. In: commands. Never here: the agent itself.
 
+use super::agent_record::{AgentRecord, Live};
+use super::agent_runner::AgentRunner;
 use super::cluster::Handover;
 use super::events::AgentEvent;
 use super::form_slot::FormSlot;
@@ -9,25 +11,27 @@ use super::histogram::Histogram;
 use super::mailbox::{Command, Keyed, Mailbox, SendError};
 use super::metrics::{AgentState, AgentStats, Metrics};
 use super::probe::{Sample, Trace};
-use super::removed_agent::REMOVED;
-use super::ring::Ring;
+use super::removed_agent::{REMOVED, nothing};
 use super::sleep::SleepRegistry;
 use super::slot::LatestSlot;
 use super::spawn::AgentSpawn;
+use super::streams::{EventStreams, Heard};
 use super::turns::Turn;
+use metachron_contact::Law;
 use metachron_contact::stepper::ClusterScene;
 use metachron_core::{AgentId, Body, HASH_START, SimSpan, SimTime, Snapshot};
 use metachron_geometry::CollisionShape;
 use std::sync::atomic::Ordering::Relaxed;
-use std::sync::{Arc, Mutex, MutexGuard, OnceLock, PoisonError};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 
 /// Data shared by an agent and its observers.
 #[derive(Debug)]
 pub(super) struct Shared {
     pub id: AgentId,
-    /// Unset where nothing more is known than that it has left; a state that is read may tell later ([`super::archive`]).
-    pub identity: OnceLock<Identity>,
+    pub identity: Identity,
+    /// The laws of its pairs that are not [`Law::Cluster`], by rising numbers of the peers.
+    pub laws: Box<[(AgentId, Law)]>,
     pub gauges: Metrics,
     /// Its contact shape; `None` where nothing can touch it.
     pub form: FormSlot,
@@ -38,7 +42,7 @@ pub(super) struct Shared {
     /// Used by readers only: the agent never waits for this lock.
     pub ages: Mutex<Histogram>,
     /// Empty for most agents. Only the agent writes, so that it never waits during the run; readers read at the end.
-    pub traces: Vec<Mutex<Trace>>,
+    pub traces: Box<[Mutex<Trace>]>,
 }
 
 /// Which agent has a number: it never changes.
@@ -76,257 +80,64 @@ impl Identity {
 
 impl Shared {
     pub fn name(&self) -> &str {
-        self.identity.get().map_or("", |identity| &identity.name)
+        &self.identity.name
     }
 
-    pub fn model(&self) -> &'static str {
-        self.identity.get().map_or(REMOVED, |identity| identity.model)
+    pub const fn model(&self) -> &'static str {
+        self.identity.model
     }
 
     /// Requested steps per simulated second.
-    pub fn wanted_hz(&self) -> f64 {
-        self.identity.get().map_or(1.0, |identity| identity.wanted_hz)
+    pub const fn wanted_hz(&self) -> f64 {
+        self.identity.wanted_hz
     }
 
-    pub fn takes_poses(&self) -> bool {
-        self.identity.get().is_some_and(|identity| identity.takes_poses)
+    pub const fn takes_poses(&self) -> bool {
+        self.identity.takes_poses
     }
 
     /// Whether the run began with it.
-    pub fn is_first(&self) -> bool {
-        self.identity.get().is_some_and(|identity| identity.is_first)
+    pub const fn is_first(&self) -> bool {
+        self.identity.is_first
+    }
+
+    /// Whether it has left and nothing of it is kept: what joined the run is made again where it comes back.
+    pub fn is_forgotten(&self) -> bool {
+        self.gauges.has_left() && !self.is_first()
     }
 
     fn has_motor(&self, joint: u32) -> bool {
-        let scene = self.identity.get().and_then(|identity| identity.motored.as_ref());
-        let mut joints = scene.into_iter().flat_map(|scene| scene.joints_of(self.id));
+        let mut joints = self.identity.motored.iter().flat_map(|scene| scene.joints_of(self.id));
         joints.any(|(number, it)| number == joint && it.takes_motor())
     }
 
-    pub fn handover(&self) -> Option<&Handover> {
-        self.identity.get()?.handover.as_ref()
-    }
-}
-
-/// What an agent tells readers; there is nothing of it before the first of them.
-#[derive(Debug, Default)]
-pub(super) struct EventStreams(OnceLock<Box<Rings>>);
-
-#[derive(Debug, Default)]
-struct Rings {
-    events: Ring<AgentEvent>,
-    turns: Ring<Turn>,
-}
-
-impl EventStreams {
-    fn rings(&self) -> &Rings {
-        self.0.get_or_init(Box::default)
-    }
-
-    /// Tells of an event, from one thread at a time.
-    pub fn event(&self, event: &AgentEvent) {
-        self.0.get().into_iter().for_each(|rings| rings.events.push(event));
-    }
-
-    /// Tells of a turn, from one thread at a time.
-    pub fn turn(&self, turn: impl FnOnce() -> Turn) {
-        if let Some(rings) = self.0.get().filter(|rings| rings.turns.is_heard()) {
-            rings.turns.push(&turn());
-        }
-    }
-}
-
-/// A running agent, seen from outside. Copies refer to the same agent; they outlive the run and then show its final state.
-#[derive(Debug, Clone)]
-pub struct AgentHandle {
-    pub(super) shared: Arc<Shared>,
-}
-
-impl AgentHandle {
-    /// Its number: its place in the list at the start.
-    #[must_use]
-    pub fn id(&self) -> AgentId {
-        self.shared.id
-    }
-
-    /// Its name in the scene.
-    #[must_use]
-    pub fn name(&self) -> &str {
-        self.shared.name()
-    }
-
-    /// Its model.
-    #[must_use]
-    pub fn model(&self) -> &'static str {
-        self.shared.model()
-    }
-
-    /// Whether it is kinematic: poses lead it, and no force moves it.
-    #[must_use]
-    pub fn takes_poses(&self) -> bool {
-        self.shared.takes_poses()
-    }
-
-    /// Its newest state. There is one from the start on.
-    #[must_use]
-    pub fn latest(&self) -> Arc<Snapshot> {
-        self.shared.slot.latest()
-    }
-
-    /// The scene time up to which it has lived: that of its newest state, or of its last waking, if that is later.
-    #[must_use]
-    pub fn lived_to(&self) -> SimTime {
-        self.latest().moment().max(SimTime::from_nanos(self.shared.gauges.woken_at.load(Relaxed)))
-    }
-
-    /// Age of `snapshot` at the simulated time `now`, seconds, ≥ 0.
-    ///
-    /// Zero for a state that covers `now` (one that is on time does), and for the state of an agent at rest: it is still valid.
-    #[must_use]
-    pub fn age_s(&self, snapshot: &Snapshot, now: SimTime) -> f64 {
-        if self.shared.gauges.is_resting() { 0.0 } else { now.since(snapshot.moment()).as_secs_f64() }
-    }
-
-    /// Counts the age of a state that was used, seconds ([`Self::age_s`]); invalid ages are ignored.
-    pub fn record_age(&self, age_s: f64) {
-        if let Ok(age) = Duration::try_from_secs_f64(age_s) {
-            self.ages().record(age);
-        }
-    }
-
-    /// Counts several ages.
-    pub(super) fn record_ages(&self, ages: impl Iterator<Item = SimSpan>) {
-        let mut counted = self.ages();
-        ages.for_each(|age| counted.record(Duration::from_nanos(age.as_nanos())));
-    }
-
-    /// Counts a state that covered the present in so many frames.
-    pub(super) fn record_no_age(&self, frames: usize) {
-        self.ages().record_often(Duration::ZERO, u16::try_from(frames).unwrap_or(u16::MAX));
+    pub const fn handover(&self) -> Option<&Handover> {
+        self.identity.handover.as_ref()
     }
 
     fn ages(&self) -> MutexGuard<'_, Histogram> {
-        self.shared.ages.lock().unwrap_or_else(PoisonError::into_inner)
+        self.ages.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// The leader of the cluster in which it steps; `None` if it makes its own turns.
-    #[must_use]
-    pub fn led_by(&self) -> Option<AgentId> {
-        Some(self.shared.sleep.leader(self.shared.id)).filter(|leader| *leader != self.shared.id)
-    }
-
-    /// Whether it was woken, and has not made a turn since.
-    #[must_use]
-    pub fn is_woken(&self) -> bool {
-        self.shared.sleep.is_woken(self.shared.id)
-    }
-
-    /// Its newest contact shape; `None` where nothing can touch it. It is another one, with the same kind, traits and vertices, where matter was
-    /// taken out of it ([`Command::Carve`]).
-    #[must_use]
-    pub fn form(&self) -> Option<Arc<CollisionShape>> {
-        self.shared.form.latest()
-    }
-
-    /// State of its execution.
-    #[must_use]
-    pub fn state(&self) -> AgentState {
-        self.shared.gauges.state()
-    }
-
-    /// Sends a command to the agent; it obeys at its next turn, and wakes for it.
-    ///
-    /// # Errors
-    /// [`SendError`]: nothing was delivered.
-    pub fn send(&self, command: Command) -> Result<(), SendError> {
-        if let Command::Motor(Keyed { key: joint, .. }) = command
-            && !self.shared.has_motor(joint)
-        {
-            return Err(SendError::NoMotor { agent: self.id(), joint });
-        }
-        if matches!(command, Command::Pose(_)) && !self.shared.takes_poses() {
-            return Err(SendError::NotKinematic(self.id()));
-        }
-        self.shared.mail.send(command)?;
-        self.shared.sleep.wake(self.shared.id);
-        Ok(())
-    }
-
-    /// Lets it take another state before its next step, and wakes it; a state that does not fit changes nothing.
-    pub fn set_state(&self, state: Body) {
-        self.shared.mail.set_state(state);
-        self.shared.sleep.wake(self.shared.id);
-    }
-
-    /// Lets it leave the run at its next turn.
-    pub(super) fn leave(&self) {
-        self.shared.mail.leave();
-        self.shared.sleep.wake(self.shared.id);
-    }
-
-    /// Begins to keep its events for readers; the number of the next one.
-    pub fn listen(&self) -> u64 {
-        self.shared.streams.rings().events.listen()
-    }
-
-    /// Passes its events from number `next` on to `take`; returns the number of the next one, and how many were lost: an agent keeps the
-    /// newest [`crate::EVENTS_KEPT`].
-    pub fn events_from(&self, next: u64, take: impl FnMut(AgentEvent)) -> (u64, u64) {
-        self.shared.streams.rings().events.read(next, take)
-    }
-
-    /// Begins to keep its turns for readers; the number of the next one.
-    pub fn listen_to_turns(&self) -> u64 {
-        self.shared.streams.rings().turns.listen()
-    }
-
-    /// Passes its turns from number `next` on to `take`; returns the number of the next one, and how many were lost: an agent keeps the
-    /// newest [`crate::TURNS_KEPT`].
-    pub fn turns_from(&self, next: u64, take: impl FnMut(Turn)) -> (u64, u64) {
-        self.shared.streams.rings().turns.read(next, take)
-    }
-
-    /// CPU time of its turns so far, seconds; updated about twice a second on threads.
-    #[must_use]
-    pub fn cpu_s(&self) -> f64 {
-        self.shared.gauges.cpu_nanos.load(Relaxed) as f64 * 1e-9
-    }
-
-    /// Samples of the point watched as number `watch`; empty if there is none. To be read when the run has ended: until then reading may
-    /// block the agent.
-    #[must_use]
-    pub fn samples(&self, watch: usize) -> Vec<Sample> {
-        let trace = self.shared.traces.get(watch).map(|trace| trace.lock().unwrap_or_else(PoisonError::into_inner));
-        trace.map_or_else(Vec::new, |trace| trace.samples().to_vec())
-    }
-
-    /// Steps taken.
-    #[must_use]
-    pub fn steps(&self) -> u64 {
-        self.shared.gauges.steps.load(Relaxed)
-    }
-
-    /// Its statistics so far. Reading the percentiles of its ages takes microseconds: for a table, not for every draw call.
-    #[must_use]
-    pub fn stats(&self) -> AgentStats {
-        let Shared { gauges, .. } = &*self.shared;
-        let newest = self.latest();
+    fn stats(&self) -> AgentStats {
+        let Self { gauges, identity, .. } = self;
+        let newest = self.slot.latest();
         let span = |nanos: &std::sync::atomic::AtomicU64| SimSpan::from_nanos(nanos.load(Relaxed));
         AgentStats {
-            id: self.shared.id,
-            name: self.shared.identity.get().map_or_else(|| "".into(), |identity| Arc::clone(&identity.name)),
-            model: self.shared.model(),
+            id: self.id,
+            name: Arc::clone(&identity.name),
+            model: identity.model,
             steps: gauges.steps.load(Relaxed),
             rate_hz: if gauges.is_running() { gauges.rate_hz.get() } else { 0.0 },
             mean_hz: gauges.mean_hz.get(),
-            wanted_hz: self.shared.wanted_hz(),
+            wanted_hz: identity.wanted_hz,
             dt: span(&gauges.dt),
             resolution: newest.resolution,
             nodes: newest.nodes,
             work_s: gauges.work_s.get(),
             turn_s: gauges.turn_s.get(),
             work: gauges.work.get(),
-            cpu_s: self.cpu_s(),
+            cpu_s: gauges.cpu_s(),
             age: self.ages().spread(),
             late: gauges.late(),
             misses: gauges.misses.load(Relaxed),
@@ -336,14 +147,226 @@ impl AgentHandle {
             energy_j: newest.energy_j,
             residual_m: newest.residual_m,
             drift_m: newest.drift_m,
-            led_by: self.led_by(),
+            led_by: self.sleep.led_by(self.id),
         }
+    }
+}
+
+/// A running agent, seen from outside. Copies refer to the same agent; they outlive the run and then show its final state.
+#[derive(Debug, Clone)]
+pub struct AgentHandle {
+    pub(super) record: Arc<AgentRecord>,
+}
+
+impl AgentHandle {
+    /// That of an agent that begins.
+    pub(super) fn of(shared: &Arc<Shared>) -> Self {
+        Self { record: Arc::new(AgentRecord::of(shared)) }
+    }
+
+    /// The agent; `None` of one that has left and is not kept.
+    pub(super) fn live(&self) -> Option<Live> {
+        self.record.live()
+    }
+
+    /// The runner, if it has returned from a leader.
+    pub(super) fn take_returned(&self) -> Option<Box<AgentRunner>> {
+        self.live()?.handover()?.take_returned()
+    }
+
+    /// Whether it has left.
+    pub(super) fn has_left(&self) -> bool {
+        self.live().is_none_or(|shared| shared.gauges.has_left())
+    }
+
+    /// Its number: its place in the list at the start.
+    #[must_use]
+    pub fn id(&self) -> AgentId {
+        self.record.id
+    }
+
+    /// Its name in the scene.
+    #[must_use]
+    pub fn name(&self) -> &str {
+        self.record.name()
+    }
+
+    /// Its model.
+    #[must_use]
+    pub fn model(&self) -> &'static str {
+        self.live().map_or(REMOVED, |shared| shared.model())
+    }
+
+    /// Whether it is kinematic: poses lead it, and no force moves it.
+    #[must_use]
+    pub fn takes_poses(&self) -> bool {
+        self.live().is_some_and(|shared| shared.takes_poses())
+    }
+
+    /// Its newest state. There is one from the start on.
+    #[must_use]
+    pub fn latest(&self) -> Arc<Snapshot> {
+        self.live().map_or_else(nothing, |shared| shared.slot.latest())
+    }
+
+    /// The scene time up to which it has lived: that of its newest state, or of its last waking, if that is later.
+    #[must_use]
+    pub fn lived_to(&self) -> SimTime {
+        let Some(shared) = self.live() else { return SimTime::ZERO };
+        shared.slot.latest().moment().max(SimTime::from_nanos(shared.gauges.woken_at.load(Relaxed)))
+    }
+
+    /// Age of `snapshot` at the simulated time `now`, seconds, ≥ 0.
+    ///
+    /// Zero for a state that covers `now` (one that is on time does), and for the state of an agent at rest: it is still valid.
+    #[must_use]
+    pub fn age_s(&self, snapshot: &Snapshot, now: SimTime) -> f64 {
+        if self.live().is_some_and(|shared| shared.gauges.is_resting()) {
+            0.0
+        } else {
+            now.since(snapshot.moment()).as_secs_f64()
+        }
+    }
+
+    /// Counts the age of a state that was used, seconds ([`Self::age_s`]); invalid ages are ignored.
+    pub fn record_age(&self, age_s: f64) {
+        if let (Ok(age), Some(shared)) = (Duration::try_from_secs_f64(age_s), self.live()) {
+            shared.ages().record(age);
+        }
+    }
+
+    /// Counts several ages.
+    pub(super) fn record_ages(&self, ages: impl Iterator<Item = SimSpan>) {
+        let Some(shared) = self.live() else { return };
+        let mut counted = shared.ages();
+        ages.for_each(|age| counted.record(Duration::from_nanos(age.as_nanos())));
+    }
+
+    /// Counts a state that covered the present in so many frames.
+    pub(super) fn record_no_age(&self, frames: usize) {
+        let Some(shared) = self.live() else { return };
+        shared.ages().record_often(Duration::ZERO, u16::try_from(frames).unwrap_or(u16::MAX));
+    }
+
+    /// The leader of the cluster in which it steps; `None` if it makes its own turns.
+    #[must_use]
+    pub fn led_by(&self) -> Option<AgentId> {
+        self.live()?.sleep.led_by(self.id())
+    }
+
+    /// Whether it was woken, and has not made a turn since.
+    #[must_use]
+    pub fn is_woken(&self) -> bool {
+        self.live().is_some_and(|shared| shared.sleep.is_woken(self.id()))
+    }
+
+    /// Its newest contact shape; `None` where nothing can touch it. It is another one, with the same kind, traits and vertices, where matter was
+    /// taken out of it ([`Command::Carve`]).
+    #[must_use]
+    pub fn form(&self) -> Option<Arc<CollisionShape>> {
+        self.live()?.form.latest()
+    }
+
+    /// State of its execution.
+    #[must_use]
+    pub fn state(&self) -> AgentState {
+        self.live().map_or(AgentState::Gone, |shared| shared.gauges.state())
+    }
+
+    /// Sends a command to the agent; it obeys at its next turn, and wakes for it.
+    ///
+    /// # Errors
+    /// [`SendError`]: nothing was delivered.
+    pub fn send(&self, command: Command) -> Result<(), SendError> {
+        let shared = self.live().filter(|shared| !shared.gauges.has_left()).ok_or(SendError::NoAgent(self.id()))?;
+        if let Command::Motor(Keyed { key: joint, .. }) = command
+            && !shared.has_motor(joint)
+        {
+            return Err(SendError::NoMotor { agent: self.id(), joint });
+        }
+        if matches!(command, Command::Pose(_)) && !shared.takes_poses() {
+            return Err(SendError::NotKinematic(self.id()));
+        }
+        shared.mail.send(command)?;
+        shared.sleep.wake(self.id());
+        Ok(())
+    }
+
+    /// Lets it take another state before its next step, and wakes it; a state that does not fit changes nothing.
+    pub fn set_state(&self, state: Body) {
+        if let Some(shared) = self.live() {
+            shared.mail.set_state(state);
+            shared.sleep.wake(self.id());
+        }
+    }
+
+    /// Lets it leave the run at its next turn.
+    pub(super) fn leave(&self) {
+        if let Some(shared) = self.live() {
+            shared.mail.leave();
+            shared.sleep.wake(self.id());
+        }
+    }
+
+    /// Begins to keep its events for a reader.
+    #[must_use]
+    pub fn listen(&self) -> Heard {
+        self.live().map_or_else(Heard::default, |shared| shared.streams.listen(|rings| &rings.events))
+    }
+
+    /// Passes its events that a reader has not heard on to `take`; returns how many were lost: an agent keeps the newest
+    /// [`crate::EVENTS_KEPT`].
+    pub fn hear_events(&self, heard: &mut Heard, take: impl FnMut(AgentEvent)) -> u64 {
+        // looked at first: what has left then has told that before
+        let live = self.live();
+        heard.hear(live.as_ref().map(|shared| &shared.streams), |rings| &rings.events, take)
+    }
+
+    /// Begins to keep its turns for a reader.
+    #[must_use]
+    pub fn listen_to_turns(&self) -> Heard {
+        self.live().map_or_else(Heard::default, |shared| shared.streams.listen(|rings| &rings.turns))
+    }
+
+    /// Passes its turns that a reader has not heard on to `take`; returns how many were lost: an agent keeps the newest
+    /// [`crate::TURNS_KEPT`].
+    pub fn hear_turns(&self, heard: &mut Heard, take: impl FnMut(Turn)) -> u64 {
+        let live = self.live();
+        heard.hear(live.as_ref().map(|shared| &shared.streams), |rings| &rings.turns, take)
+    }
+
+    /// CPU time of its turns so far, seconds; updated about twice a second on threads.
+    #[must_use]
+    pub fn cpu_s(&self) -> f64 {
+        self.live().map_or(0.0, |shared| shared.gauges.cpu_s())
+    }
+
+    /// Samples of the point watched as number `watch`; empty if there is none. To be read when the run has ended: until then reading may
+    /// block the agent.
+    #[must_use]
+    pub fn samples(&self, watch: usize) -> Vec<Sample> {
+        let live = self.live();
+        let trace = live.as_ref().and_then(|shared| shared.traces.get(watch));
+        let trace = trace.map(|trace| trace.lock().unwrap_or_else(PoisonError::into_inner));
+        trace.map_or_else(Vec::new, |trace| trace.samples().to_vec())
+    }
+
+    /// Steps taken.
+    #[must_use]
+    pub fn steps(&self) -> u64 {
+        self.live().map_or(0, |shared| shared.gauges.steps.load(Relaxed))
+    }
+
+    /// Its statistics so far. Reading the percentiles of its ages takes microseconds: for a table, not for every draw call.
+    #[must_use]
+    pub fn stats(&self) -> AgentStats {
+        self.live().map_or_else(|| AgentStats::of_removed(self.id(), self.record.name()), |shared| shared.stats())
     }
 }
 
 /// Hash of the newest states of all `agents` that have not left, in their order: equal numbers mean bit-identical states.
 #[must_use]
 pub fn state_hash<'a>(agents: impl IntoIterator<Item = &'a AgentHandle>) -> u64 {
-    let present = agents.into_iter().filter(|agent| !agent.shared.gauges.has_left());
+    let present = agents.into_iter().filter(|agent| !agent.has_left());
     present.fold(HASH_START, |hash, agent| agent.latest().fold_hash(hash))
 }

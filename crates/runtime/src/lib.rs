@@ -26,6 +26,7 @@
 //! ```
 
 mod agent_clock;
+mod agent_record;
 mod agent_runner;
 mod agents;
 mod archive;
@@ -65,6 +66,7 @@ mod seqlock;
 mod sleep;
 mod slot;
 mod spawn;
+mod streams;
 mod sync;
 mod table;
 #[cfg(test)]
@@ -95,6 +97,7 @@ pub use probe::{SAMPLES_MAX, Sample, WatchedPoint};
 pub use reader::Reader;
 pub use slot::{LatestSlot, SlotWriter};
 pub use spawn::{AgentSpawn, RATE_MAX_HZ, RunError};
+pub use streams::Heard;
 pub use threads::{AUTO_THREADS_MAX, THREADS_MAX, Threads};
 pub use turn_order::{Held, OrderLog, PartKind, TurnOrder, TurnPart};
 pub use turns::{TURNS_KEPT, Turn};

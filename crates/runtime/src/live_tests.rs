@@ -1,8 +1,9 @@
 //! Claims about agents in real time, held against every executor that keeps it.
 
-use super::testing::{Dummy, Fault, Log, eventually, on_every_executor, system};
+use super::testing::{Dummy, Fault, Log, eventually, holders, on_every_executor, system};
 use super::{AgentState, Clock, Command, ManualClock, Run, TimelineCommand};
 use metachron_core::{AgentId, Archive, Resolution, SimSpan, SimTime};
+use std::collections::VecDeque;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering::SeqCst};
 use std::time::Duration;
@@ -16,7 +17,7 @@ fn every_agent_steps_on_its_own_and_the_end_joins_them() {
         let stats = run.shutdown();
         assert!(stats.iter().all(|s| s.steps >= 50 && s.state == AgentState::Running && s.cpu_s > 0.0));
         assert_eq!(kept.latest().steps, stats[0].steps, "the last state outlives the run");
-        assert_eq!(Arc::strong_count(&kept.shared), 1, "every thread has let go of its agent");
+        assert_eq!(holders(&kept), 1, "every thread has let go of its agent");
     });
 }
 
@@ -137,7 +138,26 @@ fn a_run_that_is_dropped_ends_its_threads() {
             start(vec![Dummy::new(1.0).at(500.0), Dummy { rest_from: Some(1), ..Dummy::new(1.0) }.at(500.0)], system());
         let kept: Vec<_> = run.agents().to_vec();
         drop(run);
-        assert!(kept.iter().all(|a| Arc::strong_count(&a.shared) == 1));
+        assert!(kept.iter().all(|a| holders(a) == 1));
+    });
+}
+
+#[test]
+fn of_those_that_joined_and_left_nothing_is_kept_but_their_numbers() {
+    on_every_executor(|start| {
+        let (log, mut crowd) = (Log::default(), VecDeque::new());
+        let mut run = start(vec![Dummy::new(1.0).at(100.0)], system());
+        for _ in 0..500 {
+            crowd.push_back(run.add(Dummy::member(1.0, &log).at(1000.0)).unwrap().id());
+            if crowd.len() > 3 {
+                run.remove(crowd.pop_front().unwrap()).unwrap();
+            }
+        }
+        crowd.into_iter().for_each(|id| run.remove(id).unwrap());
+        let left = || run.agents().iter().skip(1);
+        eventually("their models are freed", || Arc::strong_count(&log) == 1);
+        assert!(left().all(|agent| agent.live().is_none() && agent.state() == AgentState::Gone));
+        assert_eq!((left().count(), run.agents()[0].state()), (500, AgentState::Running));
     });
 }
 

@@ -11,7 +11,7 @@ use super::agent_clock::{Timeline, TimelineCommand};
 use super::agent_runner::{AgentRunner, Effort, Next};
 use super::agents::Agents;
 use super::archive::{Absent, Cut, VirtualEvents};
-use super::cluster::{Handover, Place, Placed, close_remaining, hand_over, put_back, take_apart};
+use super::cluster::{Place, Placed, close_remaining, hand_over, put_back, take_apart};
 use super::cpu::CpuBatch;
 use super::handle::AgentHandle;
 use super::helpers::Helpers;
@@ -24,7 +24,6 @@ use cores::Cores;
 use metachron_core::{AgentId, Archive, ArchiveError};
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
-use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 /// Agents in virtual time on a declared machine.
@@ -136,10 +135,10 @@ impl Lockstep {
                     entry.phase = Phase::Waiting;
                 }
                 (Phase::Led, _) => {
-                    let returned = self.all.handles[agent].shared.handover().and_then(Handover::take_returned);
+                    let returned = self.all.handles[agent].take_returned();
                     let Some(actor) = returned else { continue };
                     entry.phase = if actor.is_parked() { Phase::Parked } else { Phase::Waiting };
-                    entry.actor = Some(actor);
+                    entry.actor = actor.kept();
                 }
                 _ => continue,
             }
@@ -203,6 +202,9 @@ impl Lockstep {
             None => entry.phase = Phase::Parked,
         }
         self.count_cpu(agent, started.elapsed());
+        if self.entries[agent].phase == Phase::Parked {
+            self.release(agent);
+        }
     }
 
     fn finish(&mut self, agent: usize) {
@@ -236,6 +238,13 @@ impl Lockstep {
         if entry.actor.is_none() {
             entry.phase = Phase::Led;
         }
+    }
+
+    /// Frees the runner of an agent that has left, where it is not kept.
+    fn release(&mut self, agent: usize) {
+        self.settle();
+        let entry = &mut self.entries[agent];
+        entry.actor = entry.actor.take().and_then(AgentRunner::kept);
     }
 
     fn count_cpu(&mut self, agent: usize, wall: Duration) {
@@ -281,11 +290,11 @@ impl Lockstep {
             self.timeline = own.set_to(own_now, cut.now, cut.timeline.sim_at(cut.now), &cut.timeline);
             self.due.clear();
             self.cores = Cores::new(self.machine.cores);
-            for (entry, placed) in self.entries.iter_mut().zip(&cut.all) {
-                (entry.phase, entry.turns) = (phase_of(placed), 0);
+            for (entry, one) in self.entries.iter_mut().zip(&cut.all) {
+                (entry.phase, entry.turns) = (one.as_ref().map_or(Phase::Parked, phase_of), 0);
             }
             // some may have been notified just before
-            cut.all.iter().for_each(|placed| self.all.sleep.notify(placed.runner.id()));
+            cut.all.iter().flatten().for_each(|placed| self.all.sleep.notify(placed.runner.id()));
             return Ok(());
         };
         if phases.len() != cut.counted {
@@ -391,7 +400,7 @@ impl Run for Lockstep {
 
     fn add(&mut self, spawn: AgentSpawn) -> Result<AgentHandle, RunError> {
         let actor = self.all.join(spawn, self.sim_now())?;
-        let (agent, handle) = (self.entries.len(), AgentHandle { shared: Arc::clone(&actor.shared) });
+        let (agent, handle) = (self.entries.len(), self.all.handles[actor.id().0 as usize].clone());
         let phase = if actor.is_parked() { Phase::Parked } else { Phase::Waiting };
         self.entries.push(AgentEntry { actor: Some(actor), phase, turns: 0 });
         self.schedule(agent);
@@ -412,7 +421,8 @@ impl Run for Lockstep {
     }
 
     fn remove(&mut self, id: AgentId) -> Result<(), SendError> {
-        self.all.leave(id)
+        let home = self.entries.get_mut(id.0 as usize).map(|entry| &mut entry.actor);
+        self.all.leave(id, home.unwrap_or(&mut None))
     }
 
     fn shutdown(mut self: Box<Self>) -> Vec<AgentStats> {

@@ -5,6 +5,7 @@
 
 use super::agent_clock::AgentClock;
 use super::histogram::Histogram;
+use super::removed_agent::REMOVED;
 use arc_swap::ArcSwapOption;
 use metachron_core::{AgentId, Archive, ArchiveError, Resolution, SimSpan, SimTime, archive_values};
 use std::sync::Arc;
@@ -35,7 +36,7 @@ pub struct Spread {
     pub max_s: f64,
 }
 
-/// Statistics of an agent so far.
+/// Statistics of an agent so far; of one that joined the run and has left nothing but its name.
 #[derive(Debug, Clone, PartialEq)]
 pub struct AgentStats {
     /// The agent.
@@ -87,6 +88,39 @@ pub struct AgentStats {
     pub drift_m: f64,
     /// The leader that makes its turns, on the leader's thread and clock, because the two are of one cluster; `None` if it makes them itself.
     pub led_by: Option<AgentId>,
+}
+
+impl AgentStats {
+    /// Those of an agent that has left and of which nothing is kept.
+    pub(super) fn of_removed(id: AgentId, name: &str) -> Self {
+        let (none, times) = (SimSpan::ZERO, Spread::default());
+        Self {
+            id,
+            name: name.into(),
+            model: REMOVED,
+            steps: 0,
+            rate_hz: 0.0,
+            mean_hz: 0.0,
+            wanted_hz: 0.0,
+            dt: none,
+            resolution: None,
+            nodes: None,
+            work_s: 0.0,
+            turn_s: 0.0,
+            work: 0.0,
+            cpu_s: 0.0,
+            age: times,
+            late: times,
+            misses: 0,
+            dropped: none,
+            rested: none,
+            state: AgentState::Gone,
+            energy_j: 0.0,
+            residual_m: 0.0,
+            drift_m: 0.0,
+            led_by: None,
+        }
+    }
 }
 
 /// A number that one thread writes and any thread reads.
@@ -186,6 +220,11 @@ impl Metrics {
         self.reason.store(reason.map(Arc::new));
         self.state.store(state, Relaxed);
         Ok(())
+    }
+
+    /// CPU time of turns so far, seconds.
+    pub fn cpu_s(&self) -> f64 {
+        self.cpu_nanos.load(Relaxed) as f64 * 1e-9
     }
 
     pub fn late(&self) -> Spread {

@@ -4,9 +4,11 @@
 //! their order; then peers near enough to touch, and peers with unsettled impulse ledgers, by rising numbers. No allocation once the sizes
 //! settle. Never here: when an agent looks.
 
+use super::agent_record::Live;
+use super::agents::Agents;
 use super::broad_phase::{BroadPhase, NeighbourList, PlannedStep};
 use super::cluster::Membership;
-use super::handle::Shared;
+use super::handle::{AgentHandle, Shared};
 use super::helpers::Helpers;
 use super::slot::SlotWriter;
 use metachron_contact::Neighbour;
@@ -23,7 +25,7 @@ use std::sync::{Arc, OnceLock};
 /// Data of all agents that have ever been in a run.
 #[derive(Debug)]
 pub(super) struct Peers {
-    pub all: boxcar::Vec<Peer>,
+    pub all: Agents,
     pub broad_phase: BroadPhaseSlot,
     /// Who helps with the turns of large clusters.
     pub helpers: Helpers,
@@ -73,13 +75,6 @@ impl BroadPhaseSlot {
     }
 }
 
-/// Data of one agent for its peers.
-pub(super) struct Peer {
-    pub shared: Arc<Shared>,
-    /// The laws of its pairs that are not [`Law::Cluster`], by rising numbers of the peers.
-    pub laws: Vec<(AgentId, Law)>,
-}
-
 /// The list of peers that an agent sees.
 #[derive(Debug)]
 pub(super) struct Observer {
@@ -112,17 +107,11 @@ impl Source {
     }
 }
 
-impl std::fmt::Debug for Peer {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        f.debug_struct("Peer").field("shared", &self.shared).field("laws", &self.laws).finish_non_exhaustive()
-    }
-}
-
-impl Peer {
+impl Shared {
     /// By which it is settled who computes its asynchronous pairs: never what moves as it is led, which nothing that it is given moves.
     fn clock(&self) -> PairClock {
-        let step_s = if self.shared.takes_poses() { f64::INFINITY } else { self.shared.wanted_hz().recip() };
-        PairClock { id: self.shared.id, step_s }
+        let step_s = if self.takes_poses() { f64::INFINITY } else { self.wanted_hz().recip() };
+        PairClock { id: self.id, step_s }
     }
 
     /// The law of its pair with `other`.
@@ -132,13 +121,13 @@ impl Peer {
 
     /// Whether the two could ever touch.
     pub fn touches(&self, other: &Self) -> bool {
-        let (mine, theirs) = (self.shared.form.look(), other.shared.form.look());
+        let (mine, theirs) = (self.form.look(), other.form.look());
         let (Some(mine), Some(theirs)) = (&*mine, &*theirs) else { return false };
-        mine.meets(theirs) && !(is_led(mine) && is_led(theirs)) && self.law(other.shared.id) != Law::Off
+        mine.meets(theirs) && !(is_led(mine) && is_led(theirs)) && self.law(other.id) != Law::Off
     }
 
     fn is_tool(&self) -> bool {
-        self.shared.form.look().as_ref().is_some_and(|shape| is_led(shape))
+        self.form.look().as_ref().is_some_and(|shape| is_led(shape))
     }
 
     /// The neighbour `other` as seen by this agent.
@@ -146,41 +135,41 @@ impl Peer {
         // a tool needs the form to grasp it, even if it passes through it
         let known = self.touches(other) || self.is_tool();
         Neighbour {
-            id: other.shared.id,
-            step_s: other.shared.wanted_hz().recip(),
-            snapshot: other.shared.slot.latest(),
-            form: if known { other.shared.form.latest() } else { None },
-            law: self.law(other.shared.id),
+            id: other.id,
+            step_s: other.wanted_hz().recip(),
+            snapshot: other.slot.latest(),
+            form: if known { other.form.latest() } else { None },
+            law: self.law(other.id),
             computed_here: computes(self.clock(), other.clock()),
         }
     }
 }
 
 impl Peers {
-    pub fn get(&self, id: AgentId) -> Option<&Peer> {
-        self.all.get(id.0 as usize)
+    pub fn get(&self, id: AgentId) -> Option<Live> {
+        self.all.of(id)?.live()
     }
 
     /// Whether it could ever touch any other.
-    pub fn may_meet(&self, one: &Peer) -> bool {
-        let others = self.all.iter().map(|(_, other)| other);
-        others.filter(|other| other.shared.id != one.shared.id).any(|other| one.touches(other))
+    pub fn may_meet(&self, one: &Shared) -> bool {
+        let others = self.all.iter().filter(|other| other.id() != one.id);
+        others.filter_map(AgentHandle::live).any(|other| one.touches(&other))
     }
 
     /// Begins the broad phase of a run in which nothing could touch until now: with the boxes of the states that agents have published.
     pub fn begin_broad_phase(&self) {
-        let broad_phase = self.broad_phase.begin(self.all.count());
-        for (_, peer) in &self.all {
-            let state = peer.shared.slot.latest();
+        let broad_phase = self.broad_phase.begin(self.all.len());
+        for agent in &self.all {
+            let state = agent.latest();
             state.bounds.iter().for_each(|bounds| {
-                broad_phase.publish(peer.shared.id, bounds, state.moment());
+                broad_phase.publish(agent.id(), bounds, state.moment());
             });
         }
     }
 
     /// The neighbour `other` as seen by `me`.
     fn neighbour_of(&self, me: AgentId, other: AgentId) -> Option<Neighbour> {
-        Some(self.get(me)?.neighbour(self.get(other)?))
+        Some(self.get(me)?.neighbour(&*self.get(other)?))
     }
 
     /// The view of `me`, which is linked to `links`.
@@ -277,7 +266,7 @@ impl Observer {
         if let (Some(neighbour_list), Some(broad_phase)) = (&mut self.neighbour_list, peers.broad_phase.get()) {
             let mine = peers.get(me);
             neighbour_list.update(broad_phase, step, members, |other| {
-                mine.zip(peers.get(other)).is_some_and(|(a, b)| a.touches(b))
+                mine.as_ref().zip(peers.get(other)).is_some_and(|(a, b)| a.touches(&b))
             });
             self.collect_wanted(broad_phase, writer, members);
             self.list_wanted(peers);
@@ -342,7 +331,7 @@ impl Observer {
     fn list(&mut self, peers: &Peers, id: AgentId) {
         let (Some(theirs), Some(neighbour)) = (peers.get(id), peers.neighbour_of(self.me, id)) else { return };
         self.neighbours.push(neighbour);
-        self.sources.push(Source { shared: Arc::clone(&theirs.shared), is_member: false });
+        self.sources.push(Source { shared: Arc::clone(&theirs), is_member: false });
     }
 }
 
@@ -366,7 +355,7 @@ const fn is_led(form: &CollisionShape) -> bool {
 fn set_member(neighbour: &mut Neighbour, peers: &Peers, me: AgentId, is_member: bool) {
     if is_member {
         // a tool needs the form of what it may grasp, whoever steps both
-        let is_tool = peers.get(me).is_some_and(Peer::is_tool);
+        let is_tool = peers.get(me).is_some_and(|shared| shared.is_tool());
         let form = neighbour.form.take().filter(|_| is_tool);
         (neighbour.form, neighbour.law) = (form, Law::Off);
     } else if let Some(outsider) = peers.neighbour_of(me, neighbour.id) {

@@ -178,13 +178,16 @@ impl Run for Pool {
 
     fn add(&mut self, spawn: AgentSpawn) -> Result<AgentHandle, RunError> {
         let actor = self.all.join(spawn, self.sim_now())?;
-        let shared = Arc::clone(&actor.shared);
+        let handle = self.all.handles[actor.id().0 as usize].clone();
         self.state.take_up(actor);
-        Ok(AgentHandle { shared })
+        Ok(handle)
     }
 
     fn remove(&mut self, id: AgentId) -> Result<(), SendError> {
-        self.all.leave(id)
+        let mut home = self.state.take_parked(id);
+        let left = self.all.leave(id, &mut home);
+        home.into_iter().for_each(|actor| self.state.store_parked(actor));
+        left
     }
 
     fn archive(&mut self, archive: &mut Archive<'_>, absent: Absent<'_>) -> Result<(), ArchiveError> {

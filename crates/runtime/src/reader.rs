@@ -54,18 +54,16 @@ impl Reader {
     /// with the newest state and whether they are running. Those that joined since are visited first.
     pub fn read(&mut self, agents: &Agents, now: SimTime, mut visit: impl FnMut(&AgentHandle, &Arc<Snapshot>, bool)) {
         self.join(agents, &mut visit);
-        if let Some(first) = agents.first() {
-            first.shared.sleep.changed.take(|id| {
-                let at = id.0 as usize;
-                let (Some(agent), true) = (agents.get(at), at < self.readings.len()) else { return };
-                self.count(at, agent);
-                let state = agent.state();
-                self.newest[at] = agent.latest();
-                let reading = &mut self.readings[at];
-                (reading.time, reading.rests) = (self.newest[at].moment(), state == AgentState::Resting);
-                visit(agent, &self.newest[at], state == AgentState::Running);
-            });
-        }
+        agents.sleep.changed.take(|id| {
+            let at = id.0 as usize;
+            let (Some(agent), true) = (agents.get(at), at < self.readings.len()) else { return };
+            self.count(at, agent);
+            let state = agent.state();
+            self.newest[at] = agent.latest();
+            let reading = &mut self.readings[at];
+            (reading.time, reading.rests) = (self.newest[at].moment(), state == AgentState::Resting);
+            visit(agent, &self.newest[at], state == AgentState::Running);
+        });
         self.frames.push_back(now);
         self.read += 1;
         self.catch_up(agents);

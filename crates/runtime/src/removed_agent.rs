@@ -1,28 +1,60 @@
-//! What is in the place of an agent that has left.
+//! What is left of an agent that has left: its number, its name, and that it has left.
+//!
+//! In: its runner, which makes no more turns. Out: the same where the run began with it, else nothing: what joined the run is made again
+//! from what it joined as ([`super::archive`]). Never here: when an agent leaves.
 
-use metachron_contact::{Agent, StepContext};
-use metachron_core::{Archive, ArchiveError, Body, SimSpan, Snapshot, StepError, StepReport, check_span};
+use super::agent_runner::AgentRunner;
+use super::cluster::Led;
+use super::events::EventKind;
+use metachron_core::Snapshot;
+use std::sync::{Arc, LazyLock};
 
-/// Its model.
+/// The model of a number of which nothing else is known.
 pub(super) const REMOVED: &str = "removed";
 
-/// No matter, no time, nothing to save.
-pub(super) struct RemovedAgent;
+/// Its state, the same of all that have left: no matter, no time.
+pub(super) fn nothing() -> Arc<Snapshot> {
+    static NOTHING: LazyLock<Arc<Snapshot>> = LazyLock::new(Arc::default);
+    Arc::clone(&NOTHING)
+}
 
-impl Agent for RemovedAgent {
-    fn model(&self) -> &'static str {
-        REMOVED
+impl AgentRunner {
+    /// Publishes that nothing of it is left, where nobody finds it.
+    pub fn vanish(&mut self) {
+        self.withheld = false;
+        self.writer.retire(nothing());
+        if let Some(broad_phase) = self.peers.broad_phase.get() {
+            broad_phase.publish_nowhere(self.id(), self.pace.time());
+        }
+        self.shared.gauges.leave();
     }
 
-    fn step(&mut self, dt: SimSpan, _context: &StepContext<'_>) -> Result<StepReport, StepError> {
-        check_span(dt).map(|_| StepReport { work: 0.0, substeps: 0, at_rest: true })
+    /// Takes it out at once: called between turns, of one that no other leads.
+    pub fn take_out(&mut self) {
+        self.shared.mail.clear();
+        self.open = None;
+        self.tell(EventKind::Gone);
+        self.vanish();
+        self.metrics.flush(&self.shared.gauges);
+        self.notify_reader();
+        self.shared.sleep.close(self.id());
+        self.forget();
     }
 
-    fn archive(&mut self, _archive: &mut Archive<'_>) -> Result<(), ArchiveError> {
-        Ok(())
+    /// Frees what it made turns with: an agent that has left makes none.
+    pub fn forget(&mut self) {
+        (self.loads, self.announced) = (None, Vec::new());
+        self.led = Led::default();
+        self.observer.forget();
+        self.shared.form.publish(None);
     }
 
-    fn write_snapshot(&self, into: &mut Snapshot) {
-        into.body = Body::Nothing;
+    /// It, which makes no more turns; `None` of one that has left and can be made again.
+    pub fn kept(self: Box<Self>) -> Option<Box<Self>> {
+        if self.shared.is_forgotten() {
+            self.peers.all.of(self.id()).into_iter().for_each(|agent| agent.record.end());
+            return None;
+        }
+        Some(self)
     }
 }

@@ -145,10 +145,10 @@ impl SleepRegistry {
         self.signals.get(id.0 as usize)
     }
 
-    /// Registers the thread to unpark for `id`.
-    pub fn set_thread(&self, id: AgentId, thread: Thread) {
+    /// Registers the thread to unpark for `id`; `None` once that has ended.
+    pub fn set_thread(&self, id: AgentId, thread: Option<Thread>) {
         if let Some(signal) = self.signal(id) {
-            *signal.thread.lock().unwrap_or_else(PoisonError::into_inner) = Some(thread);
+            *signal.thread.lock().unwrap_or_else(PoisonError::into_inner) = thread;
         }
     }
 
@@ -166,6 +166,11 @@ impl SleepRegistry {
             at = next;
         }
         at
+    }
+
+    /// The agent that makes the turns of `id`, if that is another.
+    pub fn led_by(&self, id: AgentId) -> Option<AgentId> {
+        Some(self.leader(id)).filter(|leader| *leader != id)
     }
 
     /// How long the end of a run waits for these agents' turns before they count as hung: a turn of a cluster makes the steps of all its

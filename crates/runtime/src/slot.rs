@@ -11,6 +11,7 @@
 
 use super::sync::atomic::{AtomicUsize, Ordering};
 use super::sync::{Arc, RwLock};
+use std::sync::PoisonError;
 
 /// Number of cells. The writer needs one that is not the newest and not just being read; only three readers of one slot that are suspended
 /// inside a read (20 ns) of old values leave it none.
@@ -70,6 +71,14 @@ impl<T> LatestSlot<T> {
         spare.extend((1..CELLS).filter_map(|k| self.take((newest + k) % CELLS)));
     }
 
+    /// Frees all values but the newest. Waits for readers in their cells, which leave them in nanoseconds.
+    fn clear_others(&self) {
+        let newest = self.newest.load(Ordering::Relaxed);
+        for at in (1..CELLS).map(|k| (newest + k) % CELLS) {
+            drop(self.cells[at].write().unwrap_or_else(PoisonError::into_inner).take());
+        }
+    }
+
     fn take(&self, at: usize) -> Option<Arc<T>> {
         self.cells[at].try_write().ok()?.take()
     }
@@ -124,6 +133,14 @@ impl<T: Default> SlotWriter<T> {
         }
     }
 
+    /// Publishes `last` in place of the newest, and keeps nothing else: no more is to be written.
+    pub(super) fn retire(&mut self, last: Arc<T>) {
+        self.filled = None;
+        self.replace(last);
+        self.slot.clear_others();
+        self.spare = Vec::new();
+    }
+
     /// The value that is filled and not yet published, to be replaced; it is shared with nobody when the next is filled.
     pub(super) fn filled_mut(&mut self) -> &mut Option<Arc<T>> {
         &mut self.filled
@@ -145,11 +162,6 @@ impl<T: Default> SlotWriter<T> {
     #[must_use]
     pub const fn made(&self) -> usize {
         self.made
-    }
-
-    /// Frees the values that no reader holds and that are not to be published.
-    pub(super) fn forget_spares(&mut self) {
-        self.spare = Vec::new();
     }
 
     fn take_spare(&mut self) -> Arc<T> {

@@ -4,28 +4,28 @@
 //! Never here: threads, time passing.
 
 use super::agent_clock::AgentClock;
+use super::agent_record::AgentRecord;
 use super::agent_runner::{AgentRunner, TurnPeriod};
 use super::agents::Agents;
 use super::cluster::{ClusterSeat, JointedTo, Led, assign_leaders};
 use super::faults::Faults;
 use super::form_slot::FormSlot;
 use super::governor::Governor;
-use super::handle::{AgentHandle, EventStreams, Identity, Shared};
+use super::handle::{AgentHandle, Identity, Shared};
 use super::helpers::Helpers;
-use super::histogram::Histogram;
 use super::mailbox::{Mailbox, SendError};
 use super::metrics::{AgentState, Metrics, MetricsWriter};
-use super::observation::{BroadPhaseSlot, Peer, Peers};
+use super::observation::{BroadPhaseSlot, Peers};
 use super::probe::{Trace, WatchedPoint};
-use super::removed_agent::RemovedAgent;
 use super::sleep::SleepRegistry;
 use super::slot::SlotWriter;
+use super::streams::EventStreams;
 use metachron_contact::Agent;
 use metachron_contact::stepper::ClusterScene;
 use metachron_contact::{Law, Link};
 use metachron_core::{AgentId, DT_MAX_S, ResolutionRange, SimSpan, SimTime, Snapshot};
 use std::sync::atomic::{AtomicBool, Ordering::Relaxed};
-use std::sync::{Arc, Mutex, OnceLock};
+use std::sync::{Arc, Mutex};
 
 /// Description of an agent to be started.
 pub struct AgentSpawn {
@@ -172,17 +172,16 @@ pub(super) fn assemble(mut spawns: Vec<AgentSpawn>, helpers: Helpers) -> Result<
     spawns.iter().try_for_each(|spawn| check(spawn, count))?;
     attach_both_sides(&mut spawns);
     let sleep = Arc::new(SleepRegistry::new(count));
-    let (peers, writers) = peers(&mut spawns, &sleep, helpers);
+    let (peers, seats) = peers(&mut spawns, &sleep, helpers);
     let peers = Arc::new(peers);
     let mut jointed = jointed(&spawns);
-    let ids = (0..).map(AgentId);
-    let actors = ids.zip(spawns).zip(writers).map(|((id, spawn), writer)| {
-        let jointed = std::mem::take(&mut jointed[id.0 as usize]);
-        actor(id, Seated { spawn, jointed, writer }, &peers)
+    let actors = spawns.into_iter().zip(seats).map(|(spawn, (shared, writer))| {
+        let jointed = std::mem::take(&mut jointed[shared.id.0 as usize]);
+        actor(shared, Seated { spawn, jointed, writer }, &peers)
     });
     let mut actors: Vec<_> = actors.collect();
     actors.iter_mut().for_each(AgentRunner::publish_initial);
-    let handles = peers.all.iter().map(|(_, peer)| AgentHandle { shared: Arc::clone(&peer.shared) }).collect();
+    let handles = Agents::new(&sleep, peers.all.iter().cloned());
     Ok(AssembledRun { actors: assign_leaders(actors), all: RunAgents { handles, sleep, peers } })
 }
 
@@ -192,21 +191,31 @@ impl RunAgents {
         self.peers.is_ordered.store(true, Relaxed);
     }
 
-    /// Takes an agent out: at its next turn, or at once where it makes no more.
+    /// Takes an agent out: at its next turn, or at once where it makes no more. `home` has its runner where that makes turns of its own, or none any
+    /// more.
     ///
     /// # Errors
     /// [`SendError::NoAgent`].
-    pub fn leave(&self, id: AgentId) -> Result<(), SendError> {
+    pub fn leave(&self, id: AgentId, home: &mut Option<Box<AgentRunner>>) -> Result<(), SendError> {
         let agent = self.handles.of(id).ok_or(SendError::NoAgent(id))?;
-        if !matches!(agent.state(), AgentState::Parked(_)) {
-            agent.leave();
+        match agent.state() {
+            AgentState::Gone => return Ok(()),
+            AgentState::Running | AgentState::Resting => {
+                agent.leave();
+                return Ok(());
+            }
+            AgentState::Parked(_) => {}
+        }
+        if let Some(mut runner) = home.take() {
+            runner.take_out();
+            *home = runner.kept();
             return Ok(());
         }
-        // no other thread publishes for it any more
+        // it is in a step that does not end
         if let Some(broad_phase) = self.peers.broad_phase.get() {
             broad_phase.publish_nowhere(id, agent.latest().moment());
         }
-        agent.shared.gauges.leave();
+        agent.live().into_iter().for_each(|shared| shared.gauges.leave());
         Ok(())
     }
 
@@ -221,32 +230,35 @@ impl RunAgents {
         let id = AgentId(handles.len() as u32);
         let writer = SlotWriter::new(Snapshot::default());
         let shared = Arc::new(shared(id, &mut spawn, &self.sleep, &writer, false));
-        self.reserve(&shared);
-        if peers.broad_phase.get().is_none() && peers.all.get(id.0 as usize).is_some_and(|new| peers.may_meet(new)) {
+        let handle = AgentHandle::of(&shared);
+        self.reserve(&handle);
+        if peers.broad_phase.get().is_none() && peers.may_meet(&shared) {
             peers.begin_broad_phase();
         }
-        let mut actor = actor(id, Seated { spawn, jointed: Vec::new(), writer }, peers);
+        let mut actor = actor(shared, Seated { spawn, jointed: Vec::new(), writer }, peers);
         actor.pace = AgentClock::new(now, actor.pace.wanted());
         actor.publish_initial();
-        handles.push(AgentHandle { shared });
+        handles.push(handle);
         Ok(Box::new(actor))
     }
 
-    /// Adds numbers of agents that have left, as they are taken, until there are `count`: nothing more is known of them.
-    pub fn reach(&self, count: usize) -> impl Iterator<Item = Box<AgentRunner>> + '_ {
-        let numbers = self.handles.len()..count;
-        numbers.map(|number| {
+    /// Adds numbers of agents that have left until there are `count`: nothing more is known of them.
+    pub fn reach(&self, count: usize) {
+        for number in self.handles.len()..count {
             let id = AgentId(number as u32);
-            let mut spawn = AgentSpawn::alone("", Box::new(RemovedAgent), 1.0);
-            let writer = SlotWriter::new(Snapshot::default());
-            let shared = Shared { identity: OnceLock::new(), ..shared(id, &mut spawn, &self.sleep, &writer, false) };
-            let shared = Arc::new(shared);
-            shared.gauges.leave();
-            self.reserve(&shared);
+            let handle = AgentHandle { record: Arc::new(AgentRecord::unknown(id)) };
+            self.reserve(&handle);
             self.sleep.close(id);
-            self.handles.push(AgentHandle { shared });
-            Box::new(actor(id, Seated { spawn, jointed: Vec::new(), writer }, &self.peers))
-        })
+            self.handles.push(handle);
+        }
+    }
+
+    /// An agent that joined the run as `spawn` says, has left and is not kept, again; its state is read next.
+    pub fn revive(&self, id: AgentId, mut spawn: AgentSpawn) -> Box<AgentRunner> {
+        let writer = SlotWriter::new(Snapshot::default());
+        let shared = Arc::new(shared(id, &mut spawn, &self.sleep, &writer, false));
+        self.handles[id.0 as usize].record.begin(&shared);
+        Box::new(actor(shared, Seated { spawn, jointed: Vec::new(), writer }, &self.peers))
     }
 
     /// Checks that an agent can join a run that goes on.
@@ -262,22 +274,10 @@ impl RunAgents {
     }
 
     /// Makes room for the next number.
-    fn reserve(&self, shared: &Arc<Shared>) {
+    fn reserve(&self, agent: &AgentHandle) {
         self.sleep.join();
         self.peers.broad_phase.join();
-        self.peers.all.push(Peer { shared: Arc::clone(shared), laws: Vec::new() });
-    }
-}
-
-impl AgentRunner {
-    /// Puts an agent into the place of one that has left, whose state is read next: what it was and has kept, or what `spawn` says that joined the run.
-    pub fn revive(&mut self, spawn: Option<AgentSpawn>) {
-        let Some(mut spawn) = spawn else { return };
-        let (id, shared, peers) = (self.id(), Arc::clone(&self.shared), Arc::clone(&self.peers));
-        shared.identity.get_or_init(|| Identity::of(id, &mut spawn, false));
-        shared.form.publish(spawn.agent.form());
-        let writer = std::mem::replace(&mut self.writer, SlotWriter::new(Snapshot::default()));
-        *self = actor(id, Seated { spawn, jointed: Vec::new(), writer }, &peers);
+        self.peers.all.push(agent.clone());
     }
 }
 
@@ -324,22 +324,23 @@ fn peers(
     spawns: &mut [AgentSpawn],
     sleep: &Arc<SleepRegistry>,
     helpers: Helpers,
-) -> (Peers, Vec<SlotWriter<Snapshot>>) {
+) -> (Peers, Vec<(Arc<Shared>, SlotWriter<Snapshot>)>) {
     let mut writers = Vec::with_capacity(spawns.len());
     let mut all = Vec::with_capacity(spawns.len());
-    for (spawn, id) in spawns.iter_mut().zip((0..).map(AgentId)) {
+    let laws = laws(spawns);
+    for ((spawn, laws), id) in spawns.iter_mut().zip(laws).zip((0..).map(AgentId)) {
         let writer = SlotWriter::new(Snapshot::default());
-        let shared = Arc::new(shared(id, spawn, sleep, &writer, true));
+        all.push(Shared { laws: laws.into(), ..shared(id, spawn, sleep, &writer, true) });
         writers.push(writer);
-        all.push(Peer { shared, laws: Vec::new() });
     }
-    store_laws(spawns, &mut all);
     let broad_phase = BroadPhaseSlot::default();
     if may_any_touch(&all) {
         broad_phase.begin(all.len());
     }
     let is_ordered = AtomicBool::new(false);
-    (Peers { all: all.into_iter().collect(), broad_phase, helpers, is_ordered }, writers)
+    let seats: Vec<_> = all.into_iter().map(Arc::new).zip(writers).collect();
+    let all = Agents::new(sleep, seats.iter().map(|(shared, _)| AgentHandle::of(shared)));
+    (Peers { all, broad_phase, helpers, is_ordered }, seats)
 }
 
 /// For each agent the joints that hold it to others.
@@ -356,23 +357,25 @@ fn jointed(spawns: &[AgentSpawn]) -> Vec<Vec<JointedTo>> {
 }
 
 /// Whether any two agents could touch.
-fn may_any_touch(all: &[Peer]) -> bool {
-    let formed: Vec<&Peer> = all.iter().filter(|peer| peer.shared.form.look().is_some()).collect();
+fn may_any_touch(all: &[Shared]) -> bool {
+    let formed: Vec<&Shared> = all.iter().filter(|peer| peer.form.look().is_some()).collect();
     formed.iter().enumerate().any(|(at, peer)| formed[..at].iter().any(|other| peer.touches(other)))
 }
 
-/// Stores the law of every pair on both sides.
-fn store_laws(spawns: &[AgentSpawn], all: &mut [Peer]) {
+/// For each agent the laws of its pairs, whichever side gave them.
+fn laws(spawns: &[AgentSpawn]) -> Vec<Vec<(AgentId, Law)>> {
+    let mut all = vec![Vec::new(); spawns.len()];
     for (spawn, me) in spawns.iter().zip((0..).map(AgentId)) {
         for &(other, law) in spawn.laws.iter().filter(|(other, _)| *other != me) {
             for (a, b) in [(me, other), (other, me)] {
-                let laws = &mut all[a.0 as usize].laws;
+                let laws: &mut Vec<(AgentId, Law)> = &mut all[a.0 as usize];
                 if let Err(at) = laws.binary_search_by_key(&b, |(id, _)| *id) {
                     laws.insert(at, (b, law));
                 }
             }
         }
     }
+    all
 }
 
 fn shared(
@@ -384,14 +387,15 @@ fn shared(
 ) -> Shared {
     Shared {
         id,
-        identity: Identity::of(id, spawn, is_first).into(),
+        identity: Identity::of(id, spawn, is_first),
+        laws: Box::default(),
         gauges: Metrics::default(),
         form: FormSlot::new(spawn.agent.form()),
         mail: Mailbox::default(),
         streams: EventStreams::default(),
         slot: writer.slot(),
         sleep: Arc::clone(sleep),
-        ages: Mutex::new(Histogram::default()),
+        ages: Mutex::default(),
         traces: spawn.watches.drain(..).map(|watch| Mutex::new(Trace::new(watch))).collect(),
     }
 }
@@ -404,23 +408,23 @@ struct Seated {
     writer: SlotWriter<Snapshot>,
 }
 
-fn actor(id: AgentId, parts: Seated, peers: &Arc<Peers>) -> AgentRunner {
+fn actor(shared: Arc<Shared>, parts: Seated, peers: &Arc<Peers>) -> AgentRunner {
     let Seated { mut spawn, jointed, writer } = parts;
-    let me = &peers.all[id.0 as usize];
+    let id = shared.id;
     let mut links: Vec<AgentId> = Vec::with_capacity(spawn.links.len());
     for link in spawn.links {
         if link != id && !links.contains(&link) {
             links.push(link);
         }
     }
-    let mut asynchronous = me.laws.iter().map(|(_, law)| *law).chain(spawn.attached.iter().map(|link| link.law));
+    let mut asynchronous = shared.laws.iter().map(|(_, law)| *law).chain(spawn.attached.iter().map(|link| link.law));
     let asynchronous = asynchronous.any(Law::is_asynchronous);
     let is_member = spawn.agent.member().is_some();
     let cluster = is_member.then(|| Box::new(ClusterSeat::new(spawn.scene, jointed, asynchronous)));
     // within a cluster there are no messages to lose, and no clock of its own to disturb
     let faults = if !is_member || asynchronous { spawn.faults } else { Faults::default() };
     AgentRunner {
-        shared: Arc::clone(&me.shared),
+        shared,
         peers: Arc::clone(peers),
         agent: spawn.agent,
         pace: AgentClock::new(SimTime::ZERO, spawn.dt.clamp(spawn.dt_range.0, spawn.dt_range.1)),
@@ -475,7 +479,7 @@ mod tests {
         let (peers, _) = peers(&mut spawns, &sleep, Helpers::none());
         (
             peers.broad_phase.get().is_some(),
-            peers.all.iter().filter(|(_, peer)| peer.shared.handover().is_some()).count(),
+            peers.all.iter().filter_map(AgentHandle::live).filter(|peer| peer.handover().is_some()).count(),
         )
     }
 

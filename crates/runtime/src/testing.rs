@@ -3,7 +3,7 @@
 
 use super::pool::Pool;
 use super::spawn::AgentSpawn;
-use super::{Clock, Priority, Run, SystemClock, Threads, TimelineCommand};
+use super::{AgentHandle, Clock, Priority, Run, SystemClock, Threads, TimelineCommand};
 use glam::{DQuat, DVec3};
 use metachron_contact::asynchronous::{GivenAt, Ledgers};
 use metachron_contact::cluster::Side;
@@ -53,6 +53,11 @@ pub(super) fn on_every_executor(claim: impl Fn(Start)) {
 /// The machine's own clock.
 pub(super) fn system() -> Arc<dyn Clock> {
     Arc::new(SystemClock::new())
+}
+
+/// How many hold what an agent shares.
+pub(super) fn holders(agent: &AgentHandle) -> usize {
+    agent.live().map_or(0, |shared| Arc::strong_count(&shared))
 }
 
 /// Waits for progress; the deadline only ends a test that hangs.

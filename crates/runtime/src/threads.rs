@@ -23,6 +23,7 @@ use super::turn_order::{Held, PartKind, TurnOrder, in_force};
 use super::turn_parts::Begun;
 use super::turns::Took;
 use metachron_core::{AgentId, Archive, ArchiveError};
+use std::collections::BTreeMap;
 use std::sync::Arc;
 use std::sync::mpsc::{Receiver, Sender, channel};
 use std::thread::{self, JoinHandle};
@@ -43,7 +44,10 @@ pub struct Threads {
     clock: Arc<dyn Clock>,
     timeline: Arc<SharedTimeline>,
     all: RunAgents,
-    threads: Vec<Option<Ended>>,
+    /// Of agents that make turns, or that others lead.
+    threads: BTreeMap<AgentId, Ended>,
+    /// Agents whose threads have ended.
+    ended_agents: BTreeMap<AgentId, Box<AgentRunner>>,
     /// Where threads report that they have ended.
     farewells: Sender<AgentId>,
     ended: Receiver<AgentId>,
@@ -66,23 +70,37 @@ impl Threads {
         let timeline = Arc::new(SharedTimeline::new());
         timeline.drive(Duration::ZERO, TimelineCommand::Pause);
         let (farewells, ended) = channel();
-        let (threads, order) = (Vec::new(), None);
-        let mut run = Self { clock, timeline, all, threads, farewells, ended, priority, order };
+        let (threads, ended_agents, order) = (BTreeMap::new(), BTreeMap::new(), None);
+        let mut run = Self { clock, timeline, all, threads, ended_agents, farewells, ended, priority, order };
         for (actor, id) in actors.into_iter().zip((0..).map(AgentId)) {
             // on an error the run so far is dropped, which ends its threads
-            let shared = Arc::clone(&run.all.handles[id.0 as usize].shared);
-            run.begin(actor, shared)?;
+            run.begin(id, actor)?;
         }
         Ok(run)
     }
 
     /// Gives an agent its thread.
-    fn begin(&mut self, actor: Option<Box<AgentRunner>>, shared: Arc<Shared>) -> Result<(), RunError> {
-        let id = shared.id;
-        let thread = self.spawn(actor, shared)?;
-        self.all.sleep.set_thread(id, thread.thread().clone());
-        self.threads.push(Some(thread));
+    fn begin(&mut self, id: AgentId, actor: Option<Box<AgentRunner>>) -> Result<(), RunError> {
+        let Some(shared) = self.all.handles.of(id).and_then(AgentHandle::live).map(|shared| Arc::clone(&shared)) else {
+            return Ok(());
+        };
+        self.threads.insert(id, self.spawn(actor, shared)?);
         Ok(())
+    }
+
+    /// Joins the threads that have ended: until then the system keeps their stacks.
+    fn join_ended(&mut self) {
+        while let Ok(id) = self.ended.try_recv() {
+            self.join(id);
+        }
+    }
+
+    /// Joins the thread of an agent, which ends.
+    fn join(&mut self, id: AgentId) {
+        // a panic outside a turn is a bug of metachron: it has been printed, and the other threads must still be joined
+        let actor = self.threads.remove(&id).and_then(|thread| thread.join().ok().flatten());
+        self.all.sleep.set_thread(id, None);
+        self.ended_agents.extend(actor.and_then(AgentRunner::kept).map(|actor| (id, actor)));
     }
 
     fn spawn(&self, actor: Option<Box<AgentRunner>>, shared: Arc<Shared>) -> Result<Ended, RunError> {
@@ -100,6 +118,8 @@ impl Threads {
             let _farewell = farewell;
             // a refusal was already reported to the caller of `Priority::ask`
             drop(priority.take());
+            // by itself: who gives the agent back before another does wakes nobody
+            shared.sleep.set_thread(shared.id, Some(thread::current()));
             stage.run(actor, &shared)
         };
         builder.spawn(body).map_err(|error| RunError::NoThread { name, error })
@@ -109,35 +129,34 @@ impl Threads {
     /// is left behind. Gives back the agents that make turns of their own.
     fn halt(&mut self, why: Halt) -> Vec<Option<Box<AgentRunner>>> {
         self.all.sleep.stop();
-        let (mut patience, mut homes) = (Duration::ZERO, Vec::with_capacity(self.threads.len()));
-        homes.resize_with(self.threads.len(), || None);
-        while self.threads.iter().any(Option::is_some) {
-            let running = (0..).map(AgentId).zip(&self.threads).filter(|(_, thread)| thread.is_some());
-            patience = self.all.sleep.end_patience(running.map(|(id, _)| id));
+        let mut patience = Duration::ZERO;
+        while !self.threads.is_empty() {
+            patience = self.all.sleep.end_patience(self.threads.keys().copied());
             let ended = match why {
                 Halt::End => self.ended.recv_timeout(patience).ok(),
                 Halt::Cut => self.ended.recv().ok(),
             };
             let Some(id) = ended else { break };
-            let at = id.0 as usize;
-            if let Some(thread) = self.threads.get_mut(at).and_then(Option::take) {
-                // a panic outside a turn is a bug of metachron: it has been printed, and the other threads must still be joined
-                homes[at] = thread.join().ok().flatten();
-            }
+            self.join(id);
         }
-        for (handle, _) in self.all.handles.iter().zip(&self.threads).filter(|(_, thread)| thread.is_some()) {
-            handle.shared.gauges.park(format!("a step did not end within {} s", patience.as_secs_f64()));
+        for shared in self.threads.keys().filter_map(|id| self.all.handles.of(*id)?.live()) {
+            shared.gauges.park(format!("a step did not end within {} s", patience.as_secs_f64()));
         }
         self.threads.clear();
+        let mut homes: Vec<_> = self.all.handles.iter().map(|_| None).collect();
+        let ended = std::mem::take(&mut self.ended_agents);
+        ended.into_iter().for_each(|(id, actor)| homes[id.0 as usize] = Some(actor));
         homes
     }
 
     /// Gives the agents their threads again.
     fn go_on(&mut self, homes: Vec<Option<Box<AgentRunner>>>) -> Result<(), RunError> {
         self.all.sleep.go_on();
-        for (actor, id) in homes.into_iter().zip((0..).map(AgentId)) {
-            let shared = Arc::clone(&self.all.handles[id.0 as usize].shared);
-            self.begin(actor, shared)?;
+        for (mut actor, id) in homes.into_iter().zip((0..).map(AgentId)) {
+            match actor.take_if(|actor| actor.is_parked()) {
+                Some(actor) => drop(self.ended_agents.insert(id, actor)),
+                None => self.begin(id, actor)?,
+            }
         }
         Ok(())
     }
@@ -203,18 +222,23 @@ impl Run for Threads {
     }
 
     fn add(&mut self, spawn: AgentSpawn) -> Result<AgentHandle, RunError> {
-        let running = self.threads.iter().flatten().filter(|thread| !thread.is_finished()).count();
+        self.join_ended();
+        let running = self.threads.len();
         if running >= THREADS_MAX {
             return Err(RunError::TooMany { agents: running + 1, most: THREADS_MAX });
         }
         let actor = self.all.join(spawn, self.sim_now())?;
-        let shared = Arc::clone(&actor.shared);
-        self.begin(Some(actor), Arc::clone(&shared))?;
-        Ok(AgentHandle { shared })
+        let id = actor.id();
+        self.begin(id, Some(actor))?;
+        Ok(self.all.handles[id.0 as usize].clone())
     }
 
     fn remove(&mut self, id: AgentId) -> Result<(), SendError> {
-        self.all.leave(id)
+        self.join_ended();
+        let mut home = self.ended_agents.remove(&id);
+        let left = self.all.leave(id, &mut home);
+        self.ended_agents.extend(home.map(|actor| (id, actor)));
+        left
     }
 
     fn archive(&mut self, archive: &mut Archive<'_>, absent: Absent<'_>) -> Result<(), ArchiveError> {
@@ -258,7 +282,7 @@ impl AgentThread {
         while !shared.sleep.stopping() {
             here = match here {
                 Some(actor) => match self.make_own_turns(actor) {
-                    Some(actor) if actor.is_parked() => return Some(actor),
+                    Some(actor) if actor.is_parked() => return actor.kept(),
                     moved => moved,
                 },
                 None => self.wait_for(shared.handover()),

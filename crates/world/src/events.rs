@@ -6,7 +6,7 @@ use super::object::{Object, Touched, WorldTag};
 use super::world::World;
 use glam::DVec3;
 use metachron_core::{ContactPartner, Removed, SimTime};
-use metachron_runtime::{AgentEvent, ContactEvent, EventKind};
+use metachron_runtime::{AgentEvent, ContactEvent, EventKind, Heard};
 
 /// Something that happened.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -124,8 +124,8 @@ impl EventFilter {
 pub struct Events {
     world: World,
     filter: EventFilter,
-    /// The next event of each object.
-    next: Vec<u64>,
+    /// How far each object was heard.
+    heard: Vec<Heard>,
     lost: u64,
     found: Vec<Event>,
     /// Contacts that have begun as the filter sees them.
@@ -134,26 +134,25 @@ pub struct Events {
 
 impl Events {
     pub(super) fn new(world: World, filter: EventFilter) -> Self {
-        let next = world.agents().iter().map(|agent| agent.listen()).collect();
-        Self { world, filter, next, lost: 0, found: Vec::new(), begun: Vec::new() }
+        let heard = world.agents().iter().map(|agent| agent.listen()).collect();
+        Self { world, filter, heard, lost: 0, found: Vec::new(), begun: Vec::new() }
     }
 
     /// All that happened since the last call, by their times. It never waits.
     pub fn drain(&mut self) -> impl Iterator<Item = Event> + '_ {
-        let Self { world, filter, next, lost, found, begun } = self;
+        let Self { world, filter, heard, lost, found, begun } = self;
         found.clear();
         let tag = world.tag();
         // what joined since is heard from its first drain on
-        next.extend(world.agents().iter().skip(next.len()).map(|agent| agent.listen()));
-        for (agent, next) in world.agents().iter().zip(next) {
+        heard.extend(world.agents().iter().skip(heard.len()).map(|agent| agent.listen()));
+        for (agent, heard) in world.agents().iter().zip(heard) {
             let object = tag.object(agent.id());
-            let (now, missed) = agent.events_from(*next, |event| {
+            *lost += agent.hear_events(heard, |event| {
                 let event = event_of(tag, object, &event);
                 if filter.takes(&event) && is_news(begun, &event, filter.above_n) {
                     found.push(event);
                 }
             });
-            (*next, *lost) = (now, *lost + missed);
         }
         found.sort_by_key(|event| (event.at, event.object));
         found.drain(..)

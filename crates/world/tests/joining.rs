@@ -108,6 +108,44 @@ fn hundreds_come_and_go() {
     }
 }
 
+/// Bytes that a world in lockstep keeps of each of so many objects that have joined it and left, made by `join` from their places in the row.
+fn kept_bytes(count: u32, join: impl Fn(&World, u32) -> Object) -> i64 {
+    let scene = Scene::builder().gravity([0.0; 3]).add("first", Rigid::ball(0.05).mass_kg(1.0)).build().unwrap();
+    let world = World::start(&scene, ExecutorKind::Lockstep).unwrap();
+    let kept = |numbers: std::ops::Range<u32>| {
+        let measured = allocation_counter::measure(|| {
+            let mut crowd = std::collections::VecDeque::new();
+            for number in numbers {
+                crowd.push_back(join(&world, number));
+                if crowd.len() > 3 {
+                    world.remove(crowd.pop_front().unwrap()).unwrap();
+                }
+                world.advance(ms(4));
+            }
+            crowd.into_iter().for_each(|object| world.remove(object).unwrap());
+            world.advance(ms(20));
+        });
+        measured.bytes_current
+    };
+    // what is made once
+    kept(0..200);
+    kept(200..count) / i64::from(count - 200)
+}
+
+#[test]
+fn of_what_has_left_nothing_is_kept_but_its_number_and_its_name() {
+    let at = |k: u32| [0.04 * f64::from(k % 4), 0.12 + 0.03 * f64::from(k % 3), 0.0];
+    let balls = kept_bytes(2000, |world, k| world.add(format!("{k}"), Rigid::ball(0.05).at(at(k))).unwrap());
+    let crates = kept_bytes(600, |world, k| world.add(format!("{k}"), Rigid::cuboid([0.1; 3]).at(at(k))).unwrap());
+    let jelly = |k: u32| Soft::cuboid([0.08; 3], [1, 1, 1]).young_pa(1e4).at([0.0, 0.0, 3.0 * f64::from(k % 4)]);
+    let jellies = kept_bytes(600, |world, k| world.add(format!("{k}"), jelly(k)).unwrap());
+    let tube = || metachron_world::Tube::along(&[[5.0, 0.0, 0.0], [5.2, 0.0, 0.0]]).radius_m(0.01).segments(4);
+    let tubes = kept_bytes(600, |world, k| world.add(format!("{k}"), tube()).unwrap());
+    // a state alone has a thousand; tables that double have room for as many again
+    let all = [balls, crates, jellies, tubes];
+    assert!(all.iter().all(|kept| *kept < 450), "{all:?}");
+}
+
 #[test]
 fn a_world_goes_back_to_where_it_was_with_what_acted_on_it() {
     let world = floor(ExecutorKind::Lockstep);

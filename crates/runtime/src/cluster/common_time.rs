@@ -92,7 +92,7 @@ impl AgentRunner {
     /// Whether another agent is at its time, as far as steps and hiccups allow: only then the two may step as one.
     pub fn is_at_the_time_of(&self, id: AgentId) -> bool {
         let Some(peer) = self.peers.get(id) else { return false };
-        let theirs = peer.shared.slot.latest();
+        let theirs = peer.slot.latest();
         let allowed_s = FAR_BEHIND_S + self.pace.dt().as_secs_f64() + self.step_of(id);
         theirs.at_rest || self.pace.time().secs_after(theirs.time).abs() <= allowed_s
     }
@@ -143,10 +143,10 @@ impl AgentRunner {
 
     /// How long the steps are that another agent wants now, seconds.
     fn step_of(&self, id: AgentId) -> f64 {
-        self.peers.get(id).map_or(0.0, |peer| SimSpan::from_nanos(peer.shared.gauges.dt.load(Relaxed)).as_secs_f64())
+        self.peers.get(id).map_or(0.0, |peer| SimSpan::from_nanos(peer.gauges.dt.load(Relaxed)).as_secs_f64())
     }
 
     fn runs(&self, id: AgentId) -> bool {
-        self.peers.get(id).is_some_and(|peer| peer.shared.gauges.is_running())
+        self.peers.get(id).is_some_and(|peer| peer.gauges.is_running())
     }
 }

@@ -5,7 +5,7 @@
 
 use super::ClusterSeat;
 use crate::events::{AgentEvent, ContactEvent, EventKind};
-use crate::handle::EventStreams;
+use crate::streams::EventStreams;
 use metachron_contact::stepper::{PairTotal, Partner};
 use metachron_core::{ContactPartner, ContactState, SimSpan, SimTime};
 

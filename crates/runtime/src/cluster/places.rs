@@ -5,6 +5,7 @@
 
 use super::super::agent_runner::AgentRunner;
 use super::super::agents::Agents;
+use super::super::handle::AgentHandle;
 use super::seats::Seat;
 use metachron_core::{AgentId, ArchiveError};
 use std::sync::PoisonError;
@@ -28,40 +29,45 @@ pub(in super::super) enum Place {
     Returning,
 }
 
-/// Takes all runners from their places, by rising numbers. `home` are those that make turns of their own.
+/// Takes all runners from their places, for each number its own; `None` of one that has left and is not kept. `home` are those that make turns of
+/// their own.
 pub(in super::super) fn take_apart(
     home: impl Iterator<Item = Option<Box<AgentRunner>>>,
     handles: &Agents,
-) -> Vec<Placed> {
-    let mut all = Vec::with_capacity(handles.len());
+) -> Vec<Option<Placed>> {
+    let mut all: Vec<Option<Placed>> = handles.iter().map(|_| None).collect();
     home.flatten().for_each(|runner| take(runner, Place::Home, &mut all));
-    for (handle, handover) in handles.iter().filter_map(|handle| Some((handle, handle.shared.handover()?))) {
+    for shared in handles.iter().filter_map(AgentHandle::live) {
+        let Some(handover) = shared.handover() else { continue };
         let mut arrivals = handover.arrivals.lock().unwrap_or_else(PoisonError::into_inner);
         for (before, runner) in arrivals.drain(..).enumerate() {
-            take(runner, Place::Waiting { leader: handle.id(), before }, &mut all);
+            take(runner, Place::Waiting { leader: shared.id, before }, &mut all);
         }
         handover.returned.take().into_iter().for_each(|runner| take(runner, Place::Returning, &mut all));
     }
-    all.sort_unstable_by_key(|placed| placed.runner.id());
     all
 }
 
-fn take(mut runner: Box<AgentRunner>, place: Place, all: &mut Vec<Placed>) {
+fn take(mut runner: Box<AgentRunner>, place: Place, all: &mut [Option<Placed>]) {
     let leader = runner.id();
     let led = runner.led.seats.drain(..);
-    all.extend(led.map(|Seat { actor, group }| Placed { runner: actor, place: Place::Led { leader, group } }));
-    all.push(Placed { runner, place });
+    let led = led.map(|Seat { actor, group }| (actor, Place::Led { leader, group })).collect::<Vec<_>>();
+    for (runner, place) in led.into_iter().chain([(runner, place)]) {
+        let at = runner.id().0 as usize;
+        all[at] = runner.kept().map(|runner| Placed { runner, place });
+    }
 }
 
 /// Checks that places which were read are such as runners can have.
-pub(in super::super) fn check_places(places: &[Place], all: &[Placed]) -> Result<(), ArchiveError> {
-    let leads = |leader: AgentId| all.get(leader.0 as usize).is_some_and(|at| at.runner.shared.handover().is_some());
+pub(in super::super) fn check_places(places: &[Place], all: &[Option<Placed>]) -> Result<(), ArchiveError> {
+    let has_handover = |placed: &Placed| placed.runner.shared.handover().is_some();
+    let leads = |leader: AgentId| all.get(leader.0 as usize).is_some_and(|at| at.as_ref().is_some_and(has_handover));
     let is_led = |at: usize| matches!(places[at], Place::Led { .. });
     let is_sound = |(at, place): (usize, &Place)| match *place {
         Place::Home => true,
         Place::Led { leader, .. } => leads(leader) && !is_led(leader.0 as usize) && (leader.0 as usize) < at,
         Place::Waiting { leader, .. } => leads(leader) && leader.0 as usize != at,
-        Place::Returning => all[at].runner.shared.handover().is_some(),
+        Place::Returning => all[at].as_ref().is_some_and(has_handover),
     };
     if places.len() == all.len() && places.iter().enumerate().all(is_sound) {
         return Ok(());
@@ -71,10 +77,10 @@ pub(in super::super) fn check_places(places: &[Place], all: &[Placed]) -> Result
 }
 
 /// Puts all runners back to their places. Out: for each agent the runner that is at home.
-pub(in super::super) fn put_back(all: Vec<Placed>, handles: &Agents) -> Vec<Option<Box<AgentRunner>>> {
+pub(in super::super) fn put_back(all: Vec<Option<Placed>>, handles: &Agents) -> Vec<Option<Box<AgentRunner>>> {
     let mut homes: Vec<Option<Box<AgentRunner>>> = handles.iter().map(|_| None).collect();
     let (led, mut others): (Vec<_>, Vec<_>) =
-        all.into_iter().partition(|placed| matches!(placed.place, Place::Led { .. }));
+        all.into_iter().flatten().partition(|placed| matches!(placed.place, Place::Led { .. }));
     for Placed { runner, place } in led {
         let Place::Led { leader, group } = place else { continue };
         // both lists rise by numbers
@@ -89,8 +95,8 @@ pub(in super::super) fn put_back(all: Vec<Placed>, handles: &Agents) -> Vec<Opti
     for Placed { runner, place } in others {
         let id = runner.id();
         let whose = if let Place::Waiting { leader, .. } = place { leader } else { id };
-        let handover = handles[whose.0 as usize].shared.handover();
-        match (place, handover) {
+        let there = handles[whose.0 as usize].live();
+        match (place, there.as_ref().and_then(|shared| shared.handover())) {
             (Place::Waiting { .. }, Some(to)) => {
                 to.arrivals.lock().unwrap_or_else(PoisonError::into_inner).push(runner);
             }

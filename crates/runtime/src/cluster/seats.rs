@@ -9,7 +9,7 @@ use super::super::agent_clock::Timeline;
 use super::super::agent_runner::AgentRunner;
 use super::super::agents::Agents;
 use super::super::events::EventKind;
-use super::super::handle::Shared;
+use super::super::handle::{AgentHandle, Shared};
 use super::super::turns::Took;
 use super::membership::Membership;
 use crossbeam::atomic::AtomicCell;
@@ -201,18 +201,6 @@ impl AgentRunner {
         }
     }
 
-    /// Frees what it made turns with: an agent that has left makes none.
-    pub fn forget(&mut self) {
-        if !self.shared.is_first() {
-            (self.cluster, self.governor, self.links) = (None, None, Vec::new());
-        }
-        (self.loads, self.announced) = (None, Vec::new());
-        self.led = Led::default();
-        self.observer.forget();
-        self.writer.forget_spares();
-        self.shared.form.publish(None);
-    }
-
     /// Lets all it leads return, each by itself: those that belong together find together again.
     pub fn release_all(&mut self) {
         self.led.seats.drain(..).for_each(|seat| seat.actor.return_turns());
@@ -254,7 +242,7 @@ impl AgentRunner {
         let own = newest.bonds.iter().copied();
         let theirs = self.observer.neighbours().iter().filter(|n| n.snapshot.bonds.contains(&me)).map(|n| n.id);
         let open =
-            |id: &AgentId| !sleep.is_closed(*id) && self.peers.get(*id).is_some_and(|p| p.shared.handover().is_some());
+            |id: &AgentId| !sleep.is_closed(*id) && self.peers.get(*id).is_some_and(|peer| peer.handover().is_some());
         own.chain(theirs).map(|id| sleep.leader(id)).filter(open).min()
     }
 }
@@ -273,7 +261,8 @@ fn return_groups(leaving: Vec<Seat>) {
 /// Hands `actor`, and all it leads, over to `leader`; gives it back if that admits nobody now.
 pub(in super::super) fn hand_over(actor: Box<AgentRunner>, leader: AgentId) -> Result<(), Box<AgentRunner>> {
     let (id, sleep, peers) = (actor.id(), Arc::clone(&actor.shared.sleep), Arc::clone(&actor.peers));
-    let Some(handover) = peers.get(leader).and_then(|peer| peer.shared.handover()) else { return Err(actor) };
+    let leads = peers.get(leader);
+    let Some(handover) = leads.as_ref().and_then(|leads| leads.handover()) else { return Err(actor) };
     sleep.follow(id, Some(leader));
     if let Err(actor) = handover.arrive(actor) {
         sleep.follow(id, None);
@@ -318,8 +307,8 @@ pub(in super::super) fn return_arrivals(shared: &Shared) {
 
 /// Completes the metrics of those that are among arrivals or have returned when nobody looks any more.
 pub(in super::super) fn close_remaining(handles: &Agents, timeline: &Timeline, now: Duration) {
-    let handovers = handles.iter().filter_map(|handle| handle.shared.handover());
-    for handover in handovers {
+    for shared in handles.iter().filter_map(AgentHandle::live) {
+        let Some(handover) = shared.handover() else { continue };
         let left = handover.clear().into_iter().chain(handover.take_returned());
         left.for_each(|mut actor| actor.close_account(timeline, now));
     }

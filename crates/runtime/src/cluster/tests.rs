@@ -1,7 +1,7 @@
 //! Agents that are led lose no step and make none twice, wherever they are.
 
 use super::super::lockstep::Lockstep;
-use super::super::testing::{Dummy, Fault, Log, RecordedStep, Swing, eventually, on_every_executor, system};
+use super::super::testing::{Dummy, Fault, Log, RecordedStep, Swing, eventually, holders, on_every_executor, system};
 use super::super::{AgentHandle, AgentSpawn, AgentState, AgentStats, Command, Machine, Run, WatchedPoint, state_hash};
 use metachron_contact::joint::{Joint, JointKind};
 use metachron_contact::stepper::ClusterScene;
@@ -84,7 +84,7 @@ fn a_thousand_moves_lose_no_step_and_make_none_twice() {
         let end = handle.latest().time.as_secs_f64();
         // a slow leader and a slow agent on its way: two of the longest periods behind at most
         assert!((59.94..60.06).contains(&end), "{} has come to {end} s", agent.name);
-        assert_eq!(Arc::strong_count(&handle.shared), 1, "{} is still somewhere", agent.name);
+        assert_eq!(holders(handle), 1, "{} is still somewhere", agent.name);
         let samples = handle.samples(0);
         assert!(samples.windows(2).all(|w| w[1].0 > w[0].0) && samples.len() > 500, "watched wherever it is");
     }
@@ -208,7 +208,7 @@ fn a_broken_member_is_parked_alone_and_the_others_go_on() {
             }
             let kept = run.agents().to_vec();
             drop(run);
-            assert!(kept.iter().all(|a| Arc::strong_count(&a.shared) == 1));
+            assert!(kept.iter().all(|a| holders(a) == 1));
         }
     }
 }
@@ -228,7 +228,7 @@ fn in_real_time_agents_come_and_go_and_no_step_is_lost() {
         let handles = run.agents().to_vec();
         let stats = run.shutdown();
         assert_whole(&log, &stats, &handles);
-        assert!(handles.iter().all(|a| Arc::strong_count(&a.shared) == 1), "every thread has let go of every agent");
+        assert!(handles.iter().all(|a| holders(a) == 1), "every thread has let go of every agent");
         let number = |name: &str| RATES.iter().position(|hz| name == format!("agent:member at {hz}"));
         for made in log.lock().unwrap().iter() {
             // 0 and 3 have one name; workers of a pool have none of an agent
@@ -257,7 +257,7 @@ fn a_run_that_ends_while_agents_are_led_ends_all_of_them() {
                 let stats = run.shutdown();
                 assert_whole(&log, &stats, &kept);
             }
-            assert!(kept.iter().all(|a| Arc::strong_count(&a.shared) == 1));
+            assert!(kept.iter().all(|a| holders(a) == 1));
         }
     });
 }

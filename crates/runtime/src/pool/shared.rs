@@ -9,7 +9,6 @@ use super::super::agent_clock::{SharedTimeline, Timeline};
 use super::super::agent_runner::{AgentRunner, Next};
 use super::super::agents::Agents;
 use super::super::clock::Clock;
-use super::super::cluster::Handover;
 use super::super::sleep::SleepRegistry;
 use super::super::table::Table;
 use super::super::turn_order::{PartKind, TurnOrder};
@@ -17,6 +16,7 @@ use super::queue::{NEVER, Queue};
 use crossbeam::atomic::AtomicCell;
 use crossbeam::utils::CachePadded;
 use metachron_core::AgentId;
+use std::collections::BTreeMap;
 use std::sync::atomic::{AtomicU64, Ordering::Relaxed};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
@@ -41,8 +41,7 @@ pub(super) struct PoolState {
     /// Where the parts of turns are noted; `None` of a run that is not recorded. It changes where no worker works.
     pub order: Mutex<Option<Arc<TurnOrder>>>,
     /// Those that make no more turns.
-    #[expect(clippy::vec_box, reason = "agents move as the boxes that all else holds them in")]
-    parked: Mutex<Vec<Box<AgentRunner>>>,
+    parked: Mutex<BTreeMap<AgentId, Box<AgentRunner>>>,
 }
 
 /// The queue of one worker, and its key figures, readable without the lock.
@@ -97,9 +96,20 @@ impl PoolState {
         self.order.lock().unwrap_or_else(PoisonError::into_inner).clone()
     }
 
-    /// Stores one that makes no more turns.
+    /// Stores one that makes no more turns, unless it has left and is not kept.
     pub fn store_parked(&self, actor: Box<AgentRunner>) {
-        self.parked.lock().unwrap_or_else(PoisonError::into_inner).push(actor);
+        if let Some(actor) = actor.kept() {
+            self.parked().insert(actor.id(), actor);
+        }
+    }
+
+    /// Takes one that makes no more turns.
+    pub fn take_parked(&self, id: AgentId) -> Option<Box<AgentRunner>> {
+        self.parked().remove(&id)
+    }
+
+    fn parked(&self) -> MutexGuard<'_, BTreeMap<AgentId, Box<AgentRunner>>> {
+        self.parked.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
     /// The next turn of worker `at`, which returns the agent of the last one as `back`; `None` if none is due.
@@ -151,7 +161,7 @@ impl PoolState {
 
     /// The agent that has returned from a leader.
     pub fn take_returned(&self, id: AgentId) -> Option<Box<AgentRunner>> {
-        self.handles.get(id.0 as usize)?.shared.handover().and_then(Handover::take_returned)
+        self.handles.of(id)?.take_returned()
     }
 
     /// How long worker `at` may sleep from `now` on; `None`: until it is woken.
@@ -184,9 +194,7 @@ impl PoolState {
     /// Visits and removes all agents that make turns of their own, or would: between turns.
     pub fn clear(&self, mut visit: impl FnMut(Box<AgentRunner>)) {
         self.resting.iter().filter_map(AtomicCell::take).for_each(&mut visit);
-        std::mem::take(&mut *self.parked.lock().unwrap_or_else(PoisonError::into_inner))
-            .into_iter()
-            .for_each(&mut visit);
+        std::mem::take(&mut *self.parked()).into_values().for_each(&mut visit);
         self.queues.iter().for_each(|worker| worker.with(|queue| queue.drain().for_each(&mut visit)));
     }
 

@@ -4,6 +4,7 @@
 //! thread: the agent is parked with the reason, and another worker takes the place. Never here: turns.
 
 use super::super::cluster::return_arrivals;
+use super::super::handle::AgentHandle;
 use super::super::priority::Priority;
 use super::super::sleep::Halt;
 use super::shared::PoolState;
@@ -151,10 +152,10 @@ impl Supervisor {
         let PoolState { sleep, handles, .. } = &*self.state;
         sleep.close(id);
         let led = || handles.iter().filter(|agent| sleep.leader(agent.id()) == id);
-        led().for_each(|agent| return_arrivals(&agent.shared));
+        led().filter_map(AgentHandle::live).for_each(|shared| return_arrivals(&shared));
         led().for_each(|agent| {
             sleep.close(agent.id());
-            agent.shared.gauges.park(reason.to_owned());
+            agent.live().into_iter().for_each(|shared| shared.gauges.park(reason.to_owned()));
             sleep.changed.mark(agent.id());
         });
     }

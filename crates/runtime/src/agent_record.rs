@@ -1,0 +1,66 @@
+//! What is known of a number as long as its run lives: a few words, and the agent, until that has left.
+//!
+//! In: an agent, once it has begun, and again where it comes back. Out: the same, from any thread, without waiting, or that it has left.
+//! Numbers are never used again: of one whose agent has left this is all that there is. Never here: what an agent shows ([`super::handle`]).
+
+use super::handle::Shared;
+use arc_swap::{ArcSwapOption, Guard};
+use metachron_core::AgentId;
+use std::ops::Deref;
+use std::sync::{Arc, OnceLock};
+
+/// A number of a run.
+#[derive(Debug)]
+pub(super) struct AgentRecord {
+    pub id: AgentId,
+    /// Unset where nothing more is known than that it has left; a state that is read may tell later ([`super::archive`]).
+    name: OnceLock<Arc<str>>,
+    live: ArcSwapOption<Shared>,
+}
+
+/// An agent that is there, for a look.
+pub(super) struct Live(Guard<Option<Arc<Shared>>>);
+
+impl AgentRecord {
+    /// That of an agent that begins.
+    pub fn of(shared: &Arc<Shared>) -> Self {
+        let record = Self::unknown(shared.id);
+        record.begin(shared);
+        record
+    }
+
+    /// That of a number of which nothing is known but that its agent has left.
+    pub fn unknown(id: AgentId) -> Self {
+        Self { id, name: OnceLock::new(), live: ArcSwapOption::empty() }
+    }
+
+    /// Its agent is there from now on.
+    pub fn begin(&self, shared: &Arc<Shared>) {
+        self.name.get_or_init(|| Arc::clone(&shared.identity.name));
+        self.live.store(Some(Arc::clone(shared)));
+    }
+
+    /// Its agent has left.
+    pub fn end(&self) {
+        self.live.store(None);
+    }
+
+    /// The agent's name in the scene.
+    pub fn name(&self) -> &str {
+        self.name.get().map_or("", |name| name)
+    }
+
+    /// Its agent; `None` of one that has left and is not kept.
+    pub fn live(&self) -> Option<Live> {
+        let live = self.live.load();
+        live.is_some().then_some(Live(live))
+    }
+}
+
+impl Deref for Live {
+    type Target = Arc<Shared>;
+
+    fn deref(&self) -> &Arc<Shared> {
+        self.0.as_ref().expect("looked at only where there is one")
+    }
+}

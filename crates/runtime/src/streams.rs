@@ -1,0 +1,70 @@
+//! What an agent tells readers: its events and its turns, and how far each reader has heard them.
+//!
+//! In: events and turns, from the thread that makes the agent's turns. Out: the same to each reader ([`super::ring`]), which keeps what an
+//! agent that has left has told until it has heard it. Never here: what they mean.
+
+use super::events::AgentEvent;
+use super::ring::{Ring, RingEntry};
+use super::turns::Turn;
+use std::sync::{Arc, OnceLock};
+
+/// What an agent tells; there is nothing of it before the first reader.
+#[derive(Debug, Default)]
+pub(super) struct EventStreams(OnceLock<Arc<Rings>>);
+
+#[derive(Debug, Default)]
+pub(super) struct Rings {
+    pub events: Ring<AgentEvent>,
+    pub turns: Ring<Turn>,
+}
+
+/// How far a reader has heard an agent.
+#[derive(Debug, Default)]
+pub struct Heard {
+    rings: Option<Arc<Rings>>,
+    next: u64,
+}
+
+impl EventStreams {
+    /// Tells of an event, from one thread at a time.
+    pub fn event(&self, event: &AgentEvent) {
+        self.0.get().into_iter().for_each(|rings| rings.events.push(event));
+    }
+
+    /// Tells of a turn, from one thread at a time.
+    pub fn turn(&self, turn: impl FnOnce() -> Turn) {
+        if let Some(rings) = self.0.get().filter(|rings| rings.turns.is_heard()) {
+            rings.turns.push(&turn());
+        }
+    }
+
+    /// Begins to keep what `of` says for a reader.
+    pub fn listen<E: RingEntry>(&self, of: fn(&Rings) -> &Ring<E>) -> Heard {
+        let rings = self.0.get_or_init(Arc::default);
+        Heard { next: of(rings).listen(), rings: Some(Arc::clone(rings)) }
+    }
+}
+
+impl Heard {
+    /// Passes what it has not heard on to `take`; returns how much was lost. `now` is what the agent told before that; `None` where it has left.
+    pub(super) fn hear<E: RingEntry>(
+        &mut self,
+        now: Option<&EventStreams>,
+        of: fn(&Rings) -> &Ring<E>,
+        take: impl FnMut(E),
+    ) -> u64 {
+        let mut lost = 0;
+        if let Some(rings) = &self.rings {
+            (self.next, lost) = of(rings).read(self.next, take);
+        }
+        // one that has come back tells anew
+        match now {
+            None => *self = Self::default(),
+            Some(streams) if streams.0.get().map(Arc::as_ptr) != self.rings.as_ref().map(Arc::as_ptr) => {
+                *self = streams.listen(of);
+            }
+            Some(_) => {}
+        }
+        lost
+    }
+}
