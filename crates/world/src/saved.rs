@@ -13,6 +13,7 @@ use super::world::{Shared, State, World};
 use metachron_core::{Archive, ArchiveError};
 use metachron_runtime::{AgentHandle, AgentState, Run};
 use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::sync::atomic::Ordering::Release;
 
 impl World {
     /// Starts `scene` and puts it into the state of `checkpoint`: it goes on as the world did that was saved, to the bit.
@@ -85,6 +86,7 @@ impl World {
         let outcome = read_state(run.as_mut(), checkpoint, &self.joining());
         joined.keep(&checkpoint.joined);
         self.see(run.as_ref());
+        self.shared.put_back.fetch_add(1, Release);
         let Err(reason) = outcome else { return Ok(()) };
         let (now, time, timeline) = (run.now(), run.sim_now(), run.timeline());
         let broken = std::mem::replace(&mut *state, State::Stopped { now, time, timeline });
