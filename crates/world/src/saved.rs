@@ -10,7 +10,7 @@ use super::joined::Joining;
 use super::kinds::ExecutorKind;
 use super::recording::Entry;
 use super::world::{Shared, State, World};
-use metachron_core::{Archive, ArchiveError};
+use metachron_core::Archive;
 use metachron_runtime::{AgentHandle, AgentState, Run};
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::atomic::Ordering::Release;
@@ -66,7 +66,7 @@ impl World {
     ///
     /// # Errors
     /// [`CheckpointError::OtherScene`], also where an object of this world has the number of another that joined the checkpoint's,
-    /// [`CheckpointError::Own`], [`CheckpointError::Refused`] and [`CheckpointError::Stopped`] leave the world as it was. After
+    /// [`CheckpointError::Own`], [`CheckpointError::Replay`] and [`CheckpointError::Stopped`] leave the world as it was. After
     /// [`CheckpointError::Unusable`] it is stopped.
     pub fn restore(&self, checkpoint: &Checkpoint) -> Result<(), CheckpointError> {
         let Shared { identity, joined, log, .. } = &*self.shared;
@@ -74,7 +74,7 @@ impl World {
         let mut state = self.state();
         let State::Running(run) = &mut *state else { return Err(CheckpointError::Stopped) };
         if log.is_replayed() {
-            return Err(CheckpointError::Refused(ArchiveError::Refused { what: "a replay".to_owned() }));
+            return Err(CheckpointError::Replay);
         }
         if log.is_recorded() {
             checkpoint.check_saved()?;
