@@ -10,7 +10,7 @@ use crate::events::Events;
 use crate::export::{Export, Paths};
 use crate::home::Home;
 use crate::numbers::{Rotation, Vector, span};
-use crate::object::{Named, Object};
+use crate::object::{Named, NamedJoint, Object};
 use crate::queries::{Contact, Hit};
 use crate::raised;
 use crate::scene::{Scene, part};
@@ -24,7 +24,7 @@ use metachron::runtime::{AgentState, TimelineCommand};
 use metachron::world::kinds::ExecutorKind;
 use metachron::world::{self, Command, EventFilter, Pace, SceneText};
 use numpy::{PyArray1, PyArray2, PyArray3};
-use pyo3::exceptions::{PyKeyError, PyRuntimeError, PyTypeError, PyValueError};
+use pyo3::exceptions::{PyKeyError, PyRuntimeError, PyValueError};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use std::path::PathBuf;
@@ -62,22 +62,6 @@ struct Joint {
     body: world::Object,
 }
 
-/// An argument that names a joint.
-enum NamedJoint {
-    Name(String),
-    Number(u32),
-}
-
-impl<'py> FromPyObject<'_, 'py> for NamedJoint {
-    type Error = PyErr;
-
-    fn extract(given: Borrowed<'_, 'py, PyAny>) -> PyResult<Self> {
-        let name = given.extract().map(Self::Name);
-        let wanted = |_| PyTypeError::new_err("expected the name of a joint, or its number in the scene");
-        name.or_else(|_| given.extract().map(Self::Number)).map_err(wanted)
-    }
-}
-
 /// The executors, as Python names them.
 const EXECUTORS: [ExecutorKind; 4] =
     [ExecutorKind::Lockstep, ExecutorKind::Threads, ExecutorKind::Pool, ExecutorKind::Auto];
@@ -90,6 +74,11 @@ const PATIENCE: Duration = Duration::from_millis(20);
 
 /// Keyword arguments.
 type Given<'py> = Bound<'py, PyDict>;
+
+/// Does what may wait for the world, while other threads of Python run.
+fn apart<T: Send>(work: impl FnOnce() -> T + Send) -> T {
+    Python::attach(|py| py.detach(work))
+}
 
 impl World {
     /// Starts a scene.
@@ -125,7 +114,8 @@ impl World {
     }
 
     fn send(&self, object: &Named<'_>, command: Command) -> PyResult<()> {
-        self.inner.command(object.of(&self.inner)?, command).map_err(raised::world)
+        let object = object.of(&self.inner)?;
+        apart(|| self.inner.command(object, command)).map_err(raised::world)
     }
 
     /// The joint's number, and the object that takes commands for it.
@@ -322,7 +312,8 @@ impl World {
 
     /// Puts an object into a state that it had, or another one of as many nodes.
     fn set_state(&self, object: Named<'_>, state: &State) -> PyResult<()> {
-        self.inner.set_state(object.of(&self.inner)?, &state.0.body).map_err(raised::world)
+        let (object, body) = (object.of(&self.inner)?, &state.0.body);
+        apart(|| self.inner.set_state(object, body)).map_err(raised::world)
     }
 
     /// Puts the nodes of a soft body to these places, m, (n, 3), with these velocities, m/s; at rest where there are none. How many nodes it has,
@@ -339,7 +330,7 @@ impl World {
             Body::Soft(soft) => (soft.positions, soft.velocities) = (positions, velocities),
             _ => return Err(PyValueError::new_err("only soft bodies are put elsewhere node by node")),
         }
-        self.inner.set_state(object, &body).map_err(raised::world)
+        apart(|| self.inner.set_state(object, &body)).map_err(raised::world)
     }
 
     /// What a sensor of the scene reads, of the newest states. Raises `KeyError`.
@@ -378,7 +369,8 @@ impl World {
             Some(motor) => Command::motor(number, motor),
             None => Command::motor(number, idle).taken_back(),
         };
-        self.inner.command(body, keywords.timed(command)?).map_err(raised::world)
+        let command = keywords.timed(command)?;
+        apart(|| self.inner.command(body, command)).map_err(raised::world)
     }
 
     /// Takes up another object, which lives from its first step on.
@@ -390,7 +382,8 @@ impl World {
 
     /// Takes an object out; its handle is an error from its next step on.
     fn remove(&self, object: Named<'_>) -> PyResult<()> {
-        self.inner.remove(object.of(&self.inner)?).map_err(raised::world)
+        let object = object.of(&self.inner)?;
+        apart(|| self.inner.remove(object)).map_err(raised::world)
     }
 
     /// A picture of the world now, (height, width, 4) of `uint8`: red, green, blue, opacity. `size` is (width, height), default (1280, 720).
@@ -472,7 +465,7 @@ impl World {
             Some(object) => filter.of(object.of(&self.inner)?),
             None => filter,
         };
-        Ok(Events::new(&self.inner, &self.fixed, filter))
+        Ok(apart(|| Events::new(&self.inner, &self.fixed, filter)))
     }
 
     /// What an object touches now.
