@@ -60,7 +60,8 @@ impl Shot {
     pub fn new((width, height): (i64, i64), from: Option<Viewpoint>) -> PyResult<Self> {
         let side = |pixels: i64| u32::try_from(pixels).ok().filter(|pixels| *pixels > 0);
         let (Some(width), Some(height)) = (side(width), side(height)) else {
-            let message = format!("the size is ({width}, {height}); expected a width and a height of 1 pixel or more");
+            let message =
+                format!("the size is ({width}, {height}); expected a width and a height of 1 to {} pixels", u32::MAX);
             return Err(PyValueError::new_err(message));
         };
         Ok(Self { width, height, from: from.unwrap_or(Viewpoint::Named(None)) })

@@ -34,6 +34,10 @@ impl Export {
     /// Begins the files; `fixed` is the surface of what never moves.
     pub fn create(world: &World, fixed: &Surface, paths: Paths) -> PyResult<Self> {
         let Paths { mcap, vtk, perfetto } = paths;
+        let given: Vec<_> = [&mcap, &vtk, &perfetto].into_iter().flatten().collect();
+        if let Some((_, path)) = given.iter().enumerate().find(|(at, path)| given[..*at].contains(path)) {
+            return Err(PyValueError::new_err(format!("{} would be written twice: name another path", path.display())));
+        }
         let mut writers: Vec<Box<dyn MomentWriter + Send>> = Vec::new();
         if let Some(path) = mcap {
             writers.push(Box::new(McapFile::create(&path, fixed).map_err(raised::export)?));

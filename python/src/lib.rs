@@ -9,6 +9,7 @@ mod checkpoint;
 mod command;
 mod events;
 mod export;
+mod home;
 mod numbers;
 mod object;
 mod queries;

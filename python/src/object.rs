@@ -1,4 +1,4 @@
-//! Objects of a world, by name or by handle.
+//! Objects of a world, by name or by handle; joints by name or number.
 //!
 //! In: a name, or an [`Object`] that a world gave. Out: the engine's object. Never here: its state.
 
@@ -41,6 +41,22 @@ impl<'py> FromPyObject<'_, 'py> for Named<'py> {
         let handle = given.extract().map(Self::Handle);
         let wanted = |_| PyTypeError::new_err("expected the name of an object, or an Object of this world");
         handle.or_else(|_| given.extract().map(Self::Name)).map_err(wanted)
+    }
+}
+
+/// An argument that names a joint.
+pub enum NamedJoint {
+    Name(String),
+    Number(u32),
+}
+
+impl<'py> FromPyObject<'_, 'py> for NamedJoint {
+    type Error = PyErr;
+
+    fn extract(given: Borrowed<'_, 'py, PyAny>) -> PyResult<Self> {
+        let name = given.extract().map(Self::Name);
+        let wanted = |_| PyTypeError::new_err("expected the name of a joint, or its number in the scene");
+        name.or_else(|_| given.extract().map(Self::Number)).map_err(wanted)
     }
 }
 

@@ -82,12 +82,11 @@ pub fn record(error: RecordError) -> PyErr {
 
 /// An error of one argument of a call or one field of a part, with its name.
 pub fn of_argument(py: Python<'_>, what: &str, error: &PyErr) -> PyErr {
-    let message = format!("{what}: {}", error.value(py));
     // a number that an integer of the engine cannot hold is wrong as any other is
     if error.is_instance_of::<PyOverflowError>(py) {
-        return PyValueError::new_err(message);
+        return PyValueError::new_err(format!("{what}: the number is out of range"));
     }
-    PyErr::from_type(error.get_type(py), message)
+    PyErr::from_type(error.get_type(py), format!("{what}: {}", error.value(py)))
 }
 
 /// Why a scene cannot be built.
@@ -100,6 +99,12 @@ pub fn scene(error: &SceneError) -> PyErr {
     let hidden = (error.hidden > 0).then(|| format!("and {} more", error.hidden));
     let lines = [error.to_string()].into_iter().chain(error.problems.iter().map(problem)).chain(hidden);
     PyValueError::new_err(lines.collect::<Vec<_>>().join("\n"))
+}
+
+/// Why a file is no mesh.
+pub fn mesh(error: &SceneError) -> PyErr {
+    let why = error.problems.iter().map(problem).collect::<Vec<_>>().join("\n");
+    PyValueError::new_err(format!("{}: {why}", error.name))
 }
 
 fn problem(problem: &SceneProblem) -> String {

@@ -108,6 +108,7 @@ impl Plan {
     /// Plays all worlds; each thread takes the next that no other has begun.
     fn play(&self, threads: usize) -> PyResult<Vec<Played>> {
         let worlds = self.actions.shape()[0];
+        let threads = threads.min(worlds);
         let (next, is_over) = (AtomicUsize::new(0), AtomicBool::new(false));
         let (done, results) = mpsc::sync_channel::<Outcome>(threads);
         let work = |done: SyncSender<Outcome>| {
@@ -125,7 +126,7 @@ impl Plan {
         };
         std::thread::scope(|scope| {
             let work = &work;
-            let started = (0..threads.min(worlds)).map(|_| {
+            let started = (0..threads).map(|_| {
                 let done = done.clone();
                 std::thread::Builder::new().name("rollout".to_owned()).spawn_scoped(scope, move || work(done))
             });

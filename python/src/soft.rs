@@ -25,7 +25,7 @@ pub fn soft(part: &Bound<'_, PyAny>) -> PyResult<Option<Soft>> {
         "SoftBall" => Soft::ball(number("radius")?, field(part, "segments")?),
         "SoftMesh" => {
             let surface = Source::mesh(&field::<PathBuf>(part, "file")?, number("scale")?);
-            let surface = surface.map_err(|error| raised::scene(&error))?;
+            let surface = surface.map_err(|error| raised::mesh(&error))?;
             return placed(part, Soft::mesh(Arc::new(surface), field(part, "eps")?)).map(Some);
         }
         "Rope" => {

@@ -3,6 +3,7 @@
 //! In: a world, a camera, a size. Out: the colours or the depths of all pixels. Never here: what is drawn, and how.
 
 use crate::camera::{Shot, Viewpoint};
+use crate::home::Home;
 use crate::raised;
 use metachron::render::{Camera, Gpu, GpuError, Offscreen, Picture, RendererOptions, Size};
 use metachron::session::WorldView;
@@ -14,7 +15,13 @@ use pyo3::prelude::*;
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
 /// What draws for all worlds of the process: an adapter is opened once, with the first picture.
-static SCREEN: Mutex<Option<Offscreen>> = Mutex::new(None);
+static SCREEN: Mutex<Option<Screen>> = Mutex::new(None);
+
+/// The adapter's threads are in the process that opened it.
+struct Screen {
+    offscreen: Offscreen,
+    home: Home,
+}
 
 /// The pictures of one world.
 pub struct Pictures {
@@ -62,21 +69,32 @@ impl Pictures {
             Viewpoint::Free { eye, look_at, fov } => Camera::looking(*eye, *look_at, *fov),
         };
         let picture = view.compose(&camera, size);
-        with_screen(size, |screen| draw(screen, picture, &camera)).map_err(|error| raised::drawing(&error))
+        with_screen(size, |screen| draw(screen, picture, &camera))
     }
 }
 
 /// Lets something be drawn at this size. What has failed is made anew for the next picture.
-fn with_screen<T>(size: Size, draw: impl FnOnce(&mut Offscreen) -> Result<T, GpuError>) -> Result<T, GpuError> {
+fn with_screen<T>(size: Size, draw: impl FnOnce(&mut Offscreen) -> Result<T, GpuError>) -> PyResult<T> {
     let mut kept = locked(&SCREEN);
-    let mut screen = match kept.take() {
+    kept.as_ref().map_or(Ok(()), |screen| screen.home.check("what draws"))?;
+    let before = kept.take().map(|screen| screen.offscreen);
+    let (offscreen, drawn) = drawn_at(size, before, draw).map_err(|error| raised::drawing(&error))?;
+    *kept = Some(Screen { offscreen, home: Home::here() });
+    Ok(drawn)
+}
+
+fn drawn_at<T>(
+    size: Size,
+    before: Option<Offscreen>,
+    draw: impl FnOnce(&mut Offscreen) -> Result<T, GpuError>,
+) -> Result<(Offscreen, T), GpuError> {
+    let mut screen = match before {
         Some(screen) if screen.size() == size => screen,
         Some(screen) => screen.resized(size)?,
         None => Offscreen::new(Gpu::headless()?, size, RendererOptions::STILL)?,
     };
     let drawn = draw(&mut screen)?;
-    *kept = Some(screen);
-    Ok(drawn)
+    Ok((screen, drawn))
 }
 
 fn misshapen(error: ShapeError) -> PyErr {

@@ -8,8 +8,9 @@ use crate::checkpoint::Checkpoint;
 use crate::command::Keywords;
 use crate::events::Events;
 use crate::export::{Export, Paths};
+use crate::home::Home;
 use crate::numbers::{Rotation, Vector, span};
-use crate::object::{Named, Object};
+use crate::object::{Named, NamedJoint, Object};
 use crate::queries::{Contact, Hit};
 use crate::raised;
 use crate::scene::{Scene, part};
@@ -17,17 +18,18 @@ use crate::state::State;
 use crate::view::Pictures;
 use glam::{DQuat, DVec3};
 use metachron::contact::joint::{Motor, MotorGoal};
-use metachron::core::{Body, SimSpan, SoftNodes};
+use metachron::core::{Body, SoftNodes};
 use metachron::export::{Moments, Surface, write_glb};
 use metachron::runtime::{AgentState, TimelineCommand};
 use metachron::world::kinds::ExecutorKind;
-use metachron::world::{self, Command, EventFilter, RecordingFile, SceneText};
+use metachron::world::{self, Command, EventFilter, Pace, SceneText};
 use numpy::{PyArray1, PyArray2, PyArray3};
-use pyo3::exceptions::{PyKeyError, PyRuntimeError, PyTypeError, PyValueError};
+use pyo3::exceptions::{PyKeyError, PyRuntimeError, PyValueError};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use std::path::PathBuf;
 use std::sync::Arc;
+use std::time::{Duration, Instant};
 
 /// A world that runs; any thread may read and command it. In a `with` block it stops at the end.
 #[pyclass(frozen, module = "metachron")]
@@ -41,6 +43,16 @@ pub struct World {
     joints: Vec<Joint>,
     /// The text of its scene; `None` of one that was built of parts.
     text: Option<SceneText>,
+    home: Home,
+}
+
+impl Drop for World {
+    fn drop(&mut self) {
+        if !self.is_at_home() {
+            // the last of its clones would wait for its threads
+            std::mem::forget(self.inner.clone());
+        }
+    }
 }
 
 /// A joint that a motor may drive.
@@ -50,22 +62,6 @@ struct Joint {
     body: world::Object,
 }
 
-/// An argument that names a joint.
-enum NamedJoint {
-    Name(String),
-    Number(u32),
-}
-
-impl<'py> FromPyObject<'_, 'py> for NamedJoint {
-    type Error = PyErr;
-
-    fn extract(given: Borrowed<'_, 'py, PyAny>) -> PyResult<Self> {
-        let name = given.extract().map(Self::Name);
-        let wanted = |_| PyTypeError::new_err("expected the name of a joint, or its number in the scene");
-        name.or_else(|_| given.extract().map(Self::Number)).map_err(wanted)
-    }
-}
-
 /// The executors, as Python names them.
 const EXECUTORS: [ExecutorKind; 4] =
     [ExecutorKind::Lockstep, ExecutorKind::Threads, ExecutorKind::Pool, ExecutorKind::Auto];
@@ -73,11 +69,16 @@ const EXECUTORS: [ExecutorKind; 4] =
 /// Where on an object, under which key, for how long.
 const ANCHORED: [&str; 5] = ["arc", "local", "vertex", "key", "expires"];
 
-/// So much time passes in lockstep before Python is asked whether the user has interrupted it.
-const PIECE: SimSpan = SimSpan::from_millis(20);
+/// So long is let pass before Python is asked whether the user has interrupted it.
+const PATIENCE: Duration = Duration::from_millis(20);
 
 /// Keyword arguments.
 type Given<'py> = Bound<'py, PyDict>;
+
+/// Does what may wait for the world, while other threads of Python run.
+fn apart<T: Send>(work: impl FnOnce() -> T + Send) -> T {
+    Python::attach(|py| py.detach(work))
+}
 
 impl World {
     /// Starts a scene.
@@ -99,11 +100,22 @@ impl World {
         let joints = joints.collect::<PyResult<_>>()?;
         let fixed = scene.obstacles.iter().map(|solid| solid.name.clone()).collect();
         let (fixed_surface, pictures) = (Surface::fixed(scene), Pictures::of(scene));
-        Ok(Self { inner, fixed, fixed_surface, pictures, joints, text })
+        Ok(Self { inner, fixed, fixed_surface, pictures, joints, text, home: Home::here() })
+    }
+
+    /// Whether the threads that step it are in this process.
+    fn is_at_home(&self) -> bool {
+        self.inner.executor() == ExecutorKind::Lockstep || self.home.is_here()
+    }
+
+    /// An error where they are in another.
+    fn at_home(&self) -> PyResult<&world::World> {
+        if self.is_at_home() { Ok(&self.inner) } else { self.home.check("a world").map(|()| &self.inner) }
     }
 
     fn send(&self, object: &Named<'_>, command: Command) -> PyResult<()> {
-        self.inner.command(object.of(&self.inner)?, command).map_err(raised::world)
+        let object = object.of(&self.inner)?;
+        apart(|| self.inner.command(object, command)).map_err(raised::world)
     }
 
     /// The joint's number, and the object that takes commands for it.
@@ -174,44 +186,46 @@ impl World {
 
     /// All that the next bit of it needs, objects that joined it included.
     fn checkpoint(&self, py: Python<'_>) -> PyResult<Checkpoint> {
-        let inner = py.detach(|| self.inner.checkpoint()).map_err(raised::checkpoint)?;
+        let world = self.at_home()?;
+        let inner = py.detach(|| world.checkpoint()).map_err(raised::checkpoint)?;
         Ok(Checkpoint { inner })
     }
 
     /// Goes back to a checkpoint of this world, or of another of the same scene: what comes after is the same, in lockstep to the bit. Objects that
     /// joined since are taken out, those that left since are there again.
     fn restore(&self, py: Python<'_>, checkpoint: &Checkpoint) -> PyResult<()> {
-        py.detach(|| self.inner.restore(&checkpoint.inner)).map_err(raised::checkpoint)
+        let world = self.at_home()?;
+        py.detach(|| world.restore(&checkpoint.inner)).map_err(raised::checkpoint)
     }
 
     /// Lets so much simulated time pass: at once in lockstep, in real time on other executors. Other threads of Python run meanwhile.
     fn advance(&self, py: Python<'_>, seconds: f64) -> PyResult<()> {
-        let span = span("the time to advance by", seconds)?;
-        if self.inner.executor() != ExecutorKind::Lockstep {
-            py.detach(|| self.inner.advance(span));
-            return Ok(());
-        }
-        let mut left = span;
-        while left > SimSpan::ZERO {
-            let piece = left.min(PIECE);
-            py.detach(|| self.inner.advance(piece));
-            py.check_signals()?;
-            left = SimSpan::from_nanos(left.as_nanos() - piece.as_nanos());
-        }
-        Ok(())
+        let (world, span) = (self.at_home()?, span("the time to advance by", seconds)?);
+        let (mut asked, mut interrupted) = (Instant::now(), Ok(()));
+        let goes_on = || {
+            if asked.elapsed() >= PATIENCE {
+                asked = Instant::now();
+                interrupted = Python::attach(|py| py.check_signals());
+            }
+            interrupted.is_ok()
+        };
+        py.detach(|| world.advance_while(span, goes_on));
+        interrupted
     }
 
-    /// Lets time pass from now on, so many simulated seconds a second. Not in lockstep.
+    /// Lets time pass from now on, so many simulated seconds a second, 0.001 ... 100. Not in lockstep.
     #[pyo3(signature = (speed = 1.0))]
     fn run(&self, py: Python<'_>, speed: f64) -> PyResult<()> {
         if self.inner.executor() == ExecutorKind::Lockstep {
             return Err(PyValueError::new_err("a world in lockstep has no time of its own: it needs `advance`"));
         }
+        let world = self.at_home()?;
         py.detach(|| {
-            self.inner.drive(TimelineCommand::Speed(speed));
-            self.inner.drive(TimelineCommand::Run);
-        });
-        Ok(())
+            world.set_pace(Pace::Factor(speed))?;
+            world.drive(TimelineCommand::Run);
+            Ok(())
+        })
+        .map_err(raised::world)
     }
 
     /// Stops time.
@@ -221,7 +235,10 @@ impl World {
 
     /// Ends the world. Its newest states can still be read.
     fn stop(&self, py: Python<'_>) {
-        py.detach(|| drop(self.inner.stop()));
+        // a child has none of its threads to end
+        if self.is_at_home() {
+            py.detach(|| drop(self.inner.stop()));
+        }
     }
 
     fn __enter__(slf: PyRef<'_, Self>) -> PyRef<'_, Self> {
@@ -295,7 +312,8 @@ impl World {
 
     /// Puts an object into a state that it had, or another one of as many nodes.
     fn set_state(&self, object: Named<'_>, state: &State) -> PyResult<()> {
-        self.inner.set_state(object.of(&self.inner)?, &state.0.body).map_err(raised::world)
+        let (object, body) = (object.of(&self.inner)?, &state.0.body);
+        apart(|| self.inner.set_state(object, body)).map_err(raised::world)
     }
 
     /// Puts the nodes of a soft body to these places, m, (n, 3), with these velocities, m/s; at rest where there are none. How many nodes it has,
@@ -312,7 +330,7 @@ impl World {
             Body::Soft(soft) => (soft.positions, soft.velocities) = (positions, velocities),
             _ => return Err(PyValueError::new_err("only soft bodies are put elsewhere node by node")),
         }
-        self.inner.set_state(object, &body).map_err(raised::world)
+        apart(|| self.inner.set_state(object, &body)).map_err(raised::world)
     }
 
     /// What a sensor of the scene reads, of the newest states. Raises `KeyError`.
@@ -351,7 +369,8 @@ impl World {
             Some(motor) => Command::motor(number, motor),
             None => Command::motor(number, idle).taken_back(),
         };
-        self.inner.command(body, keywords.timed(command)?).map_err(raised::world)
+        let command = keywords.timed(command)?;
+        apart(|| self.inner.command(body, command)).map_err(raised::world)
     }
 
     /// Takes up another object, which lives from its first step on.
@@ -363,7 +382,8 @@ impl World {
 
     /// Takes an object out; its handle is an error from its next step on.
     fn remove(&self, object: Named<'_>) -> PyResult<()> {
-        self.inner.remove(object.of(&self.inner)?).map_err(raised::world)
+        let object = object.of(&self.inner)?;
+        apart(|| self.inner.remove(object)).map_err(raised::world)
     }
 
     /// A picture of the world now, (height, width, 4) of `uint8`: red, green, blue, opacity. `size` is (width, height), default (1280, 720).
@@ -408,12 +428,10 @@ impl World {
     /// Writes down from now on what is done to it, so that `replay` repeats it to the bit. Raises `OSError`; `RuntimeError` on
     /// a world that has stopped, is recorded already or repeats a recording.
     fn record(&self, py: Python<'_>, path: PathBuf) -> PyResult<()> {
+        let world = self.at_home()?;
         py.detach(|| match &self.text {
-            Some(text) => {
-                let file = RecordingFile::create(path)?;
-                self.inner.record_to(Box::new(file), Some(text.clone()))
-            }
-            None => self.inner.record(&path),
+            Some(text) => world.record_scene(&path, text.clone()),
+            None => world.record(&path),
         })
         .map_err(raised::record)
     }
@@ -447,7 +465,7 @@ impl World {
             Some(object) => filter.of(object.of(&self.inner)?),
             None => filter,
         };
-        Ok(Events::new(&self.inner, &self.fixed, filter))
+        Ok(apart(|| Events::new(&self.inner, &self.fixed, filter)))
     }
 
     /// What an object touches now.

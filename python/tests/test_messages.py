@@ -79,6 +79,10 @@ def test_commands_that_cannot_be_say_why() -> None:
         world.spring("ball", [1.0, 0.0, 0.0])
     with pytest.raises(ValueError, match="advance by is -1.0 s"):
         world.advance(-1.0)
+    with pytest.raises(ValueError, match="same would be written twice"):
+        world.export(mcap="same", perfetto="same")
+    with pytest.raises(ValueError, match="argument 'key': the number is out of range"):
+        world.force("ball", [0.0, 0.0, 1.0], key=-1)
     with pytest.raises(ValueError, match="ray|cast"):
         world.cast_ray([0.0, 0.0, 0.0], [0.0, 0.0, 0.0], 1.0)
     with pytest.raises(ValueError, match="lockstep"):

@@ -43,6 +43,11 @@ def test_a_scene_from_toml_is_in_its_recording(tmp_path: Path) -> None:
     world = mc.World.from_toml("stack")
     world.record(tmp_path / "run.rec")
     world.advance(0.3)
+    # what is refused does not empty a file
+    (tmp_path / "other").write_text("kept")
+    with pytest.raises(RuntimeError, match="being recorded already"):
+        world.record(tmp_path / "other")
+    assert (tmp_path / "other").read_text() == "kept"
     world.stop()
     assert played(mc.replay(tmp_path / "run.rec")).hash() == world.hash()
 

@@ -39,6 +39,8 @@ def test_wrong_rollouts_say_what_is_wrong_and_in_which_world() -> None:
         mc.rollout(scenes.floating(), "ball", np.zeros((3, 4, 2)), step=0.1)
     with pytest.raises(ValueError, match="threads is 0"):
         mc.rollout(scenes.floating(), "ball", actions, step=0.1, threads=0)
+    # no more than there are worlds
+    mc.rollout(scenes.floating(), "ball", actions, step=0.1, threads=10**18)
     with pytest.raises(ValueError, match="step is 0.0 s"):
         mc.rollout(scenes.floating(), "ball", actions, step=0.0)
     with pytest.raises(TypeError, match="argument 'observe': expected a list of names"):

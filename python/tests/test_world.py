@@ -1,5 +1,7 @@
 """Worlds do what mechanics says, and their states are what they were."""
 
+import gc
+import os
 import signal
 import threading
 import tracemalloc
@@ -208,6 +210,9 @@ def test_a_world_goes_on_by_itself_between_run_and_pause() -> None:
             pass
         world.pause()
         assert world.time > 0.0
+        for speed in [0.0, -1.0, np.nan, 1e9]:
+            with pytest.raises(ValueError, match="expected 0.001 to 100"):
+                world.run(speed)
 
 
 def resident_kib() -> int:
@@ -265,6 +270,40 @@ def test_the_user_interrupts_what_takes_long() -> None:
         with pytest.raises(KeyboardInterrupt):
             call()
         timer.join()
+    # in real time too: it stands where it had come to
+    with scenes.bouncing().start("threads") as live:
+        timer = threading.Timer(0.05, signal.raise_signal, [signal.SIGINT])
+        timer.start()
+        with pytest.raises(KeyboardInterrupt):
+            live.advance(600.0)
+        timer.join()
+        assert 0.0 < live.time < 300.0
+        stood = live.time
+        live.advance(0.01)
+        assert live.time == pytest.approx(stood + 0.01)
+
+
+def test_a_forked_child_has_none_of_the_threads_of_a_world_and_says_so() -> None:
+    world = scenes.bouncing().start("threads")
+    told, tell = os.pipe()
+    child = os.fork()
+    if child == 0:
+        # who waits is ended
+        signal.alarm(20)
+        said = "advanced"
+        try:
+            world.advance(0.01)
+        except RuntimeError as error:
+            said = str(error)
+        world.stop()
+        del world
+        gc.collect()
+        os.write(tell, said.encode())
+        os._exit(0)
+    assert os.waitpid(child, 0)[1] == 0
+    assert b"let the child make its own" in os.read(told, 1000)
+    world.advance(0.01)
+    world.stop()
 
 
 def test_a_world_goes_back_to_a_checkpoint_also_from_a_file(tmp_path: Path) -> None:

@@ -21,7 +21,7 @@ pub(super) fn command(args: &CalibrateArgs) -> anyhow::Result<Exit> {
     if let Some(path) = &args.export {
         check_output_path(path, "--export", args.force)?;
     }
-    let gpu = Gpu::headless().context("no graphics adapter was found to measure")?;
+    let gpu = Gpu::headless().context("what drawing costs cannot be measured")?;
     let table = table(args, &gpu)?;
     if let Some(path) = &args.export {
         std::fs::write(path, table.export()).with_context(|| format!("{} cannot be written", path.display()))?;

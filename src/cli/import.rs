@@ -27,8 +27,8 @@ pub(super) fn command(args: &ImportArgs) -> anyhow::Result<Exit> {
         message(&format!("{model}: {entry}"));
     }
     // a model may have numbers that are beyond those of scenes, and a mesh that is none
-    let name = scene_folder.join("imported.toml");
-    let checked = Source::recorded(&name.to_string_lossy(), &toml, name.parent()).and_then(|source| load(&source, &[]));
+    let name = args.out.as_ref().map_or_else(|| format!("of {model}"), |path| path.display().to_string());
+    let checked = Source::recorded(&name, &toml, Some(&scene_folder)).and_then(|source| load(&source, &[]));
     if let Err(error) = checked {
         message(&rendered(&error));
         return Ok(Exit::BadInput);

@@ -28,7 +28,7 @@ pub enum StepError {
         max_s: f64,
     },
     /// The state is no longer finite. The agent must not step again; its last snapshot stays valid.
-    #[error("the {model} diverged in a step of {dt_s} s: {what}")]
+    #[error("the {model} model diverged in a step of {dt_s} s: {what}")]
     Diverged {
         /// The model's name.
         model: &'static str,

@@ -422,7 +422,8 @@ pub(super) fn contained<T>(part: impl FnOnce() -> Result<T, String>) -> Result<T
         Err(payload) => {
             let text = payload.downcast_ref::<&str>().copied().map(str::to_owned);
             let text = text.or_else(|| payload.downcast_ref::<String>().cloned()).unwrap_or_default();
-            Err(format!("panicked, which is a bug in metachron: {text}"))
+            // an agent of somebody's own may panic, too
+            Err(format!("panicked, which is a bug of its model or of metachron: {text}"))
         }
     }
 }

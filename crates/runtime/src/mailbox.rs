@@ -76,7 +76,7 @@ pub enum SendError {
     )]
     TooMany,
     /// Poses lead only what is not moved by forces.
-    #[error("agent {} is moved by what acts on it; only a kinematic body is led by poses", .0.0)]
+    #[error("it is moved by what acts on it; only a kinematic body is led by poses")]
     NotKinematic(AgentId),
     /// There is no joint of that number that can have a motor and whose first agent this is.
     #[error("joint {joint} has no motor on agent {}: it must be a hinge or a slide, and the agent the first of the two that it joins", agent.0)]

@@ -279,7 +279,7 @@ fn a_checkpoint_of_another_scene_changes_nothing() {
     let (small, crossing) = (start(&small()), start(&built_in("crossing")));
     let (mark, before) = (crossing.checkpoint().unwrap(), small.hash());
     let error = small.restore(&mark).unwrap_err();
-    assert_eq!(error.to_string(), "the checkpoint is of another scene: the number of moving objects is 2; expected 1");
+    assert_eq!(error.to_string(), "what was saved is of another scene: the number of moving objects is 2; expected 1");
     small.advance(SimSpan::from_millis(20));
     assert_ne!(small.hash(), before, "it runs on");
     small.stop();

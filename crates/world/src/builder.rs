@@ -43,6 +43,9 @@ pub enum SceneBuildError {
         /// The name.
         name: String,
     },
+    /// An object without a name: nothing could ask for it.
+    #[error("an object has an empty name; expected at least one character")]
+    NoName,
     /// A joint names what is no rigid body.
     #[error("a joint names \"{name}\", which is no rigid body of the scene")]
     NoBody {
@@ -336,7 +339,11 @@ impl SceneBuilder {
             None => Ok(()),
         };
         let fixed = self.fixed.iter().map(|solid| &solid.name);
-        differ(&fixed.chain(self.parts.iter().map(|(name, _)| name)).collect::<Vec<_>>())?;
+        let named: Vec<_> = fixed.chain(self.parts.iter().map(|(name, _)| name)).collect();
+        if named.iter().any(|name| name.is_empty()) {
+            return Err(SceneBuildError::NoName);
+        }
+        differ(&named)?;
         let joints = self.joints.iter().map(|joint| &joint.name).filter(|name| !name.is_empty());
         differ(&joints.collect::<Vec<_>>())?;
         differ(&self.sensors.iter().map(|sensor| &sensor.name).collect::<Vec<_>>())

@@ -61,8 +61,8 @@ pub enum CheckpointError {
     /// The world was stopped: it has no state that goes on.
     #[error("the world was stopped, and cannot be saved or put back")]
     Stopped,
-    /// The checkpoint is of another scene. The world goes on as it was.
-    #[error("the checkpoint is of another scene: {what} is {found}; expected {expected}")]
+    /// The checkpoint, or the recording, is of another scene. The world goes on as it was.
+    #[error("what was saved is of another scene: {what} is {found}; expected {expected}")]
     OtherScene {
         /// What differs.
         what: String,
@@ -71,6 +71,9 @@ pub enum CheckpointError {
         /// As the world has it.
         expected: String,
     },
+    /// The world is a replay, which goes on as it was.
+    #[error("a replay does what its recording says, and goes back to no checkpoint")]
+    Replay,
     /// The checkpoint has an agent of somebody's own that joined its world ([`super::Custom`]) and is not in this one: only a checkpoint that
     /// is kept in memory has what makes it again. The world goes on as it was.
     #[error(

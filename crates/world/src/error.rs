@@ -25,6 +25,12 @@ pub enum WorldError {
     /// The object is another world's.
     #[error("the object was named by another world")]
     Foreign,
+    /// The object joined after the frame was made.
+    #[error("\"{name}\" joined the world after this frame")]
+    Later {
+        /// Its name.
+        name: String,
+    },
     /// The object was removed.
     #[error("\"{name}\" has been removed from the world")]
     Gone {
@@ -32,7 +38,7 @@ pub enum WorldError {
         name: String,
     },
     /// An object of that name is in the world already.
-    #[error("the world has an object \"{name}\" already")]
+    #[error("the world has an object \"{name}\" already; one that was removed leaves at its next step")]
     SameName {
         /// The name.
         name: String,

@@ -43,16 +43,17 @@ impl Frame {
     /// The newest state of an object when the frame was made.
     ///
     /// # Errors
-    /// [`WorldError::Foreign`].
+    /// [`WorldError::Foreign`], [`WorldError::Gone`], and [`WorldError::Later`] for one that joined since.
     pub fn state(&self, object: Object) -> Result<&Snapshot, WorldError> {
-        let at = self.world.agent(object)?.id().0 as usize;
-        self.states.get(at).map(|state| &**state).ok_or(WorldError::Foreign)
+        let agent = self.world.agent(object)?;
+        let state = self.states.get(agent.id().0 as usize);
+        state.map(|state| &**state).ok_or_else(|| WorldError::Later { name: agent.name().to_owned() })
     }
 
     /// A material point of an object at the frame's moment, metres.
     ///
     /// # Errors
-    /// [`WorldError::Foreign`], and [`WorldError::NoPoint`] for a point that the object does not have.
+    /// Those of [`Frame::state`], and [`WorldError::NoPoint`] for a point that the object does not have.
     pub fn point(&self, object: Object, anchor: Anchor) -> Result<DVec3, WorldError> {
         let state = self.state(object)?;
         let (position, velocity) = state.body.point(anchor).ok_or_else(|| self.world.no_point(object, anchor))?;
@@ -62,7 +63,7 @@ impl Frame {
     /// The matter of an object at the frame's moment.
     ///
     /// # Errors
-    /// [`WorldError::Foreign`].
+    /// Those of [`Frame::state`].
     pub fn body(&self, object: Object) -> Result<Body, WorldError> {
         let state = self.state(object)?;
         let mut body = state.body.clone();
@@ -87,7 +88,8 @@ pub struct Frames {
 impl Frames {
     pub(super) fn new(world: World, rate_hz: f64) -> Self {
         world.drive(TimelineCommand::Run);
-        let period = Duration::try_from_secs_f64(rate_hz.recip()).unwrap_or(Duration::from_secs(1));
+        let period = Duration::try_from_secs_f64(rate_hz.recip()).ok().filter(|period| !period.is_zero());
+        let period = period.unwrap_or(Duration::from_secs(1));
         let next = world.now() + period;
         Self { world, period, next }
     }

@@ -3,7 +3,7 @@
 //! In: a part and its name, an object. Out: an object of the world, or one less. Never here: how an agent begins or ends
 //! ([`metachron_runtime`]).
 
-use super::builder::Part;
+use super::builder::{Part, SceneBuildError};
 use super::commands::REPLAYED;
 use super::error::WorldError;
 use super::joined::{JoinedPart, Joining};
@@ -25,8 +25,8 @@ impl World {
     /// then.
     pub fn add(&self, name: impl Into<String>, part: impl Into<Part>) -> Result<Object, WorldError> {
         let name = name.into();
-        if self.object(&name).is_ok() {
-            return Err(WorldError::SameName { name });
+        if name.is_empty() {
+            return Err(SceneBuildError::NoName.into());
         }
         let (part, log) = (part.into(), &self.shared.log);
         if log.is_replayed() {
@@ -34,6 +34,10 @@ impl World {
         }
         let entry = added(&name, &part);
         let State::Running(run) = &mut *self.state() else { return Err(WorldError::Stopped) };
+        // nobody else adds one meanwhile
+        if self.object(&name).is_ok() {
+            return Err(WorldError::SameName { name });
+        }
         if log.is_recorded() && entry.is_none() {
             let reason =
                 "a recording has rigid bodies, tubes and soft bodies that join, and no agent of your own".to_owned();

@@ -43,6 +43,14 @@ impl World {
         self.begin_recording(|| Ok(Box::new(RecordingFile::create(path.as_ref())?)), None)
     }
 
+    /// As [`World::record`], with the text of the scene, from which a replay can start it.
+    ///
+    /// # Errors
+    /// Those of [`World::record`].
+    pub fn record_scene(&self, path: impl AsRef<Path>, scene: SceneText) -> Result<(), RecordError> {
+        self.begin_recording(|| Ok(Box::new(RecordingFile::create(path.as_ref())?)), Some(scene))
+    }
+
     /// As [`World::record`], to anything that takes bytes, and with the text of the scene, from which it can be started again.
     ///
     /// # Errors

@@ -10,9 +10,10 @@ use super::joined::Joining;
 use super::kinds::ExecutorKind;
 use super::recording::Entry;
 use super::world::{Shared, State, World};
-use metachron_core::{Archive, ArchiveError};
+use metachron_core::Archive;
 use metachron_runtime::{AgentHandle, AgentState, Run};
 use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::sync::atomic::Ordering::Release;
 
 impl World {
     /// Starts `scene` and puts it into the state of `checkpoint`: it goes on as the world did that was saved, to the bit. The scene is known by
@@ -67,7 +68,7 @@ impl World {
     ///
     /// # Errors
     /// [`CheckpointError::OtherScene`], also where an object of this world has the number of another that joined the checkpoint's,
-    /// [`CheckpointError::Own`], [`CheckpointError::Refused`] and [`CheckpointError::Stopped`] leave the world as it was. After
+    /// [`CheckpointError::Own`], [`CheckpointError::Replay`] and [`CheckpointError::Stopped`] leave the world as it was. After
     /// [`CheckpointError::Unusable`] it is stopped.
     pub fn restore(&self, checkpoint: &Checkpoint) -> Result<(), CheckpointError> {
         let Shared { identity, joined, log, .. } = &*self.shared;
@@ -75,7 +76,7 @@ impl World {
         let mut state = self.state();
         let State::Running(run) = &mut *state else { return Err(CheckpointError::Stopped) };
         if log.is_replayed() {
-            return Err(CheckpointError::Refused(ArchiveError::Refused { what: "a replay".to_owned() }));
+            return Err(CheckpointError::Replay);
         }
         if log.is_recorded() {
             checkpoint.check_saved()?;
@@ -87,6 +88,7 @@ impl World {
         let outcome = read_state(run.as_mut(), checkpoint, &self.joining());
         joined.keep(&checkpoint.joined);
         self.see(run.as_ref());
+        self.shared.put_back.fetch_add(1, Release);
         let Err(reason) = outcome else { return Ok(()) };
         let (now, time, timeline) = (run.now(), run.sim_now(), run.timeline());
         let broken = std::mem::replace(&mut *state, State::Stopped { now, time, timeline });

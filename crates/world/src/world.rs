@@ -56,6 +56,8 @@ pub(super) struct Shared {
     pub clock: Arc<SystemClock>,
     /// Whether its time waits for its objects ([`super::Pace::Free`]).
     pub is_free: AtomicBool,
+    /// How often it was put back into the state of a checkpoint.
+    pub put_back: AtomicU64,
     /// What is written down of it, or followed.
     pub log: Arc<Log>,
 }
@@ -132,6 +134,7 @@ impl World {
             identity,
             clock,
             is_free: AtomicBool::new(false),
+            put_back: AtomicU64::new(0),
             log,
         };
         Self { shared: Arc::new(shared) }
@@ -144,10 +147,21 @@ impl World {
     pub fn object(&self, name: &str) -> Result<Object, WorldError> {
         let living = |agent: &&AgentHandle| agent.name() == name && agent.state() != AgentState::Gone;
         let found = self.shared.agents.iter().find(living);
-        found.map(|agent| self.shared.tag.object(agent.id())).ok_or_else(|| {
-            let known: Vec<_> = self.shared.agents.iter().take(20).map(AgentHandle::name).collect();
-            WorldError::NoObject { name: name.to_owned(), known: known.join(", ") }
-        })
+        found
+            .map(|agent| self.shared.tag.object(agent.id()))
+            .ok_or_else(|| WorldError::NoObject { name: name.to_owned(), known: self.names() })
+    }
+
+    /// The names of its objects as a message lists them: the first twenty.
+    fn names(&self) -> String {
+        let mut names =
+            self.shared.agents.iter().filter(|agent| agent.state() != AgentState::Gone).map(AgentHandle::name);
+        let first: Vec<_> = names.by_ref().take(20).collect();
+        let further = match names.count() {
+            0 => String::new(),
+            count => format!(" and {count} more"),
+        };
+        format!("{}{further}", first.join(", "))
     }
 
     /// The objects of these names.
@@ -182,7 +196,8 @@ impl World {
         Events::new(self.clone(), filter)
     }
 
-    /// All objects at one moment, so many times a second from now on; time passes meanwhile.
+    /// All objects at one moment, so many times a second from now on; time passes meanwhile. Once a second where `rate_hz` is no number of frames a
+    /// second: zero, negative, not finite, or above a thousand million.
     #[must_use]
     pub fn frames(&self, rate_hz: f64) -> Frames {
         Frames::new(self.clone(), rate_hz)

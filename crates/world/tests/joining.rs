@@ -83,6 +83,45 @@ fn names_are_free_again_and_numbers_are_not() {
 }
 
 #[test]
+fn of_those_that_join_at_once_under_one_name_one_does() {
+    for executor in EXECUTORS {
+        let world = floor(executor);
+        for round in 0..20 {
+            let (name, gate) = (format!("twin {round}"), std::sync::Barrier::new(4));
+            let join = || {
+                gate.wait();
+                world.add(name.as_str(), Rigid::ball(0.01).at([f64::from(round), 1.0, 1.0])).is_ok()
+            };
+            let joined = std::thread::scope(|scope| {
+                let all = [(); 4].map(|()| scope.spawn(join));
+                all.map(|one| one.join().unwrap()).into_iter().filter(|joined| *joined).count()
+            });
+            assert_eq!(joined, 1, "{executor:?}");
+        }
+    }
+}
+
+#[test]
+fn a_message_names_those_that_are_there() {
+    let world = floor(ExecutorKind::Lockstep);
+    assert!(world.add("", Rigid::ball(0.1)).is_err_and(|error| error.to_string().contains("an empty name")));
+    let frame = world.frame();
+    let late = world.add("late", Rigid::ball(0.1).at([2.0, 0.0, 0.1])).unwrap();
+    let error = frame.state(late).unwrap_err();
+    assert!(matches!(&error, WorldError::Later { name } if name == "late"), "{error}");
+    world.remove(world.object("stone").unwrap()).unwrap();
+    let again = world.add("stone", Rigid::ball(0.1)).unwrap_err().to_string();
+    assert!(again.contains("one that was removed leaves at its next step"), "{again}");
+    world.advance(ms(10));
+    let known = |world: &World| world.object("stone").unwrap_err().to_string();
+    assert!(known(&world).ends_with("its moving objects are late"), "{}", known(&world));
+    for number in 0..22 {
+        world.add(format!("b{number}"), Rigid::ball(0.01).at([f64::from(number), 1.0, 1.0])).unwrap();
+    }
+    assert!(known(&world).ends_with("b18 and 3 more"), "{}", known(&world));
+}
+
+#[test]
 fn hundreds_come_and_go() {
     for executor in EXECUTORS {
         let world = floor(executor);

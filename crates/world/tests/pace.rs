@@ -72,6 +72,37 @@ fn after_an_advance_a_world_stands_still_where_it_was_to_come_to() {
 }
 
 #[test]
+fn an_advance_ends_when_told_to_and_goes_on_where_the_world_is_put_back() {
+    for executor in REAL {
+        for pace in [Pace::RealTime, Pace::Free] {
+            let world = World::start(&apart(), executor).unwrap();
+            world.set_pace(pace).unwrap();
+            let mark = world.checkpoint().unwrap();
+            let begun = world.time();
+            assert!(!world.advance_while(ms(1_000_000_000), || world.time() <= begun + ms(20)));
+            let stands = world.time();
+            assert!(stands > begun + ms(20) && stands < begun + ms(500_000_000));
+            world.wait_until(world.now() + std::time::Duration::from_millis(10));
+            assert_eq!(world.time(), stands, "it stands still");
+            // who puts it back does so while another waits, which lives what was left
+            let span = ms(if pace == Pace::Free { 4000 } else { 100 });
+            std::thread::scope(|scope| {
+                scope.spawn(|| world.advance(span));
+                while world.time() <= stands {
+                    std::thread::yield_now();
+                }
+                world.restore(&mark).unwrap();
+            });
+            assert!(world.time() <= begun + span, "{executor:?} {pace:?}: {:?}", world.time());
+            assert!(world.advance_while(ms(10), || true));
+        }
+    }
+    let world = World::start(&apart(), ExecutorKind::Lockstep).unwrap();
+    assert!(!world.advance_while(ms(1000), || world.time() < SimTime::ZERO + ms(60)));
+    assert_eq!(world.time(), SimTime::ZERO + ms(60));
+}
+
+#[test]
 fn an_advance_is_so_much_life_on_every_executor_at_every_pace() {
     for executor in [ExecutorKind::Lockstep, ExecutorKind::Threads, ExecutorKind::Pool] {
         let world = World::start(&apart(), executor).unwrap();

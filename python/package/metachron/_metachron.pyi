@@ -158,7 +158,7 @@ class World:
         """Lets so much simulated time pass: at once in lockstep, in real time on other executors. Other threads of Python run meanwhile."""
 
     def run(self, speed: float = 1.0) -> None:
-        """Lets time pass from now on, so many simulated seconds a second. Not in lockstep."""
+        """Lets time pass from now on, so many simulated seconds a second, 0.001 ... 100. Not in lockstep."""
 
     def pause(self) -> None:
         """Stops time."""

@@ -35,7 +35,7 @@ impl Subject for Render {
     const NAME: &'static str = "render";
 
     fn measure(_args: &BenchArgs, progress: &Progress) -> anyhow::Result<Vec<Row>> {
-        let gpu = Gpu::headless().context("no graphics adapter was found to measure")?;
+        let gpu = Gpu::headless().context("what drawing costs cannot be measured")?;
         if !progress.continues(0.0, gpu.describe()) {
             return Ok(Vec::new());
         }
