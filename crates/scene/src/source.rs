@@ -6,9 +6,11 @@ use super::build::triangles;
 use super::builtin;
 use super::diagnostic::{SceneError, did_you_mean};
 use metachron_geometry::Triangles;
+use std::collections::BTreeSet;
 use std::fs::File;
 use std::io::Read;
 use std::path::{Component, Path, PathBuf};
+use std::sync::{Arc, Mutex, PoisonError};
 
 /// Longest scene file, bytes: more than 100000 path points need.
 pub const SCENE_BYTES_MAX: u64 = 16 << 20;
@@ -21,6 +23,8 @@ pub struct Source {
     name: String,
     text: String,
     siblings: SiblingFiles,
+    /// Files beside it that were asked for, of all copies of this source.
+    asked: Arc<Mutex<BTreeSet<PathBuf>>>,
 }
 
 /// Location of the files next to a scene.
@@ -39,7 +43,7 @@ impl Source {
     pub fn open(name_or_path: &str) -> Result<Self, SceneError> {
         if let Some(scene) = builtin::find(name_or_path) {
             let (name, text) = (scene.name.to_owned(), scene.text.to_owned());
-            return Ok(Self { name, text, siblings: SiblingFiles::BuiltIn });
+            return Ok(Self { name, text, siblings: SiblingFiles::BuiltIn, asked: Arc::default() });
         }
         let path = Path::new(name_or_path);
         let bytes = read_bounded(path, SCENE_BYTES_MAX).map_err(|why| missing(name_or_path, path, &why))?;
@@ -71,7 +75,7 @@ impl Source {
 
     fn from_bytes(name: &str, bytes: Vec<u8>, siblings: SiblingFiles) -> Result<Self, SceneError> {
         match String::from_utf8(bytes) {
-            Ok(text) => Ok(Self { name: name.to_owned(), text, siblings }),
+            Ok(text) => Ok(Self { name: name.to_owned(), text, siblings, asked: Arc::default() }),
             Err(error) => {
                 let valid = error.utf8_error().valid_up_to();
                 let before = &error.as_bytes()[..valid];
@@ -94,6 +98,15 @@ impl Source {
     pub fn folder(&self) -> Option<PathBuf> {
         let SiblingFiles::Folder(folder) = &self.siblings else { return None };
         std::env::current_dir().map_or_else(|_| Some(folder.clone()), |here| Some(here.join(folder)))
+    }
+
+    /// The files that it is made of, those included that could not be read: its own, none for a scene that is no file, and those beside it
+    /// that a [`crate::load`] of it, or of a copy, has asked for.
+    #[must_use]
+    pub fn files(&self) -> Vec<PathBuf> {
+        let own = matches!(self.siblings, SiblingFiles::Folder(_)).then(|| PathBuf::from(&self.name));
+        let asked = self.asked.lock().unwrap_or_else(PoisonError::into_inner);
+        own.into_iter().chain(asked.iter().cloned()).collect()
     }
 
     /// The text.
@@ -124,7 +137,11 @@ impl Source {
             SiblingFiles::BuiltIn => {
                 builtin::sibling(name).map(<[u8]>::to_vec).ok_or_else(|| "no such built-in file".to_owned())
             }
-            SiblingFiles::Folder(folder) => read_plain(&folder.join(path), SIBLING_BYTES_MAX),
+            SiblingFiles::Folder(folder) => {
+                let path = folder.join(path);
+                self.asked.lock().unwrap_or_else(PoisonError::into_inner).insert(path.clone());
+                read_plain(&path, SIBLING_BYTES_MAX)
+            }
             SiblingFiles::Unavailable => Err("a scene from memory has no files beside it".to_owned()),
         }
     }

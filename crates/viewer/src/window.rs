@@ -2,7 +2,7 @@
 //!
 //! In: a session and where its scene came from. Out: an [`Outcome`] when the window closes. Never here: egui, panels.
 
-mod scene_file;
+mod scene_files;
 mod time;
 
 use super::live_tuning;
@@ -22,7 +22,7 @@ use metachron_render::{Camera, Gpu, Hand, Hit, Picture, Ray};
 use metachron_runtime::TimelineCommand;
 use metachron_scene::Source;
 use metachron_session::{Finished, FrameRecord, Outcome, REWIND_BYTES, Session};
-use scene_file::WatchedFile;
+use scene_files::WatchedFiles;
 use std::path::PathBuf;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
@@ -99,8 +99,8 @@ struct WindowSimulation<'a> {
     running: bool,
     /// The run was put back, and its next frame begins at this moment.
     went_on: bool,
-    file: WatchedFile,
-    /// Why the file as it is now cannot be shown.
+    files: WatchedFiles,
+    /// Why the files as they are now cannot be shown.
     file_error: Option<Message>,
 }
 
@@ -129,7 +129,7 @@ impl<'a> WindowSimulation<'a> {
             meter: Meter::new(&session),
             notices: Vec::new(),
             session,
-            file: WatchedFile::of(&plan.source),
+            files: WatchedFiles::of(&plan.source),
             file_error: None,
             plan,
             hand: None,
@@ -361,7 +361,7 @@ impl Simulation for WindowSimulation<'_> {
         if self.pictures == 2 {
             self.begin();
         }
-        self.follow_file();
+        self.follow_files();
         self.pass_time();
         self.take_gains();
         self.refresh();

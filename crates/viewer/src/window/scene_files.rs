@@ -1,25 +1,31 @@
-//! The file of the scene that is shown: opened, read again, and watched for changes.
+//! The files of the scene that is shown: opened, read again, and watched for changes.
 //!
-//! In: a path, what the file says. Out: another session, or a message while the old one runs on. Never here: what a scene means.
+//! In: a path, what the files say. Out: another session, or a message while the old one runs on. Never here: what a scene means.
 
 use super::WindowSimulation;
 use crate::ui::{Message, Severity};
-use metachron_scene::{SceneError, Source, builtin};
+use metachron_scene::{SceneError, Source};
 use metachron_session::Session;
 use metachron_world::Scene;
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant, SystemTime};
 
-/// How often the file is looked at.
+/// How often the files are looked at.
 const LOOK_EVERY: Duration = Duration::from_secs(1);
 
-/// A file on the disk.
+/// The files on the disk that a scene is made of: its own, meshes, textures.
 #[derive(Debug)]
-pub(super) struct WatchedFile {
-    /// `None` of a built-in scene.
-    path: Option<PathBuf>,
-    state: Option<FileState>,
+pub(super) struct WatchedFiles {
+    /// None of a built-in scene.
+    files: Vec<WatchedFile>,
     looked: Instant,
+}
+
+/// One of them.
+#[derive(Debug)]
+struct WatchedFile {
+    path: PathBuf,
+    state: Option<FileState>,
 }
 
 /// By what a change is noticed.
@@ -36,43 +42,61 @@ impl FileState {
     }
 }
 
-impl WatchedFile {
-    /// The file of a scene as it is now.
+impl WatchedFiles {
+    /// The files of a scene that has been read, as they are now.
     pub fn of(source: &Source) -> Self {
-        let path = builtin::find(source.name()).is_none().then(|| PathBuf::from(source.name()));
-        Self { state: path.as_deref().and_then(FileState::of), path, looked: Instant::now() }
+        let watched = |path: PathBuf| WatchedFile { state: FileState::of(&path), path };
+        Self { files: source.files().into_iter().map(watched).collect(), looked: Instant::now() }
     }
 
-    /// Whether it is another one than when this was asked last; a file that is gone has not changed.
-    fn has_changed(&mut self, every: Duration) -> bool {
-        let Some(path) = self.path.as_deref().filter(|_| self.looked.elapsed() >= every) else { return false };
+    /// Whether one of them is another one than when this was asked last; a file that is gone has not changed.
+    fn have_changed(&mut self, every: Duration) -> bool {
+        if self.looked.elapsed() < every {
+            return false;
+        }
         self.looked = Instant::now();
-        let state = FileState::of(path);
+        self.files.iter_mut().fold(false, |changed, file| file.has_changed() || changed)
+    }
+}
+
+impl WatchedFile {
+    fn has_changed(&mut self) -> bool {
+        let state = FileState::of(&self.path);
         state.is_some() && std::mem::replace(&mut self.state, state) != self.state
     }
 }
 
 impl WindowSimulation<'_> {
-    /// Reads the scene again where its file has changed.
-    pub(super) fn follow_file(&mut self) {
-        self.follow_file_every(LOOK_EVERY);
+    /// Reads the scene again where one of its files has changed.
+    pub(super) fn follow_files(&mut self) {
+        self.follow_files_every(LOOK_EVERY);
     }
 
-    pub(super) fn follow_file_every(&mut self, every: Duration) {
-        if self.file.has_changed(every) {
+    pub(super) fn follow_files_every(&mut self, every: Duration) {
+        if self.files.have_changed(every) {
             self.reload();
         }
     }
 
-    /// Reads the scene again; while its file is wrong the message stays, and the old scene runs on.
+    /// Reads the scene again; while a file of it is wrong the message stays, and the old scene runs on.
     pub(super) fn reload(&mut self) {
-        match Source::open(self.plan.source.name()).and_then(|source| self.load(source)) {
+        let source = match Source::open(self.plan.source.name()) {
+            Ok(source) => source,
+            Err(error) => return self.not_reloaded(&error),
+        };
+        match self.load(source.clone()) {
             Ok(scene) => self.restart(scene),
             Err(error) => {
-                let text = format!("scene not reloaded: {}", first_problem(&error));
-                self.file_error = Some(Message { severity: Severity::Failure, text });
+                // the one at fault may be a file that the scene had not named before
+                self.files = WatchedFiles::of(&source);
+                self.not_reloaded(&error);
             }
         }
+    }
+
+    fn not_reloaded(&mut self, error: &SceneError) {
+        let text = format!("scene not reloaded: {}", first_problem(error));
+        self.file_error = Some(Message { severity: Severity::Failure, text });
     }
 
     pub(super) fn open(&mut self, path: &Path) {
@@ -88,7 +112,7 @@ impl WindowSimulation<'_> {
 
     fn load(&mut self, source: Source) -> Result<Scene, SceneError> {
         let scene = metachron_scene::load(&source, &self.plan.overrides)?;
-        (self.file, self.file_error) = (WatchedFile::of(&source), None);
+        (self.files, self.file_error) = (WatchedFiles::of(&source), None);
         self.plan.source = source;
         Ok(scene)
     }
