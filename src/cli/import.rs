@@ -21,7 +21,11 @@ pub(super) fn command(args: &ImportArgs) -> anyhow::Result<Exit> {
     let scene_folder = folder(out);
     let folders = Folders { model: &model_folder, scene: &scene_folder };
     let text = read(&args.model)?;
-    let imported = metachron_import::model(&text, folders).map_err(|why| BadInput(format!("{model}: {why}")))?;
+    let imported = match &args.key {
+        Some(key) => metachron_import::mjcf_at_key(&text, folders, key),
+        None => metachron_import::model(&text, folders),
+    };
+    let imported = imported.map_err(|why| BadInput(format!("{model}: {why}")))?;
     let Imported { toml, left_out } = imported;
     for entry in left_out {
         message(&format!("{model}: {entry}"));

@@ -1,6 +1,6 @@
 //! Where files that a model names are.
 //!
-//! In: a path as a model writes it. Out: the path as the scene writes it. Never here: what is in the file.
+//! In: a path as a model writes it. Out: the path as the scene writes it, the text of what is included. Never here: what that means.
 
 use crate::ImportError;
 use crate::xml::Element;
@@ -45,6 +45,15 @@ impl Folders<'_> {
         })
     }
 
+    /// A file that `element` includes, which is beside the model.
+    ///
+    /// # Errors
+    /// Where there is none that can be read.
+    pub(crate) fn included(&self, element: &Element, name: &str) -> Result<IncludedFile, ImportError> {
+        read_text(&self.model.join(name))
+            .map_err(|why| element.wrong(format!("names `{name}`, which cannot be read beside the model: {why}")))
+    }
+
     /// Where the file may be: `package://NAME/REST` is in a folder NAME at or around the model, other paths are beside it.
     fn candidates(&self, name: &str) -> Vec<PathBuf> {
         let Some(path) = name.strip_prefix("package://") else {
@@ -66,6 +75,30 @@ impl Folders<'_> {
         let up = std::iter::repeat_n("..".to_owned(), scene.len() - common);
         Some(up.chain(file[common..].iter().cloned()).collect::<Vec<_>>().join("/"))
     }
+}
+
+/// The text of a file that a model includes.
+#[derive(Debug)]
+pub(crate) struct IncludedFile {
+    /// The same for all names that the file has.
+    pub(crate) path: PathBuf,
+    pub(crate) text: String,
+}
+
+/// Longest file that a model includes, bytes: as of scenes.
+const INCLUDED_BYTES_MAX: u64 = 16 << 20;
+
+fn read_text(path: &Path) -> Result<IncludedFile, String> {
+    let file = std::fs::metadata(path).map_err(|why| why.to_string())?;
+    if !file.is_file() {
+        return Err("it is no plain file".to_owned());
+    }
+    if file.len() > INCLUDED_BYTES_MAX {
+        return Err(format!("it has {} bytes, more than {INCLUDED_BYTES_MAX}", file.len()));
+    }
+    let text = std::fs::read_to_string(path).map_err(|why| why.to_string())?;
+    let path = path.canonicalize().map_err(|why| why.to_string())?;
+    Ok(IncludedFile { path, text })
 }
 
 /// A path from the root; the empty one, which the folder of a bare file name is, is the folder of the program.
