@@ -165,7 +165,9 @@ fn a_mesh_that_is_saved_is_read_again_and_one_that_was_wrong_once_it_is_right() 
             let metachron_world::Spec::Rigid(body) = &simulation.session.scene().agents[0].spec else { panic!() };
             (body.mass_kg, simulation.status().messages.clone())
         };
-        let is = |seen: (f64, Vec<Message>), mass_kg: f64| assert!((seen.0 - mass_kg).abs() < 1e-6 && seen.1.is_empty(), "{seen:?}");
+        let is = |seen: (f64, Vec<Message>), mass_kg: f64| {
+            assert!((seen.0 - mass_kg).abs() < 1e-6 && seen.1.is_empty(), "{seen:?}")
+        };
         is(look(simulation), 100.0);
         write("first.obj", &mesh(2.5));
         is(look(simulation), 1562.5);
