@@ -155,8 +155,14 @@ pub(crate) struct End {
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) enum TieKind {
     /// Nothing up to a length that is the greatest.
-    Rope { length_m: f64 },
-    Spring { stiffness_n_m: f64, damping_n_s_m: f64, rest_m: f64 },
+    Rope {
+        length_m: f64,
+    },
+    Spring {
+        stiffness_n_m: f64,
+        damping_n_s_m: f64,
+        rest_m: f64,
+    },
 }
 
 /// The motion that a joint leaves.

@@ -87,8 +87,10 @@ fn order<'a>(
     let mut above: BTreeMap<&str, &Draft<'_>> = BTreeMap::new();
     for draft in drafts {
         if let Some(other) = above.insert(draft.child, draft) {
-            let reason =
-                format!("has the child `{}`, which {} has, too; expected a tree", draft.child, other.element.place.label);
+            let reason = format!(
+                "has the child `{}`, which {} has, too; expected a tree",
+                draft.child, other.element.place.label
+            );
             return Err(draft.element.wrong(reason));
         }
     }

@@ -69,13 +69,13 @@ fn servo(servo: Servo<'_>, reader: &mut BodyReader<'_>, joint: usize, damping: f
     };
     // of an actuator, whose length is that of its joint times its gear
     let control = reader.keyframe.as_ref().map_or(0.0, |key| key.control(number));
-    let told = if gear == 0.0 { 0.0 } else { control / gear };
+    let goal = if gear == 0.0 { 0.0 } else { control / gear };
     if element.tag == "velocity" {
         let gain = value("kv", 1.0)?;
         let both = gain + damping;
-        let velocity = if both > 0.0 { told * gain / both } else { 0.0 };
+        let velocity = if both > 0.0 { goal * gain / both } else { 0.0 };
         return Ok(Motor::Damper { velocity, damping: both, max_effort });
     }
-    let position = reader.zeros[joint] + told;
+    let position = reader.zeros[joint] + goal;
     Ok(Motor::Spring { position, stiffness: value("kp", 1.0)?, damping: value("kv", 0.0)? + damping, max_effort })
 }
