@@ -3,6 +3,8 @@
 //! In: Python's numbers, numpy arrays, parts as the dataclasses of `package/metachron/parts.py`. Out: objects of Python, errors as its exceptions.
 //! Never here: physics, a lock that Python waits for while a world runs.
 
+#[cfg_attr(not(feature = "view"), expect(dead_code, reason = "what a picture is asked for is read by what draws it"))]
+mod camera;
 mod checkpoint;
 mod command;
 mod events;
@@ -14,8 +16,11 @@ mod raised;
 mod recording;
 mod rollout;
 mod scene;
+mod sensor;
 mod soft;
 mod state;
+#[cfg_attr(not(feature = "view"), path = "no_view.rs")]
+mod view;
 mod world;
 
 /// What the package re-exports; `_metachron.pyi` says what each takes.

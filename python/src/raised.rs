@@ -4,7 +4,11 @@
 //! `RuntimeError` for a world or an object that cannot do it any more. Never here: a sentence about physics.
 
 use metachron::export::ExportError;
+#[cfg(feature = "view")]
+use metachron::render::{DrawError, GpuError};
 use metachron::scene::{SceneError, SceneProblem};
+#[cfg(feature = "view")]
+use metachron::session::SessionError;
 use metachron::world::{CheckpointError, RecordError, SceneBuildError, WorldError};
 use pyo3::exceptions::{PyKeyError, PyOSError, PyOverflowError, PyRuntimeError, PyValueError};
 use pyo3::{PyErr, Python};
@@ -37,6 +41,21 @@ pub fn export(error: ExportError) -> PyErr {
     match error {
         ExportError::File { .. } => PyOSError::new_err(error.to_string()),
         ExportError::Taken { .. } => PyValueError::new_err(error.to_string()),
+    }
+}
+
+/// Why a scene has no such camera.
+#[cfg(feature = "view")]
+pub fn camera(error: &SessionError) -> PyErr {
+    PyKeyError::new_err(error.to_string())
+}
+
+/// Why a picture cannot be drawn.
+#[cfg(feature = "view")]
+pub fn drawing(error: &GpuError) -> PyErr {
+    match error {
+        GpuError::Draw(DrawError::TooLarge { .. }) => PyValueError::new_err(error.to_string()),
+        _ => PyRuntimeError::new_err(error.to_string()),
     }
 }
 

@@ -6,6 +6,7 @@
 use crate::numbers::{Rotation, Vector};
 use crate::object::Names;
 use crate::raised;
+use crate::sensor::mount;
 use crate::soft::soft;
 use crate::world::World;
 use metachron::contact::joint::JointKind;
@@ -156,6 +157,17 @@ impl Scene {
         let (kind, Vector(at)) = (joint_kind(kind)?, field(kind, "at")?);
         slf.build(|builder| builder.joint(a, b, kind, at.to_array()).joint_name(&name))?;
         slf.joints.push(name);
+        Ok(slf)
+    }
+
+    /// Adds a sensor, which `World.sensor` reads.
+    fn sensor<'py>(
+        mut slf: PyRefMut<'py, Self>,
+        name: String,
+        on: &Bound<'py, PyAny>,
+    ) -> PyResult<PyRefMut<'py, Self>> {
+        let on = mount(on)?;
+        slf.build(|builder| builder.sensor(name, on))?;
         Ok(slf)
     }
 

@@ -5,7 +5,7 @@
 use crate::command::Keywords;
 use crate::numbers::{row, rows};
 use glam::{DQuat, DVec3};
-use metachron::core::{Body, CurveState, Snapshot};
+use metachron::core::{Body, CurveState, Snapshot, SoftState};
 use numpy::{PyArray1, PyArray2};
 use pyo3::exceptions::{PyAttributeError, PyValueError};
 use pyo3::prelude::*;
@@ -54,6 +54,16 @@ impl State {
         match &self.0.body {
             Body::Curve(curve) => Ok(curve),
             _ => Err(self.lacks(what, "tubes have them")),
+        }
+    }
+
+    fn soft_nodes(&self) -> PyResult<Points<'_>> {
+        match &self.0.body {
+            Body::Soft(SoftState { nodes: Some(nodes), .. }) => {
+                Ok(Points { positions: &nodes.positions, velocities: &nodes.velocities })
+            }
+            body @ Body::Soft(_) => Ok(Points::of(body)),
+            _ => Err(self.lacks("nodes", "soft bodies have them")),
         }
     }
 
@@ -108,6 +118,18 @@ impl State {
     #[getter]
     fn velocities<'py>(&self, py: Python<'py>) -> Rows<'py> {
         rows(py, Points::of(&self.0.body).velocities.iter().map(|v| v.to_array()))
+    }
+
+    /// (n, 3), m: of a soft body the nodes of the cage or lattice that carries its vertices, or these where nothing does.
+    #[getter]
+    fn nodes<'py>(&self, py: Python<'py>) -> PyResult<Rows<'py>> {
+        Ok(rows(py, self.soft_nodes()?.positions.iter().map(|v| v.to_array())))
+    }
+
+    /// (n, 3), m/s, of the same nodes.
+    #[getter]
+    fn node_velocities<'py>(&self, py: Python<'py>) -> PyResult<Rows<'py>> {
+        Ok(rows(py, self.soft_nodes()?.velocities.iter().map(|v| v.to_array())))
     }
 
     /// (4,): of a rigid body or tool, from its axes to the world's. Others raise `AttributeError`.

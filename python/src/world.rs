@@ -3,6 +3,7 @@
 //! In: commands by objects' names or handles. Out: states, events, answers. While time passes Python's own lock is free.
 //! Never here: the meaning of a command.
 
+use crate::camera::{SIZE, Shot, Viewpoint};
 use crate::checkpoint::Checkpoint;
 use crate::command::Keywords;
 use crate::events::Events;
@@ -13,18 +14,18 @@ use crate::queries::{Contact, Hit};
 use crate::raised;
 use crate::scene::{Scene, part};
 use crate::state::State;
+use crate::view::Pictures;
 use glam::{DQuat, DVec3};
 use metachron::contact::joint::{Motor, MotorGoal};
-use metachron::core::SimSpan;
+use metachron::core::{Body, SimSpan, SoftNodes};
 use metachron::export::{Moments, Surface, write_glb};
 use metachron::runtime::{AgentState, TimelineCommand};
 use metachron::world::kinds::ExecutorKind;
-use metachron::world::{self, Command, EventFilter, RecordError, SceneText};
-use numpy::PyArray1;
+use metachron::world::{self, Command, EventFilter, RecordingFile, SceneText};
+use numpy::{PyArray1, PyArray2, PyArray3};
 use pyo3::exceptions::{PyKeyError, PyRuntimeError, PyTypeError, PyValueError};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
-use std::fs::File;
 use std::path::PathBuf;
 use std::sync::Arc;
 
@@ -36,6 +37,7 @@ pub struct World {
     fixed: Arc<[String]>,
     /// Their surface.
     fixed_surface: Surface,
+    pictures: Pictures,
     joints: Vec<Joint>,
     /// The text of its scene; `None` of one that was built of parts.
     text: Option<SceneText>,
@@ -96,7 +98,8 @@ impl World {
         });
         let joints = joints.collect::<PyResult<_>>()?;
         let fixed = scene.obstacles.iter().map(|solid| solid.name.clone()).collect();
-        Ok(Self { inner, fixed, fixed_surface: Surface::fixed(scene), joints, text })
+        let (fixed_surface, pictures) = (Surface::fixed(scene), Pictures::of(scene));
+        Ok(Self { inner, fixed, fixed_surface, pictures, joints, text })
     }
 
     fn send(&self, object: &Named<'_>, command: Command) -> PyResult<()> {
@@ -169,13 +172,14 @@ impl World {
         self.inner.hash()
     }
 
-    /// All that the next bit of it needs, in lockstep. Raises `RuntimeError` on other executors.
+    /// All that the next bit of it needs, objects that joined it included.
     fn checkpoint(&self, py: Python<'_>) -> PyResult<Checkpoint> {
         let inner = py.detach(|| self.inner.checkpoint()).map_err(raised::checkpoint)?;
         Ok(Checkpoint { inner })
     }
 
-    /// Goes back to a checkpoint of this world, or of one of the same scene with the same objects: what comes after is the same to the bit.
+    /// Goes back to a checkpoint of this world, or of another of the same scene: what comes after is the same, in lockstep to the bit. Objects that
+    /// joined since are taken out, those that left since are there again.
     fn restore(&self, py: Python<'_>, checkpoint: &Checkpoint) -> PyResult<()> {
         py.detach(|| self.inner.restore(&checkpoint.inner)).map_err(raised::checkpoint)
     }
@@ -294,6 +298,23 @@ impl World {
         self.inner.set_state(object.of(&self.inner)?, &state.0.body).map_err(raised::world)
     }
 
+    /// Puts the nodes of a soft body to these places, m, (n, 3), with these velocities, m/s; at rest where there are none. How many nodes it has,
+    /// `State.nodes` says.
+    #[pyo3(signature = (object, positions, velocities = None))]
+    fn set_nodes(&self, object: Named<'_>, positions: Vec<Vector>, velocities: Option<Vec<Vector>>) -> PyResult<()> {
+        let object = object.of(&self.inner)?;
+        let plain = |vectors: Vec<Vector>| vectors.into_iter().map(|Vector(vector)| vector).collect::<Vec<_>>();
+        let velocities = velocities.map_or_else(|| vec![DVec3::ZERO; positions.len()], plain);
+        let positions = plain(positions);
+        let mut body = self.inner.latest(object).map_err(raised::world)?.body.clone();
+        match &mut body {
+            Body::Soft(soft) if soft.nodes.is_some() => soft.nodes = Some(SoftNodes { positions, velocities }),
+            Body::Soft(soft) => (soft.positions, soft.velocities) = (positions, velocities),
+            _ => return Err(PyValueError::new_err("only soft bodies are put elsewhere node by node")),
+        }
+        self.inner.set_state(object, &body).map_err(raised::world)
+    }
+
     /// What a sensor of the scene reads, of the newest states. Raises `KeyError`.
     fn sensor<'py>(&self, py: Python<'py>, name: &str) -> PyResult<Bound<'py, PyArray1<f64>>> {
         let reading = self.inner.sensor(name).map_err(raised::world)?;
@@ -345,6 +366,32 @@ impl World {
         self.inner.remove(object.of(&self.inner)?).map_err(raised::world)
     }
 
+    /// A picture of the world now, (height, width, 4) of `uint8`: red, green, blue, opacity. `size` is (width, height), default (1280, 720).
+    ///
+    /// The camera is one of the scene's, by its name, or a `Camera`; default the scene's first, or one that sees everything. Raises `KeyError`
+    /// for a name that there is not, and `RuntimeError` where no graphics adapter is found: a software driver is enough.
+    #[pyo3(signature = (size = SIZE, camera = None))]
+    fn render<'py>(
+        &self,
+        py: Python<'py>,
+        size: (i64, i64),
+        camera: Option<Viewpoint>,
+    ) -> PyResult<Bound<'py, PyArray3<u8>>> {
+        self.pictures.colours(py, &self.inner, &Shot::new(size, camera)?)
+    }
+
+    /// The depths that a camera sees now, (height, width) of `float32`: m along the view from the eye, infinite where there is nothing. `size`,
+    /// `camera` and errors are as of `render`.
+    #[pyo3(signature = (size = SIZE, camera = None))]
+    fn render_depth<'py>(
+        &self,
+        py: Python<'py>,
+        size: (i64, i64),
+        camera: Option<Viewpoint>,
+    ) -> PyResult<Bound<'py, PyArray2<f32>>> {
+        self.pictures.depths(py, &self.inner, &Shot::new(size, camera)?)
+    }
+
     /// Begins files for other programs: moments as MCAP for Foxglove, Lichtblick and Rerun, or in a folder as a VTK series for ParaView; for
     /// ui.perfetto.dev when each object stepped.
     #[pyo3(signature = (*, mcap = None, vtk = None, perfetto = None))]
@@ -363,7 +410,7 @@ impl World {
     fn record(&self, py: Python<'_>, path: PathBuf) -> PyResult<()> {
         py.detach(|| match &self.text {
             Some(text) => {
-                let file = File::create(&path).map_err(|error| RecordError::File { path, error })?;
+                let file = RecordingFile::create(path)?;
                 self.inner.record_to(Box::new(file), Some(text.clone()))
             }
             None => self.inner.record(&path),

@@ -5,6 +5,7 @@ from pathlib import Path
 import metachron as mc
 import numpy as np
 import pytest
+import scenes
 
 TETRAHEDRON = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 1 4 3\nf 2 3 4\n"
 
@@ -65,3 +66,24 @@ def test_soft_parts_that_cannot_be_are_named(tmp_path: Path) -> None:
         build(mc.Sheet((1.0, 1.0, 1.0), 0.01, (2, 2)))  # type: ignore[arg-type]
     with pytest.raises(ValueError, match="none.obj.*cannot be used"):
         build(mc.SoftMesh(tmp_path / "none.obj", (0.1, 0.2)))
+
+
+def test_a_soft_body_is_put_back_node_by_node() -> None:
+    cloth = mc.Sheet((0.4, 0.2), 0.002, (8, 4), eps=(0.1, 0.2), young=1e6, hold=["left"], rate=250)
+    world = mc.Scene().add("cloth", cloth).start()
+    world.advance(0.1)
+    before = world.state("cloth")
+    assert before.nodes.shape == before.node_velocities.shape == (15, 3)
+    ends = []
+    for nodes, velocities in [(before.nodes, before.node_velocities)] * 2:
+        world.set_nodes("cloth", nodes, velocities)
+        world.advance(0.1)
+        ends.append(world.state("cloth").positions)
+    assert (ends[0] == ends[1]).all() and not np.allclose(ends[0], before.positions, atol=1e-4)
+    world.set_state("cloth", before)
+    world.advance(0.1)
+    assert (world.state("cloth").positions == ends[0]).all()
+    with pytest.raises(ValueError, match=f"3 positions of nodes, 3 velocities of nodes; expected {len(before.nodes)}"):
+        world.set_nodes("cloth", np.zeros((3, 3)))
+    with pytest.raises(AttributeError, match="soft bodies have them"):
+        _ = scenes.floating().start().state("ball").nodes

@@ -283,8 +283,39 @@ def test_a_world_goes_back_to_a_checkpoint_also_from_a_file(tmp_path: Path) -> N
     again.restore(mc.Checkpoint.read(tmp_path / "mark"))
     again.advance(0.4)
     assert again.hash() == after
+    # objects that were there are there again, in another world too
+    world.add("box", mc.Box([0.1, 0.1, 0.1], at=[0, 0, 1.0]))
+    world.advance(0.1)
+    mark, seen = world.checkpoint(), world.state("ball").time
+    mark.write(tmp_path / "mark")
+    world.remove("ball")
+    world.remove("box")
+    world.advance(0.1)
+    world.add("box", mc.Ball(0.02, at=[0, 0, 1.0]))
+    world.restore(mark)
+    again = scene.start()
+    again.restore(mc.Checkpoint.read(tmp_path / "mark"))
+    assert again.hash() == world.hash() and world.state("ball").time == seen
     with pytest.raises(ValueError, match="no checkpoint"):
         (tmp_path / "other").write_text("not one")
         mc.Checkpoint.read(tmp_path / "other")
     with pytest.raises(OSError):
         mc.Checkpoint.read(tmp_path / "missing")
+
+
+def test_sensors_of_a_scene_in_code_sit_where_they_are_put() -> None:
+    scene = mc.Scene(gravity=[0, 0, 0]).add("arm", mc.Box([0.2, 0.1, 0.05], mass=2.0))
+    half = np.sqrt(0.5)
+    # its x is the arm's y
+    scene.sensor("tip", mc.Imu("arm", at=[0.2, 0.0, 0.0], rotation=[0.0, 0.0, half, half]))
+    scene.sensor("felt", mc.ContactForce("arm")).sensor("corner", mc.Pose("arm", at=[0.2, 0.1, 0.05]))
+    world = scene.start()
+    world.velocity("arm", [0, 0, 0], [0, 0, 3.0])
+    world.advance(0.25)
+    assert world.sensor("tip") == pytest.approx([0.0, 9.0 * 0.2, 0.0, 0.0, 0.0, 3.0], abs=1e-9)
+    assert world.sensor("felt") == pytest.approx([0.0, 0.0, 0.0])
+    assert np.linalg.norm(world.sensor("corner")[:3]) == pytest.approx(np.hypot(np.hypot(0.2, 0.1), 0.05))
+    with pytest.raises(TypeError, match="a sensor is an Imu.*not a Ball"):
+        scene.sensor("wrong", mc.Ball(0.1))  # type: ignore[arg-type]
+    with pytest.raises(ValueError, match='"leg"'):
+        mc.Scene().sensor("s", mc.Imu("leg")).start()

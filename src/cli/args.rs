@@ -46,7 +46,8 @@ Examples:
   metachron replay tube.rec                            ends with the same state hash, or says where it differs
   metachron replay tube.rec --until 2.5 --png then.png
 
-A recording has the scene, what was changed in it, and all that was done; one that was cut short is repeated as far as it goes.";
+A recording has the scene, what was changed in it, and all that was done; one that was cut short or
+is damaged is repeated as far as it goes, with a warning.";
 
 const CHECK_EXAMPLES: &str = "\
 Examples:
@@ -291,29 +292,29 @@ pub struct RunArgs {
 /// What `run` and `replay` write and print.
 #[derive(Debug, Args)]
 pub struct OutputArgs {
-    /// Write the last frame's picture here (PNG)
+    /// Write the last frame's picture here (PNG). Not of a window
     #[arg(long, value_name = "FILE", value_hint = ValueHint::FilePath)]
     pub png: Option<PathBuf>,
-    /// Write the depths of the last frame here: PNG of 16 bits, whose text says how many metres a unit is; 0 is nothing. Needs --headless
+    /// Write the depths of the last frame here: PNG of 16 bits, whose text says how many metres a unit is; 0 is nothing. Not of a window
     #[arg(long, value_name = "FILE", value_hint = ValueHint::FilePath)]
     pub depth: Option<PathBuf>,
     /// See with this one of the scene's cameras, by name; the first where none is given
     #[arg(long, value_name = "NAME")]
     pub camera: Option<String>,
-    /// Write a film of all frames here (YUV4MPEG2, which ffmpeg and most players read); late frames show as on the screen. Needs --headless
+    /// Write a film of all frames here (YUV4MPEG2, which ffmpeg and most players read); late frames show as on the screen. Not of a window
     #[arg(long, value_name = "FILE", value_hint = ValueHint::FilePath)]
     pub video: Option<PathBuf>,
-    /// Write every frame's states and surfaces here as MCAP, which Foxglove, Lichtblick and Rerun open. Needs --headless
+    /// Write every frame's states and surfaces here as MCAP, which Foxglove, Lichtblick and Rerun open. Not of a window
     #[arg(long, value_name = "FILE", value_hint = ValueHint::FilePath)]
     pub mcap: Option<PathBuf>,
-    /// Write every frame's surfaces into this folder as a VTK series, which ParaView opens (series.pvd); nothing is overwritten. Needs --headless
+    /// Write every frame's surfaces into this folder as a VTK series, which ParaView opens (series.pvd); nothing is overwritten. Not of a window
     #[arg(long, value_name = "FOLDER", value_hint = ValueHint::DirPath)]
     pub vtk: Option<PathBuf>,
-    /// Write the last moment's surfaces here as binary glTF, which Blender, browsers and game engines open. Needs --headless
+    /// Write the last moment's surfaces here as binary glTF, which Blender, browsers and game engines open. Not of a window
     #[arg(long, value_name = "FILE", value_hint = ValueHint::FilePath)]
     pub glb: Option<PathBuf>,
     /// Write here when each object stepped and waited, the frames and their parts, and events (JSON, which ui.perfetto.dev opens); 256 MiB at
-    /// most. Needs --headless
+    /// most. Not of a window
     #[arg(long, value_name = "FILE", value_hint = ValueHint::FilePath)]
     pub perfetto: Option<PathBuf>,
     /// Style of headless pictures: wireframe, or contact forces, or colours by resolution, age, detail or depth; several are separated by commas
@@ -331,7 +332,7 @@ pub struct OutputArgs {
     /// Print the report as JSON on standard output, instead of the summary
     #[arg(long)]
     pub json: bool,
-    /// Print errors only: no progress, no summary, no list of the files written
+    /// Print errors and warnings only: no progress, no notes, no summary, no list of the files written
     #[arg(short, long)]
     pub quiet: bool,
 }

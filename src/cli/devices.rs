@@ -50,6 +50,17 @@ pub(super) fn wish(text: &str) -> Result<DeviceWish, String> {
     Ok(DeviceWish { kind, object: object.to_owned() })
 }
 
+/// Refuses an object that two devices are to lead: the two would take turns at where it is led, and each hand would feel the other as a contact.
+pub(super) fn check(wishes: &[DeviceWish]) -> Result<(), BadInput> {
+    let is_known = |(at, wish): (usize, &DeviceWish)| wishes[..at].iter().any(|before| before.object == wish.object);
+    match wishes.iter().enumerate().find(|one| is_known(*one)) {
+        Some((_, DeviceWish { object, .. })) => {
+            Err(BadInput(format!("--device leads `{object}` twice; expected one device for each object")))
+        }
+        None => Ok(()),
+    }
+}
+
 /// Serves devices beside a session.
 ///
 /// # Errors

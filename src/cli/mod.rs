@@ -24,6 +24,7 @@ use std::process::ExitCode;
 #[must_use]
 pub fn main() -> ExitCode {
     crate::scenes::provide();
+    block_file_size_signal();
     let mut arguments: Vec<_> = std::env::args_os().collect();
     if arguments.len() < 2 {
         arguments.truncate(1);
@@ -35,6 +36,17 @@ pub fn main() -> ExitCode {
         Err(error) => error.exit(),
     };
     done.unwrap_or_else(|error| metachron_console::output::report_error(&error)).into()
+}
+
+/// Lets a write past the limit on the size of files (`ulimit -f`) fail, as one to a full disk does, instead of ending the process: the signal that
+/// would do that is held back in this thread, and so in all that it starts; programs that it starts have their own mask.
+fn block_file_size_signal() {
+    #[cfg(unix)]
+    {
+        use nix::sys::signal::{SigSet, Signal};
+        // where the system refuses, the signal ends the process as before
+        let _ = SigSet::from(Signal::SIGXFSZ).thread_block();
+    }
 }
 
 fn dispatch(cli: Cli, matches: &clap::ArgMatches) -> anyhow::Result<Exit> {

@@ -27,13 +27,12 @@ use metachron_viewer::ui::WindowError;
 #[cfg(feature = "viewer")]
 use metachron_viewer::{WindowFailure, WindowPlan, play_in_window};
 use metachron_world::kinds::ExecutorKind;
-use metachron_world::{Reading, Scene, SceneText, Sensor};
-use std::fs::File;
+use metachron_world::{Reading, RecordingFile, Scene, SceneText, Sensor};
 use std::path::{Path, PathBuf};
 
 /// Begins to write down what is done to the run.
 fn record(session: &Session, path: &Path, request: &Request) -> anyhow::Result<()> {
-    let file = File::create(path).with_context(|| format!("the recording {} cannot be written", path.display()))?;
+    let file = RecordingFile::create(path).context("the recording cannot be written")?;
     let scene = SceneText {
         name: request.source.name().to_owned(),
         text: request.source.text().to_owned(),
@@ -77,7 +76,7 @@ pub(super) fn play(request: &Request, go_on: GoOn<'_>) -> anyhow::Result<Played>
 #[cfg(not(feature = "viewer"))]
 fn in_window(session: Session, request: &Request, go_on: GoOn<'_>) -> anyhow::Result<Played> {
     let png = cfg!(feature = "render").then(|| request.png_without_window.clone());
-    let mut played = headless(session, request, request.png.clone().or(png), go_on)?;
+    let mut played = headless(session, request, png, go_on)?;
     played.no_window = Some("this build cannot open a window: it lacks the feature `viewer`".to_owned());
     Ok(played)
 }
@@ -114,8 +113,7 @@ fn window_plan(request: &Request) -> WindowPlan {
 /// A window was requested and cannot be opened: the run goes on without it, and leaves a picture.
 #[cfg(feature = "viewer")]
 fn without_window(session: Session, why: &WindowError, request: &Request, go_on: GoOn<'_>) -> anyhow::Result<Played> {
-    let png = request.png.clone().unwrap_or_else(|| request.png_without_window.clone());
-    let mut played = headless(session, request, Some(png), go_on)?;
+    let mut played = headless(session, request, Some(request.png_without_window.clone()), go_on)?;
     played.no_window = Some(why.to_string());
     Ok(played)
 }

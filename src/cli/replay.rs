@@ -25,13 +25,13 @@ pub(super) fn command(args: &ReplayArgs) -> anyhow::Result<Exit> {
     })?;
     let source = Source::recorded(&scene.name, &scene.text, scene.folder.as_deref().map(Path::new))?;
     let overrides = scene.overrides.clone();
-    if !args.output.quiet && !recording.is_complete() {
+    if !recording.is_complete() {
         let what = if recording.is_damaged() { "is damaged" } else { "was cut short" };
         let left_out = match recording.lost_bytes() {
             0 => String::new(),
             lost => format!("; {lost} bytes are left out"),
         };
-        message(&format!("{path} {what}: it is repeated to its last whole chunk{left_out}"));
+        message(&format!("warning: {path} {what}: it is repeated to its last whole chunk{left_out}"));
     }
     let request = Request {
         scene: load(&source, &overrides)?,

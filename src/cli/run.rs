@@ -4,7 +4,7 @@
 //! Never here: the loop itself.
 
 use super::args::{OutputArgs, RunArgs, StyleWord};
-use super::devices::DeviceWish;
+use super::devices::{self, DeviceWish};
 use super::exports::ExportPaths;
 use super::play::{GoOn, play};
 use anyhow::Context;
@@ -50,7 +50,7 @@ pub struct Request {
     pub style: Style,
     /// Whether to play the scene again under one very fine common clock; only without a window.
     pub oracle: bool,
-    /// Where to write the last picture as PNG.
+    /// Where to write the last picture as PNG; only without a window.
     pub png: Option<PathBuf>,
     /// Where to write the depths of the last frame (PNG, 16 bits); only without a window.
     pub depth: Option<PathBuf>,
@@ -64,7 +64,7 @@ pub struct Request {
     pub devices: Vec<DeviceWish>,
     /// Where to write down what is done to the run.
     pub record: Option<PathBuf>,
-    /// Where to write it when the requested window could not be opened, and `png` is `None`.
+    /// Where to write it when the requested window could not be opened.
     pub png_without_window: PathBuf,
 }
 
@@ -230,6 +230,7 @@ fn check_inputs(args: &RunArgs) -> anyhow::Result<()> {
     }
     let output = &args.output;
     let files = [
+        ("--png", &output.png),
         ("--depth", &output.depth),
         ("--video", &output.video),
         ("--mcap", &output.mcap),
@@ -240,6 +241,7 @@ fn check_inputs(args: &RunArgs) -> anyhow::Result<()> {
     if let Some((flag, _)) = files.iter().find(|(_, path)| path.is_some() && !args.headless) {
         return Err(BadInput(format!("{flag} needs a run without a window; add --headless")).into());
     }
+    devices::check(&args.device)?;
     let scene = Path::new(&args.scene);
     let inputs = [("the scene", Some(scene).filter(|path| path.is_file())), ("--gains", args.gains.as_deref())];
     check_outputs(&args.output, &inputs, args.record.as_deref())

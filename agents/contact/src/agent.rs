@@ -94,11 +94,15 @@ pub trait Agent: Send {
         Err(ArchiveError::Refused { what: format!("model \"{}\"", self.model()) })
     }
 
-    /// Linear momentum (kg·m/s) and angular momentum about the origin (kg·m²/s), in world axes.
-    fn momentum(&self) -> (DVec3, DVec3);
+    /// Linear momentum (kg·m/s) and angular momentum about the origin (kg·m²/s), in world axes; zero for a model without mass, as of what is led.
+    fn momentum(&self) -> (DVec3, DVec3) {
+        (DVec3::ZERO, DVec3::ZERO)
+    }
 
-    /// Total mass in kilograms; zero for a model that has none.
-    fn mass_kg(&self) -> f64;
+    /// Total mass in kilograms; zero for a model without mass.
+    fn mass_kg(&self) -> f64 {
+        0.0
+    }
 
     /// The contact shape; `None` where nothing can touch it. It is the same until [`Self::carve`] or [`Self::archive`] makes another, of the
     /// same kind, with the same traits and numbers of vertices.

@@ -39,6 +39,17 @@ pub struct SoftState {
     pub positions: Vec<DVec3>,
     /// Their velocities, m/s.
     pub velocities: Vec<DVec3>,
+    /// What carries them, as its agent published it; `None` where the vertices are solved for themselves.
+    pub nodes: Option<SoftNodes>,
+}
+
+/// The nodes of a cage or a lattice, which carry the vertices of a soft body. How many there are changes with its ε.
+#[derive(Debug, Clone, Default, serde::Serialize, serde::Deserialize)]
+pub struct SoftNodes {
+    /// Positions, metres, world axes.
+    pub positions: Vec<DVec3>,
+    /// Their velocities, m/s.
+    pub velocities: Vec<DVec3>,
 }
 
 /// A framed curve of N segments between N + 1 nodes. Positions are in metres, world axes.
@@ -280,7 +291,10 @@ impl Body {
             Self::Tool(t) => {
                 [t.tip, t.velocity, t.spin].iter().all(|v| v.is_finite()) && t.rotation.is_finite() && t.jaw.is_finite()
             }
-            Self::Soft(s) => s.positions.iter().chain(&s.velocities).all(|p| p.is_finite()),
+            Self::Soft(s) => {
+                let nodes = s.nodes.iter().flat_map(|nodes| nodes.positions.iter().chain(&nodes.velocities));
+                s.positions.iter().chain(&s.velocities).chain(nodes).all(|p| p.is_finite())
+            }
         }
     }
 
@@ -346,7 +360,7 @@ mod tests {
         let found = rigid.point(rigid.anchor_near(place).unwrap()).unwrap();
         assert!(found.0.distance(place) < 1e-15);
         let positions = vec![DVec3::ZERO, DVec3::X, DVec3::Y];
-        let soft = Body::Soft(SoftState { velocities: vec![DVec3::ZERO; 3], positions });
+        let soft = Body::Soft(SoftState { velocities: vec![DVec3::ZERO; 3], positions, nodes: None });
         assert_eq!(soft.anchor_near(place), Some(Anchor::Vertex(1)));
         assert_eq!(Body::Nothing.anchor_near(place), None);
         assert_eq!(Body::Curve(CurveState::default()).anchor_near(place), None);

@@ -63,11 +63,11 @@ pub struct ContactState {
     pub force_n: DVec3,
     /// The greatest of these forces since it began, world axes, N.
     pub greatest_n: DVec3,
-    /// The force of which its events have told last, N.
-    pub told_n: f64,
+    /// The force that its events have reported last, N.
+    pub reported_n: f64,
     /// The deepest overlap in the last step, metres, ≥ 0.
     pub depth_m: f64,
-    /// How much more it bears for each metre that the two are pressed together further within the next step, along the normal, N/m, ≥ 0;
-    /// 0 where that is not known, as in heaps and between two that give way to nothing (docs/theory/coupling.md, eq. 7s).
+    /// How much more it bears for each metre that a side which a user leads is led on within the next step, along the normal, N/m, ≥ 0; 0 where
+    /// a user leads neither, in heaps, and between two that give way to nothing (docs/theory/coupling.md, eq. 7s).
     pub stiffness_n_m: f64,
 }

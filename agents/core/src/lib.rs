@@ -47,7 +47,8 @@ pub mod wave;
 pub use archive::{Archive, ArchiveError};
 pub use attachment::{AttachmentEvent, AttachmentEventKind, AttachmentId};
 pub use body::{
-    Anchor, Body, Bounds, CurveState, GRASP_BELOW, Grasp, GraspOrientation, Grip, RigidState, SoftState, ToolState,
+    Anchor, Body, Bounds, CurveState, GRASP_BELOW, Grasp, GraspOrientation, Grip, RigidState, SoftNodes, SoftState,
+    ToolState,
 };
 pub use cluster_state::{ClusterSolves, ClusterState};
 pub use contact::{ContactPartner, ContactState, JointEffort, Wrench};

@@ -36,6 +36,8 @@ pub struct Snapshot {
     pub at_rest: bool,
     /// Its smooth acceleration, m/s², without couplings and impacts. Others predict its motion by it.
     pub acceleration: DVec3,
+    /// How its spin changed in the mean of the last step, rad/s², world axes; zero of what bends, and of what is led.
+    pub angular_acceleration: DVec3,
     /// Its response to impulses.
     pub inertia: Inertia,
     /// The bounding box of its matter; `None` where nothing of it can be touched.
@@ -89,6 +91,7 @@ impl Snapshot {
         self.touches.clear();
         self.grips.clear();
         (self.at_rest, self.acceleration, self.bounds) = (false, DVec3::ZERO, None);
+        self.angular_acceleration = DVec3::ZERO;
         (self.drift_m, self.removed) = (0.0, Removed::default());
         self.pairs.clear();
         self.contacts.clear();
@@ -111,6 +114,7 @@ impl Snapshot {
     pub fn is_finite(&self) -> bool {
         self.body.is_finite()
             && self.acceleration.is_finite()
+            && self.angular_acceleration.is_finite()
             && self.grips.iter().all(|grip| grip.force_n.is_finite())
             && self.given.iter().all(Ledger::is_finite)
             && self.local_model.is_finite()

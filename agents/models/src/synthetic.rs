@@ -3,7 +3,6 @@
 //! In: two power laws and their range of spacings. Out: work in microseconds, a residual in metres.
 //! Never here: a clock. A step burns its cost in arithmetic, so its microseconds are nominal: see [`Synthetic`].
 
-use glam::DVec3;
 use metachron_contact::{Agent, StepContext};
 use metachron_core::{
     Archive, ArchiveError, Body, Resolution, ResolutionRange, SimSpan, Snapshot, StepError, StepReport, archive_values,
@@ -152,14 +151,6 @@ impl Agent for Synthetic {
 
     fn archive(&mut self, archive: &mut Archive<'_>) -> Result<(), ArchiveError> {
         archive_values!(archive, self.resolution, self.steps, self.sink)
-    }
-
-    fn momentum(&self) -> (DVec3, DVec3) {
-        (DVec3::ZERO, DVec3::ZERO)
-    }
-
-    fn mass_kg(&self) -> f64 {
-        0.0
     }
 }
 

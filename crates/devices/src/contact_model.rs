@@ -3,7 +3,7 @@
 //! In: the newest states of a world. Out: a wrench for any pose near that. Never here: where the object is led, how old a state may be.
 //!
 //! Each contact is a plane through the point that bears most: along its normal it gives the published force and, for what the object is off the
-//! published pose, the published stiffness (docs/theory/coupling.md, eq. 7s); never a pull. Friction follows the normal force.
+//! published pose, the published stiffness (docs/theory/coupling.md, eq. 7s, 7t); never a pull. Friction follows the normal force.
 
 use glam::{DQuat, DVec3};
 use metachron_core::{Body, SimTime, Snapshot, Wrench};

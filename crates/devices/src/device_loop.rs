@@ -15,14 +15,14 @@ use super::report::DeviceReport;
 use super::tank::{EnergyTank, Handle};
 use glam::DVec3;
 use metachron_contact::AnchorSpring;
-use metachron_core::{Anchor, Body, SimSpan, Wrench};
+use metachron_core::{Anchor, Body, SimSpan, SimTime, Wrench};
 use metachron_runtime::Keyed;
 use metachron_world::{Command, Object, World, WorldError};
 use std::time::Duration;
 
-/// A state older than so many of its steps gives no force.
-const AGE_MAX_STEPS: f64 = 2.0;
-/// An object whose device has gone is led for so long, of its own time.
+/// Up to an age of so many of its steps a state's force is whole: the next one was due by then.
+const WHOLE_STEPS: f64 = 2.0;
+/// An object whose device has gone is led for so long, of its own time; a hand whose world has gone feels the contacts fade in as long.
 const LEADS: SimSpan = SimSpan::from_millis(100);
 
 /// What a loop is to do.
@@ -50,6 +50,8 @@ pub struct DeviceLoop {
     is_tool: bool,
     period_s: f64,
     model: ContactModel,
+    /// The scene's time when the newest state came.
+    came: SimTime,
     tank: EnergyTank,
     before: Option<DeviceState>,
     report: DeviceReport,
@@ -95,6 +97,7 @@ impl DeviceLoop {
             is_tool,
             period_s: rate_hz.recip(),
             model: ContactModel::default(),
+            came: SimTime::ZERO,
             tank: EnergyTank::new(tank_j),
             before: None,
             report,
@@ -172,18 +175,21 @@ impl DeviceLoop {
         self.world.command(self.object, command.lasting(LEADS))
     }
 
-    /// What the object would feel where the handle is; nothing by a state that is too old.
+    /// What the object would feel where the handle is; less and less by a state after which none came.
     fn feel(&mut self, state: &DeviceState) -> Result<Wrench, WorldError> {
-        self.model.refresh(&self.world, self.object)?;
-        let age_s = self.world.time().secs_after(self.model.moment).max(0.0);
+        let now = self.world.time();
+        if self.model.refresh(&self.world, self.object)? {
+            self.came = now;
+        }
+        // an object that its machine cannot keep up with is behind the scene, and answers the newest pose all the same: its clock tells nothing
+        let age_s = now.secs_after(self.came).max(0.0);
         // before the first step nothing has been felt, and what rests is as it was
         let age_steps = if self.model.step_s > 0.0 && !self.model.at_rest { age_s / self.model.step_s } else { 0.0 };
-        if age_steps > AGE_MAX_STEPS {
-            self.report.stale += 1;
-            return Ok(Wrench::default());
-        }
         self.age_steps.note(age_steps);
+        self.report.stale += u64::from(age_steps > WHOLE_STEPS);
+        let late_s = (age_steps - WHOLE_STEPS).max(0.0) * self.model.step_s;
+        let share = (1.0 - late_s / LEADS.as_secs_f64()).max(0.0);
         let rotation = if self.is_tool { self.model.rotation() } else { state.rotation };
-        Ok(self.model.wrench(state.position_m, rotation))
+        Ok(self.model.wrench(state.position_m, rotation) * share)
     }
 }

@@ -11,11 +11,13 @@ pub struct DeviceReport {
     pub object: String,
     /// How often it was read.
     pub ticks: u64,
+    /// Whether the system gave its thread real-time priority. Where it did not, ticks are late by what others take of the cores.
+    pub realtime: bool,
     /// By how much ticks were late, milliseconds.
     pub late_ms: Quantiles,
-    /// Age of the state that the force followed, in steps of that state: at most two, as older ones are not used.
+    /// For how long the newest state had come when the force followed it, in steps of that state: the force is whole up to two.
     pub age_steps: Quantiles,
-    /// Ticks without a force, because the newest state was older than two of its steps.
+    /// Ticks with less force or none, because the newest state had come more than two of its steps ago: it fades in 0.1 s.
     pub stale: u64,
     /// The force given, N.
     pub force_mean_n: f64,

@@ -4,6 +4,7 @@
 
 use super::device_loop::DeviceLoop;
 use super::report::DeviceReport;
+use metachron_runtime::Priority;
 use std::sync::atomic::{AtomicBool, Ordering::Relaxed};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::thread::JoinHandle;
@@ -21,7 +22,8 @@ pub struct Served {
 }
 
 impl Served {
-    /// Serves a device on a thread of its own. A tick that comes late by more than a period is not made up.
+    /// Serves a device on a thread of its own, which has real-time priority where the system grants it: it works for some microseconds of each
+    /// period. A tick that comes late by more than a period is not made up.
     ///
     /// # Errors
     /// Where the system has no thread left.
@@ -63,8 +65,9 @@ impl Drop for Served {
 
 fn serve(mut device_loop: DeviceLoop, stop: &AtomicBool, report: &Mutex<DeviceReport>) {
     let period = device_loop.period();
+    let realtime = Priority::Realtime.take().is_ok();
     let hand_out = |device_loop: &DeviceLoop| {
-        *report.lock().unwrap_or_else(PoisonError::into_inner) = device_loop.report();
+        *report.lock().unwrap_or_else(PoisonError::into_inner) = DeviceReport { realtime, ..device_loop.report() };
     };
     let mut due = Instant::now() + period;
     let (mut before, mut reported) = (Instant::now(), Instant::now());

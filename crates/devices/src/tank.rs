@@ -87,8 +87,11 @@ impl EnergyTank {
     pub fn admit(&mut self, wanted: &Wrench, handle: &Handle) -> Wrench {
         let forces_n = self.sent.iter().map(|wrench| wrench.force_n.length()).sum::<f64>() + wanted.force_n.length();
         let most_j = |wrench: &Wrench| handle.most_work_j(wrench, forces_n);
-        let on_the_way_j: f64 = self.sent.iter().map(most_j).sum();
-        let (free_j, asked_j) = ((self.level_j - on_the_way_j).max(0.0), most_j(wanted));
+        // until all have acted any one may act in the place of those that come late
+        let periods = self.sent.len() as f64;
+        let on_the_way_j = periods * self.sent.iter().map(most_j).fold(0.0, f64::max);
+        let free_j = (self.level_j - on_the_way_j).max(0.0).min(self.level_j / (periods + 1.0));
+        let asked_j = most_j(wanted);
         let admitted = if asked_j > free_j { *wanted * (free_j / asked_j) } else { *wanted };
         if self.sent.len() == IN_FLIGHT_MAX {
             self.sent.pop_front();

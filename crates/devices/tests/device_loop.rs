@@ -1,14 +1,15 @@
 //! A device beside a world in lockstep: each tick of a millisecond of virtual time, no thread, no sleep.
 
 use glam::{DQuat, DVec3};
-use metachron_core::{SimSpan, Wrench};
+use metachron_core::{Anchor, Body, SimSpan, Wrench};
 use metachron_devices::{
     ContactModel, Device, DeviceError, DeviceLoop, DeviceReport, DeviceState, Hand, HandPath, Limits, Link,
     LoopOptions, SimulatedDevice,
 };
+use metachron_geometry::{ContactTraits, Solid};
 use metachron_models::soft::Side;
-use metachron_models::tool::Keyframe;
-use metachron_world::{Rigid, Scene, Soft, World, kinds::ExecutorKind};
+use metachron_models::tool::{Keyframe, Tool, ToolSpec};
+use metachron_world::{Command, Custom, Part, Rigid, Scene, SceneBuilder, Soft, World, kinds::ExecutorKind};
 use std::sync::{Arc, Mutex};
 use std::time::Duration;
 
@@ -95,36 +96,119 @@ fn the_force_at_rest_is_that_of_the_spring_that_is_pressed() {
     }
 }
 
-#[test]
-fn between_two_states_the_force_follows_the_pose_by_the_stiffness_of_the_contact() {
-    for (tissue_hz, plate_hz) in [(60.0, 60.0), (500.0, 1000.0)] {
-        between(tissue_hz, plate_hz);
-    }
+/// One step of all in the scenes below.
+const STEP: SimSpan = SimSpan::from_millis(10);
+
+/// By how much the force in z grows on an object that is led down by 6 mm, rests there, and is led on: in the step in which it is, or, of a tool,
+/// which gets there in several, once it rests; and by how much the local model before says that it does, N/m.
+fn led_on(scene: &Scene, lead: &dyn Fn(f64) -> Command, on_m: f64) -> [f64; 2] {
+    let (name, depth_m) = ("led", 0.006);
+    let pressed = |on_m: f64| {
+        let world = World::start(scene, ExecutorKind::Lockstep).unwrap();
+        let (object, mut model) = (world.object(name).unwrap(), ContactModel::default());
+        for step in 1..=100 {
+            world.command(object, lead(depth_m * (f64::from(step) / 40.0).min(1.0))).unwrap();
+            world.advance(STEP);
+        }
+        model.refresh(&world, object).unwrap();
+        let before = world.latest(object).unwrap();
+        world.command(object, lead(depth_m + on_m)).unwrap();
+        // the step that takes the command is the next or that after it
+        let force_n = |_| {
+            world.advance(SimSpan::from_millis(1));
+            world.latest(object).unwrap().contact_wrench.force_n.z
+        };
+        ((0..300).map(force_n).collect::<Vec<_>>(), model, before)
+    };
+    let (still, model, state) = pressed(0.0);
+    let (further, ..) = pressed(on_m);
+    let mut led = still.iter().zip(&further).filter(|(still_n, further_n)| still_n != further_n);
+    let is_tool = matches!(state.body, Body::Tool(_));
+    let (still_n, further_n) = if is_tool { led.next_back() } else { led.next() }.unwrap();
+    let (place_m, rotation) = match &state.body {
+        Body::Tool(tool) => (tool.led, tool.rotation),
+        Body::Rigid(body) => (body.position, body.rotation),
+        other => panic!("{other:?}"),
+    };
+    let felt_n = |by_m: f64| model.wrench(place_m - DVec3::Z * by_m, rotation).force_n.z;
+    assert!(*still_n > 0.05, "{name} presses on nothing: {still_n} N");
+    assert_eq!(felt_n(-0.05), 0.0, "a contact never pulls");
+    [further_n - still_n, felt_n(on_m) - felt_n(0.0)].map(|more_n| more_n / on_m)
 }
 
-fn between(tissue_hz: f64, plate_hz: f64) {
-    let world = world(tissue_hz, plate_hz);
-    let hand = Hand { stiffness_n_m: 3000.0, damping_n_s_m: 30.0, ..Hand::default() };
-    let _ = serve(
-        &world,
-        Box::new(SimulatedDevice::new(hand, press(0.005), Link::default(), 20.0)),
-        LoopOptions::default(),
-        1500,
-    );
-    let plate = world.object("plate").unwrap();
-    let mut model = ContactModel::default();
-    assert!(model.refresh(&world, plate).unwrap());
-    assert!(!model.refresh(&world, plate).unwrap(), "no other state");
-    let at = |z| model.wrench(DVec3::Z * z, DQuat::IDENTITY).force_n.z;
-    let metachron_core::Body::Rigid(body) = &world.latest(plate).unwrap().body else { panic!("a plate") };
-    let (z, off_m) = (body.position.z, 1e-4);
-    let slope_n_m = (at(z - off_m) - at(z)) / off_m;
-    // within a step of the block half of its mass and its damping resist as well; but each of the four corners counts as if it were pressed
-    // alone, which takes what the others bear for free
-    let (h_s, half_kg) = (tissue_hz.recip(), 0.05);
-    let wanted_n_m = STIFFNESS_N_M + (2.0 * half_kg + 0.002 * STIFFNESS_N_M) / h_s + half_kg / (h_s * h_s);
-    assert!(slope_n_m > 0.5 * wanted_n_m && slope_n_m < 1.1 * wanted_n_m, "{slope_n_m} N/m of {wanted_n_m} N/m");
-    assert_eq!(at(z + 0.02), 0.0, "a contact never pulls");
+fn jelly(cells: u32) -> Soft {
+    let jelly = Soft::cuboid([SIDE_M; 3], [cells; 3]).at([0.0, 0.0, 0.5 * SIDE_M]).young_pa(YOUNG_PA).poisson(0.3);
+    jelly.damping(2.0, 0.002).hold(&[Side::Bottom]).density_kg_m3(100.0)
+}
+
+/// A tool through a trocar above.
+fn probe() -> Custom {
+    let keyframe = Keyframe { at_s: 0.0, tip_m: DVec3::Z * (SIDE_M + 0.01), rotation: DQuat::IDENTITY, jaw: 0.0 };
+    let spec = ToolSpec {
+        keyframes: vec![keyframe],
+        repeat: false,
+        reach_m: 0.01,
+        stiffness_n_m: 200.0,
+        damping_n_s_m: 1.0,
+        max_force_n: 10.0,
+        graspable: Vec::new(),
+        pivot_m: Some(DVec3::Z * (SIDE_M + 0.2)),
+        starts_off_m: DVec3::ZERO,
+        traits: ContactTraits::default(),
+    };
+    Custom::new(move |_| Box::new(Tool::new(spec.clone()).unwrap()))
+}
+
+/// An object `led` in a scene, and how it is led to a depth.
+struct Case<'a> {
+    what: &'static str,
+    scene: Scene,
+    lead: &'a dyn Fn(f64) -> Command,
+}
+
+#[test]
+fn the_local_model_has_the_stiffness_of_the_force_whatever_bears() {
+    let down = |from_m: f64| move |depth_m: f64| Command::pose(DVec3::Z * (from_m - depth_m), DQuat::IDENTITY);
+    let tip =
+        |depth_m: f64| Command::spring(Anchor::Local(DVec3::ZERO), DVec3::Z * (SIDE_M + 0.004 - depth_m), 0.0, 0.0);
+    let scene = |builder: SceneBuilder, name: &str, part: Part| builder.add(name, part).build().unwrap();
+    let soft = |cells: u32| Scene::builder().gravity([0.0; 3]).add("jelly", jelly(cells).rate_hz(100.0));
+    let slow = Scene::builder().gravity([0.0; 3]).add("jelly", jelly(1).rate_hz(50.0));
+    let lid = || Rigid::cuboid([0.2, 0.2, 0.01]).kinematic().at([0.0, 0.0, SIDE_M + 0.02]).rate_hz(100.0);
+    let ball = Rigid::ball(0.02).kinematic().at([0.0, 0.0, SIDE_M + 0.03]).rate_hz(100.0);
+    let apart = |x_m: f64| jelly(1).at([x_m, 0.0, 0.5 * SIDE_M]).rate_hz(100.0);
+    let two = Scene::builder().gravity([0.0; 3]).add("left", apart(-0.1)).add("right", apart(0.1));
+    let board = Rigid::cuboid([0.1, 0.1, 0.01]).at([0.0, 0.0, SIDE_M + 0.01]).mass_kg(0.1).rate_hz(100.0);
+    let loaded = soft(2).add("board", board);
+    // nothing but its stiffness resists for long
+    let light = jelly(4).damping(2.0, 0.0).density_kg_m3(1.0).rate_hz(100.0);
+    let light = Scene::builder().gravity([0.0; 3]).add("jelly", light);
+    let plate = Rigid::cuboid([0.1, 0.1, 0.5 * SIDE_M]).at([0.0, 0.0, 0.5 * SIDE_M]).rate_hz(100.0);
+    let rigid = || Scene::builder().fixed("floor", Solid::Plane).add("plate", plate.clone());
+    let cases = [
+        Case { what: "a ball on jelly", scene: scene(soft(4), "led", ball.into()), lead: &down(SIDE_M + 0.02) },
+        Case { what: "four corners", scene: scene(soft(1), "led", lid().into()), lead: &down(SIDE_M + 0.01) },
+        Case {
+            what: "four corners of slower steps",
+            scene: scene(slow, "led", lid().into()),
+            lead: &down(SIDE_M + 0.01),
+        },
+        Case { what: "twenty-five places", scene: scene(soft(4), "led", lid().into()), lead: &down(SIDE_M + 0.01) },
+        Case { what: "two bodies", scene: scene(two, "led", lid().into()), lead: &down(SIDE_M + 0.01) },
+        Case {
+            what: "a plate that lies on jelly",
+            scene: scene(loaded, "led", lid().into()),
+            lead: &down(SIDE_M + 0.03),
+        },
+        Case { what: "a tool on jelly", scene: scene(light, "led", probe().rate_hz(100.0).into()), lead: &tip },
+        Case { what: "a tool on a plate", scene: scene(rigid(), "led", probe().rate_hz(100.0).into()), lead: &tip },
+    ];
+    for Case { what, scene, lead } in cases {
+        let on_m = if what.contains("tool") { 1e-4 } else { 1e-6 };
+        let [true_n_m, felt_n_m] = led_on(&scene, lead, on_m);
+        println!("{what}: {felt_n_m:.1} N/m of {true_n_m:.1} N/m");
+        assert!((felt_n_m / true_n_m - 1.0).abs() < 0.1, "{what}: {felt_n_m} N/m of {true_n_m} N/m");
+    }
 }
 
 #[test]

@@ -179,7 +179,7 @@ mod tests {
             normal: DVec3::Z,
             force_n: 40.0 * DVec3::Z,
             greatest_n: 40.0 * DVec3::Z,
-            told_n: 0.0,
+            reported_n: 0.0,
             depth_m: 0.0,
             stiffness_n_m: 0.0,
         };

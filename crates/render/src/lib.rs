@@ -31,6 +31,8 @@ mod draw;
 mod environment;
 mod forces;
 #[cfg(feature = "gpu")]
+mod full_screen;
+#[cfg(feature = "gpu")]
 mod image_metrics;
 mod impostor_fit;
 mod instances;

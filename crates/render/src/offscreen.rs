@@ -149,9 +149,8 @@ pub fn device_descriptor(adapter: &wgpu::Adapter) -> wgpu::DeviceDescriptor<'sta
 }
 
 async fn choose(instance: &wgpu::Instance) -> Result<wgpu::Adapter, GpuError> {
-    if std::env::var("WGPU_ADAPTER_NAME").is_ok() {
-        let named = wgpu::util::initialize_adapter_from_env(instance, None).await;
-        return named.map_err(|error| GpuError::NoAdapter { detail: shortened(&error.to_string()) });
+    if let Ok(wanted) = std::env::var("WGPU_ADAPTER_NAME") {
+        return named(instance, &wanted).await;
     }
     let options = wgpu::RequestAdapterOptions {
         power_preference: wgpu::PowerPreference::from_env().unwrap_or(wgpu::PowerPreference::HighPerformance),
@@ -159,6 +158,16 @@ async fn choose(instance: &wgpu::Instance) -> Result<wgpu::Adapter, GpuError> {
     };
     let found = instance.request_adapter(&options).await;
     found.map_err(|error| GpuError::NoAdapter { detail: shortened(&error.to_string()) })
+}
+
+/// The first adapter that has `wanted` in its name, in letters of any case. The function of wgpu for this panics where there is none.
+async fn named(instance: &wgpu::Instance, wanted: &str) -> Result<wgpu::Adapter, GpuError> {
+    let adapters = instance.enumerate_adapters(wgpu::Backends::all()).await;
+    let names: Vec<String> = adapters.iter().map(|adapter| adapter.get_info().name).collect();
+    let at = names.iter().position(|name| name.to_lowercase().contains(&wanted.to_lowercase()));
+    at.and_then(|at| adapters.into_iter().nth(at)).ok_or_else(|| GpuError::NoAdapter {
+        detail: format!("WGPU_ADAPTER_NAME is {wanted:?}; the adapters are [{}]", names.join(", ")),
+    })
 }
 
 /// The first line of a library's message, shortened to 160 characters.
@@ -184,6 +193,8 @@ pub struct Offscreen {
     upscaler: Upscaler,
     /// The texture of pictures of fewer pixels.
     reduced: Option<Reduced>,
+    /// What draws depths, once they were asked for: those of several samples a pixel cannot be read.
+    of_depths: Option<Box<Self>>,
 }
 
 /// A texture of fewer pixels than the target's.
@@ -227,7 +238,7 @@ impl Offscreen {
             let view = texture.create_view(&wgpu::TextureViewDescriptor::default());
             (texture, view)
         });
-        Ok(Self { gpu, renderer, size, texture, upscaler, reduced: None })
+        Ok(Self { gpu, renderer, size, texture, upscaler, reduced: None, of_depths: None })
     }
 
     /// The device that draws.
@@ -301,13 +312,18 @@ impl Offscreen {
     ///
     /// # Errors
     /// As [`Renderer::render`], and [`GpuError::ReadBack`].
-    pub fn depths(&self, picture: &Picture, camera: &Camera) -> Result<DepthImage, GpuError> {
-        // depths of several samples a pixel cannot be read
-        let options = RendererOptions { samples: 1, ..self.renderer.options() };
-        let mut screen = Self::new(self.gpu.clone(), self.size, options)?;
+    pub fn depths(&mut self, picture: &Picture, camera: &Camera) -> Result<DepthImage, GpuError> {
+        let mut screen = match self.of_depths.take() {
+            Some(screen) => screen,
+            None => {
+                let options = RendererOptions { samples: 1, ..self.renderer.options() };
+                Box::new(Self::new(self.gpu.clone(), self.size, options)?)
+            }
+        };
         let style = Style { colouring: Colouring::Depth, wireframe: false, forces: false };
         screen.render(&Picture { style, scale: 1.0, ..picture.clone() }, camera)?;
         let depths_m = screen.renderer.read_depths(&self.gpu, camera, screen.renderer.lost())?;
+        self.of_depths = Some(screen);
         Ok(DepthImage { size: self.size, depths_m })
     }
 

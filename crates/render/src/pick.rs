@@ -224,7 +224,7 @@ mod tests {
         };
         let [near, far] = [[[0, 2, 1], [1, 2, 3]], [[4, 5, 6], [5, 7, 6]]];
         let whole = surface(&[near, far].concat());
-        let soft = SoftState { velocities: vec![DVec3::ZERO; 8], positions };
+        let soft = SoftState { velocities: vec![DVec3::ZERO; 8], positions, nodes: None };
         let form = Form::Skin(SkinForm::new(whole, &soft.positions));
         let mut scene_view = scene_view(vec![(form, Body::Soft(soft))]);
         let distance_m = |view: &SceneView| {

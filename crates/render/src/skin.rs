@@ -260,7 +260,7 @@ mod tests {
             closed: false,
         };
         let positions = vec![DVec3::ZERO, DVec3::X, DVec3::new(1.0, 1.0, 0.0), DVec3::Y];
-        (form, SoftState { velocities: vec![DVec3::ZERO; 4], positions })
+        (form, SoftState { velocities: vec![DVec3::ZERO; 4], positions, nodes: None })
     }
 
     #[test]
@@ -303,7 +303,7 @@ mod tests {
         let bit = |k: u32, b: u32| f64::from(k >> b & 1);
         let top = |x: f64, z: f64| z * (1.0 + x * turn_rad.tan());
         let positions = (0..8).map(|k| DVec3::new(bit(k, 0), bit(k, 1), top(bit(k, 0), bit(k, 2)))).collect();
-        (form, SoftState { velocities: vec![DVec3::ZERO; 8], positions })
+        (form, SoftState { velocities: vec![DVec3::ZERO; 8], positions, nodes: None })
     }
 
     #[test]
@@ -411,7 +411,7 @@ mod tests {
         let (form, _) = cube(0.0);
         let form =
             SurfaceShape { vertices: (0..positions.len() as u32).collect(), triangles: triangles.into(), ..form };
-        (form, SoftState { velocities: vec![DVec3::ZERO; positions.len()], positions })
+        (form, SoftState { velocities: vec![DVec3::ZERO; positions.len()], positions, nodes: None })
     }
 
     #[test]
@@ -447,7 +447,7 @@ mod tests {
         let (form, _) = square();
         let form =
             SurfaceShape { triangles: triangles.into(), vertices: (0..positions.len() as u32).collect(), ..form };
-        let soft = SoftState { velocities: vec![DVec3::ZERO; positions.len()], positions };
+        let soft = SoftState { velocities: vec![DVec3::ZERO; positions.len()], positions, nodes: None };
         let skins = at_level(&form, &soft, 4);
         assert!(is_without_gaps(&skins, 0.01));
         // a chord of 15 degrees sags by 8.6 mm; at the border the normals are those of half a strip
@@ -460,7 +460,7 @@ mod tests {
     #[test]
     fn a_rope_s_frames_follow_it_and_do_not_spin() {
         let positions = vec![DVec3::ZERO, DVec3::X, DVec3::new(2.0, 1.0, 0.0), DVec3::new(2.0, 2.0, 0.5)];
-        let soft = SoftState { velocities: vec![DVec3::ZERO; 4], positions };
+        let soft = SoftState { velocities: vec![DVec3::ZERO; 4], positions, nodes: None };
         let mut curve = CurveState::default();
         curve_of_rope(&soft, 0.1, &mut curve);
         for (frame, pair) in curve.frames.iter().zip(soft.positions.windows(2)) {

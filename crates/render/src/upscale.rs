@@ -6,6 +6,7 @@
 //! Enlarging is by the cubic (KEY81) with the slopes of Catmull and Rom, which keeps edges sharp and is exact for parabolas. In software its
 //! nine filtered samples take as long as shading a pixel; there one filtered sample (bilinear) has to do, at a third of that.
 
+use super::full_screen::{FullScreen, cover};
 use super::view::Size;
 use wgpu::{Device, TextureFormat, TextureView};
 
@@ -31,44 +32,21 @@ impl Upscaler {
     /// Pipelines into passes whose target has this format; `lean` enlarges bilinearly.
     #[must_use]
     pub fn new(device: &Device, target: TextureFormat, lean: bool) -> Self {
-        let source = wgpu::ShaderSource::Wgsl(SHADER.into());
-        let module = device.create_shader_module(wgpu::ShaderModuleDescriptor { label: Some("upscale"), source });
-        let layout = layout(device);
-        let pipeline_layout = device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
-            label: Some("upscale"),
-            bind_group_layouts: &[Some(&layout)],
-            immediate_size: 0,
-        });
-        let pipeline = |fragment| {
-            device.create_render_pipeline(&wgpu::RenderPipelineDescriptor {
-                label: Some("upscale"),
-                layout: Some(&pipeline_layout),
-                vertex: wgpu::VertexState {
-                    module: &module,
-                    entry_point: Some("vs_show"),
-                    compilation_options: wgpu::PipelineCompilationOptions::default(),
-                    buffers: &[],
-                },
-                primitive: wgpu::PrimitiveState::default(),
-                depth_stencil: None,
-                multisample: wgpu::MultisampleState::default(),
-                fragment: Some(wgpu::FragmentState {
-                    module: &module,
-                    entry_point: Some(fragment),
-                    compilation_options: wgpu::PipelineCompilationOptions::default(),
-                    targets: &[Some(target.into())],
-                }),
-                multiview_mask: None,
-                cache: None,
-            })
+        let texture = wgpu::BindingType::Texture {
+            sample_type: wgpu::TextureSampleType::Float { filterable: true },
+            view_dimension: wgpu::TextureViewDimension::D2,
+            multisampled: false,
         };
+        let bindings = [texture, wgpu::BindingType::Sampler(wgpu::SamplerBindingType::Filtering)];
+        let pass = FullScreen { label: "upscale", fragments: SHADER, bindings: &bindings, target };
+        let layout = pass.layout(device);
+        let pipelines = pass.pipelines(device, &layout, ["fs_same", if lean { "fs_linear" } else { "fs_cubic" }]);
         let sampler = device.create_sampler(&wgpu::SamplerDescriptor {
             label: Some("upscale"),
             mag_filter: wgpu::FilterMode::Linear,
             min_filter: wgpu::FilterMode::Linear,
             ..Default::default()
         });
-        let pipelines = [pipeline("fs_same"), pipeline(if lean { "fs_linear" } else { "fs_cubic" })];
         Self { pipelines, layout, sampler }
     }
 
@@ -90,23 +68,6 @@ impl Upscaler {
 impl Upscaled {
     /// Covers the viewport of `pass` with it.
     pub fn draw(&self, pass: &mut wgpu::RenderPass<'_>) {
-        pass.set_pipeline(&self.pipeline);
-        pass.set_bind_group(0, &self.group, &[]);
-        pass.draw(0..3, 0..1);
+        cover(pass, &self.pipeline, &self.group);
     }
-}
-
-fn layout(device: &Device) -> wgpu::BindGroupLayout {
-    let entry =
-        |binding, ty| wgpu::BindGroupLayoutEntry { binding, visibility: wgpu::ShaderStages::FRAGMENT, ty, count: None };
-    let texture = wgpu::BindingType::Texture {
-        sample_type: wgpu::TextureSampleType::Float { filterable: true },
-        view_dimension: wgpu::TextureViewDimension::D2,
-        multisampled: false,
-    };
-    let sampler = wgpu::BindingType::Sampler(wgpu::SamplerBindingType::Filtering);
-    device.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor {
-        label: Some("upscale"),
-        entries: &[entry(0, texture), entry(1, sampler)],
-    })
 }

@@ -3,17 +3,6 @@
 @group(0) @binding(0) var drawn: texture_2d<f32>;
 @group(0) @binding(1) var between: sampler;
 
-struct Corner {
-    @builtin(position) at: vec4f,
-    @location(0) uv: vec2f,
-}
-
-@vertex
-fn vs_show(@builtin(vertex_index) i: u32) -> Corner {
-    let uv = vec2f(f32((i << 1u) & 2u), f32(i & 2u));
-    return Corner(vec4f(uv.x * 2.0 - 1.0, 1.0 - uv.y * 2.0, 0.0, 1.0), uv);
-}
-
 @fragment
 fn fs_same(in: Corner) -> @location(0) vec4f {
     let size = textureDimensions(drawn);

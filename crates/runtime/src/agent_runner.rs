@@ -17,8 +17,8 @@ use super::handle::Shared;
 use super::helpers::Helped;
 use super::loads::Loads;
 use super::metrics::{MetricsWriter, SMOOTHING};
-use super::nobody::Nobody;
 use super::observation::{Observer, Peers};
+use super::removed_agent::RemovedAgent;
 use super::slot::SlotWriter;
 use super::turns::Took;
 use metachron_contact::{Agent, Carving, Link};
@@ -26,6 +26,7 @@ use metachron_core::{AgentId, Resolution, ResolutionRange, SimSpan, SimTime, Sna
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::Arc;
 use std::sync::atomic::Ordering::Relaxed;
+use std::thread;
 use std::time::Duration;
 
 /// An agent with its runtime state.
@@ -337,7 +338,9 @@ impl AgentRunner {
     fn vanish(&mut self) {
         let time = self.pace.time();
         let nothing = Snapshot { time, steps: self.writer.slot().latest().steps, ..Snapshot::default() };
-        self.agent = Box::new(Nobody);
+        if !self.shared.is_first() {
+            self.agent = Box::new(RemovedAgent);
+        }
         self.writer.fill(|into| {
             *into = nothing;
             true
@@ -347,6 +350,23 @@ impl AgentRunner {
             broad_phase.publish_nowhere(self.id(), time);
         }
         self.shared.gauges.leave();
+    }
+
+    /// Takes it out at once: called between turns, of one that no other leads.
+    pub fn take_out(&mut self) {
+        self.shared.mail.clear();
+        self.open = None;
+        self.tell(EventKind::Gone);
+        self.vanish();
+        while self.writer.filled().is_some() && !self.show() {
+            // readers are in their cells for nanoseconds
+            thread::yield_now();
+        }
+        self.withheld = false;
+        self.metrics.flush(&self.shared.gauges);
+        self.notify_reader();
+        self.shared.sleep.close(self.id());
+        self.forget();
     }
 
     /// Whether no outside influence prevents the agent from resting at simulated time `now`.
@@ -359,7 +379,7 @@ impl AgentRunner {
     /// Lets its governor answer a turn that took `work_s` seconds of its own.
     pub fn run_governor(&mut self, timeline: &Timeline, open: &PendingTurn, work_s: f64) -> Result<(), String> {
         let Some(governor) = &mut self.governor else { return Ok(()) };
-        let wanted_period_s = 1.0 / (self.shared.wanted_hz * timeline.speed());
+        let wanted_period_s = 1.0 / (self.shared.wanted_hz() * timeline.speed());
         let Demand { dt, resolution } = governor.after_step(&TurnMeasure {
             work_s,
             wanted_period_s,

@@ -9,10 +9,11 @@ use super::cluster::{Place, Placed, check_places};
 use super::handle::Shared;
 use super::lockstep::Phase;
 use super::sleep::SleepRegistry;
+use super::spawn::{AgentSpawn, RunAgents};
 use super::turn_order::{PartKind, TurnOrder};
 use metachron_core::{AgentId, Archive, ArchiveError, archive_values};
 use std::cmp::Reverse;
-use std::collections::BinaryHeap;
+use std::collections::{BTreeMap, BinaryHeap};
 use std::sync::Arc;
 use std::time::Duration;
 
@@ -45,34 +46,115 @@ impl AgentRunner {
     }
 }
 
+/// Makes an agent that joined the run of a state which is read, and that is not in the run which reads it: what it joined as, by its number.
+pub type Absent<'a> = &'a mut dyn FnMut(AgentId) -> Result<AgentSpawn, ArchiveError>;
+
+/// A run in real time, which is saved and recorded between turns.
+pub(super) trait CutBetweenTurns {
+    /// Ends all turns in progress, does something with the agents and the order of their turns, and lets them go on.
+    fn cut(
+        &mut self,
+        act: impl FnOnce(&mut Cut, &mut Option<Arc<TurnOrder>>) -> Result<(), ArchiveError>,
+    ) -> Result<(), ArchiveError>;
+
+    /// What it knows of its agents.
+    fn agents_of_run(&self) -> &RunAgents;
+
+    /// [`super::Run::archive`].
+    fn archive_between_turns(&mut self, archive: &mut Archive<'_>, absent: Absent<'_>) -> Result<(), ArchiveError> {
+        self.cut(|cut, order| cut.archive_in_order(archive, order.as_deref(), absent))
+    }
+
+    /// [`super::Run::record`].
+    fn record_between_turns(
+        &mut self,
+        order: Arc<TurnOrder>,
+        begun: Option<&mut Archive<'_>>,
+    ) -> Result<(), ArchiveError> {
+        self.agents_of_run().set_ordered();
+        self.cut(|cut, mine| {
+            begun.map_or(Ok(()), |archive| cut.archive_in_real_time(archive, &mut refuse_absent))?;
+            *mine = Some(order);
+            Ok(())
+        })
+    }
+}
+
 /// All agents of a run, taken from their places, and the time.
 pub(super) struct Cut {
     pub all: Vec<Placed>,
-    /// How many agents there have to be.
-    pub agents: usize,
+    pub run_agents: RunAgents,
+    /// How many agents the state that was read or written is of, those that had left included: all others have left.
+    pub counted: usize,
     pub timeline: Timeline,
     pub now: Duration,
 }
 
 impl Cut {
+    /// The agents of `run_agents`, taken from their places.
+    pub const fn new(all: Vec<Placed>, run_agents: RunAgents, timeline: Timeline, now: Duration) -> Self {
+        Self { all, run_agents, counted: 0, timeline, now }
+    }
+
     /// Writes or reads agents, places and time: what every executor has. What lockstep has besides follows.
-    pub fn archive(&mut self, archive: &mut Archive<'_>) -> Result<(), ArchiveError> {
-        let Self { all, agents, timeline, now } = self;
-        if all.len() != *agents {
+    pub fn archive(&mut self, archive: &mut Archive<'_>, absent: Absent<'_>) -> Result<(), ArchiveError> {
+        if self.all.len() != self.run_agents.handles.len() {
             let what = "an agent whose step does not end, or whose thread panicked,";
             return Err(ArchiveError::Refused { what: what.to_owned() });
         }
-        archive_agents(all, archive)?;
-        let mut places: Vec<Place> = all.iter().map(|placed| placed.place).collect();
+        let mut present: Vec<bool> = self.all.iter().map(|placed| !placed.has_left()).collect();
+        archive.value(&mut present)?;
+        self.counted = present.len();
+        if archive.is_reading() {
+            self.admit(&present, absent)?;
+        }
+        let Self { all, run_agents, counted, timeline, now } = self;
+        archive_agents(&mut all[..*counted], &present, archive)?;
+        archive_sleep(&run_agents.sleep, *counted, archive)?;
+        run_agents.peers.broad_phase.archive(*counted, all.len(), archive)?;
+        let of = all[..*counted].iter();
+        let mut places: Vec<Place> =
+            of.map(|placed| if placed.has_left() { Place::Home } else { placed.place }).collect();
         archive.value(&mut places)?;
-        check_places(&places, all)?;
+        check_places(&places, &all[..*counted])?;
+        let places = places.into_iter().chain(std::iter::repeat(Place::Home));
         all.iter_mut().zip(places).for_each(|(placed, place)| placed.place = place);
         archive_values!(archive, *timeline, *now)
     }
 
+    /// Lets those be in the run that are `present` in the state which is read, and no others. Nothing is changed before all that are absent are
+    /// made.
+    fn admit(&mut self, present: &[bool], absent: Absent<'_>) -> Result<(), ArchiveError> {
+        let Self { all, run_agents, .. } = self;
+        let mut made = BTreeMap::new();
+        for (at, _) in present.iter().enumerate().filter(|(_, present)| **present) {
+            let here = all.get(at);
+            if here.is_some_and(|placed| !placed.has_left() || placed.runner.shared.is_first()) {
+                continue;
+            }
+            let spawn = absent(AgentId(at as u32))?;
+            run_agents.check_joining(&spawn).map_err(|error| ArchiveError::Mismatch {
+                what: "an agent that joined",
+                found: error.to_string(),
+                expected: "one that can".to_owned(),
+            })?;
+            made.insert(at, spawn);
+        }
+        all.extend(run_agents.reach(present.len()).map(|runner| Placed { runner, place: Place::Home }));
+        let present = present.iter().copied().chain(std::iter::repeat(false));
+        for (at, (placed, present)) in all.iter_mut().zip(present).enumerate() {
+            match (placed.has_left(), present) {
+                (false, false) => placed.runner.take_out(),
+                (true, true) => placed.runner.revive(made.remove(&at)),
+                _ => {}
+            }
+        }
+        Ok(())
+    }
+
     /// As [`Self::archive`], where no events follow, and none are heard of.
-    pub fn archive_whole(&mut self, archive: &mut Archive<'_>) -> Result<(), ArchiveError> {
-        self.archive(archive)?;
+    pub fn archive_whole(&mut self, archive: &mut Archive<'_>, absent: Absent<'_>) -> Result<(), ArchiveError> {
+        self.archive(archive, absent)?;
         let mut events: Option<VirtualEvents> = None;
         archive.option(&mut events, VirtualEvents::default, VirtualEvents::archive)
     }
@@ -82,16 +164,17 @@ impl Cut {
         &mut self,
         archive: &mut Archive<'_>,
         order: Option<&TurnOrder>,
+        absent: Absent<'_>,
     ) -> Result<(), ArchiveError> {
         let noted = order.filter(|_| archive.is_reading());
         noted.inspect(|order| order.hold().note(PartKind::Restore, AgentId(0), self.now));
-        self.archive_in_real_time(archive)
+        self.archive_in_real_time(archive, absent)
     }
 
     /// The same for an executor in real time, whose clock reads the present `now`: its time passes or stands as before.
-    pub fn archive_in_real_time(&mut self, archive: &mut Archive<'_>) -> Result<(), ArchiveError> {
+    pub fn archive_in_real_time(&mut self, archive: &mut Archive<'_>, absent: Absent<'_>) -> Result<(), ArchiveError> {
         let (wall, own) = (self.now, self.timeline);
-        self.archive_whole(archive)?;
+        self.archive_whole(archive, absent)?;
         if !archive.is_reading() {
             return Ok(());
         }
@@ -120,27 +203,38 @@ impl VirtualEvents {
     }
 }
 
-/// Writes or reads all agents of a run, by rising numbers, with what they share.
-fn archive_agents(all: &mut [Placed], archive: &mut Archive<'_>) -> Result<(), ArchiveError> {
-    archive.fixed("the number of agents", all.len())?;
-    for Placed { runner, .. } in &mut *all {
+/// Says that no agent is absent: of what is written, and of runs of the same agents.
+///
+/// # Errors
+/// [`ArchiveError::Mismatch`].
+pub(super) fn refuse_absent(id: AgentId) -> Result<AgentSpawn, ArchiveError> {
+    let (found, expected) = (format!("in agent {}", id.0), "one of this run".to_owned());
+    Err(ArchiveError::Mismatch { what: "what joined", found, expected })
+}
+
+impl Placed {
+    fn has_left(&self) -> bool {
+        self.runner.shared.gauges.has_left()
+    }
+}
+
+/// Writes or reads the agents of a run that are `present`, by rising numbers.
+fn archive_agents(all: &mut [Placed], present: &[bool], archive: &mut Archive<'_>) -> Result<(), ArchiveError> {
+    for (Placed { runner, .. }, _) in all.iter_mut().zip(present).filter(|(_, present)| **present) {
         let shared = Arc::clone(&runner.shared);
-        archive.within(format_args!("agent \"{}\"", shared.name), |archive| {
+        archive.within(format_args!("agent \"{}\"", shared.name()), |archive| {
             let Shared { gauges, mail, .. } = &*shared;
             runner.archive(archive)?;
             gauges.archive(archive)?;
             mail.archive(archive)
         })?;
     }
-    let Some(first) = all.first() else { return Ok(()) };
-    archive_sleep(&first.runner.shared.sleep, archive)?;
-    first.runner.peers.broad_phase.get().map_or(Ok(()), |broad_phase| broad_phase.archive(archive))
+    Ok(())
 }
 
-/// Writes or reads who rests and who leads whom.
-fn archive_sleep(sleep: &SleepRegistry, archive: &mut Archive<'_>) -> Result<(), ArchiveError> {
+/// Writes or reads who rests and who leads whom, of the first `agents`.
+fn archive_sleep(sleep: &SleepRegistry, agents: usize, archive: &mut Archive<'_>) -> Result<(), ArchiveError> {
     let mut state = sleep.state();
-    let agents = state.signals.len();
     archive.value(&mut state)?;
     if !archive.is_reading() {
         return Ok(());

@@ -146,15 +146,24 @@ impl BroadPhase {
         }
     }
 
-    /// Writes or reads what agents have published of where they are and whom they have called; called between turns.
-    pub fn archive(&self, archive: &mut Archive<'_>) -> Result<(), ArchiveError> {
-        self.bounds.iter().try_for_each(|bounds| bounds.archive(archive))?;
+    /// Forgets all that agents have published; called between turns.
+    pub fn clear(&self) {
+        self.bounds.iter().for_each(PublishedBounds::clear);
+        self.log.iter().chain([&self.noted]).for_each(|word| word.store(0, SeqCst));
+        (0..self.calls.len() as u32).for_each(|to| self.take_callers(AgentId(to), |_| {}));
+    }
+
+    /// Writes or reads what the first `of` agents have published of where they are and whom they have called; called between turns. Nobody has
+    /// called the others then.
+    pub fn archive(&self, of: usize, archive: &mut Archive<'_>) -> Result<(), ArchiveError> {
+        self.bounds.iter().take(of).try_for_each(|bounds| bounds.archive(archive))?;
         for word in self.log.iter().chain([&self.noted]) {
             let mut value = word.load(SeqCst);
             archive.value(&mut value)?;
             word.store(value, SeqCst);
         }
-        for to in (0..self.calls.len() as u32).map(AgentId) {
+        (of..self.calls.len()).for_each(|to| self.take_callers(AgentId(to as u32), |_| {}));
+        for to in (0..of as u32).map(AgentId) {
             let mut callers = Vec::new();
             self.take_callers(to, |from| callers.push(from));
             let before = callers.clone();

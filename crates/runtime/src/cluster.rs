@@ -8,6 +8,7 @@ mod attachments;
 mod common_time;
 mod contacts;
 mod membership;
+mod notes;
 mod places;
 mod seats;
 #[cfg(test)]
@@ -27,15 +28,12 @@ use super::helpers::Helped;
 use super::loads::{Acting, Loads};
 use super::observation::{Observer, Peer, newest};
 use metachron_contact::asynchronous::{MacroStep, Pairs, Remotes, part};
-use metachron_contact::stepper::{
-    ClusterReport, ClusterScene, ClusterStepper, ContactMemory, PairTotal, Participant, Partner, Plan, Role,
-    StepDoubling,
-};
+use metachron_contact::stepper::{ClusterScene, ClusterStepper, ContactMemory, Participant, Plan, Role, StepDoubling};
 use metachron_contact::{Link, Neighbour, StepContext};
-use metachron_core::step_doubling::{DoublingSchedule, drift_m};
+use metachron_core::step_doubling::DoublingSchedule;
 use metachron_core::{
     AgentId, Archive, ArchiveError, AttachmentEvent, Body, ClusterSolves, ClusterState, ContactState, DisjointSets,
-    Grip, JointEffort, PairKind, PairState, SimSpan, SimTime, Snapshot, StepReport, Wrench, archive_values, recycled,
+    Grip, JointEffort, PairState, SimSpan, SimTime, Snapshot, StepReport, Wrench, archive_values, recycled,
 };
 use std::sync::Arc;
 
@@ -244,23 +242,6 @@ impl ClusterSeat {
         self.sleepers.clear();
         let rests = |id: &AgentId| observer.neighbours().iter().any(|n| n.id == *id && n.snapshot.at_rest);
         self.sleepers.extend(self.bonds.iter().copied().filter(rests));
-    }
-
-    /// Notes what it and `with` gave each other in a step of `dt_s` seconds: by contact, or by one of the links between them.
-    fn note_pair(&mut self, total: &PairTotal, with: AgentId, kind: PairKind, dt_s: f64) {
-        let at = self.pairs.iter().position(|pair| pair.with == with && pair.kind == kind).unwrap_or_else(|| {
-            self.pairs.push(PairState::new(with, kind));
-            self.pairs.len() - 1
-        });
-        let pair = &mut self.pairs[at];
-        let impulse_n_s = total.impulse_n_s.length();
-        pair.contacts += if kind == PairKind::Attachment { 1 } else { total.contacts };
-        pair.force_n += impulse_n_s / dt_s;
-        pair.penetration_m = pair.penetration_m.max(total.depth_m);
-        pair.impulse_n_s += impulse_n_s;
-        if total.most_n_s > 0.0 {
-            pair.inverse_mass_per_kg = Some(total.inverse_mass_per_kg);
-        }
     }
 }
 
@@ -488,113 +469,11 @@ impl AgentRunner {
         }
     }
 
-    /// Notes how the step was made and solved.
-    fn note_solves(&mut self, report: &ClusterReport, plan: Plan, dt: SimSpan) {
-        let (leader, step_s) = (self.shared.id, dt.as_secs_f64());
-        let Some(seat) = &mut self.cluster else { return };
-        let ClusterReport { contacts, factors, products, passes, cut, depth_m, .. } = *report;
-        let solves = &mut seat.solves;
-        solves.contacts = contacts;
-        solves.problems += u64::from(report.fine_steps);
-        solves.factors += u64::from(factors);
-        solves.products += u64::from(products);
-        solves.passes += u64::from(passes);
-        solves.cut += u64::from(cut);
-        (solves.depth_m, solves.deepest_m) = (depth_m, solves.deepest_m.max(depth_m));
-        let mut solves = Some(*solves);
-        self.each_member(|actor| {
-            let parts = actor.wish().map_or(1, |wish| plan.parts_in(wish.role, wish.step_s));
-            if let Some(seat) = &mut actor.cluster {
-                // those of the leader, which is the first
-                seat.state = Some(ClusterState { leader, parts, step_s, solves: solves.take() });
-            }
-        });
-    }
-
-    /// Hands every member how far a step of `dt` is from the same in halves.
-    fn note_errors(&mut self, doubling: Box<StepDoubling>, dt: SimSpan) {
-        let Some(seat) = &mut self.cluster else { return };
-        let span_s = seat.schedule.finish_step(dt.as_secs_f64()).then_some(seat.schedule.span_s());
-        if doubling.apart_m().is_empty() {
-            seat.schedule.cancel();
-        }
-        let mut apart_m = doubling.apart_m().iter();
-        self.each_member(|actor| {
-            if let (Some(seat), Some(apart_m)) = (&mut actor.cluster, apart_m.next())
-                && let Some(span_s) = span_s
-            {
-                seat.drift_m = drift_m(*apart_m, 1, span_s);
-            }
-        });
-        if let Some(seat) = &mut self.cluster {
-            seat.doubling = Some(doubling);
-        }
-    }
-
-    /// Hands every pair what it gave each other, and every member its work.
-    fn note_pairs(&mut self, stepper: &ClusterStepper, dt: SimSpan) {
-        let (dt_s, now) = (dt.as_secs_f64(), self.pace.time() + dt);
-        let mut place = 0;
-        self.each_member(|actor| {
-            let (me, Some(seat)) = (place, &mut actor.cluster) else { return };
-            seat.pairs.retain_mut(|pair| {
-                (pair.contacts, pair.force_n, pair.penetration_m) = (0, 0.0, 0.0);
-                pair.kind == PairKind::Attachment || seat.memory.near(now).any(|id| id == pair.with)
-            });
-            for total in stepper.totals_of(me).iter().filter(|total| total.contacts > 0) {
-                let apart = |with: AgentId| seat.asynchronous.as_ref().is_some_and(|pairs| pairs.meets(with));
-                let pair = match total.partner {
-                    Partner::Agent(with) => Some((with, PairKind::Cluster)),
-                    Partner::Link(number) => {
-                        let link = actor.links.iter().find(|link| link.number == number);
-                        link.map(|link| (link.other, PairKind::Attachment))
-                    }
-                    _ => None,
-                };
-                if let Some((with, kind)) = pair.filter(|(with, _)| !apart(*with)) {
-                    seat.note_pair(total, with, kind, dt_s);
-                }
-            }
-            seat.wrench = stepper.wrench_of(me) * dt_s.recip();
-            let own = stepper.efforts().iter().filter(|total| total.member == me);
-            seat.efforts.clear();
-            seat.efforts.extend(own.map(|total| JointEffort { joint: total.joint, effort: total.impulse / dt_s }));
-            seat.note_contacts(stepper.totals_of(me), dt, now, &actor.shared.streams);
-            seat.work = stepper.work_of(me);
-            let done = &actor.shared.gauges.work;
-            done.set(done.get() + seat.work);
-            place += 1;
-        });
-    }
-
-    /// Notes which of those that it leads still belong together at the end of a step, `now`.
-    fn note_groups(&mut self, now: SimTime) {
-        let Some(seat) = &mut self.cluster else { return };
-        let (mut groups, mut ids) = (std::mem::take(&mut seat.groups), std::mem::take(&mut seat.ids));
-        ids.clear();
-        self.each_member(|actor| ids.push(actor.shared.id));
-        groups.reset(ids.len());
-        let mut places = 0..;
-        self.each_member(|actor| {
-            let (Some(place), Some(seat)) = (places.next(), &actor.cluster) else { return };
-            let tied = held_by_links(&actor.links, &seat.memory);
-            for other in seat.memory.near(now).chain(tied).chain(seat.bonds.iter().copied()) {
-                if let Ok(other) = ids.binary_search(&other) {
-                    groups.join(place, other);
-                }
-            }
-        });
-        self.led.note_groups(self.pace.time(), &mut groups);
-        if let Some(seat) = &mut self.cluster {
-            (seat.groups, seat.ids) = (groups, ids);
-        }
-    }
-
     /// What the last turn cost of its own body and of each that it leads.
     pub fn member_costs(&self) -> impl Iterator<Item = MemberCost> + '_ {
         std::iter::once(self)
             .chain(self.led.all())
-            .filter_map(|actor| Some(MemberCost { model: actor.shared.model, work: actor.cluster.as_ref()?.work }))
+            .filter_map(|actor| Some(MemberCost { model: actor.shared.model(), work: actor.cluster.as_ref()?.work }))
     }
 
     /// Stops all that step with it: they rest.

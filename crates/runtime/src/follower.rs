@@ -7,13 +7,13 @@ use super::Run;
 use super::agent_clock::{Timeline, TimelineCommand};
 use super::agent_runner::{AgentRunner, Next, StepOutcome};
 use super::agents::Agents;
-use super::archive::Cut;
+use super::archive::{Absent, Cut};
 use super::cluster::{Handover, close_remaining, hand_over, put_back, take_apart};
 use super::handle::AgentHandle;
 use super::helpers::Helpers;
 use super::mailbox::SendError;
 use super::metrics::AgentStats;
-use super::spawn::{AgentSpawn, AssembledRun, Everyone, RunError, assemble};
+use super::spawn::{AgentSpawn, AssembledRun, RunAgents, RunError, assemble};
 use super::turn_order::{PartKind, TurnPart};
 use super::turn_parts::{Prepared, PreparedTurn};
 use super::turns::Took;
@@ -26,7 +26,7 @@ pub struct Follower {
     timeline: Timeline,
     now: Duration,
     followed: Vec<Followed>,
-    all: Everyone,
+    all: RunAgents,
 }
 
 /// An agent, and where in a turn it is.
@@ -68,7 +68,7 @@ impl Follower {
         let handle = self.all.handles.of(agent).ok_or_else(unknown)?;
         let followed = self.followed.get_mut(agent.0 as usize).ok_or_else(unknown)?;
         if followed.actor.is_none() {
-            followed.actor = handle.shared.handover.as_ref().and_then(Handover::take_returned);
+            followed.actor = handle.shared.handover().and_then(Handover::take_returned);
         }
         self.now = wall;
         let done = match kind {
@@ -88,9 +88,14 @@ impl Follower {
     ///
     /// # Errors
     /// Those of [`Run::archive`].
-    pub fn restore(&mut self, archive: &mut Archive<'_>, wall: Duration) -> Result<(), ArchiveError> {
+    pub fn restore(
+        &mut self,
+        archive: &mut Archive<'_>,
+        wall: Duration,
+        absent: Absent<'_>,
+    ) -> Result<(), ArchiveError> {
         self.now = wall;
-        self.cut(|cut| cut.archive_in_real_time(archive))
+        self.cut(|cut| cut.archive_in_real_time(archive, absent))
     }
 
     /// Takes up an agent as [`Run::add`] does, which begins at `at`.
@@ -108,14 +113,15 @@ impl Follower {
         if let Some(open) =
             self.followed.iter().find_map(|followed| followed.turn.as_ref().and(followed.actor.as_ref()))
         {
-            let what = format!("a replay in the middle of a turn of \"{}\"", open.shared.name);
+            let what = format!("a replay in the middle of a turn of \"{}\"", open.shared.name());
             return Err(ArchiveError::Refused { what });
         }
         let all = take_apart(self.followed.iter_mut().map(|one| one.actor.take()), &self.all.handles);
-        let mut cut = Cut { all, agents: self.followed.len(), timeline: self.timeline, now: self.now };
+        let mut cut = Cut::new(all, self.all.clone(), self.timeline, self.now);
         let outcome = act(&mut cut);
         (self.timeline, self.now) = (cut.timeline, cut.now);
         let homes = put_back(cut.all, &self.all.handles);
+        self.followed.resize_with(homes.len(), Followed::default);
         self.followed.iter_mut().zip(homes).for_each(|(one, actor)| *one = Followed { actor, ..Followed::default() });
         outcome
     }
@@ -214,8 +220,8 @@ impl Run for Follower {
     }
 
     /// In the middle of a turn its state cannot be written.
-    fn archive(&mut self, archive: &mut Archive<'_>) -> Result<(), ArchiveError> {
-        self.cut(|cut| cut.archive_whole(archive))
+    fn archive(&mut self, archive: &mut Archive<'_>, absent: Absent<'_>) -> Result<(), ArchiveError> {
+        self.cut(|cut| cut.archive_whole(archive, absent))
     }
 
     fn shutdown(mut self: Box<Self>) -> Vec<AgentStats> {

@@ -9,10 +9,13 @@ use super::histogram::Histogram;
 use super::mailbox::{Command, Keyed, Mailbox, SendError};
 use super::metrics::{AgentState, AgentStats, Metrics};
 use super::probe::{Sample, Trace};
+use super::removed_agent::REMOVED;
 use super::ring::Ring;
 use super::sleep::SleepRegistry;
 use super::slot::LatestSlot;
+use super::spawn::AgentSpawn;
 use super::turns::Turn;
+use metachron_contact::stepper::ClusterScene;
 use metachron_core::{AgentId, Body, HASH_START, SimSpan, SimTime, Snapshot};
 use metachron_geometry::CollisionShape;
 use std::sync::atomic::Ordering::Relaxed;
@@ -23,13 +26,8 @@ use std::time::Duration;
 #[derive(Debug)]
 pub(super) struct Shared {
     pub id: AgentId,
-    pub name: Arc<str>,
-    pub model: &'static str,
-    pub wanted_hz: f64,
-    /// The joints whose first body it is and that can have a motor.
-    pub motored: Box<[u32]>,
-    /// Whether poses lead it ([`metachron_contact::Agent::takes_poses`]).
-    pub takes_poses: bool,
+    /// Unset where nothing more is known than that it has left; a state that is read may tell later ([`super::archive`]).
+    pub identity: OnceLock<Identity>,
     pub gauges: Metrics,
     /// Its contact shape; `None` where nothing can touch it.
     pub form: FormSlot,
@@ -37,12 +35,77 @@ pub(super) struct Shared {
     pub streams: EventStreams,
     pub slot: Arc<LatestSlot<Snapshot>>,
     pub sleep: Arc<SleepRegistry>,
-    /// Entry for agents that it is to lead, and the place to which it returns from a leader; `None` where no agent can be led.
-    pub handover: Option<Handover>,
     /// Used by readers only: the agent never waits for this lock.
     pub ages: Mutex<Histogram>,
     /// Empty for most agents. Only the agent writes, so that it never waits during the run; readers read at the end.
     pub traces: Vec<Mutex<Trace>>,
+}
+
+/// Which agent has a number: it never changes.
+#[derive(Debug)]
+pub(super) struct Identity {
+    pub name: Arc<str>,
+    pub model: &'static str,
+    pub wanted_hz: f64,
+    /// Where its joints are, if there is one whose first body it is and that can have a motor.
+    pub motored: Option<Arc<ClusterScene>>,
+    /// Whether poses lead it ([`metachron_contact::Agent::takes_poses`]).
+    pub takes_poses: bool,
+    /// Whether the run began with it. Nothing outside can make such an agent again as it was, with its governor and its ties: where it leaves it
+    /// keeps them and its model, and comes back with a state that is read.
+    pub is_first: bool,
+    /// Entry for agents that it is to lead, and the place to which it returns from a leader; `None` where no agent can be led.
+    pub handover: Option<Handover>,
+}
+
+impl Identity {
+    /// That of the agent that is to be started, whose name it takes.
+    pub fn of(id: AgentId, spawn: &mut AgentSpawn, is_first: bool) -> Self {
+        let is_motored = spawn.scene.joints_of(id).any(|(_, joint)| joint.takes_motor());
+        Self {
+            name: std::mem::take(&mut spawn.name).into(),
+            model: spawn.agent.model(),
+            wanted_hz: spawn.rate_hz,
+            motored: is_motored.then(|| Arc::clone(&spawn.scene)),
+            takes_poses: spawn.agent.takes_poses(),
+            is_first,
+            handover: spawn.agent.member().is_some().then(Handover::default),
+        }
+    }
+}
+
+impl Shared {
+    pub fn name(&self) -> &str {
+        self.identity.get().map_or("", |identity| &identity.name)
+    }
+
+    pub fn model(&self) -> &'static str {
+        self.identity.get().map_or(REMOVED, |identity| identity.model)
+    }
+
+    /// Requested steps per simulated second.
+    pub fn wanted_hz(&self) -> f64 {
+        self.identity.get().map_or(1.0, |identity| identity.wanted_hz)
+    }
+
+    pub fn takes_poses(&self) -> bool {
+        self.identity.get().is_some_and(|identity| identity.takes_poses)
+    }
+
+    /// Whether the run began with it.
+    pub fn is_first(&self) -> bool {
+        self.identity.get().is_some_and(|identity| identity.is_first)
+    }
+
+    fn has_motor(&self, joint: u32) -> bool {
+        let scene = self.identity.get().and_then(|identity| identity.motored.as_ref());
+        let mut joints = scene.into_iter().flat_map(|scene| scene.joints_of(self.id));
+        joints.any(|(number, it)| number == joint && it.takes_motor())
+    }
+
+    pub fn handover(&self) -> Option<&Handover> {
+        self.identity.get()?.handover.as_ref()
+    }
 }
 
 /// What an agent tells readers; there is nothing of it before the first of them.
@@ -89,19 +152,19 @@ impl AgentHandle {
     /// Its name in the scene.
     #[must_use]
     pub fn name(&self) -> &str {
-        &self.shared.name
+        self.shared.name()
     }
 
     /// Its model.
     #[must_use]
     pub fn model(&self) -> &'static str {
-        self.shared.model
+        self.shared.model()
     }
 
     /// Whether it is kinematic: poses lead it, and no force moves it.
     #[must_use]
     pub fn takes_poses(&self) -> bool {
-        self.shared.takes_poses
+        self.shared.takes_poses()
     }
 
     /// Its newest state. There is one from the start on.
@@ -171,11 +234,11 @@ impl AgentHandle {
     /// [`SendError`]: nothing was delivered.
     pub fn send(&self, command: Command) -> Result<(), SendError> {
         if let Command::Motor(Keyed { key: joint, .. }) = command
-            && !self.shared.motored.contains(&joint)
+            && !self.shared.has_motor(joint)
         {
             return Err(SendError::NoMotor { agent: self.id(), joint });
         }
-        if matches!(command, Command::Pose(_)) && !self.shared.takes_poses {
+        if matches!(command, Command::Pose(_)) && !self.shared.takes_poses() {
             return Err(SendError::NotKinematic(self.id()));
         }
         self.shared.mail.send(command)?;
@@ -245,12 +308,12 @@ impl AgentHandle {
         let span = |nanos: &std::sync::atomic::AtomicU64| SimSpan::from_nanos(nanos.load(Relaxed));
         AgentStats {
             id: self.shared.id,
-            name: Arc::clone(&self.shared.name),
-            model: self.shared.model,
+            name: self.shared.identity.get().map_or_else(|| "".into(), |identity| Arc::clone(&identity.name)),
+            model: self.shared.model(),
             steps: gauges.steps.load(Relaxed),
             rate_hz: if gauges.is_running() { gauges.rate_hz.get() } else { 0.0 },
             mean_hz: gauges.mean_hz.get(),
-            wanted_hz: self.shared.wanted_hz,
+            wanted_hz: self.shared.wanted_hz(),
             dt: span(&gauges.dt),
             resolution: newest.resolution,
             nodes: newest.nodes,
@@ -272,8 +335,9 @@ impl AgentHandle {
     }
 }
 
-/// Hash of the newest states of all `agents`, in their order: equal numbers mean bit-identical states.
+/// Hash of the newest states of all `agents` that have not left, in their order: equal numbers mean bit-identical states.
 #[must_use]
 pub fn state_hash<'a>(agents: impl IntoIterator<Item = &'a AgentHandle>) -> u64 {
-    agents.into_iter().fold(HASH_START, |hash, agent| agent.latest().fold_hash(hash))
+    let present = agents.into_iter().filter(|agent| !agent.shared.gauges.has_left());
+    present.fold(HASH_START, |hash, agent| agent.latest().fold_hash(hash))
 }

@@ -52,7 +52,6 @@ mod lockstep;
 mod machine;
 mod mailbox;
 mod metrics;
-mod nobody;
 mod observation;
 mod pool;
 mod prefetch;
@@ -60,6 +59,7 @@ mod priority;
 mod probe;
 mod publish;
 mod reader;
+mod removed_agent;
 mod ring;
 mod seqlock;
 mod sleep;
@@ -78,6 +78,7 @@ mod worker_wakeup;
 pub use agent_clock::{AgentClock, LAG_CAP, Start};
 pub use agent_clock::{SPEED_RANGE, SharedTimeline, Timeline, TimelineCommand};
 pub use agents::Agents;
+pub use archive::Absent;
 pub use clock::{Clock, ManualClock, SystemClock, wait_until};
 pub use events::{AgentEvent, ContactEvent, EVENTS_KEPT, EventKind};
 pub use faults::Faults;
@@ -98,6 +99,7 @@ pub use threads::{AUTO_THREADS_MAX, THREADS_MAX, Threads};
 pub use turn_order::{Held, OrderLog, PartKind, TurnOrder, TurnPart};
 pub use turns::{TURNS_KEPT, Turn};
 
+use archive::refuse_absent;
 use metachron_core::{AgentId, Archive, ArchiveError, SimTime};
 use std::sync::Arc;
 use std::time::Duration;
@@ -140,14 +142,23 @@ pub trait Run: Send {
     /// the last states.
     fn shutdown(self: Box<Self>) -> Vec<AgentStats>;
 
-    /// Writes the state of the run and of all its agents to an archive, or reads it from one into a run of the same agents; it then goes on
-    /// as it did then; in lockstep to the bit. In real time all turns in progress end first, each agent at a time of its own, and the clock
+    /// Writes the state of the run and of all its agents to an archive, or reads it from one into a run of the same first agents; it then goes on
+    /// as it did then; in lockstep to the bit. Agents that joined since are taken out, those that left since are put back: what joined the run
+    /// of the state and is not in this one is made by `absent`. In real time all turns in progress end first, each agent at a time of its own, and the clock
     /// goes on from where it is. Watched points keep their samples. A state that one executor has written another can read.
     ///
     /// # Errors
     /// [`ArchiveError::Refused`] where a step does not end, and by agents and governors that do not save their state: nothing is changed then. Any error
     /// while reading leaves a run that is not usable any more.
-    fn archive(&mut self, archive: &mut Archive<'_>) -> Result<(), ArchiveError>;
+    fn archive(&mut self, archive: &mut Archive<'_>, absent: Absent<'_>) -> Result<(), ArchiveError>;
+
+    /// Writes the state of the run ([`Run::archive`]).
+    ///
+    /// # Errors
+    /// Those of [`Run::archive`].
+    fn save(&mut self, archive: &mut Archive<'_>) -> Result<(), ArchiveError> {
+        self.archive(archive, &mut refuse_absent)
+    }
 
     /// Makes the parts of its turns in `order` from now on, which begins between two turns; before it does, writes its state to `begun` if
     /// that is given. In lockstep the order follows from the calls, and is not noted. Who holds `order` keeps turns from going on, but does
@@ -157,7 +168,7 @@ pub trait Run: Send {
     /// Those of [`Run::archive`]; the order is not noted then.
     fn record(&mut self, order: Arc<TurnOrder>, begun: Option<&mut Archive<'_>>) -> Result<(), ArchiveError> {
         drop(order);
-        begun.map_or(Ok(()), |archive| self.archive(archive))
+        begun.map_or(Ok(()), |archive| self.save(archive))
     }
 
     /// Simulated time now.

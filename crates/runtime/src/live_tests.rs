@@ -149,7 +149,7 @@ fn a_cut_waits_for_the_steps_in_progress_however_long_they_take() {
         let mut run = start(vec![Dummy::new(1.0).at(500.0), slow.at(500.0)], system());
         eventually("its slow step", || log.lock().unwrap().len() == 3);
         // whether its model can be saved is another matter
-        let _ = run.archive(&mut Archive::writer());
+        let _ = run.save(&mut Archive::writer());
         eventually("it goes on", || run.agents()[1].stats().steps > 5);
         run.shutdown().iter().for_each(|stats| assert_eq!(stats.state, AgentState::Running));
     });

@@ -10,7 +10,7 @@ use super::Run;
 use super::agent_clock::{Timeline, TimelineCommand};
 use super::agent_runner::{AgentRunner, Effort, Next};
 use super::agents::Agents;
-use super::archive::{Cut, VirtualEvents};
+use super::archive::{Absent, Cut, VirtualEvents};
 use super::cluster::{Handover, Place, Placed, close_remaining, hand_over, put_back, take_apart};
 use super::cpu::CpuBatch;
 use super::handle::AgentHandle;
@@ -18,7 +18,7 @@ use super::helpers::Helpers;
 use super::machine::{Machine, duration};
 use super::mailbox::SendError;
 use super::metrics::AgentStats;
-use super::spawn::{AgentSpawn, AssembledRun, Everyone, RunError, assemble};
+use super::spawn::{AgentSpawn, AssembledRun, RunAgents, RunError, assemble};
 use super::turns::Took;
 use cores::Cores;
 use metachron_core::{AgentId, Archive, ArchiveError};
@@ -36,7 +36,7 @@ pub struct Lockstep {
     /// Due times of the turns of waiting agents, without those that the timeline never reaches.
     due: BinaryHeap<Reverse<(Duration, u32)>>,
     cores: Cores,
-    all: Everyone,
+    all: RunAgents,
     batch: CpuBatch,
     /// Agents that have made turns in the open batch.
     unsettled: Vec<u32>,
@@ -136,7 +136,7 @@ impl Lockstep {
                     entry.phase = Phase::Waiting;
                 }
                 (Phase::Led, _) => {
-                    let returned = self.all.handles[agent].shared.handover.as_ref().and_then(Handover::take_returned);
+                    let returned = self.all.handles[agent].shared.handover().and_then(Handover::take_returned);
                     let Some(actor) = returned else { continue };
                     entry.phase = if actor.is_parked() { Phase::Parked } else { Phase::Waiting };
                     entry.actor = Some(actor);
@@ -192,7 +192,7 @@ impl Lockstep {
                     self.jobs.extend(actor.member_costs().map(|cost| price(cost.model, cost.work)));
                     join(&mut self.jobs, self.machine.cores);
                 } else {
-                    self.jobs.push(price(actor.shared.model, work) * steps);
+                    self.jobs.push(price(actor.shared.model(), work) * steps);
                 }
                 self.jobs.iter().for_each(|job| self.cores.start(agent as u32, *job));
                 let [all, longest] = [self.jobs.iter().sum(), self.jobs.iter().copied().max().unwrap_or_default()];
@@ -258,9 +258,16 @@ impl Lockstep {
     }
 
     /// Writes or reads all agents, which were taken from their places, and the events to come; a cut of a run in real time has none of these.
-    fn archive_all(&mut self, cut: &mut Cut, archive: &mut Archive<'_>) -> Result<(), ArchiveError> {
+    fn archive_all(
+        &mut self,
+        cut: &mut Cut,
+        archive: &mut Archive<'_>,
+        absent: Absent<'_>,
+    ) -> Result<(), ArchiveError> {
         let (own, own_now) = (self.timeline, self.now);
-        cut.archive(archive)?;
+        let read = cut.archive(archive, absent);
+        self.entries.resize_with(cut.all.len(), || AgentEntry { actor: None, phase: Phase::Parked, turns: 0 });
+        read?;
         let phases = self.entries.iter().map(|entry| (entry.phase, entry.turns)).collect();
         let (served, jobs) = self.cores.jobs();
         let mut events = Some(VirtualEvents { due: self.due.clone(), served, jobs, phases });
@@ -281,18 +288,19 @@ impl Lockstep {
             cut.all.iter().for_each(|placed| self.all.sleep.notify(placed.runner.id()));
             return Ok(());
         };
-        if phases.len() != self.entries.len() {
-            let (found, expected) = (phases.len().to_string(), self.entries.len().to_string());
+        if phases.len() != cut.counted {
+            let (found, expected) = (phases.len().to_string(), cut.counted.to_string());
             return Err(ArchiveError::Mismatch { what: "the number of agents with phases", found, expected });
         }
         self.cores.set_jobs(served, jobs);
         self.due = due;
+        let phases = phases.into_iter().chain(std::iter::repeat((Phase::Parked, 0)));
         self.entries.iter_mut().zip(phases).for_each(|(entry, (phase, turns))| {
             (entry.phase, entry.turns) = (phase, turns);
         });
         let owners = self.due.iter().map(|Reverse((_, agent))| *agent).chain(self.cores.owners());
-        if let Some(agent) = owners.filter(|owner| *owner != FRAME).find(|owner| *owner as usize >= cut.all.len()) {
-            let (found, expected) = (agent.to_string(), format!("below {}", cut.all.len()));
+        if let Some(agent) = owners.filter(|owner| *owner != FRAME).find(|owner| *owner as usize >= cut.counted) {
+            let (found, expected) = (agent.to_string(), format!("below {}", cut.counted));
             return Err(ArchiveError::Mismatch { what: "the number of an agent with a turn", found, expected });
         }
         Ok(())
@@ -390,11 +398,11 @@ impl Run for Lockstep {
         Ok(handle)
     }
 
-    fn archive(&mut self, archive: &mut Archive<'_>) -> Result<(), ArchiveError> {
+    fn archive(&mut self, archive: &mut Archive<'_>, absent: Absent<'_>) -> Result<(), ArchiveError> {
         self.settle();
         let all = take_apart(self.entries.iter_mut().map(|entry| entry.actor.take()), &self.all.handles);
-        let mut cut = Cut { all, agents: self.entries.len(), timeline: self.timeline, now: self.now };
-        let outcome = self.archive_all(&mut cut, archive);
+        let mut cut = Cut::new(all, self.all.clone(), self.timeline, self.now);
+        let outcome = self.archive_all(&mut cut, archive, absent);
         let homes = put_back(cut.all, &self.all.handles);
         self.entries.iter_mut().zip(homes).for_each(|(entry, home)| entry.actor = home);
         if archive.is_reading() && self.due.is_empty() {

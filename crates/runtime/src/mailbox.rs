@@ -171,9 +171,19 @@ impl Mailbox {
         if is_full {
             let pending = self.pending.get_or_init(Box::default);
             archive.value(&mut *pending.lock().unwrap_or_else(PoisonError::into_inner))?;
+        } else if archive.is_reading() {
+            // what waits now was sent after
+            self.clear();
         }
         self.full.store(is_full, Release);
         Ok(())
+    }
+
+    /// Forgets what waits; called between turns.
+    pub fn clear(&self) {
+        self.full.store(false, Release);
+        let waiting = self.pending.get().map(|pending| pending.lock().unwrap_or_else(PoisonError::into_inner));
+        waiting.into_iter().for_each(|mut waiting| *waiting = PendingCommands::default());
     }
 
     /// Whether any command has arrived.

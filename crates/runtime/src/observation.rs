@@ -14,19 +14,63 @@ use metachron_contact::asynchronous::{PairClock, computes};
 use metachron_contact::{Law, acknowledged};
 use metachron_core::{AgentId, Archive, ArchiveError, Snapshot};
 use metachron_geometry::{CollisionShape, ShapeKind};
-use std::sync::atomic::AtomicBool;
+use std::sync::atomic::{
+    AtomicBool,
+    Ordering::{Acquire, Release},
+};
 use std::sync::{Arc, OnceLock};
 
 /// Data of all agents that have ever been in a run.
 #[derive(Debug)]
 pub(super) struct Peers {
     pub all: boxcar::Vec<Peer>,
-    /// Empty as long as no two agents could touch: then no agent searches for peers.
-    pub broad_phase: OnceLock<BroadPhase>,
+    pub broad_phase: BroadPhaseSlot,
     /// Who helps with the turns of large clusters.
     pub helpers: Helpers,
     /// Whether the order of turns is noted, or followed: what a turn publishes is seen by the next.
     pub is_ordered: AtomicBool,
+}
+
+/// The broad phase of a run; there is none as long as no two agents could touch, and no agent searches for peers then.
+#[derive(Debug, Default)]
+pub(super) struct BroadPhaseSlot {
+    made: OnceLock<BroadPhase>,
+    is_used: AtomicBool,
+}
+
+impl BroadPhaseSlot {
+    pub fn get(&self) -> Option<&BroadPhase> {
+        self.made.get().filter(|_| self.is_used.load(Acquire))
+    }
+
+    /// Makes room for the agent of the next number.
+    pub fn join(&self) {
+        self.made.get().inspect(|broad_phase| broad_phase.join());
+    }
+
+    /// The broad phase of `agents`, from now on in use; one that was not has no box in it.
+    pub fn begin(&self, agents: usize) -> &BroadPhase {
+        let broad_phase = self.made.get_or_init(|| BroadPhase::new(agents));
+        self.is_used.store(true, Release);
+        broad_phase
+    }
+
+    /// Uses none any more; called between turns.
+    fn end(&self) {
+        self.is_used.store(false, Release);
+        self.made.get().inspect(|broad_phase| broad_phase.clear());
+    }
+
+    /// Writes or reads what the first `of` of `agents` have published; called between turns.
+    pub fn archive(&self, of: usize, agents: usize, archive: &mut Archive<'_>) -> Result<(), ArchiveError> {
+        let mut is_used = self.get().is_some();
+        archive.value(&mut is_used)?;
+        if !is_used {
+            self.end();
+            return Ok(());
+        }
+        self.begin(agents).archive(of, archive)
+    }
 }
 
 /// Data of one agent for its peers.
@@ -77,7 +121,7 @@ impl std::fmt::Debug for Peer {
 impl Peer {
     /// By which it is settled who computes its asynchronous pairs: never what moves as it is led, which nothing that it is given moves.
     fn clock(&self) -> PairClock {
-        let step_s = if self.shared.takes_poses { f64::INFINITY } else { self.shared.wanted_hz.recip() };
+        let step_s = if self.shared.takes_poses() { f64::INFINITY } else { self.shared.wanted_hz().recip() };
         PairClock { id: self.shared.id, step_s }
     }
 
@@ -103,7 +147,7 @@ impl Peer {
         let known = self.touches(other) || self.is_tool();
         Neighbour {
             id: other.shared.id,
-            step_s: other.shared.wanted_hz.recip(),
+            step_s: other.shared.wanted_hz().recip(),
             snapshot: other.shared.slot.latest(),
             form: if known { other.shared.form.latest() } else { None },
             law: self.law(other.shared.id),
@@ -123,16 +167,15 @@ impl Peers {
         others.filter(|other| other.shared.id != one.shared.id).any(|other| one.touches(other))
     }
 
-    /// The broad phase of a run in which nothing could touch until now: with the boxes of the states that agents have published.
-    pub fn first_broad_phase(&self) -> BroadPhase {
-        let broad_phase = BroadPhase::new(self.all.count());
+    /// Begins the broad phase of a run in which nothing could touch until now: with the boxes of the states that agents have published.
+    pub fn begin_broad_phase(&self) {
+        let broad_phase = self.broad_phase.begin(self.all.count());
         for (_, peer) in &self.all {
             let state = peer.shared.slot.latest();
             state.bounds.iter().for_each(|bounds| {
                 broad_phase.publish(peer.shared.id, bounds, state.moment());
             });
         }
-        broad_phase
     }
 
     /// The neighbour `other` as seen by `me`.
@@ -185,6 +228,14 @@ impl Observer {
         let me = self.me;
         let first = || Box::new(NeighbourList::new(me));
         archive.option(&mut self.neighbour_list, first, |list, archive| list.archive(archive))
+    }
+
+    /// Sees but those that it is linked to: it has left.
+    pub fn forget(&mut self) {
+        let links = self.links as usize;
+        self.neighbours.truncate(links);
+        self.sources.truncate(links);
+        (self.neighbour_list, self.wanted) = (None, Vec::new());
     }
 
     /// The agents so near that they may touch it, as they were at the last update, by rising numbers.

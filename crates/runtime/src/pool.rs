@@ -14,7 +14,7 @@ mod worker;
 use super::Run;
 use super::agent_clock::{Timeline, TimelineCommand};
 use super::agents::Agents;
-use super::archive::Cut;
+use super::archive::{Absent, Cut, CutBetweenTurns};
 use super::clock::Clock;
 use super::cluster::{close_remaining, put_back, take_apart};
 use super::handle::AgentHandle;
@@ -23,7 +23,7 @@ use super::mailbox::SendError;
 use super::metrics::AgentStats;
 use super::priority::Priority;
 use super::sleep::Halt;
-use super::spawn::{AgentSpawn, AssembledRun, Everyone, RunError, assemble};
+use super::spawn::{AgentSpawn, AssembledRun, RunAgents, RunError, assemble};
 use super::turn_order::TurnOrder;
 use metachron_core::{AgentId, Archive, ArchiveError};
 use shared::PoolState;
@@ -40,7 +40,7 @@ const PATIENCE: Duration = Duration::from_secs(5);
 /// Agents that share workers.
 pub struct Pool {
     state: Arc<PoolState>,
-    all: Everyone,
+    all: RunAgents,
     messages: Sender<Message>,
     watch: Option<JoinHandle<()>>,
     workers: usize,
@@ -111,28 +111,6 @@ impl Pool {
         Ok(())
     }
 
-    /// Ends all workers between turns, does something with the agents and the order of their turns, and lets them go on.
-    fn cut(
-        &mut self,
-        act: impl FnOnce(&mut Cut, &mut Option<Arc<TurnOrder>>) -> Result<(), ArchiveError>,
-    ) -> Result<(), ArchiveError> {
-        self.halt(Halt::Cut);
-        let mut homes = Vec::new();
-        self.state.clear(|actor| homes.push(Some(actor)));
-        let all = take_apart(homes.into_iter(), &self.all.handles);
-        let (agents, timeline) = (self.all.handles.len(), self.state.timeline.read());
-        let mut cut = Cut { all, agents, timeline, now: self.state.clock.now() };
-        let outcome = act(&mut cut, &mut self.state.order.lock().unwrap_or_else(PoisonError::into_inner));
-        if cut.timeline != timeline {
-            self.state.timeline.set(cut.timeline);
-        }
-        self.state.distribute(put_back(cut.all, &self.all.handles), cut.now);
-        // some may have been woken, or have returned from a leader
-        self.all.handles.iter().for_each(|agent| self.state.sleep.notify(agent.id()));
-        let no_thread = |error: RunError| ArchiveError::Refused { what: format!("a run that cannot go on ({error})") };
-        outcome.and(self.go_on().map_err(no_thread))
-    }
-
     fn end(&mut self) {
         self.halt(Halt::End);
         let (timeline, now) = (self.state.timeline.read(), self.state.clock.now());
@@ -144,6 +122,33 @@ impl Pool {
 impl Drop for Pool {
     fn drop(&mut self) {
         self.end();
+    }
+}
+
+impl CutBetweenTurns for Pool {
+    fn agents_of_run(&self) -> &RunAgents {
+        &self.all
+    }
+
+    fn cut(
+        &mut self,
+        act: impl FnOnce(&mut Cut, &mut Option<Arc<TurnOrder>>) -> Result<(), ArchiveError>,
+    ) -> Result<(), ArchiveError> {
+        self.halt(Halt::Cut);
+        let mut homes = Vec::new();
+        self.state.clear(|actor| homes.push(Some(actor)));
+        let all = take_apart(homes.into_iter(), &self.all.handles);
+        let timeline = self.state.timeline.read();
+        let mut cut = Cut::new(all, self.all.clone(), timeline, self.state.clock.now());
+        let outcome = act(&mut cut, &mut self.state.order.lock().unwrap_or_else(PoisonError::into_inner));
+        if cut.timeline != timeline {
+            self.state.timeline.set(cut.timeline);
+        }
+        self.state.distribute(put_back(cut.all, &self.all.handles), cut.now);
+        // some may have been woken, or have returned from a leader
+        self.all.handles.iter().for_each(|agent| self.state.sleep.notify(agent.id()));
+        let no_thread = |error: RunError| ArchiveError::Refused { what: format!("a run that cannot go on ({error})") };
+        outcome.and(self.go_on().map_err(no_thread))
     }
 }
 
@@ -182,17 +187,12 @@ impl Run for Pool {
         self.all.leave(id)
     }
 
-    fn archive(&mut self, archive: &mut Archive<'_>) -> Result<(), ArchiveError> {
-        self.cut(|cut, order| cut.archive_in_order(archive, order.as_deref()))
+    fn archive(&mut self, archive: &mut Archive<'_>, absent: Absent<'_>) -> Result<(), ArchiveError> {
+        self.archive_between_turns(archive, absent)
     }
 
     fn record(&mut self, order: Arc<TurnOrder>, begun: Option<&mut Archive<'_>>) -> Result<(), ArchiveError> {
-        self.all.set_ordered();
-        self.cut(|cut, mine| {
-            begun.map_or(Ok(()), |archive| cut.archive_in_real_time(archive))?;
-            *mine = Some(order);
-            Ok(())
-        })
+        self.record_between_turns(order, begun)
     }
 
     fn shutdown(mut self: Box<Self>) -> Vec<AgentStats> {

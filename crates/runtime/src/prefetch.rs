@@ -43,10 +43,10 @@ fn fetch_shared(shared: &Shared) {
         gauges.dropped.load(Relaxed),
         gauges.cpu_nanos.load(Relaxed),
         gauges.work.get().to_bits(),
-        shared.wanted_hz.to_bits(),
+        shared.wanted_hz().to_bits(),
         u64::from(shared.id.0),
     ]);
-    black_box([gauges.is_running(), shared.handover.is_some(), shared.traces.is_empty(), shared.mail.has_pending()]);
+    black_box([gauges.is_running(), shared.handover().is_some(), shared.traces.is_empty(), shared.mail.has_pending()]);
     shared.slot.fetch();
 }
 

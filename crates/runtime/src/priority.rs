@@ -29,11 +29,12 @@ pub struct PriorityRefused {
 }
 
 impl Priority {
-    /// Sets the priority of this thread. After a refusal it has its previous one.
+    /// Sets the priority of this thread: for threads of a caller that have to be as steady as those of agents. After a refusal it has its
+    /// previous one.
     ///
     /// # Errors
     /// [`PriorityRefused`].
-    pub(super) fn take(self) -> Result<(), PriorityRefused> {
+    pub fn take(self) -> Result<(), PriorityRefused> {
         if self == Self::Normal {
             return Ok(());
         }

@@ -55,7 +55,7 @@ impl AgentRunner {
             (into.time, into.clock_offset, into.at_rest) = (time, clock_offset, at_rest);
             into.is_finite()
         });
-        let model = self.shared.model;
+        let model = self.shared.model();
         if let (true, Some(state)) = (finite, self.writer.filled()) {
             self.observer.publish(&self.peers, state);
             self.shared.traces.iter().for_each(|trace| locked(trace).record(state));

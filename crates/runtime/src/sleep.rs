@@ -310,10 +310,12 @@ impl SleepRegistry {
         SleepState { signals: self.signals.iter().map(Signal::state).collect(), notified, far_behind }
     }
 
-    /// Takes over a state of as many agents; all of them have new states then.
+    /// Takes over a state of the first agents: the others have left. All of them have new states then.
     pub fn set_state(&self, state: &SleepState) {
         let SleepState { signals, notified, far_behind } = state;
-        self.signals.iter().zip(signals).for_each(|(signal, state)| signal.set_state(*state));
+        let left = SignalState { resting: false, woken: false, leader: NO_AGENT, closed: true, touched: 0 };
+        let states = signals.iter().copied().chain(std::iter::repeat(left));
+        self.signals.iter().zip(states).for_each(|(signal, state)| signal.set_state(state));
         self.notified.store(*notified, Release);
         self.far_behind.store(*far_behind, Release);
         (0..).map(AgentId).take(self.signals.len()).for_each(|id| self.changed.mark(id));

@@ -6,18 +6,18 @@
 use super::agent_clock::AgentClock;
 use super::agent_runner::{AgentRunner, TurnPeriod};
 use super::agents::Agents;
-use super::broad_phase::BroadPhase;
-use super::cluster::{ClusterSeat, Handover, JointedTo, Led, assign_leaders};
+use super::cluster::{ClusterSeat, JointedTo, Led, assign_leaders};
 use super::faults::Faults;
 use super::form_slot::FormSlot;
 use super::governor::Governor;
-use super::handle::{AgentHandle, EventStreams, Shared};
+use super::handle::{AgentHandle, EventStreams, Identity, Shared};
 use super::helpers::Helpers;
 use super::histogram::Histogram;
 use super::mailbox::{Mailbox, SendError};
 use super::metrics::{AgentState, Metrics, MetricsWriter};
-use super::observation::{Peer, Peers};
+use super::observation::{BroadPhaseSlot, Peer, Peers};
 use super::probe::{Trace, WatchedPoint};
+use super::removed_agent::RemovedAgent;
 use super::sleep::SleepRegistry;
 use super::slot::SlotWriter;
 use metachron_contact::Agent;
@@ -155,15 +155,15 @@ pub enum RunError {
 pub(super) struct AssembledRun {
     /// Agents with turns of their own; an agent that is led from the start belongs to its leader.
     pub actors: Vec<Option<Box<AgentRunner>>>,
-    pub all: Everyone,
+    pub all: RunAgents,
 }
 
 /// What all agents of a run share, and those that join it.
 #[derive(Debug, Clone)]
-pub(super) struct Everyone {
+pub(super) struct RunAgents {
     pub handles: Agents,
     pub sleep: Arc<SleepRegistry>,
-    peers: Arc<Peers>,
+    pub peers: Arc<Peers>,
 }
 
 /// Assembles all agents; `helpers` help with the turns of their large clusters. Each has published its initial state, at simulated time zero.
@@ -183,10 +183,10 @@ pub(super) fn assemble(mut spawns: Vec<AgentSpawn>, helpers: Helpers) -> Result<
     let mut actors: Vec<_> = actors.collect();
     actors.iter_mut().for_each(AgentRunner::publish_initial);
     let handles = peers.all.iter().map(|(_, peer)| AgentHandle { shared: Arc::clone(&peer.shared) }).collect();
-    Ok(AssembledRun { actors: assign_leaders(actors), all: Everyone { handles, sleep, peers } })
+    Ok(AssembledRun { actors: assign_leaders(actors), all: RunAgents { handles, sleep, peers } })
 }
 
-impl Everyone {
+impl RunAgents {
     /// From now on the order of turns is noted, or followed.
     pub fn set_ordered(&self) {
         self.peers.is_ordered.store(true, Relaxed);
@@ -215,29 +215,69 @@ impl Everyone {
     /// # Errors
     /// [`RunError`] for an agent that cannot run as requested, and for one with ties: nothing was done then.
     pub fn join(&self, spawn: AgentSpawn, now: SimTime) -> Result<Box<AgentRunner>, RunError> {
-        let Self { handles, sleep, peers } = self;
+        let Self { handles, peers, .. } = self;
         let mut spawn = spawn;
-        check(&spawn, handles.len())?;
-        if !(spawn.laws.is_empty() && spawn.attached.is_empty()) {
-            return Err(RunError::LateTie { name: spawn.name });
-        }
+        self.check_joining(&spawn)?;
         let id = AgentId(handles.len() as u32);
-        let moves = spawn.agent.member().is_some();
         let writer = SlotWriter::new(Snapshot::default());
-        let shared = Arc::new(shared(id, &mut spawn, sleep, &writer, moves));
-        sleep.join();
-        if let Some(broad_phase) = peers.broad_phase.get() {
-            broad_phase.join();
-        }
-        peers.all.push(Peer { shared: Arc::clone(&shared), laws: Vec::new() });
+        let shared = Arc::new(shared(id, &mut spawn, &self.sleep, &writer, false));
+        self.reserve(&shared);
         if peers.broad_phase.get().is_none() && peers.all.get(id.0 as usize).is_some_and(|new| peers.may_meet(new)) {
-            peers.broad_phase.get_or_init(|| peers.first_broad_phase());
+            peers.begin_broad_phase();
         }
         let mut actor = actor(id, Seated { spawn, jointed: Vec::new(), writer }, peers);
         actor.pace = AgentClock::new(now, actor.pace.wanted());
         actor.publish_initial();
         handles.push(AgentHandle { shared });
         Ok(Box::new(actor))
+    }
+
+    /// Adds numbers of agents that have left, as they are taken, until there are `count`: nothing more is known of them.
+    pub fn reach(&self, count: usize) -> impl Iterator<Item = Box<AgentRunner>> + '_ {
+        let numbers = self.handles.len()..count;
+        numbers.map(|number| {
+            let id = AgentId(number as u32);
+            let mut spawn = AgentSpawn::alone("", Box::new(RemovedAgent), 1.0);
+            let writer = SlotWriter::new(Snapshot::default());
+            let shared = Shared { identity: OnceLock::new(), ..shared(id, &mut spawn, &self.sleep, &writer, false) };
+            let shared = Arc::new(shared);
+            shared.gauges.leave();
+            self.reserve(&shared);
+            self.sleep.close(id);
+            self.handles.push(AgentHandle { shared });
+            Box::new(actor(id, Seated { spawn, jointed: Vec::new(), writer }, &self.peers))
+        })
+    }
+
+    /// Checks that an agent can join a run that goes on.
+    ///
+    /// # Errors
+    /// [`RunError`].
+    pub fn check_joining(&self, spawn: &AgentSpawn) -> Result<(), RunError> {
+        check(spawn, self.handles.len())?;
+        if !(spawn.laws.is_empty() && spawn.attached.is_empty()) {
+            return Err(RunError::LateTie { name: spawn.name.clone() });
+        }
+        Ok(())
+    }
+
+    /// Makes room for the next number.
+    fn reserve(&self, shared: &Arc<Shared>) {
+        self.sleep.join();
+        self.peers.broad_phase.join();
+        self.peers.all.push(Peer { shared: Arc::clone(shared), laws: Vec::new() });
+    }
+}
+
+impl AgentRunner {
+    /// Puts an agent into the place of one that has left, whose state is read next: what it was and has kept, or what `spawn` says that joined the run.
+    pub fn revive(&mut self, spawn: Option<AgentSpawn>) {
+        let Some(mut spawn) = spawn else { return };
+        let (id, shared, peers) = (self.id(), Arc::clone(&self.shared), Arc::clone(&self.peers));
+        shared.identity.get_or_init(|| Identity::of(id, &mut spawn, false));
+        shared.form.publish(spawn.agent.form());
+        let writer = std::mem::replace(&mut self.writer, SlotWriter::new(Snapshot::default()));
+        *self = actor(id, Seated { spawn, jointed: Vec::new(), writer }, &peers);
     }
 }
 
@@ -285,19 +325,18 @@ fn peers(
     sleep: &Arc<SleepRegistry>,
     helpers: Helpers,
 ) -> (Peers, Vec<SlotWriter<Snapshot>>) {
-    let members: Vec<_> = spawns.iter_mut().map(|spawn| spawn.agent.member().is_some()).collect();
     let mut writers = Vec::with_capacity(spawns.len());
     let mut all = Vec::with_capacity(spawns.len());
-    for ((spawn, id), is_member) in spawns.iter_mut().zip((0..).map(AgentId)).zip(members) {
+    for (spawn, id) in spawns.iter_mut().zip((0..).map(AgentId)) {
         let writer = SlotWriter::new(Snapshot::default());
-        let shared = Arc::new(shared(id, spawn, sleep, &writer, is_member));
+        let shared = Arc::new(shared(id, spawn, sleep, &writer, true));
         writers.push(writer);
         all.push(Peer { shared, laws: Vec::new() });
     }
     store_laws(spawns, &mut all);
-    let broad_phase = OnceLock::new();
+    let broad_phase = BroadPhaseSlot::default();
     if may_any_touch(&all) {
-        broad_phase.get_or_init(|| BroadPhase::new(all.len()));
+        broad_phase.begin(all.len());
     }
     let is_ordered = AtomicBool::new(false);
     (Peers { all: all.into_iter().collect(), broad_phase, helpers, is_ordered }, writers)
@@ -341,31 +380,20 @@ fn shared(
     spawn: &mut AgentSpawn,
     sleep: &Arc<SleepRegistry>,
     writer: &SlotWriter<Snapshot>,
-    moves: bool,
+    is_first: bool,
 ) -> Shared {
     Shared {
         id,
-        name: std::mem::take(&mut spawn.name).into(),
-        model: spawn.agent.model(),
-        takes_poses: spawn.agent.takes_poses(),
-        wanted_hz: spawn.rate_hz,
-        motored: motored(id, spawn),
+        identity: Identity::of(id, spawn, is_first).into(),
         gauges: Metrics::default(),
         form: FormSlot::new(spawn.agent.form()),
         mail: Mailbox::default(),
         streams: EventStreams::default(),
         slot: writer.slot(),
         sleep: Arc::clone(sleep),
-        handover: moves.then(Handover::default),
         ages: Mutex::new(Histogram::default()),
         traces: spawn.watches.drain(..).map(|watch| Mutex::new(Trace::new(watch))).collect(),
     }
-}
-
-/// The joints of which `id` is the first agent and that can have a motor.
-fn motored(id: AgentId, spawn: &AgentSpawn) -> Box<[u32]> {
-    let joints = spawn.scene.joints_of(id);
-    joints.filter(|(_, joint)| joint.takes_motor()).map(|(number, _)| number).collect()
 }
 
 /// What an agent is assembled from.
@@ -445,7 +473,10 @@ mod tests {
     fn set_up(mut spawns: Vec<AgentSpawn>) -> (bool, usize) {
         let sleep = Arc::new(SleepRegistry::new(spawns.len()));
         let (peers, _) = peers(&mut spawns, &sleep, Helpers::none());
-        (peers.broad_phase.get().is_some(), peers.all.iter().filter(|(_, peer)| peer.shared.handover.is_some()).count())
+        (
+            peers.broad_phase.get().is_some(),
+            peers.all.iter().filter(|(_, peer)| peer.shared.handover().is_some()).count(),
+        )
     }
 
     #[test]

@@ -297,14 +297,6 @@ impl Agent for Dummy {
         }
     }
 
-    fn momentum(&self) -> (DVec3, DVec3) {
-        (DVec3::ZERO, DVec3::ZERO)
-    }
-
-    fn mass_kg(&self) -> f64 {
-        0.0
-    }
-
     fn form(&self) -> Option<Arc<CollisionShape>> {
         self.form.clone()
     }

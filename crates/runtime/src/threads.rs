@@ -8,7 +8,7 @@ use super::Run;
 use super::agent_clock::{SharedTimeline, Timeline, TimelineCommand};
 use super::agent_runner::{AgentRunner, Next};
 use super::agents::Agents;
-use super::archive::Cut;
+use super::archive::{Absent, Cut, CutBetweenTurns};
 use super::clock::{Clock, wait_until};
 use super::cluster::{Handover, close_remaining, hand_over, put_back, take_apart};
 use super::cpu::CpuBatch;
@@ -18,7 +18,7 @@ use super::mailbox::SendError;
 use super::metrics::AgentStats;
 use super::priority::Priority;
 use super::sleep::Halt;
-use super::spawn::{AgentSpawn, AssembledRun, Everyone, RunError, assemble};
+use super::spawn::{AgentSpawn, AssembledRun, RunAgents, RunError, assemble};
 use super::turn_order::{Held, PartKind, TurnOrder, in_force};
 use super::turn_parts::Begun;
 use super::turns::Took;
@@ -42,7 +42,7 @@ type Ended = JoinHandle<Option<Box<AgentRunner>>>;
 pub struct Threads {
     clock: Arc<dyn Clock>,
     timeline: Arc<SharedTimeline>,
-    all: Everyone,
+    all: RunAgents,
     threads: Vec<Option<Ended>>,
     /// Where threads report that they have ended.
     farewells: Sender<AgentId>,
@@ -86,7 +86,7 @@ impl Threads {
     }
 
     fn spawn(&self, actor: Option<Box<AgentRunner>>, shared: Arc<Shared>) -> Result<Ended, RunError> {
-        let name = format!("agent:{}", shared.name.replace('\0', ""));
+        let name = format!("agent:{}", shared.name().replace('\0', ""));
         let stage = AgentThread {
             clock: Arc::clone(&self.clock),
             timeline: Arc::clone(&self.timeline),
@@ -142,24 +142,6 @@ impl Threads {
         Ok(())
     }
 
-    /// Ends all threads between turns, does something with the agents and the order of their turns, and lets them go on.
-    fn cut(
-        &mut self,
-        act: impl FnOnce(&mut Cut, &mut Option<Arc<TurnOrder>>) -> Result<(), ArchiveError>,
-    ) -> Result<(), ArchiveError> {
-        let homes = self.halt(Halt::Cut);
-        let all = take_apart(homes.into_iter(), &self.all.handles);
-        let agents = self.all.handles.len();
-        let mut cut = Cut { all, agents, timeline: self.timeline.read(), now: self.clock.now() };
-        let outcome = act(&mut cut, &mut self.order);
-        if cut.timeline != self.timeline.read() {
-            self.timeline.set(cut.timeline);
-        }
-        let gone_on = self.go_on(put_back(cut.all, &self.all.handles));
-        let no_thread = |error: RunError| ArchiveError::Refused { what: format!("a run that cannot go on ({error})") };
-        outcome.and(gone_on.map_err(no_thread))
-    }
-
     fn end(&mut self) {
         let homes = self.halt(Halt::End);
         let (timeline, now) = (self.timeline.read(), self.clock.now());
@@ -171,6 +153,28 @@ impl Threads {
 impl Drop for Threads {
     fn drop(&mut self) {
         self.end();
+    }
+}
+
+impl CutBetweenTurns for Threads {
+    fn agents_of_run(&self) -> &RunAgents {
+        &self.all
+    }
+
+    fn cut(
+        &mut self,
+        act: impl FnOnce(&mut Cut, &mut Option<Arc<TurnOrder>>) -> Result<(), ArchiveError>,
+    ) -> Result<(), ArchiveError> {
+        let homes = self.halt(Halt::Cut);
+        let all = take_apart(homes.into_iter(), &self.all.handles);
+        let mut cut = Cut::new(all, self.all.clone(), self.timeline.read(), self.clock.now());
+        let outcome = act(&mut cut, &mut self.order);
+        if cut.timeline != self.timeline.read() {
+            self.timeline.set(cut.timeline);
+        }
+        let gone_on = self.go_on(put_back(cut.all, &self.all.handles));
+        let no_thread = |error: RunError| ArchiveError::Refused { what: format!("a run that cannot go on ({error})") };
+        outcome.and(gone_on.map_err(no_thread))
     }
 }
 
@@ -213,17 +217,12 @@ impl Run for Threads {
         self.all.leave(id)
     }
 
-    fn archive(&mut self, archive: &mut Archive<'_>) -> Result<(), ArchiveError> {
-        self.cut(|cut, order| cut.archive_in_order(archive, order.as_deref()))
+    fn archive(&mut self, archive: &mut Archive<'_>, absent: Absent<'_>) -> Result<(), ArchiveError> {
+        self.archive_between_turns(archive, absent)
     }
 
     fn record(&mut self, order: Arc<TurnOrder>, begun: Option<&mut Archive<'_>>) -> Result<(), ArchiveError> {
-        self.all.set_ordered();
-        self.cut(|cut, mine| {
-            begun.map_or(Ok(()), |archive| cut.archive_in_real_time(archive))?;
-            *mine = Some(order);
-            Ok(())
-        })
+        self.record_between_turns(order, begun)
     }
 
     fn shutdown(mut self: Box<Self>) -> Vec<AgentStats> {
@@ -262,7 +261,7 @@ impl AgentThread {
                     Some(actor) if actor.is_parked() => return Some(actor),
                     moved => moved,
                 },
-                None => self.wait_for(shared.handover.as_ref()),
+                None => self.wait_for(shared.handover()),
             };
         }
         here.iter_mut().for_each(|actor| self.settle(actor));

@@ -179,7 +179,7 @@ impl AgentRunner {
     /// Whether another agent has found since its last step that it should lead this one: a slow agent that stepped once more alone would
     /// not be where its leader expects it.
     fn should_join(&mut self) -> bool {
-        if self.shared.handover.is_none() || self.observer.neighbours().is_empty() {
+        if self.shared.handover().is_none() || self.observer.neighbours().is_empty() {
             return false;
         }
         self.observer.refresh();

@@ -152,6 +152,12 @@ pub fn scene_view(scene: &Scene) -> SceneView {
     scene_view
 }
 
+/// Takes up an agent that joined, whose number is the next one.
+pub fn join(scene: &mut Scene, scene_view: &mut SceneView, member: Member) {
+    scene_view.join(actor(&member));
+    scene.agents.push(member);
+}
+
 /// How an agent is drawn.
 pub fn actor(member: &Member) -> Actor {
     Actor { id: member.id, form: form(&member.spec), appearance: appearance(&member.appearance) }

@@ -22,6 +22,14 @@ pub enum SessionError {
     /// A recording could not be written to its end.
     #[error(transparent)]
     Record(#[from] RecordError),
+    /// The scene has no camera of that name.
+    #[error("the scene has no camera \"{name}\"; its cameras are [{known}]")]
+    NoCamera {
+        /// The name asked for.
+        name: String,
+        /// The names that there are.
+        known: String,
+    },
     /// The adapter failed.
     #[cfg(feature = "picture")]
     #[error("drawing failed")]

@@ -1,7 +1,7 @@
 //! The frame loop that connects runtime, control and picture: gather, choose, draw, measure.
 //!
 //! In: a checked [`metachron_world::Scene`]. Out: frames on the screen or in a file, and an [`Outcome`] that summarises the run.
-//! A [`Session`] is a running scene; [`play_headless`] drives it. Never here: a window, arguments, a control law, physics.
+//! A [`Session`] is a running scene; [`play_headless`] drives it; a [`WorldView`] is the picture of a world that a program runs by itself. Never here: a window, arguments, a control law, physics.
 //!
 //! ```
 //! use metachron_render::{Size, Style};
@@ -46,6 +46,7 @@ mod session;
 mod step_response;
 mod trace;
 mod visible_resolution;
+mod world_view;
 
 pub use agent_experiment::{AgentExperiment, AgentResponse, agent_experiment};
 pub use assemble::law;
@@ -66,3 +67,4 @@ pub use reference_run::{PairError, ReferenceComparison, compare_with_reference};
 pub use session::{Finished, REWIND_BYTES, RewindStatus, Session};
 pub use step_response::{After, Pushes, median, push};
 pub use trace::Trace;
+pub use world_view::WorldView;

@@ -2,9 +2,9 @@
 //!
 //! In: a [`Scene`]. Out: spawns for the runtime. Never here: time passing, a law of control.
 
+use super::error::WorldError;
 use super::kinds::{ExecutorKind, PriorityKind};
 use super::ties::{Ties, faults};
-use super::world::WorldError;
 use super::{Member, Scene, Spec};
 use metachron_contact::Agent;
 use metachron_contact::stepper::{ClusterScene, Passage};

@@ -65,6 +65,14 @@ pub enum SceneBuildError {
         /// What it can be on.
         what: &'static str,
     },
+    /// A sensor sits where nothing can.
+    #[error("the sensor \"{sensor}\" is at {found}; expected finite numbers and a quaternion of a length above 0")]
+    BadSite {
+        /// The sensor.
+        sensor: String,
+        /// The site as given.
+        found: String,
+    },
     /// A joint cannot be.
     #[error("the joint of \"{name}\" cannot be: {reason}")]
     BadJoint {
@@ -104,8 +112,8 @@ struct Joined {
     at_m: DVec3,
 }
 
-/// What can be added to a scene: a [`Rigid`] body, a [`Tube`], a [`Soft`] body, or an agent of your own ([`Custom`]).
-#[derive(Debug, Clone)]
+/// What can be added to a scene: a [`Rigid`] body, a [`Tube`], a [`Soft`] body, or an agent of your own ([`Custom`]), which no file can have.
+#[derive(Debug, Clone, serde::Serialize, serde::Deserialize)]
 pub enum Part {
     /// A rigid body.
     Rigid(Rigid),
@@ -114,6 +122,7 @@ pub enum Part {
     /// A sheet, solid or rope.
     Soft(Soft),
     /// An agent of somebody else's.
+    #[serde(skip)]
     Custom(Custom),
 }
 

@@ -6,15 +6,16 @@
 //! A file: [`MAGIC`], the version of the format, the length and the checksum of what follows, then the program's version, the scene's
 //! identity, the time, the state. All numbers of its head are little-endian.
 
+use super::joined::{JoinedParts, archive_parts};
 use super::{Scene, WorldError};
 use metachron_core::{Archive, ArchiveError, HASH_START, SimTime};
-use metachron_runtime::{AgentState, Agents};
+use metachron_runtime::{AgentHandle, AgentState, Run};
 use std::path::{Path, PathBuf};
 
 /// The first bytes of every file.
 const MAGIC: [u8; 8] = *b"METACHRN";
 /// The version of the format: it changes with what the bytes mean.
-const FORMAT: u32 = 3;
+const FORMAT: u32 = 4;
 /// Bytes before those that the checksum is of.
 const HEAD: usize = MAGIC.len() + 4 + 8 + 8;
 /// The program that can read what it has written: states are saved field by field as this version has them.
@@ -26,6 +27,8 @@ pub struct Checkpoint {
     pub(super) of: SceneIdentity,
     pub(super) time: SimTime,
     pub(super) times: Vec<SimTime>,
+    /// What those were given as that have joined since the start and are there.
+    pub(super) joined: JoinedParts,
     pub(super) state: Vec<u8>,
 }
 
@@ -37,9 +40,6 @@ pub(super) struct SceneIdentity {
     fixed: usize,
     joints: usize,
     couplings: usize,
-    /// Who has joined the world since its start, in that order, and who has left it, by rising numbers.
-    pub(super) joined: Vec<String>,
-    pub(super) left: Vec<u32>,
 }
 
 /// By what an object is known again.
@@ -69,6 +69,15 @@ pub enum CheckpointError {
         found: String,
         /// As the world has it.
         expected: String,
+    },
+    /// The checkpoint has an agent of somebody's own that joined its world ([`super::Custom`]) and is not in this one: only a checkpoint that
+    /// is kept in memory has what makes it again. The world goes on as it was.
+    #[error(
+        "\"{name}\" is an agent of your own that joined the world: no file has what makes it again, only a checkpoint that is kept in memory"
+    )]
+    Own {
+        /// Its name.
+        name: String,
     },
     /// The state could not be read into the world, which is stopped and shows its last states.
     #[error("the state could not be read, and the world is not usable any more: {reason}")]
@@ -144,7 +153,8 @@ impl Checkpoint {
         self.time
     }
 
-    /// The time of each object's state, by their numbers: in real time they differ, as each is at the end of a step of its own.
+    /// The time of each object's state, by their numbers: in real time they differ, as each is at the end of a step of its own. Zero of those
+    /// that have left.
     #[must_use]
     pub fn times(&self) -> &[SimTime] {
         &self.times
@@ -162,7 +172,8 @@ impl Checkpoint {
         self.state.len()
     }
 
-    /// Writes it to a file, in place of one that is there.
+    /// Writes it to a file, in place of one that is there. Of an agent of your own that joined ([`super::Custom`]) the file has the state and
+    /// the name: a world goes on from it where that agent is there.
     ///
     /// # Errors
     /// [`CheckpointError::File`].
@@ -232,12 +243,34 @@ impl Checkpoint {
     }
 
     fn archive(program: &mut String, of: &mut Self, archive: &mut Archive<'_>) -> Result<(), ArchiveError> {
-        metachron_core::archive_values!(archive, *program, of.of, of.time, of.times, of.state)
+        metachron_core::archive_values!(archive, *program, of.of, of.time, of.times)?;
+        archive_parts(&mut of.joined, archive)?;
+        archive.value(&mut of.state)
     }
 
     fn empty() -> Self {
         let of = SceneIdentity::default();
-        Self { of, time: SimTime::ZERO, times: vec![], state: vec![] }
+        Self { of, time: SimTime::ZERO, times: vec![], joined: JoinedParts::new(), state: vec![] }
+    }
+
+    /// The state that a run has written.
+    pub(super) fn of_run(of: SceneIdentity, run: &dyn Run, joined: JoinedParts, state: Vec<u8>) -> Self {
+        let time = |agent: &AgentHandle| match agent.state() {
+            AgentState::Gone => SimTime::ZERO,
+            _ => agent.latest().moment(),
+        };
+        Self { of, time: run.sim_now(), times: run.agents().iter().map(time).collect(), joined, state }
+    }
+
+    /// Checks that a file can have all that joined.
+    ///
+    /// # Errors
+    /// [`CheckpointError::Own`].
+    pub(super) fn check_saved(&self) -> Result<(), CheckpointError> {
+        match self.joined.values().find(|joined| joined.is_own()) {
+            Some(own) => Err(CheckpointError::Own { name: own.name.clone() }),
+            None => Ok(()),
+        }
     }
 }
 
@@ -254,16 +287,7 @@ impl SceneIdentity {
             fixed: scene.obstacles.len(),
             joints: scene.joints.len(),
             couplings: scene.couplings.len(),
-            joined: Vec::new(),
-            left: Vec::new(),
         }
-    }
-
-    /// The same with those that have joined the world and left it since.
-    pub fn now(&self, agents: &Agents) -> Self {
-        let joined = agents.iter().skip(self.objects.len()).map(|agent| agent.name().to_owned()).collect();
-        let left = agents.iter().filter(|agent| agent.state() == AgentState::Gone).map(|agent| agent.id().0).collect();
-        Self { joined, left, ..self.clone() }
     }
 
     /// Checks that a checkpoint of the scene `found` is one of this scene. Its name may be another: files are renamed.
@@ -281,14 +305,6 @@ impl SceneIdentity {
         ];
         if let Some((what, found, expected)) = counts.into_iter().find(|(_, found, expected)| found != expected) {
             return other(format!("the number of {what}"), found.to_string(), expected.to_string());
-        }
-        if found.joined != self.joined {
-            let said = |joined: &[String]| format!("[{}]", joined.join(", "));
-            return other("who has joined since the start".to_owned(), said(&found.joined), said(&self.joined));
-        }
-        if found.left != self.left {
-            let said = |left: &[u32]| format!("agents {left:?}");
-            return other("who has left since the start".to_owned(), said(&found.left), said(&self.left));
         }
         let mut pairs = found.objects.iter().zip(&self.objects).enumerate();
         let Some((at, (found, expected))) = pairs.find(|(_, (found, expected))| found != expected) else {
@@ -327,7 +343,10 @@ mod tests {
     #[test]
     fn a_state_with_any_byte_changed_is_read_or_refused() {
         let world = start();
-        world.advance(SimSpan::from_millis(100));
+        world.add("crate", Rigid::cuboid([0.02; 3]).at([0.3, 0.0, 0.2])).unwrap();
+        world.advance(SimSpan::from_millis(50));
+        world.remove(world.object("tube").unwrap()).unwrap();
+        world.advance(SimSpan::from_millis(50));
         let mark = world.checkpoint().unwrap();
         let mut refused = 0;
         let mut world = start();

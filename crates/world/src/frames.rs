@@ -2,8 +2,9 @@
 //!
 //! In: the newest states. Out: points at a common time. Never here: drawing.
 
+use super::error::WorldError;
 use super::object::Object;
-use super::world::{World, WorldError};
+use super::world::World;
 use glam::DVec3;
 use metachron_core::{Anchor, Body, SimTime, Snapshot};
 use metachron_runtime::TimelineCommand;

@@ -2,8 +2,9 @@
 //!
 //! In: a pace, spans. Out: objects that have lived so much more, and a world that stands still then. Never here: when a turn is due.
 
+use super::error::WorldError;
 use super::kinds::ExecutorKind;
-use super::world::{World, WorldError};
+use super::world::World;
 use metachron_core::{SimSpan, SimTime};
 use metachron_runtime::{AgentHandle, AgentState, SPEED_RANGE, TimelineCommand};
 use std::sync::atomic::Ordering::Relaxed;

@@ -3,9 +3,10 @@
 //! In: the newest states. Out: hits. A ray or a shape goes on by what is certainly free until it is within a hundredth of a millimetre of
 //! something: exact for every kind of object, and no faster where it grazes one. Never here: forces, steps.
 
+use super::error::WorldError;
 use super::events::touched;
 use super::object::{Object, Touched};
-use super::world::{World, WorldError};
+use super::world::World;
 use glam::{DQuat, DVec3};
 use metachron_contact::stepper::Matter;
 use metachron_core::{ContactPartner, ContactState, SimTime};
@@ -49,8 +50,8 @@ pub struct ContactNow {
     pub force_n: DVec3,
     /// The deepest overlap, metres, ≥ 0.
     pub depth_m: f64,
-    /// How much more it bears for each metre that the object is pressed on further within the next step, along the normal, N/m, ≥ 0; 0 where
-    /// that is not known, as in heaps.
+    /// How much more it bears for each metre that a side which a user leads (poses of a kinematic body, the spring of a tool) is led on within
+    /// the next step, along the normal, N/m, ≥ 0; 0 where a user leads neither, and in heaps.
     pub stiffness_n_m: f64,
 }
 

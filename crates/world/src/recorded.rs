@@ -5,13 +5,15 @@
 
 use super::assemble;
 use super::assemble::Govern;
-use super::checkpoint::{CheckpointError, SceneIdentity};
-use super::joined::Joined;
+use super::checkpoint::{Checkpoint, CheckpointError, SceneIdentity};
+use super::error::WorldError;
+use super::joined::{Joined, Joining};
 use super::kinds::ExecutorKind;
 use super::log::{Log, TurnsToLog, logged};
 use super::recording::{Entry, RecordError, Recorder, Recording, SceneText};
+use super::recording_file::RecordingFile;
 use super::replay::{Followed, Player};
-use super::world::{Setting, Shared, State, World, WorldError};
+use super::world::{Setting, Shared, State, World};
 use super::{Member, Scene};
 use metachron_core::{Archive, SimTime};
 use metachron_runtime::{Demand, Follower, Governor, Lockstep, Run, SystemClock, TurnMeasure, TurnOrder};
@@ -31,14 +33,14 @@ impl Governor for Silent {
 
 impl World {
     /// Writes down from now on, to the file at `path`, what is done to the world, so that [`World::replay`] can do it again, to the bit: of a
-    /// world on threads or in a pool also the order of its turns. A world that has run before begins with a checkpoint; one that an object has
-    /// joined or left before does not begin, as a replay starts the scene and has no other objects. In lockstep commands of other threads wait for
+    /// world on threads or in a pool also the order of its turns. A world that has run before begins with a checkpoint, whatever joined it and left
+    /// it; one with an agent of your own that joined does not begin. In lockstep commands of other threads wait for
     /// the call in progress from now on.
     ///
     /// # Errors
     /// [`RecordError`]; nothing is recorded then. In lockstep the file is as it was unless it is that which cannot be written.
     pub fn record(&self, path: impl AsRef<Path>) -> Result<(), RecordError> {
-        self.begin_recording(|| Recorder::file(path.as_ref()), None)
+        self.begin_recording(|| Ok(Box::new(RecordingFile::create(path.as_ref())?)), None)
     }
 
     /// As [`World::record`], to anything that takes bytes, and with the text of the scene, from which it can be started again.
@@ -66,9 +68,7 @@ impl World {
         }
         log.record(|is_fresh| {
             let begun = (!is_fresh).then(|| self.cut(run.as_mut())).transpose().map_err(RecordError::Begun)?;
-            if let Some(checkpoint) = &begun {
-                identity.check(&checkpoint.of).map_err(RecordError::Begun)?;
-            }
+            begun.iter().try_for_each(Checkpoint::check_saved).map_err(RecordError::Begun)?;
             let mut recorder = Recorder::begin(open()?, identity.clone(), scene, false)?;
             begun.into_iter().for_each(|checkpoint| recorder.note(Entry::Restore(checkpoint.to_bytes())));
             Ok((recorder, None))
@@ -82,18 +82,20 @@ impl World {
         open: impl FnOnce() -> Result<Box<dyn Write + Send>, RecordError>,
         scene: Option<SceneText>,
     ) -> Result<(), RecordError> {
-        let (Shared { identity, log, .. }, agents) = (&*self.shared, self.agents());
+        let (Shared { identity, log, joined, .. }, agents) = (&*self.shared, self.agents());
         let turns = TurnsToLog { log: Arc::downgrade(log), agents: agents.clone() };
         let order = Arc::new(TurnOrder::new(Box::new(turns)));
         // no turn is made in this order before the log has what it begins with
         let _held = order.between();
         log.record(|is_fresh| {
-            identity.check(&identity.now(agents)).map_err(RecordError::Begun)?;
+            let (joined, mut archive) = (joined.present(agents), Archive::writer());
+            let mut begun = Checkpoint::of_run(identity.clone(), run, joined, Vec::new());
+            begun.check_saved().map_err(RecordError::Begun)?;
             let mut recorder = Recorder::begin(open()?, identity.clone(), scene, true)?;
-            let mut archive = Archive::writer();
-            let begun = run.record(Arc::clone(&order), (!is_fresh).then_some(&mut archive));
-            begun.map_err(|error| RecordError::Begun(CheckpointError::Refused(error)))?;
-            recorder.note(if is_fresh { Entry::Timeline(run.timeline()) } else { Entry::Begin(archive.into_bytes()) });
+            let written = run.record(Arc::clone(&order), (!is_fresh).then_some(&mut archive));
+            written.map_err(|error| RecordError::Begun(CheckpointError::Refused(error)))?;
+            begun.state = archive.into_bytes();
+            recorder.note(if is_fresh { Entry::Timeline(run.timeline()) } else { Entry::Begin(begun.to_bytes()) });
             Ok((recorder, Some(Arc::clone(&order))))
         })
     }
@@ -161,8 +163,7 @@ impl World {
             restored: None,
             until,
             log: Arc::clone(&log),
-            gravity: scene.gravity,
-            surroundings: Arc::clone(&surroundings),
+            joining: Joining { gravity: scene.gravity, surroundings: Arc::clone(&surroundings), executor: lockstep },
             identity,
             joined: Arc::clone(&joined),
         };

@@ -8,7 +8,7 @@
 //! read to its last whole chunk, and a damaged one is known from it. The first chunk says whose calls follow. All numbers outside of chunks are
 //! little-endian.
 
-use super::builder::{Part, Rigid, Soft, Tube};
+use super::builder::Part;
 use super::checkpoint::{CheckpointError, SceneIdentity, checksum};
 use metachron_core::{AgentId, Archive, ArchiveError, Body, SimTime, archive_values};
 use metachron_runtime::{Command, Demand, PartKind, Timeline, TimelineCommand, TurnPart};
@@ -20,7 +20,7 @@ use std::time::Duration;
 /// The first bytes of every file.
 const MAGIC: [u8; 8] = *b"METACREC";
 /// The version of the format: it changes with what the bytes mean.
-const FORMAT: u32 = 2;
+const FORMAT: u32 = 3;
 /// Bytes of a chunk before its contents: length, its complement and checksum.
 const CHUNK_HEAD: usize = 4 + 4 + 8;
 /// So many entries are written at once: a process that is killed loses the newest ones, about a second of a frame loop.
@@ -63,7 +63,7 @@ pub(super) enum Entry {
     /// Work of this length occupied a core.
     Spend(Duration),
     Drive(TimelineCommand),
-    /// In real time: the state in which it began.
+    /// In real time: the state in which it began, as the bytes of a checkpoint's file.
     Begin(Vec<u8>),
     /// In real time: from now on time passes by this timeline.
     Timeline(Timeline),
@@ -75,9 +75,7 @@ pub(super) enum Entry {
     Check(u64),
     Command(AgentId, Command),
     SetState(AgentId, Box<Body>),
-    AddRigid(String, Box<Rigid>),
-    AddTube(String, Box<Tube>),
-    AddSoft(String, Box<Soft>),
+    Add(String, Box<Part>),
     Remove(AgentId),
     /// It was put into the state of this checkpoint, as the bytes of its file.
     Restore(Vec<u8>),
@@ -368,16 +366,6 @@ impl Recorder {
         Ok(Self { out, entries, silent_turns, written: Duration::ZERO, hashed: Duration::ZERO, failed: None })
     }
 
-    /// The file at `path`, anew.
-    ///
-    /// # Errors
-    /// [`RecordError::File`].
-    pub fn file(path: &Path) -> Result<Box<dyn Write + Send>, RecordError> {
-        let file = std::fs::File::create(path);
-        let file = file.map_err(|error| RecordError::File { path: path.to_owned(), error })?;
-        Ok(Box::new(file))
-    }
-
     /// Writes down what is about to be done. What came before it is complete, and leaves the process if it is much.
     pub fn note(&mut self, entry: Entry) {
         if self.entries.len() >= CHUNK_ENTRIES {
@@ -463,10 +451,6 @@ fn write_chunk(
 
 /// The entry of a part that joins; `None` of one that cannot be written down.
 pub(super) fn added(name: &str, part: &Part) -> Option<Entry> {
-    match part {
-        Part::Rigid(rigid) => Some(Entry::AddRigid(name.to_owned(), Box::new(rigid.clone()))),
-        Part::Tube(tube) => Some(Entry::AddTube(name.to_owned(), Box::new(tube.clone()))),
-        Part::Soft(soft) => Some(Entry::AddSoft(name.to_owned(), Box::new(soft.clone()))),
-        Part::Custom(_) => None,
-    }
+    let is_own = matches!(part, Part::Custom(_));
+    (!is_own).then(|| Entry::Add(name.to_owned(), Box::new(part.clone())))
 }

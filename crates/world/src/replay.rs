@@ -3,20 +3,16 @@
 //! In: a run from the recorded scene, in lockstep or one that follows turns in real time, a [`Recording`]. Out: the same bits, as far as its reader lets time pass.
 //! Never here: the file, what governors answer ([`super::log`]).
 
-use super::assemble;
-use super::builder::{Part, member};
+use super::builder::Part;
 use super::checkpoint::{Checkpoint, SceneIdentity};
-use super::joined::Joined;
-use super::kinds::ExecutorKind;
+use super::joined::{Joined, JoinedPart, Joining};
 use super::log::Log;
 use super::recording::{Entry, Recording};
-use super::world::read_state;
-use glam::DVec3;
-use metachron_contact::stepper::ClusterScene;
+use super::saved::read_state;
 use metachron_core::{AgentId, Archive, ArchiveError, SimTime};
 use metachron_runtime::{
-    AgentHandle, AgentSpawn, AgentStats, Agents, Follower, Lockstep, PartKind, Run, RunError, SendError, Timeline,
-    TimelineCommand, TurnPart, state_hash,
+    Absent, AgentHandle, AgentSpawn, AgentStats, Agents, Follower, Lockstep, PartKind, Run, RunError, SendError,
+    Timeline, TimelineCommand, TurnPart, state_hash,
 };
 use std::collections::VecDeque;
 use std::sync::Arc;
@@ -36,8 +32,7 @@ pub(super) struct Player {
     /// It plays no further than to this time.
     pub until: Option<SimTime>,
     pub log: Arc<Log>,
-    pub gravity: DVec3,
-    pub surroundings: Arc<ClusterScene>,
+    pub joining: Joining,
     pub identity: SceneIdentity,
     pub joined: Arc<Joined>,
 }
@@ -111,8 +106,12 @@ impl Player {
             return self.run.follower()?.make(part);
         }
         let checkpoint = self.restored.take().ok_or("the recording does not have the state that was restored")?;
+        let Self { run, joining, joined, .. } = self;
+        joined.expect(&checkpoint.joined);
         let mut archive = Archive::reader(&checkpoint.state);
-        let restored = self.run.follower()?.restore(&mut archive, part.wall).and_then(|()| archive.finish());
+        let absent = &mut |id| joining.absent(id, &checkpoint.joined);
+        let restored = run.follower()?.restore(&mut archive, part.wall, absent).and_then(|()| archive.finish());
+        joined.keep(&checkpoint.joined);
         restored.map_err(|error| error.to_string())
     }
 
@@ -128,7 +127,7 @@ impl Player {
             }
             Entry::Spend(work) => self.run.run_mut().spend(work),
             Entry::Drive(drive) => self.run.run_mut().drive(drive),
-            Entry::Begin(state) => read_state(self.run.run_mut(), &state)?,
+            Entry::Begin(bytes) => self.begin(&self.known(&bytes)?)?,
             Entry::Timeline(timeline) => self.run.follower()?.set_timeline(timeline),
             Entry::Present(at) => self.present = Some(at),
             Entry::Turns(turns) => self.turns.extend(turns.parts()),
@@ -137,9 +136,7 @@ impl Player {
                 let agent = self.run.run().agents().of(id).ok_or_else(|| format!("there is no agent {}", id.0))?;
                 agent.set_state(*state);
             }
-            Entry::AddRigid(name, rigid) => self.add(name, Part::Rigid(*rigid))?,
-            Entry::AddTube(name, tube) => self.add(name, Part::Tube(*tube))?,
-            Entry::AddSoft(name, soft) => self.add(name, Part::Soft(*soft))?,
+            Entry::Add(name, part) => self.add(name, *part)?,
             Entry::Remove(id) => self.run.run_mut().remove(id).map_err(|error| error.to_string())?,
             Entry::Restore(bytes) => self.restore(&bytes)?,
             Entry::Demand(..) => {}
@@ -168,10 +165,8 @@ impl Player {
 
     fn add(&mut self, name: String, part: Part) -> Result<(), String> {
         let id = AgentId(self.run.run().agents().len() as u32);
-        let member = member(id, name, part, self.gravity).map_err(|error| error.to_string())?;
-        let spawn = assemble::lone(&member, &self.surroundings, ExecutorKind::Lockstep);
-        let spawn = spawn.map_err(|error| error.to_string())?;
-        self.joined.push(member);
+        let spawn = self.joining.spawn(id, &name, &part).map_err(|error| error.to_string())?;
+        self.joined.add(id, JoinedPart { name, part: Some(Arc::new(part)) }, self.run.run().agents());
         let added = match (&mut self.run, self.present.take()) {
             (Followed::RealTime(run), Some(at)) => run.add_at(spawn, at),
             (run, _) => run.run_mut().add(spawn),
@@ -179,11 +174,26 @@ impl Player {
         added.map(drop).map_err(|error| error.to_string())
     }
 
-    fn restore(&mut self, bytes: &[u8]) -> Result<(), String> {
+    /// The checkpoint in these bytes, of the recorded scene.
+    fn known(&self, bytes: &[u8]) -> Result<Checkpoint, String> {
         let checkpoint = Checkpoint::from_bytes(bytes).map_err(|error| error.to_string())?;
-        self.identity.now(self.run.run().agents()).check(&checkpoint.of).map_err(|error| error.to_string())?;
-        if let Followed::Lockstep(run) = &mut self.run {
-            return read_state(&mut **run, &checkpoint.state);
+        self.identity.check(&checkpoint.of).map_err(|error| error.to_string())?;
+        Ok(checkpoint)
+    }
+
+    /// Puts the run into the state of a checkpoint.
+    fn begin(&mut self, checkpoint: &Checkpoint) -> Result<(), String> {
+        let Self { run, joining, joined, .. } = self;
+        joined.expect(&checkpoint.joined);
+        let outcome = read_state(run.run_mut(), checkpoint, joining);
+        joined.keep(&checkpoint.joined);
+        outcome
+    }
+
+    fn restore(&mut self, bytes: &[u8]) -> Result<(), String> {
+        let checkpoint = self.known(bytes)?;
+        if let Followed::Lockstep(_) = &self.run {
+            return self.begin(&checkpoint);
         }
         // turns that were in progress come first
         self.restored = Some(checkpoint);
@@ -223,8 +233,8 @@ impl Run for Player {
         self.run.run_mut().remove(id)
     }
 
-    fn archive(&mut self, archive: &mut Archive<'_>) -> Result<(), ArchiveError> {
-        self.run.run_mut().archive(archive)
+    fn archive(&mut self, archive: &mut Archive<'_>, absent: Absent<'_>) -> Result<(), ArchiveError> {
+        self.run.run_mut().archive(archive, absent)
     }
 
     fn shutdown(self: Box<Self>) -> Vec<AgentStats> {

@@ -2,14 +2,16 @@
 //!
 //! In: the newest states. Out: numbers, with the time that they are of. Never here: noise, delays, stored readings.
 
+use super::error::WorldError;
 use super::object::Object;
-use super::world::{World, WorldError};
+use super::world::World;
 use glam::{DQuat, DVec3};
 use metachron_contact::joint::{Joint, JointKind, Motor};
 use metachron_contact::stepper::Pose;
-use metachron_core::{AgentId, Anchor, Body, ContactPartner, RigidState, SimTime};
+use metachron_core::{AgentId, Anchor, Body, ContactPartner, RigidState, SimTime, Snapshot};
 use metachron_geometry::ShapeKind;
 use metachron_runtime::Command;
+use std::sync::Arc;
 
 /// A sensor of a scene.
 #[derive(Debug, Clone, PartialEq)]
@@ -38,13 +40,15 @@ pub enum SensorKind {
         /// Whose contacts count; `None` for all.
         with: Option<ContactPartner>,
     },
-    /// What an accelerometer in a rigid body's centre of mass reads, its acceleration less that of gravity, m/s², in the mean of the last step,
-    /// then a gyroscope, rad/s, both in the axes of its shape. Six numbers.
+    /// What an accelerometer on a rigid body reads, the acceleration of the matter there less that of gravity, m/s², then a gyroscope, rad/s, both
+    /// in the axes of its site. Accelerations are the mean of the last step, spins those at its end. Six numbers.
     Imu {
         /// The body.
         object: AgentId,
         /// The gravity on it, m/s².
         gravity_m_s2: DVec3,
+        /// Where on the body it is.
+        site: Site,
     },
     /// Where a point of a rigid body is, metres, and the rotation of its shape's axes as a unit quaternion x, y, z, w. Seven numbers.
     Pose {
@@ -53,6 +57,15 @@ pub enum SensorKind {
         /// The point, metres in the axes of its shape.
         at_m: DVec3,
     },
+}
+
+/// Where on a rigid body a sensor sits, and how it is turned there: by default in the centre of mass, in the axes of the shape.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Site {
+    /// Its place, metres in the axes of the body's shape; `None` for the centre of mass.
+    pub at_m: Option<DVec3>,
+    /// The rotation from its own axes to those of the shape, of length 1.
+    pub rotation: DQuat,
 }
 
 impl SensorKind {
@@ -110,7 +123,7 @@ impl JointRef {
 #[derive(Debug, Default)]
 pub(super) struct Instruments {
     pub joint_names: Vec<String>,
-    pub joints: std::sync::Arc<[Joint]>,
+    pub joints: Arc<[Joint]>,
     pub sensors: Vec<Sensor>,
 }
 
@@ -119,7 +132,7 @@ struct Placed {
     pose: Pose,
     velocity: DVec3,
     spin: DVec3,
-    time: SimTime,
+    state: Arc<Snapshot>,
 }
 
 impl World {
@@ -180,20 +193,25 @@ impl World {
                 let force_n: DVec3 = forces.map(|contact| contact.force_n).sum();
                 Ok(Reading { time: self.latest(object)?.time, values: force_n.to_array().to_vec() })
             }
-            SensorKind::Imu { object, gravity_m_s2 } => {
-                let state = self.latest(self.object_of(object)?)?;
-                let RigidState { rotation, spin, .. } = rigid(&state.body);
-                // what rests is held: gravity alone is missing
-                let felt_m_s2 = rotation.conjugate() * (state.acceleration - gravity_m_s2);
-                let values = [felt_m_s2, rotation.conjugate() * spin].map(|v| v.to_array()).concat();
+            SensorKind::Imu { object, gravity_m_s2, site } => self.read_imu(object, gravity_m_s2, site),
+            SensorKind::Pose { object, at_m } => {
+                let Placed { pose, state, .. } = self.placed(object)?;
+                let values = [&pose.place(at_m).to_array()[..], &pose.rotation.to_array()].concat();
                 Ok(Reading { time: state.time, values })
             }
-            SensorKind::Pose { object, at_m } => {
-                let Placed { pose, time, .. } = self.placed(object)?;
-                let values = [&pose.place(at_m).to_array()[..], &pose.rotation.to_array()].concat();
-                Ok(Reading { time, values })
-            }
         }
+    }
+
+    /// The acceleration of a point of a rigid body, a + α × r + ω × (ω × r), less that of gravity, and its spin.
+    fn read_imu(&self, id: AgentId, gravity_m_s2: DVec3, site: Site) -> Result<Reading, WorldError> {
+        let Placed { pose, spin, state, .. } = self.placed(id)?;
+        let arm_m = site.at_m.map_or(DVec3::ZERO, |at_m| pose.place(at_m) - pose.centre_m);
+        let beside_m_s2 = state.angular_acceleration.cross(arm_m) + spin.cross(spin.cross(arm_m));
+        let to_site = (pose.rotation * site.rotation).conjugate();
+        // what rests is held: gravity alone is missing
+        let felt_m_s2 = state.acceleration + beside_m_s2 - gravity_m_s2;
+        let values = [felt_m_s2, spin].map(|v| (to_site * v).to_array()).concat();
+        Ok(Reading { time: state.time, values })
     }
 
     fn joint_at(&self, number: u32) -> Result<&Joint, WorldError> {
@@ -206,8 +224,8 @@ impl World {
     fn read_joint(&self, number: u32, read: impl Fn(&Joint, [&Placed; 2]) -> f64) -> Result<Reading, WorldError> {
         let joint = self.joint_at(number)?;
         let a = self.placed(joint.a)?;
-        let b = joint.b.map_or(Ok(WORLD), |b| self.placed(b))?;
-        Ok(Reading { time: a.time, values: vec![read(joint, [&a, &b])] })
+        let b = joint.b.map_or_else(|| Ok(Placed::world()), |b| self.placed(b))?;
+        Ok(Reading { time: a.state.time, values: vec![read(joint, [&a, &b])] })
     }
 
     fn placed(&self, id: AgentId) -> Result<Placed, WorldError> {
@@ -221,14 +239,16 @@ impl World {
         let RigidState { position, rotation, velocity, spin } = rigid(&state.body);
         let origin_m = position - rotation * com;
         let pose = Pose { centre_m: position, origin_m, rotation, ..Pose::WORLD };
-        Ok(Placed { pose, velocity, spin, time: state.time })
+        Ok(Placed { pose, velocity, spin, state })
     }
 }
 
-/// What never moves.
-const WORLD: Placed = Placed { pose: Pose::WORLD, velocity: DVec3::ZERO, spin: DVec3::ZERO, time: SimTime::ZERO };
-
 impl Placed {
+    /// What never moves.
+    fn world() -> Self {
+        Self { pose: Pose::WORLD, velocity: DVec3::ZERO, spin: DVec3::ZERO, state: Arc::default() }
+    }
+
     /// The velocity of its matter at a point of space, m/s.
     fn at(&self, point_m: DVec3) -> DVec3 {
         self.velocity + self.spin.cross(point_m - self.pose.centre_m)

@@ -6,120 +6,26 @@
 use super::Scene;
 use super::assemble;
 use super::assemble::Govern;
-use super::builder::{Part, SceneBuildError, member};
-use super::checkpoint::{Checkpoint, CheckpointError, SceneIdentity};
+use super::checkpoint::SceneIdentity;
+use super::error::WorldError;
 use super::events::{EventFilter, Events};
 use super::frames::{Frame, Frames};
 use super::joined::Joined;
 use super::kinds::ExecutorKind;
 use super::log::{Log, Mode, logged};
 use super::object::{Object, WorldTag};
-use super::recording::{Entry, added};
-use super::scene::Member;
+use super::recording::Entry;
 use super::sensors::Instruments;
 use glam::DVec3;
 use metachron_contact::stepper::ClusterScene;
-use metachron_core::{AgentId, Anchor, Archive, ArchiveError, Body, SimTime, Snapshot};
+use metachron_core::{AgentId, SimTime, Snapshot};
 use metachron_runtime::{
-    AgentHandle, AgentState, AgentStats, Agents, Command, Keyed, Lockstep, Pool, Run, RunError, SystemClock, Threads,
-    Timeline, TimelineCommand, state_hash, wait_until,
+    AgentHandle, AgentState, AgentStats, Agents, Lockstep, Pool, Run, SystemClock, Threads, Timeline, TimelineCommand,
+    state_hash, wait_until,
 };
-use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering::Relaxed};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError, TryLockError};
 use std::time::Duration;
-
-/// Why a world could not be started, or refuses something.
-#[derive(Debug, thiserror::Error)]
-#[non_exhaustive]
-pub enum WorldError {
-    /// A model rejected its object.
-    #[error("object \"{name}\": {reason}")]
-    Build {
-        /// The object's name.
-        name: String,
-        /// The model's message.
-        reason: String,
-    },
-    /// The agents could not be started.
-    #[error(transparent)]
-    Run(#[from] RunError),
-    /// There is no agent of that number.
-    #[error("the world has no agent {}", .0.0)]
-    NoAgent(AgentId),
-    /// The object is another world's.
-    #[error("the object was named by another world")]
-    Foreign,
-    /// The object was removed.
-    #[error("\"{name}\" has been removed from the world")]
-    Gone {
-        /// The name that it had.
-        name: String,
-    },
-    /// An object of that name is in the world already.
-    #[error("the world has an object \"{name}\" already")]
-    SameName {
-        /// The name.
-        name: String,
-    },
-    /// A world that was stopped takes nothing up.
-    #[error("the world has been stopped")]
-    Stopped,
-    /// An object cannot be built.
-    #[error(transparent)]
-    Part(#[from] SceneBuildError),
-    /// The object has no such point.
-    #[error("\"{name}\" has no point {anchor:?}: {wanted}")]
-    NoPoint {
-        /// The object's name.
-        name: String,
-        /// The point asked for.
-        anchor: Anchor,
-        /// Which points it has.
-        wanted: String,
-    },
-    /// A command was refused.
-    #[error("\"{name}\" takes no such command: {reason}")]
-    Refused {
-        /// The object's name.
-        name: String,
-        /// Why.
-        reason: String,
-    },
-    /// The world has no joint of that name.
-    #[error("the world has no joint \"{name}\"; its joints with names are [{known}]")]
-    NoJoint {
-        /// The name asked for.
-        name: String,
-        /// The names that there are.
-        known: String,
-    },
-    /// The world has no sensor of that name.
-    #[error("the world has no sensor \"{name}\"; its sensors are [{known}]")]
-    NoSensor {
-        /// The name asked for.
-        name: String,
-        /// The names that there are.
-        known: String,
-    },
-    /// A pace that no machine keeps, or that is a pause.
-    #[error("the factor of time is {factor}; expected 0.001 to 100")]
-    BadPace {
-        /// The factor.
-        factor: f64,
-    },
-    /// A query that asks for nothing that can be found.
-    #[error("{0}")]
-    BadQuery(String),
-    /// The world has no moving object of that name.
-    #[error("the world has no moving object \"{name}\"; its moving objects are {known}")]
-    NoObject {
-        /// The name asked for.
-        name: String,
-        /// The names that there are.
-        known: String,
-    },
-}
 
 /// A running world. Clones are the same world; every method takes `&self`.
 ///
@@ -134,7 +40,7 @@ pub(super) struct Shared {
     state: Mutex<State>,
     agents: Agents,
     /// How many agents the scene has, and those that joined since, in the order of their numbers.
-    of_scene: usize,
+    pub of_scene: usize,
     pub joined: Arc<Joined>,
     /// Gravity, m/s²: that of objects that join it.
     pub gravity: DVec3,
@@ -160,12 +66,6 @@ impl std::fmt::Debug for World {
     }
 }
 
-impl WorldError {
-    pub(super) fn bad_query(reason: &str) -> Self {
-        Self::BadQuery(reason.to_owned())
-    }
-}
-
 /// What makes agents step, or where its time stood when it ended.
 pub(super) enum State {
     Running(Box<dyn Run>),
@@ -179,9 +79,6 @@ pub(super) struct Setting {
     pub log: Arc<Log>,
     pub joined: Arc<Joined>,
 }
-
-/// Why a replay refuses what is asked of it.
-const REPLAYED: &str = "a replay does what its recording says, and nothing else";
 
 impl World {
     /// Starts the agents of `scene` on `executor`, each with the step and the resolution that the scene gives it.
@@ -240,76 +137,6 @@ impl World {
         Self { shared: Arc::new(shared) }
     }
 
-    /// Starts `scene` and puts it into the state of `checkpoint`: it goes on as the world did that was saved, to the bit.
-    ///
-    /// # Errors
-    /// Those of [`World::start`] and [`World::restore`].
-    pub fn open(scene: &Scene, executor: ExecutorKind, checkpoint: &Checkpoint) -> Result<Self, CheckpointError> {
-        Self::open_governed(scene, executor, &mut |_| None, checkpoint)
-    }
-
-    /// As [`World::open`], with the governors of the world that was saved.
-    ///
-    /// # Errors
-    /// Those of [`World::start_governed`] and [`World::restore`].
-    pub fn open_governed(
-        scene: &Scene,
-        executor: ExecutorKind,
-        govern: Govern<'_>,
-        checkpoint: &Checkpoint,
-    ) -> Result<Self, CheckpointError> {
-        let world = Self::start_governed(scene, executor, govern)?;
-        world.restore(checkpoint)?;
-        Ok(world)
-    }
-
-    /// The state of the world now: all that the next bit of it needs, but samples of watched points and CPU times. On threads and in a pool
-    /// turns in progress end first, however long they take, and each object is saved at the end of its own step ([`Checkpoint::times`]): what it has given others is
-    /// either in their states or still in its own. Any executor goes on from it.
-    ///
-    /// # Errors
-    /// [`CheckpointError::Refused`] where a model or a governor does not save its state, [`CheckpointError::Stopped`]. The world goes on as it
-    /// was.
-    pub fn checkpoint(&self) -> Result<Checkpoint, CheckpointError> {
-        let mut state = self.state();
-        let State::Running(run) = &mut *state else { return Err(CheckpointError::Stopped) };
-        self.cut(run.as_mut())
-    }
-
-    /// The state of its run now.
-    pub(super) fn cut(&self, run: &mut dyn Run) -> Result<Checkpoint, CheckpointError> {
-        let mut archive = Archive::writer();
-        run.archive(&mut archive).map_err(CheckpointError::Refused)?;
-        let of = self.shared.identity.now(&self.shared.agents);
-        let times = self.shared.agents.iter().map(|agent| agent.latest().moment()).collect();
-        Ok(Checkpoint { of, time: run.sim_now(), times, state: archive.into_bytes() })
-    }
-
-    /// Puts the world back into the state of `checkpoint`, of this world or of another of the same scene: what it would have done after, it does
-    /// again, in lockstep to the bit. Objects and agents stay valid.
-    ///
-    /// # Errors
-    /// [`CheckpointError::OtherScene`], also where objects have joined or left since, [`CheckpointError::Refused`] and [`CheckpointError::Stopped`] leave the world as it was. After
-    /// [`CheckpointError::Unusable`] it is stopped.
-    pub fn restore(&self, checkpoint: &Checkpoint) -> Result<(), CheckpointError> {
-        self.shared.identity.now(&self.shared.agents).check(&checkpoint.of)?;
-        let mut state = self.state();
-        let State::Running(run) = &mut *state else { return Err(CheckpointError::Stopped) };
-        if self.shared.log.is_replayed() {
-            return Err(CheckpointError::Refused(ArchiveError::Refused { what: "a replay".to_owned() }));
-        }
-        // in real time the turns in progress end before it is read
-        self.in_order(|| (), |log, ()| log.note(|| Entry::Restore(checkpoint.to_bytes())));
-        let outcome = read_state(run.as_mut(), &checkpoint.state);
-        self.see(run.as_ref());
-        let Err(reason) = outcome else { return Ok(()) };
-        let (now, time, timeline) = (run.now(), run.sim_now(), run.timeline());
-        let broken = std::mem::replace(&mut *state, State::Stopped { now, time, timeline });
-        // what it has become is not accounted for
-        let _ = catch_unwind(AssertUnwindSafe(|| drop(broken)));
-        Err(CheckpointError::Unusable { reason })
-    }
-
     /// The object of that name.
     ///
     /// # Errors
@@ -347,147 +174,6 @@ impl World {
     /// [`WorldError::Foreign`].
     pub fn latest(&self, object: Object) -> Result<Arc<Snapshot>, WorldError> {
         self.agent(object).map(AgentHandle::latest)
-    }
-
-    /// Sends a command to an object, which obeys at its next step.
-    ///
-    /// # Errors
-    /// [`WorldError::Foreign`]; [`WorldError::NoPoint`] for a material point that it does not have; [`WorldError::Refused`] for numbers outside
-    /// their range and for a joint that it cannot drive. Nothing was done then.
-    pub fn command(&self, object: Object, command: Command) -> Result<(), WorldError> {
-        let agent = self.agent(object)?;
-        let refused = |reason: String| WorldError::Refused { name: agent.name().to_owned(), reason };
-        let state = agent.latest();
-        if agent.takes_poses() && matches!(command, Command::Force(_) | Command::Impulse(_) | Command::Spring(_)) {
-            return Err(refused("it is kinematic: no force moves it; lead it by poses".to_owned()));
-        }
-        match command {
-            Command::Force(Keyed { what: Some(force), .. }) | Command::Impulse(force) => {
-                self.check_point(object, &state, force.anchor)?;
-                if force.torque_n_m != DVec3::ZERO && matches!(state.body, Body::Soft(_)) {
-                    return Err(refused("its vertices do not turn, so a torque has nothing to act on".to_owned()));
-                }
-            }
-            Command::Spring(Keyed { what: Some(spring), .. }) => self.check_point(object, &state, spring.anchor)?,
-            Command::Carve(_) if !agent.form().is_some_and(|form| form.has_cells()) => {
-                return Err(refused("only solids and sheets have cells that can be removed".to_owned()));
-            }
-            _ => {}
-        }
-        if self.shared.log.is_replayed() {
-            return Err(refused(REPLAYED.to_owned()));
-        }
-        let note = |log: &mut Mode, sent: &Result<(), String>| {
-            if sent.is_ok() {
-                log.note(|| Entry::Command(object.id(), command));
-            }
-        };
-        let send = || agent.send(command).map_err(|error| error.to_string());
-        self.shared.log.in_order(|| self.between_calls(), send, note).map_err(refused)
-    }
-
-    /// Puts an object into another state before its next step: one that [`World::latest`] gave before, or of as many nodes. A rigid body takes its
-    /// place and motion, a tube its nodes and frames, a soft body without ε its vertices; what a tube's parts turn with is zero.
-    ///
-    /// # Errors
-    /// [`WorldError::Foreign`]; [`WorldError::Refused`] for a state of another kind or length and for numbers that are not finite. Nothing was
-    /// done then; nor where the object divides itself otherwise before it hears of it.
-    pub fn set_state(&self, object: Object, state: &Body) -> Result<(), WorldError> {
-        let agent = self.agent(object)?;
-        let refused = |reason: String| Err(WorldError::Refused { name: agent.name().to_owned(), reason });
-        let lengths = |body: &Body| match body {
-            Body::Curve(curve) => vec![curve.positions.len(), curve.velocities.len(), curve.frames.len()],
-            Body::Soft(soft) => vec![soft.positions.len(), soft.velocities.len()],
-            _ => Vec::new(),
-        };
-        let now = agent.latest();
-        let is_alike = std::mem::discriminant(state) == std::mem::discriminant(&now.body);
-        if !is_alike || matches!(state, Body::Nothing | Body::Tool(_)) || agent.takes_poses() {
-            return refused(
-                "it takes states of rigid bodies, tubes and soft bodies that are of its own kind".to_owned(),
-            );
-        }
-        let (found, wanted) = (lengths(state), lengths(&now.body));
-        if found != wanted {
-            return refused(format!(
-                "the lists of the state have {found:?} entries; those of the object have {wanted:?}"
-            ));
-        }
-        if let (Body::Soft(soft), Some(nodes)) = (state, now.nodes)
-            && nodes as usize != soft.positions.len()
-        {
-            return refused(format!(
-                "its {} vertices are carried by {nodes} nodes, which their places do not tell; restore a checkpoint instead",
-                soft.positions.len()
-            ));
-        }
-        if !state.is_finite() {
-            return refused("every number of a state must be finite".to_owned());
-        }
-        if self.shared.log.is_replayed() {
-            return refused(REPLAYED.to_owned());
-        }
-        let note = |log: &mut Mode, (): &()| log.note(|| Entry::SetState(object.id(), Box::new(state.clone())));
-        self.shared.log.in_order(|| self.between_calls(), || agent.set_state(state.clone()), note);
-        Ok(())
-    }
-
-    /// Takes up another object: it lives from its first step on, and touches what it meets. No other object waits for it.
-    ///
-    /// # Errors
-    /// [`WorldError::SameName`], [`WorldError::Part`], [`WorldError::Build`], [`WorldError::Run`] and [`WorldError::Stopped`]; nothing was done
-    /// then.
-    pub fn add(&self, name: impl Into<String>, part: impl Into<Part>) -> Result<Object, WorldError> {
-        let name = name.into();
-        if self.object(&name).is_ok() {
-            return Err(WorldError::SameName { name });
-        }
-        let (part, log) = (part.into(), &self.shared.log);
-        if log.is_replayed() {
-            return Err(WorldError::Refused { name, reason: REPLAYED.to_owned() });
-        }
-        let entry = added(&name, &part);
-        let State::Running(run) = &mut *self.state() else { return Err(WorldError::Stopped) };
-        if log.is_recorded() && entry.is_none() {
-            let reason =
-                "a recording has rigid bodies, tubes and soft bodies that join, and no agent of your own".to_owned();
-            return Err(WorldError::Refused { name, reason });
-        }
-        let id = AgentId(self.shared.agents.len() as u32);
-        let member = member(id, name, part, self.shared.gravity)?;
-        let spawn = assemble::lone(&member, &self.shared.surroundings, self.executor())?;
-        let note = |log: &mut Mode, joined: &Result<AgentHandle, RunError>| {
-            let (Ok(joined), Some(entry)) = (joined, entry) else { return log.note_begun() };
-            if self.executor() != ExecutorKind::Lockstep {
-                log.note(|| Entry::Present(joined.latest().moment()));
-            }
-            log.note(|| entry);
-        };
-        // who sees the agent can ask for its member
-        self.shared.joined.push(member);
-        let joined = self.in_order(|| run.add(spawn), note).inspect_err(|_| self.shared.joined.pop())?;
-        Ok(self.shared.tag.object(joined.id()))
-    }
-
-    /// Takes an object out: at its next step nothing of it is left, and what lay on it falls. Its name is free again; it itself is an error
-    /// from then on.
-    ///
-    /// # Errors
-    /// [`WorldError::Foreign`], [`WorldError::Gone`] and [`WorldError::Stopped`].
-    pub fn remove(&self, object: Object) -> Result<(), WorldError> {
-        let agent = self.agent(object)?;
-        let refused = |reason: String| WorldError::Refused { name: agent.name().to_owned(), reason };
-        let log = &self.shared.log;
-        if log.is_replayed() {
-            return Err(refused(REPLAYED.to_owned()));
-        }
-        let State::Running(run) = &mut *self.state() else { return Err(WorldError::Stopped) };
-        let note = |log: &mut Mode, left: &Result<(), String>| {
-            if left.is_ok() {
-                log.note(|| Entry::Remove(object.id()));
-            }
-        };
-        self.in_order(|| run.remove(object.id()).map_err(|error| error.to_string()), note).map_err(refused)
     }
 
     /// Events of its objects from now on.
@@ -542,19 +228,6 @@ impl World {
     #[must_use]
     pub fn agents(&self) -> &Agents {
         &self.shared.agents
-    }
-
-    /// How many agents its scene has; those of higher numbers joined it since ([`World::joined`]).
-    #[must_use]
-    pub fn agents_of_scene(&self) -> usize {
-        self.shared.of_scene
-    }
-
-    /// What an agent that joined since the start was built from, as a scene has it of its own; `None` of agents of the scene.
-    #[must_use]
-    pub fn joined(&self, id: AgentId) -> Option<Member> {
-        let at = (id.0 as usize).checked_sub(self.shared.of_scene)?;
-        self.shared.joined.get(at)
     }
 
     /// Wall time since the start; virtual in lockstep.
@@ -642,36 +315,17 @@ impl World {
         if left { Err(WorldError::Gone { name: agent.name().to_owned() }) } else { Ok(agent) }
     }
 
-    fn check_point(&self, object: Object, state: &Snapshot, anchor: Anchor) -> Result<(), WorldError> {
-        state.body.point(anchor).map(drop).ok_or_else(|| self.no_point(object, anchor))
-    }
-
-    /// Why an object has no such point.
-    pub(super) fn no_point(&self, object: Object, anchor: Anchor) -> WorldError {
-        let Ok(agent) = self.agent(object) else { return WorldError::Foreign };
-        let wanted = match &agent.latest().body {
-            Body::Nothing => "it has no matter".to_owned(),
-            Body::Curve(curve) => {
-                let length_m = curve.arc_m.last().copied().unwrap_or_default();
-                format!("it has Arc of 0 to {length_m} m")
-            }
-            Body::Rigid(_) | Body::Tool(_) => "it has Local, metres from its centre of mass in its own axes".to_owned(),
-            Body::Soft(soft) => format!("it has Vertex of 0 to {}", soft.positions.len().saturating_sub(1)),
-        };
-        WorldError::NoPoint { name: agent.name().to_owned(), anchor, wanted }
-    }
-
     pub(super) fn has_stopped(&self) -> bool {
         matches!(*self.state(), State::Stopped { .. })
     }
 
     /// [`Log::in_order`] for who has the run.
-    fn in_order<T>(&self, act: impl FnOnce() -> T, note: impl FnOnce(&mut Mode, &T)) -> T {
+    pub(super) fn in_order<T>(&self, act: impl FnOnce() -> T, note: impl FnOnce(&mut Mode, &T)) -> T {
         self.shared.log.in_order(|| None::<()>, act, note)
     }
 
     /// Waits in lockstep until no call lets time pass: a recording there has the order of calls alone.
-    fn between_calls(&self) -> Option<MutexGuard<'_, State>> {
+    pub(super) fn between_calls(&self) -> Option<MutexGuard<'_, State>> {
         (self.executor() == ExecutorKind::Lockstep).then(|| self.state())
     }
 
@@ -686,24 +340,11 @@ impl World {
     }
 
     /// Notes the time for those that ask while it passes.
-    fn see(&self, run: &dyn Run) {
+    pub(super) fn see(&self, run: &dyn Run) {
         self.shared.seen_ns.store(run.sim_now().as_nanos(), Relaxed);
     }
 
     pub(super) fn state(&self) -> MutexGuard<'_, State> {
         self.shared.state.lock().unwrap_or_else(PoisonError::into_inner)
-    }
-}
-
-/// Reads the state of a run; a broken one may break any promise of those that read it.
-pub(super) fn read_state(run: &mut dyn Run, state: &[u8]) -> Result<(), String> {
-    let read = catch_unwind(AssertUnwindSafe(|| {
-        let mut archive = Archive::reader(state);
-        run.archive(&mut archive)?;
-        archive.finish()
-    }));
-    match read {
-        Ok(outcome) => outcome.map_err(|error| error.to_string()),
-        Err(_) => Err("its numbers do not fit together".to_owned()),
     }
 }

@@ -1,12 +1,20 @@
 //! Objects join a world that runs and leave it: on every executor they meet what is there, and what lay on them falls.
 
 use glam::DVec3;
-use metachron_core::{Body, SimSpan};
+use metachron_core::{Body, SimSpan, SimTime};
 use metachron_geometry::Solid;
+use metachron_models::rigid::{RigidBody, RigidSpec};
 use metachron_world::kinds::ExecutorKind;
-use metachron_world::{EventFilter, Happening, Object, Rigid, Scene, Touched, World, WorldError};
+use metachron_world::{
+    Checkpoint, CheckpointError, EventFilter, Happening, Object, Pace, RecordError, Rigid, Scene, Soft, Touched, World,
+    WorldError,
+};
 
 const EXECUTORS: [ExecutorKind; 3] = [ExecutorKind::Lockstep, ExecutorKind::Threads, ExecutorKind::Pool];
+
+const fn ms(count: u64) -> SimSpan {
+    SimSpan::from_millis(count)
+}
 
 fn floor(executor: ExecutorKind) -> World {
     let stone = Rigid::cuboid([0.1; 3]).mass_kg(2.0).at([0.0, 0.0, 0.1]);
@@ -37,8 +45,8 @@ fn what_joins_lies_on_what_is_there_and_what_leaves_lets_it_fall() {
         world.advance(SimSpan::from_millis(1200));
         assert!((position(&world, ball).z - 0.05).abs() < 1e-3, "{executor:?}: {}", position(&world, ball));
         assert!(matches!(world.latest(stone), Err(WorldError::Gone { .. })), "{executor:?}");
-        let told: Vec<_> = events.drain().filter(|event| event.object == stone).map(|event| event.what).collect();
-        assert!(told.contains(&Happening::Gone), "{executor:?}: {told:?}");
+        let received: Vec<_> = events.drain().filter(|event| event.object == stone).map(|event| event.what).collect();
+        assert!(received.contains(&Happening::Gone), "{executor:?}: {received:?}");
     }
 }
 
@@ -94,6 +102,9 @@ fn hundreds_come_and_go() {
         assert_eq!(world.agents().len(), 201);
         let left = world.agents().iter().filter(|agent| agent.state() != metachron_runtime::AgentState::Gone).count();
         assert_eq!(left, 1, "{executor:?}");
+        // a checkpoint looks for what those that have left were made of, and nobody keeps it
+        world.checkpoint().unwrap();
+        assert_eq!(world.joined(metachron_core::AgentId(7)).unwrap().spec.model(), "synthetic", "{executor:?}");
     }
 }
 
@@ -112,12 +123,153 @@ fn a_world_goes_back_to_where_it_was_with_what_acted_on_it() {
         end
     });
     assert_eq!(ends[0], ends[1], "the force ends at the same time again");
-    world.remove(ball).unwrap();
-    world.advance(SimSpan::from_millis(50));
-    assert!(world.restore(&mark).unwrap_err().to_string().contains("left"));
-    let without = world.checkpoint().unwrap();
-    world.advance(SimSpan::from_millis(50));
-    world.restore(&without).unwrap();
+}
+
+#[test]
+fn a_world_goes_back_to_those_that_were_in_it() {
+    for executor in EXECUTORS {
+        let world = floor(executor);
+        if executor != ExecutorKind::Lockstep {
+            world.set_pace(Pace::Factor(4.0)).unwrap();
+        }
+        let stone = world.object("stone").unwrap();
+        let ball = world.add("ball", Rigid::ball(0.05).mass_kg(0.2).at([0.0, 0.0, 0.3]).restitution(0.0)).unwrap();
+        world.advance(ms(200));
+        let (mark, hash) = (world.checkpoint().unwrap(), world.hash());
+        world.advance(ms(100));
+        [ball, stone].into_iter().for_each(|object| world.remove(object).unwrap());
+        world.advance(ms(50));
+        let newer = world.add("ball", Rigid::cuboid([0.02; 3]).at([0.0, 0.0, 0.5])).unwrap();
+        let mut events = world.events(EventFilter::all());
+        world.advance(ms(50));
+        for _ in 0..2 {
+            world.restore(&mark).unwrap();
+            assert_eq!((world.object("ball").unwrap(), world.object("stone").unwrap()), (ball, stone), "{executor:?}");
+            assert_eq!(world.hash(), hash, "{executor:?}");
+            assert!(matches!(world.latest(newer), Err(WorldError::Gone { .. })), "{executor:?}");
+        }
+        let received: Vec<_> = events.drain().filter(|event| event.what == Happening::Gone).collect();
+        assert!(received.iter().map(|event| event.object).eq([newer]), "{executor:?}: {received:?}");
+        world.advance(ms(1200));
+        assert!((position(&world, ball).z - 0.25).abs() < 1e-3, "{executor:?}: it lies on the stone again");
+        world.remove(ball).unwrap();
+        world.advance(ms(50));
+        world.add("ball", Rigid::ball(0.05).at([1.0, 0.0, 0.5])).unwrap();
+    }
+}
+
+/// A body on a hinge, a tube across it and a stone.
+fn hung() -> Scene {
+    let hinge = metachron_models::rigid::JointKind::Revolute { axis: DVec3::Y, range_rad: None, motor: None };
+    Scene::builder()
+        .fixed("floor", Solid::Plane)
+        .add("arm", Rigid::capsule(0.02, 0.1).at([0.1, 0.0, 0.5]))
+        .add("tube", metachron_world::Tube::along(&[[-0.2, 0.0, 0.3], [0.2, 0.0, 0.3]]).radius_m(0.01).segments(4))
+        .add("stone", Rigid::cuboid([0.1; 3]).at([0.0, 0.0, 0.1]))
+        .joint("arm", None, hinge, [0.0, 0.0, 0.5])
+        .build()
+        .unwrap()
+}
+
+/// What joins, leaves and happens from a checkpoint on.
+fn go_on(world: &World, newcomer: &str) -> (u64, SimTime) {
+    world.advance(ms(60));
+    world.add(newcomer, Rigid::ball(0.03).at([0.05, 0.0, 0.6])).unwrap();
+    world.advance(ms(200));
+    (world.hash(), world.time())
+}
+
+#[test]
+fn what_follows_a_checkpoint_of_others_is_the_same_to_the_bit() {
+    let world = World::start(&hung(), ExecutorKind::Lockstep).unwrap();
+    let [arm, tube] = world.objects(["arm", "tube"]).unwrap();
+    world.advance(ms(40));
+    let cloth = Soft::sheet([0.2; 2], 0.002, [3, 3]).at([0.0, 0.0, 0.45]).young_pa(1e5);
+    let cloth = world.add("cloth", cloth).unwrap();
+    world.add("brief", Rigid::ball(0.02).at([0.3, 0.0, 0.4])).unwrap();
+    world.advance(ms(40));
+    world.remove(world.object("brief").unwrap()).unwrap();
+    world.advance(ms(40));
+    let early = world.checkpoint().unwrap();
+    let first = go_on(&world, "one");
+    [arm, tube, cloth].into_iter().for_each(|object| world.remove(object).unwrap());
+    world.advance(ms(40));
+    let late = world.checkpoint().unwrap();
+    let second = go_on(&world, "two");
+    for _ in 0..2 {
+        world.restore(&early).unwrap();
+        assert!([arm, tube, cloth].iter().all(|object| world.latest(*object).is_ok()));
+        assert_eq!(go_on(&world, "one"), first);
+        world.restore(&late).unwrap();
+        assert!([arm, tube, cloth].iter().all(|object| world.latest(*object).is_err()));
+        assert_eq!(go_on(&world, "two"), second);
+    }
+    // in another world, from the bytes of a file
+    for (mark, end, are_there) in [(&early, first, true), (&late, second, false)] {
+        let path = std::env::temp_dir().join(format!("metachron-joined-{}.mark", std::process::id()));
+        mark.write(&path).unwrap();
+        let read = Checkpoint::read(&path).unwrap();
+        std::fs::remove_file(&path).unwrap();
+        assert_eq!(&read, mark);
+        let opened = World::open(&hung(), ExecutorKind::Lockstep, &read).unwrap();
+        assert_eq!(opened.checkpoint().unwrap(), read);
+        assert_eq!(opened.object("cloth").is_ok(), are_there);
+        assert_eq!(go_on(&opened, "two"), end);
+        [ExecutorKind::Threads, ExecutorKind::Pool].into_iter().for_each(|executor| {
+            let opened = World::open(&hung(), executor, &read).unwrap();
+            opened.advance(ms(20));
+            opened.add("late", Rigid::ball(0.03).at([0.05, 0.0, 0.6])).unwrap();
+            assert_eq!(opened.object("arm").is_ok(), are_there, "{executor:?}");
+        });
+    }
+}
+
+#[test]
+fn an_agent_of_ones_own_comes_back_from_memory_and_from_no_file() {
+    let own = |_| {
+        let spec = RigidSpec::free(Solid::Ball { radius_m: 0.05 }, DVec3::new(0.5, 0.0, 0.5), 1.0);
+        Box::new(RigidBody::new(spec).unwrap()) as Box<dyn metachron_contact::Agent>
+    };
+    let world = floor(ExecutorKind::Lockstep);
+    let mill = world.add("mill", metachron_world::Custom::new(own)).unwrap();
+    world.advance(ms(50));
+    let (mark, hash) = (world.checkpoint().unwrap(), world.hash());
+    let path = std::env::temp_dir().join(format!("metachron-own-{}.mark", std::process::id()));
+    mark.write(&path).unwrap();
+    let read = Checkpoint::read(&path).unwrap();
+    std::fs::remove_file(&path).unwrap();
+    world.advance(ms(50));
+    // it is there
+    world.restore(&read).unwrap();
+    assert_eq!(world.hash(), hash);
+    world.remove(mill).unwrap();
+    world.advance(ms(50));
+    let gone = world.hash();
+    let refused = world.restore(&read).unwrap_err();
+    assert!(matches!(&refused, CheckpointError::Own { name } if name == "mill"), "{refused}");
+    assert_eq!(world.hash(), gone);
+    world.record_to(Box::new(std::io::sink()), None).unwrap();
+    let refused = world.restore(&mark).unwrap_err();
+    assert!(matches!(&refused, CheckpointError::Own { .. }), "no recording has it: {refused}");
+    world.end_recording().unwrap();
+    world.restore(&mark).unwrap();
+    assert_eq!((world.hash(), world.object("mill").unwrap()), (hash, mill));
+    let stone = Rigid::cuboid([0.1; 3]).mass_kg(2.0).at([0.0, 0.0, 0.1]);
+    let scene = Scene::builder().fixed("floor", Solid::Plane).add("stone", stone).build().unwrap();
+    assert_eq!(World::open(&scene, ExecutorKind::Lockstep, &mark).unwrap().hash(), hash);
+    assert!(matches!(World::open(&scene, ExecutorKind::Lockstep, &read), Err(CheckpointError::Own { .. })));
+    let recorded = world.record_to(Box::new(std::io::sink()), None);
+    assert!(matches!(recorded, Err(RecordError::Begun(CheckpointError::Own { .. }))));
+}
+
+#[test]
+fn a_checkpoint_of_another_world_whose_numbers_are_taken_is_refused() {
+    let [world, other] = [0, 1].map(|_| floor(ExecutorKind::Lockstep));
+    world.add("ball", Rigid::ball(0.05).at([0.0, 0.0, 0.5])).unwrap();
+    other.add("ball", Rigid::ball(0.07).at([0.0, 0.0, 0.5])).unwrap();
+    let (mark, hash) = (other.checkpoint().unwrap(), world.hash());
+    let error = world.restore(&mark).unwrap_err().to_string();
+    assert!(error.contains("agent 1 is \"ball\"") && world.hash() == hash, "{error}");
 }
 
 #[test]
@@ -155,13 +307,5 @@ impl metachron_contact::Agent for Broken {
 
     fn write_snapshot(&self, into: &mut metachron_core::Snapshot) {
         into.body = Body::Nothing;
-    }
-
-    fn momentum(&self) -> (DVec3, DVec3) {
-        (DVec3::ZERO, DVec3::ZERO)
-    }
-
-    fn mass_kg(&self) -> f64 {
-        0.0
     }
 }

@@ -94,6 +94,31 @@ fn a_recording_that_begins_later_begins_with_the_state_of_then() {
 }
 
 #[test]
+fn a_recording_begins_with_whoever_is_there() {
+    let world = start();
+    let ball = world.object("ball").unwrap();
+    let crate_ = world.add("crate", Rigid::cuboid([0.02; 3]).at([0.05, 0.0, 0.4])).unwrap();
+    world.advance(ms(40));
+    let before = world.checkpoint().unwrap();
+    [ball, crate_].into_iter().for_each(|object| world.remove(object).unwrap());
+    world.advance(ms(40));
+    world.add("ball", Rigid::ball(0.03).at([0.0, 0.0, 0.5])).unwrap();
+    let kept = recorded(&world);
+    world.advance(ms(60));
+    // one whom the replay has never seen
+    world.restore(&before).unwrap();
+    world.advance(ms(40));
+    world.add("late", Rigid::ball(0.03).at([0.0, 0.0, 0.5])).unwrap();
+    world.advance(ms(40));
+    world.remove(crate_).unwrap();
+    world.advance(ms(40));
+    world.end_recording().unwrap();
+    let again = replayed(kept.read().unwrap());
+    assert_eq!((again.hash(), again.time()), (world.hash(), world.time()));
+    assert!(again.object("ball").is_ok() && again.object("crate").is_err());
+}
+
+#[test]
 fn a_recording_that_was_cut_anywhere_is_read_to_its_last_whole_chunk() {
     let world = start();
     let kept = recorded(&world);
@@ -170,14 +195,21 @@ fn a_recording_that_cannot_be_written_on_is_known_meanwhile_and_says_once_why() 
     assert!(error.to_string().contains("no storage space") && std::error::Error::source(&error).is_none(), "{error}");
 }
 
+#[cfg(target_os = "linux")]
+#[test]
+fn a_recording_that_finds_no_room_names_its_file() {
+    let error = start().record("/dev/full").unwrap_err().to_string();
+    assert!(error.contains("/dev/full: ") && error.contains("os error"), "{error}");
+}
+
 #[test]
 fn another_format_another_scene_and_other_worlds_are_named() {
     let world = start();
     let kept = recorded(&world);
     world.end_recording().unwrap();
-    kept.0.lock().unwrap()[8] = 9;
-    assert!(matches!(kept.read(), Err(BadRecording::OtherFormat { found: 9 })));
-    kept.0.lock().unwrap()[8] = 2;
+    let format = std::mem::replace(&mut kept.0.lock().unwrap()[8], 99);
+    assert!(matches!(kept.read(), Err(BadRecording::OtherFormat { found: 99 })));
+    kept.0.lock().unwrap()[8] = format;
     let other = Scene::builder().add("ball", Rigid::ball(0.05)).build().unwrap();
     let error = World::replay(&other, kept.read().unwrap(), None).unwrap_err().to_string();
     assert!(error.contains("moving objects") && error.contains("expected 1"), "{error}");

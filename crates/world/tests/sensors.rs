@@ -1,11 +1,12 @@
 //! What sensors read is what mechanics says.
 
-use glam::{DQuat, DVec3};
+use glam::{DMat3, DQuat, DVec3};
 use metachron_contact::joint::{JointKind, Motor, MotorGoal};
-use metachron_core::SimSpan;
+use metachron_core::{Anchor, Body, SimSpan};
 use metachron_geometry::Solid;
+use metachron_models::rigid::GivenInertia;
 use metachron_world::kinds::ExecutorKind;
-use metachron_world::{Command, Rigid, Scene, SceneBuildError, SensorOn, World, WorldError};
+use metachron_world::{Command, Rigid, Scene, SceneBuildError, SensorOn, Site, World, WorldError};
 
 const G_M_S2: f64 = 9.81;
 
@@ -97,6 +98,52 @@ fn contact_sensors_tell_one_partner_from_all() {
     assert!(DVec3::from_slice(&values(&world, "fall")[..3]).length() < 1e-9, "{:?}", values(&world, "fall"));
 }
 
+/// A lopsided body with an IMU at a site, that floats: started, with what the site reads in the closed form. World axes of the arm at first.
+fn floating(rate_hz: f64) -> (World, Site, DVec3) {
+    let com_m = DVec3::new(0.02, -0.01, 0.0);
+    let about_com_kg_m2 = DMat3::from_diagonal(DVec3::new(0.01, 0.02, 0.025));
+    let site = Site { at_m: Some(DVec3::new(0.15, 0.08, 0.03)), rotation: DQuat::from_rotation_y(0.7) };
+    let body = Rigid::cuboid([0.2, 0.1, 0.05]).mass_kg(2.0).inertia(GivenInertia { com_m, about_com_kg_m2 });
+    let scene = Scene::builder()
+        .gravity([0.0; 3])
+        .add("body", body.rate_hz(rate_hz))
+        .sensor("imu", SensorOn::ImuAt("body".into(), site));
+    let world = World::start(&scene.build().unwrap(), ExecutorKind::Lockstep).unwrap();
+    (world, site, site.at_m.unwrap() - com_m)
+}
+
+/// What the IMU reads, and what a body that turns about its own z with this spin and angular acceleration has there.
+fn read_and_expected(world: &World, site: Site, arm_m: DVec3, [spin, angular]: [f64; 2]) -> [DVec3; 4] {
+    let (spin, angular) = (DVec3::Z * spin, DVec3::Z * angular);
+    let there = angular.cross(arm_m) + spin.cross(spin.cross(arm_m));
+    let read = values(world, "imu");
+    let to_site = site.rotation.conjugate();
+    [DVec3::from_slice(&read[..3]), DVec3::from_slice(&read[3..]), to_site * there, to_site * spin]
+}
+
+#[test]
+fn a_site_on_a_body_that_spins_steadily_feels_its_centripetal_acceleration() {
+    let (world, site, arm_m) = floating(240.0);
+    world.command(world.object("body").unwrap(), Command::velocity(DVec3::X, DVec3::Z * 5.0)).unwrap();
+    world.advance(SimSpan::from_millis(300));
+    let [felt, spin, there, turned] = read_and_expected(&world, site, arm_m, [5.0, 0.0]);
+    assert!(felt.distance(there) < 1e-9 && spin.distance(turned) < 1e-9, "{felt} {there}, {spin} {turned}");
+}
+
+#[test]
+fn a_site_on_a_body_that_spins_up_feels_the_tangential_acceleration_too() {
+    let (world, site, arm_m) = floating(1000.0);
+    let body = world.object("body").unwrap();
+    let torque = Command::torque(Anchor::Local(DVec3::ZERO), DVec3::Z * 0.05);
+    world.command(body, torque).unwrap();
+    world.advance(SimSpan::from_millis(500));
+    // α = τ / I, and the spin is what it has made by then
+    let Body::Rigid(state) = world.latest(body).unwrap().body else { panic!("rigid") };
+    let [felt, spin, there, turned] = read_and_expected(&world, site, arm_m, [state.spin.z, 0.05 / 0.025]);
+    assert!((state.spin.z - 1.0).abs() < 5e-3, "{}", state.spin);
+    assert!(felt.distance(there) < 1e-6 && spin.distance(turned) < 1e-9, "{felt} {there}, {spin} {turned}");
+}
+
 #[test]
 fn names_that_there_are_not_are_told_with_those_that_there_are() {
     let world = arm();
@@ -110,4 +157,7 @@ fn names_that_there_are_not_are_told_with_those_that_there_are() {
         let error = with(on);
         assert!(matches!(error, SceneBuildError::NoMount { .. }) && error.to_string().contains("\"bat\""), "{error}");
     }
+    let nowhere = Site { at_m: Some(DVec3::NAN), ..Site::default() };
+    let error = with(SensorOn::ImuAt("ball".into(), nowhere)).to_string();
+    assert!(error.contains("\"s\"") && error.contains("finite"), "{error}");
 }

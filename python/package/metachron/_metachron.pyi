@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from typing_extensions import Self, Unpack
 
-from .parts import JointKind, Part, Solid
+from .parts import Camera, JointKind, Part, Sensor, Solid
 from .typing import Array, Numbers
 
 __all__ = ["Checkpoint", "Contact", "Event", "Events", "Export", "Hit", "Object", "Rollout", "Scene", "State", "World", "replay", "rollout"]
@@ -98,6 +98,9 @@ class Scene:
     def joint(self, name: str, kind: JointKind, a: str, b: str | None = None) -> Self:
         """Joins the rigid bodies `a` and `b`, or `a` and the world."""
 
+    def sensor(self, name: str, on: Sensor) -> Self:
+        """Adds a sensor, which `World.sensor` reads."""
+
     def start(self, executor: _Executor = "lockstep") -> World:
         """Starts a world of it, whose time stands at first. Raises `ValueError` for what cannot be built."""
 
@@ -145,10 +148,11 @@ class World:
         """Equal numbers mean the same states of all objects, bit for bit."""
 
     def checkpoint(self) -> Checkpoint:
-        """All that the next bit of it needs, in lockstep. Raises `RuntimeError` on other executors."""
+        """All that the next bit of it needs, objects that joined it included."""
 
     def restore(self, checkpoint: Checkpoint) -> None:
-        """Goes back to a checkpoint of this world, or of one of the same scene with the same objects: what comes after is the same to the bit."""
+        """Goes back to a checkpoint of this world, or of another of the same scene: what comes after is the same, in lockstep to the bit. Objects that
+        joined since are taken out, those that left since are there again."""
 
     def advance(self, seconds: float) -> None:
         """Lets so much simulated time pass: at once in lockstep, in real time on other executors. Other threads of Python run meanwhile."""
@@ -184,6 +188,11 @@ class World:
     def set_state(self, object: str | Object, state: State) -> None:
         """Puts an object into a state that it had, or another one of as many nodes."""
 
+    def set_nodes(self, object: str | Object, positions: ArrayLike, velocities: ArrayLike | None = None) -> None:
+        """Puts the nodes of a soft body to these places, m, (n, 3), with these velocities, m/s; at rest where there are none. How many nodes it has,
+        `State.nodes` says.
+        """
+
     def sensor(self, name: str) -> Array:
         """What a sensor of the scene reads, of the newest states. Raises `KeyError`."""
 
@@ -209,6 +218,18 @@ class World:
         self, *, contacts: bool = True, states: bool = True, above: float = 0.0, of: str | Object | None = None
     ) -> Events:
         """Listens from now on: to contacts of at least `above` newtons, to changes of state, of all objects or one."""
+
+    def render(self, size: tuple[int, int] = ..., camera: str | Camera | None = None) -> NDArray[np.uint8]:
+        """A picture of the world now, (height, width, 4) of `uint8`: red, green, blue, opacity. `size` is (width, height), default (1280, 720).
+
+        The camera is one of the scene's, by its name, or a `Camera`; default the scene's first, or one that sees everything. Raises `KeyError`
+        for a name that there is not, and `RuntimeError` where no graphics adapter is found: a software driver is enough.
+        """
+
+    def render_depth(self, size: tuple[int, int] = ..., camera: str | Camera | None = None) -> NDArray[np.float32]:
+        """The depths that a camera sees now, (height, width) of `float32`: m along the view from the eye, infinite where there is nothing. `size`,
+        `camera` and errors are as of `render`.
+        """
 
     def export(
         self,
@@ -274,6 +295,14 @@ class State:
     @property
     def velocities(self) -> Array:
         """(n, 3), m/s, of the same points."""
+
+    @property
+    def nodes(self) -> Array:
+        """(n, 3), m: of a soft body the nodes of the cage or lattice that carries its vertices, or these where nothing does."""
+
+    @property
+    def node_velocities(self) -> Array:
+        """(n, 3), m/s, of the same nodes."""
 
     @property
     def rotation(self) -> Array:

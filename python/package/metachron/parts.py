@@ -1,4 +1,4 @@
-"""Parts of a scene: solids, bodies, tubes, soft bodies, and the kinds of joints. They hold numbers and nothing else.
+"""Parts of a scene: solids, bodies, tubes, soft bodies, kinds of joints, sensors; and cameras. They hold numbers and nothing else.
 
 What is `None` is as the engine has it by default. Units are SI; a rotation is a unit quaternion (x, y, z, w).
 """
@@ -259,6 +259,82 @@ class Weld(_Joint):
     """Nothing moves."""
 
 
+@final
+@dataclass(frozen=True)
+class Imu:
+    """An accelerometer and a gyroscope on a rigid body: the acceleration there less that of gravity, m/s2, then the spin, rad/s, in its own axes."""
+
+    object: str
+    """The body's name."""
+    at: Numbers | None = None
+    """Its place, m in the axes of the body's shape; default the centre of mass."""
+    rotation: Numbers | None = None
+    """From its own axes to those of the shape; default none."""
+
+
+@final
+@dataclass(frozen=True)
+class Pose:
+    """Where a point of a rigid body is, m, and the rotation of its shape's axes, (x, y, z, w)."""
+
+    object: str
+    """The body's name."""
+    at: Numbers = (0.0, 0.0, 0.0)
+    """The point, m in the axes of its shape."""
+
+
+@final
+@dataclass(frozen=True)
+class ContactForce:
+    """What touches an object gives it, N, world axes."""
+
+    object: str
+    """The object's name."""
+    other: str | None = None
+    """The object or fixed solid whose contacts count; default all."""
+
+
+@final
+@dataclass(frozen=True)
+class JointPosition:
+    """How far the second body of a joint has moved from the first, rad or m."""
+
+    joint: str
+    """The joint's name."""
+
+
+@final
+@dataclass(frozen=True)
+class JointVelocity:
+    """How fast it moves, rad/s or m/s."""
+
+    joint: str
+    """The joint's name."""
+
+
+@final
+@dataclass(frozen=True)
+class JointEffort:
+    """What its motor and its stops give the second body together, N m or N."""
+
+    joint: str
+    """The joint's name."""
+
+
+@final
+@dataclass(frozen=True)
+class Camera:
+    """A view for `World.render`; up is +z."""
+
+    eye: Numbers
+    """Where it is, m."""
+    look_at: Numbers
+    """The point in the middle of the picture, m."""
+    fov: float = 0.7
+    """Vertical angle of view, rad, 0.01 ... 3."""
+
+
 Solid = Plane | Ball | Box | Capsule | Cylinder
 Part = Ball | Box | Capsule | Cylinder | Tube | Sheet | SoftBox | SoftBall | SoftMesh | Rope
 JointKind = Revolute | Prismatic | Spherical | Weld
+Sensor = Imu | Pose | ContactForce | JointPosition | JointVelocity | JointEffort

@@ -59,6 +59,7 @@ mod order;
 mod passivity;
 mod problem;
 mod rebound;
+mod resistance;
 mod rows;
 mod scale;
 mod shifts;

@@ -133,8 +133,9 @@ pub struct Solver {
     stores: Stores,
     kept: Kept,
     pub(super) solution: Solution,
-    /// Storage of [`Self::held_compliance`].
+    /// Storage of [`Self::held_compliance`] and [`Self::resistance`], and what the latter found.
     pub(super) held: [Vec<DVec3>; 3],
+    pub(super) resisted: Vec<DVec3>,
 }
 
 impl Solver {

@@ -4,9 +4,10 @@
 //! are laid out, the solve.
 
 use super::memory::{Partner, Remembered};
+use super::pair_total::total_of;
 use super::spin_friction::Spin;
 use super::ties::place_key;
-use super::{ClusterMember, ClusterStepper, PairTotal, Participant, search};
+use super::{ClusterMember, ClusterStepper, Participant, search};
 use glam::DVec3;
 use metachron_core::{SimSpan, Wrench};
 
@@ -26,7 +27,6 @@ impl ClusterStepper {
         self.remember_spins(all, h_s);
         let Self { solver, search, ties, joints, outside, tearing, yielding, efforts, .. } = self;
         let solution = solver.solution();
-        self.totals.iter_mut().for_each(|total| total.last_n_s = 0.0);
         for (k, (owner, contact)) in search.owners.iter().zip(&search.contacts).enumerate() {
             let impulse = solution.contacts_n_s[k];
             let owed_slip_m = contact.owed_slip_after(impulse, solution.contacts_m_s[k], h_s);
@@ -49,8 +49,6 @@ impl ClusterStepper {
                 if impulse.length() > total.most_n_s {
                     (total.most_n_s, total.point_m, total.normal) = (impulse.length(), point_m, contact.normal);
                     total.inverse_mass_per_kg = solver.inverse_masses(k, self.progress[owner.member].place);
-                    let own_s = |member: usize| h_s * f64::from(self.progress[member].share);
-                    total.note_give([own_s(owner.member), owner.other.map_or(h_s, own_s)]);
                 }
             } else if contact.gap_m < self.depth_m {
                 // no nearer than what bears something lies deep: the two touch, though nothing presses them together now
@@ -104,59 +102,9 @@ impl ClusterStepper {
     }
 }
 
-impl PairTotal {
-    /// Adds the impulse of a contact or of a link's row.
-    pub(super) fn add(&mut self, impulse_n_s: DVec3, depth_m: f64) {
-        self.impulse_n_s += impulse_n_s;
-        self.last_n_s += impulse_n_s.length();
-        self.depth_m = self.depth_m.max(depth_m);
-        self.contacts += 1;
-    }
-
-    /// Notes how the two give way at the contact that bears most, where their own steps take `steps_s`.
-    fn note_give(&mut self, steps_s: [f64; 2]) {
-        let gives = self.inverse_mass_per_kg.into_iter().zip(steps_s);
-        self.give_m_per_n = gives.map(|(inverse_mass, own_s)| own_s * own_s * inverse_mass).sum();
-    }
-
-    /// How much more the pair bears for each metre that it is pressed together further within a step, N/m, ≥ 0: each place in proportion to what
-    /// it bears (coupling.md, eq. 7s). 0 where neither gives way, and where it is not known.
-    #[must_use]
-    pub fn stiffness_n_m(&self) -> f64 {
-        let stiffness_n_m = self.last_n_s / (self.most_n_s * self.give_m_per_n);
-        if stiffness_n_m.is_finite() { stiffness_n_m } else { 0.0 }
-    }
-}
-
 /// Adds an impulse at a point to what contacts gave a body, if that moves as a whole.
 fn give(wrench: &mut Wrench, member: &dyn ClusterMember, impulse_n_s: DVec3, point_m: DVec3) {
     if let Some(pose) = member.pose(&[], 0.0) {
         wrench.add(impulse_n_s, point_m - pose.centre_m);
     }
-}
-
-/// The total of a pair, made where it is new.
-pub(super) fn total_of(totals: &mut Vec<PairTotal>, member: usize, partner: Partner) -> &mut PairTotal {
-    let order = |total: &PairTotal| (total.member, total.partner);
-    let at = totals.binary_search_by_key(&(member, partner), order).unwrap_or_else(|at| {
-        let (impulse_n_s, contacts, depth_m) = (DVec3::ZERO, 0, 0.0);
-        totals.insert(
-            at,
-            PairTotal {
-                member,
-                partner,
-                impulse_n_s,
-                contacts,
-                depth_m,
-                most_n_s: 0.0,
-                point_m: DVec3::NAN,
-                normal: DVec3::ZERO,
-                inverse_mass_per_kg: [0.0; 2],
-                last_n_s: 0.0,
-                give_m_per_n: 0.0,
-            },
-        );
-        at
-    });
-    &mut totals[at]
 }

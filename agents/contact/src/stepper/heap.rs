@@ -5,8 +5,8 @@
 //! Never here: bodies that bend, which touch none of the heap; rows of springs and joints: these are solved before, as if nothing touched.
 //! Theory: docs/theory/clusters.md, section 9.
 
-use super::between_steps::total_of;
 use super::domain::{Domain, assign};
+use super::pair_total::total_of;
 use super::progress::Progress;
 use super::search::Search;
 use super::{ClusterReport, ClusterScene, Locked, PairTotal, Participant, Partner};

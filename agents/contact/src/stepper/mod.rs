@@ -17,6 +17,7 @@
 mod arms;
 mod between_steps;
 mod blows;
+mod divide;
 mod domain;
 mod doubling;
 mod foresight;
@@ -30,6 +31,8 @@ mod memory;
 mod motors;
 mod outside;
 mod own_springs;
+mod pair_total;
+mod participant;
 mod plan;
 mod progress;
 mod remote;
@@ -38,15 +41,15 @@ mod search;
 mod solve;
 mod spin_friction;
 mod springs;
+mod stiffness;
 mod tearing;
 mod ties;
 mod weighing;
 mod yielding;
 
-use crate::StepContext;
 use crate::cluster::{DEPTH_DEFAULT_M, Member, Settings, Solver};
-use crate::law::Law;
 use blows::Rebounds;
+use divide::times;
 pub use doubling::StepDoubling;
 use glam::DVec3;
 use heap::{Heap, Sums};
@@ -57,8 +60,10 @@ pub use matter::Matter;
 pub use member::{ClusterMember, Drive, Locked, MaterialPoint, OwnAttachment, OwnSpring, Pose, Role, Slid};
 pub use memory::{ContactMemory, Partner};
 use metachron_core::parallel::for_each;
-use metachron_core::{AgentId, Archive, ArchiveError, Grip, ParallelFor, SimSpan, StepError, Wrench, check_span};
+use metachron_core::{Archive, ArchiveError, ParallelFor, SimSpan, StepError, Wrench, check_span};
 pub use outside::{KnownImpulse, LineRow, Outside, RemoteImpulse};
+pub use pair_total::PairTotal;
+pub use participant::Participant;
 pub use plan::Plan;
 use progress::Progress;
 pub use remote::{RemoteMember, RemoteView};
@@ -71,59 +76,11 @@ use ties::{FineStep, Ties};
 pub use yielding::Yielded;
 use yielding::Yielding;
 
-/// The most times as many steps that a member makes whose motion strains it too far.
-const DIVIDED_MAX: u32 = 64;
-
-/// A body in its cluster's step.
-pub struct Participant<'a> {
-    /// The agent's number.
-    pub id: AgentId,
-    /// The body.
-    pub member: &'a mut dyn ClusterMember,
-    /// What it sees at the start of the macro step.
-    pub context: StepContext<'a>,
-    /// The laws of its pairs other than [`Law::Cluster`], by rising numbers: a pair with one is not the cluster's.
-    pub laws: &'a [(AgentId, Law)],
-    /// What it remembers of others.
-    pub memory: &'a mut ContactMemory,
-    /// Its own steps within the macro step: a power of two, at most 16; a rigid body makes the most of its cluster.
-    pub parts: u32,
-    /// How long a step it makes alone, seconds: so far ahead it looks for others.
-    pub alone_s: f64,
-    /// The forces of springs and grasps on it in the last fine step.
-    pub grips: &'a mut Vec<Grip>,
-}
-
 /// The surroundings of a macro step, and the threads that make it.
 #[derive(Clone, Copy)]
 struct On<'a> {
     scene: &'a ClusterScene,
     threads: &'a dyn ParallelFor,
-}
-
-impl Participant<'_> {
-    /// How many blocks of three velocities it has.
-    #[must_use]
-    pub fn size(&self) -> usize {
-        self.member.velocities().len()
-    }
-
-    /// Whether it touches `other` where the two meet. An asynchronous pair whose sides have come into one cluster has one clock in it.
-    fn may_touch(&self, other: &Self) -> bool {
-        let law = self.laws.binary_search_by_key(&other.id, |(id, _)| *id).ok().map(|at| self.laws[at].1);
-        let remote = [self, other].map(|one| one.member.is_remote());
-        let off = match remote {
-            [true, true] => true,
-            [false, false] => law.is_some_and(|law| !law.is_asynchronous()),
-            _ => law != Some(Law::Ledger),
-        };
-        !(off || self.member.spares(other.id) || other.member.spares(self.id)) && self.meets(other)
-    }
-
-    /// Whether neither lets the other pass by its collision groups.
-    fn meets(&self, other: &Self) -> bool {
-        self.member.skin().zip(other.member.skin()).is_some_and(|(mine, theirs)| mine.form.meets(theirs.form))
-    }
 }
 
 /// What a macro step was.
@@ -153,33 +110,6 @@ pub struct ClusterReport {
     pub work: f64,
 }
 
-/// What a pair of bodies, or a link, gave in a macro step.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct PairTotal {
-    /// The participant of lower number, by its place in the list.
-    pub member: usize,
-    /// What it touched, or by which of its links it is held.
-    pub partner: Partner,
-    /// The impulse on the participant, world axes, N·s.
-    pub impulse_n_s: DVec3,
-    /// Places that bore something, or rows of the link, counted in every fine step; zero for a pair that only touches.
-    pub contacts: u32,
-    /// The deepest overlap, metres, ≥ 0.
-    pub depth_m: f64,
-    /// The most that one contact gave, N·s; zero for links and in heaps.
-    pub most_n_s: f64,
-    /// Where that contact is, metres; not a number for links and in heaps.
-    pub point_m: DVec3,
-    /// Its normal, towards the participant, of length 1; zero for links and in heaps.
-    pub normal: DVec3,
-    /// How easily the participant and its partner give way at that contact along its normal, 1/kg, ≥ 0 (coupling.md, eq. 7h).
-    pub inverse_mass_per_kg: [f64; 2],
-    /// What its places gave in the last fine step, magnitudes summed, N·s.
-    pub last_n_s: f64,
-    /// By how much the two give way at that contact under a newton that lasts for a step of theirs, m/N, ≥ 0 (coupling.md, eq. 7s).
-    pub give_m_per_n: f64,
-}
-
 /// Steps clusters one after the other, and keeps structure and storage between them.
 pub struct ClusterStepper {
     /// How deep contacts rest in the scene of the macro step that is made, metres.
@@ -204,8 +134,9 @@ pub struct ClusterStepper {
     /// The participant of each member of the problem.
     places: Vec<usize>,
     outside: Outside,
-    /// Storage of local models.
+    /// Storage of local models, and of how the sides of contacts are moved.
     local: [Vec<DVec3>; 2],
+    moved_m_s: Vec<DVec3>,
     /// The macro step that is made and its fine steps, seconds.
     macro_s: f64,
     fine_s: f64,
@@ -237,6 +168,7 @@ impl Default for ClusterStepper {
             places: Vec::new(),
             outside: Outside::default(),
             local: Default::default(),
+            moved_m_s: Vec::new(),
             macro_s: 0.0,
             fine_s: 0.0,
             joints_ask: 1,
@@ -370,7 +302,11 @@ impl ClusterStepper {
             if self.divide_blows(all) || self.divide_joints(all) || self.divide(all, h_s) {
                 return Ok(false);
             }
-            self.remember(all, h_s, fine + 1 == parts, dt);
+            let is_last = fine + 1 == parts;
+            self.remember(all, h_s, is_last, dt);
+            if is_last {
+                self.note_stiffness(all, h_s);
+            }
             self.step_heap(all, h_s, report)?;
             self.end(all, h_s, threads)?;
             self.heap.place(all);
@@ -403,48 +339,6 @@ impl ClusterStepper {
             .step(all, &mut self.progress, h_s, Sums { totals: &mut self.totals, wrenches: &mut self.wrenches })?
             .add_to(report);
         Ok(())
-    }
-
-    /// Gives shorter steps to rigid members where blows follow each other in a fine step; whether they do.
-    fn divide_blows(&mut self, all: &[Participant<'_>]) -> bool {
-        let Some(wanted) = self.rebounds.wanted_parts() else { return false };
-        for (one, state) in all.iter().zip(&mut self.progress) {
-            if one.member.role() == Role::Rigid {
-                state.parts = state.parts.max(wanted);
-            }
-        }
-        true
-    }
-
-    /// Gives shorter steps to rigid members where joints ask for them; whether it does.
-    fn divide_joints(&mut self, all: &[Participant<'_>]) -> bool {
-        if self.joints_ask <= 1 {
-            return false;
-        }
-        let mut any = false;
-        for (one, state) in all.iter().zip(&mut self.progress).filter(|(one, _)| one.member.role() == Role::Rigid) {
-            let most = one.parts * DIVIDED_MAX;
-            any |= state.parts < most;
-            state.parts = (state.parts * self.joints_ask).min(most);
-        }
-        any
-    }
-
-    /// Gives shorter steps to members that the solution strains too far; whether there are any.
-    fn divide(&mut self, all: &[Participant<'_>], h_s: f64) -> bool {
-        let mut any = false;
-        for (one, state) in all.iter().zip(&mut self.progress) {
-            let so_far = one.member.strain(&state.before, h_s * f64::from(state.part));
-            // what is too much already grows through the rest of its step
-            let more = if so_far > 1.0 { times(so_far * f64::from(state.share) / f64::from(state.part)) } else { 1 };
-            // what its free motion asked for counts
-            let most = one.parts * DIVIDED_MAX;
-            if more > 1 && state.parts < most {
-                state.parts = (state.parts * more).min(most);
-                any = true;
-            }
-        }
-        any
     }
 
     /// Keeps what a macro step starts from.
@@ -582,13 +476,4 @@ impl ClusterStepper {
         }
         Ok(())
     }
-}
-
-/// How many times as many steps a member needs that this one strains so far, as a share of what it can take.
-fn times(strain: f64) -> u32 {
-    let mut times = 1;
-    while times < DIVIDED_MAX && strain > f64::from(times) {
-        times *= 2;
-    }
-    times
 }

@@ -77,7 +77,7 @@ pub fn touches(
     let (first, second) = (Pieces::of(a, known), Pieces::of(b, known));
     for (i, piece) in first.iter() {
         for (j, other) in second.iter() {
-            searches.touches([(i, piece), (j, other)], reach_m, into);
+            searches.touches([(i, &piece), (j, &other)], reach_m, into);
         }
     }
     finish(into);
@@ -169,7 +169,7 @@ pub fn self_touches(
             known.prepare_pieces(placed);
             for (_, piece) in Pieces::of(placed, known).iter() {
                 if let Piece::Surface(surface) = piece {
-                    searches.surfaces.self_touches(surface, rest, reach_m, into);
+                    searches.surfaces.self_touches(&surface, rest, reach_m, into);
                 }
             }
         }
@@ -209,7 +209,7 @@ pub fn gap(
     for (_, piece) in first.iter() {
         for (_, other) in second.iter() {
             let reach_m = nearest.map_or(reach_m, |(_, gap_m)| gap_m.min(reach_m));
-            let found = searches.gap(piece, other, reach_m);
+            let found = searches.gap(&piece, &other, reach_m);
             nearest = found.filter(|&(_, gap_m)| nearest.is_none_or(|(_, least)| gap_m < least)).or(nearest);
         }
     }

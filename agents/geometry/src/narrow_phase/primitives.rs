@@ -1,22 +1,42 @@
 //! The pieces of a form for contact: placed strands and blocks.
 //!
-//! In: a form and its place. Out: at most [`PARTS`] pieces with bounds. Never here: contacts.
+//! In: a form and its place. Out: its pieces with bounds. Never here: contacts.
 
-use super::shape_cache::{PARTS, ShapeCache};
+use super::shape_cache::{ShapeCache, ToolSolid};
 use super::skin;
 use super::skin_tree::PlacedSkin;
 use crate::capsule_chain::foot;
 use crate::signed_distance::{Ball, Field};
 use crate::{Aabb, Place, PlacedShape, ShapeKind, ShapePose, SolidShape, SurfaceShape};
-use crate::{CompoundPart, Solid};
+use crate::{CompoundPart, Solid, ToolShape};
 use glam::{DQuat, DVec3};
-use rapier3d::parry::shape::Shape;
+use rapier3d::parry::shape::{Shape, SharedShape};
 
-/// The pieces of a form.
-#[derive(Default)]
-pub(super) struct Pieces<'a>([Option<Piece<'a>>; PARTS]);
+/// The pieces of a form, each made where it is asked for: most forms have one, and a store for as many as any can have would be cleared and
+/// moved about with every pair that is looked at.
+#[derive(Clone, Copy)]
+pub(super) enum Pieces<'a> {
+    /// Of a form that has no others; `None` where it touches nothing.
+    One(Option<Piece<'a>>),
+    Compound {
+        parts: &'a [CompoundPart],
+        shapes: &'a [Option<SharedShape>],
+        /// Where its axes' origin is.
+        origin: DVec3,
+        rotation: DQuat,
+        known: &'a ShapeCache,
+    },
+    Tool {
+        shape: &'a ToolShape,
+        solids: &'a [ToolSolid],
+        tip: DVec3,
+        rotation: DQuat,
+        jaw: f64,
+    },
+}
 
 /// A piece of a form.
+#[derive(Clone, Copy)]
 pub(super) enum Piece<'a> {
     Strand(Strand<'a>),
     Block(Block<'a>),
@@ -24,6 +44,7 @@ pub(super) enum Piece<'a> {
 }
 
 /// The skin of a soft body.
+#[derive(Clone, Copy)]
 pub(super) struct Surface<'a> {
     pub form: &'a SurfaceShape,
     /// Where its vertices are, metres.
@@ -35,6 +56,7 @@ pub(super) struct Surface<'a> {
 }
 
 /// Balls joined by spans.
+#[derive(Clone, Copy)]
 pub(super) struct Strand<'a> {
     nodes: Nodes<'a>,
     /// Lowest and highest coordinates of the nodes.
@@ -52,6 +74,7 @@ pub(super) struct StrandPoint {
     pub share: f64,
 }
 
+#[derive(Clone, Copy)]
 enum Nodes<'a> {
     /// A ball or capsule: one or two nodes, and the radius.
     Solid([DVec3; 2], usize, f64),
@@ -59,6 +82,7 @@ enum Nodes<'a> {
 }
 
 /// A solid that is no strand.
+#[derive(Clone, Copy)]
 pub(super) struct Block<'a> {
     /// Its distance field, in its own axes; `None` where no strand is near.
     pub field: Option<&'a Field>,
@@ -79,48 +103,62 @@ pub(super) struct Block<'a> {
 impl<'a> Pieces<'a> {
     /// Decomposes a form.
     pub fn of(placed: &PlacedShape<'a>, known: &'a ShapeCache) -> Self {
-        let mut pieces = Self::default();
         match (&placed.form.kind, placed.view) {
-            (ShapeKind::Chain, ShapePose::Chain { positions, radii_m }) => pieces.0[0] = tube(positions, radii_m),
+            (ShapeKind::Chain, ShapePose::Chain { positions, radii_m }) => Self::One(tube(positions, radii_m)),
             (ShapeKind::Solid(form), ShapePose::Solid { position, rotation }) => {
                 let SolidShape { solid, com_local, radius_m, .. } = form;
                 let origin = position - rotation * *com_local;
-                let radius_m = if matches!(solid, Solid::Plane) { f64::INFINITY } else { *radius_m };
                 if let Solid::Compound { parts } = solid {
-                    for (piece, part) in pieces.0.iter_mut().zip(parts.iter()) {
-                        let at = Standing::part(part, origin, rotation);
-                        *piece = known.part(&part.solid).map(|shape| at.piece(&part.solid, shape.as_ref(), known));
-                    }
-                } else {
-                    let around = Ball { centre: position, radius_m };
-                    let at = Standing { origin, rotation, around };
-                    pieces.0[0] = Some(at.piece(solid, known.shape(form).as_ref(), known));
+                    let Some(shapes) = known.compound(parts) else { return Self::One(None) };
+                    return Self::Compound { parts, shapes, origin, rotation, known };
                 }
+                let radius_m = if matches!(solid, Solid::Plane) { f64::INFINITY } else { *radius_m };
+                let at = Standing { origin, rotation, around: Ball { centre: position, radius_m } };
+                Self::One(Some(at.piece(solid, known.shape(form).as_ref(), known)))
             }
-            (ShapeKind::Tool(shape), ShapePose::Tool { tip, rotation, jaw }) => {
-                let solids = known.tool(shape).into_iter().flatten();
-                for ((piece, part), solid) in pieces.0.iter_mut().zip(shape.parts(jaw)).zip(solids) {
-                    let origin = tip + rotation * part.position;
-                    let rotation = rotation * part.rotation;
-                    let around = Ball { centre: origin + rotation * solid.around.centre, ..solid.around };
-                    let field = Some(&solid.field);
-                    let (shape, deep_m) = (solid.shape.as_ref(), 2.0 * around.radius_m);
-                    let pierces = true;
-                    *piece = Some(Piece::Block(Block { field, shape, origin, rotation, around, deep_m, pierces }));
-                }
-            }
+            (ShapeKind::Tool(shape), ShapePose::Tool { tip, rotation, jaw }) => match known.tool(shape) {
+                Some(solids) => Self::Tool { shape, solids, tip, rotation, jaw },
+                None => Self::One(None),
+            },
             (ShapeKind::Surface(form), ShapePose::Surface(positions)) => {
                 let surface = |skin: &'a PlacedSkin| Surface { form, positions, bounds: skin.bounds(), skin };
-                pieces.0[0] = known.skins.placed(form, positions).map(surface).map(Piece::Surface);
+                Self::One(known.skins.placed(form, positions).map(surface).map(Piece::Surface))
             }
-            _ => {}
+            _ => Self::One(None),
         }
-        pieces
+    }
+
+    /// The most numbers that pieces have.
+    const fn count(&self) -> usize {
+        match self {
+            Self::One(_) => 1,
+            Self::Compound { parts, .. } => parts.len(),
+            Self::Tool { solids, .. } => solids.len(),
+        }
+    }
+
+    /// The piece of a number; `None` where there is none, or it has no shape.
+    pub fn get(&self, number: usize) -> Option<Piece<'a>> {
+        match *self {
+            Self::One(piece) => piece.filter(|_| number == 0),
+            Self::Compound { parts, shapes, origin, rotation, known } => {
+                let (part, shape) = (parts.get(number)?, shapes.get(number)?.as_ref()?);
+                Some(Standing::part(part, origin, rotation).piece(&part.solid, shape.as_ref(), known))
+            }
+            Self::Tool { shape, solids, tip, rotation, jaw } => {
+                let (solid, part) = (solids.get(number)?, shape.parts(jaw)[number]);
+                let origin = tip + rotation * part.position;
+                let rotation = rotation * part.rotation;
+                let around = Ball { centre: origin + rotation * solid.around.centre, ..solid.around };
+                let (field, shape, deep_m) = (Some(&solid.field), solid.shape.as_ref(), 2.0 * around.radius_m);
+                Some(Piece::Block(Block { field, shape, origin, rotation, around, deep_m, pierces: true }))
+            }
+        }
     }
 
     /// The pieces with their numbers.
-    pub fn iter(&self) -> impl Iterator<Item = (usize, &Piece<'a>)> {
-        self.0.iter().enumerate().filter_map(|(i, piece)| Some((i, piece.as_ref()?)))
+    pub fn iter(&self) -> impl Iterator<Item = (usize, Piece<'a>)> {
+        (0..self.count()).filter_map(|number| Some((number, self.get(number)?)))
     }
 }
 

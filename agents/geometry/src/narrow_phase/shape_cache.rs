@@ -5,13 +5,11 @@
 use super::skin_tree::SkinCache;
 use crate::signed_distance::{Ball, Field};
 use crate::{Aabb, PlacedShape, ShapeKind, ShapePose, SolidShape};
-use crate::{COMPOUND_PARTS_MAX, Primitive, ShapeError, Solid, ToolPart, ToolShape, is_closed, mesh_triangles};
+use crate::{CompoundPart, Primitive, ShapeError, Solid, ToolPart, ToolShape, is_closed, mesh_triangles};
 use glam::DVec3;
 use rapier3d::parry::shape::SharedShape;
 use std::sync::Arc;
 
-/// The most parts of a form: a compound has no more, and a tool has fewer.
-pub(super) const PARTS: usize = COMPOUND_PARTS_MAX;
 /// How many parts a tool has.
 const TOOL_PARTS: usize = 6;
 /// The level of the jaw's mesh whose hull touches: past it the hull grows by less than a hundredth of the jaw's thickness.
@@ -22,11 +20,16 @@ const JAW_LEVEL: u8 = 2;
 pub(super) struct ShapeCache {
     fields: Vec<(Solid, Option<Field>)>,
     hulls: Vec<(Solid, Option<SharedShape>)>,
-    /// Parts of compounds.
-    parts: Vec<(Solid, Option<SharedShape>)>,
+    compounds: Vec<CompoundShapes>,
     tools: Vec<(ToolShape, Option<[ToolSolid; TOOL_PARTS]>)>,
     /// Skins where they were last.
     pub skins: SkinCache,
+}
+
+/// The shapes of the parts of a compound, `None` of a part that has none.
+struct CompoundShapes {
+    parts: Arc<[CompoundPart]>,
+    shapes: Box<[Option<SharedShape>]>,
 }
 
 /// A part of a tool as a solid.
@@ -56,7 +59,7 @@ impl ShapeCache {
     pub fn prepare_pieces(&mut self, placed: &PlacedShape<'_>) {
         match (&placed.form.kind, placed.view) {
             (ShapeKind::Solid(SolidShape { solid: Solid::Compound { parts }, .. }), _) => {
-                parts.iter().for_each(|part| self.prepare_part(&part.solid));
+                self.prepare_compound(parts);
             }
             (ShapeKind::Solid(SolidShape { solid, shape, .. }), _) if shape.as_trimesh().is_some() => {
                 self.prepare_hull(solid)
@@ -83,9 +86,10 @@ impl ShapeCache {
         }
     }
 
-    fn prepare_part(&mut self, solid: &Solid) {
-        if !self.parts.iter().any(|(known, _)| is_same(known, solid)) {
-            self.parts.push((solid.clone(), solid.to_moving_shape().ok()));
+    fn prepare_compound(&mut self, parts: &Arc<[CompoundPart]>) {
+        if self.compound(parts).is_none() {
+            let shapes = parts.iter().map(|part| part.solid.to_moving_shape().ok()).collect();
+            self.compounds.push(CompoundShapes { parts: Arc::clone(parts), shapes });
         }
     }
 
@@ -107,14 +111,14 @@ impl ShapeCache {
         hull.and_then(|(_, hull)| hull.as_ref()).unwrap_or(shape)
     }
 
-    /// The cached shape of a part of a compound.
-    pub fn part(&self, solid: &Solid) -> Option<&SharedShape> {
-        self.parts.iter().find(|(known, _)| is_same(known, solid))?.1.as_ref()
+    /// The cached shapes of the parts of a compound, `None` of a part that has none.
+    pub fn compound(&self, parts: &Arc<[CompoundPart]>) -> Option<&[Option<SharedShape>]> {
+        Some(&self.compounds.iter().find(|known| Arc::ptr_eq(&known.parts, parts))?.shapes)
     }
 
     /// The cached solids of a tool.
-    pub fn tool(&self, shape: &ToolShape) -> Option<&[ToolSolid; TOOL_PARTS]> {
-        self.tools.iter().find(|(known, _)| known == shape)?.1.as_ref()
+    pub fn tool(&self, shape: &ToolShape) -> Option<&[ToolSolid]> {
+        Some(self.tools.iter().find(|(known, _)| known == shape)?.1.as_ref()?)
     }
 }
 

@@ -228,7 +228,7 @@ impl StaticSolid {
                 deep_m: 2.0 * around.radius_m,
                 pierces: false,
             });
-            searches.touches([(number, piece), (0, &slab)], reach_m, into);
+            searches.touches([(number, &piece), (0, &slab)], reach_m, into);
         }
     }
 
@@ -250,11 +250,11 @@ impl StaticSolid {
         let whole = Piece::Block(Block { field, shape, origin, rotation, around, deep_m, pierces: false });
         for (number, piece) in Pieces::of(body, known).iter() {
             let from = into.len();
-            if let Piece::Block(block) = piece {
+            if let Piece::Block(block) = &piece {
                 searches.blocks.touches_mesh(block, &placed, reach_m, into);
                 into[from..].iter_mut().for_each(|touch| touch.key.pieces = [number as u8, 0]);
             } else {
-                searches.touches([(number, piece), (0, &whole)], reach_m, into);
+                searches.touches([(number, &piece), (0, &whole)], reach_m, into);
             }
         }
     }

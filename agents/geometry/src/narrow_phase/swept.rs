@@ -370,7 +370,7 @@ impl<'a> Elements<'a> {
                 Aabb::of(&start).union(Aabb::of(&end)).grown(wide_m)
             }
             Element::Rigid { way, piece, turned_m, .. } => {
-                let around = self.pieces.iter().find(|(number, _)| *number == piece).map(|(_, piece)| piece.around());
+                let around = self.pieces.get(piece).map(|piece| piece.around());
                 let Some(around) = around else { return Aabb { low: DVec3::NAN, high: DVec3::NAN } };
                 let wide_m = around.radius_m + turned_m[1];
                 Aabb::about(around.centre, wide_m).union(Aabb::about(around.centre + way.way, wide_m))
@@ -413,9 +413,7 @@ impl<'a> Element<'a> {
             }
             Self::Rigid { elements, piece, part, .. } => {
                 let placed = elements.shape.rigid_within(share)?;
-                let pieces = Pieces::of(&placed, elements.known);
-                let (_, piece) = pieces.iter().find(|(number, _)| *number == piece)?;
-                match piece {
+                match &Pieces::of(&placed, elements.known).get(piece)? {
                     Piece::Strand(strand) => {
                         let [a, b] = strand.ends(part);
                         let radii_m = [a.radius_m, b.radius_m, b.radius_m];

@@ -27,6 +27,8 @@ pub struct RigidBody {
     pub(super) radius_m: f64,
     /// The mean acceleration of the last step, m/s².
     pub(super) acceleration: DVec3,
+    /// How its spin changed in the mean of that step, rad/s².
+    pub(super) angular_acceleration: DVec3,
     pub(super) at_rest: bool,
     pub(super) calm_s: f64,
     pub(super) steps: u64,
@@ -69,6 +71,7 @@ impl RigidBody {
             form: Arc::new(form),
             radius_m,
             acceleration: flight.gravity,
+            angular_acceleration: DVec3::ZERO,
             at_rest: false,
             calm_s: 0.0,
             steps: 0,
@@ -130,7 +133,8 @@ impl Agent for RigidBody {
             return false;
         }
         *motion = to;
-        (self.at_rest, self.calm_s, self.acceleration) = (false, 0.0, DVec3::ZERO);
+        (self.at_rest, self.calm_s) = (false, 0.0);
+        (self.acceleration, self.angular_acceleration) = (DVec3::ZERO, DVec3::ZERO);
         self.unknowns.start([velocity, spin_rad_s]);
         true
     }
@@ -170,12 +174,14 @@ impl Agent for RigidBody {
         into.energy_j = self.motion.energy_j(&self.spread, self.flight.gravity);
         into.residual_m = (self.motion.position.abs().max_element() + self.radius_m) * f64::EPSILON;
         (into.at_rest, into.acceleration) = (self.at_rest, self.acceleration);
+        into.angular_acceleration = self.angular_acceleration;
         into.inertia = self.answers();
         into.bounds = Some(self.bounds());
     }
 
     fn archive(&mut self, archive: &mut Archive<'_>) -> Result<(), ArchiveError> {
-        archive_values!(archive, self.motion, self.acceleration, self.at_rest, self.calm_s, self.steps)?;
+        archive_values!(archive, self.motion, self.acceleration, self.angular_acceleration)?;
+        archive_values!(archive, self.at_rest, self.calm_s, self.steps)?;
         self.unknowns.archive(archive)
     }
 

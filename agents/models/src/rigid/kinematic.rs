@@ -283,13 +283,4 @@ impl Agent for KinematicBody {
     fn member(&mut self) -> Option<&mut dyn ClusterMember> {
         Some(self)
     }
-
-    /// It is driven from outside and has no mass here.
-    fn momentum(&self) -> (DVec3, DVec3) {
-        (DVec3::ZERO, DVec3::ZERO)
-    }
-
-    fn mass_kg(&self) -> f64 {
-        0.0
-    }
 }

@@ -47,6 +47,7 @@ pub(super) struct Unknowns {
 struct Kept {
     motion: Motion,
     acceleration: DVec3,
+    angular_acceleration: DVec3,
     calm_s: f64,
     at_rest: bool,
     steps: u64,
@@ -217,14 +218,15 @@ impl ClusterMember for RigidBody {
     }
 
     fn keep(&mut self) {
-        let Self { motion, acceleration, calm_s, at_rest, steps, .. } = *self;
-        self.unknowns.kept = Some(Kept { motion, acceleration, calm_s, at_rest, steps });
+        let Self { motion, acceleration, angular_acceleration, calm_s, at_rest, steps, .. } = *self;
+        self.unknowns.kept = Some(Kept { motion, acceleration, angular_acceleration, calm_s, at_rest, steps });
     }
 
     fn go_back(&mut self) {
-        let Some(Kept { motion, acceleration, calm_s, at_rest, steps }) = self.unknowns.kept else { return };
-        (self.motion, self.acceleration, self.calm_s) = (motion, acceleration, calm_s);
-        (self.at_rest, self.steps) = (at_rest, steps);
+        let Some(kept) = self.unknowns.kept else { return };
+        let Kept { motion, acceleration, angular_acceleration, calm_s, at_rest, steps } = kept;
+        (self.motion, self.acceleration, self.angular_acceleration) = (motion, acceleration, angular_acceleration);
+        (self.calm_s, self.at_rest, self.steps) = (calm_s, at_rest, steps);
     }
 
     fn move_to(&mut self, _v: &[DVec3], _t_s: f64) {
@@ -238,8 +240,10 @@ impl ClusterMember for RigidBody {
             self.motion = before;
             return Err(self.diverged(h_s, "the body left the coordinate range"));
         }
+        let spin = self.motion.spin(&self.spread);
         self.acceleration = (self.motion.velocity - before.velocity) / h_s;
-        self.unknowns.now = [self.motion.velocity, self.motion.spin(&self.spread)];
+        self.angular_acceleration = (spin - before.spin(&self.spread)) / h_s;
+        self.unknowns.now = [self.motion.velocity, spin];
         self.steps += 1;
         self.at_rest = false;
         self.count_calm(&before, h_s, touched);
@@ -253,7 +257,7 @@ impl ClusterMember for RigidBody {
     fn rest(&mut self) {
         self.at_rest = true;
         (self.motion.velocity, self.motion.angular) = (DVec3::ZERO, DVec3::ZERO);
-        self.acceleration = DVec3::ZERO;
+        (self.acceleration, self.angular_acceleration) = (DVec3::ZERO, DVec3::ZERO);
         self.unknowns.now = [DVec3::ZERO; 2];
     }
 }

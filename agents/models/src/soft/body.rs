@@ -18,8 +18,8 @@ use glam::DVec3;
 use metachron_contact::stepper::ClusterMember;
 use metachron_contact::{Agent, AnchorSpring, Carving, SetMotion, StepContext};
 use metachron_core::{
-    Archive, ArchiveError, Body, Bounds, Grip, Removed, Resolution, SimSpan, Snapshot, SoftState, StepError,
-    StepReport, check_span,
+    Archive, ArchiveError, Body, Bounds, Grip, Removed, Resolution, SimSpan, Snapshot, StepError, StepReport,
+    check_span,
 };
 use metachron_geometry::{Aabb, Carried, CollisionShape, ShapeKind};
 use std::sync::Arc;
@@ -75,6 +75,7 @@ impl SoftBody {
         let rotation = spec.rotation.normalize();
         let positions: Vec<_> = mesh.rest.iter().map(|rest| spec.position + rotation * *rest).collect();
         let velocities: Vec<_> = mesh.held.iter().map(|&held| if held { DVec3::ZERO } else { spec.velocity }).collect();
+        mesh.begin_turns(&positions);
         let system = mesh.system(&positions);
         let mut body = Self {
             system,
@@ -145,13 +146,6 @@ impl SoftBody {
         self.before.clone_from(&self.velocities);
         (self.quiet_s, self.at_rest) = (0.0, false);
         self.follow();
-    }
-
-    /// Its skin in the form of a snapshot.
-    #[must_use]
-    pub fn start(&self) -> Body {
-        let velocities = self.skin.as_ref().map_or(&self.velocities, |skin| &skin.velocities);
-        Body::Soft(SoftState { positions: self.seen().to_vec(), velocities: velocities.clone() })
     }
 
     /// The specification it was built from.
@@ -259,21 +253,30 @@ impl Agent for SoftBody {
             *x = whole.place(*x);
             *v = if *held { DVec3::ZERO } else { whole.velocity(*x, *v) };
         }
+        if whole.shifts() {
+            mesh.begin_turns(positions);
+        }
         self.woken();
         true
     }
 
     fn set_state(&mut self, state: &Body) -> Result<(), String> {
         let Body::Soft(state) = state else { return Err("a soft body has the state of vertices".to_owned()) };
-        if self.skin.is_some() {
-            return Err("what others see of it is carried by other nodes: restore a checkpoint instead".to_owned());
-        }
-        let Self { positions, velocities, mesh, .. } = self;
-        check_nodes(positions, [&state.positions, &state.velocities], |at| mesh.held[at])?;
-        for (at, (x, v)) in state.positions.iter().zip(&state.velocities).enumerate().filter(|(at, _)| !mesh.held[*at])
-        {
+        let (to, to_m_s) = match (&self.skin, &state.nodes) {
+            (None, _) => (&state.positions, &state.velocities),
+            (Some(_), Some(nodes)) => (&nodes.positions, &nodes.velocities),
+            (Some(_), None) => {
+                return Err(format!("it is carried by {} nodes; the state has none", self.positions.len()));
+            }
+        };
+        let Self { positions, velocities, mesh, skin, .. } = self;
+        // what is held stays where it is
+        check_nodes(positions, [to, to_m_s], |_| false)?;
+        for (at, (x, v)) in to.iter().zip(to_m_s).enumerate().filter(|(at, _)| !mesh.held[*at]) {
             (positions[at], velocities[at]) = (*x, *v);
         }
+        mesh.begin_turns(positions);
+        skin.iter_mut().for_each(Skin::end_easing);
         self.woken();
         Ok(())
     }

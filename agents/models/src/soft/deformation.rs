@@ -15,6 +15,19 @@ pub(super) fn outer(a: DVec3, b: DVec3) -> DMat3 {
     DMat3::from_cols(a * b.x, a * b.y, a * b.z)
 }
 
+/// Where to begin with a rotation of which nothing is known: none, or the half turn about the axis by which `f` is nearest to one. No rotation is
+/// farther from all four than a third of a turn, and none is where Newton's method finds no way on, half a turn away.
+pub(super) fn first_turn(f: DMat3) -> DQuat {
+    let [x, y, z] = [f.x_axis.x, f.y_axis.y, f.z_axis.z];
+    // traces of RᵀF
+    let halves = [(x - y - z, DVec3::X), (y - z - x, DVec3::Y), (z - x - y, DVec3::Z)];
+    let none = (x + y + z, DQuat::IDENTITY);
+    let nearer = |best: (f64, DQuat), (trace, axis): (f64, DVec3)| {
+        if trace > best.0 { (trace, DQuat::from_vec4(axis.extend(0.0))) } else { best }
+    };
+    halves.into_iter().fold(none, nearer).1
+}
+
 /// Moves a rotation to the one nearest to `f`, by Newton's method on the trace of RᵀF from where it is (eq. 12); returns the matrix that
 /// maps a change of F to a further rotation.
 pub(super) fn follow_turn(turn: &mut DQuat, f: DMat3) -> DMat3 {

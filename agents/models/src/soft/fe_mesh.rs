@@ -248,6 +248,13 @@ impl FeMesh {
         all.zip(turns).for_each(|(own, turn)| *own = *turn);
     }
 
+    /// Forgets the rotations of the cells: what is followed next depends on these positions alone.
+    pub fn begin_turns(&mut self, positions: &[DVec3]) {
+        let Self { hexahedra, kinds, tetrahedra, .. } = self;
+        hexahedra.iter_mut().for_each(|cell| cell.begin_turn(&kinds[cell.kind], positions));
+        tetrahedra.iter_mut().for_each(|element| element.begin_turn(positions));
+    }
+
     /// Elastic energy, J; uses updated rotations of the cells.
     pub fn energy_j(&self, positions: &[DVec3]) -> f64 {
         let bars: f64 = self.bars.iter().map(|bar| bar.energy_j(positions)).sum();

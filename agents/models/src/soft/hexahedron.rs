@@ -3,7 +3,7 @@
 //! In: corners at rest and now. Out: forces and stiffness. Theory: docs/theory/soft.md, eq. 10–14, 32: the incompatible modes of (TBW76)
 //! let the cell bend without locking, and its forces are the exact gradient of its energy, so that they exert no net torque.
 
-use super::deformation::{ConstantStrain, Deformation, follow_turn, outer};
+use super::deformation::{ConstantStrain, Deformation, first_turn, follow_turn, outer};
 use super::material::{Lame, Law, Material};
 use super::spec::SoftMatter;
 use super::system::System;
@@ -209,6 +209,11 @@ struct Bent {
 impl Hexahedron {
     const fn strain<'a>(&self, kind: &'a HexahedronKind) -> ConstantStrain<'a, 8> {
         ConstantStrain { vertices: self.vertices, gradients: &kind.gradients, volume_m3: kind.volume_m3 * self.fill }
+    }
+
+    /// Forgets the rotation of the cell, which is found anew from these positions.
+    pub fn begin_turn(&mut self, kind: &HexahedronKind, positions: &[DVec3]) {
+        self.turn = first_turn(self.strain(kind).gradient(positions));
     }
 
     /// Updates the rotation of the cell; returns how it is deformed on the mean.

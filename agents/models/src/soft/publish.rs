@@ -3,7 +3,7 @@
 //! In: a body between two steps. Out: its vertices. Never here: any change of its state.
 
 use super::body::SoftBody;
-use metachron_core::Snapshot;
+use metachron_core::{Body, Snapshot, SoftState};
 
 impl SoftBody {
     /// Writes everything but the time.
@@ -19,10 +19,29 @@ impl SoftBody {
         into.grips.clone_from(&self.grips);
         (into.at_rest, into.acceleration) = (self.at_rest, self.acceleration);
         into.bounds = Some(self.bounds());
-        let soft = into.body.soft_mut();
-        let (positions, velocities) =
-            self.skin.as_ref().map_or((&self.positions, &self.velocities), |skin| (&skin.positions, &skin.velocities));
-        soft.positions.clone_from(positions);
-        soft.velocities.clone_from(velocities);
+        self.write_state(into.body.soft_mut());
+    }
+
+    /// Writes its vertices, and what carries them.
+    fn write_state(&self, into: &mut SoftState) {
+        let Some(skin) = &self.skin else {
+            into.positions.clone_from(&self.positions);
+            into.velocities.clone_from(&self.velocities);
+            into.nodes = None;
+            return;
+        };
+        into.positions.clone_from(&skin.positions);
+        into.velocities.clone_from(&skin.velocities);
+        let nodes = into.nodes.get_or_insert_default();
+        nodes.positions.clone_from(&self.positions);
+        nodes.velocities.clone_from(&self.velocities);
+    }
+
+    /// Its state as a snapshot has it.
+    #[must_use]
+    pub fn start(&self) -> Body {
+        let mut state = SoftState::default();
+        self.write_state(&mut state);
+        Body::Soft(state)
     }
 }

@@ -116,6 +116,11 @@ impl Skin {
         self.apart.forget_rounding();
     }
 
+    /// Puts it where its nodes carry it, with the next [`Self::follow`].
+    pub fn end_easing(&mut self) {
+        self.apart = Apart::default();
+    }
+
     /// Moves it on to where its nodes carry it, by what goes in `h` seconds (eq. 24a).
     pub fn ease(&mut self, h: f64) {
         let left = libm::exp(-h / EASE_S);

@@ -2,7 +2,7 @@
 //!
 //! In: corners at rest and now. Out: forces and stiffness. Never here: material laws. Theory: docs/theory/soft.md, section 9.
 
-use super::deformation::{ConstantStrain, Deformation, follow_turn};
+use super::deformation::{ConstantStrain, Deformation, first_turn, follow_turn};
 use super::material::{Law, Material};
 use super::system::System;
 use glam::{DMat3, DQuat, DVec3};
@@ -37,6 +37,11 @@ impl Tetrahedron {
 
     const fn strain(&self) -> ConstantStrain<'_, 4> {
         ConstantStrain { vertices: self.vertices, gradients: &self.gradients, volume_m3: self.volume_m3 }
+    }
+
+    /// Forgets its rotation, which is found anew from these positions.
+    pub fn begin_turn(&mut self, positions: &[DVec3]) {
+        self.turn = first_turn(self.strain().gradient(positions));
     }
 
     /// Updates its rotation; returns how it is deformed.

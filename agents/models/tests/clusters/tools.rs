@@ -244,14 +244,6 @@ impl Agent for Pusher {
         into.clear();
     }
 
-    fn momentum(&self) -> (DVec3, DVec3) {
-        (DVec3::ZERO, DVec3::ZERO)
-    }
-
-    fn mass_kg(&self) -> f64 {
-        0.0
-    }
-
     fn member(&mut self) -> Option<&mut dyn ClusterMember> {
         Some(self)
     }

@@ -2,6 +2,7 @@
 //!
 //! In: the depths that a picture left. Out: a pass into the picture's target; numbers. Never here: what was drawn.
 
+use super::super::full_screen::{FullScreen, cover};
 use super::super::offscreen::{DeviceLoss, Gpu, GpuError, read_bytes};
 use super::super::view::Camera;
 use super::Renderer;
@@ -24,14 +25,6 @@ impl DepthPass {
         } else {
             SHADER.to_owned()
         };
-        let source = wgpu::ShaderSource::Wgsl(source.into());
-        let module = device.create_shader_module(wgpu::ShaderModuleDescriptor { label: Some("depth"), source });
-        let entry = |binding, ty| wgpu::BindGroupLayoutEntry {
-            binding,
-            visibility: wgpu::ShaderStages::FRAGMENT,
-            ty,
-            count: None,
-        };
         let depths = wgpu::BindingType::Texture {
             sample_type: wgpu::TextureSampleType::Depth,
             view_dimension: wgpu::TextureViewDimension::D2,
@@ -42,36 +35,10 @@ impl DepthPass {
             has_dynamic_offset: false,
             min_binding_size: None,
         };
-        let layout = device.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor {
-            label: Some("depth"),
-            entries: &[entry(0, depths), entry(1, uniform)],
-        });
-        let pipeline_layout = device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
-            label: Some("depth"),
-            bind_group_layouts: &[Some(&layout)],
-            immediate_size: 0,
-        });
-        let pipeline = device.create_render_pipeline(&wgpu::RenderPipelineDescriptor {
-            label: Some("depth"),
-            layout: Some(&pipeline_layout),
-            vertex: wgpu::VertexState {
-                module: &module,
-                entry_point: Some("vs_depth"),
-                compilation_options: wgpu::PipelineCompilationOptions::default(),
-                buffers: &[],
-            },
-            primitive: wgpu::PrimitiveState::default(),
-            depth_stencil: None,
-            multisample: wgpu::MultisampleState::default(),
-            fragment: Some(wgpu::FragmentState {
-                module: &module,
-                entry_point: Some("fs_depth"),
-                compilation_options: wgpu::PipelineCompilationOptions::default(),
-                targets: &[Some(format.into())],
-            }),
-            multiview_mask: None,
-            cache: None,
-        });
+        let bindings = [depths, uniform];
+        let pass = FullScreen { label: "depth", fragments: &source, bindings: &bindings, target: format };
+        let layout = pass.layout(device);
+        let [pipeline] = pass.pipelines(device, &layout, ["fs_depth"]);
         Self { pipeline, layout }
     }
 }
@@ -108,9 +75,7 @@ impl Renderer {
             color_attachments: &[Some(attachment)],
             ..Default::default()
         });
-        drawn.set_pipeline(&pass.pipeline);
-        drawn.set_bind_group(0, &group, &[]);
-        drawn.draw(0..3, 0..1);
+        cover(&mut drawn, &pass.pipeline, &group);
         1
     }
 

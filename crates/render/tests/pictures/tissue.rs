@@ -44,7 +44,7 @@ fn draw_part(
     stage.set_shape(AgentId(0), &CollisionShape::new(ShapeKind::Surface(carved), 0.0));
     stage.set_environment(Environment::Endoscope);
     let positions: Vec<DVec3> = made.points.iter().map(|p| *p + moved).collect();
-    let body = Body::Soft(SoftState { velocities: vec![DVec3::ZERO; positions.len()], positions });
+    let body = Body::Soft(SoftState { velocities: vec![DVec3::ZERO; positions.len()], positions, nodes: None });
     stage.set_snapshot(AgentId(0), &Arc::new(Snapshot { body, ..Snapshot::default() }), true);
     stage.pose(SimTime::ZERO, States::Latest);
     let camera = Camera::looking(moved + DVec3::new(0.6, -3.0, 1.0), moved, 0.6);

@@ -80,6 +80,11 @@ impl PublishedBounds {
         Ok(())
     }
 
+    /// Forgets it; called between turns.
+    pub fn clear(&self) {
+        self.0.clear();
+    }
+
     /// The last written box.
     pub fn read(&self) -> ReadBounds {
         for _ in 0..TRIES {

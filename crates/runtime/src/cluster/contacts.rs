@@ -33,19 +33,20 @@ impl ClusterSeat {
                 normal: total.normal,
                 force_n,
                 greatest_n: force_n,
-                told_n: force_n.length(),
+                reported_n: force_n.length(),
                 depth_m: total.depth_m,
-                stiffness_n_m: total.stiffness_n_m(),
+                stiffness_n_m: total.stiffness_n_m,
             };
             match self.contacts.binary_search_by_key(&with, |contact| contact.with) {
                 Ok(at) => {
                     let before = &mut self.contacts[at];
                     let greater = force_n.length_squared() > before.greatest_n.length_squared();
                     let greatest_n = if greater { force_n } else { before.greatest_n };
-                    let grew = force_n.length() > GREW_BY * before.told_n;
-                    let told_n = if grew { force_n.length() } else { before.told_n };
+                    let grew = force_n.length() > GREW_BY * before.reported_n;
+                    let reported_n = if grew { force_n.length() } else { before.reported_n };
                     let here = if total.contacts > 0 { seen } else { ContactState { places: 0, force_n, ..*before } };
-                    *before = ContactState { since: before.since, greatest_n, told_n, depth_m: total.depth_m, ..here };
+                    *before =
+                        ContactState { since: before.since, greatest_n, reported_n, depth_m: total.depth_m, ..here };
                     if grew {
                         streams.event(&AgentEvent { at: now, kind: EventKind::ContactGrew(event(before)) });
                     }

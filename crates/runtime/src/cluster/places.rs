@@ -35,7 +35,7 @@ pub(in super::super) fn take_apart(
 ) -> Vec<Placed> {
     let mut all = Vec::with_capacity(handles.len());
     home.flatten().for_each(|runner| take(runner, Place::Home, &mut all));
-    for (handle, handover) in handles.iter().filter_map(|handle| Some((handle, handle.shared.handover.as_ref()?))) {
+    for (handle, handover) in handles.iter().filter_map(|handle| Some((handle, handle.shared.handover()?))) {
         let mut arrivals = handover.arrivals.lock().unwrap_or_else(PoisonError::into_inner);
         for (before, runner) in arrivals.drain(..).enumerate() {
             take(runner, Place::Waiting { leader: handle.id(), before }, &mut all);
@@ -55,13 +55,13 @@ fn take(mut runner: Box<AgentRunner>, place: Place, all: &mut Vec<Placed>) {
 
 /// Checks that places which were read are such as runners can have.
 pub(in super::super) fn check_places(places: &[Place], all: &[Placed]) -> Result<(), ArchiveError> {
-    let leads = |leader: AgentId| all.get(leader.0 as usize).is_some_and(|at| at.runner.shared.handover.is_some());
+    let leads = |leader: AgentId| all.get(leader.0 as usize).is_some_and(|at| at.runner.shared.handover().is_some());
     let is_led = |at: usize| matches!(places[at], Place::Led { .. });
     let is_sound = |(at, place): (usize, &Place)| match *place {
         Place::Home => true,
         Place::Led { leader, .. } => leads(leader) && !is_led(leader.0 as usize) && (leader.0 as usize) < at,
         Place::Waiting { leader, .. } => leads(leader) && leader.0 as usize != at,
-        Place::Returning => all[at].runner.shared.handover.is_some(),
+        Place::Returning => all[at].runner.shared.handover().is_some(),
     };
     if places.len() == all.len() && places.iter().enumerate().all(is_sound) {
         return Ok(());
@@ -89,7 +89,7 @@ pub(in super::super) fn put_back(all: Vec<Placed>, handles: &Agents) -> Vec<Opti
     for Placed { runner, place } in others {
         let id = runner.id();
         let whose = if let Place::Waiting { leader, .. } = place { leader } else { id };
-        let handover = handles[whose.0 as usize].shared.handover.as_ref();
+        let handover = handles[whose.0 as usize].shared.handover();
         match (place, handover) {
             (Place::Waiting { .. }, Some(to)) => {
                 to.arrivals.lock().unwrap_or_else(PoisonError::into_inner).push(runner);

@@ -133,7 +133,12 @@ impl Led {
 
     /// Lets those that are parked return.
     pub fn release_parked(&mut self) {
-        self.seats.extract_if(.., |seat| seat.actor.is_parked()).for_each(|seat| seat.actor.return_turns());
+        self.seats.extract_if(.., |seat| seat.actor.is_parked()).for_each(|mut seat| {
+            if seat.actor.shared.gauges.has_left() {
+                seat.actor.forget();
+            }
+            seat.actor.return_turns();
+        });
     }
 
     /// Adds `actor` and all it leads.
@@ -166,7 +171,7 @@ impl AgentRunner {
     }
 
     fn next_arrival(&self) -> Option<Box<AgentRunner>> {
-        self.shared.handover.as_ref()?.next_arrival()
+        self.shared.handover()?.next_arrival()
     }
 
     fn admit(&mut self, actor: Box<AgentRunner>) {
@@ -196,12 +201,14 @@ impl AgentRunner {
         }
     }
 
-    /// Frees what it made turns with: who has left makes none, and its number is not given again.
-    fn forget(&mut self) {
-        (self.cluster, self.governor, self.loads) = (None, None, None);
-        (self.links, self.announced) = (Vec::new(), Vec::new());
+    /// Frees what it made turns with: an agent that has left makes none.
+    pub fn forget(&mut self) {
+        if !self.shared.is_first() {
+            (self.cluster, self.governor, self.links) = (None, None, Vec::new());
+        }
+        (self.loads, self.announced) = (None, Vec::new());
         self.led = Led::default();
-        self.observer = self.peers.observer(self.id(), &[]);
+        self.observer.forget();
         self.writer.forget_spares();
         self.shared.form.publish(None);
     }
@@ -224,7 +231,7 @@ impl AgentRunner {
         self.tell(EventKind::Left);
         shared.sleep.follow(id, None);
         self.settle(1.0);
-        if let Some(handover) = &shared.handover {
+        if let Some(handover) = shared.handover() {
             // its place is free: there is only one of it
             drop(handover.returned.swap(Some(self)));
         }
@@ -234,7 +241,7 @@ impl AgentRunner {
     /// The agent that should lead it: of the leaders of those that it, or one it leads, is bonded with, the lowest number. An agent at
     /// another time would make up for that alone, and is not led before the two have come together.
     pub fn seek_leader(&self) -> Option<AgentId> {
-        self.shared.handover.as_ref()?;
+        self.shared.handover()?;
         let led = self.led.seats.iter().map(|seat| &*seat.actor);
         let leaders = std::iter::once(self).chain(led).filter_map(AgentRunner::bonded_leader);
         leaders.min().filter(|leader| *leader < self.id() && self.is_at_the_time_of(*leader))
@@ -247,7 +254,7 @@ impl AgentRunner {
         let own = newest.bonds.iter().copied();
         let theirs = self.observer.neighbours().iter().filter(|n| n.snapshot.bonds.contains(&me)).map(|n| n.id);
         let open =
-            |id: &AgentId| !sleep.is_closed(*id) && self.peers.get(*id).is_some_and(|p| p.shared.handover.is_some());
+            |id: &AgentId| !sleep.is_closed(*id) && self.peers.get(*id).is_some_and(|p| p.shared.handover().is_some());
         own.chain(theirs).map(|id| sleep.leader(id)).filter(open).min()
     }
 }
@@ -266,7 +273,7 @@ fn return_groups(leaving: Vec<Seat>) {
 /// Hands `actor`, and all it leads, over to `leader`; gives it back if that admits nobody now.
 pub(in super::super) fn hand_over(actor: Box<AgentRunner>, leader: AgentId) -> Result<(), Box<AgentRunner>> {
     let (id, sleep, peers) = (actor.id(), Arc::clone(&actor.shared.sleep), Arc::clone(&actor.peers));
-    let Some(handover) = peers.get(leader).and_then(|peer| peer.shared.handover.as_ref()) else { return Err(actor) };
+    let Some(handover) = peers.get(leader).and_then(|peer| peer.shared.handover()) else { return Err(actor) };
     sleep.follow(id, Some(leader));
     if let Err(actor) = handover.arrive(actor) {
         sleep.follow(id, None);
@@ -285,7 +292,7 @@ pub(in super::super) fn hand_over(actor: Box<AgentRunner>, leader: AgentId) -> R
 pub(in super::super) fn assign_leaders(mut actors: Vec<AgentRunner>) -> Vec<Option<Box<AgentRunner>>> {
     let mut sets = DisjointSets::default();
     sets.reset(actors.len());
-    for (at, actor) in actors.iter_mut().enumerate().filter(|(_, actor)| actor.shared.handover.is_some()) {
+    for (at, actor) in actors.iter_mut().enumerate().filter(|(_, actor)| actor.shared.handover().is_some()) {
         actor.look_first().iter().for_each(|other| sets.join(at, other.0 as usize));
     }
     let mut places: Vec<_> = actors.into_iter().map(|actor| Some(Box::new(actor))).collect();
@@ -306,12 +313,12 @@ pub(in super::super) fn assign_leaders(mut actors: Vec<AgentRunner>) -> Vec<Opti
 
 /// Lets the arrivals of an agent that makes no more turns return.
 pub(in super::super) fn return_arrivals(shared: &Shared) {
-    shared.handover.iter().flat_map(Handover::clear).for_each(AgentRunner::return_turns);
+    shared.handover().into_iter().flat_map(Handover::clear).for_each(AgentRunner::return_turns);
 }
 
 /// Completes the metrics of those that are among arrivals or have returned when nobody looks any more.
 pub(in super::super) fn close_remaining(handles: &Agents, timeline: &Timeline, now: Duration) {
-    let handovers = handles.iter().filter_map(|handle| handle.shared.handover.as_ref());
+    let handovers = handles.iter().filter_map(|handle| handle.shared.handover());
     for handover in handovers {
         let left = handover.clear().into_iter().chain(handover.take_returned());
         left.for_each(|mut actor| actor.close_account(timeline, now));

@@ -72,6 +72,8 @@ impl PoolState {
     /// Gives agents that make turns of their own to workers, by their numbers.
     pub fn distribute(&self, actors: Vec<Option<Box<AgentRunner>>>, now: Duration) {
         let (timeline, order, workers) = (self.timeline.read(), self.order(), self.queues.len());
+        // some may have been added by a state that was read
+        (self.resting.len()..actors.len()).for_each(|_| self.resting.grow());
         // neighbours in the scene share a worker, and still every worker gets agents of each kind
         let block = (actors.len() / (8 * workers)).clamp(1, 64);
         for (at, mut actor) in actors.into_iter().enumerate().filter_map(|(at, actor)| Some((at, actor?))) {
@@ -149,7 +151,7 @@ impl PoolState {
 
     /// The agent that has returned from a leader.
     pub fn take_returned(&self, id: AgentId) -> Option<Box<AgentRunner>> {
-        self.handles.get(id.0 as usize)?.shared.handover.as_ref().and_then(Handover::take_returned)
+        self.handles.get(id.0 as usize)?.shared.handover().and_then(Handover::take_returned)
     }
 
     /// How long worker `at` may sleep from `now` on; `None`: until it is woken.

@@ -198,13 +198,13 @@ impl Worker {
 mod tests {
     use super::super::super::agent_clock::TimelineCommand;
     use super::super::super::helpers::Helpers;
-    use super::super::super::spawn::{AssembledRun, Everyone, assemble};
+    use super::super::super::spawn::{AssembledRun, RunAgents, assemble};
     use super::super::super::testing::Dummy;
     use super::super::super::{Clock, ManualClock};
     use super::*;
 
     fn worker(spawns: Vec<crate::AgentSpawn>, clock: &Arc<ManualClock>) -> Worker {
-        let AssembledRun { actors, all: Everyone { handles, sleep, .. } } = assemble(spawns, Helpers::none()).unwrap();
+        let AssembledRun { actors, all: RunAgents { handles, sleep, .. } } = assemble(spawns, Helpers::none()).unwrap();
         sleep.set_workers(1);
         let clock = Arc::clone(clock) as Arc<dyn Clock>;
         let state = Arc::new(PoolState::new(clock, sleep, handles, actors, 1));

@@ -2,13 +2,14 @@
 //!
 //! In: [`SensorFile`]s, the objects and joints of the scene. Out: [`Sensor`]s; problems to the [`Checker`]. Never here: what sensors read.
 
-use super::POSITION_MAX_M;
 use super::object::{NamedObject, Objects};
+use super::rigid::{point_or_zero, rotation};
+use super::{POSITION_MAX_M, ROTATION_MAX_DEG};
 use crate::check::{Checker, Place};
 use crate::format::{JointFile, SensorFile, SensorFileKind as Kind};
 use glam::DVec3;
 use metachron_core::{AgentId, ContactPartner};
-use metachron_world::{Sensor, SensorKind, Spec};
+use metachron_world::{Sensor, SensorKind, Site, Spec};
 
 /// Most sensors of a scene.
 const SENSORS_MAX: usize = 1000;
@@ -91,7 +92,7 @@ impl Mounts<'_> {
                     c.wrong(place, "object", "is kinematic, and has no acceleration of its own", expected);
                     return None;
                 }
-                SensorKind::Imu { object, gravity_m_s2: spec.gravity }
+                SensorKind::Imu { object, gravity_m_s2: spec.gravity, site: site(c, place, file) }
             }
             Kind::Pose => {
                 let at_m = file.at_m.map_or(DVec3::ZERO, |at| c.point(place, "at_m", at, POSITION_MAX_M));
@@ -152,6 +153,12 @@ impl Mounts<'_> {
     }
 }
 
+/// Where on its object a sensor is.
+fn site(c: &mut Checker<'_, '_>, place: &Place, file: &SensorFile) -> Site {
+    let at_m = file.at_m.map(|at| c.point(place, "at_m", at, POSITION_MAX_M));
+    Site { at_m, rotation: rotation(point_or_zero(c, place, "rotation_deg", file.rotation_deg, ROTATION_MAX_DEG)) }
+}
+
 fn required<'a>(c: &mut Checker<'_, '_>, place: &Place, key: &str, given: Option<&'a String>) -> Option<&'a String> {
     if given.is_none() {
         c.wrong(place, key, "is missing", format!("expected the name of {key}s in this table"));
@@ -166,7 +173,8 @@ fn check_keys(c: &mut Checker<'_, '_>, place: &Place, file: &SensorFile) {
         ("joint", file.joint.is_some(), of_joint),
         ("object", file.object.is_some(), !of_joint),
         ("with", file.with.is_some(), file.kind == Kind::ContactForce),
-        ("at_m", file.at_m.is_some(), file.kind == Kind::Pose),
+        ("at_m", file.at_m.is_some(), matches!(file.kind, Kind::Pose | Kind::Imu)),
+        ("rotation_deg", file.rotation_deg.is_some(), file.kind == Kind::Imu),
     ];
     for (key, ..) in given.into_iter().filter(|(_, given, takes)| *given && !takes) {
         c.wrong(place, key, "does not belong to a sensor of this kind", "expected no such key");

@@ -13,8 +13,8 @@ pub struct SensorFile {
     pub name: String,
     /// Its reading. `joint-position`: how far `b` of a joint has moved from `a`, rad within ±π or metres. `joint-velocity`: rad/s or m/s.
     /// `joint-effort`: what motor and stops give `b`, N·m or N. `contact-force`: what touches an object gives it, world axes, N. `imu`: of a
-    /// rigid object its acceleration less that of gravity, m/s², and its spin, rad/s, in the axes of its shape. `pose`: position of a point of
-    /// a rigid object, metres, and the rotation of its axes as a quaternion x, y, z, w.
+    /// rigid object the acceleration of its matter at a site less that of gravity, m/s², and its spin, rad/s, in the axes of the site. `pose`:
+    /// position of a point of a rigid object, metres, and the rotation of its axes as a quaternion x, y, z, w.
     pub kind: SensorFileKind,
     /// Name of a joint, for kinds of joints.
     pub joint: Option<String>,
@@ -22,8 +22,11 @@ pub struct SensorFile {
     pub object: Option<String>,
     /// Of a `contact-force` the object, fixed or not, whose contacts count. Default: all.
     pub with: Option<String>,
-    /// Of a `pose` the point, in the axes of the object's shape, metres. Default: their origin.
+    /// Of a `pose` the point, in the axes of the object's shape, metres; default: their origin. Of an `imu` the place of its site; default:
+    /// the centre of mass.
     pub at_m: Option<Point>,
+    /// Of an `imu` how its site is turned in the axes of the object's shape: angles about their x, then y, then z, degrees. Default: not.
+    pub rotation_deg: Option<Point>,
 }
 
 /// What a sensor reads.

@@ -123,6 +123,12 @@ fn device_line(out: &mut String, report: &DeviceReport) {
         "device {device} · {object}: {ticks} ticks, late by {:.3} ms p50, {:.3} p99; state {:.2} steps old p99, {:.2} max; {force_mean_n:.3} N mean, {force_max_n:.3} max; {:.4} J of {:.4} given out",
         late_ms.p50, late_ms.p99, age_steps.p99, age_steps.max, report.energy_out_j, report.tank_j
     );
+    if !report.realtime {
+        let _ = writeln!(
+            out,
+            "note  the system gives the device's thread no real-time priority: what else runs makes its ticks late"
+        );
+    }
     if let Some(why) = &report.first_failure {
         let _ = writeln!(out, "note  the device failed {} times, first: {why}", report.failures);
     }

@@ -32,8 +32,7 @@ impl Session {
             if id.0 as usize == scene.agents.len()
                 && let Some(member) = world.joined(id)
             {
-                scene_view.join(assemble::actor(&member));
-                scene.agents.push(member);
+                assemble::join(scene, scene_view, member);
             }
             couplings.mark_changed(id);
             match agent.state() {

@@ -8,6 +8,7 @@
 use super::super::cpu_budget::CpuBudget;
 use super::super::visible_resolution::VisibleResolution;
 use super::{Chosen, Session};
+use glam::DVec3;
 use metachron_core::{Body, SimTime, Snapshot};
 use metachron_lod::control::{ObjectView, PictureControl};
 use metachron_render::{Camera, History, Level};
@@ -56,8 +57,6 @@ pub(super) struct Rewind {
     /// The last time that one was kept, and how long that takes, smoothed.
     kept: Option<Instant>,
     cost_s: f64,
-    /// Agents that there were when the newest was kept, and those of them that had left.
-    members: (usize, usize),
 }
 
 /// One of them.
@@ -110,11 +109,6 @@ impl Rewind {
         }
     }
 
-    fn clear(&mut self) {
-        (self.bytes, self.shown) = (0, None);
-        self.moments.clear();
-    }
-
     /// Whether so little wall time has passed since the last one that another would cost too much of it.
     fn is_too_soon(&self) -> bool {
         let rests = Duration::try_from_secs_f64(self.cost_s).unwrap_or_default() * COST_PARTS;
@@ -125,15 +119,8 @@ impl Rewind {
 impl Session {
     /// Keeps moments from now on, in at most so many bytes.
     pub fn keep_moments(&mut self, bytes_max: usize) {
-        self.rewind = Some(Rewind {
-            moments: VecDeque::new(),
-            bytes: 0,
-            bytes_max,
-            shown: None,
-            kept: None,
-            cost_s: 0.0,
-            members: (0, 0),
-        });
+        self.rewind =
+            Some(Rewind { moments: VecDeque::new(), bytes: 0, bytes_max, shown: None, kept: None, cost_s: 0.0 });
     }
 
     /// What is kept; `None` before there is anything.
@@ -168,13 +155,6 @@ impl Session {
         let begun = Instant::now();
         let going_on = if self.is_virtual() { self.going_on().inspect_err(|_| self.rewind = None)? } else { None };
         let Some(rewind) = &mut self.rewind else { return Ok(()) };
-        let gone = self.world.agents().iter().filter(|agent| agent.state() == metachron_runtime::AgentState::Gone);
-        let members = (self.scene.agents.len(), gone.count());
-        if going_on.is_some() && rewind.members != members {
-            // no world goes back to when it had others in it
-            rewind.clear();
-        }
-        rewind.members = members;
         let mut histories = self.scene_view.histories(self.scene.agents.len());
         let copied = copy(&mut histories, rewind.moments.back().map_or(&[], |last| &last.histories));
         let checkpoint = going_on.as_ref().map_or(0, |it| it.world.size_bytes() + OBJECT_BYTES * it.views.len());
@@ -305,6 +285,12 @@ impl Session {
         self.visible_resolution = there.visible_resolution.clone();
         self.views.clone_from(&there.views);
         self.levels.clone_from(&there.levels);
+        // those that joined after it keep their places in the picture, unseen
+        let later = moment.map_or(0, |moment| self.scene.agents.len().saturating_sub(moment.histories.len()));
+        (0..later).for_each(|_| self.visible_resolution.join());
+        if later > 0 {
+            self.levels.clear();
+        }
         self.chosen = there.chosen;
         self.frame_cpu_s = there.frame_cpu_s;
         (self.last_start, self.lag_s, self.finished) = (there.last_start, there.lag_s, there.finished);
@@ -362,7 +348,11 @@ fn size_bytes(state: &Snapshot) -> usize {
                 + size_of_val(&curve.radii_m[..])
                 + size_of_val(&curve.flattening_m[..])
         }
-        Body::Soft(soft) => size_of_val(&soft.positions[..]) + size_of_val(&soft.velocities[..]),
+        Body::Soft(soft) => {
+            let of = |lists: [&[DVec3]; 2]| size_of_val(lists[0]) + size_of_val(lists[1]);
+            let nodes = soft.nodes.as_ref().map_or(0, |nodes| of([&nodes.positions, &nodes.velocities]));
+            of([&soft.positions, &soft.velocities]) + nodes
+        }
         Body::Nothing | Body::Rigid(_) | Body::Tool(_) => 0,
     };
     size_of::<Snapshot>() + body + size_of_val(&state.contacts[..]) + size_of_val(&state.grips[..])

@@ -4,7 +4,7 @@
 
 use super::SceneBuildError;
 use crate::scene::{Member, Spec};
-use crate::sensors::{Sensor, SensorKind};
+use crate::sensors::{Sensor, SensorKind, Site};
 use metachron_core::ContactPartner;
 use metachron_geometry::Obstacle;
 
@@ -31,6 +31,8 @@ pub enum SensorOn {
     ContactBetween(String, String),
     /// An accelerometer and a gyroscope in a rigid body that is not kinematic: [`SensorKind::Imu`].
     Imu(String),
+    /// The same where a site says, whose rotation needs no length of 1.
+    ImuAt(String, Site),
     /// A point of a rigid body, metres in the axes of its shape: [`SensorKind::Pose`].
     Pose(String, [f64; 3]),
 }
@@ -57,6 +59,10 @@ impl Mounts<'_> {
             Some((id, Spec::Rigid(spec))) => Ok((id, spec)),
             _ => Err(nothing(on, "rigid body")),
         };
+        let imu = |on: &String, site| match rigid(on)? {
+            (_, spec) if spec.led.is_some() => Err(nothing(on, "rigid body that forces move")),
+            (object, spec) => Ok(SensorKind::Imu { object, gravity_m_s2: spec.gravity, site }),
+        };
         let partner = |on: &String| match self.fixed.iter().position(|solid| solid.name == *on) {
             Some(at) => Ok(ContactPartner::Static(at as u32)),
             None => moving(on).map(ContactPartner::Agent),
@@ -69,15 +75,19 @@ impl Mounts<'_> {
             SensorOn::ContactBetween(on, with) => {
                 SensorKind::ContactForce { object: moving(on)?, with: Some(partner(with)?) }
             }
-            SensorOn::Imu(on) => {
-                let (object, spec) = rigid(on)?;
-                if spec.led.is_some() {
-                    return Err(nothing(on, "rigid body that forces move"));
-                }
-                SensorKind::Imu { object, gravity_m_s2: spec.gravity }
-            }
+            SensorOn::Imu(on) => imu(on, Site::default())?,
+            SensorOn::ImuAt(on, site) => imu(on, checked(&name, site)?)?,
             SensorOn::Pose(on, at_m) => SensorKind::Pose { object: rigid(on)?.0, at_m: (*at_m).into() },
         };
         Ok(Sensor { name, kind })
     }
+}
+
+/// The same site by a quaternion of length 1.
+fn checked(sensor: &str, site: &Site) -> Result<Site, SceneBuildError> {
+    let length = site.rotation.length();
+    if site.at_m.is_none_or(|at_m| at_m.is_finite()) && length.is_finite() && length > 0.0 {
+        return Ok(Site { rotation: site.rotation.normalize(), ..*site });
+    }
+    Err(SceneBuildError::BadSite { sensor: sensor.to_owned(), found: format!("{site:?}") })
 }

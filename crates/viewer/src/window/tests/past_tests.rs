@@ -107,10 +107,22 @@ fn an_object_that_joins_is_drawn_picked_and_listed_until_it_leaves() {
         assert_eq!(simulation.pick(ray).map(|hit| hit.object), Some(late.id()));
         let row = simulation.status().agents.last().unwrap();
         assert_eq!((row.name.as_str(), simulation.status().agents.len()), ("late", listed + 1));
+        let there = simulation.session.rewind().unwrap().newest;
         world.remove(late).unwrap();
-        assert!(with_it > drawn(simulation), "{with_it} of {before} and it");
+        let without_it = drawn(simulation);
+        assert!(with_it > without_it, "{with_it} of {before} and it");
         assert_eq!(simulation.pick(ray), None);
         assert_eq!(simulation.status().agents.last().unwrap().state, AgentState::Gone);
+        // the way back leads beyond joins and leaves, and on again
+        let oldest = simulation.session.rewind().unwrap().oldest;
+        for (look, is_there) in [(Look::At(there), true), (Look::At(oldest), false), (Look::At(there), true)] {
+            simulation.apply(Action::Look(look));
+            let instances = drawn(simulation);
+            assert_eq!(instances, if is_there { with_it } else { without_it }, "{look:?}");
+            assert_eq!((simulation.pick(ray).is_some(), world.latest(late).is_ok()), (is_there, is_there), "{look:?}");
+        }
+        simulation.apply(Action::Look(Look::Live));
+        assert!(world.latest(late).is_err() && drawn(simulation) == without_it);
     });
 }
 

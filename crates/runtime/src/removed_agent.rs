@@ -1,15 +1,17 @@
 //! What is in the place of an agent that has left.
 
-use glam::DVec3;
 use metachron_contact::{Agent, StepContext};
 use metachron_core::{Archive, ArchiveError, Body, SimSpan, Snapshot, StepError, StepReport, check_span};
 
-/// No matter, no time, nothing to save.
-pub(super) struct Nobody;
+/// Its model.
+pub(super) const REMOVED: &str = "removed";
 
-impl Agent for Nobody {
+/// No matter, no time, nothing to save.
+pub(super) struct RemovedAgent;
+
+impl Agent for RemovedAgent {
     fn model(&self) -> &'static str {
-        "nobody"
+        REMOVED
     }
 
     fn step(&mut self, dt: SimSpan, _context: &StepContext<'_>) -> Result<StepReport, StepError> {
@@ -22,13 +24,5 @@ impl Agent for Nobody {
 
     fn write_snapshot(&self, into: &mut Snapshot) {
         into.body = Body::Nothing;
-    }
-
-    fn momentum(&self) -> (DVec3, DVec3) {
-        (DVec3::ZERO, DVec3::ZERO)
-    }
-
-    fn mass_kg(&self) -> f64 {
-        0.0
     }
 }

@@ -1,0 +1,81 @@
+//! How much more contacts bear where what a user leads is led on: what a device feels between two states.
+//!
+//! In: the last fine step of a macro step, with its solution. Out: a stiffness of each pair with a side that a user leads now. Never here: the
+//! device, what leads members. Theory: docs/theory/coupling.md, eq. 7s.
+
+use super::memory::Partner;
+use super::pair_total::PairTotal;
+use super::ties::place_of;
+use super::{ClusterStepper, Drive, Participant, Role};
+use crate::cluster::Side;
+use glam::DVec3;
+
+impl Participant<'_> {
+    /// Whether a user leads it in this step.
+    fn is_led_by_user(&self) -> bool {
+        let is_held = || self.context.hands.iter().any(|spring| spring.by.is_none());
+        self.member.is_led() && (self.context.pose.is_some() || is_held())
+    }
+
+    /// A stiffness within a step along `normal`, with the drive's spring alone where mass and damping of a driven tip resist too: a hand that
+    /// goes on evenly is followed without them.
+    fn drive_settled(&self, within_n_m: f64, normal: DVec3, [h_s, own_s]: [f64; 2]) -> f64 {
+        let Some((drive, tip)) = self.member.drive().zip(self.member.blocks().first()) else { return within_n_m };
+        let Drive { stiffness_n_m, damping_n_s_m, .. } = drive;
+        let given_kg = normal.dot(tip.value * normal) + h_s * (damping_n_s_m + h_s * stiffness_n_m);
+        let give_m_per_n = (within_n_m.recip() - h_s * own_s / given_kg).max(0.0);
+        (give_m_per_n + stiffness_n_m.recip()).recip()
+    }
+}
+
+impl ClusterStepper {
+    /// Notes the stiffness of all pairs with a side that a user leads now, one solve for each.
+    pub(super) fn note_stiffness(&mut self, all: &[Participant<'_>], h_s: f64) {
+        if !all.iter().any(Participant::is_led_by_user) {
+            return;
+        }
+        let mut totals = std::mem::take(&mut self.totals);
+        for total in &mut totals {
+            total.stiffness_n_m = self.stiffness_of(all, total, h_s).unwrap_or(0.0);
+        }
+        self.totals = totals;
+    }
+
+    /// The stiffness of a pair; `None` where nothing presses it, or where a user leads neither side.
+    fn stiffness_of(&mut self, all: &[Participant<'_>], total: &PairTotal, h_s: f64) -> Option<f64> {
+        if self.search.contacts.is_empty() {
+            return None;
+        }
+        let other = match total.partner {
+            Partner::Agent(id) => place_of(all, id),
+            Partner::Static(_) => None,
+            _ => return None,
+        };
+        let both = || std::iter::once(total.member).chain(other);
+        let led = both().find(|&member| all[member].is_led_by_user())?;
+        // side 0 is pressed against side 1
+        let towards = if led == total.member { -total.normal } else { total.normal };
+        let Self { solver, search, moved_m_s, progress, .. } = self;
+        moved_m_s.clear();
+        moved_m_s.extend(search.contacts.iter().zip(&search.owners).map(|(contact, owner)| {
+            let [here, there] = &contact.sides;
+            let moved = |side: &Side| match all[led].member.role() {
+                Role::Kinematic => towards,
+                Role::Rigid | Role::Deformable => side.velocity(&[towards, DVec3::ZERO]),
+            };
+            match led {
+                _ if owner.member == led => moved(here),
+                _ if owner.other == Some(led) => -moved(there),
+                _ => DVec3::ZERO,
+            }
+        }));
+        let given = solver.resistance(moved_m_s)?;
+        let of_pair =
+            search.owners.iter().zip(given).filter(|(owner, _)| owner.pair() == (total.member, total.partner));
+        let impulse_n_s = of_pair.map(|(_, given)| given.dot(total.normal)).sum::<f64>();
+        let own_s = both().map(|member| h_s * f64::from(progress[member].share)).fold(h_s, f64::max);
+        let within_n_m = impulse_n_s / (h_s * own_s);
+        let stiffness_n_m = all[led].drive_settled(within_n_m, total.normal, [h_s, own_s]);
+        (stiffness_n_m > 0.0 && stiffness_n_m.is_finite()).then_some(stiffness_n_m)
+    }
+}

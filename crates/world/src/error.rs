@@ -1,0 +1,103 @@
+//! Why a world could not be started, or refuses something.
+
+use super::builder::SceneBuildError;
+use metachron_core::{AgentId, Anchor};
+use metachron_runtime::RunError;
+
+/// Why a world could not be started, or refuses something.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum WorldError {
+    /// A model rejected its object.
+    #[error("object \"{name}\": {reason}")]
+    Build {
+        /// The object's name.
+        name: String,
+        /// The model's message.
+        reason: String,
+    },
+    /// The agents could not be started.
+    #[error(transparent)]
+    Run(#[from] RunError),
+    /// There is no agent of that number.
+    #[error("the world has no agent {}", .0.0)]
+    NoAgent(AgentId),
+    /// The object is another world's.
+    #[error("the object was named by another world")]
+    Foreign,
+    /// The object was removed.
+    #[error("\"{name}\" has been removed from the world")]
+    Gone {
+        /// The name that it had.
+        name: String,
+    },
+    /// An object of that name is in the world already.
+    #[error("the world has an object \"{name}\" already")]
+    SameName {
+        /// The name.
+        name: String,
+    },
+    /// A world that was stopped takes nothing up.
+    #[error("the world has been stopped")]
+    Stopped,
+    /// An object cannot be built.
+    #[error(transparent)]
+    Part(#[from] SceneBuildError),
+    /// The object has no such point.
+    #[error("\"{name}\" has no point {anchor:?}: {wanted}")]
+    NoPoint {
+        /// The object's name.
+        name: String,
+        /// The point asked for.
+        anchor: Anchor,
+        /// Which points it has.
+        wanted: String,
+    },
+    /// A command was refused.
+    #[error("\"{name}\" takes no such command: {reason}")]
+    Refused {
+        /// The object's name.
+        name: String,
+        /// Why.
+        reason: String,
+    },
+    /// The world has no joint of that name.
+    #[error("the world has no joint \"{name}\"; its joints with names are [{known}]")]
+    NoJoint {
+        /// The name asked for.
+        name: String,
+        /// The names that there are.
+        known: String,
+    },
+    /// The world has no sensor of that name.
+    #[error("the world has no sensor \"{name}\"; its sensors are [{known}]")]
+    NoSensor {
+        /// The name asked for.
+        name: String,
+        /// The names that there are.
+        known: String,
+    },
+    /// A pace that no machine keeps, or that is a pause.
+    #[error("the factor of time is {factor}; expected 0.001 to 100")]
+    BadPace {
+        /// The factor.
+        factor: f64,
+    },
+    /// A query that asks for nothing that can be found.
+    #[error("{0}")]
+    BadQuery(String),
+    /// The world has no moving object of that name.
+    #[error("the world has no moving object \"{name}\"; its moving objects are {known}")]
+    NoObject {
+        /// The name asked for.
+        name: String,
+        /// The names that there are.
+        known: String,
+    },
+}
+
+impl WorldError {
+    pub(super) fn bad_query(reason: &str) -> Self {
+        Self::BadQuery(reason.to_owned())
+    }
+}
