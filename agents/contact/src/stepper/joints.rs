@@ -245,9 +245,9 @@ impl Joints {
             let turns = matches!(joint.kind, JointKind::Revolute { .. });
             self.drives |= motor.moves();
             let before = |member: usize| &step.progress[member].before[..];
-            let speed = sides.map(|side| velocity(&side, before).dot(axis));
-            let inverse_mass = sides.iter().map(|side| gives_way(step.all, side, axis)).sum();
-            let speed = speed[1] - speed[0];
+            let [of_a, of_b] = sides.map(|side| velocity(&side, before).dot(axis));
+            let inverse_mass = sides.iter().map(|side| own_inverse_mass(step.all, side, axis)).sum();
+            let speed = of_b - of_a;
             let motored = Motored { sides, axis, travel: now.travel, speed, inverse_mass, turns };
             let row = motor.row(&motored, step.h_s);
             ties.motor(step, row, lasting.row(MOTOR, second));
@@ -438,8 +438,8 @@ fn material(all: &[Participant<'_>], member: Option<usize>, pose: &Pose, place: 
     all[member].member.anchor(Anchor::Local(pose.rotation.conjugate() * (place - pose.centre_m)))
 }
 
-/// By how much the velocity of a side along an axis changes for an impulse along it, if nothing but its member's own blocks resists.
-fn gives_way(all: &[Participant<'_>], side: &Side, axis: DVec3) -> f64 {
+/// The inverse mass of a side along an axis where nothing but its member's own blocks resists, 1/kg, or 1/(kg m²) of a turn.
+fn own_inverse_mass(all: &[Participant<'_>], side: &Side, axis: DVec3) -> f64 {
     let of = |term: &SideTerm| {
         let mut blocks = all[side.member].member.blocks().iter();
         let block = blocks.find(|block| block.row == term.block && block.column == term.block)?;

@@ -20,7 +20,7 @@ pub(super) struct Motored {
     pub travel: f64,
     /// How fast it does so when the step begins, m/s or rad/s.
     pub speed: f64,
-    /// By how much its velocity would change for an impulse if nothing but the masses of both resisted, 1/kg or 1/(kg m²), ≥ 0.
+    /// The inverse mass of both along or about it where nothing else holds them, 1/kg or 1/(kg m²), ≥ 0.
     pub inverse_mass: f64,
     /// Whether travel is known but for whole turns.
     pub turns: bool,
