@@ -4,11 +4,11 @@
 
 use super::WindowSimulation;
 use crate::ui::{Message, Severity};
-use metachron_scene::{SceneError, Source};
+use metachron_scene::{FileVersion, SceneError, Source, SourceFile};
 use metachron_session::Session;
 use metachron_world::Scene;
-use std::path::{Path, PathBuf};
-use std::time::{Duration, Instant, SystemTime};
+use std::path::Path;
+use std::time::{Duration, Instant};
 
 /// How often the files are looked at.
 const LOOK_EVERY: Duration = Duration::from_secs(1);
@@ -17,36 +17,14 @@ const LOOK_EVERY: Duration = Duration::from_secs(1);
 #[derive(Debug)]
 pub(super) struct WatchedFiles {
     /// None of a built-in scene.
-    files: Vec<WatchedFile>,
+    files: Vec<SourceFile>,
     looked: Instant,
 }
 
-/// One of them.
-#[derive(Debug)]
-struct WatchedFile {
-    path: PathBuf,
-    state: Option<FileState>,
-}
-
-/// By what a change is noticed.
-#[derive(Debug, PartialEq, Eq)]
-struct FileState {
-    modified: SystemTime,
-    bytes: u64,
-}
-
-impl FileState {
-    fn of(path: &Path) -> Option<Self> {
-        let file = path.metadata().ok()?;
-        Some(Self { modified: file.modified().ok()?, bytes: file.len() })
-    }
-}
-
 impl WatchedFiles {
-    /// The files of a scene that has been read, as they are now.
+    /// The files of a scene that has been read, as they were then.
     pub fn of(source: &Source) -> Self {
-        let watched = |path: PathBuf| WatchedFile { state: FileState::of(&path), path };
-        Self { files: source.files().into_iter().map(watched).collect(), looked: Instant::now() }
+        Self { files: source.files(), looked: Instant::now() }
     }
 
     /// Whether one of them is another one than when this was asked last; a file that is gone has not changed.
@@ -55,15 +33,13 @@ impl WatchedFiles {
             return false;
         }
         self.looked = Instant::now();
-        self.files.iter_mut().fold(false, |changed, file| file.has_changed() || changed)
+        self.files.iter_mut().fold(false, |changed, file| has_changed(file) || changed)
     }
 }
 
-impl WatchedFile {
-    fn has_changed(&mut self) -> bool {
-        let state = FileState::of(&self.path);
-        state.is_some() && std::mem::replace(&mut self.state, state) != self.state
-    }
+fn has_changed(file: &mut SourceFile) -> bool {
+    let now = FileVersion::of(&file.path);
+    now.is_some() && std::mem::replace(&mut file.version, now) != now
 }
 
 impl WindowSimulation<'_> {
