@@ -1,7 +1,8 @@
 //! URDF robots and MJCF models as scene files.
 //!
 //! In: the text of a model and its folder. Out: the text of a scene, and a list of all that has no place in one ([`Imported`]).
-//! Never here: running a scene, reading the points of meshes, checking the scene that comes out (`metachron-scene` does).
+//! Never here: files that are opened (the caller reads what a model includes, [`ReadText`]), running a scene, the points of meshes, checking the
+//! scene that comes out (`metachron-scene` does).
 //!
 //! Links become rigid objects whose axes are those of the link, joints `[[joint]]` tables, collision geometries shapes and parts.
 //! Everything in the file that no line of this crate has read is in the list: an element or attribute cannot be dropped unseen.
@@ -17,7 +18,7 @@ mod settle;
 mod urdf;
 mod xml;
 
-pub use folders::Folders;
+pub use folders::{Folders, ReadText};
 
 /// The page of the crate: its code runs as a test.
 #[cfg(doctest)]
@@ -95,7 +96,8 @@ pub fn urdf<'a>(text: &str, folders: impl Into<Folders<'a>>) -> Result<Imported,
     of_urdf(&xml::parse(text, None)?, folders.into())
 }
 
-/// Reads an MJCF model, its classes of defaults and frames resolved. Meshes and included files are looked for in the folder of the model.
+/// Reads an MJCF model, its classes of defaults and frames resolved. Meshes and included files are looked for in the folder of the model; what is
+/// included comes by [`Folders::read`].
 ///
 /// # Errors
 /// [`ImportError`] at the first element that no scene can have, as [`urdf`].

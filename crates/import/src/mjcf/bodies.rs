@@ -35,8 +35,8 @@ pub(super) struct BodyReader<'a> {
 pub(super) struct Site<'a> {
     pub(super) element: &'a Element,
     pub(super) end: End,
-    /// In the world, where the file has its bodies, metres.
-    pub(super) filed_m: DVec3,
+    /// In the world, where every joint is at its `springref`, metres.
+    pub(super) at_springs_m: DVec3,
 }
 
 /// The body that elements are read for.
@@ -46,10 +46,18 @@ pub(super) struct Host {
     pub(super) link: Option<usize>,
     /// Its axes in the world at the start.
     pub(super) pose: Pose,
-    /// The same where the file has them.
-    filed: Pose,
+    /// The same where every joint is at its `springref`.
+    at_springs: Pose,
     /// Whether it is the world, or nothing lets it move against the world.
     is_fixed: bool,
+}
+
+impl Host {
+    /// The same after a joint.
+    fn moved(self, joint: &StartedJoint) -> Self {
+        let (pose, at_springs) = (self.pose.then(joint.motion), self.at_springs.then(joint.to_spring));
+        Self { pose, at_springs, ..self }
+    }
 }
 
 /// What the elements of one body, those in its frames too, amount to.
@@ -122,7 +130,7 @@ impl<'a> BodyReader<'a> {
             let name = self.unused(placed.element.text("name"), "geom");
             self.model.fixed.push(Fixed { name, look: look(std::slice::from_ref(&geom)), part: geom.part });
         }
-        let world = Host { link: None, pose: Pose::IDENTITY, filed: Pose::IDENTITY, is_fixed: true };
+        let world = Host { link: None, pose: Pose::IDENTITY, at_springs: Pose::IDENTITY, is_fixed: true };
         self.note_sites(&contents, world)?;
         contents.bodies.iter().try_for_each(|body| self.body(*body, world))
     }
@@ -134,7 +142,7 @@ impl<'a> BodyReader<'a> {
         let name = self.unused(element.text("name"), "body");
         let rest = placed.frame.then(self.compiler.pose(element)?);
         let is_fixed = host.is_fixed && contents.joints.is_empty();
-        let from = Host { pose: host.pose.then(rest), filed: host.filed.then(rest), ..host };
+        let from = Host { pose: host.pose.then(rest), at_springs: host.at_springs.then(rest), ..host };
         let (last, above) = match contents.joints.split_last() {
             Some((last, outer)) => (Some(last), self.carriers(outer, from, &name, &place)?),
             None => (None, from),
@@ -146,7 +154,8 @@ impl<'a> BodyReader<'a> {
         {
             return Err(free_with_others(*last));
         }
-        let pose = above.pose.then(joint.as_ref().map_or(Pose::IDENTITY, |joint| joint.motion));
+        let above = joint.as_ref().map_or(above, |joint| above.moved(joint));
+        let pose = above.pose;
         let geoms = self.geoms(&contents)?;
         let mass = if is_fixed {
             contents.inertial.inspect(|inertial| inertial.read_all_within());
@@ -168,7 +177,7 @@ impl<'a> BodyReader<'a> {
             None => self.push_joint(Joint::weld(place, host.link, index), 0.0),
             Some(StartedJoint { between, zero, .. }) => between.into_iter().for_each(|one| self.push_joint(one, zero)),
         }
-        let here = Host { link: Some(index), pose, filed: from.filed, is_fixed };
+        let here = Host { link: Some(index), is_fixed, ..above };
         self.note_sites(&contents, here)?;
         contents.bodies.iter().try_for_each(|body| self.body(*body, here))
     }
@@ -178,9 +187,9 @@ impl<'a> BodyReader<'a> {
         let mut at = from;
         for placed in joints {
             let link = self.model.links.len();
-            let StartedJoint { between, motion, zero } = self.joint(*placed, at, link)?;
-            let between = between.ok_or_else(|| free_with_others(*placed))?;
-            at = Host { link: Some(link), pose: at.pose.then(motion), ..from };
+            let joint = self.joint(*placed, at, link)?;
+            at = Host { link: Some(link), ..at.moved(&joint) };
+            let between = joint.between.ok_or_else(|| free_with_others(*placed))?;
             let name = self.unused(None, &format!("{body}-{}", placed.element.text("name").unwrap_or("joint")));
             let (mass, parts, look) = (Mass::None, Vec::new(), Look::default());
             self.model.links.push(Link {
@@ -192,7 +201,7 @@ impl<'a> BodyReader<'a> {
                 look,
                 is_lent: false,
             });
-            self.push_joint(between, zero);
+            self.push_joint(between, joint.zero);
         }
         Ok(at)
     }
@@ -207,8 +216,8 @@ impl<'a> BodyReader<'a> {
         for Placed { element, frame } in &contents.sites {
             let Some(name) = element.text("name") else { continue };
             let at_m = frame.then(self.compiler.pose(element)?).position;
-            let (end, filed_m) = (End { link: host.link, at_m }, host.filed.point(at_m));
-            self.sites.insert(name.to_owned(), Site { element, end, filed_m });
+            let (end, at_springs_m) = (End { link: host.link, at_m }, host.at_springs.point(at_m));
+            self.sites.insert(name.to_owned(), Site { element, end, at_springs_m });
         }
         Ok(())
     }

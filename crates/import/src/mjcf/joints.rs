@@ -16,6 +16,8 @@ pub(super) struct StartedJoint {
     pub(super) between: Option<Joint>,
     /// The motion of the body from its place in the file to its start.
     pub(super) motion: Pose,
+    /// That to where the joint is at its `springref`.
+    pub(super) to_spring: Pose,
     /// Where the file's zero is from the start, radians or metres.
     pub(super) zero: f64,
 }
@@ -23,7 +25,7 @@ pub(super) struct StartedJoint {
 impl StartedJoint {
     /// A joint whose body starts where the file has it.
     const fn still(between: Option<Joint>) -> Self {
-        Self { between, motion: Pose::IDENTITY, zero: 0.0 }
+        Self { between, motion: Pose::IDENTITY, to_spring: Pose::IDENTITY, zero: 0.0 }
     }
 }
 
@@ -64,10 +66,11 @@ impl BodyReader<'_> {
         }
         let zero = -at_rest - start;
         let axis = frame.rotation * given;
-        let motor = passive(element, zero, unit)?;
+        let spring = element.number("springref")?.unwrap_or(0.0) * unit - at_rest;
+        let motor = passive(element, spring - start)?;
         let range = range.map(|range| range.map(|end| end - start));
-        let motion = kind.motion(anchor_m, axis, start);
-        Ok(StartedJoint { between: Some(Joint { axis, range, motor, ..joint }), motion, zero })
+        let [motion, to_spring] = [start, spring].map(|travel| kind.motion(anchor_m, axis, travel));
+        Ok(StartedJoint { between: Some(Joint { axis, range, motor, ..joint }), motion, to_spring, zero })
     }
 
     /// A body that moves freely: where the keyframe has it in the world, or else as the file has it.
@@ -101,15 +104,14 @@ impl BodyReader<'_> {
     }
 }
 
-/// What holds or brakes a joint by itself: a spring with a damper, a damper, or dry friction where it has neither.
-fn passive(element: &Element, zero: f64, unit: f64) -> Result<Option<Motor>, ImportError> {
+/// What holds or brakes a joint by itself: a spring to a position, with a damper, a damper, or dry friction where it has neither.
+fn passive(element: &Element, position: f64) -> Result<Option<Motor>, ImportError> {
     let at_least_0 = |name: &str| {
         let value = element.number(name)?.unwrap_or(0.0);
         if value < 0.0 { Err(element.wrong(format!("`{name}` is {value}; expected 0 or more"))) } else { Ok(value) }
     };
     let (stiffness, damping) = (at_least_0("stiffness")?, at_least_0("damping")?);
     if stiffness > 0.0 {
-        let position = element.number("springref")?.unwrap_or(0.0) * unit + zero;
         return Ok(Some(Motor::Spring { position, stiffness, damping, max_effort: None }));
     }
     if damping > 0.0 {

@@ -29,15 +29,15 @@ pub(super) fn read(root: &Element, reader: &mut BodyReader<'_>) -> Result<(), Im
     Ok(())
 }
 
-/// The ends of a tendon, and its length where the file has its bodies, metres.
+/// The ends of a tendon, and its length where every joint is at its `springref`, metres.
 struct Ends {
     ends: [End; 2],
-    filed_m: f64,
+    at_springs_m: f64,
 }
 
 /// A tendon between two sites.
 fn tie(element: &Element, sites: [&Element; 2], reader: &mut BodyReader<'_>) -> Result<(), ImportError> {
-    let Ends { ends, filed_m } = ends(sites, reader)?;
+    let Ends { ends, at_springs_m } = ends(sites, reader)?;
     let number = |name: &str| {
         let value = element.number(name)?.unwrap_or(0.0);
         if value < 0.0 { Err(element.wrong(format!("`{name}` is {value}; expected 0 or more"))) } else { Ok(value) }
@@ -58,7 +58,7 @@ fn tie(element: &Element, sites: [&Element; 2], reader: &mut BodyReader<'_>) -> 
         }
         _ if stiffness_n_m == 0.0 => Some("has no damping: scenes have no damper alone"),
         [rest_m] | [rest_m, _] if rest.iter().all(|end| end == rest_m) => {
-            let rest_m = if *rest_m < 0.0 { filed_m } else { *rest_m };
+            let rest_m = if *rest_m < 0.0 { at_springs_m } else { *rest_m };
             push(TieKind::Spring { stiffness_n_m, damping_n_s_m, rest_m });
             None
         }
@@ -79,7 +79,7 @@ fn ends(sites: [&Element; 2], reader: &BodyReader<'_>) -> Result<Ends, ImportErr
         Ok(site)
     };
     let (a, b) = (find(sites[0])?, find(sites[1])?);
-    Ok(Ends { ends: [a.end, b.end], filed_m: a.filed_m.distance(b.filed_m) })
+    Ok(Ends { ends: [a.end, b.end], at_springs_m: a.at_springs_m.distance(b.at_springs_m) })
 }
 
 /// The least and greatest length of a tendon, metres, where it is limited.

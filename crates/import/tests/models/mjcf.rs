@@ -1,7 +1,7 @@
 //! MJCF models.
 
 use crate::play::{advance, left_out, position, start};
-use metachron_import::{ImportError, Imported, mjcf};
+use metachron_import::{Folders, ImportError, Imported, mjcf};
 use std::path::Path;
 
 fn import(text: &str) -> Result<Imported, ImportError> {
@@ -181,6 +181,11 @@ fn folder(files: &[(&str, &str)]) -> tempfile::TempDir {
     folder
 }
 
+/// Where the files of a model are, which are read from the disk.
+fn several(folder: &Path) -> Folders<'_> {
+    Folders { read: Some(&|path| std::fs::read_to_string(path)), ..Folders::from(folder) }
+}
+
 #[test]
 fn a_model_in_several_files_is_the_model_in_one() {
     let (defaults, body) = (r#"<geom density="500"/>"#, r#"<body name="a"><freejoint/><geom size="0.1"/></body>"#);
@@ -193,7 +198,7 @@ fn a_model_in_several_files_is_the_model_in_one() {
     let folder = folder(&files);
     let text =
         r#"<mujoco><include file="common.xml"/><worldbody><include file="parts/body.xml"/></worldbody></mujoco>"#;
-    let parts = mjcf(text, folder.path()).unwrap();
+    let parts = mjcf(text, several(folder.path())).unwrap();
     assert_eq!(parts.toml, import(&whole).unwrap().toml);
     assert_eq!(left_out(&parts), ["line 3 of `parts/body.xml`: body `b`, light: is left out"]);
 }
@@ -208,15 +213,17 @@ fn what_cannot_be_included_is_refused_with_file_line_and_element() {
     ];
     let folder = folder(&files);
     for (name, expected) in [
-        ("a.xml", "line 3 of `b.xml`: include: names `a.xml`, which is included already"),
+        ("./a.xml", "line 3 of `b.xml`: include: names `a.xml`, which is included already"),
         ("broken.xml", "line 2 of `broken.xml`: the file: is not XML"),
         ("none.xml", "line 1: worldbody, include: names `none.xml`, which cannot be read beside the model"),
         ("wrong.xml", "line 2 of `wrong.xml`: body `a`, joint: `axis` has no direction"),
     ] {
         let text = format!("<mujoco><worldbody><include file=\"{name}\"/></worldbody></mujoco>");
-        let error = mjcf(&text, folder.path()).expect_err(name).to_string();
+        let error = mjcf(&text, several(folder.path())).expect_err(name).to_string();
         assert!(error.starts_with(expected), "{error}\nis not {expected}");
     }
+    let error = mjcf("<mujoco><include file=\"a.xml\"/></mujoco>", folder.path()).unwrap_err().to_string();
+    assert!(error.ends_with("`a.xml`, and no included file is read here; expected a model in one file"), "{error}");
 }
 
 #[test]
@@ -254,6 +261,15 @@ fn tendons_between_two_sites_are_ropes_and_springs() {
     // 0.1 m below their sites: where the rope is long, and where 100 N/m bear 2 kg
     assert!((height("hung") - (2.0 - 0.5 - 0.1)).abs() < 1e-3, "{}", height("hung"));
     assert!((height("sprung") - (2.0 - 0.3 - 2.0 * 9.81 / 100.0 - 0.1)).abs() < 1e-3, "{}", height("sprung"));
+}
+
+#[test]
+fn a_tendon_that_gives_no_length_rests_where_joints_are_at_their_springs() {
+    // the file has the slide at 0.25 m, 1 m above the site of the world; its spring is at 0.75 m
+    let text = r#"<mujoco><worldbody><site name="ground"/><body name="post" pos="0 0 1">
+        <joint type="slide" ref="0.25" springref="0.75"/><geom size="0.1"/><site name="top"/></body></worldbody>
+        <tendon><spatial stiffness="10"><site site="ground"/><site site="top"/></spatial></tendon></mujoco>"#;
+    assert!(import(text).unwrap().toml.contains("\nrest_m = 1.5\n"));
 }
 
 /// A hinge at a height of 1 m with a servo, a slide and a ball joint below it, and a body that is free.
