@@ -230,7 +230,8 @@ impl Shown {
         };
         let part = |from: f32, to: f32, low: f32, high: f32| {
             let y = |share: f32| rect.bottom() - share * rect.height();
-            Rect::from_min_max(pos2(from.max(rect.left()), y(high)), pos2(to.min(rect.right()), y(low)))
+            let [from, to] = [from, to].map(|x| x.clamp(rect.left(), rect.right()));
+            Rect::from_min_max(pos2(from, y(high)), pos2(to, y(low)))
         };
         // how far to the left bars and feet have come
         let (mut bars, mut feet) = (f32::INFINITY, f32::INFINITY);
@@ -294,6 +295,18 @@ mod tests {
         // 20 ms of turns are a fifth of the lane
         assert!((15..=21).contains(&drawn), "{drawn} bars for 20 points");
         assert!(mesh.vertices.iter().all(|vertex| (78.0..=100.0).contains(&vertex.pos.x)));
+    }
+
+    #[test]
+    fn nothing_is_drawn_beyond_the_ends_of_a_lane() {
+        // each was due long before the left end
+        let late =
+            (0..20).map(|k| TurnRow { late_s: 10.0 + 0.1 * f64::from(k), ..turn(0.9 + 0.01 * f64::from(k), 1e-3) });
+        let shown = Shown { newest_s: 1.0, span_s: 0.1, palette: super::super::theme::DARK };
+        let rect = Rect::from_min_max(pos2(150.0, 0.0), pos2(250.0, 10.0));
+        let mesh = shown.mesh(&AgentRow::new(AgentId(0), "a", "rigid"), &lane(late), rect);
+        let drawn: Vec<f32> = mesh.vertices.iter().map(|vertex| vertex.pos.x).collect();
+        assert!(drawn.len() > 20 && drawn.iter().all(|x| (150.0..=250.0).contains(x)), "{drawn:?}");
     }
 
     #[test]

@@ -33,7 +33,11 @@ impl WatchedFiles {
             return false;
         }
         self.looked = Instant::now();
-        self.files.iter_mut().fold(false, |changed, file| has_changed(file) || changed)
+        let mut changed = false;
+        for file in &mut self.files {
+            changed |= has_changed(file);
+        }
+        changed
     }
 }
 
