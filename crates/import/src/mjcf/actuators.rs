@@ -28,7 +28,7 @@ pub(super) fn read(root: &Element, reader: &mut BodyReader<'_>) -> Result<(), Im
         };
         let damping = match reader.model.joints[at].motor {
             None => 0.0,
-            Some(Motor::Damper { velocity, damping, max_effort: None }) if velocity == 0.0 => damping,
+            Some(Motor::Damper { velocity: 0.0, damping, max_effort: None }) => damping,
             // a motor is one spring or one brake
             Some(_) => continue,
         };
