@@ -3,7 +3,7 @@
 //! In: a [`Model`] as the file has it. Out: the same where every link has a mass and a part. Never here: XML, TOML.
 
 use crate::masses::{STAND_IN_M, ball, lend, repair};
-use crate::model::{End, Fixed, Joint, Kind, Link, Look, Mass, Model, Part};
+use crate::model::{End, Fixed, Joint, Kind, Link, Look, Mass, Model, Part, TieKind};
 use crate::pose::Pose;
 use crate::{ImportError, LeftOut};
 use glam::{DMat3, DVec3};
@@ -77,22 +77,32 @@ fn fate(link: &Link, joint: Option<&Joint>, before: &[Fate], model: &Model) -> R
     })
 }
 
-/// Brings the ends of ties to the bodies that links become; what ties a body to itself is left out.
+/// How much longer than its rope a distance may be by rounding alone, metres.
+const ROUNDING_M: f64 = 1e-9;
+
+/// Brings the ends of ties to the bodies that links become; what ties a body to itself is left out, and so is a rope that is too short to start with.
 fn move_ties(model: &mut Model, fates: &[Fate], notes: &mut Vec<LeftOut>) {
-    for end in model.ties.iter_mut().flat_map(|tie| &mut tie.ends) {
+    let Model { links, ties, .. } = model;
+    for end in ties.iter_mut().flat_map(|tie| &mut tie.ends) {
         let Some(link) = end.link else { continue };
         *end = match fates[link] {
             Fate::Itself => *end,
             Fate::PartOf(host, pose) => End { link: Some(host), at_m: pose.point(end.at_m) },
-            Fate::World => End { link: None, at_m: model.links[link].pose.point(end.at_m) },
+            Fate::World => End { link: None, at_m: links[link].pose.point(end.at_m) },
         };
     }
-    model.ties.retain(|tie| {
-        let [a, b] = tie.ends;
-        if a.link == b.link {
-            notes.push(tie.place.note("is left out: both of its ends are on one body"));
-        }
-        a.link != b.link
+    ties.retain(|tie| {
+        let [a, b] = tie.ends.map(|end| end.link.map_or(end.at_m, |link| links[link].pose.point(end.at_m)));
+        let apart_m = a.distance(b);
+        let why = match tie.kind {
+            _ if tie.ends[0].link == tie.ends[1].link => "both of its ends are on one body".to_owned(),
+            TieKind::Rope { length_m } if apart_m > length_m + ROUNDING_M => {
+                format!("its ends start {apart_m:.4} m apart, and it is at most {length_m} m long")
+            }
+            TieKind::Rope { .. } | TieKind::Spring { .. } => return true,
+        };
+        notes.push(tie.place.note(format!("is left out: {why}")));
+        false
     });
 }
 

@@ -240,6 +240,7 @@ fn tendons_between_two_sites_are_ropes_and_springs() {
         <site name="unused"/>{}{}</worldbody><tendon>
         <spatial name="rope" damping="0" range="0 0.5"><site site="top"/><site site="on hung"/></spatial>
         <spatial name="spring" stiffness="100" width="0.01"><site site="top"/><site site="on sprung"/></spatial>
+        <spatial name="short" limited="true" range="0 0.1" damping="0"><site site="top"/><site site="on hung"/></spatial>
         <spatial name="bent"><site site="top"/><site site="on hung"/><site site="on sprung"/></spatial>
         <fixed name="geared"><joint joint="none" coef="1"/></fixed></tendon></mujoco>"#,
         ball("hung", 1.7),
@@ -251,8 +252,9 @@ fn tendons_between_two_sites_are_ropes_and_springs() {
         [
             "line 2: site `unused`: is left out",
             "line 4: spatial `spring`: `width` is left out",
-            "line 5: spatial `bent`: is left out: scenes have ropes and springs between two points alone",
-            "line 6: fixed `geared`: is left out: it couples joints, and scenes have no such coupling",
+            "line 5: spatial `short`: is left out: its ends start 0.2000 m apart, and it is at most 0.1 m long",
+            "line 6: spatial `bent`: is left out: scenes have ropes and springs between two points alone",
+            "line 7: fixed `geared`: is left out: it couples joints, and scenes have no such coupling",
         ]
     );
     let world = start(&imported, &[], 500.0);
