@@ -194,6 +194,9 @@ pub struct ImportArgs {
     /// A URDF robot or an MJCF model
     #[arg(value_hint = ValueHint::FilePath)]
     pub model: PathBuf,
+    /// Start an MJCF model from the keyframe of this name: its qpos and ctrl
+    #[arg(long, value_name = "NAME")]
+    pub key: Option<String>,
     /// Write the scene to this file instead of standard output
     #[arg(long, value_name = "FILE", value_hint = ValueHint::FilePath)]
     pub out: Option<PathBuf>,

@@ -1,6 +1,6 @@
 //! `import`: a URDF robot or an MJCF model as a scene.
 //!
-//! In: the model's file. Out: TOML on standard output or in a file, on standard error what has no place in it. Never here: what a model means.
+//! In: the model's file, and those that it includes. Out: TOML on standard output or in a file, on standard error what has no place in it. Never here: what a model means.
 
 use super::args::ImportArgs;
 use metachron_console::exit::Exit;
@@ -19,9 +19,13 @@ pub(super) fn command(args: &ImportArgs) -> anyhow::Result<Exit> {
     let folder = |path: &Path| path.parent().map_or_else(PathBuf::new, Path::to_path_buf);
     let (model_folder, out) = (folder(&args.model), args.out.as_deref().unwrap_or(&args.model));
     let scene_folder = folder(out);
-    let folders = Folders { model: &model_folder, scene: &scene_folder };
-    let text = read(&args.model)?;
-    let imported = metachron_import::model(&text, folders).map_err(|why| BadInput(format!("{model}: {why}")))?;
+    let folders = Folders { model: &model_folder, scene: &scene_folder, read: Some(&read_included) };
+    let text = read(&args.model).map_err(|why| BadInput(format!("{model} cannot be read: {why}")))?;
+    let imported = match &args.key {
+        Some(key) => metachron_import::mjcf_at_key(&text, folders, key),
+        None => metachron_import::model(&text, folders),
+    };
+    let imported = imported.map_err(|why| BadInput(format!("{model}: {why}")))?;
     let Imported { toml, left_out } = imported;
     for entry in left_out {
         message(&format!("{model}: {entry}"));
@@ -44,11 +48,18 @@ pub(super) fn command(args: &ImportArgs) -> anyhow::Result<Exit> {
     Ok(Exit::Ok)
 }
 
-fn read(path: &Path) -> Result<String, BadInput> {
-    let bad = |why: String| BadInput(format!("{} cannot be read: {why}", path.display()));
-    let size = std::fs::metadata(path).map_err(|why| bad(why.to_string()))?.len();
-    if size > SCENE_BYTES_MAX {
-        return Err(bad(format!("it has {size} bytes, more than {SCENE_BYTES_MAX}")));
+/// The text of a file that the model includes: only the caller of the program may make it wait for a stream.
+fn read_included(path: &Path) -> std::io::Result<String> {
+    match std::fs::metadata(path)?.is_file() {
+        true => read(path),
+        false => Err(std::io::Error::other("it is no plain file")),
     }
-    std::fs::read_to_string(path).map_err(|why| bad(why.to_string()))
+}
+
+fn read(path: &Path) -> std::io::Result<String> {
+    let size = std::fs::metadata(path)?.len();
+    if size > SCENE_BYTES_MAX {
+        return Err(std::io::Error::other(format!("it has {size} bytes, more than {SCENE_BYTES_MAX}")));
+    }
+    std::fs::read_to_string(path)
 }

@@ -79,12 +79,12 @@ fn import_writes_scenes_that_load_lists_what_is_left_out_and_refuses_broken_mode
         "<mujoco><worldbody>\n<body name=\"b\"><joint type=\"screw\"/></body></worldbody></mujoco>",
     )
     .unwrap();
-    let broken = metachron(&["import", &path("b.xml")]);
-    assert!(
-        code(&broken) == 2 && err(&broken).contains("b.xml: line 2: body `b`, joint: is of the type `screw`"),
-        "{}",
-        err(&broken)
-    );
+    std::fs::write(path("c.xml"), "<mujoco><include file=\"b.xml\"/></mujoco>").unwrap();
+    for (model, line) in [("b.xml", "line 2"), ("c.xml", "line 2 of `b.xml`")] {
+        let broken = metachron(&["import", &path(model)]);
+        let expected = format!("{model}: {line}: body `b`, joint: is of the type `screw`");
+        assert!(code(&broken) == 2 && err(&broken).contains(&expected), "{}", err(&broken));
+    }
 }
 
 #[test]

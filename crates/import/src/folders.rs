@@ -1,23 +1,36 @@
 //! Where files that a model names are.
 //!
-//! In: a path as a model writes it. Out: the path as the scene writes it. Never here: what is in the file.
+//! In: a path as a model writes it. Out: the path as the scene writes it, the text of what is included. Never here: what that means, files that
+//! are opened (the caller's [`ReadText`] does).
 
 use crate::ImportError;
 use crate::xml::Element;
 use std::path::{Component, Path, PathBuf};
 
+/// Gives the text of the file at a path, or why there is none: [`std::fs::read_to_string`], or one that reads an archive.
+pub type ReadText<'a> = &'a dyn Fn(&Path) -> std::io::Result<String>;
+
 /// The folder of a model's file, and that of the scene which it becomes: scenes name meshes relative to their own.
-#[derive(Debug, Clone, Copy)]
+#[derive(Clone, Copy)]
 pub struct Folders<'a> {
     /// The folder of the model.
     pub model: &'a Path,
     /// The folder of the scene.
     pub scene: &'a Path,
+    /// Reads what the model includes; `None` refuses a model in several files.
+    pub read: Option<ReadText<'a>>,
 }
 
+impl std::fmt::Debug for Folders<'_> {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.debug_struct("Folders").field("model", &self.model).field("scene", &self.scene).finish_non_exhaustive()
+    }
+}
+
+/// One folder for both, of a model in one file.
 impl<'a> From<&'a Path> for Folders<'a> {
     fn from(folder: &'a Path) -> Self {
-        Self { model: folder, scene: folder }
+        Self { model: folder, scene: folder, read: None }
     }
 }
 
@@ -45,6 +58,21 @@ impl Folders<'_> {
         })
     }
 
+    /// A file that `element` includes, which is beside the model.
+    ///
+    /// # Errors
+    /// Where there is none that can be read.
+    pub(crate) fn included(&self, element: &Element, name: &str) -> Result<IncludedFile, ImportError> {
+        let Some(read) = self.read else {
+            let reason = format!("names `{name}`, and no included file is read here; expected a model in one file");
+            return Err(element.wrong(reason));
+        };
+        let path = self.model.join(name);
+        let text = read(&path)
+            .map_err(|why| element.wrong(format!("names `{name}`, which cannot be read beside the model: {why}")))?;
+        Ok(IncludedFile { path: plain(&path).unwrap_or(path), text })
+    }
+
     /// Where the file may be: `package://NAME/REST` is in a folder NAME at or around the model, other paths are beside it.
     fn candidates(&self, name: &str) -> Vec<PathBuf> {
         let Some(path) = name.strip_prefix("package://") else {
@@ -63,9 +91,18 @@ impl Folders<'_> {
         if common == 0 {
             return None;
         }
-        let up = std::iter::repeat_n("..".to_owned(), scene.len() - common);
-        Some(up.chain(file[common..].iter().cloned()).collect::<Vec<_>>().join("/"))
+        let up = std::iter::repeat_n(Some(".."), scene.iter().count() - common);
+        let parts: Option<Vec<&str>> = up.chain(file.iter().skip(common).map(|part| part.to_str())).collect();
+        Some(parts?.join("/"))
     }
+}
+
+/// The text of a file that a model includes.
+#[derive(Debug)]
+pub(crate) struct IncludedFile {
+    /// The same however a model writes it.
+    pub(crate) path: PathBuf,
+    pub(crate) text: String,
 }
 
 /// A path from the root; the empty one, which the folder of a bare file name is, is the folder of the program.
@@ -73,15 +110,15 @@ fn absolute(path: &Path) -> Option<PathBuf> {
     std::path::absolute(Path::new(".").join(path)).ok()
 }
 
-/// The parts of a path from the root, without `.` and `..`.
-fn plain(path: &Path) -> Option<Vec<String>> {
-    let mut parts = Vec::new();
+/// A path from the root, without `.` and `..`.
+fn plain(path: &Path) -> Option<PathBuf> {
+    let mut plain = PathBuf::new();
     for part in absolute(path)?.components() {
         match part {
-            Component::ParentDir => drop(parts.pop()),
+            Component::ParentDir => drop(plain.pop()),
             Component::CurDir => {}
-            part => parts.push(part.as_os_str().to_str()?.to_owned()),
+            part => plain.push(part),
         }
     }
-    Some(parts)
+    Some(plain)
 }

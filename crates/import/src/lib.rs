@@ -1,7 +1,8 @@
 //! URDF robots and MJCF models as scene files.
 //!
 //! In: the text of a model and its folder. Out: the text of a scene, and a list of all that has no place in one ([`Imported`]).
-//! Never here: running a scene, reading the points of meshes, checking the scene that comes out (`metachron-scene` does).
+//! Never here: files that are opened (the caller reads what a model includes, [`ReadText`]), running a scene, the points of meshes, checking the
+//! scene that comes out (`metachron-scene` does).
 //!
 //! Links become rigid objects whose axes are those of the link, joints `[[joint]]` tables, collision geometries shapes and parts.
 //! Everything in the file that no line of this crate has read is in the list: an element or attribute cannot be dropped unseen.
@@ -10,13 +11,14 @@ mod folders;
 mod masses;
 mod mjcf;
 mod model;
+mod place;
 mod pose;
 mod scene_text;
 mod settle;
 mod urdf;
 mod xml;
 
-pub use folders::Folders;
+pub use folders::{Folders, ReadText};
 
 /// The page of the crate: its code runs as a test.
 #[cfg(doctest)]
@@ -35,7 +37,9 @@ pub struct Imported {
 /// A part of a model that a scene has no place for, or that is in it otherwise than in the model.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct LeftOut {
-    /// Line of the model's file, from 1.
+    /// The included file that it is in, as the model names it; `None` for the model's own.
+    pub file: Option<String>,
+    /// Line of that file, from 1.
     pub line: u32,
     /// Which element, such as ``joint `elbow`, dynamics``.
     pub element: String,
@@ -45,15 +49,22 @@ pub struct LeftOut {
 
 impl std::fmt::Display for LeftOut {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        write!(f, "line {}: {}: {}", self.line, self.element, self.what)
+        write!(f, "{}: {}: {}", spot(self.file.as_deref(), self.line), self.element, self.what)
     }
+}
+
+/// A line, and the file that it is in where that is not the model's own.
+fn spot(file: Option<&str>, line: u32) -> String {
+    file.map_or_else(|| format!("line {line}"), |file| format!("line {line} of `{file}`"))
 }
 
 /// Why a model cannot be a scene.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
-#[error("line {line}: {element}: {reason}")]
+#[error("{}: {element}: {reason}", spot(file.as_deref(), *line))]
 pub struct ImportError {
-    /// Line of the model's file, from 1.
+    /// The included file that it is in, as the model names it; `None` for the model's own.
+    pub file: Option<String>,
+    /// Line of that file, from 1.
     pub line: u32,
     /// Which element, such as ``link `arm`, inertial``.
     pub element: String,
@@ -66,10 +77,10 @@ pub struct ImportError {
 /// # Errors
 /// As those two, and for another root.
 pub fn model<'a>(text: &str, folders: impl Into<Folders<'a>>) -> Result<Imported, ImportError> {
-    let root = xml::parse(text)?;
+    let root = xml::parse(text, None)?;
     match root.tag.as_str() {
         "robot" => of_urdf(&root, folders.into()),
-        "mujoco" => of_mjcf(root, folders.into()),
+        "mujoco" => of_mjcf(root, folders.into(), None),
         _ => Err(root.wrong("is the root of no model that is known here; expected `robot` (URDF) or `mujoco` (MJCF)")),
     }
 }
@@ -82,15 +93,24 @@ pub fn model<'a>(text: &str, folders: impl Into<Folders<'a>>) -> Result<Imported
 /// [`ImportError`] at the first element that no scene can have: text that is no XML, a missing mesh, a mass that is not above zero, links that
 /// are no tree.
 pub fn urdf<'a>(text: &str, folders: impl Into<Folders<'a>>) -> Result<Imported, ImportError> {
-    of_urdf(&xml::parse(text)?, folders.into())
+    of_urdf(&xml::parse(text, None)?, folders.into())
 }
 
-/// Reads an MJCF model, its classes of defaults and frames resolved. Meshes are looked for in the folder of the model.
+/// Reads an MJCF model, its classes of defaults and frames resolved. Meshes and included files are looked for in the folder of the model; what is
+/// included comes by [`Folders::read`].
 ///
 /// # Errors
 /// [`ImportError`] at the first element that no scene can have, as [`urdf`].
 pub fn mjcf<'a>(text: &str, folders: impl Into<Folders<'a>>) -> Result<Imported, ImportError> {
-    of_mjcf(xml::parse(text)?, folders.into())
+    of_mjcf(xml::parse(text, None)?, folders.into(), None)
+}
+
+/// The same, begun at the keyframe `key`: joints at its `qpos`, servos at its `ctrl`.
+///
+/// # Errors
+/// As [`mjcf`], and where there is no such keyframe or it has other numbers than the model has coordinates.
+pub fn mjcf_at_key<'a>(text: &str, folders: impl Into<Folders<'a>>, key: &str) -> Result<Imported, ImportError> {
+    of_mjcf(xml::parse(text, None)?, folders.into(), Some(key))
 }
 
 fn of_urdf(root: &xml::Element, folders: Folders<'_>) -> Result<Imported, ImportError> {
@@ -99,10 +119,11 @@ fn of_urdf(root: &xml::Element, folders: Folders<'_>) -> Result<Imported, Import
     imported(root, model, notes)
 }
 
-fn of_mjcf(mut root: xml::Element, folders: Folders<'_>) -> Result<Imported, ImportError> {
-    mjcf::resolve_defaults(&mut root)?;
+fn of_mjcf(mut root: xml::Element, folders: Folders<'_>, key: Option<&str>) -> Result<Imported, ImportError> {
     let mut notes = Vec::new();
-    let model = mjcf::read(&root, folders, &mut notes)?;
+    mjcf::include(&mut root, folders, &mut notes)?;
+    mjcf::resolve_defaults(&mut root)?;
+    let model = mjcf::read(&root, mjcf::Given { folders, key }, &mut notes)?;
     imported(&root, model, notes)
 }
 
@@ -110,6 +131,6 @@ fn imported(root: &xml::Element, model: model::Model, mut notes: Vec<LeftOut>) -
     let settled = settle::settle(model, &mut notes)?;
     let toml = scene_text::write(&settled, &mut notes);
     root.list_unread(&mut notes);
-    notes.sort_by_key(|note| note.line);
+    notes.sort_by(|a, b| (&a.file, a.line).cmp(&(&b.file, b.line)));
     Ok(Imported { toml, left_out: notes })
 }

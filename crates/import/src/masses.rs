@@ -40,7 +40,7 @@ pub(crate) fn lend(model: &mut Model, notes: &mut Vec<LeftOut>) {
         let what = format!("has no mass, and moves: a thousandth of that of `{}` is added", model.links[carried].name);
         let com_m = joint.anchor_m;
         let link = &mut model.links[at];
-        notes.push(LeftOut { line: link.place.line, element: link.place.label.clone(), what });
+        notes.push(link.place.note(what));
         let inertia_kg_m2 = Some(DMat3::from_diagonal(DVec3::splat(LENT * weight.moment_kg_m2)));
         link.mass = Mass::Given { mass_kg: (LENT * weight.mass_kg).max(MASS_MIN_KG), com_m, inertia_kg_m2 };
         link.is_lent = true;
@@ -113,7 +113,7 @@ pub(crate) fn repair(link: &mut Link, notes: &mut Vec<LeftOut>) {
     }
     *tensor += DMat3::from_diagonal(DVec3::splat(added));
     let what = format!("has moments of inertia that no body has: {added:.3e} kg·m² is added to each");
-    notes.push(LeftOut { line: link.place.line, element: link.place.label.clone(), what });
+    notes.push(link.place.note(what));
 }
 
 /// Whether all principal moments are above zero, and none is larger than the sum of the others.
@@ -131,13 +131,14 @@ fn is_positive(m: DMat3) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::model::{Look, Place};
+    use crate::model::Look;
+    use crate::place::Place;
 
     fn repaired(moments: [f64; 3]) -> (DVec3, usize) {
         let inertia_kg_m2 = Some(DMat3::from_diagonal(DVec3::from_array(moments)));
         let mut link = Link {
             name: String::new(),
-            place: Place { line: 1, label: String::new() },
+            place: Place { file: None, line: 1, label: String::new() },
             pose: Pose::IDENTITY,
             mass: Mass::Given { mass_kg: 2.0, com_m: DVec3::ZERO, inertia_kg_m2 },
             parts: Vec::new(),

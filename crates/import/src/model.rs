@@ -2,6 +2,7 @@
 //!
 //! In: what the readers found. Out: plain data. Never here: XML, TOML.
 
+use crate::place::Place;
 use crate::pose::Pose;
 use glam::{DMat3, DVec3};
 use metachron_geometry::Solid;
@@ -15,17 +16,11 @@ pub(crate) struct Model {
     /// Each after the one that it hangs on.
     pub(crate) links: Vec<Link>,
     pub(crate) joints: Vec<Joint>,
+    pub(crate) ties: Vec<Tie>,
     /// Pairs of links that pass through each other.
     pub(crate) apart: Vec<[usize; 2]>,
     /// Solids of the world itself, in its axes.
     pub(crate) fixed: Vec<Fixed>,
-}
-
-/// An element of the file, for messages.
-#[derive(Debug, Clone)]
-pub(crate) struct Place {
-    pub(crate) line: u32,
-    pub(crate) label: String,
 }
 
 /// A body.
@@ -139,6 +134,37 @@ pub(crate) struct Joint {
     pub(crate) motor: Option<Motor>,
 }
 
+/// A rope or spring between two points.
+#[derive(Debug, Clone)]
+pub(crate) struct Tie {
+    pub(crate) place: Place,
+    pub(crate) ends: [End; 2],
+    pub(crate) kind: TieKind,
+}
+
+/// An end of a tie.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub(crate) struct End {
+    /// `None` for the world.
+    pub(crate) link: Option<usize>,
+    /// In the axes of the link, or the world's.
+    pub(crate) at_m: DVec3,
+}
+
+/// What is between the ends of a tie.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) enum TieKind {
+    /// Nothing up to a length that is the greatest.
+    Rope {
+        length_m: f64,
+    },
+    Spring {
+        stiffness_n_m: f64,
+        damping_n_s_m: f64,
+        rest_m: f64,
+    },
+}
+
 /// The motion that a joint leaves.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Kind {
@@ -154,7 +180,7 @@ pub(crate) enum Motor {
     /// A spring to a position, with a damper.
     Spring { position: f64, stiffness: f64, damping: f64, max_effort: Option<f64> },
     /// A damper against a velocity.
-    Damper { damping: f64, max_effort: Option<f64> },
+    Damper { velocity: f64, damping: f64, max_effort: Option<f64> },
     /// Dry friction.
     Brake { max_effort: f64 },
 }

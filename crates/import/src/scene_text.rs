@@ -3,7 +3,7 @@
 //! In: a [`Model`] where every link has a mass and a part. Out: TOML. Never here: what the model was read from.
 
 use crate::LeftOut;
-use crate::model::{Fixed, Joint, Kind, Link, Look, Masks, Mass, Model, Motor, Part, Shape};
+use crate::model::{End, Fixed, Joint, Kind, Link, Look, Masks, Mass, Model, Motor, Part, Shape, Tie, TieKind};
 use crate::pose::{Pose, fixed_angles_deg};
 use glam::{DMat3, DQuat, DVec3};
 use metachron_geometry::Solid;
@@ -34,6 +34,9 @@ pub(crate) fn write(model: &Model, notes: &mut Vec<LeftOut>) -> String {
     }
     for joint in &model.joints {
         write_joint(&mut out, model, joint, notes);
+    }
+    for tie in &model.ties {
+        write_tie(&mut out, model, tie);
     }
     for [a, b] in &model.apart {
         out.push_str("\n[[coupling]]\n");
@@ -216,13 +219,35 @@ fn write_joint(out: &mut String, model: &Model, joint: &Joint, notes: &mut Vec<L
     match joint.range {
         Some(range) if unit.is_angle && range.iter().any(|end| end.abs() > ANGLE_MAX_RAD) => {
             let what = "its limits are left out: they are more than half a turn from the start";
-            notes.push(LeftOut { line: joint.place.line, element: joint.place.label.clone(), what: what.to_owned() });
+            notes.push(joint.place.note(what));
         }
         Some(range) => put(out, unit.range, &format!("[{}, {}]", unit.position(range[0]), unit.position(range[1]))),
         None => {}
     }
     if let Some(motor) = joint.motor {
         put(out, "motor", &unit.motor(within(motor, joint, notes)));
+    }
+}
+
+/// A rope or spring, whose first object is no world.
+fn write_tie(out: &mut String, model: &Model, tie: &Tie) {
+    let [a, b] = tie.ends;
+    let [a, b] = if a.link.is_none() { [b, a] } else { [a, b] };
+    let name = |end: End| end.link.map_or("world", |link| model.links[link].name.as_str());
+    out.push_str("\n[[joint]]\n");
+    let (kind, keys) = match tie.kind {
+        TieKind::Rope { length_m } => ("rope", vec![("length_m", length_m)]),
+        TieKind::Spring { stiffness_n_m, damping_n_s_m, rest_m } => {
+            ("spring", vec![("stiffness_n_m", stiffness_n_m), ("damping_n_s_m", damping_n_s_m), ("rest_m", rest_m)])
+        }
+    };
+    put(out, "kind", &quoted(kind));
+    put(out, "a", &quoted(name(a)));
+    put(out, "b", &quoted(name(b)));
+    put(out, "at_a_m", &vector(a.at_m));
+    put(out, "at_b_m", &vector(b.at_m));
+    for (key, value) in keys {
+        put(out, key, &exact(value));
     }
 }
 
@@ -234,7 +259,7 @@ fn within(motor: Motor, joint: &Joint, notes: &mut Vec<LeftOut>) -> Motor {
     };
     if !(least..=greatest).contains(&position) {
         let what = "its spring or servo rests at the end of its range, where the file has it beyond";
-        notes.push(LeftOut { line: joint.place.line, element: joint.place.label.clone(), what: what.to_owned() });
+        notes.push(joint.place.note(what));
     }
     Motor::Spring { position: position.clamp(least, greatest), stiffness, damping, max_effort }
 }
@@ -287,8 +312,8 @@ impl Unit {
                 let damper = if damping > 0.0 { format!(", {} = {damping:?}", self.damping) } else { String::new() };
                 (goal + &damper, max_effort)
             }
-            Motor::Damper { damping, max_effort } => {
-                (format!("{} = 0, {} = {damping:?}", self.velocity, self.damping), max_effort)
+            Motor::Damper { velocity, damping, max_effort } => {
+                (format!("{} = {}, {} = {damping:?}", self.velocity, number(velocity), self.damping), max_effort)
             }
             Motor::Brake { max_effort } => (format!("{} = 0", self.velocity), Some(max_effort)),
         };

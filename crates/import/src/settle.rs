@@ -3,7 +3,7 @@
 //! In: a [`Model`] as the file has it. Out: the same where every link has a mass and a part. Never here: XML, TOML.
 
 use crate::masses::{STAND_IN_M, ball, lend, repair};
-use crate::model::{Fixed, Joint, Kind, Link, Look, Mass, Model, Part, Place};
+use crate::model::{End, Fixed, Joint, Kind, Link, Look, Mass, Model, Part, TieKind};
 use crate::pose::Pose;
 use crate::{ImportError, LeftOut};
 use glam::{DMat3, DVec3};
@@ -44,6 +44,7 @@ pub(crate) fn settle(mut model: Model, notes: &mut Vec<LeftOut>) -> Result<Model
             }
         }
     }
+    move_ties(&mut model, &fates, notes);
     keep(&mut model, &fates);
     let neighbours = neighbours(&model);
     model.apart.extend(neighbours);
@@ -66,15 +67,43 @@ fn fate(link: &Link, joint: Option<&Joint>, before: &[Fate], model: &Model) -> R
     }
     let Some(joint) = joint else { return Ok(Fate::World) };
     if joint.kind != Kind::Fixed {
-        let Place { line, label: element } = link.place.clone();
         let reason = format!("has no mass, and {} lets it move; expected a mass above zero", joint.place.label);
-        return Err(ImportError { line, element, reason });
+        return Err(link.place.wrong(reason));
     }
     Ok(match joint.parent.map(|parent| (parent, before[parent])) {
         None | Some((_, Fate::World)) => Fate::World,
         Some((parent, Fate::Itself)) => Fate::PartOf(parent, model.links[parent].pose.inverse().then(link.pose)),
         Some((_, Fate::PartOf(host, _))) => Fate::PartOf(host, model.links[host].pose.inverse().then(link.pose)),
     })
+}
+
+/// How much longer than its rope a distance may be by rounding alone, metres.
+const ROUNDING_M: f64 = 1e-9;
+
+/// Brings the ends of ties to the bodies that links become; what ties a body to itself is left out, and so is a rope that is too short to start with.
+fn move_ties(model: &mut Model, fates: &[Fate], notes: &mut Vec<LeftOut>) {
+    let Model { links, ties, .. } = model;
+    for end in ties.iter_mut().flat_map(|tie| &mut tie.ends) {
+        let Some(link) = end.link else { continue };
+        *end = match fates[link] {
+            Fate::Itself => *end,
+            Fate::PartOf(host, pose) => End { link: Some(host), at_m: pose.point(end.at_m) },
+            Fate::World => End { link: None, at_m: links[link].pose.point(end.at_m) },
+        };
+    }
+    ties.retain(|tie| {
+        let [a, b] = tie.ends.map(|end| end.link.map_or(end.at_m, |link| links[link].pose.point(end.at_m)));
+        let apart_m = a.distance(b);
+        let why = match tie.kind {
+            _ if tie.ends[0].link == tie.ends[1].link => "both of its ends are on one body".to_owned(),
+            TieKind::Rope { length_m } if apart_m > length_m + ROUNDING_M => {
+                format!("its ends start {apart_m:.4} m apart, and it is at most {length_m} m long")
+            }
+            TieKind::Rope { .. } | TieKind::Spring { .. } => return true,
+        };
+        notes.push(tie.place.note(format!("is left out: {why}")));
+        false
+    });
 }
 
 /// Leaves the links that remain themselves, and the joints and pairs between them.
@@ -93,6 +122,9 @@ fn keep(model: &mut Model, fates: &[Fate]) {
     model.joints.retain(|joint| fates[joint.child] == Fate::Itself);
     for joint in &mut model.joints {
         (joint.parent, joint.child) = (joint.parent.and_then(standing), numbers[joint.child]);
+    }
+    for end in model.ties.iter_mut().flat_map(|tie| &mut tie.ends) {
+        end.link = end.link.and_then(standing);
     }
     let pairs = std::mem::take(&mut model.apart).into_iter();
     model.apart = pairs.filter_map(|[a, b]| Some([standing(a)?, standing(b)?])).filter(|[a, b]| a != b).collect();
@@ -132,19 +164,13 @@ fn neighbours(model: &Model) -> Vec<[usize; 2]> {
 /// Leaves a link the parts that are touched, or else those that are seen, or else a ball with its moments of inertia.
 fn choose_parts(link: &mut Link, notes: &mut Vec<LeftOut>) -> Result<(), ImportError> {
     let touched = link.parts.iter().any(|part| part.touches);
-    let mut left_out = |part: &Part, what: String| {
-        notes.push(LeftOut { line: part.place.line, element: part.place.label.clone(), what });
-    };
+    let mut left_out = |part: &Part, what: String| notes.push(part.place.note(what));
     let weighs = |part: &Part| matches!(link.mass, Mass::OfParts) && part.density_kg_m3 != Some(0.0);
     if touched {
         if let Some(part) = link.parts.iter().find(|part| !part.touches && weighs(part)) {
             let reason = "weighs something, and nothing touches it, where something touches other parts of its body; \
                           expected an inertial element in the body";
-            return Err(ImportError {
-                line: part.place.line,
-                element: part.place.label.clone(),
-                reason: reason.to_owned(),
-            });
+            return Err(part.place.wrong(reason));
         }
         link.parts
             .iter()
@@ -155,9 +181,8 @@ fn choose_parts(link: &mut Link, notes: &mut Vec<LeftOut>) -> Result<(), ImportE
     if link.parts.len() > COMPOUND_PARTS_MAX {
         let beyond = &link.parts[COMPOUND_PARTS_MAX..];
         if beyond.iter().any(weighs) {
-            let Place { line, label: element } = link.place.clone();
             let reason = format!("has {} solids that weigh; expected at most {COMPOUND_PARTS_MAX}", link.parts.len());
-            return Err(ImportError { line, element, reason });
+            return Err(link.place.wrong(reason));
         }
         beyond.iter().for_each(|part| left_out(part, format!("is left out: it is beyond {COMPOUND_PARTS_MAX} solids")));
         link.parts.truncate(COMPOUND_PARTS_MAX);

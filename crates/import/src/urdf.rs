@@ -4,7 +4,7 @@
 //! The axes of a link are those of the joint that it hangs on, so that a joint is at the origin of its child.
 
 use crate::folders::{Folders, is_readable};
-use crate::model::{Joint, Kind, Link, Look, Mass, Model, Motor, Part, Place, Shape};
+use crate::model::{Joint, Kind, Link, Look, Mass, Model, Motor, Part, Shape};
 use crate::pose::{Pose, fixed_angles};
 use crate::xml::Element;
 use crate::{ImportError, LeftOut};
@@ -87,8 +87,10 @@ fn order<'a>(
     let mut above: BTreeMap<&str, &Draft<'_>> = BTreeMap::new();
     for draft in drafts {
         if let Some(other) = above.insert(draft.child, draft) {
-            let reason =
-                format!("has the child `{}`, which {} has, too; expected a tree", draft.child, other.element.label);
+            let reason = format!(
+                "has the child `{}`, which {} has, too; expected a tree",
+                draft.child, other.element.place.label
+            );
             return Err(draft.element.wrong(reason));
         }
     }
@@ -161,7 +163,7 @@ fn damper(element: &Element) -> Result<Option<Motor>, ImportError> {
     };
     let damping = brakes("damping")?;
     if damping > 0.0 {
-        return Ok(Some(Motor::Damper { damping, max_effort: None }));
+        return Ok(Some(Motor::Damper { velocity: 0.0, damping, max_effort: None }));
     }
     let friction = brakes("friction")?;
     Ok((friction > 0.0).then_some(Motor::Brake { max_effort: friction }))
@@ -180,7 +182,7 @@ fn start(draft: &Draft<'_>, notes: &mut Vec<LeftOut>) -> f64 {
 fn joint(draft: &Draft<'_>, parent: usize, child: usize, start: f64) -> Joint {
     Joint {
         name: draft.element.text("name").unwrap_or_default().to_owned(),
-        place: place(draft.element),
+        place: draft.element.place.clone(),
         parent: Some(parent),
         child,
         kind: draft.kind,
@@ -189,10 +191,6 @@ fn joint(draft: &Draft<'_>, parent: usize, child: usize, start: f64) -> Joint {
         range: draft.limits.map(|limits| limits.map(|end| end - start)),
         motor: draft.motor,
     }
-}
-
-fn place(element: &Element) -> Place {
-    Place { line: element.line, label: element.label.clone() }
 }
 
 /// The pose of an element's `origin`.
@@ -216,11 +214,11 @@ fn link(
     for geometry in element.children(if touches { "collision" } else { "visual" }) {
         let Some(shape) = shape(geometry, folders, notes)? else { continue };
         let pose = origin(geometry)?;
-        parts.push(Part { place: place(geometry), shape, pose, density_kg_m3: None, touches });
+        parts.push(Part { place: geometry.place.clone(), shape, pose, density_kg_m3: None, touches });
     }
     let look = Look { colour: colour(element, touches, colours)?, surface: None };
     let name = element.needed("name")?.to_owned();
-    Ok(Link { name, place: place(element), pose, mass: mass(element)?, parts, look, is_lent: false })
+    Ok(Link { name, place: element.place.clone(), pose, mass: mass(element)?, parts, look, is_lent: false })
 }
 
 fn mass(element: &Element) -> Result<Mass, ImportError> {

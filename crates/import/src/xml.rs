@@ -2,19 +2,19 @@
 //!
 //! In: text. Out: [`Element`]s, numbers of their attributes, and the list of what no reader asked for. Never here: the meaning of a tag.
 
+use crate::place::Place;
 use crate::{ImportError, LeftOut};
 use std::cell::Cell;
+use std::rc::Rc;
 
 /// Deepest nesting of elements: readers recurse.
-const DEPTH_MAX: usize = 200;
+pub(crate) const DEPTH_MAX: usize = 200;
 
 /// An element with all that is in it.
 #[derive(Debug, Clone)]
 pub(crate) struct Element {
     pub(crate) tag: String,
-    /// For messages, such as ``joint `elbow` ``, or of an element without a name ``joint `elbow`, limit``.
-    pub(crate) label: String,
-    pub(crate) line: u32,
+    pub(crate) place: Place,
     attributes: Vec<Attribute>,
     children: Vec<Element>,
     is_read: Cell<bool>,
@@ -27,25 +27,30 @@ struct Attribute {
     is_read: Cell<bool>,
 }
 
-/// The root element of a text.
+/// The root element of a text: of an included `file`, or of the model's own.
 ///
 /// # Errors
 /// For text that is no XML, or nested too deep.
-pub(crate) fn parse(text: &str) -> Result<Element, ImportError> {
-    let document = roxmltree::Document::parse(text).map_err(|why| ImportError {
-        line: why.pos().row,
-        element: "the file".to_owned(),
-        reason: format!("is not XML: {why}"),
-    })?;
-    let root = Element::of(document.root_element(), &document, None, 0)?;
+pub(crate) fn parse(text: &str, file: Option<&str>) -> Result<Element, ImportError> {
+    let file: Option<Rc<str>> = file.map(Rc::from);
+    let place = |line: u32, label: &str| Place { file: file.clone(), line, label: label.to_owned() };
+    let document = roxmltree::Document::parse(text)
+        .map_err(|why| place(why.pos().row, "the file").wrong(format!("is not XML: {why}")))?;
+    let root = Element::of(document.root_element(), &Text { document: &document, file: file.clone() }, None, 0)?;
     root.is_read.set(true);
     Ok(root)
+}
+
+/// What elements are read from.
+struct Text<'a> {
+    document: &'a roxmltree::Document<'a>,
+    file: Option<Rc<str>>,
 }
 
 impl Element {
     fn of(
         node: roxmltree::Node<'_, '_>,
-        document: &roxmltree::Document<'_>,
+        text: &Text<'_>,
         parent: Option<&str>,
         depth: usize,
     ) -> Result<Self, ImportError> {
@@ -55,9 +60,10 @@ impl Element {
             (None, Some(parent)) => format!("{parent}, {tag}"),
             (None, None) => tag.clone(),
         };
-        let line = document.text_pos_at(node.range().start).row;
+        let line = text.document.text_pos_at(node.range().start).row;
         if depth > DEPTH_MAX {
-            return Err(ImportError { line, element: tag, reason: format!("is nested more than {DEPTH_MAX} deep") });
+            let place = Place { file: text.file.clone(), line, label: tag };
+            return Err(place.wrong(format!("is nested more than {DEPTH_MAX} deep")));
         }
         let attribute = |a: roxmltree::Attribute<'_, '_>| Attribute {
             // the label says the name
@@ -69,8 +75,9 @@ impl Element {
         // the root's name is that of the model, and of no use in labels
         let inside = (depth > 0).then_some(label.as_str());
         let elements = node.children().filter(roxmltree::Node::is_element);
-        let children = elements.map(|child| Self::of(child, document, inside, depth + 1)).collect::<Result<_, _>>()?;
-        Ok(Self { tag, label, line, attributes, children, is_read: Cell::new(false) })
+        let children = elements.map(|child| Self::of(child, text, inside, depth + 1)).collect::<Result<_, _>>()?;
+        let place = Place { file: text.file.clone(), line, label };
+        Ok(Self { tag, place, attributes, children, is_read: Cell::new(false) })
     }
 
     /// The text of an attribute; it counts as read.
@@ -165,12 +172,12 @@ impl Element {
 
     /// An error about this element.
     pub(crate) fn wrong(&self, reason: impl Into<String>) -> ImportError {
-        ImportError { line: self.line, element: self.label.clone(), reason: reason.into() }
+        self.place.wrong(reason)
     }
 
     /// A note about this element.
     pub(crate) fn note(&self, what: impl Into<String>) -> LeftOut {
-        LeftOut { line: self.line, element: self.label.clone(), what: what.into() }
+        self.place.note(what)
     }
 
     /// Lists every element and attribute that nothing has read.

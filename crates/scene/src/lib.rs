@@ -32,7 +32,7 @@ mod source;
 
 pub use diagnostic::{SceneError, SceneProblem};
 pub use schema::json_schema;
-pub use source::{SCENE_BYTES_MAX, Source};
+pub use source::{FileVersion, SCENE_BYTES_MAX, Source, SourceFile};
 
 use build::{Objects, SceneContext};
 use check::{Checker, Place, allowed};

@@ -6,9 +6,12 @@ use super::build::triangles;
 use super::builtin;
 use super::diagnostic::{SceneError, did_you_mean};
 use metachron_geometry::Triangles;
+use std::collections::BTreeMap;
 use std::fs::File;
 use std::io::Read;
 use std::path::{Component, Path, PathBuf};
+use std::sync::{Arc, Mutex, PoisonError};
+use std::time::SystemTime;
 
 /// Longest scene file, bytes: more than 100000 path points need.
 pub const SCENE_BYTES_MAX: u64 = 16 << 20;
@@ -21,6 +24,35 @@ pub struct Source {
     name: String,
     text: String,
     siblings: SiblingFiles,
+    /// The files on the disk that it has been read from, by all copies of this source.
+    files: Files,
+}
+
+type Files = Arc<Mutex<BTreeMap<PathBuf, Option<FileVersion>>>>;
+
+/// By what it is noticed that a file is another one than before.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct FileVersion {
+    modified: SystemTime,
+    bytes: u64,
+}
+
+impl FileVersion {
+    /// That of the file at a path at present; `None` where there is none.
+    #[must_use]
+    pub fn of(path: &Path) -> Option<Self> {
+        let file = path.metadata().ok()?;
+        Some(Self { modified: file.modified().ok()?, bytes: file.len() })
+    }
+}
+
+/// A file that a scene is made of.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct SourceFile {
+    /// Where it is.
+    pub path: PathBuf,
+    /// What it was before the scene first read it: one that changes while it is read is another one afterwards. `None` where there was none.
+    pub version: Option<FileVersion>,
 }
 
 /// Location of the files next to a scene.
@@ -39,12 +71,15 @@ impl Source {
     pub fn open(name_or_path: &str) -> Result<Self, SceneError> {
         if let Some(scene) = builtin::find(name_or_path) {
             let (name, text) = (scene.name.to_owned(), scene.text.to_owned());
-            return Ok(Self { name, text, siblings: SiblingFiles::BuiltIn });
+            return Ok(Self { name, text, siblings: SiblingFiles::BuiltIn, files: Arc::default() });
         }
         let path = Path::new(name_or_path);
+        let version = FileVersion::of(path);
         let bytes = read_bounded(path, SCENE_BYTES_MAX).map_err(|why| missing(name_or_path, path, &why))?;
         let folder = path.parent().map_or_else(PathBuf::new, Path::to_path_buf);
-        Self::from_bytes(name_or_path, bytes, SiblingFiles::Folder(folder))
+        let source = Self::from_bytes(name_or_path, bytes, SiblingFiles::Folder(folder))?;
+        source.note_file(path, version);
+        Ok(source)
     }
 
     /// A scene from bytes in memory, without files next to it.
@@ -71,7 +106,7 @@ impl Source {
 
     fn from_bytes(name: &str, bytes: Vec<u8>, siblings: SiblingFiles) -> Result<Self, SceneError> {
         match String::from_utf8(bytes) {
-            Ok(text) => Ok(Self { name: name.to_owned(), text, siblings }),
+            Ok(text) => Ok(Self { name: name.to_owned(), text, siblings, files: Arc::default() }),
             Err(error) => {
                 let valid = error.utf8_error().valid_up_to();
                 let before = &error.as_bytes()[..valid];
@@ -94,6 +129,19 @@ impl Source {
     pub fn folder(&self) -> Option<PathBuf> {
         let SiblingFiles::Folder(folder) = &self.siblings else { return None };
         std::env::current_dir().map_or_else(|_| Some(folder.clone()), |here| Some(here.join(folder)))
+    }
+
+    /// The files that it has been read from, those included that could not be read: its own, and those beside it that a [`crate::load`] of it,
+    /// or of a copy, has asked for. None of a scene that is built in or from memory.
+    #[must_use]
+    pub fn files(&self) -> Vec<SourceFile> {
+        let files = self.files.lock().unwrap_or_else(PoisonError::into_inner);
+        files.iter().map(|(path, version)| SourceFile { path: path.clone(), version: *version }).collect()
+    }
+
+    fn note_file(&self, path: &Path, version: Option<FileVersion>) {
+        let mut files = self.files.lock().unwrap_or_else(PoisonError::into_inner);
+        files.entry(path.to_path_buf()).or_insert(version);
     }
 
     /// The text.
@@ -124,7 +172,11 @@ impl Source {
             SiblingFiles::BuiltIn => {
                 builtin::sibling(name).map(<[u8]>::to_vec).ok_or_else(|| "no such built-in file".to_owned())
             }
-            SiblingFiles::Folder(folder) => read_plain(&folder.join(path), SIBLING_BYTES_MAX),
+            SiblingFiles::Folder(folder) => {
+                let path = folder.join(path);
+                self.note_file(&path, FileVersion::of(&path));
+                read_plain(&path, SIBLING_BYTES_MAX)
+            }
             SiblingFiles::Unavailable => Err("a scene from memory has no files beside it".to_owned()),
         }
     }
@@ -186,5 +238,24 @@ mod tests {
         assert_eq!(read_plain(folder.path(), 9).unwrap_err(), "it is a folder");
         // a scene may come from a pipe, but its length is bounded
         assert!(read_bounded(Path::new("/dev/zero"), 9).unwrap_err().contains("more than 9 bytes"));
+    }
+
+    #[test]
+    fn a_file_that_has_changed_since_it_was_read_is_another_one_than_the_source_has() {
+        let folder = tempfile::tempdir().unwrap();
+        let at = |name: &str| folder.path().join(name);
+        std::fs::write(at("scene.toml"), "format = 1\n").unwrap();
+        let source = Source::open(at("scene.toml").to_str().unwrap()).unwrap();
+        let changed = || {
+            let all = source.files().into_iter();
+            let changed = all.filter(|file| FileVersion::of(&file.path) != file.version).map(|file| file.path);
+            changed.collect::<Vec<_>>()
+        };
+        assert!(source.clone().sibling("mesh.obj").is_err());
+        assert!(changed().is_empty() && source.files().len() == 2);
+        std::fs::write(at("mesh.obj"), "v 0 0 0\n").unwrap();
+        assert_eq!(changed(), [at("mesh.obj")]);
+        std::fs::write(at("scene.toml"), "format = 1\nname = 'other'\n").unwrap();
+        assert_eq!(changed(), [at("mesh.obj"), at("scene.toml")]);
     }
 }

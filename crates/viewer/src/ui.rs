@@ -30,7 +30,7 @@ pub use history::{FrameSummary, History};
 pub use native_window::{WindowEnd, WindowError, WindowOptions, run_window};
 pub use protocol::{
     Action, AgentRow, AgentState, Bounds, CouplingRow, Filled, Forces, FrameTimes, HandStatus, Law, Look, Message,
-    Severity, Shares, Simulation, Skip, Status, Tuning, ViewRequest,
+    Severity, Shares, Simulation, Skip, Status, Tuning, TurnRow, ViewRequest,
 };
 
 use egui::{Frame, Margin, Panel, Rect, Sense, Ui};
@@ -191,7 +191,7 @@ impl Viewer {
         let now = ui.ctx().time();
         self.history.sample(now, simulation.status());
         match self.layout.panels && self.layout.lanes {
-            true => self.lanes.sample(now, simulation.status()),
+            true => self.lanes.gather(simulation),
             false => self.lanes.clear(),
         }
         self.notes.retain(|(until, _)| now < *until);
@@ -250,7 +250,7 @@ impl Viewer {
         if self.layout.lanes {
             let panel = Panel::bottom("lanes").resizable(true).default_size(120.0).min_size(40.0);
             panel.frame(frame(8, 4)).show(ui, |ui| {
-                actions.extend(lanes::show(ui, status, &self.lanes).map(|id| Action::Select(Some(id))));
+                actions.extend(lanes::show(ui, status, &mut self.lanes).map(|id| Action::Select(Some(id))));
             });
         }
         Panel::bottom("agents").resizable(true).default_size(152.0).min_size(70.0).frame(frame(8, 6)).show(ui, |ui| {

@@ -2,11 +2,11 @@
 //!
 //! In: a [`Session`]. Out: a [`Status`]. Never here: how panels look.
 
-use crate::ui::{AgentRow, AgentState, CouplingRow, Filled, Law, Shares, Status};
+use crate::ui::{AgentRow, AgentState, CouplingRow, Filled, Law, Shares, Status, TurnRow};
 use metachron_core::{SimTime, Snapshot};
 use metachron_lod::control;
 use metachron_lod::control::Policy;
-use metachron_runtime::AgentStats;
+use metachron_runtime::{AgentStats, Turn};
 use metachron_session::FrameRecord;
 use metachron_session::Session;
 use metachron_world::kinds::PolicyKind;
@@ -126,7 +126,6 @@ pub(super) fn fill(status: &mut Status, session: &mut Session, meter: &mut Meter
     status.shares = shares(session, meter);
     fill_couplings(status, session);
     status.energy_j = 0.0;
-    let now = session.sim_now();
     for (at, agent) in session.agents().iter().enumerate().take(status.agents.len()) {
         let (stats, newest) = (agent.stats(), agent.latest());
         let row = &mut status.agents[at];
@@ -140,11 +139,6 @@ pub(super) fn fill(status: &mut Status, session: &mut Session, meter: &mut Meter
             messages.push(format!("{} is parked: {reason}", row.name));
         }
         row.picture = session.levels().get(at).map(|level| level.resolution);
-        row.late_s = if stats.state == metachron_runtime::AgentState::Running {
-            now.secs_after(newest.moment()).max(0.0)
-        } else {
-            0.0
-        };
         row.age_s = session.scene_view().age_s(agent.id()).unwrap_or(0.0);
         status.energy_j += stats.energy_j;
     }
@@ -193,7 +187,6 @@ fn fill_row(row: &mut AgentRow, stats: &AgentStats, newest: &Snapshot) {
     row.nodes = stats.nodes;
     row.step_s = stats.work_s;
     row.dropped_s = stats.dropped.as_secs_f64();
-    row.put_off_s = newest.clock_offset.as_secs_f64();
     row.leader = newest.cluster.map(|cluster| cluster.leader);
     row.residual_m = stats.residual_m;
     row.force_n = newest.body.tool().map(|tool| tool.force_n);
@@ -203,6 +196,20 @@ fn fill_row(row: &mut AgentRow, stats: &AgentStats, newest: &Snapshot) {
         metachron_runtime::AgentState::Parked(reason) => AgentState::Parked(reason.clone()),
         metachron_runtime::AgentState::Gone => AgentState::Gone,
     };
+}
+
+/// A turn for its lane.
+pub(super) fn turn(turn: &Turn) -> TurnRow {
+    TurnRow {
+        begun_s: turn.begun.as_secs_f64(),
+        ended_s: turn.ended.as_secs_f64(),
+        time: turn.time,
+        dt_s: turn.dt.as_secs_f64(),
+        eps_m: turn.eps_m,
+        leader: turn.led_by,
+        late_s: turn.late.as_secs_f64(),
+        dropped_s: turn.dropped.as_secs_f64(),
+    }
 }
 
 /// The mass for which the user spring is scaled, kilograms: of a body that bends, the stretch near the pulled point follows, not all of it.

@@ -2,7 +2,7 @@
 //!
 //! In: a session and where its scene came from. Out: an [`Outcome`] when the window closes. Never here: egui, panels.
 
-mod scene_file;
+mod scene_files;
 mod time;
 
 use super::live_tuning;
@@ -11,8 +11,8 @@ use super::view_model;
 use super::view_model::Meter;
 use crate::ui;
 use crate::ui::{
-    Action, Bounds, FrameTimes, HandStatus, Message, Severity, Simulation, Skip, Status, ViewRequest, WindowError,
-    WindowOptions, run_window,
+    Action, Bounds, FrameTimes, HandStatus, Message, Severity, Simulation, Skip, Status, TurnRow, ViewRequest,
+    WindowError, WindowOptions, run_window,
 };
 use glam::DVec3;
 use metachron_contact::AnchorSpring;
@@ -22,7 +22,8 @@ use metachron_render::{Camera, Gpu, Hand, Hit, Picture, Ray};
 use metachron_runtime::TimelineCommand;
 use metachron_scene::Source;
 use metachron_session::{Finished, FrameRecord, Outcome, REWIND_BYTES, Session};
-use scene_file::WatchedFile;
+use scene_files::WatchedFiles;
+use std::collections::BTreeMap;
 use std::path::PathBuf;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
@@ -99,9 +100,11 @@ struct WindowSimulation<'a> {
     running: bool,
     /// The run was put back, and its next frame begins at this moment.
     went_on: bool,
-    file: WatchedFile,
-    /// Why the file as it is now cannot be shown.
+    files: WatchedFiles,
+    /// Why the files as they are now cannot be shown.
     file_error: Option<Message>,
+    /// The next turn to read of each agent whose lane was shown.
+    turns_from: BTreeMap<AgentId, u64>,
 }
 
 /// Frames stored of a run without an end: an hour at 30 frames a second, some 10 MB.
@@ -129,8 +132,9 @@ impl<'a> WindowSimulation<'a> {
             meter: Meter::new(&session),
             notices: Vec::new(),
             session,
-            file: WatchedFile::of(&plan.source),
+            files: WatchedFiles::of(&plan.source),
             file_error: None,
+            turns_from: BTreeMap::new(),
             plan,
             hand: None,
             tuning: None,
@@ -167,6 +171,7 @@ impl<'a> WindowSimulation<'a> {
         self.status = Status { selected, ..view_model::initial_status(&self.session) };
         self.meter = Meter::new(&self.session);
         self.notices.clear();
+        self.turns_from.clear();
         match recorded {
             Ok(true) => self.show_message(Severity::Note, "the recording ends with the run before this one".to_owned()),
             Ok(false) => {}
@@ -361,7 +366,7 @@ impl Simulation for WindowSimulation<'_> {
         if self.pictures == 2 {
             self.begin();
         }
-        self.follow_file();
+        self.follow_files();
         self.pass_time();
         self.take_gains();
         self.refresh();
@@ -428,6 +433,12 @@ impl Simulation for WindowSimulation<'_> {
 
     fn predict_camera(&mut self, camera: Camera) -> Camera {
         self.session.predict_camera(camera)
+    }
+
+    fn turns(&mut self, of: AgentId, take: &mut dyn FnMut(TurnRow)) {
+        let Some(agent) = self.session.agents().of(of) else { return };
+        let next = self.turns_from.entry(of).or_insert_with(|| agent.listen_to_turns());
+        *next = agent.turns_from(*next, |turn| take(view_model::turn(&turn))).0;
     }
 
     fn scene_camera(&self) -> Camera {

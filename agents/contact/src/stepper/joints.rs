@@ -17,7 +17,7 @@ use super::search::velocity;
 use super::springs::{End, Name, Pull};
 use super::ties::{FineStep, RowOwner, Ties, place_of};
 use super::yielding::{Frame, Slides, SlidingRow, YieldLimit};
-use crate::cluster::{Hold, JointRow, Side};
+use crate::cluster::{Hold, JointRow, Side, SideTerm};
 use crate::joint::{Joint, JointKind};
 use crate::push_out::PUSH_OUT_MAX_M_S;
 use glam::{DQuat, DVec3};
@@ -244,7 +244,12 @@ impl Joints {
         if let Some((motor, Together { sides, .. })) = driven {
             let turns = matches!(joint.kind, JointKind::Revolute { .. });
             self.drives |= motor.moves();
-            let row = motor.row(&Motored { sides, axis, travel: now.travel, turns }, step.h_s);
+            let before = |member: usize| &step.progress[member].before[..];
+            let [of_a, of_b] = sides.map(|side| velocity(&side, before).dot(axis));
+            let inverse_mass = sides.iter().map(|side| own_inverse_mass(step.all, side, axis)).sum();
+            let speed = of_b - of_a;
+            let motored = Motored { sides, axis, travel: now.travel, speed, inverse_mass, turns };
+            let row = motor.row(&motored, step.h_s);
             ties.motor(step, row, lasting.row(MOTOR, second));
         }
     }
@@ -431,6 +436,17 @@ impl Pose {
 fn material(all: &[Participant<'_>], member: Option<usize>, pose: &Pose, place: DVec3) -> Option<MaterialPoint> {
     let Some(member) = member else { return Some(MaterialPoint::led(place, DVec3::ZERO)) };
     all[member].member.anchor(Anchor::Local(pose.rotation.conjugate() * (place - pose.centre_m)))
+}
+
+/// The inverse mass of a side along an axis where nothing but its member's own blocks resists, 1/kg, or 1/(kg m²) of a turn.
+fn own_inverse_mass(all: &[Participant<'_>], side: &Side, axis: DVec3) -> f64 {
+    let of = |term: &SideTerm| {
+        let mut blocks = all[side.member].member.blocks().iter();
+        let block = blocks.find(|block| block.row == term.block && block.column == term.block)?;
+        let given = term.map.transpose() * axis;
+        Some(given.dot(block.value.inverse() * given))
+    };
+    side.terms().iter().filter_map(of).sum()
 }
 
 /// The turn that leads from one direction to another, as a rotation vector.

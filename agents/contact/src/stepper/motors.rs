@@ -18,6 +18,10 @@ pub(super) struct Motored {
     pub axis: DVec3,
     /// How far b has moved from a along or about it, m or rad.
     pub travel: f64,
+    /// How fast it does so when the step begins, m/s or rad/s.
+    pub speed: f64,
+    /// The inverse mass of both along or about it where nothing else holds them, 1/kg or 1/(kg m²), ≥ 0.
+    pub inverse_mass: f64,
     /// Whether travel is known but for whole turns.
     pub turns: bool,
 }
@@ -33,7 +37,7 @@ impl Ties {
 impl Motor {
     /// Its row in a fine step of `h_s` seconds. What moves b forward pushes a back.
     pub(super) fn row(&self, joint: &Motored, h_s: f64) -> JointRow {
-        let Motored { sides, axis, travel, turns } = *joint;
+        let Motored { sides, axis, travel, speed, inverse_mass, turns } = *joint;
         let row = JointRow::new(sides, Hold::motor(axis, self.max_effort * h_s));
         match self.goal {
             MotorGoal::Velocity(velocity) => JointRow { target_m_s: axis * -velocity, ..row },
@@ -43,7 +47,10 @@ impl Motor {
                 let law = Spring { stiffness_n_m: stiffness, damping_n_s_m: damping, stretch_m: axis * -off };
                 let row = row.with_spring(law, h_s);
                 let compliance = row.compliance_per_kg.unwrap_or(0.0);
-                let target_m_s = row.target_m_s - axis * (velocity * h_s * damping * compliance);
+                // what a step resolves, it need not damp (eq. 22a)
+                let stiff = h_s * h_s * stiffness;
+                let kept = speed * stiff / (1.0 + stiff * inverse_mass);
+                let target_m_s = row.target_m_s - axis * ((velocity * h_s * damping + kept) * compliance);
                 JointRow { target_m_s, ..row }
             }
         }

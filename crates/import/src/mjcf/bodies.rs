@@ -5,8 +5,10 @@
 use super::compiler::Compiler;
 use super::geoms::{Geom, Mesh};
 use super::joints::StartedJoint;
+use super::keyframe::Keyframe;
 use crate::folders::Folders;
-use crate::model::{Fixed, Joint, Link, Look, Masks, Mass, Model, Part, Place, Surface};
+use crate::model::{End, Fixed, Joint, Link, Look, Masks, Mass, Model, Part, Surface};
+use crate::place::Place;
 use crate::pose::Pose;
 use crate::xml::Element;
 use crate::{ImportError, LeftOut};
@@ -22,18 +24,40 @@ pub(super) struct BodyReader<'a> {
     pub(super) model: Model,
     /// For each joint of the model, where the zero of its file is: from its start, radians or metres.
     pub(super) zeros: Vec<f64>,
+    pub(super) sites: BTreeMap<String, Site<'a>>,
+    /// `None` for a start where the file has its bodies.
+    pub(super) keyframe: Option<Keyframe<'a>>,
     names: BTreeSet<String>,
+}
+
+/// A point of a body.
+#[derive(Debug)]
+pub(super) struct Site<'a> {
+    pub(super) element: &'a Element,
+    pub(super) end: End,
+    /// In the world, where every joint is at its `springref`, metres.
+    pub(super) at_springs_m: DVec3,
 }
 
 /// The body that elements are read for.
 #[derive(Debug, Clone, Copy)]
-struct Host {
+pub(super) struct Host {
     /// `None` for the world.
-    link: Option<usize>,
-    /// Its axes in the world.
-    pose: Pose,
+    pub(super) link: Option<usize>,
+    /// Its axes in the world at the start.
+    pub(super) pose: Pose,
+    /// The same where every joint is at its `springref`.
+    at_springs: Pose,
     /// Whether it is the world, or nothing lets it move against the world.
     is_fixed: bool,
+}
+
+impl Host {
+    /// The same after a joint.
+    fn moved(self, joint: &StartedJoint) -> Self {
+        let (pose, at_springs) = (self.pose.then(joint.motion), self.at_springs.then(joint.to_spring));
+        Self { pose, at_springs, ..self }
+    }
 }
 
 /// What the elements of one body, those in its frames too, amount to.
@@ -43,6 +67,7 @@ struct Contents<'e> {
     joints: Vec<Placed<'e>>,
     geoms: Vec<Placed<'e>>,
     bodies: Vec<Placed<'e>>,
+    sites: Vec<Placed<'e>>,
 }
 
 /// An element, and the frames around it in the axes of its body.
@@ -67,6 +92,7 @@ impl<'e> Contents<'e> {
                 "joint" | "freejoint" => self.joints.push(Placed { element: child.read(), frame }),
                 "geom" => self.geoms.push(placed),
                 "body" => self.bodies.push(placed),
+                "site" => self.sites.push(placed),
                 "frame" => self.take(child.read(), frame.then(compiler.pose(child)?), compiler)?,
                 _ => {}
             }
@@ -76,15 +102,20 @@ impl<'e> Contents<'e> {
 }
 
 impl<'a> BodyReader<'a> {
-    pub(super) fn new(
-        compiler: &'a Compiler,
-        meshes: BTreeMap<String, Mesh<'a>>,
-        folders: Folders<'a>,
-        notes: &'a mut Vec<LeftOut>,
-    ) -> Self {
+    pub(super) fn new(compiler: &'a Compiler, folders: Folders<'a>, notes: &'a mut Vec<LeftOut>) -> Self {
         // no object of a scene can have the name of the world
         let names = BTreeSet::from(["world".to_owned()]);
-        Self { compiler, meshes, folders, notes, model: Model::default(), zeros: Vec::new(), names }
+        Self {
+            compiler,
+            meshes: BTreeMap::new(),
+            folders,
+            notes,
+            model: Model::default(),
+            zeros: Vec::new(),
+            sites: BTreeMap::new(),
+            keyframe: None,
+            names,
+        }
     }
 
     pub(super) fn finish(self) -> Model {
@@ -92,37 +123,39 @@ impl<'a> BodyReader<'a> {
     }
 
     /// Reads the world and all bodies in it.
-    pub(super) fn world(&mut self, element: &Element) -> Result<(), ImportError> {
+    pub(super) fn world(&mut self, element: &'a Element) -> Result<(), ImportError> {
         let contents = Contents::of(element, self.compiler)?;
         for placed in &contents.geoms {
             let Some(geom) = self.geom(*placed)? else { continue };
             let name = self.unused(placed.element.text("name"), "geom");
             self.model.fixed.push(Fixed { name, look: look(std::slice::from_ref(&geom)), part: geom.part });
         }
-        let world = Host { link: None, pose: Pose::IDENTITY, is_fixed: true };
+        let world = Host { link: None, pose: Pose::IDENTITY, at_springs: Pose::IDENTITY, is_fixed: true };
+        self.note_sites(&contents, world)?;
         contents.bodies.iter().try_for_each(|body| self.body(*body, world))
     }
 
-    fn body(&mut self, placed: Placed<'_>, host: Host) -> Result<(), ImportError> {
+    fn body(&mut self, placed: Placed<'a>, host: Host) -> Result<(), ImportError> {
         let element = placed.element.read();
         let contents = Contents::of(element, self.compiler)?;
-        let place = Place { line: element.line, label: element.label.clone() };
+        let place = element.place.clone();
         let name = self.unused(element.text("name"), "body");
-        let rest = host.pose.then(placed.frame).then(self.compiler.pose(element)?);
+        let rest = placed.frame.then(self.compiler.pose(element)?);
         let is_fixed = host.is_fixed && contents.joints.is_empty();
-        let from = Host { pose: rest, ..host };
+        let from = Host { pose: host.pose.then(rest), at_springs: host.at_springs.then(rest), ..host };
         let (last, above) = match contents.joints.split_last() {
             Some((last, outer)) => (Some(last), self.carriers(outer, from, &name, &place)?),
             None => (None, from),
         };
         let index = self.model.links.len();
-        let joint = last.map(|last| self.joint(*last, above.link, index)).transpose()?;
+        let joint = last.map(|last| self.joint(*last, above, index)).transpose()?;
         if let Some((last, true)) =
             last.zip(joint.as_ref().map(|joint| joint.between.is_none() && contents.joints.len() > 1))
         {
             return Err(free_with_others(*last));
         }
-        let pose = above.pose.then(joint.as_ref().map_or(Pose::IDENTITY, |joint| joint.motion));
+        let above = joint.as_ref().map_or(above, |joint| above.moved(joint));
+        let pose = above.pose;
         let geoms = self.geoms(&contents)?;
         let mass = if is_fixed {
             contents.inertial.inspect(|inertial| inertial.read_all_within());
@@ -144,7 +177,9 @@ impl<'a> BodyReader<'a> {
             None => self.push_joint(Joint::weld(place, host.link, index), 0.0),
             Some(StartedJoint { between, zero, .. }) => between.into_iter().for_each(|one| self.push_joint(one, zero)),
         }
-        contents.bodies.iter().try_for_each(|body| self.body(*body, Host { link: Some(index), pose, is_fixed }))
+        let here = Host { link: Some(index), is_fixed, ..above };
+        self.note_sites(&contents, here)?;
+        contents.bodies.iter().try_for_each(|body| self.body(*body, here))
     }
 
     /// Links without mass, one for each joint of a body but its last, as the joints follow each other; the last of them.
@@ -152,9 +187,9 @@ impl<'a> BodyReader<'a> {
         let mut at = from;
         for placed in joints {
             let link = self.model.links.len();
-            let StartedJoint { between, motion, zero } = self.joint(*placed, at.link, link)?;
-            let between = between.ok_or_else(|| free_with_others(*placed))?;
-            at = Host { link: Some(link), pose: at.pose.then(motion), ..from };
+            let joint = self.joint(*placed, at, link)?;
+            at = Host { link: Some(link), ..at.moved(&joint) };
+            let between = joint.between.ok_or_else(|| free_with_others(*placed))?;
             let name = self.unused(None, &format!("{body}-{}", placed.element.text("name").unwrap_or("joint")));
             let (mass, parts, look) = (Mass::None, Vec::new(), Look::default());
             self.model.links.push(Link {
@@ -166,7 +201,7 @@ impl<'a> BodyReader<'a> {
                 look,
                 is_lent: false,
             });
-            self.push_joint(between, zero);
+            self.push_joint(between, joint.zero);
         }
         Ok(at)
     }
@@ -174,6 +209,17 @@ impl<'a> BodyReader<'a> {
     fn push_joint(&mut self, joint: Joint, zero: f64) {
         self.model.joints.push(joint);
         self.zeros.push(zero);
+    }
+
+    /// Keeps where the sites of a body are; those that nothing names are not read.
+    fn note_sites(&mut self, contents: &Contents<'a>, host: Host) -> Result<(), ImportError> {
+        for Placed { element, frame } in &contents.sites {
+            let Some(name) = element.text("name") else { continue };
+            let at_m = frame.then(self.compiler.pose(element)?).position;
+            let (end, at_springs_m) = (End { link: host.link, at_m }, host.at_springs.point(at_m));
+            self.sites.insert(name.to_owned(), Site { element, end, at_springs_m });
+        }
+        Ok(())
     }
 
     fn geoms(&mut self, contents: &Contents<'_>) -> Result<Vec<Geom>, ImportError> {
@@ -196,11 +242,10 @@ impl<'a> BodyReader<'a> {
                 Ok(Mass::Given { mass_kg: *mass_kg, com_m: DVec3::ZERO, inertia_kg_m2: None })
             }
             _ => match geoms.iter().find(|geom| geom.density_kg_m3.is_none()) {
-                Some(Geom { part: Part { place: Place { line, label }, .. }, .. }) => Err(ImportError {
-                    line: *line,
-                    element: label.clone(),
-                    reason: "is a mesh with a `mass` beside other geoms; expected an `inertial` in its body".to_owned(),
-                }),
+                Some(geom) => {
+                    let reason = "is a mesh with a `mass` beside other geoms; expected an `inertial` in its body";
+                    Err(geom.part.place.wrong(reason))
+                }
                 None => Ok(Mass::OfParts),
             },
         }

@@ -26,7 +26,9 @@ pub(crate) fn resolve_defaults(root: &mut Element) -> Result<(), ImportError> {
     }
     root.all_mut().retain(|child| child.tag != "default");
     for section in root.all_mut() {
-        give(section, MAIN, &classes)?;
+        // sections have the names of elements: `tendon`, `equality`
+        let inside = section.text("childclass").unwrap_or(MAIN).to_owned();
+        section.all_mut().iter_mut().try_for_each(|child| give(child, &inside, &classes))?;
     }
     Ok(())
 }
@@ -50,6 +52,11 @@ fn inherit(element: &mut Element, from: &Element) {
     element.inherit(from, |name| ["name", "class"].contains(&name) || (is_turned && ROTATIONS.contains(&name)));
 }
 
+/// The name by which classes have an element: both kinds of tendons are one there.
+fn kind(tag: &str) -> &str {
+    if ["spatial", "fixed"].contains(&tag) { "tendon" } else { tag }
+}
+
 /// Gives an element, and all in it, what their classes have; `ambient` is the class of what names none.
 fn give(element: &mut Element, ambient: &str, classes: &BTreeMap<String, Class>) -> Result<(), ImportError> {
     let own = element.text("class").unwrap_or(ambient).to_owned();
@@ -58,7 +65,7 @@ fn give(element: &mut Element, ambient: &str, classes: &BTreeMap<String, Class>)
     if let Some(name) = unknown {
         return Err(element.wrong(format!("is of the class `{name}`, and there is no default of that class")));
     }
-    if let Some(from) = classes[&own].get(&element.tag) {
+    if let Some(from) = classes[&own].get(kind(&element.tag)) {
         inherit(element, from);
     }
     element.all_mut().iter_mut().try_for_each(|child| give(child, &inside, classes))

@@ -6,7 +6,7 @@ use super::bodies::{BodyReader, Placed, z_to};
 use super::compiler::Compiler;
 use crate::ImportError;
 use crate::folders::is_readable;
-use crate::model::{Masks, Part, Place, Shape, Surface};
+use crate::model::{Masks, Part, Shape, Surface};
 use crate::pose::Pose;
 use crate::xml::Element;
 use glam::DVec3;
@@ -78,7 +78,7 @@ impl BodyReader<'_> {
         };
         let colour = element.numbers::<4>("rgba")?;
         let colour = colour.map(|[r, g, b, _]| [r, g, b].map(|c| (c.clamp(0.0, 1.0) * 255.0).round() as u8));
-        let place = Place { line: element.line, label: element.label.clone() };
+        let place = element.place.clone();
         let part = Part { place, shape, pose: placed.frame.then(pose), density_kg_m3: None, touches };
         Ok(Some(Geom { part, density_kg_m3, mass_kg, colour, surface: Surface { friction, masks } }))
     }

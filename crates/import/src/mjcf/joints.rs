@@ -2,9 +2,10 @@
 //!
 //! In: `joint` and `freejoint` elements. Out: [`Joint`]s. Never here: actuators.
 
-use super::bodies::{BodyReader, Placed};
+use super::bodies::{BodyReader, Host, Placed};
+use super::keyframe::Keyframe;
 use crate::ImportError;
-use crate::model::{Joint, Kind, Motor, Place};
+use crate::model::{Joint, Kind, Motor};
 use crate::pose::Pose;
 use crate::xml::Element;
 use glam::DVec3;
@@ -15,22 +16,26 @@ pub(super) struct StartedJoint {
     pub(super) between: Option<Joint>,
     /// The motion of the body from its place in the file to its start.
     pub(super) motion: Pose,
+    /// That to where the joint is at its `springref`.
+    pub(super) to_spring: Pose,
     /// Where the file's zero is from the start, radians or metres.
     pub(super) zero: f64,
 }
 
+impl StartedJoint {
+    /// A joint whose body starts where the file has it.
+    const fn still(between: Option<Joint>) -> Self {
+        Self { between, motion: Pose::IDENTITY, to_spring: Pose::IDENTITY, zero: 0.0 }
+    }
+}
+
 impl BodyReader<'_> {
-    pub(super) fn joint(
-        &mut self,
-        placed: Placed<'_>,
-        parent: Option<usize>,
-        child: usize,
-    ) -> Result<StartedJoint, ImportError> {
+    pub(super) fn joint(&mut self, placed: Placed<'_>, host: Host, child: usize) -> Result<StartedJoint, ImportError> {
         let Placed { element, frame } = placed;
-        let free = StartedJoint { between: None, motion: Pose::IDENTITY, zero: 0.0 };
+        let parent = host.link;
         let kind = match element.text("type").unwrap_or("hinge") {
-            _ if element.tag == "freejoint" => return Ok(free),
-            "free" => return Ok(free),
+            _ if element.tag == "freejoint" => return self.free(host),
+            "free" => return self.free(host),
             "hinge" => Kind::Revolute,
             "slide" => Kind::Prismatic,
             "ball" => Kind::Spherical,
@@ -39,11 +44,11 @@ impl BodyReader<'_> {
             }
         };
         let anchor_m = frame.point(element.numbers("pos")?.map_or(DVec3::ZERO, DVec3::from_array));
-        let place = Place { line: element.line, label: element.label.clone() };
+        let place = element.place.clone();
         let name = element.text("name").unwrap_or_default().to_owned();
         let joint = Joint { name, place, parent, child, kind, anchor_m, axis: DVec3::Z, range: None, motor: None };
         if kind == Kind::Spherical {
-            return Ok(StartedJoint { between: Some(joint), ..free });
+            return self.ball(joint);
         }
         let given = element.numbers("axis")?.map_or(DVec3::Z, DVec3::from_array);
         if given.length() < 1e-9 {
@@ -52,16 +57,37 @@ impl BodyReader<'_> {
         let unit = if kind == Kind::Revolute { self.compiler.angle_rad } else { 1.0 };
         let at_rest = element.number("ref")?.unwrap_or(0.0) * unit;
         let range = self.range(element)?.map(|range| range.map(|end| end * unit - at_rest));
-        let start = range.map_or(0.0, |[least, greatest]| 0.0_f64.clamp(least, greatest));
-        if start != 0.0 {
-            self.notes.push(element.note("starts at the end of its range that is nearest to its place in the file"));
+        let key = self.keyframe.as_mut().and_then(Keyframe::next);
+        let wanted = key.map_or(0.0, |[position]: [f64; 1]| position - at_rest);
+        let start = range.map_or(wanted, |[least, greatest]| wanted.clamp(least, greatest));
+        if start != wanted {
+            let place = if key.is_some() { "that of the keyframe" } else { "its place in the file" };
+            self.notes.push(element.note(format!("starts at the end of its range that is nearest to {place}")));
         }
         let zero = -at_rest - start;
         let axis = frame.rotation * given;
-        let motor = passive(element, zero, unit)?;
+        let spring = element.number("springref")?.unwrap_or(0.0) * unit - at_rest;
+        let motor = passive(element, spring - start)?;
         let range = range.map(|range| range.map(|end| end - start));
-        let motion = kind.motion(anchor_m, axis, start);
-        Ok(StartedJoint { between: Some(Joint { axis, range, motor, ..joint }), motion, zero })
+        let [motion, to_spring] = [start, spring].map(|travel| kind.motion(anchor_m, axis, travel));
+        Ok(StartedJoint { between: Some(Joint { axis, range, motor, ..joint }), motion, to_spring, zero })
+    }
+
+    /// A body that moves freely: where the keyframe has it in the world, or else as the file has it.
+    fn free(&mut self, host: Host) -> Result<StartedJoint, ImportError> {
+        let Some(key) = &mut self.keyframe else { return Ok(StartedJoint::still(None)) };
+        let Some([x, y, z, a, b, c, d]) = key.next() else { return Ok(StartedJoint::still(None)) };
+        let pose = Pose { position: DVec3::new(x, y, z), rotation: key.rotation([a, b, c, d])? };
+        Ok(StartedJoint { motion: host.pose.inverse().then(pose), ..StartedJoint::still(None) })
+    }
+
+    /// A ball joint, turned as the keyframe has it.
+    fn ball(&mut self, joint: Joint) -> Result<StartedJoint, ImportError> {
+        let Some(key) = &mut self.keyframe else { return Ok(StartedJoint::still(Some(joint))) };
+        let Some(turned) = key.next() else { return Ok(StartedJoint::still(Some(joint))) };
+        let rotation = key.rotation(turned)?;
+        let motion = Pose { position: joint.anchor_m - rotation * joint.anchor_m, rotation };
+        Ok(StartedJoint { motion, ..StartedJoint::still(Some(joint)) })
     }
 
     /// The range of a joint in the unit of the file, where it is one.
@@ -78,19 +104,18 @@ impl BodyReader<'_> {
     }
 }
 
-/// What holds or brakes a joint by itself: a spring with a damper, a damper, or dry friction where it has neither.
-fn passive(element: &Element, zero: f64, unit: f64) -> Result<Option<Motor>, ImportError> {
+/// What holds or brakes a joint by itself: a spring to a position, with a damper, a damper, or dry friction where it has neither.
+fn passive(element: &Element, position: f64) -> Result<Option<Motor>, ImportError> {
     let at_least_0 = |name: &str| {
         let value = element.number(name)?.unwrap_or(0.0);
         if value < 0.0 { Err(element.wrong(format!("`{name}` is {value}; expected 0 or more"))) } else { Ok(value) }
     };
     let (stiffness, damping) = (at_least_0("stiffness")?, at_least_0("damping")?);
     if stiffness > 0.0 {
-        let position = element.number("springref")?.unwrap_or(0.0) * unit + zero;
         return Ok(Some(Motor::Spring { position, stiffness, damping, max_effort: None }));
     }
     if damping > 0.0 {
-        return Ok(Some(Motor::Damper { damping, max_effort: None }));
+        return Ok(Some(Motor::Damper { velocity: 0.0, damping, max_effort: None }));
     }
     let friction = at_least_0("frictionloss")?;
     Ok((friction > 0.0).then_some(Motor::Brake { max_effort: friction }))

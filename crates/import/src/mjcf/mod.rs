@@ -8,9 +8,13 @@ mod bodies;
 mod compiler;
 mod defaults;
 mod geoms;
+mod include;
 mod joints;
+mod keyframe;
+mod tendons;
 
 pub(crate) use defaults::resolve_defaults;
+pub(crate) use include::include;
 
 use crate::folders::Folders;
 use crate::model::Model;
@@ -19,23 +23,33 @@ use crate::{ImportError, LeftOut};
 use bodies::BodyReader;
 use compiler::Compiler;
 use glam::DVec3;
+use keyframe::Keyframe;
 use std::collections::BTreeMap;
+
+/// What a model is read with.
+pub(crate) struct Given<'a> {
+    pub(crate) folders: Folders<'a>,
+    /// The name of the keyframe that it starts from.
+    pub(crate) key: Option<&'a str>,
+}
 
 /// Reads a model.
 ///
 /// # Errors
 /// [`ImportError`] at the first element that no scene can have.
-pub(crate) fn read(root: &Element, folders: Folders<'_>, notes: &mut Vec<LeftOut>) -> Result<Model, ImportError> {
+pub(crate) fn read(root: &Element, given: Given<'_>, notes: &mut Vec<LeftOut>) -> Result<Model, ImportError> {
     if root.tag != "mujoco" {
         return Err(root.wrong("is not the root of a model; expected `mujoco`"));
     }
     let compiler = Compiler::read(root)?;
-    let meshes = geoms::meshes(root, &compiler)?;
-    let mut reader = BodyReader::new(&compiler, meshes, folders, notes);
+    let mut reader = BodyReader::new(&compiler, given.folders, notes);
+    reader.meshes = geoms::meshes(root, &compiler)?;
+    reader.keyframe = given.key.map(|name| Keyframe::find(root, name)).transpose()?;
     for body in root.children("worldbody") {
         reader.world(body)?;
     }
     actuators::read(root, &mut reader)?;
+    tendons::read(root, &mut reader)?;
     let mut model = reader.finish();
     model.name = root.text("model").unwrap_or("model").to_owned();
     for option in root.children("option") {

@@ -191,7 +191,7 @@ fn meshes_are_named_from_the_folder_of_the_scene_and_others_are_listed() {
     let imported =
         urdf(&robot(r#"filename="package://robot/meshes/a.stl" scale="0.5 0.5 0.5""#), urdfs.as_path()).unwrap();
     assert!(imported.toml.contains("shape = \"hull\"\nfile = \"../meshes/a.stl\"\nscale = 0.5\n"), "{}", imported.toml);
-    let elsewhere = Folders { model: urdfs.as_path(), scene: Path::new("") };
+    let elsewhere = Folders { scene: Path::new(""), ..Folders::from(urdfs.as_path()) };
     let imported = urdf(&robot(r#"filename="../meshes/a.stl""#), elsewhere).unwrap();
     assert!(
         imported.toml.contains("file = \"../") && imported.toml.contains("robot/meshes/a.stl\""),

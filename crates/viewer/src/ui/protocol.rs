@@ -30,6 +30,9 @@ pub trait Simulation {
     /// The numbers of the panels, as of the last frame.
     fn status(&self) -> &Status;
 
+    /// Passes on the turns that an agent has made since this was called for it last; from the first call on its newest ones are kept.
+    fn turns(&mut self, _of: AgentId, _take: &mut dyn FnMut(TurnRow)) {}
+
     /// The scene's own camera at present.
     fn scene_camera(&self) -> Camera;
 
@@ -362,10 +365,6 @@ pub struct AgentRow {
     pub picture: Option<Resolution>,
     /// Age of the displayed state, seconds, ≥ 0.
     pub age_s: f64,
-    /// How far its newest state is behind the scene's time, seconds, ≥ 0.
-    pub late_s: f64,
-    /// How far its own time has been put off behind the scene's, seconds, ≥ 0.
-    pub put_off_s: f64,
     /// Wall time of a step, seconds, ≥ 0.
     pub step_s: f64,
     /// Share of one core, 0 … 1.
@@ -384,6 +383,27 @@ pub struct AgentRow {
     pub leader: Option<AgentId>,
     /// Present activity.
     pub state: AgentState,
+}
+
+/// A turn of an agent: a step, or a wait for others.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct TurnRow {
+    /// Wall time at which it began, seconds since the start; virtual in lockstep.
+    pub begun_s: f64,
+    /// Wall time at which it ended, likewise.
+    pub ended_s: f64,
+    /// The agent's own time at its end.
+    pub time: SimTime,
+    /// Its step in simulated seconds; 0 of a turn in which it only waited.
+    pub dt_s: f64,
+    /// The spacing ε that it was simulated at, metres; `None` of a model that has none.
+    pub eps_m: Option<f64>,
+    /// The agent whose turn it was: the leader of its cluster, or itself.
+    pub leader: AgentId,
+    /// How late it began, seconds of wall time, ≥ 0.
+    pub late_s: f64,
+    /// The simulated time that was given up before it, because it began too late, seconds, ≥ 0.
+    pub dropped_s: f64,
 }
 
 /// The pressure of what fills an object.
@@ -410,8 +430,6 @@ impl AgentRow {
             nodes: None,
             picture: None,
             age_s: 0.0,
-            late_s: 0.0,
-            put_off_s: 0.0,
             step_s: 0.0,
             cpu_share: 0.0,
             dropped_s: 0.0,

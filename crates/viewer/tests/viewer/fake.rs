@@ -7,15 +7,19 @@ use glam::DVec3;
 use metachron_core::{AgentId, Anchor, Resolution, SimTime};
 use metachron_render::{Camera, Hit, Picture, Ray, Size};
 use metachron_viewer::ui::{
-    Action, AgentRow, AgentState, Bounds, FrameTimes, HandStatus, Law, Screen, Simulation, Status, Tuning, ViewRequest,
-    Viewer, WindowRequests,
+    Action, AgentRow, AgentState, Bounds, FrameTimes, HandStatus, Law, Screen, Simulation, Status, Tuning, TurnRow,
+    ViewRequest, Viewer, WindowRequests,
 };
+use std::collections::{BTreeMap, BTreeSet};
 
 /// A show of three agents around the origin that writes down what it is asked for.
 pub struct Fake {
     pub status: Status,
     pub asked: Vec<Action>,
     pub picture: Picture,
+    /// Turns that agents have made and that were not asked for yet, and whose were asked for.
+    pub turns: BTreeMap<AgentId, Vec<TurnRow>>,
+    pub asked_turns: BTreeSet<AgentId>,
 }
 
 pub const BALL: AgentId = AgentId(1);
@@ -44,7 +48,13 @@ impl Fake {
             agents: vec![tube, ball, tool],
             ..Status::default()
         };
-        Self { status, asked: Vec::new(), picture: Picture::default() }
+        Self {
+            status,
+            asked: Vec::new(),
+            picture: Picture::default(),
+            turns: BTreeMap::new(),
+            asked_turns: BTreeSet::new(),
+        }
     }
 }
 
@@ -72,6 +82,11 @@ impl Simulation for Fake {
 
     fn compose(&mut self, _view: &ViewRequest) -> &Picture {
         &self.picture
+    }
+
+    fn turns(&mut self, of: AgentId, take: &mut dyn FnMut(TurnRow)) {
+        self.asked_turns.insert(of);
+        self.turns.remove(&of).into_iter().flatten().for_each(take);
     }
 
     fn measured(&mut self, _times: &FrameTimes) {}

@@ -11,7 +11,8 @@ use metachron_core::{AgentId, SimTime};
 use metachron_render::{Colouring, Hit};
 use metachron_session::RewindStatus;
 use metachron_viewer::ui::{
-    Action, AgentRow, Forces, FrameTimes, Law, Look, MOUSE, Message, SHORTCUTS, Severity, Simulation, keys_text,
+    Action, AgentRow, Forces, FrameTimes, Law, Look, MOUSE, Message, SHORTCUTS, Severity, Simulation, TurnRow,
+    keys_text,
 };
 use std::time::Duration;
 
@@ -388,22 +389,38 @@ fn the_timeline_goes_back_by_scrubber_button_and_key_and_returns() {
 fn lanes_of_a_thousand_agents_are_laid_out_as_far_as_they_fit_and_tell_of_turns() {
     let mut simulation = Fake::new();
     simulation.status.agents = (0..1000).map(|i| AgentRow::new(AgentId(i), format!("box {i}"), "rigid")).collect();
-    let row = &mut simulation.status.agents[1];
-    (row.rate_hz, row.wanted_hz, row.dt_s, row.late_s, row.leader) = (120.0, 240.0, 4e-3, 9e-3, Some(AgentId(0)));
+    simulation.status.agents[1].leader = Some(AgentId(0));
     let mut harness = window_of(simulation);
+    harness.run_steps(4);
+    assert!(harness.state().simulation.asked_turns.is_empty(), "nothing is recorded for lanes that are not shown");
     press(&mut harness, Key::L);
-    for tick in 1..40 {
-        harness.state_mut().simulation.status.sim_time = SimTime::from_nanos(tick * 100_000_000);
-        harness.run_steps(8);
-    }
+    harness.run_steps(2);
+    // a wait of 30 ms, and the step after it, which is a quarter of the lane
+    let turn = |begun_s: f64, ended_s: f64| TurnRow {
+        begun_s,
+        ended_s,
+        time: SimTime::from_nanos(7_250_000_000),
+        dt_s: 4e-3,
+        eps_m: Some(0.02),
+        leader: AgentId(0),
+        late_s: 9e-3,
+        dropped_s: 0.0,
+    };
+    let turns = [TurnRow { dt_s: 0.0, ..turn(9.0, 9.03) }, turn(9.03, 9.53)];
+    harness.state_mut().simulation.turns.insert(AgentId(1), turns.to_vec());
+    harness.run_steps(8);
+    let listened = harness.state().simulation.asked_turns.clone();
     let lanes = harness.query_all_by_label_contains("Lane of box ").count();
     assert!((2..40).contains(&lanes), "{lanes} lanes were laid out");
+    assert!(listened.len() <= lanes, "{} agents were asked for {lanes} lanes", listened.len());
     let lane = harness.get_by_label("Lane of box 1").rect();
     harness.hover_at(lane.right_center() - egui::vec2(18.0, 0.0));
     harness.run_steps(60);
-    let told = harness.query_by_label_contains("120 of 240 Hz").expect("a tooltip");
+    let told = harness.query_by_label_contains("begun at 9.0300 s").expect("a tooltip");
     let told = told.accesskit_node().label().or(told.accesskit_node().value()).unwrap_or_default();
-    assert!(["late 9.00 ms", "dt 4.00 ms", "cluster of box 0"].iter().all(|what| told.contains(what)), "{told}");
+    let numbers =
+        ["7.2500 s", "took 500 ms", "late 9.00 ms", "dt 4.00 ms", "waited 30.0 ms", "20.0 mm", "cluster of box 0"];
+    assert!(numbers.iter().all(|what| told.contains(what)), "{told}");
     harness.get_by_label("Lane of box 1").click();
     assert_eq!(asked(&mut harness), [Action::Select(Some(AgentId(1)))]);
 }

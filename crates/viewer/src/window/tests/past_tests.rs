@@ -137,7 +137,7 @@ fn a_scene_file_that_changes_is_read_again_and_a_broken_one_leaves_the_old_scene
     let source = Source::open(path.to_str().unwrap()).unwrap();
     with_plan(WindowPlan { source, overrides: Vec::new(), ..plan("pendulum") }, |simulation| {
         let look = |simulation: &mut WindowSimulation<'_>| {
-            simulation.follow_file_every(Duration::ZERO);
+            simulation.follow_files_every(Duration::ZERO);
             (0..3).for_each(|_| frame(simulation, None));
         };
         look(simulation);
@@ -151,5 +151,45 @@ fn a_scene_file_that_changes_is_read_again_and_a_broken_one_leaves_the_old_scene
         write(&format!("{whole}{}", object("other")));
         look(simulation);
         assert_eq!((simulation.status().agents.len(), simulation.status().messages.len()), (2, 0));
+    });
+}
+
+#[test]
+fn a_mesh_that_is_saved_is_read_again_and_one_that_was_wrong_once_it_is_right() {
+    let folder = tempfile::tempdir().unwrap();
+    let write = |name: &str, text: &str| std::fs::write(folder.path().join(name), text).unwrap();
+    // a tetrahedron with edges of this length along the axes: its volume is length³/6
+    let mesh = |length: f64| {
+        let corners = format!("v 0 0 0\nv {length} 0 0\nv 0 {length} 0\nv 0 0 {length}\n");
+        corners + "f 1 3 2\nf 1 2 4\nf 2 3 4\nf 1 4 3\n"
+    };
+    let hull = |file: &str| {
+        let object = "[[object]]\nname = 'one'\nmodel = 'rigid'\nshape = 'hull'\ndensity_kg_m3 = 600.0\n";
+        format!("format = 1\nexecutor = 'lockstep'\n{object}file = '{file}'\n")
+    };
+    write("first.obj", &mesh(1.0));
+    write("scene.toml", &hull("first.obj"));
+    let source = Source::open(folder.path().join("scene.toml").to_str().unwrap()).unwrap();
+    with_plan(WindowPlan { source, overrides: Vec::new(), ..plan("pendulum") }, |simulation| {
+        let look = |simulation: &mut WindowSimulation<'_>| {
+            simulation.follow_files_every(Duration::ZERO);
+            (0..3).for_each(|_| frame(simulation, None));
+            let metachron_world::Spec::Rigid(body) = &simulation.session.scene().agents[0].spec else { panic!() };
+            (body.mass_kg, simulation.status().messages.clone())
+        };
+        let is = |seen: (f64, Vec<Message>), mass_kg: f64| {
+            // corners are of single precision
+            assert!((seen.0 / mass_kg - 1.0).abs() < 1e-6 && seen.1.is_empty(), "{seen:?}");
+        };
+        is(look(simulation), 100.0);
+        write("first.obj", &mesh(2.5));
+        is(look(simulation), 1562.5);
+        // a mesh that the scene had not named before, and that is none yet
+        write("second.obj", "v 0 0 0\n");
+        write("scene.toml", &hull("second.obj"));
+        let (mass_kg, messages) = look(simulation);
+        assert!((mass_kg / 1562.5 - 1.0).abs() < 1e-6 && messages[0].text.contains("second.obj"), "{messages:?}");
+        write("second.obj", &mesh(0.5));
+        is(look(simulation), 12.5);
     });
 }
