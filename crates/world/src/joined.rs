@@ -130,66 +130,67 @@ impl Member {
     }
 }
 
-/// The parts of a world.
+/// The parts of a world, by the numbers of the agents that joined it.
 #[derive(Debug, Default)]
-pub(super) struct Joined(Mutex<Kept>);
+pub(super) struct JoinedTable(Mutex<Table>);
 
 #[derive(Debug, Default)]
-struct Kept {
+struct Table {
     parts: JoinedParts,
-    /// As many were there when those that had left were last given up.
+    /// How many parts the last sweep left.
     swept: usize,
 }
 
-/// Beyond twice as many as there were, and so many more, those that have left are given up.
+/// Parts of agents that have left are swept out once there are twice as many parts as the last sweep left, and so many more: an agent that joins
+/// costs O(1) in the mean.
 const SLACK: usize = 16;
 
-impl Joined {
-    /// Adds one, and gives up those that have left where there may be many of them.
+impl JoinedTable {
+    /// Adds one, and sweeps out those of agents that have left where there may be many of them.
     pub fn add(&self, id: AgentId, joined: JoinedPart, agents: &Agents) {
-        let mut kept = self.kept();
-        if kept.parts.len() >= 2 * kept.swept + SLACK {
-            kept.sweep(agents);
+        let mut table = self.lock();
+        if table.parts.len() >= 2 * table.swept + SLACK {
+            table.sweep(agents);
         }
-        kept.parts.insert(id, joined);
+        table.parts.insert(id, joined);
     }
 
     /// Takes one back: its agent could not be started.
     pub fn take_back(&self, id: AgentId) {
-        self.kept().parts.remove(&id);
+        self.lock().parts.remove(&id);
     }
 
     /// The one of an agent.
     pub fn get(&self, id: AgentId) -> Option<JoinedPart> {
-        self.kept().parts.get(&id).cloned()
+        self.lock().parts.get(&id).cloned()
     }
 
-    /// Those of agents that have not left.
+    /// Those of agents that have not left; the others are swept out.
     pub fn present(&self, agents: &Agents) -> JoinedParts {
-        let mut kept = self.kept();
-        kept.sweep(agents);
-        kept.parts.clone()
+        let mut table = self.lock();
+        table.sweep(agents);
+        table.parts.clone()
     }
 
     /// Adds those of a checkpoint that is about to be read: a reader that sees an agent can ask for its part.
     pub fn expect(&self, parts: &JoinedParts) {
-        let mut kept = self.kept();
+        let mut table = self.lock();
         for (id, joined) in parts.iter().filter(|(_, joined)| joined.part.is_some()) {
-            kept.parts.entry(*id).or_insert_with(|| joined.clone());
+            table.parts.entry(*id).or_insert_with(|| joined.clone());
         }
     }
 
     /// Keeps those of a checkpoint that was read.
     pub fn keep(&self, parts: &JoinedParts) {
-        self.kept().parts.retain(|id, _| parts.contains_key(id));
+        self.lock().parts.retain(|id, _| parts.contains_key(id));
     }
 
-    fn kept(&self) -> MutexGuard<'_, Kept> {
+    fn lock(&self) -> MutexGuard<'_, Table> {
         self.0.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }
 
-impl Kept {
+impl Table {
     fn sweep(&mut self, agents: &Agents) {
         self.parts.retain(|id, _| agents.of(*id).is_some_and(|agent| agent.state() != AgentState::Gone));
         self.swept = self.parts.len();

@@ -7,7 +7,7 @@ use super::assemble;
 use super::assemble::Govern;
 use super::checkpoint::{Checkpoint, CheckpointError, SceneIdentity};
 use super::error::WorldError;
-use super::joined::{Joined, Joining};
+use super::joined::{JoinedTable, Joining};
 use super::kinds::ExecutorKind;
 use super::log::{Log, TurnsToLog, logged};
 use super::recording::{Entry, RecordError, Recorder, Recording, SceneText};
@@ -161,7 +161,7 @@ impl World {
         } else {
             Followed::Lockstep(Box::new(Lockstep::start(spawns, assemble::machine(scene)).map_err(WorldError::Run)?))
         };
-        let joined = Arc::<Joined>::default();
+        let joined = Arc::<JoinedTable>::default();
         let player = Player {
             run,
             recording,

@@ -5,7 +5,7 @@
 
 use super::builder::Part;
 use super::checkpoint::{Checkpoint, SceneIdentity};
-use super::joined::{Joined, JoinedPart, Joining};
+use super::joined::{JoinedPart, JoinedTable, Joining};
 use super::log::Log;
 use super::recording::{Entry, Recording};
 use super::saved::read_state;
@@ -34,7 +34,7 @@ pub(super) struct Player {
     pub log: Arc<Log>,
     pub joining: Joining,
     pub identity: SceneIdentity,
-    pub joined: Arc<Joined>,
+    pub joined: Arc<JoinedTable>,
 }
 
 /// What does again what was done.

@@ -10,7 +10,7 @@ use super::checkpoint::SceneIdentity;
 use super::error::WorldError;
 use super::events::{EventFilter, Events};
 use super::frames::{Frame, Frames};
-use super::joined::Joined;
+use super::joined::JoinedTable;
 use super::kinds::ExecutorKind;
 use super::log::{Log, Mode, logged};
 use super::object::{Object, WorldTag};
@@ -41,7 +41,7 @@ pub(super) struct Shared {
     agents: Agents,
     /// How many agents the scene has, and those that joined since, in the order of their numbers.
     pub of_scene: usize,
-    pub joined: Arc<Joined>,
+    pub joined: Arc<JoinedTable>,
     /// Gravity, m/s²: that of objects that join it.
     pub gravity: DVec3,
     /// The static solids and joints.
@@ -79,7 +79,7 @@ pub(super) struct Setting {
     pub surroundings: Arc<ClusterScene>,
     pub clock: Arc<SystemClock>,
     pub log: Arc<Log>,
-    pub joined: Arc<Joined>,
+    pub joined: Arc<JoinedTable>,
 }
 
 impl World {
