@@ -209,6 +209,12 @@ impl AgentHandle {
         self.live().map_or_else(nothing, |shared| shared.slot.latest())
     }
 
+    /// Its newest state; `None` where it has left.
+    #[must_use]
+    pub fn latest_present(&self) -> Option<Arc<Snapshot>> {
+        self.live().filter(|shared| !shared.gauges.has_left()).map(|shared| shared.slot.latest())
+    }
+
     /// Age of `snapshot` at the simulated time `now`, seconds, ≥ 0.
     ///
     /// Zero for a state that covers `now` (one that is on time does), and for the state of an agent at rest: it is still valid.
