@@ -216,6 +216,12 @@ impl AgentHandle {
         shared.slot.latest().moment().max(SimTime::from_nanos(shared.gauges.woken_at.load(Relaxed)))
     }
 
+    /// Its newest state; `None` where it has left.
+    #[must_use]
+    pub fn latest_present(&self) -> Option<Arc<Snapshot>> {
+        self.live().filter(|shared| !shared.gauges.has_left()).map(|shared| shared.slot.latest())
+    }
+
     /// Age of `snapshot` at the simulated time `now`, seconds, ≥ 0.
     ///
     /// Zero for a state that covers `now` (one that is on time does), and for the state of an agent at rest: it is still valid.

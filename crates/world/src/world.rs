@@ -187,7 +187,8 @@ impl World {
     /// # Errors
     /// [`WorldError::Foreign`].
     pub fn latest(&self, object: Object) -> Result<Arc<Snapshot>, WorldError> {
-        self.agent(object).map(AgentHandle::latest)
+        let agent = self.known(object)?;
+        agent.latest_present().ok_or_else(|| gone(agent))
     }
 
     /// Events of its objects from now on.
@@ -324,10 +325,14 @@ impl World {
 
     /// The agent of an object.
     pub(super) fn agent(&self, object: Object) -> Result<&AgentHandle, WorldError> {
+        let agent = self.known(object)?;
+        if agent.state() == AgentState::Gone { Err(gone(agent)) } else { Ok(agent) }
+    }
+
+    /// The agent of an object, there or not.
+    fn known(&self, object: Object) -> Result<&AgentHandle, WorldError> {
         let known = self.shared.agents.of(object.id()).filter(|_| object.is_of(self.shared.tag));
-        let agent = known.ok_or(WorldError::Foreign)?;
-        let left = agent.state() == AgentState::Gone;
-        if left { Err(WorldError::Gone { name: agent.name().to_owned() }) } else { Ok(agent) }
+        known.ok_or(WorldError::Foreign)
     }
 
     pub(super) fn has_stopped(&self) -> bool {
@@ -362,4 +367,8 @@ impl World {
     pub(super) fn state(&self) -> MutexGuard<'_, State> {
         self.shared.state.lock().unwrap_or_else(PoisonError::into_inner)
     }
+}
+
+fn gone(agent: &AgentHandle) -> WorldError {
+    WorldError::Gone { name: agent.name().to_owned() }
 }
