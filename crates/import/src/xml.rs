@@ -36,21 +36,36 @@ pub(crate) fn parse(text: &str, file: Option<&str>) -> Result<Element, ImportErr
     let place = |line: u32, label: &str| Place { file: file.clone(), line, label: label.to_owned() };
     let document = roxmltree::Document::parse(text)
         .map_err(|why| place(why.pos().row, "the file").wrong(format!("is not XML: {why}")))?;
-    let root = Element::of(document.root_element(), &Text { document: &document, file: file.clone() }, None, 0)?;
+    let text = Text { lines: Lines::of(document.input_text()), file: file.clone() };
+    let root = Element::of(document.root_element(), &text, None, 0)?;
     root.is_read.set(true);
     Ok(root)
 }
 
 /// What elements are read from.
-struct Text<'a> {
-    document: &'a roxmltree::Document<'a>,
+struct Text {
+    lines: Lines,
     file: Option<Rc<str>>,
+}
+
+/// Where the lines of a text end, in bytes: counted for each element from the start, they take longer than all else in a large file.
+struct Lines(Vec<usize>);
+
+impl Lines {
+    fn of(text: &str) -> Self {
+        Self(text.bytes().enumerate().filter(|(_, byte)| *byte == b'\n').map(|(at, _)| at).collect())
+    }
+
+    /// The line of a byte, from 1.
+    fn at(&self, byte: usize) -> u32 {
+        self.0.partition_point(|end| *end < byte) as u32 + 1
+    }
 }
 
 impl Element {
     fn of(
         node: roxmltree::Node<'_, '_>,
-        text: &Text<'_>,
+        text: &Text,
         parent: Option<&str>,
         depth: usize,
     ) -> Result<Self, ImportError> {
@@ -60,7 +75,7 @@ impl Element {
             (None, Some(parent)) => format!("{parent}, {tag}"),
             (None, None) => tag.clone(),
         };
-        let line = text.document.text_pos_at(node.range().start).row;
+        let line = text.lines.at(node.range().start);
         if depth > DEPTH_MAX {
             let place = Place { file: text.file.clone(), line, label: tag };
             return Err(place.wrong(format!("is nested more than {DEPTH_MAX} deep")));
