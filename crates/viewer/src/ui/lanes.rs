@@ -1,4 +1,4 @@
-//! A lane for every agent: its turns over the last seconds of wall time, each from its begin to its end.
+//! A lane for every agent: its turns over the last seconds of wall time (of virtual time in lockstep), each from its begin to its end.
 //!
 //! In: the turns of the agents whose lanes are shown, frame by frame. Out: the lane that was pressed. Never here: how turns come about.
 //! Only lanes that fit are laid out, only their agents are asked, and of each at most [`TURNS_MAX`] turns are kept while its lane is shown.
@@ -153,7 +153,7 @@ pub fn show(ui: &mut Ui, status: &Status, lanes: &mut Lanes) -> Option<AgentId> 
     }
     let palette = palette(ui);
     ui.spacing_mut().item_spacing.y = 0.0;
-    let across = format!("{} of wall time, Ctrl+wheel zooms", text::seconds(lanes.span_s));
+    let across = format!("{} across, Ctrl+wheel zooms", text::seconds(lanes.span_s));
     ui.vertical_centered(|ui| ui.label(egui::RichText::new(across).size(10.0).color(palette.weak)));
     let shown = Shown { newest_s: lanes.newest_s(), span_s: lanes.span_s, palette };
     let (mut pressed, mut visible) = (None, Vec::new());
