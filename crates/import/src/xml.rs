@@ -63,12 +63,7 @@ impl Lines {
 }
 
 impl Element {
-    fn of(
-        node: roxmltree::Node<'_, '_>,
-        text: &Text,
-        parent: Option<&str>,
-        depth: usize,
-    ) -> Result<Self, ImportError> {
+    fn of(node: roxmltree::Node<'_, '_>, text: &Text, parent: Option<&str>, depth: usize) -> Result<Self, ImportError> {
         let tag = node.tag_name().name().to_owned();
         let label = match (node.attribute("name"), parent) {
             (Some(name), _) => format!("{tag} `{name}`"),

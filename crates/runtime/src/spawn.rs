@@ -172,10 +172,10 @@ pub(super) fn assemble(mut spawns: Vec<AgentSpawn>, helpers: Helpers) -> Result<
     spawns.iter().try_for_each(|spawn| check(spawn, count))?;
     attach_both_sides(&mut spawns);
     let sleep = Arc::new(SleepRegistry::new(count));
-    let (peers, seats) = peers(&mut spawns, &sleep, helpers);
+    let (peers, shown) = peers(&mut spawns, &sleep, helpers);
     let peers = Arc::new(peers);
     let mut jointed = jointed(&spawns);
-    let actors = spawns.into_iter().zip(seats).map(|(spawn, (shared, writer))| {
+    let actors = spawns.into_iter().zip(shown).map(|(spawn, Shown { shared, writer })| {
         let jointed = std::mem::take(&mut jointed[shared.id.0 as usize]);
         actor(shared, Seated { spawn, jointed, writer }, &peers)
     });
@@ -320,11 +320,7 @@ fn attach_both_sides(spawns: &mut [AgentSpawn]) {
 }
 
 /// The data fixed at the start, and the writer of each agent.
-fn peers(
-    spawns: &mut [AgentSpawn],
-    sleep: &Arc<SleepRegistry>,
-    helpers: Helpers,
-) -> (Peers, Vec<(Arc<Shared>, SlotWriter<Snapshot>)>) {
+fn peers(spawns: &mut [AgentSpawn], sleep: &Arc<SleepRegistry>, helpers: Helpers) -> (Peers, Vec<Shown>) {
     let mut writers = Vec::with_capacity(spawns.len());
     let mut all = Vec::with_capacity(spawns.len());
     let laws = laws(spawns);
@@ -338,9 +334,10 @@ fn peers(
         broad_phase.begin(all.len());
     }
     let is_ordered = AtomicBool::new(false);
-    let seats: Vec<_> = all.into_iter().map(Arc::new).zip(writers).collect();
-    let all = Agents::new(sleep, seats.iter().map(|(shared, _)| AgentHandle::of(shared)));
-    (Peers { all, broad_phase, helpers, is_ordered }, seats)
+    let shown: Vec<_> =
+        all.into_iter().zip(writers).map(|(shared, writer)| Shown { shared: Arc::new(shared), writer }).collect();
+    let all = Agents::new(sleep, shown.iter().map(|shown| AgentHandle::of(&shown.shared)));
+    (Peers { all, broad_phase, helpers, is_ordered }, shown)
 }
 
 /// For each agent the joints that hold it to others.
@@ -398,6 +395,12 @@ fn shared(
         ages: Mutex::default(),
         traces: spawn.watches.drain(..).map(|watch| Mutex::new(Trace::new(watch))).collect(),
     }
+}
+
+/// What an agent shows to others, and who writes its states there.
+struct Shown {
+    shared: Arc<Shared>,
+    writer: SlotWriter<Snapshot>,
 }
 
 /// What an agent is assembled from.

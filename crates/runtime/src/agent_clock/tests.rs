@@ -180,7 +180,8 @@ fn time_at_rest_is_not_dropped() {
 
 #[test]
 fn who_wakes_in_a_span_that_waits_for_agents_takes_part_from_its_start() {
-    let line = Timeline::new().after(ms(100), TimelineCommand::Pause).after(ms(150), TimelineCommand::Leap(span_ms(10)));
+    let line =
+        Timeline::new().after(ms(100), TimelineCommand::Pause).after(ms(150), TimelineCommand::Leap(span_ms(10)));
     let mut pace = pace(4);
     pace.wake(line.wakes_at(ms(200)));
     assert_eq!(pace.time(), SimTime::from_nanos(100_000_000));
