@@ -216,6 +216,7 @@ impl RunAgents {
             broad_phase.publish_nowhere(id, agent.latest().moment());
         }
         agent.live().into_iter().for_each(|shared| shared.gauges.leave());
+        agent.record.set_left(true);
         Ok(())
     }
 
@@ -255,9 +256,10 @@ impl RunAgents {
 
     /// An agent that joined the run as `spawn` says, has left and is not kept, again; its state is read next.
     pub fn revive(&self, id: AgentId, mut spawn: AgentSpawn) -> Box<AgentRunner> {
-        let writer = SlotWriter::new(Snapshot::default());
+        let record = &self.handles[id.0 as usize].record;
+        let writer = SlotWriter::of(Arc::clone(&record.slot));
         let shared = Arc::new(shared(id, &mut spawn, &self.sleep, &writer, false));
-        self.handles[id.0 as usize].record.begin(&shared);
+        record.begin(&shared);
         Box::new(actor(shared, Seated { spawn, jointed: Vec::new(), writer }, &self.peers))
     }
 
