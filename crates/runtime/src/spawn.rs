@@ -172,10 +172,12 @@ pub(super) fn assemble(mut spawns: Vec<AgentSpawn>, helpers: Helpers) -> Result<
     spawns.iter().try_for_each(|spawn| check(spawn, count))?;
     attach_both_sides(&mut spawns);
     let sleep = Arc::new(SleepRegistry::new(count));
-    let (peers, seats) = peers(&mut spawns, &sleep, helpers);
+    let (peers, writers) = peers(&mut spawns, &sleep, helpers);
     let peers = Arc::new(peers);
     let mut jointed = jointed(&spawns);
-    let actors = spawns.into_iter().zip(seats).map(|(spawn, (shared, writer))| {
+    let live = peers.all.iter().filter_map(AgentHandle::live);
+    let actors = spawns.into_iter().zip(live).zip(writers).map(|((spawn, live), writer)| {
+        let shared = Arc::clone(&live);
         let jointed = std::mem::take(&mut jointed[shared.id.0 as usize]);
         actor(shared, Seated { spawn, jointed, writer }, &peers)
     });
@@ -326,7 +328,7 @@ fn peers(
     spawns: &mut [AgentSpawn],
     sleep: &Arc<SleepRegistry>,
     helpers: Helpers,
-) -> (Peers, Vec<(Arc<Shared>, SlotWriter<Snapshot>)>) {
+) -> (Peers, Vec<SlotWriter<Snapshot>>) {
     let mut writers = Vec::with_capacity(spawns.len());
     let mut all = Vec::with_capacity(spawns.len());
     let laws = laws(spawns);
@@ -340,9 +342,8 @@ fn peers(
         broad_phase.begin(all.len());
     }
     let is_ordered = AtomicBool::new(false);
-    let seats: Vec<_> = all.into_iter().map(Arc::new).zip(writers).collect();
-    let all = Agents::new(sleep, seats.iter().map(|(shared, _)| AgentHandle::of(shared)));
-    (Peers { all, broad_phase, helpers, is_ordered }, seats)
+    let all = Agents::new(sleep, all.into_iter().map(|shared| AgentHandle::of(&Arc::new(shared))));
+    (Peers { all, broad_phase, helpers, is_ordered }, writers)
 }
 
 /// For each agent the joints that hold it to others.
