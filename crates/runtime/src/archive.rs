@@ -147,6 +147,8 @@ impl Cut {
         for (at, spawn) in made {
             all[at] = Some(Placed { runner: run_agents.revive(AgentId(at as u32), spawn), place: Place::Home });
         }
+        let there = run_agents.handles.iter().zip(present).filter(|(_, present)| **present);
+        there.for_each(|(agent, _)| agent.record.set_left(false));
         let present = present.iter().copied().chain(std::iter::repeat(false));
         for (one, _) in all.iter_mut().zip(present).filter(|(_, present)| !present) {
             if let Some(placed) = one.as_mut().filter(|placed| !placed.has_left()) {

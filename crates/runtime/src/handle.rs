@@ -9,9 +9,9 @@ use super::events::AgentEvent;
 use super::form_slot::FormSlot;
 use super::histogram::Histogram;
 use super::mailbox::{Command, Keyed, Mailbox, SendError};
-use super::metrics::{AgentState, AgentStats, Metrics};
+use super::metrics::{AgentState, AgentStats, Metrics, Spread};
 use super::probe::{Sample, Trace};
-use super::removed_agent::{REMOVED, nothing};
+use super::removed_agent::REMOVED;
 use super::sleep::SleepRegistry;
 use super::slot::LatestSlot;
 use super::spawn::AgentSpawn;
@@ -40,7 +40,7 @@ pub(super) struct Shared {
     pub slot: Arc<LatestSlot<Snapshot>>,
     pub sleep: Arc<SleepRegistry>,
     /// Used by readers only: the agent never waits for this lock.
-    pub ages: Mutex<Histogram>,
+    pub ages: Mutex<Option<Box<Histogram>>>,
     /// Empty for most agents. Only the agent writes, so that it never waits during the run; readers read at the end.
     pub traces: Box<[Mutex<Trace>]>,
 }
@@ -115,7 +115,7 @@ impl Shared {
         self.identity.handover.as_ref()
     }
 
-    fn ages(&self) -> MutexGuard<'_, Histogram> {
+    fn ages(&self) -> MutexGuard<'_, Option<Box<Histogram>>> {
         self.ages.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
@@ -138,7 +138,7 @@ impl Shared {
             turn_s: gauges.turn_s.get(),
             work: gauges.work.get(),
             cpu_s: gauges.cpu_s(),
-            age: self.ages().spread(),
+            age: self.ages().as_ref().map_or_else(Spread::default, |ages| ages.spread()),
             late: gauges.late(),
             misses: gauges.misses.load(Relaxed),
             dropped: span(&gauges.dropped),
@@ -176,7 +176,7 @@ impl AgentHandle {
 
     /// Whether it has left.
     pub(super) fn has_left(&self) -> bool {
-        self.live().is_none_or(|shared| shared.gauges.has_left())
+        self.record.has_left()
     }
 
     /// Its number: its place in the list at the start.
@@ -206,7 +206,7 @@ impl AgentHandle {
     /// Its newest state. There is one from the start on.
     #[must_use]
     pub fn latest(&self) -> Arc<Snapshot> {
-        self.live().map_or_else(nothing, |shared| shared.slot.latest())
+        self.record.slot.latest()
     }
 
     /// The scene time up to which it has lived: that of its newest state, or of its last waking, if that is later.
@@ -219,7 +219,7 @@ impl AgentHandle {
     /// Its newest state; `None` where it has left.
     #[must_use]
     pub fn latest_present(&self) -> Option<Arc<Snapshot>> {
-        self.live().filter(|shared| !shared.gauges.has_left()).map(|shared| shared.slot.latest())
+        (!self.has_left()).then(|| self.latest())
     }
 
     /// Age of `snapshot` at the simulated time `now`, seconds, ≥ 0.
@@ -237,21 +237,22 @@ impl AgentHandle {
     /// Counts the age of a state that was used, seconds ([`Self::age_s`]); invalid ages are ignored.
     pub fn record_age(&self, age_s: f64) {
         if let (Ok(age), Some(shared)) = (Duration::try_from_secs_f64(age_s), self.live()) {
-            shared.ages().record(age);
+            shared.ages().get_or_insert_default().record(age);
         }
     }
 
     /// Counts several ages.
     pub(super) fn record_ages(&self, ages: impl Iterator<Item = SimSpan>) {
         let Some(shared) = self.live() else { return };
-        let mut counted = shared.ages();
+        let mut ages_so_far = shared.ages();
+        let counted = ages_so_far.get_or_insert_default();
         ages.for_each(|age| counted.record(Duration::from_nanos(age.as_nanos())));
     }
 
     /// Counts a state that covered the present in so many frames.
     pub(super) fn record_no_age(&self, frames: usize) {
         let Some(shared) = self.live() else { return };
-        shared.ages().record_often(Duration::ZERO, u16::try_from(frames).unwrap_or(u16::MAX));
+        shared.ages().get_or_insert_default().record_often(Duration::ZERO, u16::try_from(frames).unwrap_or(u16::MAX));
     }
 
     /// The leader of the cluster in which it steps; `None` if it makes its own turns.
@@ -284,7 +285,7 @@ impl AgentHandle {
     /// # Errors
     /// [`SendError`]: nothing was delivered.
     pub fn send(&self, command: Command) -> Result<(), SendError> {
-        let shared = self.live().filter(|shared| !shared.gauges.has_left()).ok_or(SendError::NoAgent(self.id()))?;
+        let shared = self.live().filter(|_| !self.has_left()).ok_or(SendError::NoAgent(self.id()))?;
         if let Command::Motor(Keyed { key: joint, .. }) = command
             && !shared.has_motor(joint)
         {

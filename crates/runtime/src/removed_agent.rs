@@ -3,6 +3,7 @@
 //! In: its runner, which makes no more turns. Out: the same where the run began with it, else nothing: what joined the run is made again
 //! from what it joined as ([`super::archive`]). Never here: when an agent leaves.
 
+use super::agent_record::AgentRecord;
 use super::agent_runner::AgentRunner;
 use super::cluster::Led;
 use super::events::EventKind;
@@ -27,6 +28,7 @@ impl AgentRunner {
             broad_phase.publish_nowhere(self.id(), self.pace.time());
         }
         self.shared.gauges.leave();
+        self.record().set_left(true);
     }
 
     /// Takes it out at once: called between turns, of one that no other leads.
@@ -52,9 +54,13 @@ impl AgentRunner {
     /// It, which makes no more turns; `None` of one that has left and can be made again.
     pub fn kept(self: Box<Self>) -> Option<Box<Self>> {
         if self.shared.is_forgotten() {
-            self.peers.all.of(self.id()).into_iter().for_each(|agent| agent.record.end());
+            self.record().end();
             return None;
         }
         Some(self)
+    }
+
+    fn record(&self) -> &AgentRecord {
+        &self.peers.all[self.id().0 as usize].record
     }
 }

@@ -26,7 +26,12 @@ pub struct LatestSlot<T> {
 
 impl<T> LatestSlot<T> {
     fn new(first: T) -> Self {
-        let mut first = Some(Arc::new(first));
+        Self::holding(Arc::new(first))
+    }
+
+    /// A slot whose first value is there already.
+    pub(super) fn holding(first: Arc<T>) -> Self {
+        let mut first = Some(first);
         Self { newest: AtomicUsize::new(0), cells: std::array::from_fn(|_| RwLock::new(first.take())) }
     }
 
@@ -99,6 +104,11 @@ impl<T: Default> SlotWriter<T> {
     pub fn new(first: T) -> Self {
         // one published, one to be filled: allocated one after the other they are on neighbouring pages
         Self { slot: Arc::new(LatestSlot::new(first)), spare: vec![Arc::new(T::default())], filled: None, made: 2 }
+    }
+
+    /// Another writer of a slot whose last one writes no more.
+    pub(super) const fn of(slot: Arc<LatestSlot<T>>) -> Self {
+        Self { slot, spare: Vec::new(), filled: None, made: 0 }
     }
 
     /// The slot, for readers.

@@ -172,10 +172,12 @@ pub(super) fn assemble(mut spawns: Vec<AgentSpawn>, helpers: Helpers) -> Result<
     spawns.iter().try_for_each(|spawn| check(spawn, count))?;
     attach_both_sides(&mut spawns);
     let sleep = Arc::new(SleepRegistry::new(count));
-    let (peers, shown) = peers(&mut spawns, &sleep, helpers);
+    let (peers, writers) = peers(&mut spawns, &sleep, helpers);
     let peers = Arc::new(peers);
     let mut jointed = jointed(&spawns);
-    let actors = spawns.into_iter().zip(shown).map(|(spawn, Shown { shared, writer })| {
+    let live = peers.all.iter().filter_map(AgentHandle::live);
+    let actors = spawns.into_iter().zip(live).zip(writers).map(|((spawn, live), writer)| {
+        let shared = Arc::clone(&live);
         let jointed = std::mem::take(&mut jointed[shared.id.0 as usize]);
         actor(shared, Seated { spawn, jointed, writer }, &peers)
     });
@@ -216,6 +218,7 @@ impl RunAgents {
             broad_phase.publish_nowhere(id, agent.latest().moment());
         }
         agent.live().into_iter().for_each(|shared| shared.gauges.leave());
+        agent.record.set_left(true);
         Ok(())
     }
 
@@ -255,9 +258,10 @@ impl RunAgents {
 
     /// An agent that joined the run as `spawn` says, has left and is not kept, again; its state is read next.
     pub fn revive(&self, id: AgentId, mut spawn: AgentSpawn) -> Box<AgentRunner> {
-        let writer = SlotWriter::new(Snapshot::default());
+        let record = &self.handles[id.0 as usize].record;
+        let writer = SlotWriter::of(Arc::clone(&record.slot));
         let shared = Arc::new(shared(id, &mut spawn, &self.sleep, &writer, false));
-        self.handles[id.0 as usize].record.begin(&shared);
+        record.begin(&shared);
         Box::new(actor(shared, Seated { spawn, jointed: Vec::new(), writer }, &self.peers))
     }
 
@@ -320,7 +324,11 @@ fn attach_both_sides(spawns: &mut [AgentSpawn]) {
 }
 
 /// The data fixed at the start, and the writer of each agent.
-fn peers(spawns: &mut [AgentSpawn], sleep: &Arc<SleepRegistry>, helpers: Helpers) -> (Peers, Vec<Shown>) {
+fn peers(
+    spawns: &mut [AgentSpawn],
+    sleep: &Arc<SleepRegistry>,
+    helpers: Helpers,
+) -> (Peers, Vec<SlotWriter<Snapshot>>) {
     let mut writers = Vec::with_capacity(spawns.len());
     let mut all = Vec::with_capacity(spawns.len());
     let laws = laws(spawns);
@@ -334,10 +342,8 @@ fn peers(spawns: &mut [AgentSpawn], sleep: &Arc<SleepRegistry>, helpers: Helpers
         broad_phase.begin(all.len());
     }
     let is_ordered = AtomicBool::new(false);
-    let shown: Vec<_> =
-        all.into_iter().zip(writers).map(|(shared, writer)| Shown { shared: Arc::new(shared), writer }).collect();
-    let all = Agents::new(sleep, shown.iter().map(|shown| AgentHandle::of(&shown.shared)));
-    (Peers { all, broad_phase, helpers, is_ordered }, shown)
+    let all = Agents::new(sleep, all.into_iter().map(|shared| AgentHandle::of(&Arc::new(shared))));
+    (Peers { all, broad_phase, helpers, is_ordered }, writers)
 }
 
 /// For each agent the joints that hold it to others.
@@ -395,12 +401,6 @@ fn shared(
         ages: Mutex::default(),
         traces: spawn.watches.drain(..).map(|watch| Mutex::new(Trace::new(watch))).collect(),
     }
-}
-
-/// What an agent shows to others, and who writes its states there.
-struct Shown {
-    shared: Arc<Shared>,
-    writer: SlotWriter<Snapshot>,
 }
 
 /// What an agent is assembled from.
