@@ -2,6 +2,8 @@
 //!
 //! In: pixels, or the name of a pattern. Out: a [`Texture`]. Never here: files, light, the GPU.
 
+use std::sync::LazyLock;
+
 /// Mapping of a texture onto a mesh.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Wrap {
@@ -120,10 +122,15 @@ impl Texture {
     }
 }
 
-/// The linear light of an sRGB value, 0 … 1.
+/// The linear light of an sRGB value, 0 … 1: there are 256 of them, and a texture asks for millions.
 fn light(value: u8) -> f64 {
-    let c = f64::from(value) / 255.0;
-    if c <= 0.04045 { c / 12.92 } else { libm::pow((c + 0.055) / 1.055, 2.4) }
+    static LIGHTS: LazyLock<[f64; 256]> = LazyLock::new(|| {
+        std::array::from_fn(|value| {
+            let c = value as f64 / 255.0;
+            if c <= 0.04045 { c / 12.92 } else { libm::pow((c + 0.055) / 1.055, 2.4) }
+        })
+    });
+    LIGHTS[usize::from(value)]
 }
 
 /// The sRGB value of a linear light.
