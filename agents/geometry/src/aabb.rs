@@ -24,30 +24,35 @@ impl Aabb {
 
     /// The cube about `centre` whose sides are `half_m` from it, metres.
     #[must_use]
+    #[inline]
     pub fn about(centre: DVec3, half_m: f64) -> Self {
         Self { low: centre - half_m, high: centre + half_m }
     }
 
     /// The box without bounds.
     #[must_use]
+    #[inline]
     pub const fn everywhere() -> Self {
         Self { low: DVec3::NEG_INFINITY, high: DVec3::INFINITY }
     }
 
     /// The smallest box that contains both.
     #[must_use]
+    #[inline]
     pub fn union(self, other: Self) -> Self {
         Self { low: self.low.min(other.low), high: self.high.max(other.high) }
     }
 
     /// Whether the two have a point in common.
     #[must_use]
+    #[inline]
     pub fn meets(self, other: Self) -> bool {
         self.low.cmple(other.high).all() && other.low.cmple(self.high).all()
     }
 
     /// The same with every side moved out by `by_m` metres.
     #[must_use]
+    #[inline]
     pub fn grown(self, by_m: f64) -> Self {
         Self { low: self.low - by_m, high: self.high + by_m }
     }
