@@ -5,7 +5,7 @@ import os
 import signal
 import threading
 import tracemalloc
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Literal
 
@@ -257,6 +257,15 @@ def test_equal_worlds_have_equal_hashes_however_their_time_passes() -> None:
     assert hashes[0] == hashes[1]
 
 
+@pytest.fixture
+def interruptible() -> Iterator[None]:
+    """Ctrl-C raises KeyboardInterrupt: a shell that starts tests in the background has it ignored, and Python leaves that so."""
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    yield
+    signal.signal(signal.SIGINT, before)
+
+
+@pytest.mark.usefixtures("interruptible")
 def test_the_user_interrupts_what_takes_long() -> None:
     world = scenes.bouncing().start()
     long = np.zeros((2, 1_000_000, 3))
