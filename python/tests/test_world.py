@@ -294,7 +294,7 @@ def test_the_user_interrupts_what_takes_long() -> None:
 
 def test_a_forked_child_has_none_of_the_threads_of_a_world_and_says_so() -> None:
     world = scenes.bouncing().start("threads")
-    told, tell = os.pipe()
+    read_end, write_end = os.pipe()
     child = os.fork()
     if child == 0:
         # who waits is ended
@@ -307,10 +307,10 @@ def test_a_forked_child_has_none_of_the_threads_of_a_world_and_says_so() -> None
         world.stop()
         del world
         gc.collect()
-        os.write(tell, said.encode())
+        os.write(write_end, said.encode())
         os._exit(0)
     assert os.waitpid(child, 0)[1] == 0
-    assert b"let the child make its own" in os.read(told, 1000)
+    assert b"let the child make its own" in os.read(read_end, 1000)
     world.advance(0.01)
     world.stop()
 

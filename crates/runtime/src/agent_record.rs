@@ -63,7 +63,7 @@ impl AgentRecord {
         self.has_left.load(Acquire)
     }
 
-    /// Nobody finds its agent any more, which has left.
+    /// Its agent, which has left, is no longer found.
     pub fn end(&self) {
         self.live.store(None);
     }

@@ -12,10 +12,11 @@ use super::mailbox::{Command, Keyed, Mailbox, SendError};
 use super::metrics::{AgentState, AgentStats, Metrics, Spread};
 use super::probe::{Sample, Trace};
 use super::removed_agent::REMOVED;
+use super::ring::{Ring, RingEntry};
 use super::sleep::SleepRegistry;
 use super::slot::LatestSlot;
 use super::spawn::AgentSpawn;
-use super::streams::{EventStreams, Heard};
+use super::streams::{EventStreams, Heard, Rings};
 use super::turns::Turn;
 use metachron_contact::Law;
 use metachron_contact::stepper::ClusterScene;
@@ -212,8 +213,8 @@ impl AgentHandle {
     /// The scene time up to which it has lived: that of its newest state, or of its last waking, if that is later.
     #[must_use]
     pub fn lived_to(&self) -> SimTime {
-        let Some(shared) = self.live() else { return SimTime::ZERO };
-        shared.slot.latest().moment().max(SimTime::from_nanos(shared.gauges.woken_at.load(Relaxed)))
+        let woken_at = self.live().map_or(0, |shared| shared.gauges.woken_at.load(Relaxed));
+        self.latest().moment().max(SimTime::from_nanos(woken_at))
     }
 
     /// Its newest state; `None` where it has left.
@@ -318,28 +319,35 @@ impl AgentHandle {
     /// Begins to keep its events for a reader.
     #[must_use]
     pub fn listen(&self) -> Heard {
-        self.live().map_or_else(Heard::default, |shared| shared.streams.listen(|rings| &rings.events))
+        self.listen_to(|rings| &rings.events)
     }
 
     /// Passes its events that a reader has not heard on to `take`; returns how many were lost: an agent keeps the newest
     /// [`crate::EVENTS_KEPT`].
     pub fn hear_events(&self, heard: &mut Heard, take: impl FnMut(AgentEvent)) -> u64 {
-        // looked at first: what has left then has told that before
-        let live = self.live();
-        heard.hear(live.as_ref().map(|shared| &shared.streams), |rings| &rings.events, take)
+        self.hear(heard, |rings| &rings.events, take)
     }
 
     /// Begins to keep its turns for a reader.
     #[must_use]
     pub fn listen_to_turns(&self) -> Heard {
-        self.live().map_or_else(Heard::default, |shared| shared.streams.listen(|rings| &rings.turns))
+        self.listen_to(|rings| &rings.turns)
     }
 
     /// Passes its turns that a reader has not heard on to `take`; returns how many were lost: an agent keeps the newest
     /// [`crate::TURNS_KEPT`].
     pub fn hear_turns(&self, heard: &mut Heard, take: impl FnMut(Turn)) -> u64 {
+        self.hear(heard, |rings| &rings.turns, take)
+    }
+
+    fn listen_to<E: RingEntry>(&self, of: fn(&Rings) -> &Ring<E>) -> Heard {
+        self.live().map_or_else(Heard::default, |shared| shared.streams.listen(of))
+    }
+
+    fn hear<E: RingEntry>(&self, heard: &mut Heard, of: fn(&Rings) -> &Ring<E>, take: impl FnMut(E)) -> u64 {
+        // looked up first: what has left by then has pushed all it had to tell before
         let live = self.live();
-        heard.hear(live.as_ref().map(|shared| &shared.streams), |rings| &rings.turns, take)
+        heard.hear(live.as_ref().map(|shared| &shared.streams), of, take)
     }
 
     /// CPU time of its turns so far, seconds; updated about twice a second on threads.

@@ -20,7 +20,7 @@ pub(super) fn nothing() -> Arc<Snapshot> {
 }
 
 impl AgentRunner {
-    /// Publishes that nothing of it is left, where nobody finds it.
+    /// Publishes that nothing of it is left, where no other agent finds it.
     pub fn vanish(&mut self) {
         self.withheld = false;
         self.writer.retire(nothing());

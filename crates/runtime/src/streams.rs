@@ -1,7 +1,7 @@
 //! What an agent tells readers: its events and its turns, and how far each reader has heard them.
 //!
 //! In: events and turns, from the thread that makes the agent's turns. Out: the same to each reader ([`super::ring`]), which keeps what an
-//! agent that has left has told until it has heard it. Never here: what they mean.
+//! agent that has left has pushed until it has read it. Never here: what they mean.
 
 use super::events::AgentEvent;
 use super::ring::{Ring, RingEntry};
@@ -46,7 +46,8 @@ impl EventStreams {
 }
 
 impl Heard {
-    /// Passes what it has not heard on to `take`; returns how much was lost. `now` is what the agent told before that; `None` where it has left.
+    /// Passes what it has not read on to `take`; returns how much was lost. `now` are the agent's streams, looked up before that; `None` where it has
+    /// left.
     pub(super) fn hear<E: RingEntry>(
         &mut self,
         now: Option<&EventStreams>,

@@ -118,7 +118,7 @@ impl Threads {
             let _farewell = farewell;
             // a refusal was already reported to the caller of `Priority::ask`
             drop(priority.take());
-            // by itself: who gives the agent back before another does wakes nobody
+            // by itself: where the agent is given back before another thread registers this one, no thread is woken
             shared.sleep.set_thread(shared.id, Some(thread::current()));
             stage.run(actor, &shared)
         };

@@ -34,7 +34,7 @@ impl World {
         }
         let entry = added(&name, &part);
         let State::Running(run) = &mut *self.state() else { return Err(WorldError::Stopped) };
-        // nobody else adds one meanwhile
+        // under the lock: no other thread adds one meanwhile
         if self.object(&name).is_ok() {
             return Err(WorldError::SameName { name });
         }

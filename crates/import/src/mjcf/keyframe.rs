@@ -1,4 +1,4 @@
-//! The keyframe that a model starts from: where its joints are, and what its actuators are told.
+//! The keyframe that a model starts from: where its joints are, and what its actuators are commanded.
 //!
 //! In: `key` elements. Out: their numbers, joint by joint. Never here: what a joint makes of them; the keyframes that are not started from.
 
@@ -35,12 +35,12 @@ impl<'a> Keyframe<'a> {
         self.positions.as_ref()?.get(from..self.taken)?.try_into().ok()
     }
 
-    /// What the actuator of this number is told; zero where the keyframe says nothing.
+    /// The command of the actuator of this number; zero where the keyframe says nothing.
     pub(super) fn control(&self, number: usize) -> f64 {
         self.controls.as_ref().and_then(|all| all.get(number)).copied().unwrap_or(0.0)
     }
 
-    /// Checks that joints have taken all there is, and that each of the actuators is told something.
+    /// Checks that joints have taken all there is, and that each of the actuators has a command.
     pub(super) fn check(&self, actuators: usize) -> Result<(), ImportError> {
         let lists = [("qpos", &self.positions, self.taken), ("ctrl", &self.controls, actuators)];
         for (name, given, expected) in lists {

@@ -416,11 +416,11 @@ fn lanes_of_a_thousand_agents_are_laid_out_as_far_as_they_fit_and_tell_of_turns(
     let lane = harness.get_by_label("Lane of box 1").rect();
     harness.hover_at(lane.right_center() - egui::vec2(18.0, 0.0));
     harness.run_steps(60);
-    let told = harness.query_by_label_contains("begun at 9.0300 s").expect("a tooltip");
-    let told = told.accesskit_node().label().or(told.accesskit_node().value()).unwrap_or_default();
+    let tooltip = harness.query_by_label_contains("begun at 9.0300 s").expect("a tooltip");
+    let tooltip = tooltip.accesskit_node().label().or(tooltip.accesskit_node().value()).unwrap_or_default();
     let numbers =
         ["7.2500 s", "took 500 ms", "late 9.00 ms", "dt 4.00 ms", "waited 30.0 ms", "20.0 mm", "cluster of box 0"];
-    assert!(numbers.iter().all(|what| told.contains(what)), "{told}");
+    assert!(numbers.iter().all(|what| tooltip.contains(what)), "{tooltip}");
     harness.get_by_label("Lane of box 1").click();
     assert_eq!(asked(&mut harness), [Action::Select(Some(AgentId(1)))]);
 }
