@@ -7,7 +7,7 @@ use super::kinds::ExecutorKind;
 use super::world::World;
 use metachron_core::{SimSpan, SimTime};
 use metachron_runtime::{AgentHandle, AgentState, SPEED_RANGE, TimelineCommand};
-use std::sync::atomic::Ordering::{Acquire, Relaxed};
+use std::sync::atomic::Ordering::Relaxed;
 use std::time::Duration;
 
 /// How fast a world's time passes.
@@ -121,7 +121,7 @@ impl World {
         poll: Duration,
         goes_on: &mut dyn FnMut() -> bool,
     ) -> bool {
-        let mut put_back = self.shared.put_back.load(Acquire);
+        let mut put_back = self.rewinds();
         let Some(mut end) = self.timeline().until() else { return true };
         let mut asked = end;
         while !self.has_stopped() {
@@ -129,7 +129,7 @@ impl World {
                 self.drive(TimelineCommand::Pause);
                 return false;
             }
-            let often = self.shared.put_back.load(Acquire);
+            let often = self.rewinds();
             if often != put_back {
                 // time stops elsewhere since
                 let Some(until) = self.timeline().until() else { return true };

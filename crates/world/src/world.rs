@@ -23,7 +23,10 @@ use metachron_runtime::{
     AgentHandle, AgentState, AgentStats, Agents, Lockstep, Pool, Run, SystemClock, Threads, Timeline, TimelineCommand,
     state_hash, wait_until,
 };
-use std::sync::atomic::{AtomicBool, AtomicU64, Ordering::Relaxed};
+use std::sync::atomic::{
+    AtomicBool, AtomicU64,
+    Ordering::{Acquire, Relaxed},
+};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError, TryLockError};
 use std::time::Duration;
 
@@ -333,6 +336,11 @@ impl World {
     fn known(&self, object: Object) -> Result<&AgentHandle, WorldError> {
         let known = self.shared.agents.of(object.id()).filter(|_| object.is_of(self.shared.tag));
         known.ok_or(WorldError::Foreign)
+    }
+
+    /// How often it was put back into the state of a checkpoint.
+    pub(super) fn rewinds(&self) -> u64 {
+        self.shared.put_back.load(Acquire)
     }
 
     pub(super) fn has_stopped(&self) -> bool {
