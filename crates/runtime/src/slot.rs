@@ -244,6 +244,18 @@ mod tests {
     }
 
     #[test]
+    fn a_filled_value_that_somebody_has_kept_is_not_written_to() {
+        let mut writer = writer();
+        writer.fill(|block| *block = vec![1]);
+        let kept = writer.filled_mut().clone().unwrap();
+        writer.fill(|block| *block = vec![2]);
+        assert_eq!((kept[0], writer.filled().unwrap()[0]), (1, 2));
+        assert!(writer.publish());
+        writer.fill(|block| *block = vec![3]);
+        assert_eq!((kept[0], writer.slot().latest()[0]), (1, 2));
+    }
+
+    #[test]
     fn nothing_is_allocated_after_warm_up() {
         let mut writer = writer();
         let slot = writer.slot();

@@ -360,11 +360,16 @@ impl World {
     /// Does something with a world in lockstep that runs; nothing with one that was stopped.
     fn with_run(&self, entry: impl FnOnce() -> Entry, act: impl FnOnce(&mut dyn Run)) {
         if let State::Running(run) = &mut *self.state() {
-            self.shared.log.note(entry);
-            self.see(run.as_ref());
-            act(run.as_mut());
-            self.see(run.as_ref());
+            self.let_pass(run.as_mut(), entry, act);
         }
+    }
+
+    /// The same for who has the run.
+    pub(super) fn let_pass(&self, run: &mut dyn Run, entry: impl FnOnce() -> Entry, act: impl FnOnce(&mut dyn Run)) {
+        self.shared.log.note(entry);
+        self.see(run);
+        act(run);
+        self.see(run);
     }
 
     /// Notes the time for those that ask while it passes.

@@ -165,7 +165,8 @@ pub fn storm(executor: ExecutorKind, threads: usize, calls: u64, most: Duration,
         let (world, marks, at, sender) = (world.clone(), Arc::clone(&marks), Arc::clone(&at), sender.clone());
         std::thread::spawn(move || {
             let events = world.events(EventFilter::all());
-            let mut caller = Caller { world, marks, events, random: Random(seed + thread as u64), tally: Tally::default() };
+            let mut caller =
+                Caller { world, marks, events, random: Random(seed + thread as u64), tally: Tally::default() };
             while caller.tally.calls < calls && Instant::now() < ends && caller.tally.lost.is_empty() {
                 let which = caller.random.below(CALLS);
                 at[thread].store(which, Relaxed);
