@@ -67,7 +67,7 @@ impl Agent for Clerk {
     fn step(&mut self, dt: SimSpan, _context: &StepContext<'_>) -> Result<StepReport, StepError> {
         self.steps += 1;
         self.half_s += dt.as_secs_f64() / 2.0;
-        Ok(StepReport::default())
+        Ok(StepReport { work: 1.0, substeps: 1, at_rest: false })
     }
 
     fn write_snapshot(&self, into: &mut Snapshot) {
@@ -129,7 +129,10 @@ fn a_way_back_that_is_refused_changes_nothing() {
             let refused = world.restore(mark).unwrap_err();
             assert!(matches!(&refused, CheckpointError::Unreadable(_)), "{executor:?}: {refused}");
             assert!(refused.to_string().contains(why), "{executor:?}: {refused}");
-            assert!(world.checkpoint().unwrap() == before, "{executor:?}, {why}");
+            let after = world.checkpoint().unwrap();
+            assert_eq!(after.times(), before.times(), "{executor:?}, {why}");
+            // in real time a checkpoint has readings of the clock
+            assert!(executor != ExecutorKind::Lockstep || after == before, "{why}");
             assert_eq!((world.hash(), world.agents().len()), (hash, count), "{executor:?}, {why}");
             assert!(world.object("came").is_ok() && world.object("left").is_err(), "{executor:?}, {why}");
         }
@@ -175,17 +178,26 @@ fn falling(executor: ExecutorKind) -> World {
     World::start(&scene.unwrap(), executor).unwrap()
 }
 
-/// Which of the ball's events there are: that the world went back, and contacts that begin.
+/// What the ball tells: each time that the world went back, and what its contact with the floor does first after that.
 fn told(world: &World, events: Vec<Event>) -> Vec<&'static str> {
     let ball = world.object("ball").unwrap();
     let of_it = events.into_iter().filter(|event| event.object == ball);
     let named = |event: Event| match event.what {
         Happening::Rewound => Some("rewound"),
-        Happening::Contact(contact) if contact.begins && contact.with == Touched::Fixed(0) => Some("begins"),
-        Happening::Contact(_) => Some("another"),
+        Happening::Contact(contact) if contact.with == Touched::Fixed(0) => {
+            Some(if contact.begins { "begins" } else { "ends" })
+        }
         _ => None,
     };
-    of_it.filter_map(named).collect()
+    let mut all: Vec<_> = of_it.filter_map(named).collect();
+    // it bounces
+    let mut was_told = false;
+    all.retain(|what| {
+        let is_first = *what == "rewound" || !was_told;
+        was_told = *what != "rewound";
+        is_first
+    });
+    all
 }
 
 #[test]
@@ -196,7 +208,7 @@ fn a_contact_that_begins_again_after_a_way_back_begins() {
             let mut events = world.events(filter);
             world.advance(ms(50));
             let in_the_air = world.checkpoint().unwrap();
-            world.advance(ms(300));
+            world.advance(ms(1000));
             let on_the_floor = world.checkpoint().unwrap();
             assert_eq!(told(&world, events.drain().collect()), ["begins"], "{executor:?}");
             world.restore(&in_the_air).unwrap();
@@ -222,7 +234,7 @@ fn a_contact_that_begins_again_after_a_way_back_begins() {
 fn who_was_away_or_slept_through_it_learns_that_the_world_went_back() {
     for executor in EXECUTORS {
         let world = falling(executor);
-        let joined = world.add("ball 2", Rigid::ball(0.05).at([0.5, 0.0, 0.15])).unwrap();
+        let joined = world.add("ball 2", Rigid::ball(0.05).at([0.5, 0.0, 0.15]).restitution(0.0)).unwrap();
         let mut events = world.events(EventFilter::contacts());
         world.advance(ms(50));
         let mark = world.checkpoint().unwrap();
@@ -235,8 +247,8 @@ fn who_was_away_or_slept_through_it_learns_that_the_world_went_back() {
             events.into_iter().filter(|event| event.object == joined).map(|event| event.what).collect()
         };
         assert_eq!(of_it(events.drain().collect()), [Happening::Rewound], "{executor:?}: it was away");
-        // so many that the first event is overwritten: each way back tells of one that comes and of the contact that is there
-        world.advance(ms(300));
+        // so many that the first event is overwritten: each way back tells of itself and of the contact that is there
+        world.advance(ms(1000));
         events.drain().for_each(drop);
         let mark = world.checkpoint().unwrap();
         (0..100).for_each(|_| world.restore(&mark).unwrap());

@@ -21,7 +21,7 @@ const CROWD: usize = 18;
 /// Checkpoints that are kept to go back to.
 const MARKS: usize = 8;
 /// How long threads that should have ended are waited for.
-const PATIENCE: Duration = Duration::from_secs(120);
+const PATIENCE: Duration = Duration::from_secs(60);
 
 /// How much is to be done.
 #[derive(Debug, Clone, Copy)]
@@ -177,9 +177,9 @@ pub fn storm(executor: ExecutorKind, threads: usize, calls: u64, most: Duration,
         });
     }
     drop(sender);
-    let (mut all, mut returned) = (Tally::default(), vec![false; threads]);
+    let (mut all, mut returned, late) = (Tally::default(), vec![false; threads], ends + PATIENCE);
     while returned.contains(&false) {
-        match receiver.recv_timeout(most + PATIENCE) {
+        match receiver.recv_timeout(Duration::from_millis(100)) {
             Ok((thread, tally)) => {
                 returned[thread] = true;
                 all.checkpoints += tally.checkpoints;
@@ -188,10 +188,20 @@ pub fn storm(executor: ExecutorKind, threads: usize, calls: u64, most: Duration,
                 all.calls += tally.calls;
                 all.lost.extend(tally.lost);
             }
+            Err(_) if Instant::now() < late => {
+                // who advances a world that another thread has paused waits until it runs again
+                if returned.contains(&true) {
+                    world.drive(TimelineCommand::Run);
+                }
+            }
             Err(error) => {
                 let missing = (0..threads).filter(|thread| !returned[*thread]);
                 let calls: Vec<_> = missing.map(|thread| at[thread].load(Relaxed)).collect();
-                all.lost.push(format!("threads in the calls {calls:?} did not return: {error}"));
+                let (timeline, time) = (world.timeline(), world.time());
+                let agents: Vec<_> = world.agents().iter().map(|agent| (agent.state(), agent.lived_to())).collect();
+                all.lost.push(format!(
+                    "threads in the calls {calls:?} did not return: {error}; {timeline:?} at {time:?}, {agents:?}"
+                ));
                 return all;
             }
         }
