@@ -6,14 +6,13 @@
 
 mod state;
 
-pub(super) use state::{FRAME, VirtualEvents};
-
 use super::agent_clock::Timeline;
 use super::agent_runner::AgentRunner;
 use super::cluster::{Place, Placed};
 use super::events::EventKind;
 use super::spawn::{AgentSpawn, RunAgents};
 use super::turn_order::{PartKind, TurnOrder};
+use super::virtual_events::VirtualEvents;
 use metachron_core::{AgentId, Archive, ArchiveError};
 use state::{RunState, caught};
 use std::collections::BTreeMap;
@@ -95,7 +94,8 @@ impl Cut {
         if archive.is_reading() {
             return self.read(archive, absent);
         }
-        let mut state = RunState::of(self, events);
+        let Self { all, run_agents, timeline, now, .. } = self;
+        let mut state = RunState { timeline: *timeline, now: *now, events, ..RunState::of(all, run_agents) };
         archive.value(&mut state.present)?;
         let mut none = Made::new();
         let mut runners = runners_of(&mut self.all, &mut none, &state.present);

@@ -75,6 +75,7 @@ mod threads;
 mod turn_order;
 mod turn_parts;
 mod turns;
+mod virtual_events;
 mod worker_wakeup;
 
 pub use agent_clock::{AgentClock, LAG_CAP, Start};

@@ -10,7 +10,7 @@ use super::Run;
 use super::agent_clock::{Timeline, TimelineCommand};
 use super::agent_runner::{AgentRunner, Effort, Next};
 use super::agents::Agents;
-use super::archive::{Absent, Cut, FRAME, VirtualEvents};
+use super::archive::{Absent, Cut};
 use super::cluster::{Place, Placed, close_remaining, hand_over, put_back, take_apart};
 use super::cpu::CpuBatch;
 use super::handle::AgentHandle;
@@ -20,6 +20,7 @@ use super::mailbox::SendError;
 use super::metrics::AgentStats;
 use super::spawn::{AgentSpawn, AssembledRun, RunAgents, RunError, assemble};
 use super::turns::Took;
+use super::virtual_events::{FRAME, Phase, Turn, VirtualEvents};
 use cores::Cores;
 use metachron_core::{AgentId, Archive, ArchiveError};
 use std::cmp::Reverse;
@@ -49,27 +50,6 @@ struct AgentEntry {
     actor: Option<Box<AgentRunner>>,
     phase: Phase,
     turns: u64,
-}
-
-#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
-pub(super) enum Phase {
-    Waiting,
-    /// In a turn.
-    Busy(Turn),
-    Resting,
-    Led,
-    Parked,
-}
-
-/// A turn that goes on.
-#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
-pub(super) struct Turn {
-    /// When it began.
-    since: Duration,
-    /// Its jobs that have not ended.
-    jobs: u32,
-    /// How many cores it keeps busy in the mean, ≥ 1.
-    cores: f64,
 }
 
 impl Lockstep {

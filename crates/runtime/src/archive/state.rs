@@ -7,14 +7,12 @@ use super::super::agent_clock::Timeline;
 use super::super::agent_runner::{AgentRunner, contained};
 use super::super::broad_phase::BroadPhaseState;
 use super::super::cluster::{Place, Placed, check_places};
-use super::super::lockstep::Phase;
 use super::super::mailbox::PendingCommands;
 use super::super::observation::Seen;
 use super::super::sleep::SleepState;
-use super::Cut;
+use super::super::spawn::RunAgents;
+use super::super::virtual_events::VirtualEvents;
 use metachron_core::{Archive, ArchiveError, Snapshot, archive_values};
-use std::cmp::Reverse;
-use std::collections::BinaryHeap;
 use std::sync::Arc;
 use std::time::Duration;
 
@@ -43,33 +41,9 @@ pub(super) struct ShownState {
     pub seen: Vec<Seen>,
 }
 
-/// The events to come of a run in virtual time.
-#[derive(Default, serde::Serialize, serde::Deserialize)]
-pub(in super::super) struct VirtualEvents {
-    /// Due times of turns.
-    pub due: BinaryHeap<Reverse<(Duration, u32)>>,
-    /// Service of the cores, and the jobs in progress.
-    pub served: u128,
-    pub jobs: BinaryHeap<Reverse<(u128, u32)>>,
-    /// For each agent its phase and how many turns it has made.
-    pub phases: Vec<(Phase, u64)>,
-}
-
-/// The number of the frame loop's own job: above every agent's, so that agents' jobs come first at equal end times.
-pub(in super::super) const FRAME: u32 = u32::MAX;
-
-impl VirtualEvents {
-    /// The agents whose turns are due or in progress.
-    fn owners(&self) -> impl Iterator<Item = u32> {
-        let due = self.due.iter().map(|Reverse((_, agent))| *agent);
-        due.chain(self.jobs.iter().map(|Reverse((_, owner))| *owner)).filter(|owner| *owner != FRAME)
-    }
-}
-
 impl RunState {
-    /// That of a run, but for what its agents keep to themselves.
-    pub fn of(cut: &Cut, events: Option<VirtualEvents>) -> Self {
-        let Cut { all, run_agents, timeline, now, .. } = cut;
+    /// That of a run without events to come, at no time, but for what its agents keep to themselves.
+    pub fn of(all: &[Option<Placed>], run_agents: &RunAgents) -> Self {
         let present: Vec<bool> = run_agents.handles.iter().map(|agent| !agent.has_left()).collect();
         let there = all.iter().zip(&present).filter(|(_, present)| **present);
         let shown = there.filter_map(|(one, _)| Some(ShownState::of(&one.as_ref()?.runner, &present))).collect();
@@ -80,10 +54,7 @@ impl RunState {
             sleep: run_agents.sleep.state(),
             broad_phase: run_agents.peers.broad_phase.state(),
             places: all.iter().map(place).collect(),
-            timeline: *timeline,
-            now: *now,
-            events,
-            present,
+            ..Self::empty(present)
         }
     }
 
