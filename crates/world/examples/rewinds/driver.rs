@@ -188,12 +188,8 @@ pub fn storm(executor: ExecutorKind, threads: usize, calls: u64, most: Duration,
                 all.calls += tally.calls;
                 all.lost.extend(tally.lost);
             }
-            Err(_) if Instant::now() < late => {
-                // who advances a world that another thread has paused waits until it runs again
-                if returned.contains(&true) {
-                    world.drive(TimelineCommand::Run);
-                }
-            }
+            // who advances a world that another thread has paused waits until it runs again: all of them may
+            Err(_) if Instant::now() < late => world.drive(TimelineCommand::Run),
             Err(error) => {
                 let missing = (0..threads).filter(|thread| !returned[*thread]);
                 let calls: Vec<_> = missing.map(|thread| at[thread].load(Relaxed)).collect();
