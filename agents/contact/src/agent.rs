@@ -88,7 +88,8 @@ pub trait Agent: Send {
     ///
     /// # Errors
     /// [`ArchiveError::Refused`] by a model that does not save its state, as this one does where a model has nothing else;
-    /// [`ArchiveError`] for a state of another agent. After an error while reading the agent must not step again.
+    /// [`ArchiveError`] for a state of another agent. After an error while reading it reads what it has written itself just before, and goes on from
+    /// that.
     fn archive(&mut self, archive: &mut Archive<'_>) -> Result<(), ArchiveError> {
         let _ = archive;
         Err(ArchiveError::Refused { what: format!("model \"{}\"", self.model()) })

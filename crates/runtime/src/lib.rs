@@ -75,6 +75,7 @@ mod threads;
 mod turn_order;
 mod turn_parts;
 mod turns;
+mod virtual_events;
 mod worker_wakeup;
 
 pub use agent_clock::{AgentClock, LAG_CAP, Start};
@@ -152,8 +153,8 @@ pub trait Run: Send {
     /// another can read.
     ///
     /// # Errors
-    /// [`ArchiveError::Refused`] where a step does not end, and by agents and governors that do not save their state: nothing is changed then.
-    /// Any error while reading leaves a run that is not usable any more.
+    /// [`ArchiveError::Refused`] where a step does not end, and by agents and governors that do not save their state; any other for a state that
+    /// is not one of this run, or that a model does not read. The run goes on as it was then: all is read and checked before anything is shown.
     fn archive(&mut self, archive: &mut Archive<'_>, absent: Absent<'_>) -> Result<(), ArchiveError>;
 
     /// Writes the state of the run ([`Run::archive`]).

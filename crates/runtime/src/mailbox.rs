@@ -4,7 +4,7 @@
 //! overwrites. Never here: the execution of commands ([`crate::agent_runner`] does).
 
 use metachron_contact::{AnchorForce, AnchorSpring, Carving, PoseGoal, SetMotion, SetMotor};
-use metachron_core::{AgentId, Anchor, Archive, ArchiveError, Body, Resolution, SimSpan};
+use metachron_core::{AgentId, Anchor, Body, Resolution, SimSpan};
 use std::sync::atomic::{
     AtomicBool,
     Ordering::{Acquire, Release},
@@ -98,7 +98,7 @@ pub(super) struct Mailbox {
 }
 
 /// Contents of a mailbox.
-#[derive(Debug, Default, serde::Serialize, serde::Deserialize)]
+#[derive(Debug, Clone, Default, serde::Serialize, serde::Deserialize)]
 pub(super) struct PendingCommands {
     /// The newest requested resolution.
     pub set_resolution: Option<Resolution>,
@@ -164,19 +164,19 @@ impl Mailbox {
         Ok(())
     }
 
-    /// Writes or reads the commands that wait.
-    pub fn archive(&self, archive: &mut Archive<'_>) -> Result<(), ArchiveError> {
-        let mut is_full = self.has_pending();
-        archive.value(&mut is_full)?;
-        if is_full {
-            let pending = self.pending.get_or_init(Box::default);
-            archive.value(&mut *pending.lock().unwrap_or_else(PoisonError::into_inner))?;
-        } else if archive.is_reading() {
-            // what waits now was sent after
-            self.clear();
-        }
-        self.full.store(is_full, Release);
-        Ok(())
+    /// What waits, if anything does.
+    pub fn waiting(&self) -> Option<PendingCommands> {
+        let pending = self.pending.get().filter(|_| self.has_pending())?;
+        Some(pending.lock().unwrap_or_else(PoisonError::into_inner).clone())
+    }
+
+    /// Lets `commands` wait in place of all that waits now.
+    pub fn replace(&self, commands: Option<PendingCommands>) {
+        let Some(commands) = commands else { return self.clear() };
+        let _ = self.put(|pending| {
+            *pending = commands;
+            Ok(())
+        });
     }
 
     /// Forgets what waits; called between turns.

@@ -91,7 +91,7 @@ pub(super) struct SleepRegistry {
 }
 
 /// What a [`SleepRegistry`] knows of its agents between turns.
-#[derive(Debug, Clone, PartialEq, serde::Serialize, serde::Deserialize)]
+#[derive(Debug, Clone, Default, PartialEq, serde::Serialize, serde::Deserialize)]
 pub(super) struct SleepState {
     pub signals: Vec<SignalState>,
     notified: bool,

@@ -187,6 +187,7 @@ impl CutBetweenTurns for Threads {
         let homes = self.halt(Halt::Cut);
         let all = take_apart(homes.into_iter(), &self.all.handles);
         let mut cut = Cut::new(all, self.all.clone(), self.timeline.read(), self.clock.now());
+        cut.most = THREADS_MAX;
         let outcome = act(&mut cut, &mut self.order);
         if cut.timeline != self.timeline.read() {
             self.timeline.set(cut.timeline);

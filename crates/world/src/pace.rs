@@ -4,10 +4,11 @@
 
 use super::error::WorldError;
 use super::kinds::ExecutorKind;
-use super::world::World;
+use super::recording::Entry;
+use super::world::{State, World};
 use metachron_core::{SimSpan, SimTime};
 use metachron_runtime::{AgentHandle, AgentState, SPEED_RANGE, TimelineCommand};
-use std::sync::atomic::Ordering::{Acquire, Relaxed};
+use std::sync::atomic::Ordering::Relaxed;
 use std::time::Duration;
 
 /// How fast a world's time passes.
@@ -102,15 +103,20 @@ impl World {
         true
     }
 
-    /// Lets virtual time pass, which does so in calls alone: where it was stopped, it is let go so far.
+    /// Lets virtual time pass, which does so in calls alone: where it was stopped, it is let go so far. One call: no other thread puts the world
+    /// back between what it looks at and what it does.
     fn advance_virtual(&self, span: SimSpan) {
-        if self.timeline().until().is_some() {
-            self.drive(TimelineCommand::Step(span));
+        let State::Running(run) = &mut *self.state() else { return };
+        let run = run.as_mut();
+        if run.timeline().until().is_some() {
+            let step = TimelineCommand::Step(span);
+            self.let_pass(run, || Entry::Drive(step), |run| run.drive(step));
         }
-        let (now, timeline) = (self.now(), self.timeline());
+        let (now, timeline) = (run.now(), run.timeline());
         // a step that was begun before is made first; a replay lets time go as its recording says
         let left = timeline.until().map_or(span, |end| end.since(timeline.sim_at(now)).max(span));
-        self.wait_until(now + timeline.wall_span(left));
+        let until = now + timeline.wall_span(left);
+        self.let_pass(run, || Entry::Wait(until), |run| run.wait_until(until));
     }
 
     /// Waits until all objects have lived to where time stops; it stops at once where they are not to go on, and `false` is returned. One that
@@ -121,7 +127,7 @@ impl World {
         poll: Duration,
         goes_on: &mut dyn FnMut() -> bool,
     ) -> bool {
-        let mut put_back = self.shared.put_back.load(Acquire);
+        let mut put_back = self.rewinds();
         let Some(mut end) = self.timeline().until() else { return true };
         let mut asked = end;
         while !self.has_stopped() {
@@ -129,7 +135,7 @@ impl World {
                 self.drive(TimelineCommand::Pause);
                 return false;
             }
-            let often = self.shared.put_back.load(Acquire);
+            let often = self.rewinds();
             if often != put_back {
                 // time stops elsewhere since
                 let Some(until) = self.timeline().until() else { return true };

@@ -110,8 +110,8 @@ impl Player {
         joined.expect(&checkpoint.joined);
         let mut archive = Archive::reader(&checkpoint.state);
         let absent = &mut |id| joining.absent(id, &checkpoint.joined);
-        let restored = run.follower()?.restore(&mut archive, part.wall, absent).and_then(|()| archive.finish());
-        joined.keep(&checkpoint.joined);
+        let restored = run.follower()?.restore(&mut archive, part.wall, absent);
+        joined.sweep(run.run().agents());
         restored.map_err(|error| error.to_string())
     }
 
@@ -186,8 +186,8 @@ impl Player {
         let Self { run, joining, joined, .. } = self;
         joined.expect(&checkpoint.joined);
         let outcome = read_state(run.run_mut(), checkpoint, joining);
-        joined.keep(&checkpoint.joined);
-        outcome
+        joined.sweep(run.run().agents());
+        outcome.map_err(|error| error.to_string())
     }
 
     fn restore(&mut self, bytes: &[u8]) -> Result<(), String> {

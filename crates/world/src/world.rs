@@ -23,7 +23,10 @@ use metachron_runtime::{
     AgentHandle, AgentState, AgentStats, Agents, Lockstep, Pool, Run, SystemClock, Threads, Timeline, TimelineCommand,
     state_hash, wait_until,
 };
-use std::sync::atomic::{AtomicBool, AtomicU64, Ordering::Relaxed};
+use std::sync::atomic::{
+    AtomicBool, AtomicU64,
+    Ordering::{Acquire, Relaxed},
+};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError, TryLockError};
 use std::time::Duration;
 
@@ -335,6 +338,11 @@ impl World {
         known.ok_or(WorldError::Foreign)
     }
 
+    /// How often it was put back into the state of a checkpoint.
+    pub(super) fn rewinds(&self) -> u64 {
+        self.shared.put_back.load(Acquire)
+    }
+
     pub(super) fn has_stopped(&self) -> bool {
         matches!(*self.state(), State::Stopped { .. })
     }
@@ -352,11 +360,16 @@ impl World {
     /// Does something with a world in lockstep that runs; nothing with one that was stopped.
     fn with_run(&self, entry: impl FnOnce() -> Entry, act: impl FnOnce(&mut dyn Run)) {
         if let State::Running(run) = &mut *self.state() {
-            self.shared.log.note(entry);
-            self.see(run.as_ref());
-            act(run.as_mut());
-            self.see(run.as_ref());
+            self.let_pass(run.as_mut(), entry, act);
         }
+    }
+
+    /// The same for who has the run.
+    pub(super) fn let_pass(&self, run: &mut dyn Run, entry: impl FnOnce() -> Entry, act: impl FnOnce(&mut dyn Run)) {
+        self.shared.log.note(entry);
+        self.see(run);
+        act(run);
+        self.see(run);
     }
 
     /// Notes the time for those that ask while it passes.

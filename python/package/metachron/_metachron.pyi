@@ -374,6 +374,7 @@ class Event:
         "attachment_gave",
         "rate_missed",
         "carved",
+        "rewound",
         "unknown",
     ]: ...
     @property

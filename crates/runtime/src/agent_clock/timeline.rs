@@ -52,6 +52,11 @@ impl Timeline {
         Self { wall: Duration::ZERO, sim: SimTime::ZERO, speed: 1.0, until: None, free_since: None, piece: 0 }
     }
 
+    /// Whether it can be in force: one that was read may be of any numbers.
+    pub fn is_sound(&self) -> bool {
+        (SPEED_RANGE.0..=SPEED_RANGE.1).contains(&self.speed)
+    }
+
     /// The simulated time at wall time `wall`.
     #[must_use]
     pub fn sim_at(&self, wall: Duration) -> SimTime {
