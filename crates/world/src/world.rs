@@ -23,7 +23,7 @@ use metachron_runtime::{
     AgentHandle, AgentState, AgentStats, Agents, Lockstep, Pool, Run, SystemClock, Threads, Timeline, TimelineCommand,
     state_hash, wait_until,
 };
-use std::sync::atomic::{AtomicBool, AtomicU64, Ordering::Relaxed};
+use std::sync::atomic::{AtomicU64, Ordering::Relaxed};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError, TryLockError};
 use std::time::Duration;
 
@@ -54,8 +54,6 @@ pub(super) struct Shared {
     pub identity: SceneIdentity,
     /// The clock of executors in real time.
     pub clock: Arc<SystemClock>,
-    /// Whether its time waits for its objects ([`super::Pace::Free`]).
-    pub is_free: AtomicBool,
     /// How often it was put back into the state of a checkpoint.
     pub put_back: AtomicU64,
     /// What is written down of it, or followed.
@@ -133,7 +131,6 @@ impl World {
             executor,
             identity,
             clock,
-            is_free: AtomicBool::new(false),
             put_back: AtomicU64::new(0),
             log,
         };
