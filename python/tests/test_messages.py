@@ -51,6 +51,8 @@ def test_parts_that_cannot_be_are_named() -> None:
     wrong(lambda: mc.Scene.from_toml(TOML).add("b", mc.Ball(0.1)), "complete")
     with pytest.raises(ValueError, match="expected one of lockstep, threads, pool, auto"):
         scenes.floating().start("gpu")  # type: ignore[arg-type]
+    with pytest.raises(ValueError, match="there is no pace \"slow\"; expected one of real-time, free"):
+        scenes.floating().start("lockstep", "slow")  # type: ignore[arg-type]
     with pytest.raises(TypeError, match="field 'at': expected three numbers"):
         scene().add("a", mc.Ball(0.1, at=[1.0, 2.0]))
     with pytest.raises(TypeError, match="got a dict"):

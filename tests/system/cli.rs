@@ -29,7 +29,7 @@ fn help_teaches_by_examples_and_exit_codes() {
         assert!(out(&help).contains(word), "{word}");
     }
     let help = out(&metachron(&["run", "--help"]));
-    let flags = "--headless --frames --seconds --target-fps --policy --law --executor --size --png --report --frames-csv --seed --oracle \
+    let flags = "--headless --frames --seconds --target-fps --policy --law --executor --pace --size --png --report --frames-csv --seed --oracle \
                  --fail-on --set --json --quiet METACHRON_TARGET_FPS";
     for flag in flags.split_whitespace() {
         assert!(help.contains(flag), "{flag}");
@@ -225,6 +225,9 @@ fn wrong_usage_ends_with_two_and_says_what_is_right() {
         (&["run", "--headless", "--vtk", "a", "--frames-csv", "a/objects.csv"], "the folder of a/objects.csv"),
         (&["run", "--device", "simulated=a", "--device", "simulated=a"], "leads `a` twice"),
         (&["run", "--png", "a.png"], "add --headless"),
+        (&["run", "--pace", "free"], "add --headless"),
+        (&["run", "--pace", "slow"], "real-time"),
+        (&["run", "--headless", "--pace", "free", "--device", "simulated=a"], "leave one of the two out"),
         (&["bench", "agents", "--agents", "0", "--out", "target"], "no case"),
         (&["check"], "SCENE"),
     ] {

@@ -142,6 +142,8 @@ impl Shared {
             age: self.ages().as_ref().map_or_else(Spread::default, |ages| ages.spread()),
             late: gauges.late(),
             misses: gauges.misses.load(Relaxed),
+            lived: span(&gauges.stepped) + span(&gauges.rested),
+            lengthened: gauges.lengthened.load(Relaxed),
             dropped: span(&gauges.dropped),
             rested: span(&gauges.rested),
             state: gauges.state(),
@@ -215,6 +217,19 @@ impl AgentHandle {
     pub fn lived_to(&self) -> SimTime {
         let woken_at = self.live().map_or(0, |shared| shared.gauges.woken_at.load(Relaxed));
         self.latest().moment().max(SimTime::from_nanos(woken_at))
+    }
+
+    /// The simulated time that it has not lived, where time is at `now`: what it dropped, and what it is behind. Zero of one that has failed or
+    /// left.
+    #[must_use]
+    pub fn given_up(&self, now: SimTime) -> SimSpan {
+        let Some(shared) = self.live() else { return SimSpan::ZERO };
+        let dropped = SimSpan::from_nanos(shared.gauges.dropped.load(Relaxed));
+        match shared.gauges.state() {
+            AgentState::Running => dropped + now.since(self.lived_to()),
+            AgentState::Resting => dropped,
+            AgentState::Parked(_) | AgentState::Gone => SimSpan::ZERO,
+        }
     }
 
     /// Its newest state; `None` where it has left.

@@ -2,7 +2,7 @@
 //!
 //! In: agents and a [`Machine`]. Out: a run that is bit-identical every time. Events happen in the order (time, ends before starts,
 //! number): a turn sees the states published when it starts, and its own state is seen when its declared cost has passed, on cores that all
-//! turns and the frame loop share. Never here: a wall clock, except for the CPU time that is reported.
+//! turns and the frame loop share; at the free pace at once. Never here: a wall clock, except for the CPU time that is reported.
 
 mod cores;
 
@@ -127,7 +127,9 @@ impl Lockstep {
     fn next_event(&mut self, limit: Duration) -> Option<Event> {
         self.wake_sleepers();
         let end = self.cores.until_end().map(|span| self.now.saturating_add(span));
-        let due = self.due.peek().map(|&Reverse((due, _))| due);
+        // at the free pace a turn that is due at the end belongs to the time after it, as no turn is in progress there
+        let begins = |due: &Duration| *due < limit || !self.timeline.is_free();
+        let due = self.due.peek().map(|&Reverse((due, _))| due).filter(begins);
         let at = end.into_iter().chain(due).min()?;
         if at > limit {
             return None;
@@ -160,7 +162,8 @@ impl Lockstep {
         let Some(actor) = &mut entry.actor else { return };
         match actor.begin(&self.timeline, self.now) {
             Some(Effort { work, steps }) => {
-                let slower = self.machine.slower(self.now);
+                // at the free pace turns take no time
+                let slower = if self.timeline.is_free() { 0.0 } else { self.machine.slower(self.now) };
                 let price =
                     |model, work| duration(self.machine.step_s(model, work, agent as u64, entry.turns) * slower);
                 self.jobs.clear();
