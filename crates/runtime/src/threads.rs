@@ -162,9 +162,9 @@ impl Threads {
     }
 
     fn end(&mut self) {
-        let homes = self.halt(Halt::End);
+        self.end_turns();
         let (timeline, now) = (self.timeline.read(), self.clock.now());
-        homes.into_iter().flatten().for_each(|mut actor| actor.close_account(&timeline, now));
+        std::mem::take(&mut self.ended_agents).into_values().for_each(|mut actor| actor.close_account(&timeline, now));
         close_remaining(&self.all.handles, &timeline, now);
     }
 }
@@ -247,6 +247,12 @@ impl Run for Threads {
 
     fn record(&mut self, order: Arc<TurnOrder>, begun: Option<&mut Archive<'_>>) -> Result<(), ArchiveError> {
         self.record_between_turns(order, begun)
+    }
+
+    fn end_turns(&mut self) {
+        self.all.sleep.end();
+        let homes = self.halt(Halt::End).into_iter();
+        self.ended_agents = (0..).map(AgentId).zip(homes).filter_map(|(id, home)| Some((id, home?))).collect();
     }
 
     fn shutdown(mut self: Box<Self>) -> Vec<AgentStats> {

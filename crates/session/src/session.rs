@@ -424,7 +424,7 @@ impl Session {
         }
     }
 
-    /// Ends the run.
+    /// Ends the run, and with its last states the recording.
     #[must_use]
     pub fn end(mut self, adapter: Option<String>, interrupted: bool) -> Outcome {
         self.gather();
@@ -434,6 +434,7 @@ impl Session {
         let (scene, policy, law) = (self.scene.name.clone(), self.policy_name(), self.law_name());
         let (wall_s, sim_s) = (self.now().saturating_sub(self.begun).as_secs_f64(), self.sim_now().as_secs_f64());
         let stats = self.world.stop();
+        let unwritten = self.world.end_recording().err().map(|error| Arc::new(error.into()));
         let tolerance = |at: usize| error_control::tolerance_status(&self.error_statuses, AgentId(at as u32));
         let last: Vec<_> = handles.iter().map(AgentHandle::latest).collect();
         let drawn = |at: usize| self.levels.get(at).map(|level| level.resolution);
@@ -467,7 +468,7 @@ impl Session {
             clamp,
             unpriced: self.unpriced,
             interrupted,
-            unwritten: None,
+            unwritten,
         }
     }
 

@@ -237,6 +237,10 @@ impl Run for Player {
         self.run.run_mut().archive(archive, absent)
     }
 
+    fn end_turns(&mut self) {
+        self.run.run_mut().end_turns();
+    }
+
     fn shutdown(self: Box<Self>) -> Vec<AgentStats> {
         match self.run {
             Followed::Lockstep(run) => run.shutdown(),

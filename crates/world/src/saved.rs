@@ -90,8 +90,8 @@ impl World {
         self.see(run.as_ref());
         self.shared.put_back.fetch_add(1, Release);
         let Err(reason) = outcome else { return Ok(()) };
-        let (now, time, timeline) = (run.now(), run.sim_now(), run.timeline());
-        let broken = std::mem::replace(&mut *state, State::Stopped { now, time, timeline });
+        let stopped = State::stopped(run.as_ref(), None);
+        let broken = std::mem::replace(&mut *state, stopped);
         // what it has become is not accounted for
         let _ = catch_unwind(AssertUnwindSafe(|| drop(broken)));
         Err(CheckpointError::Unusable { reason })

@@ -14,7 +14,7 @@ use super::joined::JoinedTable;
 use super::kinds::ExecutorKind;
 use super::log::{Log, Mode, logged};
 use super::object::{Object, WorldTag};
-use super::recording::Entry;
+use super::recording::{Entry, RecordError};
 use super::sensors::Instruments;
 use glam::DVec3;
 use metachron_contact::stepper::ClusterScene;
@@ -71,7 +71,23 @@ impl std::fmt::Debug for World {
 /// What makes agents step, or where its time stood when it ended.
 pub(super) enum State {
     Running(Box<dyn Run>),
-    Stopped { now: Duration, time: SimTime, timeline: Timeline },
+    Stopped(Stopped),
+}
+
+/// Where the time of a world stood when it ended.
+pub(super) struct Stopped {
+    now: Duration,
+    time: SimTime,
+    timeline: Timeline,
+    /// What became of the recording that ended with it, until somebody asks; whether there was one.
+    pub recorded: Option<Result<bool, RecordError>>,
+}
+
+impl State {
+    /// That of a world whose `run` has ended.
+    pub fn stopped(run: &dyn Run, recorded: Option<Result<bool, RecordError>>) -> Self {
+        Self::Stopped(Stopped { now: run.now(), time: run.sim_now(), timeline: run.timeline(), recorded })
+    }
 }
 
 /// What a world has besides its run.
@@ -224,7 +240,7 @@ impl World {
         };
         match &*state {
             State::Running(run) => run.sim_now(),
-            State::Stopped { time, .. } => *time,
+            State::Stopped(stopped) => stopped.time,
         }
     }
 
@@ -251,7 +267,7 @@ impl World {
     pub fn now(&self) -> Duration {
         match &*self.state() {
             State::Running(run) => run.now(),
-            State::Stopped { now, .. } => *now,
+            State::Stopped(stopped) => stopped.now,
         }
     }
 
@@ -275,7 +291,7 @@ impl World {
     pub fn timeline(&self) -> Timeline {
         match &*self.state() {
             State::Running(run) => run.timeline(),
-            State::Stopped { timeline, .. } => *timeline,
+            State::Stopped(stopped) => stopped.timeline,
         }
     }
 
@@ -295,19 +311,18 @@ impl World {
         self.see(run.as_ref());
     }
 
-    /// Ends the run for all clones: waits for the turns in progress (boundedly) and returns the metrics of every agent.
-    /// Latest states stay readable.
+    /// Ends the run for all clones: waits for the turns in progress (boundedly) and returns the metrics of every agent. A recording ends with
+    /// these turns, in the states that are final; [`World::end_recording`] says what became of it. Latest states stay readable.
     pub fn stop(&self) -> Vec<AgentStats> {
-        // who wants to know whether it is complete has ended it before
-        drop(self.end_recording());
         let mut state = self.state();
-        let ended = match &*state {
-            State::Running(run) => State::Stopped { now: run.now(), time: run.sim_now(), timeline: run.timeline() },
-            State::Stopped { .. } => return self.shared.agents.iter().map(AgentHandle::stats).collect(),
+        let State::Running(run) = &mut *state else {
+            return self.shared.agents.iter().map(AgentHandle::stats).collect();
         };
+        run.end_turns();
+        let ended = State::stopped(run.as_ref(), Some(self.close_recording()));
         match std::mem::replace(&mut *state, ended) {
             State::Running(run) => run.shutdown(),
-            State::Stopped { .. } => unreachable!("it ran a moment ago, and the lock is held"),
+            State::Stopped(_) => unreachable!("it ran a moment ago, and the lock is held"),
         }
     }
 
@@ -336,7 +351,7 @@ impl World {
     }
 
     pub(super) fn has_stopped(&self) -> bool {
-        matches!(*self.state(), State::Stopped { .. })
+        matches!(*self.state(), State::Stopped(_))
     }
 
     /// [`Log::in_order`] for who has the run.
