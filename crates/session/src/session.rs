@@ -371,8 +371,8 @@ impl Session {
         self.world.command(self.world.object_of(to)?, Command::Spring(Keyed::first(pull)))
     }
 
-    /// Sets the pressure of what fills an agent, inside minus outside, Pa; one that nothing fills stays as it is. An agent that does not exist
-    /// and a number that is not finite give an error.
+    /// Sets the pressure of what fills an agent, inside minus outside, Pa. An agent that nothing fills or that does not exist and a number that is
+    /// not finite give an error.
     pub fn set_pressure(&self, of: AgentId, pressure_pa: f64) -> Result<(), WorldError> {
         self.world.command(self.world.object_of(of)?, Command::SetPressure(pressure_pa))
     }

@@ -134,7 +134,7 @@ impl Player {
             Entry::Command(to, command) => self.run.run().send(to, command).map_err(|error| error.to_string())?,
             Entry::SetState(id, state) => {
                 let agent = self.run.run().agents().of(id).ok_or_else(|| format!("there is no agent {}", id.0))?;
-                agent.set_state(*state);
+                agent.set_state(*state).map_err(|error| error.to_string())?;
             }
             Entry::Add(name, part) => self.add(name, *part)?,
             Entry::Remove(id) => self.run.run_mut().remove(id).map_err(|error| error.to_string())?,
