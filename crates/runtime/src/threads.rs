@@ -36,6 +36,10 @@ pub const THREADS_MAX: usize = 1000;
 /// pool, 100 cost 10 and 6 (`docs/throughput.md`).
 pub const AUTO_THREADS_MAX: usize = 64;
 
+/// An agent that is behind keeps its core for this long, then yields it: of a thousand threads that have more to do than two cores can, each waits
+/// for tenths of a second then. The system's own slices, milliseconds each, would let it wait for seconds.
+const CATCH_UP_MAX: Duration = Duration::from_micros(20);
+
 /// A thread that gives back its agent when it ends, if it has it.
 type Ended = JoinHandle<Option<Box<AgentRunner>>>;
 
@@ -110,6 +114,7 @@ impl Threads {
             timeline: Arc::clone(&self.timeline),
             batch: CpuBatch::default(),
             order: self.order.clone(),
+            awake: Duration::ZERO,
         };
         let farewell = EndNotice { id: shared.id, ended: self.farewells.clone() };
         let builder = thread::Builder::new().name(name.clone());
@@ -280,6 +285,8 @@ struct AgentThread {
     timeline: Arc<SharedTimeline>,
     batch: CpuBatch,
     order: Option<Arc<TurnOrder>>,
+    /// How long it has made turns since it last slept or yielded its core.
+    awake: Duration,
 }
 
 impl AgentThread {
@@ -355,9 +362,16 @@ impl AgentThread {
         let timeline = self.timeline.read();
         let now = self.clock.now();
         match actor.pace.due(&timeline) {
+            Some(due) if due <= now && self.awake >= CATCH_UP_MAX => {
+                drop(held);
+                thread::yield_now();
+                self.awake = Duration::ZERO;
+                Next::Due
+            }
             Some(due) if due <= now => self.turn(actor, &timeline, now, held),
             Some(due) => {
                 drop(held);
+                self.awake = Duration::ZERO;
                 thread::park_timeout(due - now);
                 Next::Due
             }
@@ -400,6 +414,7 @@ impl AgentThread {
         drop(held);
         let wall = started.elapsed();
         actor.count(wall);
+        self.awake += wall;
         if self.batch.add(wall) {
             self.settle(actor);
         }
