@@ -142,6 +142,10 @@ pub trait Run: Send {
     /// [`SendError::NoAgent`].
     fn remove(&mut self, id: AgentId) -> Result<(), SendError>;
 
+    /// Lets no further turn begin and waits for those in progress (with a timeout): what a recording of the run is to have has happened then. From
+    /// now on commands are refused ([`SendError::Ended`]).
+    fn end_turns(&mut self);
+
     /// Ends the run: waits for the turns in progress (with a timeout) and returns every agent's statistics. Existing handles keep showing
     /// the last states.
     fn shutdown(self: Box<Self>) -> Vec<AgentStats>;

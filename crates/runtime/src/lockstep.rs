@@ -241,6 +241,7 @@ impl Lockstep {
 
     /// Ends all agents, whatever their phase.
     fn end(&mut self) {
+        self.end_turns();
         let actors = self.entries.drain(..).filter_map(|entry| entry.actor);
         actors.for_each(|mut actor| actor.close_account(&self.timeline, self.now));
         close_remaining(&self.all.handles, &self.timeline, self.now);
@@ -397,6 +398,11 @@ impl Run for Lockstep {
     fn remove(&mut self, id: AgentId) -> Result<(), SendError> {
         let home = self.entries.get_mut(id.0 as usize).map(|entry| &mut entry.actor);
         self.all.leave(id, home.unwrap_or(&mut None))
+    }
+
+    /// No turn is in progress between two calls.
+    fn end_turns(&mut self) {
+        self.all.sleep.end();
     }
 
     fn shutdown(mut self: Box<Self>) -> Vec<AgentStats> {

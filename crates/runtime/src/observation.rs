@@ -11,9 +11,8 @@ use super::cluster::Membership;
 use super::handle::{AgentHandle, Shared};
 use super::helpers::Helpers;
 use super::slot::SlotWriter;
-use metachron_contact::Neighbour;
 use metachron_contact::asynchronous::{PairClock, computes};
-use metachron_contact::{Law, acknowledged};
+use metachron_contact::{Input, Law, Neighbour, acknowledged};
 use metachron_core::{AgentId, Archive, ArchiveError, Snapshot, archive_values};
 use metachron_geometry::{CollisionShape, ShapeKind};
 use std::sync::atomic::{
@@ -122,7 +121,7 @@ impl Source {
 impl Shared {
     /// By which it is settled who computes its asynchronous pairs: never what moves as it is led, which nothing that it is given moves.
     fn clock(&self) -> PairClock {
-        let step_s = if self.takes_poses() { f64::INFINITY } else { self.wanted_hz().recip() };
+        let step_s = if self.inputs().has(Input::Pose) { f64::INFINITY } else { self.wanted_hz().recip() };
         PairClock { id: self.id, step_s }
     }
 

@@ -122,8 +122,8 @@ pub fn play_headless(
         unwritten = keep_unwritten(unwritten, write_picture(&mut session, &mut plan))?;
     }
     let adapter = plan.drawing.adapter();
-    let unwritten = unwritten.or(session.end_recording().err().map(SessionError::from));
-    Ok(Outcome { unwritten: unwritten.map(Arc::new), ..session.end(adapter, interrupted) })
+    let outcome = session.end(adapter, interrupted);
+    Ok(Outcome { unwritten: unwritten.map(Arc::new).or(outcome.unwritten), ..outcome })
 }
 
 /// The first file that could not be written: `before`, or the picture. Other errors end the run without an outcome.

@@ -345,8 +345,8 @@ impl Session {
         self.world.command(self.world.object_of(to)?, Command::Spring(Keyed::first(pull)))
     }
 
-    /// Sets the pressure of what fills an agent, inside minus outside, Pa; one that nothing fills stays as it is. An agent that does not exist
-    /// and a number that is not finite give an error.
+    /// Sets the pressure of what fills an agent, inside minus outside, Pa. An agent that nothing fills or that does not exist and a number that is
+    /// not finite give an error.
     pub fn set_pressure(&self, of: AgentId, pressure_pa: f64) -> Result<(), WorldError> {
         self.world.command(self.world.object_of(of)?, Command::SetPressure(pressure_pa))
     }
@@ -398,7 +398,7 @@ impl Session {
         }
     }
 
-    /// Ends the run.
+    /// Ends the run, and with its last states the recording.
     #[must_use]
     pub fn end(mut self, adapter: Option<String>, interrupted: bool) -> Outcome {
         self.gather();
@@ -411,6 +411,7 @@ impl Session {
         let given_up_s: Vec<_> = handles.iter().map(given_up).collect();
         let (wall_s, sim_s) = (self.now().saturating_sub(self.begun).as_secs_f64(), self.sim_now().as_secs_f64());
         let stats = self.world.stop();
+        let unwritten = self.world.end_recording().err().map(|error| Arc::new(error.into()));
         let tolerance = |at: usize| error_control::tolerance_status(&self.error_statuses, AgentId(at as u32));
         let last: Vec<_> = handles.iter().map(AgentHandle::latest).collect();
         let drawn = |at: usize| self.levels.get(at).map(|level| level.resolution);
@@ -450,7 +451,7 @@ impl Session {
             clamp,
             unpriced: self.unpriced,
             interrupted,
-            unwritten: None,
+            unwritten,
         }
     }
 

@@ -134,7 +134,7 @@ impl Player {
             Entry::Command(to, command) => self.run.run().send(to, command).map_err(|error| error.to_string())?,
             Entry::SetState(id, state) => {
                 let agent = self.run.run().agents().of(id).ok_or_else(|| format!("there is no agent {}", id.0))?;
-                agent.set_state(*state);
+                agent.set_state(*state).map_err(|error| error.to_string())?;
             }
             Entry::Add(name, part) => self.add(name, *part)?,
             Entry::Remove(id) => self.run.run_mut().remove(id).map_err(|error| error.to_string())?,
@@ -235,6 +235,10 @@ impl Run for Player {
 
     fn archive(&mut self, archive: &mut Archive<'_>, absent: Absent<'_>) -> Result<(), ArchiveError> {
         self.run.run_mut().archive(archive, absent)
+    }
+
+    fn end_turns(&mut self) {
+        self.run.run_mut().end_turns();
     }
 
     fn shutdown(self: Box<Self>) -> Vec<AgentStats> {
