@@ -3,7 +3,7 @@
 //! In: members, the static solids around them. Out: whose each member's contacts are. Never here: steps, contacts.
 //! Theory: docs/theory/clusters.md, section 9.
 
-use super::{ClusterScene, Participant, Role};
+use super::{ClusterMember, ClusterScene, Participant, Role};
 use metachron_core::AgentId;
 use metachron_geometry::{CollisionShape, ContactTraits, ShapeKind, ShapePose};
 

@@ -9,7 +9,7 @@ use super::domain::{Domain, assign};
 use super::pair_total::total_of;
 use super::progress::Progress;
 use super::search::Search;
-use super::{ClusterReport, ClusterScene, Locked, PairTotal, Participant, Partner};
+use super::{ClusterMember, ClusterReport, ClusterScene, Locked, PairTotal, Participant, Partner};
 use glam::{DMat3, DQuat, DVec3};
 use metachron_core::{AgentId, Archive, ArchiveError, StepError, Wrench, archive_values};
 use metachron_geometry::narrow_phase::StaticSolid;

@@ -6,7 +6,7 @@ use super::arms::Arms;
 use super::memory::Partner;
 use super::search::velocity;
 use super::yielding::SlidingRow;
-use super::{Participant, Progress};
+use super::{ClusterMember, Participant, Progress};
 use crate::cluster::JointRow;
 use glam::DVec3;
 use metachron_core::{AgentId, Grip};
