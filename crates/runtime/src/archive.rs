@@ -20,8 +20,10 @@ use std::time::Duration;
 impl AgentRunner {
     /// Writes or reads it, without the agents that it leads.
     fn archive(&mut self, archive: &mut Archive<'_>) -> Result<(), ArchiveError> {
-        self.agent.archive(archive)?;
-        self.publish_form();
+        self.model.archive(archive)?;
+        if self.model.broken().is_none() {
+            self.publish_form().map_err(|reason| ArchiveError::Refused { what: format!("a model that {reason}") })?;
+        }
         archive_values!(archive, self.pace, self.loads, self.open, self.was_near, self.withheld)?;
         archive_values!(archive, self.announced, self.turn_period)?;
         self.led.archive(archive)?;

@@ -10,6 +10,7 @@ use super::form_slot::FormSlot;
 use super::histogram::Histogram;
 use super::mailbox::{Command, Keyed, Mailbox, SendError};
 use super::metrics::{AgentState, AgentStats, Metrics, Spread};
+use super::model::Traits;
 use super::probe::{Sample, Trace};
 use super::removed_agent::REMOVED;
 use super::ring::{Ring, RingEntry};
@@ -19,7 +20,7 @@ use super::spawn::AgentSpawn;
 use super::streams::{EventStreams, Heard, Rings};
 use super::turns::Turn;
 use metachron_contact::Law;
-use metachron_contact::stepper::ClusterScene;
+use metachron_contact::stepper::{CallMark, ClusterScene};
 use metachron_core::{AgentId, Body, HASH_START, SimSpan, SimTime, Snapshot};
 use metachron_geometry::CollisionShape;
 use std::sync::atomic::Ordering::Relaxed;
@@ -33,6 +34,8 @@ pub(super) struct Shared {
     pub identity: Identity,
     /// The laws of its pairs that are not [`Law::Cluster`], by rising numbers of the peers.
     pub laws: Box<[(AgentId, Law)]>,
+    /// Whether code of its model runs.
+    pub calls: Arc<CallMark>,
     pub gauges: Metrics,
     /// Its contact shape; `None` where nothing can touch it.
     pub form: FormSlot,
@@ -65,16 +68,16 @@ pub(super) struct Identity {
 
 impl Identity {
     /// That of the agent that is to be started, whose name it takes.
-    pub fn of(id: AgentId, spawn: &mut AgentSpawn, is_first: bool) -> Self {
+    pub fn of(id: AgentId, spawn: &mut AgentSpawn, traits: &Traits, is_first: bool) -> Self {
         let is_motored = spawn.scene.joints_of(id).any(|(_, joint)| joint.takes_motor());
         Self {
             name: std::mem::take(&mut spawn.name).into(),
-            model: spawn.agent.model(),
+            model: traits.model,
             wanted_hz: spawn.rate_hz,
             motored: is_motored.then(|| Arc::clone(&spawn.scene)),
-            takes_poses: spawn.agent.takes_poses(),
+            takes_poses: traits.takes_poses,
             is_first,
-            handover: spawn.agent.member().is_some().then(Handover::default),
+            handover: traits.is_member.then(Handover::default),
         }
     }
 }

@@ -53,6 +53,7 @@ mod lockstep;
 mod machine;
 mod mailbox;
 mod metrics;
+mod model;
 mod observation;
 mod pool;
 mod prefetch;

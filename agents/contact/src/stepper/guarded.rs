@@ -185,7 +185,8 @@ fn reject(what: String) {
     resume_unwind(Box::new(BadAnswer(what)));
 }
 
-/// What is wrong with how long the lists of a member are, after a step was begun or ended, and with where its skin is.
+/// What is wrong with the lists of a member, after a step was begun or ended, and with where its skin is. Its matrix is looked through where it
+/// is used.
 fn lengths_fault(member: &dyn ClusterMember) -> Option<String> {
     let (size, free, unanswered) = (member.velocities().len(), member.free().len(), member.unanswered().len());
     if free != size {
@@ -195,6 +196,9 @@ fn lengths_fault(member: &dyn ClusterMember) -> Option<String> {
         return Some(format!(
             "{unanswered} momenta unanswered; expected none or one for each of its {size} velocities"
         ));
+    }
+    if let Some(block) = member.blocks().iter().find(|block| block.row >= size || block.column > block.row) {
+        return Some(format!("block {}, {} of a matrix whose lower half has {size} rows", block.row, block.column));
     }
     let is_finite = |list: &[DVec3]| list.iter().all(|v| v.is_finite());
     if !is_finite(member.velocities()) || !is_finite(member.free()) {

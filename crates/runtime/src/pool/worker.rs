@@ -75,7 +75,7 @@ impl Worker {
     /// Makes turns of `actor` for as long as it is behind, but for [`CATCH_UP_MAX`] at most; returns it if it waits for another one.
     ///
     /// If all agents are behind, the data of one are still in the cache for its second turn, but no longer after the turns of all others.
-    fn catch_up(&mut self, actor: Box<AgentRunner>, timeline: &Timeline) -> Option<Box<AgentRunner>> {
+    fn catch_up(&mut self, mut actor: Box<AgentRunner>, timeline: &Timeline) -> Option<Box<AgentRunner>> {
         let until = self.now + CATCH_UP_MAX;
         actor.fetch();
         let mut waiting = self.turn(actor, timeline);

@@ -1,0 +1,184 @@
+//! What a model of somebody's own does wrong, wherever it does: it is parked and an event says so, all others step on as they would have, and
+//! the world takes checkpoints, goes back, and lets objects join and leave.
+
+mod rogue;
+
+use glam::DVec3;
+use metachron_core::SimSpan;
+use metachron_geometry::Solid;
+use metachron_runtime::AgentState;
+use metachron_world::kinds::ExecutorKind;
+use metachron_world::{Command, Custom, EventFilter, Happening, Pace, Rigid, Scene, Touched, World};
+use rogue::{HALF_M, Kind, Rogue, Switch};
+use std::sync::Arc;
+use std::sync::atomic::Ordering::SeqCst;
+use std::time::{Duration, Instant};
+
+const EXECUTORS: [ExecutorKind; 3] = [ExecutorKind::Lockstep, ExecutorKind::Threads, ExecutorKind::Pool];
+
+/// How often each case is made; `METACHRON_REPEATS` says otherwise.
+fn repeats() -> u32 {
+    std::env::var("METACHRON_REPEATS").ok().and_then(|text| text.parse().ok()).unwrap_or(1)
+}
+
+const fn ms(count: u64) -> SimSpan {
+    SimSpan::from_millis(count)
+}
+
+/// A rogue on a floor that bears a ball and touches a box; far away, out of its reach, a box with a ball on it and a ball that flies. The rogue
+/// leads its cluster, or is led in it.
+fn scene(switch: &Arc<Switch>, leads: bool) -> Scene {
+    let mine = Arc::clone(switch);
+    let rogue = Custom::new(move |_| Box::new(Rogue::new(&mine, DVec3::Z * HALF_M))).rate_hz(250.0);
+    let rider = Rigid::ball(0.05).mass_kg(0.2).at([0.0, 0.0, 0.25]).rate_hz(250.0);
+    let beside = Rigid::cuboid([0.1; 3]).mass_kg(1.0).at([0.2005, 0.0, 0.1]).rate_hz(500.0);
+    let mut scene = Scene::builder().fixed("floor", Solid::Plane);
+    if leads {
+        scene = scene.add("rogue", rogue.clone());
+    }
+    scene = scene.add("rider", rider).add("beside", beside);
+    if !leads {
+        scene = scene.add("rogue", rogue);
+    }
+    let flying = Rigid::ball(0.05).mass_kg(1.0).at([-9.0, 0.0, 5.0]).velocity_m_s([0.5, 0.0, 2.0]);
+    scene
+        .add("far box", Rigid::cuboid([0.1; 3]).mass_kg(1.0).at([9.0, 0.0, 0.1]).rate_hz(500.0))
+        .add("far ball", Rigid::ball(0.05).mass_kg(0.2).at([9.0, 0.0, 0.255]).rate_hz(250.0))
+        .add("flying", flying.rate_hz(200.0))
+        .build()
+        .unwrap()
+}
+
+/// What a case leaves.
+#[derive(Debug, PartialEq, Default)]
+struct Left {
+    /// Steps and hashes of those that touch nothing that touches the rogue.
+    far: Vec<(u64, u64)>,
+    /// The same of those that touch it.
+    near: Vec<(u64, u64)>,
+    is_parked: bool,
+    times: u64,
+}
+
+fn hashes(world: &World, names: &[&str]) -> Vec<(u64, u64)> {
+    let of = |name: &&str| {
+        let state = world.latest(world.object(name).unwrap()).unwrap();
+        (state.steps, state.fold_hash(metachron_core::HASH_START))
+    };
+    names.iter().map(of).collect()
+}
+
+/// Lets it live for so long; whether it has done so within ten seconds: no more than ends a test that hangs.
+fn advance(world: &World, span_ms: u64) -> bool {
+    let begun = Instant::now();
+    world.advance_while(ms(span_ms), || begun.elapsed() < Duration::from_secs(10))
+}
+
+/// Lets the rogue misbehave after 100 ms; what is not as promised is told of.
+fn case(executor: ExecutorKind, kind: Kind, leads: bool, faults: &mut Vec<String>) -> Left {
+    let switch = Arc::<Switch>::default();
+    let world = World::start(&scene(&switch, leads), executor).unwrap();
+    world.set_pace(Pace::Free).unwrap();
+    let name = format!("{kind:?} on {executor:?}, {}", if leads { "leading" } else { "led" });
+    let mut check = |holds: bool, what: &str| {
+        if !holds {
+            faults.push(format!("{name}: {what}"));
+        }
+    };
+    let mut events = world.events(EventFilter::all());
+    check(advance(&world, 100), "its first 100 ms do not end");
+    let [rogue, rider] = world.objects(["rogue", "rider"]).unwrap();
+    let good = world.checkpoint().unwrap();
+    switch.set(kind);
+    match kind {
+        Kind::SetMotion => world.command(rogue, Command::velocity(DVec3::Y, DVec3::ZERO)).unwrap(),
+        Kind::SetState => {
+            let body = world.latest(rogue).unwrap().body.clone();
+            world.set_state(rogue, &body).unwrap();
+        }
+        Kind::Archive | Kind::Form => {
+            let error = world.checkpoint().map(drop);
+            let names_it = error.as_ref().err().is_some_and(|error| error.to_string().contains("rogue"));
+            check(kind == Kind::Form && error.is_ok() || names_it, &format!("the checkpoint says {error:?}"));
+        }
+        _ => {}
+    }
+    if !advance(&world, 100) {
+        faults.push(format!("{name}: the world is lost"));
+        return Left::default();
+    }
+    let mut check = |holds: bool, what: &str| {
+        if !holds {
+            faults.push(format!("{name}: {what}"));
+        }
+    };
+    let at = world.agents().of(rogue.id()).unwrap();
+    let (is_parked, times) = (matches!(at.state(), AgentState::Parked(_)), switch.times.load(SeqCst));
+    let stands = |kind: Kind| matches!(kind, Kind::None | Kind::Sleeps | Kind::Momentum | Kind::Drop);
+    check(is_parked || stands(kind) || times == 0, "it is not parked");
+    check((world.time().as_secs_f64() - 0.2).abs() < 1e-6, &format!("time is {}", world.time().as_secs_f64()));
+    let left = Left {
+        far: hashes(&world, &["far box", "far ball", "flying"]),
+        near: hashes(&world, &["rider", "beside"]),
+        is_parked,
+        times,
+    };
+    let running = |name: &str| world.agents().of(world.object(name).unwrap().id()).unwrap().state();
+    for other in ["rider", "beside", "far box", "far ball", "flying"] {
+        check(!matches!(running(other), AgentState::Parked(_)), &format!("{other} is parked"));
+    }
+    let told: Vec<_> = events.drain().collect();
+    if is_parked {
+        check(told.iter().any(|e| e.object == rogue && e.what == Happening::Failed), "no event says that it is parked");
+    }
+    let touches = world.contacts(rider).unwrap().iter().any(|c| c.with == Touched::Object(rogue));
+    check(is_parked || touches, "its rider does not touch it any more, and nothing says so");
+    // the world goes on
+    if kind != Kind::Archive || is_parked {
+        check(world.checkpoint().is_ok(), &format!("no checkpoint afterwards: {:?}", world.checkpoint().err()));
+    }
+    let added = world.add("new", Rigid::ball(0.05).at([0.0, 3.0, 1.0]));
+    check(added.is_ok(), "nothing can be added");
+    check(advance(&world, 20), "20 ms do not end");
+    check(world.remove(world.object("new").unwrap()).is_ok(), "nothing can be removed");
+    switch.set(if kind == Kind::Drop { kind } else { Kind::None });
+    let back = world.restore(&good);
+    check(back.is_ok(), &format!("it cannot be put back: {:?}", back.err()));
+    check(advance(&world, 20), "20 ms do not end");
+    check(at.state() == AgentState::Running, &format!("put back, it is {:?}", at.state()));
+    let gone = world.remove(rogue);
+    check(gone.is_ok(), &format!("it cannot be removed: {:?}", gone.err()));
+    check(advance(&world, 20), "20 ms do not end");
+    world.stop();
+    left
+}
+
+#[test]
+fn one_that_misbehaves_is_parked_and_all_others_step_as_without_it() {
+    let mut faults = Vec::new();
+    for executor in EXECUTORS {
+        for leads in [true, false] {
+            let [clean, refuses] = [Kind::None, Kind::Diverges].map(|kind| case(executor, kind, leads, &mut faults));
+            for kind in Kind::ALL {
+                for _ in 0..repeats() {
+                    let left = case(executor, kind, leads, &mut faults);
+                    let name = format!("{kind:?} on {executor:?}, leads {leads}");
+                    if left.far != clean.far {
+                        faults.push(format!("{name}: far away {:?} instead of {:?}", left.far, clean.far));
+                    }
+                    // in virtual time those that touch it step as if it had refused the step at its start, but where it fails at its end
+                    // or later
+                    let wanted = if left.is_parked { &refuses.near } else { &clean.near };
+                    let at_end = matches!(
+                        kind,
+                        Kind::GoBack | Kind::Snapshot | Kind::NanBody | Kind::NanEnergy | Kind::NanBounds | Kind::Calm
+                    );
+                    if executor == ExecutorKind::Lockstep && !at_end && left.near != *wanted {
+                        faults.push(format!("{name}: near {:?} instead of {wanted:?}", left.near));
+                    }
+                }
+            }
+        }
+    }
+    assert!(faults.is_empty(), "{} faults:\n{}", faults.len(), faults.join("\n"));
+}
