@@ -143,7 +143,7 @@ impl AgentRunner {
 
     /// Whether the agent is parked.
     pub fn is_parked(&self) -> bool {
-        !self.shared.gauges.is_running() && !self.shared.gauges.is_resting()
+        self.shared.gauges.has_ended()
     }
 
     /// Publishes the initial state of the agent, or parks it.

@@ -32,6 +32,8 @@ pub enum EventKind {
     Rests,
     /// It moves again after a rest.
     Wakes,
+    /// Its step has lasted too long, and is not at its end ([`crate::AgentState::Stalled`]).
+    Stalled,
     /// It failed and stands still from now on ([`crate::AgentState`] has the reason).
     Parked,
     /// It has left the run.
@@ -91,6 +93,7 @@ fn words(event: &AgentEvent) -> [u64; WORDS] {
         EventKind::ContactGrew(contact) => (9, Some(contact)),
         EventKind::Gone => (10, None),
         EventKind::RateMissed => (8, None),
+        EventKind::Stalled => (12, None),
         EventKind::Carved(Removed { cells, triangles, mass_kg, momentum }) => {
             words[1] = 11 | u64::from(cells) << 32;
             words[2] = u64::from(triangles.cast_unsigned());
@@ -129,6 +132,7 @@ fn event(words: &[u64; WORDS]) -> Option<AgentEvent> {
         8 => EventKind::RateMissed,
         9 => EventKind::ContactGrew(contact),
         10 => EventKind::Gone,
+        12 => EventKind::Stalled,
         11 => EventKind::Carved(Removed {
             cells: id,
             triangles: (words[2] as u32).cast_signed(),
@@ -159,6 +163,7 @@ mod tests {
             EventKind::AttachmentGave,
             EventKind::RateMissed,
             EventKind::Gone,
+            EventKind::Stalled,
             EventKind::Carved(Removed { cells: 10, triangles: -24, mass_kg: 0.25, momentum: DVec3::NEG_Y }),
         ]
     }

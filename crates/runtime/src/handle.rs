@@ -5,7 +5,7 @@
 use super::agent_record::{AgentRecord, Live};
 use super::agent_runner::AgentRunner;
 use super::cluster::Handover;
-use super::events::AgentEvent;
+use super::events::{AgentEvent, EventKind};
 use super::form_slot::FormSlot;
 use super::histogram::Histogram;
 use super::mailbox::{Command, Keyed, Mailbox, SendError};
@@ -35,7 +35,7 @@ pub(super) struct Shared {
     /// The laws of its pairs that are not [`Law::Cluster`], by rising numbers of the peers.
     pub laws: Box<[(AgentId, Law)]>,
     /// Whether code of its model runs.
-    pub calls: Arc<CallMark>,
+    pub calls: CallMark,
     pub gauges: Metrics,
     /// Its contact shape; `None` where nothing can touch it.
     pub form: FormSlot,
@@ -284,6 +284,19 @@ impl AgentHandle {
         self.live().map_or(AgentState::Gone, |shared| shared.gauges.state())
     }
 
+    /// How long its turn has lasted, wall time; zero where it is not stalled ([`AgentState::Stalled`]).
+    #[must_use]
+    pub fn stalled_for(&self) -> Duration {
+        let live = self.live();
+        let stalled = live.filter(|shared| shared.gauges.is_stalled());
+        stalled.map_or(Duration::ZERO, |shared| shared.gauges.stalled_for())
+    }
+
+    /// The length of its steps, nanoseconds.
+    pub(super) fn dt_ns(&self) -> u64 {
+        self.live().map_or(0, |shared| shared.gauges.dt.load(Relaxed))
+    }
+
     /// Sends a command to the agent; it obeys at its next turn, and wakes for it.
     ///
     /// # Errors
@@ -322,13 +335,22 @@ impl AgentHandle {
     /// Begins to keep its events for a reader.
     #[must_use]
     pub fn listen(&self) -> Heard {
-        self.listen_to(|rings| &rings.events)
+        let stalls = self.live().map_or(0, |shared| shared.gauges.stalls.load(Relaxed));
+        let mut heard = self.listen_to(|rings| &rings.events);
+        heard.stalls = stalls;
+        heard
     }
 
     /// Passes its events that a reader has not heard on to `take`; returns how many were lost: an agent keeps the newest
     /// [`crate::EVENTS_KEPT`].
-    pub fn hear_events(&self, heard: &mut Heard, take: impl FnMut(AgentEvent)) -> u64 {
-        self.hear(heard, |rings| &rings.events, take)
+    pub fn hear_events(&self, heard: &mut Heard, mut take: impl FnMut(AgentEvent)) -> u64 {
+        let lost = self.hear(heard, |rings| &rings.events, &mut take);
+        let stalls = self.live().map_or(heard.stalls, |shared| shared.gauges.stalls.load(Relaxed));
+        for _ in heard.stalls..stalls {
+            take(AgentEvent { at: self.latest().time, kind: EventKind::Stalled });
+        }
+        heard.stalls = stalls;
+        lost
     }
 
     /// Begins to keep its turns for a reader.

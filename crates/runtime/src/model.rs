@@ -4,6 +4,7 @@
 //! runs is marked, so that others can see whose code that is ([`CallMark`]). Never here: what becomes of the agent.
 
 use super::agent_runner::contained;
+use super::handle::Shared;
 use metachron_contact::Agent;
 use metachron_contact::StepContext;
 use metachron_contact::stepper::{CallMark, GuardedMember};
@@ -17,9 +18,10 @@ use std::sync::Arc;
 /// A model, with what is known of its code.
 pub(super) struct Model {
     agent: Box<dyn Agent>,
-    mark: Arc<CallMark>,
+    /// Has the mark of its calls.
+    shared: Arc<Shared>,
     /// Why it is not called any more.
-    broken: Option<String>,
+    broken: Option<Box<str>>,
 }
 
 /// What a model says of itself once, at the start.
@@ -47,10 +49,10 @@ impl Traits {
 }
 
 impl Model {
-    /// `agent`, whose calls `mark` marks from now on.
-    pub fn new(agent: Box<dyn Agent>, mark: Arc<CallMark>) -> Self {
-        let broken = mark.is_running().then(|| "panicked when it was asked what it is".to_owned());
-        Self { agent, mark, broken }
+    /// The model of the agent that `shared` is of.
+    pub fn new(agent: Box<dyn Agent>, shared: Arc<Shared>) -> Self {
+        let broken = shared.calls.is_running().then(|| "panicked when it was asked what it is".into());
+        Self { agent, shared, broken }
     }
 
     /// Calls it.
@@ -58,11 +60,12 @@ impl Model {
     /// # Errors
     /// Why it is called no more: for a panic, in this call or before.
     pub fn call<T>(&mut self, call: impl FnOnce(&mut dyn Agent) -> T) -> Result<T, String> {
-        let Self { agent, mark, broken } = self;
+        let Self { agent, shared, broken } = self;
         if let Some(reason) = broken {
-            return Err(reason.clone());
+            return Err(reason.to_string());
         }
-        contained(|| Ok(mark.during(|| call(&mut **agent)))).inspect_err(|reason| *broken = Some(reason.clone()))
+        contained(|| Ok(shared.calls.during(|| call(&mut **agent))))
+            .inspect_err(|reason| *broken = Some(reason.as_str().into()))
     }
 
     /// Reads a word of it ([`super::prefetch`]).
@@ -76,13 +79,14 @@ impl Model {
     /// # Errors
     /// As [`Self::call`].
     pub fn member(&mut self) -> Result<Option<GuardedMember<'_>>, String> {
-        let Self { agent, mark, broken } = self;
+        let Self { agent, shared, broken } = self;
         if let Some(reason) = broken {
-            return Err(reason.clone());
+            return Err(reason.to_string());
         }
+        let mark = &shared.calls;
         mark.take_refused();
-        let member =
-            contained(|| Ok(mark.during(|| agent.member()))).inspect_err(|reason| *broken = Some(reason.clone()))?;
+        let member = contained(|| Ok(mark.during(|| agent.member())))
+            .inspect_err(|reason| *broken = Some(reason.as_str().into()))?;
         Ok(member.map(|member| GuardedMember::new(member, mark)))
     }
 
@@ -103,15 +107,15 @@ impl Model {
         if self.broken.is_some() {
             return Ok(());
         }
-        self.mark.clear();
+        self.shared.calls.clear();
         let refused = |reason: String| ArchiveError::Refused { what: format!("a model that {reason}") };
         self.call(|agent| agent.archive(archive)).map_err(refused)?
     }
 
     /// Notes that a step unwound for `reason`, where it did so in code of this model.
     pub fn note_unwound(&mut self, reason: &str) {
-        if self.broken.is_none() && self.mark.is_running() {
-            self.broken = Some(reason.to_owned());
+        if self.broken.is_none() && self.shared.calls.is_running() {
+            self.broken = Some(reason.into());
         }
     }
 
@@ -122,7 +126,7 @@ impl Model {
 
     /// Whether it has refused the step that was made last.
     pub fn take_refused(&self) -> bool {
-        self.mark.take_refused()
+        self.shared.calls.take_refused()
     }
 }
 

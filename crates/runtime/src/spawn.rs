@@ -13,8 +13,8 @@ use super::form_slot::FormSlot;
 use super::governor::Governor;
 use super::handle::{AgentHandle, Identity, Shared};
 use super::helpers::Helpers;
-use super::mailbox::{Mailbox, SendError};
-use super::metrics::{AgentState, Metrics, MetricsWriter};
+use super::mailbox::Mailbox;
+use super::metrics::{Metrics, MetricsWriter};
 use super::model::{Model, Traits};
 use super::observation::{BroadPhaseSlot, Peers};
 use super::probe::{Trace, WatchedPoint};
@@ -194,35 +194,6 @@ impl RunAgents {
         self.peers.is_ordered.store(true, Relaxed);
     }
 
-    /// Takes an agent out: at its next turn, or at once where it makes no more. `home` has its runner where that makes turns of its own, or none any
-    /// more.
-    ///
-    /// # Errors
-    /// [`SendError::NoAgent`].
-    pub fn leave(&self, id: AgentId, home: &mut Option<Box<AgentRunner>>) -> Result<(), SendError> {
-        let agent = self.handles.of(id).ok_or(SendError::NoAgent(id))?;
-        match agent.state() {
-            AgentState::Gone => return Ok(()),
-            AgentState::Running | AgentState::Resting => {
-                agent.leave();
-                return Ok(());
-            }
-            AgentState::Parked(_) => {}
-        }
-        if let Some(mut runner) = home.take() {
-            runner.take_out();
-            *home = runner.kept();
-            return Ok(());
-        }
-        // it is in a step that does not end
-        if let Some(broad_phase) = self.peers.broad_phase.get() {
-            broad_phase.publish_nowhere(id, agent.latest().moment());
-        }
-        agent.live().into_iter().for_each(|shared| shared.gauges.leave());
-        agent.record.set_left(true);
-        Ok(())
-    }
-
     /// Takes up an agent that begins at `now`, under the next number; agents join one at a time. It has published its first state.
     ///
     /// # Errors
@@ -389,7 +360,7 @@ fn shared(
     writer: &SlotWriter<Snapshot>,
     is_first: bool,
 ) -> Shared {
-    let calls = Arc::<CallMark>::default();
+    let calls = CallMark::default();
     let traits = Traits::of(&mut *spawn.agent, &calls);
     Shared {
         id,
@@ -430,7 +401,7 @@ fn actor(shared: Arc<Shared>, parts: Seated, peers: &Arc<Peers>) -> AgentRunner 
     let cluster = is_member.then(|| Box::new(ClusterSeat::new(spawn.scene, jointed, asynchronous)));
     // within a cluster there are no messages to lose, and no clock of its own to disturb
     let faults = if !is_member || asynchronous { spawn.faults } else { Faults::default() };
-    let model = Model::new(spawn.agent, Arc::clone(&shared.calls));
+    let model = Model::new(spawn.agent, Arc::clone(&shared));
     AgentRunner {
         shared,
         peers: Arc::clone(peers),

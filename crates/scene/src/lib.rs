@@ -44,6 +44,11 @@ use metachron_contact::cluster::DEPTH_DEFAULT_M;
 use metachron_contact::stepper::DEPTH_RANGE_M;
 use metachron_world::Scene;
 use metachron_world::kinds::ExecutorKind;
+use std::ops::RangeInclusive;
+use std::time::Duration;
+
+/// The least and the most time that a turn may be given, seconds.
+const STALL_RANGE_S: RangeInclusive<f64> = 0.001..=3600.0;
 
 /// The only version of the format.
 const FORMAT: i64 = 1;
@@ -133,12 +138,17 @@ fn assemble(c: &mut Checker<'_, '_>, source: &Source, file: SceneFile, gravity: 
         let range = allowed(DEPTH_RANGE_M, "m");
         c.number(&Place::new("world", "of `[world]`"), "contact_depth_m", depth_m, &range)
     });
+    let stall_limit = file.stall_s.map(|stall_s| {
+        let range = allowed(STALL_RANGE_S, "s");
+        Duration::from_secs_f64(c.number(&Place::new("", ""), "stall_s", stall_s, &range))
+    });
     let environment = file.world.as_ref().and_then(|world| world.environment).unwrap_or_default();
     Scene {
         name: source.name().to_owned(),
         description: file.description.unwrap_or_default(),
         executor: file.executor.unwrap_or_default(),
         priority: file.priority.unwrap_or_default(),
+        stall_limit,
         states: file.states.unwrap_or_default(),
         environment,
         gravity,

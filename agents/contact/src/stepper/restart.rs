@@ -4,7 +4,7 @@
 //! why it begins anew, the storage of the stepper, which the next step overwrites.
 
 use super::{ClusterMember, ClusterStepper, ContactMemory, Participant};
-use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
 
 impl ClusterStepper {
     /// Keeps what a macro step starts from.
@@ -15,6 +15,15 @@ impl ClusterStepper {
             kept.clone_from(one.memory);
         }
         self.is_kept = true;
+    }
+
+    /// As [`Self::go_back`], for all where one of them unwinds, too.
+    pub(super) fn go_back_all(&mut self, all: &mut [Participant<'_>]) {
+        let gone_back = catch_unwind(AssertUnwindSafe(|| self.go_back(all)));
+        gone_back.unwrap_or_else(|panic| {
+            self.put_back(all);
+            resume_unwind(panic)
+        });
     }
 
     /// Puts all back to the start of the macro step but those whose code has unwound, from wherever in it that came. Until all are kept none has

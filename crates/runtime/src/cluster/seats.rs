@@ -135,6 +135,7 @@ impl Led {
     pub fn release_parked(&mut self) {
         self.seats.extract_if(.., |seat| seat.actor.is_parked()).for_each(|mut seat| {
             if seat.actor.shared.gauges.has_left() {
+                seat.actor.vanish();
                 seat.actor.forget();
             }
             seat.actor.return_turns();

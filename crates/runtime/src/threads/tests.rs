@@ -30,6 +30,6 @@ fn threads_of_those_that_have_left_are_joined() {
 #[test]
 fn threads_carry_the_names_of_their_agents() {
     let run = Threads::start(vec![Dummy::new(1.0).at(60.0)], Arc::new(SystemClock::new()), Priority::Normal).unwrap();
-    let names: Vec<_> = run.threads.values().filter_map(|t| t.thread().name()).collect();
+    let names: Vec<_> = run.threads.values().filter_map(|t| t.thread.thread().name()).collect();
     assert_eq!(names, ["agent:dummy at 60"]);
 }

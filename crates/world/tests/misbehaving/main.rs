@@ -2,6 +2,7 @@
 //! the world takes checkpoints, goes back, and lets objects join and leave.
 
 mod rogue;
+mod stalls;
 
 use glam::DVec3;
 use metachron_core::SimSpan;
@@ -52,18 +53,18 @@ fn scene(switch: &Arc<Switch>, leads: bool) -> Scene {
 /// What a case leaves.
 #[derive(Debug, PartialEq, Default)]
 struct Left {
-    /// Steps and hashes of those that touch nothing that touches the rogue.
-    far: Vec<(u64, u64)>,
+    /// Steps, times and hashes of those that touch nothing that touches the rogue.
+    far: Vec<(u64, u64, u64)>,
     /// The same of those that touch it.
-    near: Vec<(u64, u64)>,
+    near: Vec<(u64, u64, u64)>,
     is_parked: bool,
     times: u64,
 }
 
-fn hashes(world: &World, names: &[&str]) -> Vec<(u64, u64)> {
+fn hashes(world: &World, names: &[&str]) -> Vec<(u64, u64, u64)> {
     let of = |name: &&str| {
         let state = world.latest(world.object(name).unwrap()).unwrap();
-        (state.steps, state.fold_hash(metachron_core::HASH_START))
+        (state.steps, state.time.as_nanos(), state.fold_hash(metachron_core::HASH_START))
     };
     names.iter().map(of).collect()
 }

@@ -63,6 +63,8 @@ pub enum Kind {
     NanBounds,
     /// Its step does not end before it behaves again.
     Sleeps,
+    /// Its step does not end before it is told otherwise.
+    Hangs,
 }
 
 impl Kind {
@@ -255,6 +257,9 @@ impl ClusterMember for Rogue {
         if self.switch.is(Kind::Sleeps) {
             std::thread::sleep(Duration::from_millis(700));
             self.switch.set(Kind::None);
+        }
+        while self.switch.is(Kind::Hangs) {
+            std::thread::sleep(Duration::from_millis(1));
         }
         self.body.begin(h_s)?;
         let (free, nan) = (self.body.free().to_vec(), DVec3::NAN);
