@@ -368,6 +368,7 @@ class Event:
         "rests",
         "wakes",
         "failed",
+        "stalled",
         "gone",
         "joined",
         "left",
