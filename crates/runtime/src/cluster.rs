@@ -408,7 +408,10 @@ impl AgentRunner {
     /// Stops all that step with it: they rest.
     pub fn rest_members(&mut self) {
         self.each_member(|actor| {
-            let rested = contained(|| Ok(actor.model.member()?.into_iter().for_each(|mut member| member.rest())));
+            let rested = contained(|| {
+                actor.model.member()?.into_iter().for_each(|mut member| member.rest());
+                Ok(())
+            });
             // it is parked where its state is written
             rested.unwrap_or_else(|reason| actor.model.note_unwound(&reason));
             actor.cluster.iter_mut().for_each(|seat| seat.drift_m = 0.0);

@@ -105,6 +105,12 @@ fn gravity(c: &mut Checker<'_, '_>, world: Option<&WorldFile>) -> DVec3 {
     given.map_or(GRAVITY_DEFAULT, |g| c.point(&place, "gravity_m_s2", g, GRAVITY_MAX))
 }
 
+/// How long a turn may last.
+fn stall_limit(c: &mut Checker<'_, '_>, stall_s: Option<f64>) -> Option<Duration> {
+    let given_s = c.optional(&Place::new("", ""), "stall_s", stall_s, &allowed(STALL_RANGE_S, "s"))?;
+    Some(Duration::from_secs_f64(given_s))
+}
+
 fn assemble(c: &mut Checker<'_, '_>, source: &Source, file: SceneFile, gravity: DVec3, mut objects: Objects) -> Scene {
     if file.format != FORMAT {
         let what = format!("is {}, which this version does not support", file.format);
@@ -138,17 +144,13 @@ fn assemble(c: &mut Checker<'_, '_>, source: &Source, file: SceneFile, gravity: 
         let range = allowed(DEPTH_RANGE_M, "m");
         c.number(&Place::new("world", "of `[world]`"), "contact_depth_m", depth_m, &range)
     });
-    let stall_limit = file.stall_s.map(|stall_s| {
-        let range = allowed(STALL_RANGE_S, "s");
-        Duration::from_secs_f64(c.number(&Place::new("", ""), "stall_s", stall_s, &range))
-    });
     let environment = file.world.as_ref().and_then(|world| world.environment).unwrap_or_default();
     Scene {
         name: source.name().to_owned(),
         description: file.description.unwrap_or_default(),
         executor: file.executor.unwrap_or_default(),
         priority: file.priority.unwrap_or_default(),
-        stall_limit,
+        stall_limit: stall_limit(c, file.stall_s),
         states: file.states.unwrap_or_default(),
         environment,
         gravity,

@@ -405,3 +405,22 @@ impl ClusterMember for GuardedMember<'_> {
         self.ask(|m| m.work(), number_fault("a work"))
     }
 }
+
+#[cfg(test)]
+mod tests {
+    /// The names of the methods in the block of `text` that begins with `head`.
+    fn methods(text: &str, head: &str) -> Vec<String> {
+        let block = text.split(head).nth(1).and_then(|rest| rest.split("\n}\n").next()).unwrap();
+        let heads = block.lines().filter_map(|line| line.strip_prefix("    fn "));
+        let mut names: Vec<_> = heads.map(|head| head.split(['(', '<']).next().unwrap().to_owned()).collect();
+        names.sort_unstable();
+        names
+    }
+
+    #[test]
+    fn every_method_of_a_member_is_passed_on() {
+        let wanted = methods(include_str!("member.rs"), "pub trait ClusterMember");
+        assert!(wanted.len() > 30, "{wanted:?}");
+        assert_eq!(methods(include_str!("guarded.rs"), "impl ClusterMember for GuardedMember"), wanted);
+    }
+}

@@ -124,17 +124,22 @@ impl AgentRunner {
         if let Some(doubling) = doubling {
             self.note_errors(doubling, dt);
         }
-        let Made { report, extra } = made?;
+        let made = made?;
+        let report = self.note_made(stepper, (plan, dt), &made);
+        Ok(StepOutcome { report: StepReport { at_rest: concluded.unwrap_or(false), ..report }, dt })
+    }
+
+    /// Notes what a macro step was that has been made.
+    fn note_made(&mut self, stepper: Box<ClusterStepper>, (plan, dt): (Plan, SimSpan), made: &Made) -> StepReport {
+        let Made { report, extra } = made;
         self.note_pairs(&stepper, dt);
         self.note_events(&stepper, dt);
-        self.note_solves(&report, plan, dt);
-        self.note_groups(time + dt);
+        self.note_solves(report, plan, dt);
+        self.note_groups(self.pace.time() + dt);
         if let Some(seat) = &mut self.cluster {
             seat.stepper = Some(stepper);
         }
-        let at_rest = concluded.unwrap_or(false);
-        let report = StepReport { work: report.work + extra, substeps: report.fine_steps, at_rest };
-        Ok(StepOutcome { report, dt })
+        StepReport { work: report.work + extra, substeps: report.fine_steps, at_rest: false }
     }
 
     /// What it brings into a step from a time on, of which it makes so many parts, and its asynchronous pairs.
