@@ -196,9 +196,12 @@ fn one_that_misbehaves_is_parked_and_all_others_step_as_without_it() {
                 for _ in 0..repeats() {
                     let left = case(executor, kind, leads, &mut faults);
                     let name = format!("{kind:?} on {executor:?}, leads {leads}");
-                    // in real time who is of one cluster may differ now and then, and rounding with it
+                    // in real time who is of one cluster may differ now and then, how long its steps are and how they round with it; nobody
+                    // is faster than 4 m/s
                     let is_on_path = |(path, seen): (&Seen, &Seen)| {
-                        path.time_ns == seen.time_ns && (path.position - seen.position).length() < 1e-4
+                        let apart_s = path.time_ns.abs_diff(seen.time_ns) as f64 * 1e-9;
+                        let allowed_m = 1e-4 + 4.0 * apart_s;
+                        apart_s <= 0.0025 && (path.position - seen.position).length() < allowed_m
                     };
                     let holds = |at: usize| paths.iter().any(|path| is_on_path((&path[at], &left.far[at])));
                     let holds_all = match executor {
