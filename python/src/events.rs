@@ -94,6 +94,7 @@ fn kind(what: &Happening) -> &'static str {
         Happening::Contact(_) => "contact_ended",
         Happening::Rests => "rests",
         Happening::Wakes => "wakes",
+        Happening::Stalled => "stalled",
         Happening::Failed => "failed",
         Happening::Gone => "gone",
         Happening::Joined(_) => "joined",

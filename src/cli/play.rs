@@ -286,13 +286,14 @@ fn agent(scene: &Scene, agent: &AgentOutcome) -> AgentReport {
     let stats = &agent.stats;
     let parked_reason = match &stats.state {
         AgentState::Parked(reason) => Some(reason.clone()),
-        AgentState::Running | AgentState::Resting | AgentState::Gone => None,
+        AgentState::Running | AgentState::Stalled | AgentState::Resting | AgentState::Gone => None,
     };
     AgentReport {
         name: stats.name.to_string(),
         model: stats.model.to_owned(),
         state: match &stats.state {
             AgentState::Running => "running",
+            AgentState::Stalled => "stalled",
             AgentState::Resting => "resting",
             AgentState::Parked(_) => "parked",
             AgentState::Gone => "gone",

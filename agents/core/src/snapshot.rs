@@ -118,6 +118,8 @@ impl Snapshot {
             && self.grips.iter().all(|grip| grip.force_n.is_finite())
             && self.given.iter().all(Ledger::is_finite)
             && self.local_model.is_finite()
+            && [self.energy_j, self.residual_m, self.drift_m].iter().all(|x| x.is_finite())
+            && self.bounds.is_none_or(|b| b.low.is_finite() && b.high.is_finite() && b.speed_m_s.is_finite())
     }
 
     /// Folds every bit of the state into `hash` (FNV-1a, 64 bits): equal hashes mean bit-identical runs.

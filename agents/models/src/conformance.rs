@@ -211,8 +211,16 @@ impl Cluster {
     fn step(&mut self, agent: &mut dyn Agent, dt: SimSpan, context: StepContext<'_>) -> Result<(), StepError> {
         let Self { scene, stepper, memory, grips } = self;
         let Some(member) = agent.member() else { return Ok(()) };
-        let mut all =
-            [Participant { id: ME, member, context, laws: &[], memory, parts: 1, alone_s: dt.as_secs_f64(), grips }];
+        let mut all = [Participant {
+            id: ME,
+            member: member.into(),
+            context,
+            laws: &[],
+            memory,
+            parts: 1,
+            alone_s: dt.as_secs_f64(),
+            grips,
+        }];
         stepper.step(scene, &mut all, dt, &PlainLoop).map(drop)
     }
 }

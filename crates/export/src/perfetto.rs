@@ -217,6 +217,7 @@ impl PerfettoFile {
             }
             Happening::Rests => ("rests", None),
             Happening::Wakes => ("wakes", None),
+            Happening::Stalled => ("stalled", None),
             Happening::Failed => ("failed", None),
             Happening::Gone => ("gone", None),
             Happening::Joined(leader) => ("joins the cluster", of(leader)),

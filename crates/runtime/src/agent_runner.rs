@@ -17,10 +17,12 @@ use super::handle::Shared;
 use super::helpers::Helped;
 use super::loads::Loads;
 use super::metrics::{MetricsWriter, SMOOTHING};
+use super::model::Model;
 use super::observation::{Observer, Peers};
 use super::slot::SlotWriter;
 use super::turns::Took;
-use metachron_contact::{Agent, Carving, Link};
+use metachron_contact::stepper::BadAnswer;
+use metachron_contact::{Carving, Link};
 use metachron_core::{AgentId, Resolution, ResolutionRange, SimSpan, SimTime, Snapshot, StepReport};
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::Arc;
@@ -31,7 +33,7 @@ use std::time::Duration;
 pub(super) struct AgentRunner {
     pub shared: Arc<Shared>,
     pub peers: Arc<Peers>,
-    pub agent: Box<dyn Agent>,
+    pub model: Model,
     pub pace: AgentClock,
     pub dt_range: (SimSpan, SimSpan),
     pub range: Option<ResolutionRange>,
@@ -141,7 +143,7 @@ impl AgentRunner {
 
     /// Whether the agent is parked.
     pub fn is_parked(&self) -> bool {
-        !self.shared.gauges.is_running() && !self.shared.gauges.is_resting()
+        self.shared.gauges.has_ended()
     }
 
     /// Publishes the initial state of the agent, or parks it.
@@ -282,8 +284,9 @@ impl AgentRunner {
     }
 
     /// Its resolution, if a governor needs it.
-    pub fn resolution(&self) -> Option<Resolution> {
-        self.governor.as_ref().and_then(|_| self.agent.resolution())
+    pub fn resolution(&mut self) -> Option<Resolution> {
+        self.governor.as_ref()?;
+        self.model.call(|agent| agent.resolution()).ok().flatten()
     }
 
     /// The error estimates of the state that was written last, metres: in all, and the part caused by its time steps.
@@ -301,8 +304,11 @@ impl AgentRunner {
             self.vanish();
             return Err(GONE.to_owned());
         }
+        if let Some(broken) = self.model.broken() {
+            return Err(broken.to_owned());
+        }
         if let Some(wanted) = pending.set_resolution {
-            self.set_resolution(wanted);
+            self.set_resolution(wanted)?;
         }
         if let Some(dt) = pending.dt {
             self.set_dt(dt);
@@ -311,26 +317,29 @@ impl AgentRunner {
             self.loads.get_or_insert_default().take(&mut pending, self.pace.time());
         }
         if let Some(pressure_pa) = pending.pressure_pa {
-            self.agent.set_pressure_pa(pressure_pa);
+            self.model.call(|agent| agent.set_pressure_pa(pressure_pa))?;
         }
-        self.carve(&pending.carvings);
-        let state = pending.state.as_ref().is_some_and(|state| self.agent.set_state(state).is_ok());
-        let moved = pending.motion.is_some_and(|motion| self.agent.set_motion(&motion));
+        self.carve(&pending.carvings)?;
+        let mut moved = false;
+        if let Some(state) = &pending.state {
+            moved = self.model.call(|agent| agent.set_state(state))?.is_ok();
+        }
+        if let Some(motion) = &pending.motion {
+            moved |= self.model.call(|agent| agent.set_motion(motion))?;
+        }
         // others find it where it is now
-        if state || moved { self.write_snapshot(self.pace.time(), false) } else { Ok(()) }
+        if moved { self.write_snapshot(self.pace.time(), false) } else { Ok(()) }
     }
 
     /// Removes the cells in some regions; others touch and see it without them from now on.
-    fn carve(&mut self, carvings: &[Carving]) {
+    fn carve(&mut self, carvings: &[Carving]) -> Result<(), String> {
         for carving in carvings {
-            if let Some(removed) = self.agent.carve(carving) {
+            if let Some(removed) = self.model.call(|agent| agent.carve(carving))? {
                 self.carved = true;
                 self.tell(EventKind::Carved(removed));
             }
         }
-        if self.carved {
-            self.publish_form();
-        }
+        if self.carved { self.publish_form() } else { Ok(()) }
     }
 
     /// Whether no outside influence prevents the agent from resting at simulated time `now`.
@@ -357,20 +366,21 @@ impl AgentRunner {
             drift_m: open.errors_m[1],
         });
         dt.into_iter().for_each(|dt| self.set_dt(dt));
-        resolution.into_iter().for_each(|wanted| self.set_resolution(wanted));
-        Ok(())
+        resolution.map_or(Ok(()), |wanted| self.set_resolution(wanted))
     }
 
     fn set_dt(&mut self, dt: SimSpan) {
         self.pace.set_dt(dt.clamp(self.dt_range.0, self.dt_range.1));
     }
 
-    fn set_resolution(&mut self, wanted: Resolution) {
-        let Some(range) = &self.range else { return };
+    fn set_resolution(&mut self, wanted: Resolution) -> Result<(), String> {
+        let Some(range) = &self.range else { return Ok(()) };
         let wanted = range.clamp(wanted);
-        if self.agent.resolution().is_some_and(|held| held != wanted) {
-            self.agent.set_resolution(wanted);
-        }
+        self.model.call(|agent| {
+            if agent.resolution().is_some_and(|held| held != wanted) {
+                agent.set_resolution(wanted);
+            }
+        })
     }
 
     fn try_to_rest(&mut self, now: SimTime) -> bool {
@@ -417,10 +427,13 @@ const GONE: &str = "it has left";
 
 /// Runs `part` of a turn; an error or a panic in it is the reason to park.
 pub(super) fn contained<T>(part: impl FnOnce() -> Result<T, String>) -> Result<T, String> {
-    // the agent is not used again after a panic, so its broken invariants have no effect
+    // a model is not called again after a panic, so its broken invariants have no effect
     match catch_unwind(AssertUnwindSafe(part)) {
         Ok(result) => result,
         Err(payload) => {
+            if let Some(BadAnswer(what)) = payload.downcast_ref() {
+                return Err(format!("answered {what}, which no step can go on with"));
+            }
             let text = payload.downcast_ref::<&str>().copied().map(str::to_owned);
             let text = text.or_else(|| payload.downcast_ref::<String>().cloned()).unwrap_or_default();
             // an agent of somebody's own may panic, too

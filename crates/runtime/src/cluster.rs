@@ -7,6 +7,8 @@
 mod attachments;
 mod common_time;
 mod contacts;
+mod exclusion;
+mod macro_step;
 mod membership;
 mod notes;
 mod places;
@@ -28,13 +30,15 @@ use super::handle::Shared;
 use super::helpers::Helped;
 use super::loads::{Acting, Loads};
 use super::observation::{Observer, newest};
-use metachron_contact::asynchronous::{MacroStep, Pairs, Remotes, part};
-use metachron_contact::stepper::{ClusterScene, ClusterStepper, ContactMemory, Participant, Plan, Role, StepDoubling};
+use metachron_contact::asynchronous::{Pairs, Remotes};
+use metachron_contact::stepper::{
+    ClusterMember, ClusterScene, ClusterStepper, ContactMemory, Participant, Plan, Role, StepDoubling,
+};
 use metachron_contact::{Link, Neighbour, StepContext};
 use metachron_core::step_doubling::DoublingSchedule;
 use metachron_core::{
     AgentId, Archive, ArchiveError, AttachmentEvent, Body, ClusterSolves, ClusterState, ContactState, DisjointSets,
-    Grip, JointEffort, PairState, SimSpan, SimTime, Snapshot, StepReport, Wrench, archive_values, recycled,
+    Grip, JointEffort, PairState, SimSpan, SimTime, Snapshot, Wrench, archive_values,
 };
 use std::sync::Arc;
 
@@ -299,7 +303,7 @@ impl AgentRunner {
         let (me, time, neighbours) = (self.shared.id, self.pace.time(), self.observer.neighbours());
         let Acting { springs: hands, forces, motors, pose } = prepared(&mut self.loads, time, dt);
         let context = StepContext { me, time, neighbours, hands, forces, motors, pose: *pose, links: &self.links };
-        let report = self.agent.step(dt, &context).map_err(|e| e.to_string())?;
+        let report = self.model.step(dt, &context)?;
         let done = &self.shared.gauges.work;
         done.set(done.get() + report.work);
         Ok(StepOutcome { report, dt })
@@ -310,72 +314,6 @@ impl AgentRunner {
         let time = self.pace.time();
         visit(self);
         self.led.members_at(time).for_each(visit);
-    }
-
-    /// Steps all that it leads and that are at its time, with itself, as one problem.
-    ///
-    /// # Errors
-    /// The reason why a member cannot go on: all that belong to the cluster stop with it.
-    fn step_cluster(&mut self, plan: Plan, dt: SimSpan) -> Result<StepOutcome, String> {
-        let (id, time, steps) = (self.shared.id, self.pace.time(), self.metrics.turns());
-        let Some(seat) = &mut self.cluster else { return Err(NO_SEAT.to_owned()) };
-        let mut list = recycled(std::mem::take(&mut seat.participants));
-        let mut sides = recycled(std::mem::take(&mut seat.sides));
-        let (mut remotes, mut helped) = (seat.remotes.take(), seat.helped);
-        let mut stepper = seat.stepper.take().unwrap_or_default();
-        let mut doubling = seat.repeats(steps, id);
-        let (scene, wishes) = (Arc::clone(&seat.scene), std::mem::take(&mut seat.wishes));
-        let (mut led, peers) = (std::mem::take(&mut self.led), Arc::clone(&self.peers));
-        let all = std::iter::once(&mut *self).chain(led.members_at(time));
-        let parts = wishes.iter().map(|wish| plan.parts_in(wish.role, wish.step_s));
-        for (actor, parts) in all.zip(parts) {
-            if let Some((participant, pairs)) = actor.participant((time, dt), parts) {
-                list.push(participant);
-                sides.push(pairs);
-            }
-        }
-        let meets = sides.iter().any(Option::is_some);
-        let size = list.iter().map(Participant::size).sum();
-        let outcome = contained(|| {
-            peers.helpers.make(size, &mut helped, |threads| {
-                // a finer step that diverges says nothing of this one; what partners give is given once
-                let repeated = doubling.as_mut().filter(|_| !meets);
-                let extra = repeated.and_then(|doubling| doubling.foresee(&scene, &mut list, dt, threads).ok());
-                if meets {
-                    let step = MacroStep { dt_s: dt.as_secs_f64(), parts: plan.parts };
-                    remotes.get_or_insert_default().join(&mut list, &mut sides, &mut stepper, step);
-                }
-                let report = stepper.step(&scene, &mut list, dt, threads).map_err(|error| error.to_string())?;
-                if meets {
-                    part(&list, &mut sides, &mut stepper, dt.as_secs_f64());
-                }
-                if let Some(doubling) = &mut doubling {
-                    doubling.compare(&list);
-                }
-                let calm = stepper.lets_rest() && list.iter().all(|one| one.member.is_calm());
-                Ok((report, extra, calm && !sides.iter().flatten().any(|pairs| pairs.is_active())))
-            })
-        });
-        let (list, sides) = (recycled(list), recycled(sides));
-        // a panic of one member must not end the others
-        self.led = led;
-        if let Some(seat) = &mut self.cluster {
-            (seat.participants, seat.sides, seat.wishes) = (list, sides, wishes);
-            (seat.remotes, seat.helped) = (remotes, helped);
-        }
-        let (report, extra, at_rest) = outcome?;
-        if let Some(doubling) = doubling {
-            self.note_errors(doubling, dt);
-        }
-        self.note_pairs(&stepper, dt);
-        self.note_events(&stepper, dt);
-        self.note_solves(&report, plan, dt);
-        self.note_groups(time + dt);
-        if let Some(seat) = &mut self.cluster {
-            seat.stepper = Some(stepper);
-        }
-        let report = StepReport { work: report.work + extra.unwrap_or(0.0), substeps: report.fine_steps, at_rest };
-        Ok(StepOutcome { report, dt })
     }
 
     /// How many steps each member makes, and the length of the macro step.
@@ -400,6 +338,9 @@ impl AgentRunner {
         if let Some(seat) = &mut self.cluster {
             seat.wishes = wishes;
         }
+        if let Some(broken) = self.model.broken().or_else(|| self.led.all().find_map(|actor| actor.model.broken())) {
+            return Err(broken.to_owned());
+        }
         let dt = SimSpan::from_secs_f64(macro_s).filter(|dt| *dt > SimSpan::ZERO);
         // what is left to a given time is taken whole, not as seconds
         let dt = match span {
@@ -409,27 +350,14 @@ impl AgentRunner {
         Ok((plan, dt.unwrap_or(self.pace.wanted())))
     }
 
-    /// What it brings into a step from a time on, of which it makes so many parts, and its asynchronous pairs.
-    fn participant(
-        &mut self,
-        (time, dt): (SimTime, SimSpan),
-        parts: u32,
-    ) -> Option<(Participant<'_>, Option<&mut Pairs>)> {
-        let id = self.shared.id;
-        let Self { agent, observer, loads, links, shared, cluster, .. } = self;
-        let ClusterSeat { memory, grips, asynchronous, .. } = &mut **cluster.as_mut()?;
-        let Acting { springs: hands, forces, motors, pose } = prepared(loads, time, dt);
-        let (neighbours, pose) = (observer.neighbours(), *pose);
-        let context = StepContext { me: id, time, neighbours, hands, forces, motors, pose, links };
-        let laws = &shared.laws;
-        let (member, alone_s) = (agent.member()?, self.pace.wanted().as_secs_f64());
-        let participant = Participant { id, member, context, laws, memory, parts, alone_s, grips };
-        Some((participant, asynchronous.as_deref_mut()))
-    }
-
     fn wish(&mut self) -> Option<Wish> {
         let step_s = self.pace.wanted().as_secs_f64();
-        self.agent.member().map(|member| Wish { role: member.role(), step_s })
+        let Self { model, .. } = self;
+        let wished = contained(|| Ok(model.member()?.map(|member| Wish { role: member.role(), step_s })));
+        wished.unwrap_or_else(|reason| {
+            model.note_unwound(&reason);
+            None
+        })
     }
 
     /// Looks around before the first step: the agents with which it begins in one cluster.
@@ -480,7 +408,12 @@ impl AgentRunner {
     /// Stops all that step with it: they rest.
     pub fn rest_members(&mut self) {
         self.each_member(|actor| {
-            actor.agent.member().into_iter().for_each(|member| member.rest());
+            let rested = contained(|| {
+                actor.model.member()?.into_iter().for_each(|mut member| member.rest());
+                Ok(())
+            });
+            // it is parked where its state is written
+            rested.unwrap_or_else(|reason| actor.model.note_unwound(&reason));
             actor.cluster.iter_mut().for_each(|seat| seat.drift_m = 0.0);
         });
     }

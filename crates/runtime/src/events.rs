@@ -32,6 +32,8 @@ pub enum EventKind {
     Rests,
     /// It moves again after a rest.
     Wakes,
+    /// Its step has lasted too long, and is not at its end ([`crate::AgentState::Stalled`]).
+    Stalled,
     /// It failed and stands still from now on ([`crate::AgentState`] has the reason).
     Parked,
     /// It has left the run.
@@ -94,6 +96,7 @@ fn words(event: &AgentEvent) -> [u64; WORDS] {
         EventKind::Gone => (10, None),
         EventKind::RateMissed => (8, None),
         EventKind::Rewound => (12, None),
+        EventKind::Stalled => (13, None),
         EventKind::Carved(Removed { cells, triangles, mass_kg, momentum }) => {
             words[1] = 11 | u64::from(cells) << 32;
             words[2] = u64::from(triangles.cast_unsigned());
@@ -132,6 +135,7 @@ fn event(words: &[u64; WORDS]) -> Option<AgentEvent> {
         8 => EventKind::RateMissed,
         9 => EventKind::ContactGrew(contact),
         10 => EventKind::Gone,
+        13 => EventKind::Stalled,
         11 => EventKind::Carved(Removed {
             cells: id,
             triangles: (words[2] as u32).cast_signed(),
@@ -164,6 +168,7 @@ mod tests {
             EventKind::RateMissed,
             EventKind::Gone,
             EventKind::Rewound,
+            EventKind::Stalled,
             EventKind::Carved(Removed { cells: 10, triangles: -24, mass_kg: 0.25, momentum: DVec3::NEG_Y }),
         ]
     }

@@ -4,6 +4,7 @@
 #[path = "../../../agents/models/tests/clusters/plate.rs"]
 mod plate;
 
+use super::watchdog::StallLimit;
 use super::{
     AgentHandle, AgentSpawn, AgentState, Agents, Lockstep, Machine, ManualClock, Pool, Priority, Run, Threads,
     TimelineCommand, state_hash,
@@ -47,8 +48,8 @@ impl Executor {
             Self::Lockstep => Box::new(Lockstep::start(spawns, quick_machine()).unwrap()),
             Self::Threads => Box::new(Threads::start(spawns, clock.clone(), Priority::Normal).unwrap()),
             Self::Pool(workers) => {
-                let patience = Duration::from_secs(60);
-                Box::new(Pool::with_workers(spawns, clock.clone(), workers, patience, Priority::Normal).unwrap())
+                let limit = StallLimit::of(Duration::from_secs(60));
+                Box::new(Pool::with_workers(spawns, clock.clone(), workers, limit, Priority::Normal).unwrap())
             }
         };
         run.drive(TimelineCommand::Run);

@@ -5,11 +5,12 @@
 use super::agent_record::{AgentRecord, Live};
 use super::agent_runner::AgentRunner;
 use super::cluster::Handover;
-use super::events::AgentEvent;
+use super::events::{AgentEvent, EventKind};
 use super::form_slot::FormSlot;
 use super::histogram::Histogram;
 use super::mailbox::{Command, Keyed, Mailbox, SendError};
 use super::metrics::{AgentState, AgentStats, Metrics, Spread};
+use super::model::Traits;
 use super::probe::{Sample, Trace};
 use super::removed_agent::REMOVED;
 use super::ring::{Ring, RingEntry};
@@ -18,7 +19,7 @@ use super::slot::LatestSlot;
 use super::spawn::AgentSpawn;
 use super::streams::{EventStreams, Heard, Rings};
 use super::turns::Turn;
-use metachron_contact::stepper::ClusterScene;
+use metachron_contact::stepper::{CallMark, ClusterScene};
 use metachron_contact::{Input, Inputs, Law};
 use metachron_core::{AgentId, Body, HASH_START, SimSpan, SimTime, Snapshot};
 use metachron_geometry::CollisionShape;
@@ -33,6 +34,8 @@ pub(super) struct Shared {
     pub identity: Identity,
     /// The laws of its pairs that are not [`Law::Cluster`], by rising numbers of the peers.
     pub laws: Box<[(AgentId, Law)]>,
+    /// Whether code of its model runs.
+    pub calls: CallMark,
     pub gauges: Metrics,
     /// Its contact shape; `None` where nothing can touch it.
     pub form: FormSlot,
@@ -65,17 +68,17 @@ pub(super) struct Identity {
 
 impl Identity {
     /// That of the agent that is to be started, whose name it takes.
-    pub fn of(id: AgentId, spawn: &mut AgentSpawn, is_first: bool) -> Self {
-        let inputs = spawn.agent.inputs();
+    pub fn of(id: AgentId, spawn: &mut AgentSpawn, traits: &Traits, is_first: bool) -> Self {
+        let inputs = traits.inputs;
         let is_motored = spawn.scene.joints_of(id).any(|(_, joint)| joint.takes_motor());
         Self {
             name: std::mem::take(&mut spawn.name).into(),
-            model: spawn.agent.model(),
+            model: traits.model,
             wanted_hz: spawn.rate_hz,
             motored: is_motored.then(|| Arc::clone(&spawn.scene)),
             inputs: inputs.with(Input::Resolution, inputs.has(Input::Resolution) && spawn.range.is_some()),
             is_first,
-            handover: spawn.agent.member().is_some().then(Handover::default),
+            handover: traits.is_member.then(Handover::default),
         }
     }
 }
@@ -240,7 +243,7 @@ impl AgentHandle {
         let Some(shared) = self.live() else { return SimSpan::ZERO };
         let dropped = SimSpan::from_nanos(shared.gauges.dropped.load(Relaxed));
         match shared.gauges.state() {
-            AgentState::Running => dropped + now.since(self.lived_to()),
+            AgentState::Running | AgentState::Stalled => dropped + now.since(self.lived_to()),
             AgentState::Resting => dropped,
             AgentState::Parked(_) | AgentState::Gone => SimSpan::ZERO,
         }
@@ -310,6 +313,19 @@ impl AgentHandle {
         self.live().map_or(AgentState::Gone, |shared| shared.gauges.state())
     }
 
+    /// How long its turn has lasted, wall time; zero where it is not stalled ([`AgentState::Stalled`]).
+    #[must_use]
+    pub fn stalled_for(&self) -> Duration {
+        let live = self.live();
+        let stalled = live.filter(|shared| shared.gauges.is_stalled());
+        stalled.map_or(Duration::ZERO, |shared| shared.gauges.stalled_for())
+    }
+
+    /// The length of its steps, nanoseconds.
+    pub(super) fn dt_ns(&self) -> u64 {
+        self.live().map_or(0, |shared| shared.gauges.dt.load(Relaxed))
+    }
+
     /// Sends a command to the agent; it obeys at its next turn, and wakes for it.
     ///
     /// # Errors
@@ -356,13 +372,22 @@ impl AgentHandle {
     /// Begins to keep its events for a reader.
     #[must_use]
     pub fn listen(&self) -> Heard {
-        self.listen_to(|rings| &rings.events)
+        let stalls = self.live().map_or(0, |shared| shared.gauges.stalls.load(Relaxed));
+        let mut heard = self.listen_to(|rings| &rings.events);
+        heard.stalls = stalls;
+        heard
     }
 
     /// Passes its events that a reader has not heard on to `take`; returns how many were lost: an agent keeps the newest
     /// [`crate::EVENTS_KEPT`].
-    pub fn hear_events(&self, heard: &mut Heard, take: impl FnMut(AgentEvent)) -> u64 {
-        self.hear(heard, |rings| &rings.events, take)
+    pub fn hear_events(&self, heard: &mut Heard, mut take: impl FnMut(AgentEvent)) -> u64 {
+        let lost = self.hear(heard, |rings| &rings.events, &mut take);
+        let stalls = self.live().map_or(heard.stalls, |shared| shared.gauges.stalls.load(Relaxed));
+        for _ in heard.stalls..stalls {
+            take(AgentEvent { at: self.latest().time, kind: EventKind::Stalled });
+        }
+        heard.stalls = stalls;
+        lost
     }
 
     /// Begins to keep its turns for a reader.

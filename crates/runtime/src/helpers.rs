@@ -205,7 +205,7 @@ mod tests {
                     let context = StepContext::alone(id, time);
                     Participant {
                         id,
-                        member: tube.member().unwrap(),
+                        member: tube.member().unwrap().into(),
                         context,
                         laws: &[],
                         memory,

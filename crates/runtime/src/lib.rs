@@ -53,6 +53,7 @@ mod lockstep;
 mod machine;
 mod mailbox;
 mod metrics;
+mod model;
 mod observation;
 mod pool;
 mod prefetch;
@@ -76,6 +77,7 @@ mod turn_order;
 mod turn_parts;
 mod turns;
 mod virtual_events;
+mod watchdog;
 mod worker_wakeup;
 
 pub use agent_clock::{AgentClock, LAG_CAP, Start};
@@ -102,6 +104,7 @@ pub use streams::Heard;
 pub use threads::{AUTO_THREADS_MAX, THREADS_MAX, Threads};
 pub use turn_order::{Held, OrderLog, PartKind, TurnOrder, TurnPart};
 pub use turns::{TURNS_KEPT, Turn};
+pub use watchdog::STALLED_FOR_GOOD;
 
 use archive::refuse_absent;
 use metachron_core::{AgentId, Archive, ArchiveError, SimTime};
@@ -122,6 +125,12 @@ pub trait Run: Send {
 
     /// The timeline in force.
     fn timeline(&self) -> Timeline;
+
+    /// Sets how long a turn of one agent may last, wall time, > 0, before the agent counts as stalled ([`AgentState::Stalled`]): 250 ms, but ten
+    /// of its steps at least, and a cluster's so many times as long as it has members. Nothing in lockstep, whose turns are its caller's.
+    fn set_stall_limit(&mut self, limit: Duration) {
+        let _ = limit;
+    }
 
     /// Changes the timeline: pause, run, speed, single step.
     fn drive(&mut self, drive: TimelineCommand);
@@ -157,8 +166,9 @@ pub trait Run: Send {
     /// another can read.
     ///
     /// # Errors
-    /// [`ArchiveError::Refused`] where a step does not end, and by agents and governors that do not save their state; any other for a state that
-    /// is not one of this run, or that a model does not read. The run goes on as it was then: all is read and checked before anything is shown.
+    /// [`ArchiveError::Refused`] where a step does not end within the time that it may last ([`Run::set_stall_limit`]), and by agents and governors
+    /// that do not save their state; any other for a state that is not one of this run, or that a model does not read. The run goes on as it was
+    /// then: all is read and checked before anything is shown.
     fn archive(&mut self, archive: &mut Archive<'_>, absent: Absent<'_>) -> Result<(), ArchiveError>;
 
     /// Writes the state of the run ([`Run::archive`]).

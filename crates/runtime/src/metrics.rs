@@ -9,7 +9,7 @@ use super::removed_agent::REMOVED;
 use arc_swap::ArcSwapOption;
 use metachron_core::{AgentId, Archive, ArchiveError, Resolution, SimSpan, SimTime, archive_values};
 use std::sync::Arc;
-use std::sync::atomic::{AtomicU8, AtomicU64, Ordering::Relaxed};
+use std::sync::atomic::{AtomicU8, AtomicU32, AtomicU64, Ordering::Relaxed};
 use std::time::Duration;
 
 /// State of an agent's execution.
@@ -17,6 +17,8 @@ use std::time::Duration;
 pub enum AgentState {
     /// It steps.
     Running,
+    /// Its step, or that of one in whose cluster it steps, lasts too long: it goes on where that ends.
+    Stalled,
     /// It is at rest and takes no steps until it is woken.
     Resting,
     /// It was parked for this reason; its last snapshot remains.
@@ -147,6 +149,7 @@ const RUNNING: u8 = 0;
 const RESTING: u8 = 1;
 const PARKED: u8 = 2;
 const GONE: u8 = 3;
+const STALLED: u8 = 4;
 
 /// The readable side of an agent's metrics.
 #[derive(Debug, Default)]
@@ -169,6 +172,9 @@ pub(super) struct Metrics {
     pub work: Gauge,
     late: [Gauge; 3],
     state: AtomicU8,
+    /// How often its code was the reason of a turn that lasted too long, and for how long the last one had, ms.
+    pub stalls: AtomicU32,
+    stalled_ms: AtomicU32,
     /// Why it was parked; read when it is.
     reason: ArcSwapOption<String>,
 }
@@ -179,6 +185,7 @@ impl Metrics {
             RUNNING => AgentState::Running,
             RESTING => AgentState::Resting,
             GONE => AgentState::Gone,
+            STALLED => AgentState::Stalled,
             _ => AgentState::Parked(self.reason.load().as_deref().cloned().unwrap_or_default()),
         }
     }
@@ -189,6 +196,36 @@ impl Metrics {
 
     pub fn is_running(&self) -> bool {
         self.state.load(Relaxed) == RUNNING
+    }
+
+    pub fn is_stalled(&self) -> bool {
+        self.state.load(Relaxed) == STALLED
+    }
+
+    /// Whether it makes no more turns: it is parked, or has left.
+    pub fn has_ended(&self) -> bool {
+        matches!(self.state.load(Relaxed), PARKED | GONE)
+    }
+
+    /// Its turn has lasted too long, for so long already; `by_it`: by its own code.
+    pub fn stall(&self, lasts: Duration, by_it: bool) {
+        self.set_stalled_for(lasts);
+        self.stalls.fetch_add(u32::from(by_it), Relaxed);
+        // one that rests or is parked makes no turn
+        let _ = self.state.compare_exchange(RUNNING, STALLED, Relaxed, Relaxed);
+    }
+
+    /// Such a turn has ended.
+    pub fn resume(&self) {
+        let _ = self.state.compare_exchange(STALLED, RUNNING, Relaxed, Relaxed);
+    }
+
+    pub fn set_stalled_for(&self, lasts: Duration) {
+        self.stalled_ms.store(lasts.as_millis().min(u128::from(u32::MAX)) as u32, Relaxed);
+    }
+
+    pub fn stalled_for(&self) -> Duration {
+        Duration::from_millis(u64::from(self.stalled_ms.load(Relaxed)))
     }
 
     pub fn set_resting(&self, resting: bool) {
@@ -206,7 +243,7 @@ impl Metrics {
 
     /// Parks the agent for good; the first reason is kept.
     pub fn park(&self, reason: String) {
-        if matches!(self.state.load(Relaxed), RUNNING | RESTING) {
+        if matches!(self.state.load(Relaxed), RUNNING | RESTING | STALLED) {
             self.reason.store(Some(Arc::new(reason)));
             self.state.store(PARKED, Relaxed);
         }

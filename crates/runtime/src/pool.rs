@@ -8,7 +8,6 @@
 mod queue;
 mod shared;
 mod supervisor;
-mod watchdog;
 mod worker;
 
 use super::Run;
@@ -25,6 +24,7 @@ use super::priority::Priority;
 use super::sleep::Halt;
 use super::spawn::{AgentSpawn, AssembledRun, RunAgents, RunError, assemble};
 use super::turn_order::TurnOrder;
+use super::watchdog::{StallLimit, Watchdog};
 use metachron_core::{AgentId, Archive, ArchiveError};
 use shared::PoolState;
 use std::num::NonZero;
@@ -32,20 +32,19 @@ use std::sync::mpsc::Sender;
 use std::sync::{Arc, PoisonError};
 use std::thread::{self, JoinHandle};
 use std::time::Duration;
-use supervisor::{Message, Supervisor};
-
-/// A step that takes longer is given up: its agent is parked, its worker replaced.
-const PATIENCE: Duration = Duration::from_secs(5);
+use supervisor::{Message, Supervisor, Team, WorkerRecord};
 
 /// Agents that share workers.
 pub struct Pool {
     state: Arc<PoolState>,
     all: RunAgents,
     messages: Sender<Message>,
-    watch: Option<JoinHandle<()>>,
+    watch: Option<JoinHandle<Vec<WorkerRecord>>>,
     workers: usize,
-    patience: Duration,
+    watchdog: Watchdog,
     priority: Priority,
+    /// Those whose turns are stalled, in whose places others work.
+    stuck: Vec<WorkerRecord>,
 }
 
 impl Pool {
@@ -56,36 +55,36 @@ impl Pool {
     /// [`RunError`] for agents that cannot run as requested, and if the system gives no thread.
     pub fn start(spawns: Vec<AgentSpawn>, clock: Arc<dyn Clock>, priority: Priority) -> Result<Self, RunError> {
         let workers = thread::available_parallelism().map_or(1, NonZero::get);
-        Self::with_workers(spawns, clock, workers, PATIENCE, priority)
+        Self::with_workers(spawns, clock, workers, StallLimit::default(), priority)
     }
 
-    /// Starts `workers` workers, at least one, each given up after `patience` in one step.
+    /// Starts `workers` workers, at least one, each replaced where a turn lasts longer than `limit` says.
     pub(super) fn with_workers(
         spawns: Vec<AgentSpawn>,
         clock: Arc<dyn Clock>,
         workers: usize,
-        patience: Duration,
+        limit: StallLimit,
         priority: Priority,
     ) -> Result<Self, RunError> {
         let AssembledRun { actors, all } = assemble(spawns, Helpers::one_per_core(priority))?;
         let workers = workers.clamp(1, all.handles.len().max(1));
         all.sleep.set_workers(workers);
         let (sleep, handles) = (Arc::clone(&all.sleep), all.handles.clone());
+        let watchdog = Watchdog { handles: handles.clone(), sleep: Arc::clone(&sleep), limit: Arc::new(limit) };
         let state = Arc::new(PoolState::new(clock, sleep, handles, actors, workers));
         state.timeline.drive(Duration::ZERO, TimelineCommand::Pause);
-        let (messages, watch) = Self::watched(&state, workers, patience, priority)?;
-        Ok(Self { state, all, messages, watch: Some(watch), workers, patience, priority })
+        let team = Team { places: workers, watchdog: watchdog.clone(), priority, stuck: Vec::new() };
+        let (messages, watch) = Self::watched(&state, team)?;
+        Ok(Self { state, all, messages, watch: Some(watch), workers, watchdog, priority, stuck: Vec::new() })
     }
 
     /// Starts workers, and the thread that watches them.
     fn watched(
         state: &Arc<PoolState>,
-        workers: usize,
-        patience: Duration,
-        priority: Priority,
-    ) -> Result<(Sender<Message>, JoinHandle<()>), RunError> {
+        team: Team,
+    ) -> Result<(Sender<Message>, JoinHandle<Vec<WorkerRecord>>), RunError> {
         let no_thread = |error| RunError::NoThread { name: "the pool's workers".to_owned(), error };
-        let supervisor = Supervisor::start(Arc::clone(state), workers, patience, priority).map_err(no_thread)?;
+        let supervisor = Supervisor::start(Arc::clone(state), team).map_err(no_thread)?;
         let messages = supervisor.sender();
         let watch =
             thread::Builder::new().name("pool:watch".to_owned()).spawn(|| supervisor.watch()).map_err(|source| {
@@ -95,18 +94,20 @@ impl Pool {
         Ok((messages, watch))
     }
 
-    /// Ends all workers, between turns.
+    /// Ends all workers, between turns, but for those whose turns are stalled.
     fn halt(&mut self, why: Halt) {
         self.state.sleep.stop();
         // the send fails only if the watchdog has already ended
         let _ = self.messages.send(Message::Stop(why));
-        drop(self.watch.take().map(JoinHandle::join));
+        self.stuck = self.watch.take().and_then(|watch| watch.join().ok()).unwrap_or_default();
     }
 
     /// Starts workers again.
     fn go_on(&mut self) -> Result<(), RunError> {
         self.state.sleep.go_on();
-        let (messages, watch) = Self::watched(&self.state, self.workers, self.patience, self.priority)?;
+        let stuck = std::mem::take(&mut self.stuck);
+        let team = Team { places: self.workers, watchdog: self.watchdog.clone(), priority: self.priority, stuck };
+        let (messages, watch) = Self::watched(&self.state, team)?;
         (self.messages, self.watch) = (messages, Some(watch));
         Ok(())
     }
@@ -134,7 +135,15 @@ impl CutBetweenTurns for Pool {
         &mut self,
         act: impl FnOnce(&mut Cut, &mut Option<Arc<TurnOrder>>) -> Result<(), ArchiveError>,
     ) -> Result<(), ArchiveError> {
+        let refused = |what: String| ArchiveError::Refused { what };
+        let no_thread = |error: RunError| refused(format!("a run that cannot go on ({error})"));
+        self.watchdog.await_stalled().map_err(refused)?;
         self.halt(Halt::Cut);
+        if self.stuck.iter().any(|worker| worker.watchdog.is_stalled()) {
+            let complaint = self.watchdog.complaint();
+            self.go_on().map_err(no_thread)?;
+            return Err(refused(complaint.unwrap_or_else(|| "a step that does not end".to_owned())));
+        }
         let mut homes = Vec::new();
         self.state.clear(|actor| homes.push(Some(actor)));
         let all = take_apart(homes.into_iter(), &self.all.handles);
@@ -147,7 +156,6 @@ impl CutBetweenTurns for Pool {
         self.state.distribute(put_back(cut.all, &self.all.handles), cut.now);
         // some may have been woken, or have returned from a leader
         self.all.handles.iter().for_each(|agent| self.state.sleep.notify(agent.id()));
-        let no_thread = |error: RunError| ArchiveError::Refused { what: format!("a run that cannot go on ({error})") };
         outcome.and(self.go_on().map_err(no_thread))
     }
 }
@@ -165,6 +173,10 @@ impl Run for Pool {
 
     fn timeline(&self) -> Timeline {
         self.state.timeline.read()
+    }
+
+    fn set_stall_limit(&mut self, limit: Duration) {
+        self.watchdog.limit.set(limit);
     }
 
     fn drive(&mut self, drive: TimelineCommand) {

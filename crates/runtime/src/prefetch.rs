@@ -12,8 +12,8 @@ use std::sync::atomic::Ordering::Relaxed;
 
 impl AgentRunner {
     /// Reads one word of each block of memory that a turn of this agent reads or writes.
-    pub fn fetch(&self) {
-        black_box(self.agent.resolution());
+    pub fn fetch(&mut self) {
+        self.model.fetch();
         black_box([
             self.pace.time().as_nanos(),
             self.served.as_nanos(),

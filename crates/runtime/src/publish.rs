@@ -44,17 +44,17 @@ impl AgentRunner {
     /// Writes the state at `time`, to be published later; `at_rest`: the agent is about to rest in it.
     pub fn write_snapshot(&mut self, time: SimTime, at_rest: bool) -> Result<(), String> {
         let cluster = self.cluster.as_deref();
-        let (agent, clock_offset) = (&self.agent, self.pace.clock_offset());
+        let (model, clock_offset) = (&mut self.model, self.pace.clock_offset());
         self.withheld = false;
         let finite = self.writer.fill(|into| {
             into.clear();
-            agent.write_snapshot(into);
+            model.call(|agent| agent.write_snapshot(into))?;
             if let Some(seat) = cluster {
                 seat.complete(into);
             }
             (into.time, into.clock_offset, into.at_rest) = (time, clock_offset, at_rest);
-            into.is_finite()
-        });
+            Ok::<_, String>(into.is_finite())
+        })?;
         let model = self.shared.model();
         if let (true, Some(state)) = (finite, self.writer.filled()) {
             self.observer.publish(&self.peers, state);
@@ -77,8 +77,13 @@ impl AgentRunner {
     }
 
     /// Publishes the contact shape, where it is another one.
-    pub fn publish_form(&mut self) {
-        self.shared.form.publish(self.agent.form());
+    ///
+    /// # Errors
+    /// Where the model panics.
+    pub fn publish_form(&mut self) -> Result<(), String> {
+        let form = self.model.call(|agent| agent.form())?;
+        self.shared.form.publish(form);
+        Ok(())
     }
 
     /// Publishes a withheld state: the last state of an agent is never withheld.

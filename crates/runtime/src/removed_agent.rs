@@ -7,7 +7,11 @@ use super::agent_record::AgentRecord;
 use super::agent_runner::AgentRunner;
 use super::cluster::Led;
 use super::events::EventKind;
-use metachron_core::Snapshot;
+use super::mailbox::SendError;
+use super::metrics::AgentState;
+use super::spawn::RunAgents;
+use super::watchdog::STALLED_FOR_GOOD;
+use metachron_core::{AgentId, Snapshot};
 use std::sync::{Arc, LazyLock};
 
 /// The model of a number of which nothing else is known.
@@ -17,6 +21,39 @@ pub(super) const REMOVED: &str = "removed";
 pub(super) fn nothing() -> Arc<Snapshot> {
     static NOTHING: LazyLock<Arc<Snapshot>> = LazyLock::new(Arc::default);
     Arc::clone(&NOTHING)
+}
+
+impl RunAgents {
+    /// Takes an agent out: at its next turn, or at once where it makes no more. `home` has its runner where that makes turns of its own, or none any
+    /// more.
+    ///
+    /// # Errors
+    /// [`SendError::NoAgent`].
+    pub fn leave(&self, id: AgentId, home: &mut Option<Box<AgentRunner>>) -> Result<(), SendError> {
+        let agent = self.handles.of(id).ok_or(SendError::NoAgent(id))?;
+        match agent.state() {
+            AgentState::Gone => return Ok(()),
+            AgentState::Parked(_) => {}
+            // where its step ends after all it obeys that
+            AgentState::Stalled if agent.stalled_for() >= STALLED_FOR_GOOD => agent.leave(),
+            AgentState::Running | AgentState::Resting | AgentState::Stalled => {
+                agent.leave();
+                return Ok(());
+            }
+        }
+        if let Some(mut runner) = home.take() {
+            runner.take_out();
+            *home = runner.kept();
+            return Ok(());
+        }
+        // it is in a step that does not end
+        if let Some(broad_phase) = self.peers.broad_phase.get() {
+            broad_phase.publish_nowhere(id, agent.latest().moment());
+        }
+        agent.live().into_iter().for_each(|shared| shared.gauges.leave());
+        agent.record.set_left(true);
+        Ok(())
+    }
 }
 
 impl AgentRunner {

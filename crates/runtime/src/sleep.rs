@@ -83,6 +83,8 @@ pub(super) struct SleepRegistry {
     notified: AtomicBool,
     stop: AtomicBool,
     ended: AtomicBool,
+    /// Held while threads find that they are to end, and while that is taken back.
+    gate: Mutex<()>,
     /// Simulated nanoseconds at which an agent near peers was last far behind, plus one; zero for never.
     far_behind: AtomicU64,
     /// Wake-up of the workers, where agents have no threads of their own.
@@ -116,6 +118,7 @@ impl SleepRegistry {
             notified: AtomicBool::new(false),
             stop: AtomicBool::new(false),
             ended: AtomicBool::new(false),
+            gate: Mutex::new(()),
             far_behind: AtomicU64::new(0),
             wakeup: OnceLock::new(),
             changed: DirtySet::default(),
@@ -334,8 +337,9 @@ impl SleepRegistry {
         self.unpark_all();
     }
 
-    /// Takes that back, once all have ended: the run goes on with others.
+    /// Takes that back: the run goes on, with others for those that have ended.
     pub fn go_on(&self) {
+        let _gate = self.gate.lock().unwrap_or_else(PoisonError::into_inner);
         self.stop.store(false, Release);
     }
 
@@ -347,6 +351,16 @@ impl SleepRegistry {
     /// Whether the run ends for good, or has ended.
     pub fn has_ended(&self) -> bool {
         self.ended.load(Acquire)
+    }
+
+    /// Calls `leave` if threads are still asked to end, and that will not be taken back unseen: a thread that finds it `false` goes on.
+    pub fn end_if_stopping(&self, leave: impl FnOnce()) -> bool {
+        let _gate = self.gate.lock().unwrap_or_else(PoisonError::into_inner);
+        let stopping = self.stopping();
+        if stopping {
+            leave();
+        }
+        stopping
     }
 
     /// Whether threads have been asked to end.

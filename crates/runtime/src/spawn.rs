@@ -13,15 +13,16 @@ use super::form_slot::FormSlot;
 use super::governor::Governor;
 use super::handle::{AgentHandle, Identity, Shared};
 use super::helpers::Helpers;
-use super::mailbox::{Mailbox, SendError};
-use super::metrics::{AgentState, Metrics, MetricsWriter};
+use super::mailbox::Mailbox;
+use super::metrics::{Metrics, MetricsWriter};
+use super::model::{Model, Traits};
 use super::observation::{BroadPhaseSlot, Peers};
 use super::probe::{Trace, WatchedPoint};
 use super::sleep::SleepRegistry;
 use super::slot::SlotWriter;
 use super::streams::EventStreams;
 use metachron_contact::Agent;
-use metachron_contact::stepper::ClusterScene;
+use metachron_contact::stepper::{CallMark, ClusterScene};
 use metachron_contact::{Law, Link};
 use metachron_core::{AgentId, DT_MAX_S, ResolutionRange, SimSpan, SimTime, Snapshot};
 use std::sync::atomic::{AtomicBool, Ordering::Relaxed};
@@ -193,35 +194,6 @@ impl RunAgents {
         self.peers.is_ordered.store(true, Relaxed);
     }
 
-    /// Takes an agent out: at its next turn, or at once where it makes no more. `home` has its runner where that makes turns of its own, or none any
-    /// more.
-    ///
-    /// # Errors
-    /// [`SendError::NoAgent`].
-    pub fn leave(&self, id: AgentId, home: &mut Option<Box<AgentRunner>>) -> Result<(), SendError> {
-        let agent = self.handles.of(id).ok_or(SendError::NoAgent(id))?;
-        match agent.state() {
-            AgentState::Gone => return Ok(()),
-            AgentState::Running | AgentState::Resting => {
-                agent.leave();
-                return Ok(());
-            }
-            AgentState::Parked(_) => {}
-        }
-        if let Some(mut runner) = home.take() {
-            runner.take_out();
-            *home = runner.kept();
-            return Ok(());
-        }
-        // it is in a step that does not end
-        if let Some(broad_phase) = self.peers.broad_phase.get() {
-            broad_phase.publish_nowhere(id, agent.latest().moment());
-        }
-        agent.live().into_iter().for_each(|shared| shared.gauges.leave());
-        agent.record.set_left(true);
-        Ok(())
-    }
-
     /// Takes up an agent that begins at `now`, under the next number; agents join one at a time. It has published its first state.
     ///
     /// # Errors
@@ -391,12 +363,15 @@ fn shared(
     writer: &SlotWriter<Snapshot>,
     is_first: bool,
 ) -> Shared {
+    let calls = CallMark::default();
+    let traits = Traits::of(&mut *spawn.agent, &calls);
     Shared {
         id,
-        identity: Identity::of(id, spawn, is_first),
+        identity: Identity::of(id, spawn, &traits, is_first),
+        calls,
         laws: Box::default(),
         gauges: Metrics::default(),
-        form: FormSlot::new(spawn.agent.form()),
+        form: FormSlot::new(traits.form),
         mail: Mailbox::default(),
         streams: EventStreams::default(),
         slot: writer.slot(),
@@ -415,7 +390,7 @@ struct Seated {
 }
 
 fn actor(shared: Arc<Shared>, parts: Seated, peers: &Arc<Peers>) -> AgentRunner {
-    let Seated { mut spawn, jointed, writer } = parts;
+    let Seated { spawn, jointed, writer } = parts;
     let id = shared.id;
     let mut links: Vec<AgentId> = Vec::with_capacity(spawn.links.len());
     for link in spawn.links {
@@ -425,14 +400,15 @@ fn actor(shared: Arc<Shared>, parts: Seated, peers: &Arc<Peers>) -> AgentRunner 
     }
     let mut asynchronous = shared.laws.iter().map(|(_, law)| *law).chain(spawn.attached.iter().map(|link| link.law));
     let asynchronous = asynchronous.any(Law::is_asynchronous);
-    let is_member = spawn.agent.member().is_some();
+    let is_member = shared.handover().is_some();
     let cluster = is_member.then(|| Box::new(ClusterSeat::new(spawn.scene, jointed, asynchronous)));
     // within a cluster there are no messages to lose, and no clock of its own to disturb
     let faults = if !is_member || asynchronous { spawn.faults } else { Faults::default() };
+    let model = Model::new(spawn.agent, Arc::clone(&shared));
     AgentRunner {
         shared,
         peers: Arc::clone(peers),
-        agent: spawn.agent,
+        model,
         pace: AgentClock::new(SimTime::ZERO, spawn.dt.clamp(spawn.dt_range.0, spawn.dt_range.1)),
         dt_range: spawn.dt_range,
         range: spawn.range,

@@ -23,6 +23,8 @@ pub(super) struct Rings {
 pub struct Heard {
     rings: Option<Arc<Rings>>,
     next: u64,
+    /// How many stalls were told of: the thread that writes the rings cannot tell of its own.
+    pub(super) stalls: u32,
 }
 
 impl EventStreams {
@@ -41,7 +43,7 @@ impl EventStreams {
     /// Begins to keep what `of` says for a reader.
     pub fn listen<E: RingEntry>(&self, of: fn(&Rings) -> &Ring<E>) -> Heard {
         let rings = self.0.get_or_init(Arc::default);
-        Heard { next: of(rings).listen(), rings: Some(Arc::clone(rings)) }
+        Heard { next: of(rings).listen(), rings: Some(Arc::clone(rings)), stalls: 0 }
     }
 }
 
@@ -64,7 +66,7 @@ impl Heard {
             Some(streams) => {
                 let are_its = |rings: &Arc<Rings>| streams.0.get().is_some_and(|now| Arc::ptr_eq(now, rings));
                 if !self.rings.as_ref().is_some_and(are_its) {
-                    *self = streams.listen(of);
+                    *self = Self { stalls: self.stalls, ..streams.listen(of) };
                 }
             }
         }

@@ -3,6 +3,7 @@
 
 use super::pool::Pool;
 use super::spawn::AgentSpawn;
+use super::watchdog::StallLimit;
 use super::{AgentHandle, Clock, Priority, Run, SystemClock, Threads, TimelineCommand};
 use glam::{DQuat, DVec3};
 use metachron_contact::asynchronous::{GivenAt, Ledgers};
@@ -32,7 +33,9 @@ const LIVE: [(&str, Start); 4] = [
 ];
 
 fn pool(spawns: Vec<AgentSpawn>, clock: Arc<dyn Clock>, workers: usize) -> Box<dyn Run> {
-    running(Pool::with_workers(spawns, clock, workers, Duration::from_secs(60), Priority::Normal).unwrap())
+    running(
+        Pool::with_workers(spawns, clock, workers, StallLimit::of(Duration::from_secs(60)), Priority::Normal).unwrap(),
+    )
 }
 
 /// Starts the time of a run.

@@ -4,6 +4,8 @@
 //! and the end; a thread whose agent rests or is led by another sleeps without a timer, a thread whose agent is parked ends.
 //! Never here: virtual time, declared costs.
 
+mod watch;
+
 use super::Run;
 use super::agent_clock::{SharedTimeline, Timeline, TimelineCommand};
 use super::agent_runner::{AgentRunner, Next};
@@ -17,17 +19,18 @@ use super::helpers::Helpers;
 use super::mailbox::SendError;
 use super::metrics::AgentStats;
 use super::priority::Priority;
-use super::sleep::Halt;
 use super::spawn::{AgentSpawn, AssembledRun, RunAgents, RunError, assemble};
 use super::turn_order::{Held, PartKind, TurnOrder, in_force};
 use super::turn_parts::Begun;
 use super::turns::Took;
+use super::watchdog::{CHECKS, StallLimit, Watchdog, WatchdogWord};
 use metachron_core::{AgentId, Archive, ArchiveError};
 use std::collections::BTreeMap;
-use std::sync::Arc;
 use std::sync::mpsc::{Receiver, Sender, channel};
-use std::thread::{self, JoinHandle};
+use std::sync::{Arc, MutexGuard, PoisonError};
+use std::thread;
 use std::time::{Duration, Instant};
+use watch::{Ended, Words, watch};
 
 /// The most agents with a thread each; beyond, waking them costs more than their steps.
 pub const THREADS_MAX: usize = 1000;
@@ -39,9 +42,6 @@ pub const AUTO_THREADS_MAX: usize = 64;
 /// An agent that is behind keeps its core for this long, then yields it: of a thousand threads that have more to do than two cores can, each waits
 /// for tenths of a second then. The system's own slices, milliseconds each, would let it wait for seconds.
 const CATCH_UP_MAX: Duration = Duration::from_micros(20);
-
-/// A thread that gives back its agent when it ends, if it has it.
-type Ended = JoinHandle<Option<Box<AgentRunner>>>;
 
 /// Agents on threads of their own.
 pub struct Threads {
@@ -58,6 +58,10 @@ pub struct Threads {
     priority: Priority,
     /// Where the parts of turns are noted; `None` of a run that is not recorded.
     order: Option<Arc<TurnOrder>>,
+    watchdog: Watchdog,
+    words: Words,
+    /// Ends the thread that watches.
+    unwatched: Sender<()>,
 }
 
 impl Threads {
@@ -75,7 +79,24 @@ impl Threads {
         timeline.drive(Duration::ZERO, TimelineCommand::Pause);
         let (farewells, ended) = channel();
         let (threads, ended_agents, order) = (BTreeMap::new(), BTreeMap::new(), None);
-        let mut run = Self { clock, timeline, all, threads, ended_agents, farewells, ended, priority, order };
+        let limit = Arc::<StallLimit>::default();
+        let watchdog = Watchdog { handles: all.handles.clone(), sleep: Arc::clone(&all.sleep), limit };
+        let words = Words::default();
+        let unwatched = watch(watchdog.clone(), Arc::clone(&words))?;
+        let mut run = Self {
+            clock,
+            timeline,
+            all,
+            threads,
+            ended_agents,
+            farewells,
+            ended,
+            priority,
+            order,
+            watchdog,
+            words,
+            unwatched,
+        };
         for (actor, id) in actors.into_iter().zip((0..).map(AgentId)) {
             // on an error the run so far is dropped, which ends its threads
             run.begin(id, actor)?;
@@ -88,7 +109,9 @@ impl Threads {
         let Some(shared) = self.all.handles.of(id).and_then(AgentHandle::live).map(|shared| Arc::clone(&shared)) else {
             return Ok(());
         };
-        self.threads.insert(id, self.spawn(actor, shared)?);
+        let ended = self.spawn(actor, shared)?;
+        self.words().insert(id, Arc::clone(&ended.word));
+        self.threads.insert(id, ended);
         Ok(())
     }
 
@@ -102,9 +125,14 @@ impl Threads {
     /// Joins the thread of an agent, which ends.
     fn join(&mut self, id: AgentId) {
         // a panic outside a turn is a bug of metachron: it has been printed, and the other threads must still be joined
-        let actor = self.threads.remove(&id).and_then(|thread| thread.join().ok().flatten());
+        let actor = self.threads.remove(&id).and_then(|ended| ended.thread.join().ok().flatten());
+        self.words().remove(&id);
         self.all.sleep.set_thread(id, None);
         self.ended_agents.extend(actor.and_then(AgentRunner::kept).map(|actor| (id, actor)));
+    }
+
+    fn words(&self) -> MutexGuard<'_, BTreeMap<AgentId, Arc<WatchdogWord>>> {
+        self.words.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
     fn spawn(&self, actor: Option<Box<AgentRunner>>, shared: Arc<Shared>) -> Result<Ended, RunError> {
@@ -115,7 +143,11 @@ impl Threads {
             batch: CpuBatch::default(),
             order: self.order.clone(),
             awake: Duration::ZERO,
+            watchdog: self.watchdog.clone(),
+            word: Arc::default(),
+            turns: 0,
         };
+        let word = Arc::clone(&stage.word);
         let farewell = EndNotice { id: shared.id, ended: self.farewells.clone() };
         let builder = thread::Builder::new().name(name.clone());
         let priority = self.priority;
@@ -127,27 +159,64 @@ impl Threads {
             shared.sleep.set_thread(shared.id, Some(thread::current()));
             stage.run(actor, &shared)
         };
-        builder.spawn(body).map_err(|error| RunError::NoThread { name, error })
+        let thread = builder.spawn(body).map_err(|error| RunError::NoThread { name, error })?;
+        Ok(Ended { thread, word })
     }
 
-    /// Ends all threads and waits for them: at the end of the run until a timeout, where a step that takes longer counts as hung, and its thread
-    /// is left behind. Gives back the agents that make turns of their own.
-    fn halt(&mut self, why: Halt) -> Vec<Option<Box<AgentRunner>>> {
+    /// Ends all threads for a cut and waits for them, but for those whose turns are stalled: then all go on. Gives back the agents that make turns
+    /// of their own.
+    fn pause(&mut self) -> Result<Vec<Option<Box<AgentRunner>>>, ArchiveError> {
+        let refused = |what: String| ArchiveError::Refused { what };
+        self.watchdog.await_stalled().map_err(refused)?;
+        self.all.sleep.stop();
+        let mut quiet = 0;
+        while !self.threads.is_empty() {
+            let Err(_) = self.ended.recv_timeout(self.watchdog.limit.interval()).map(|id| self.join(id)) else {
+                quiet = 0;
+                continue;
+            };
+            quiet += 1;
+            // others may wait for the place in the order of turns that a stalled one has
+            if quiet >= CHECKS && self.threads.values().any(|ended| ended.word.is_stalled()) {
+                let complaint = self.watchdog.complaint();
+                self.resume_all().map_err(no_thread)?;
+                return Err(refused(complaint.unwrap_or_else(|| "a step that does not end".to_owned())));
+            }
+        }
+        Ok(self.homes())
+    }
+
+    /// Lets all go on again, of which some have not ended.
+    fn resume_all(&mut self) -> Result<(), RunError> {
+        self.all.sleep.go_on();
+        // those that end nevertheless have said so before
+        while self.threads.values().any(|ended| ended.word.has_ended()) {
+            let Ok(id) = self.ended.recv() else { break };
+            self.join(id);
+        }
+        let homes = self.homes();
+        self.go_on(homes)
+    }
+
+    /// Ends all threads and waits for them until a timeout: a step that takes longer counts as hung, and its thread is left behind. Gives back the
+    /// agents that make turns of their own.
+    fn halt(&mut self) -> Vec<Option<Box<AgentRunner>>> {
         self.all.sleep.stop();
         let mut patience = Duration::ZERO;
         while !self.threads.is_empty() {
             patience = self.all.sleep.end_patience(self.threads.keys().copied());
-            let ended = match why {
-                Halt::End => self.ended.recv_timeout(patience).ok(),
-                Halt::Cut => self.ended.recv().ok(),
-            };
-            let Some(id) = ended else { break };
+            let Ok(id) = self.ended.recv_timeout(patience) else { break };
             self.join(id);
         }
         for shared in self.threads.keys().filter_map(|id| self.all.handles.of(*id)?.live()) {
             shared.gauges.park(format!("a step did not end within {} s", patience.as_secs_f64()));
         }
         self.threads.clear();
+        self.homes()
+    }
+
+    /// Takes the agents whose threads have ended, each by its number.
+    fn homes(&mut self) -> Vec<Option<Box<AgentRunner>>> {
         let mut homes: Vec<_> = self.all.handles.iter().map(|_| None).collect();
         let ended = std::mem::take(&mut self.ended_agents);
         ended.into_iter().for_each(|(id, actor)| homes[id.0 as usize] = Some(actor));
@@ -160,6 +229,8 @@ impl Threads {
         for (mut actor, id) in homes.into_iter().zip((0..).map(AgentId)) {
             match actor.take_if(|actor| actor.is_parked()) {
                 Some(actor) => drop(self.ended_agents.insert(id, actor)),
+                // its step has not ended
+                None if self.threads.contains_key(&id) => {}
                 None => self.begin(id, actor)?,
             }
         }
@@ -168,6 +239,8 @@ impl Threads {
 
     fn end(&mut self) {
         self.end_turns();
+        // it fails only where that thread has ended
+        let _ = self.unwatched.send(());
         let (timeline, now) = (self.timeline.read(), self.clock.now());
         std::mem::take(&mut self.ended_agents).into_values().for_each(|mut actor| actor.close_account(&timeline, now));
         close_remaining(&self.all.handles, &timeline, now);
@@ -189,7 +262,7 @@ impl CutBetweenTurns for Threads {
         &mut self,
         act: impl FnOnce(&mut Cut, &mut Option<Arc<TurnOrder>>) -> Result<(), ArchiveError>,
     ) -> Result<(), ArchiveError> {
-        let homes = self.halt(Halt::Cut);
+        let homes = self.pause()?;
         let all = take_apart(homes.into_iter(), &self.all.handles);
         let mut cut = Cut::new(all, self.all.clone(), self.timeline.read(), self.clock.now());
         cut.most = THREADS_MAX;
@@ -198,9 +271,13 @@ impl CutBetweenTurns for Threads {
             self.timeline.set(cut.timeline);
         }
         let gone_on = self.go_on(put_back(cut.all, &self.all.handles));
-        let no_thread = |error: RunError| ArchiveError::Refused { what: format!("a run that cannot go on ({error})") };
         outcome.and(gone_on.map_err(no_thread))
     }
+}
+
+/// A cut after which the system gives no threads again.
+fn no_thread(error: RunError) -> ArchiveError {
+    ArchiveError::Refused { what: format!("a run that cannot go on ({error})") }
 }
 
 impl Run for Threads {
@@ -216,6 +293,10 @@ impl Run for Threads {
 
     fn timeline(&self) -> Timeline {
         self.timeline.read()
+    }
+
+    fn set_stall_limit(&mut self, limit: Duration) {
+        self.watchdog.limit.set(limit);
     }
 
     fn drive(&mut self, drive: TimelineCommand) {
@@ -257,7 +338,7 @@ impl Run for Threads {
 
     fn end_turns(&mut self) {
         self.all.sleep.end();
-        let homes = self.halt(Halt::End).into_iter();
+        let homes = self.halt().into_iter();
         self.ended_agents = (0..).map(AgentId).zip(homes).filter_map(|(id, home)| Some((id, home?))).collect();
     }
 
@@ -288,12 +369,15 @@ struct AgentThread {
     order: Option<Arc<TurnOrder>>,
     /// How long it has made turns since it last slept or yielded its core.
     awake: Duration,
+    watchdog: Watchdog,
+    word: Arc<WatchdogWord>,
+    turns: u32,
 }
 
 impl AgentThread {
     /// The thread's main loop: turn after turn until the agent is asked to end, or is parked. While it is led, its leader has the actor.
     fn run(mut self, mut here: Option<Box<AgentRunner>>, shared: &Shared) -> Option<Box<AgentRunner>> {
-        while !shared.sleep.stopping() {
+        while !(shared.sleep.stopping() && shared.sleep.end_if_stopping(|| self.word.leave())) {
             here = match here {
                 Some(actor) => match self.make_own_turns(actor) {
                     Some(actor) if actor.is_parked() => return actor.kept(),
@@ -402,7 +486,12 @@ impl AgentThread {
     fn turn(&mut self, actor: &mut AgentRunner, timeline: &Timeline, began: Duration, held: Option<Held<'_>>) -> Next {
         self.batch.open();
         let started = Instant::now();
+        self.turns = self.turns.wrapping_add(1);
+        let watched = self.word.begin(self.turns, actor.id());
         let Begun { effort, mut held } = actor.begin_in(timeline, began, held);
+        if !self.word.end(watched) {
+            self.watchdog.resume(actor.id());
+        }
         let now = self.clock.now();
         held.iter_mut().for_each(|held| held.note_end(now));
         let next = match effort {

@@ -134,8 +134,13 @@ impl AgentRunner {
         let is_met = self.peers.broad_phase.get().is_some() || !self.links.is_empty();
         let wanted = if is_met { self.pace.stretch(wanted, timeline, wall, near) } else { wanted };
         let resolution = self.resolution();
+        let step = loop {
+            match self.plan_step(Span::Wanted(wanted)) {
+                Ok(step) => break step,
+                Err(reason) => self.exclude(reason)?,
+            }
+        };
         let led = self.led.members_at(time).count() as u32;
-        let step = self.plan_step(Span::Wanted(wanted))?;
         Ok(Prepared::Steps(PreparedTurn { timeline: *timeline, wall, step, start, wanted, resolution, led, alone }))
     }
 
@@ -147,12 +152,7 @@ impl AgentRunner {
         let PreparedTurn { timeline, wall, start, wanted, resolution, led, alone, .. } = *turn;
         let (StepOutcome { report, dt }, led) = match made {
             Ok(outcome) => (outcome, led),
-            Err(reason) if led == 0 => return Err(reason),
-            // they part: one of them will fail alone, the others find together again
-            Err(_) => {
-                self.release_all();
-                (self.step_alone(Span::Wanted(self.pace.wanted()))?, 0)
-            }
+            Err(reason) => self.step_without_failed(reason, wanted)?,
         };
         if start.dropped > SimSpan::ZERO {
             self.tell(EventKind::RateMissed);

@@ -75,13 +75,14 @@ pub(super) struct Took {
 
 impl AgentRunner {
     /// Tells readers of its turns of the step that is `open`, made in a turn of `led_by`.
-    pub(super) fn tell_turn(&self, open: &PendingTurn, led_by: AgentId, took: Took) {
-        self.shared.streams.turn(|| Turn {
+    pub(super) fn tell_turn(&mut self, open: &PendingTurn, led_by: AgentId, took: Took) {
+        let Self { shared, model, pace, .. } = self;
+        shared.streams.turn(|| Turn {
             begun: took.begun,
             ended: took.ended,
-            time: self.pace.time(),
+            time: pace.time(),
             dt: open.dt,
-            eps_m: self.agent.resolution().map(|held| held.eps_m),
+            eps_m: model.call(|agent| agent.resolution()).ok().flatten().map(|held| held.eps_m),
             led_by,
             late: open.start.late,
             dropped: open.start.dropped,

@@ -44,6 +44,11 @@ use metachron_contact::cluster::DEPTH_DEFAULT_M;
 use metachron_contact::stepper::DEPTH_RANGE_M;
 use metachron_world::Scene;
 use metachron_world::kinds::ExecutorKind;
+use std::ops::RangeInclusive;
+use std::time::Duration;
+
+/// The least and the most time that a turn may be given, seconds.
+const STALL_RANGE_S: RangeInclusive<f64> = 0.001..=3600.0;
 
 /// The only version of the format.
 const FORMAT: i64 = 1;
@@ -100,17 +105,27 @@ fn gravity(c: &mut Checker<'_, '_>, world: Option<&WorldFile>) -> DVec3 {
     given.map_or(GRAVITY_DEFAULT, |g| c.point(&place, "gravity_m_s2", g, GRAVITY_MAX))
 }
 
+/// How long a turn may last.
+fn stall_limit(c: &mut Checker<'_, '_>, stall_s: Option<f64>) -> Option<Duration> {
+    let given_s = c.optional(&Place::new("", ""), "stall_s", stall_s, &allowed(STALL_RANGE_S, "s"))?;
+    Some(Duration::from_secs_f64(given_s))
+}
+
+/// Whether the executor that was asked for takes so many agents.
+fn check_executor(c: &mut Checker<'_, '_>, executor: Option<ExecutorKind>, agents: usize) {
+    if executor == Some(ExecutorKind::Threads) && agents > THREADED_MAX {
+        let what = format!("is `threads`, with {agents} agents");
+        let expected = format!("expected `pool` or `auto`: at most {THREADED_MAX} agents have a thread each");
+        c.wrong(&Place::new("", ""), "executor", what, expected);
+    }
+}
+
 fn assemble(c: &mut Checker<'_, '_>, source: &Source, file: SceneFile, gravity: DVec3, mut objects: Objects) -> Scene {
     if file.format != FORMAT {
         let what = format!("is {}, which this version does not support", file.format);
         c.wrong(&Place::new("", ""), "format", what, format!("expected {FORMAT}"));
     }
-    let agents = objects.agents.len();
-    if file.executor == Some(ExecutorKind::Threads) && agents > THREADED_MAX {
-        let what = format!("is `threads`, with {agents} agents");
-        let expected = format!("expected `pool` or `auto`: at most {THREADED_MAX} agents have a thread each");
-        c.wrong(&Place::new("", ""), "executor", what, expected);
-    }
+    check_executor(c, file.executor, objects.agents.len());
     let probes = build::probes(c, &file.probe, &objects.names);
     // ties between objects that are wrong themselves would give spurious problems
     let sound = c.count() == 0;
@@ -139,6 +154,7 @@ fn assemble(c: &mut Checker<'_, '_>, source: &Source, file: SceneFile, gravity: 
         description: file.description.unwrap_or_default(),
         executor: file.executor.unwrap_or_default(),
         priority: file.priority.unwrap_or_default(),
+        stall_limit: stall_limit(c, file.stall_s),
         states: file.states.unwrap_or_default(),
         environment,
         gravity,

@@ -103,7 +103,7 @@ pub fn play_points(
     };
     let parked = stats().zip(&scene.agents).find_map(|(stats, member)| match &stats.state {
         AgentState::Parked(reason) => Some((member.id, reason.clone())),
-        AgentState::Running | AgentState::Resting | AgentState::Gone => None,
+        AgentState::Running | AgentState::Stalled | AgentState::Resting | AgentState::Gone => None,
     });
     Ok(Some(Played {
         paths: outcome.probes.iter().map(|probe| path(probe.samples.as_deref().unwrap_or_default())).collect(),

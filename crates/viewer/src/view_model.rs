@@ -192,6 +192,7 @@ fn fill_row(row: &mut AgentRow, stats: &AgentStats, newest: &Snapshot) {
     row.force_n = newest.body.tool().map(|tool| tool.force_n);
     row.state = match &stats.state {
         metachron_runtime::AgentState::Running => AgentState::Running,
+        metachron_runtime::AgentState::Stalled => AgentState::Stalled,
         metachron_runtime::AgentState::Resting => AgentState::Resting,
         metachron_runtime::AgentState::Parked(reason) => AgentState::Parked(reason.clone()),
         metachron_runtime::AgentState::Gone => AgentState::Gone,

@@ -292,6 +292,7 @@ impl SceneBuilder {
             description: String::new(),
             executor: ExecutorKind::default(),
             priority: PriorityKind::default(),
+            stall_limit: None,
             states: StatesKind::default(),
             environment: EnvironmentKind::default(),
             gravity,

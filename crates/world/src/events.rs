@@ -29,6 +29,8 @@ pub enum Happening {
     Rests,
     /// It moves again after a rest.
     Wakes,
+    /// Its step lasts too long: it stands still until that ends ([`Scene::stall_limit`](super::Scene::stall_limit)). Not told in lockstep.
+    Stalled,
     /// It failed and stands still from now on.
     Failed,
     /// It was removed.
@@ -251,6 +253,7 @@ fn event_of(tag: WorldTag, object: Object, event: &AgentEvent) -> Event {
         EventKind::ContactBegan(began) | EventKind::ContactGrew(began) => contact(true, began),
         EventKind::ContactEnded(ended) => contact(false, ended),
         EventKind::Wakes => Happening::Wakes,
+        EventKind::Stalled => Happening::Stalled,
         EventKind::Parked => Happening::Failed,
         EventKind::Gone => Happening::Gone,
         EventKind::Joined(leader) => Happening::Joined(tag.object(leader)),

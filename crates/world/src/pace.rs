@@ -7,7 +7,7 @@ use super::kinds::ExecutorKind;
 use super::recording::Entry;
 use super::world::{State, World};
 use metachron_core::{SimSpan, SimTime};
-use metachron_runtime::{AgentHandle, AgentState, SPEED_RANGE, TimelineCommand};
+use metachron_runtime::{AgentHandle, AgentState, SPEED_RANGE, STALLED_FOR_GOOD, TimelineCommand};
 use std::time::Duration;
 
 /// How fast a world's time passes.
@@ -70,9 +70,10 @@ impl World {
 
     /// Lets the world live for `span`, whatever its pace, then stops its time: it stands still.
     ///
-    /// In lockstep every step that is due by then, at [`Pace::Free`] before then, has been made; its clock counts whole nanoseconds, so that at a factor that does not divide
-    /// `span` it lives longer by less than so many nanoseconds. On threads and in the pool each object that neither rests nor has failed
-    /// has lived to the end at least; one whose step is longer than what was left is ahead by less than that step.
+    /// In lockstep every step that is due by then, at [`Pace::Free`] before then, has been made; its clock counts whole nanoseconds, so that at a
+    /// factor that does not divide `span` it lives longer by less than so many nanoseconds. On threads and in the pool each object that neither
+    /// rests nor has failed, nor has been in one step for five seconds, has lived to the end at least; one whose step is longer than what was left
+    /// is ahead by less than that step.
     /// A world that was stopped stays as it is; one that another thread pauses waits until it runs again, and one that another thread puts back
     /// ([`World::restore`]) lives from there what was left of the span.
     pub fn advance(&self, span: SimSpan) {
@@ -180,11 +181,12 @@ impl World {
     }
 }
 
-/// Whether nothing more is to be waited for: the agent has reached `end`, rests on, or has failed. One that wakes at
+/// Whether nothing more is to be waited for: the agent has reached `end`, rests on, has failed, or makes a step that does not end. One that wakes at
 /// the end is to step only after it.
 fn has_reached(agent: &AgentHandle, end: SimTime) -> bool {
     match agent.state() {
         AgentState::Running => agent.lived_to() >= end,
+        AgentState::Stalled => agent.lived_to() >= end || agent.stalled_for() >= STALLED_FOR_GOOD,
         AgentState::Resting => !agent.is_woken(),
         AgentState::Parked(_) | AgentState::Gone => true,
     }

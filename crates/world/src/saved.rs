@@ -41,11 +41,12 @@ impl World {
     }
 
     /// The state of the world now: all that the next bit of it needs, but samples of watched points and CPU times. On threads and in a pool
-    /// turns in progress end first, however long they take, and each object is saved at the end of its own step ([`Checkpoint::times`]): what
+    /// turns in progress end first, and each object is saved at the end of its own step ([`Checkpoint::times`]): what
     /// it has given others is either in their states or still in its own. Any executor goes on from it.
     ///
     /// # Errors
-    /// [`CheckpointError::Refused`] where a model or a governor does not save its state, [`CheckpointError::Stopped`]. The world goes on as it
+    /// [`CheckpointError::Refused`] where a model or a governor does not save its state, and where an object's step has not ended within the time
+    /// that it may last ([`Scene::stall_limit`]), [`CheckpointError::Stopped`]. The world goes on as it
     /// was.
     pub fn checkpoint(&self) -> Result<Checkpoint, CheckpointError> {
         let mut state = self.state();

@@ -24,6 +24,7 @@ use metachron_models::synthetic::SyntheticSpec;
 use metachron_models::tool::ToolSpec;
 use std::ops::Range;
 use std::sync::Arc;
+use std::time::Duration;
 
 /// A scene that can be run.
 #[derive(Debug, Clone)]
@@ -36,6 +37,9 @@ pub struct Scene {
     pub executor: ExecutorKind,
     /// How the operating system schedules the threads of agents.
     pub priority: PriorityKind,
+    /// How long the turn of an object may last, wall time, before the object counts as stalled; `None` for 250 ms. Ten of its steps are
+    /// always allowed, and a cluster's turn so many times as long as it has members. In lockstep nobody looks.
+    pub stall_limit: Option<Duration>,
     /// Time at which states are drawn.
     pub states: StatesKind,
     /// What lights it in pictures.

@@ -126,6 +126,7 @@ impl World {
         if executor != ExecutorKind::Lockstep {
             run.drive(TimelineCommand::Pause);
         }
+        scene.stall_limit.into_iter().for_each(|limit| run.set_stall_limit(limit));
         Ok(Self::of_run(scene, executor, run, Setting { surroundings, clock, log, joined: Arc::default() }))
     }
 

@@ -383,6 +383,7 @@ class Event:
         "rests",
         "wakes",
         "failed",
+        "stalled",
         "gone",
         "joined",
         "left",

@@ -6,7 +6,7 @@
 use super::state_of;
 use crate::cluster::{Hold, Side};
 use crate::laws::{Line, LineLaw, LineStep};
-use crate::stepper::{ClusterStepper, KnownImpulse, LineRow, Matter, Participant};
+use crate::stepper::{ClusterMember, ClusterStepper, KnownImpulse, LineRow, Matter, Participant};
 use crate::{Law, Link, Neighbour};
 use glam::DVec3;
 use metachron_core::{AgentId, Archive, ArchiveError, PairKind, PairState};

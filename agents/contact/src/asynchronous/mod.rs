@@ -16,7 +16,8 @@ pub use ledgers::{GivenAt, Ledgers, TakenImpulse, acknowledged};
 
 use crate::cluster::Side;
 use crate::stepper::{
-    ClusterStepper, ContactMemory, KnownImpulse, LocalQuery, Matter, Participant, Partner, RemoteMember, RemoteView,
+    ClusterMember, ClusterStepper, ContactMemory, KnownImpulse, LocalQuery, Matter, Participant, Partner, RemoteMember,
+    RemoteView,
 };
 use crate::{Law, Neighbour, StepContext};
 use glam::DVec3;
@@ -156,7 +157,7 @@ impl Remotes {
             let (id, context) = (seen.id, StepContext::alone(seen.id, time));
             locals.push(Participant {
                 id,
-                member,
+                member: member.into(),
                 context,
                 laws: &[],
                 memory,
@@ -226,11 +227,11 @@ impl Pairs {
                     list.get_mut(term.block).into_iter().for_each(|sum| *sum += term.map.transpose() * impulse);
                 }
             };
-            blocks::visit_sides(&*one.member, taken.site, taken.impulse, |side, impulse| {
+            blocks::visit_sides(&one.member, taken.site, taken.impulse, |side, impulse| {
                 known.push(KnownImpulse { member: place, side, impulse });
                 add(sums, &side, impulse);
             });
-            blocks::visit_sides(&*one.member, taken.site, taken.carried, |side, way| add(carried, &side, way));
+            blocks::visit_sides(&one.member, taken.site, taken.carried, |side, way| add(carried, &side, way));
         });
         for ((way, sum), weight) in carried.iter_mut().zip(&*sums).zip(&*weight) {
             let force = *sum / dt_s;
@@ -304,7 +305,7 @@ impl Pairs {
             partner.forces.clear();
             partner.forces.resize(blocks.len(), DVec3::ZERO);
             let add = |site: Site, force: Impulse, list: &mut [DVec3]| {
-                blocks::visit_sides(&*one.member, site, force, |side, force| {
+                blocks::visit_sides(&one.member, site, force, |side, force| {
                     for term in side.terms() {
                         if let Ok(at) = blocks.binary_search(&term.block) {
                             list[at] += term.map.transpose() * force;

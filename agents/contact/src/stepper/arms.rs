@@ -11,6 +11,7 @@ use super::Participant;
 use super::springs::{End, Name};
 use super::ties::{FineStep, RowOwner, Ties};
 use crate::cluster::{Hold, JointRow, Side};
+use crate::stepper::ClusterMember;
 use glam::DVec3;
 
 /// Of h² times the stiffness of a force, the share that a body's inertia has to reach: ¼ is where steps begin to throw it.

@@ -44,7 +44,7 @@ impl ClusterStepper {
                 let point_m = skin.map_or(DVec3::NAN, |skin| skin.point(&owner.place, -contact.normal));
                 let given = std::iter::once((owner.member, impulse)).chain(owner.other.map(|at| (at, -impulse)));
                 for (member, impulse_n_s) in given {
-                    give(&mut self.wrenches[member], &*all[member].member, impulse_n_s, point_m);
+                    give(&mut self.wrenches[member], &all[member].member, impulse_n_s, point_m);
                 }
                 if impulse.length() > total.most_n_s {
                     (total.most_n_s, total.point_m, total.normal) = (impulse.length(), point_m, contact.normal);

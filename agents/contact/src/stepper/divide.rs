@@ -3,7 +3,7 @@
 //! In: members, what a solve made of them. Out: how many steps each makes when the macro step begins anew. Never here: going back to its start.
 //! Theory: docs/theory/clusters.md, section 9.
 
-use super::{ClusterStepper, Participant, Role};
+use super::{ClusterMember, ClusterStepper, Participant, Role};
 
 /// The most times as many steps that a member makes whose motion strains it too far.
 const DIVIDED_MAX: u32 = 64;

@@ -4,7 +4,7 @@
 //! Theory: docs/theory/clusters.md, section 9.
 
 use super::participant::place_of;
-use super::{ClusterScene, Participant, Role};
+use super::{ClusterMember, ClusterScene, Participant, Role};
 use metachron_core::AgentId;
 use metachron_geometry::{CollisionShape, ContactTraits, ShapeKind, ShapePose};
 
@@ -108,6 +108,7 @@ mod tests {
                 .iter_mut()
                 .map(|(id, member, memory, grips)| {
                     let context = StepContext::alone(*id, SimTime::ZERO);
+                    let member = member.into();
                     Participant { id: *id, member, context, laws: &[], memory, parts: 1, alone_s: 0.01, grips }
                 })
                 .collect();

@@ -56,12 +56,14 @@ impl StepDoubling {
         stepper.keep(all);
         all.iter_mut().for_each(|one| one.parts *= 2);
         let outcome = stepper.step(scene, all, dt, threads);
+        // what cannot be made in shorter steps may be made in these
+        all.iter().for_each(|one| one.member.forgive());
         if outcome.is_ok() {
             finer.resize_with(all.len(), Vec::new);
-            all.iter().zip(finer).for_each(|(one, places)| probe(&*one.member, places));
+            all.iter().zip(finer).for_each(|(one, places)| probe(&one.member, places));
         }
         all.iter_mut().for_each(|one| one.parts /= 2);
-        stepper.go_back(all);
+        stepper.go_back_all(all);
         let report = outcome?;
         *made = true;
         Ok(report.work)
@@ -82,7 +84,7 @@ impl StepDoubling {
             off.iter_mut().for_each(Vec::clear);
         }
         for ((one, finer), off) in all.iter().zip(finer).zip(off) {
-            probe(&*one.member, now);
+            probe(&one.member, now);
             off.resize(now.len(), DVec3::ZERO);
             off.iter_mut().zip(now.iter().zip(finer)).for_each(|(off, (now, finer))| *off += *now - *finer);
             apart_m.push(off.iter().map(|off| off.length_squared()).fold(0.0, f64::max).sqrt());

@@ -7,7 +7,7 @@ use super::outside::respond;
 use super::progress::Progress;
 use super::search::Search;
 use super::ties::Ties;
-use super::{Participant, Role};
+use super::{ClusterMember, Participant, Role};
 use crate::cluster::Side;
 use glam::DVec3;
 
@@ -63,7 +63,7 @@ impl Foresight {
             else {
                 continue;
             };
-            let (member, state) = (&*all[moved.member].member, &progress[moved.member]);
+            let (member, state) = (&all[moved.member].member, &progress[moved.member]);
             gains.extend(state.seen.iter().zip(&state.before).map(|(seen, before)| *seen - *before));
             if member.role() != Role::Rigid {
                 continue;

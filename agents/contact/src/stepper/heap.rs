@@ -10,7 +10,7 @@ use super::pair_total::total_of;
 use super::participant::place_of;
 use super::progress::Progress;
 use super::search::Search;
-use super::{ClusterReport, ClusterScene, Locked, PairTotal, Participant, Partner};
+use super::{ClusterMember, ClusterReport, ClusterScene, Locked, PairTotal, Participant, Partner};
 use glam::{DMat3, DQuat, DVec3};
 use metachron_core::{AgentId, Archive, ArchiveError, StepError, Wrench, archive_values};
 use metachron_geometry::narrow_phase::StaticSolid;

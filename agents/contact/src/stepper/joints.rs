@@ -21,6 +21,7 @@ use super::yielding::{Frame, Slides, SlidingRow, YieldLimit};
 use crate::cluster::{Hold, JointRow, Side, SideTerm};
 use crate::joint::{Joint, JointKind};
 use crate::push_out::PUSH_OUT_MAX_M_S;
+use crate::stepper::ClusterMember;
 use glam::{DQuat, DVec3};
 use metachron_core::{Anchor, shortest_turn};
 use metachron_geometry::narrow_phase::TouchKey;

@@ -12,6 +12,7 @@ use super::ties::{FineStep, Holders, Ties};
 use super::yielding::{Frame, YieldLimit};
 use crate::agent::tool_extrapolation_s;
 use crate::law::{Law, Link};
+use crate::stepper::ClusterMember;
 use glam::DVec3;
 use metachron_core::{Anchor, Body};
 

@@ -4,7 +4,7 @@
 //! who the partners are, which blocks. Theory: docs/theory/coupling.md, section 3 (eq. 7m).
 
 use super::outside::respond;
-use super::{ClusterStepper, Participant};
+use super::{ClusterMember, ClusterStepper, Participant};
 use glam::DVec3;
 use metachron_core::{LocalBlock, LocalModel};
 
@@ -43,7 +43,7 @@ impl ClusterStepper {
     /// Fills blocks, compliance and step of a local model from the macro step that was made last.
     pub fn local_model(&mut self, all: &[Participant<'_>], query: &LocalQuery<'_>, into: &mut LocalModel) {
         let LocalQuery { place, blocks, .. } = *query;
-        let member = &*all[place].member;
+        let member = &all[place].member;
         let (share, held) = (f64::from(self.progress[place].share), self.progress[place].held);
         (into.step_s, into.held) = (self.macro_s, held);
         let in_problem = self.progress[place].place.filter(|_| held);
@@ -68,7 +68,7 @@ impl ClusterStepper {
 
     /// W of a participant that nothing touched.
     fn own_compliance(&mut self, all: &[Participant<'_>], query: &LocalQuery<'_>, into: &mut LocalModel) {
-        let (member, blocks) = (&*all[query.place].member, query.blocks);
+        let (member, blocks) = (&all[query.place].member, query.blocks);
         let Self { local, .. } = self;
         let [x, residual] = local;
         into.compliance.clear();

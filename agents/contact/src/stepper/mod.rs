@@ -21,6 +21,7 @@ mod divide;
 mod domain;
 mod doubling;
 mod foresight;
+mod guarded;
 mod heap;
 mod joints;
 mod links;
@@ -36,6 +37,7 @@ mod participant;
 mod plan;
 mod progress;
 mod remote;
+mod restart;
 mod scene;
 mod search;
 mod solve;
@@ -52,6 +54,8 @@ use blows::Rebounds;
 use divide::times;
 pub use doubling::StepDoubling;
 use glam::DVec3;
+use guarded::Lent;
+pub use guarded::{BadAnswer, CallMark, GuardedMember};
 use heap::{Heap, Sums};
 pub use joints::JointTotal;
 use joints::Joints;
@@ -70,6 +74,7 @@ pub use remote::{RemoteMember, RemoteView};
 pub use scene::{BadDepth, ClusterScene, DEPTH_RANGE_M, Passage};
 use search::{Judge, Round, Search};
 use spin_friction::SpinFriction;
+use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
 use tearing::Tearing;
 pub use tearing::Torn;
 use ties::{FineStep, Ties};
@@ -121,6 +126,7 @@ pub struct ClusterStepper {
     spins: SpinFriction,
     progress: Vec<Progress>,
     members: Vec<Member<'static>>,
+    lent: Vec<Option<Lent<'static>>>,
     totals: Vec<PairTotal>,
     /// What contacts gave each participant in the macro step, N·s and N·m·s.
     wrenches: Vec<Wrench>,
@@ -129,6 +135,8 @@ pub struct ClusterStepper {
     yielding: Yielding,
     /// What participants remembered when the macro step began.
     kept: Vec<ContactMemory>,
+    /// Whether that is of this macro step, and members have kept their states.
+    is_kept: bool,
     rebounds: Rebounds,
     heap: Heap,
     /// The participant of each member of the problem.
@@ -157,12 +165,14 @@ impl Default for ClusterStepper {
             spins: SpinFriction::default(),
             progress: Vec::new(),
             members: Vec::new(),
+            lent: Vec::new(),
             totals: Vec::new(),
             wrenches: Vec::new(),
             efforts: Vec::new(),
             tearing: Tearing::default(),
             yielding: Yielding::default(),
             kept: Vec::new(),
+            is_kept: false,
             rebounds: Rebounds::default(),
             heap: Heap::default(),
             places: Vec::new(),
@@ -208,6 +218,9 @@ impl ClusterStepper {
     /// # Errors
     /// [`StepError::BadSpan`] for a span that no body steps by. [`StepError::Diverged`] where the state of a member stops being finite: all are
     /// as they were.
+    ///
+    /// # Panics
+    /// Where a member does, or answers what no step goes on with ([`GuardedMember`]): all others are as they were.
     pub fn step(
         &mut self,
         scene: &ClusterScene,
@@ -216,6 +229,17 @@ impl ClusterStepper {
         threads: &dyn ParallelFor,
     ) -> Result<ClusterReport, StepError> {
         check_span(dt)?;
+        self.is_kept = false;
+        let made = catch_unwind(AssertUnwindSafe(|| self.make(On { scene, threads }, all, dt)));
+        made.unwrap_or_else(|panic| {
+            self.put_back(all);
+            resume_unwind(panic)
+        })
+    }
+
+    /// The same; after a panic members are where it came.
+    fn make(&mut self, on: On<'_>, all: &mut [Participant<'_>], dt: SimSpan) -> Result<ClusterReport, StepError> {
+        let On { scene, threads } = on;
         self.progress.resize_with(all.len(), Progress::default);
         self.progress.iter_mut().for_each(|state| state.work = 0.0);
         let mut report = ClusterReport::default();
@@ -228,7 +252,7 @@ impl ClusterStepper {
         self.keep(all);
         // each time at least one member makes twice as many steps, at most 64 times as many as it began with
         loop {
-            match self.advance(On { scene, threads }, all, dt, &mut report) {
+            match self.advance(on, all, dt, &mut report) {
                 Ok(true) => break,
                 Ok(false) => self.go_back(all),
                 Err(error) => {
@@ -247,7 +271,7 @@ impl ClusterStepper {
         for_each(threads, all, &mut self.progress, &Participant::size, &|one, state| {
             let own_s = dt_s / f64::from(one.parts);
             one.member.look(&one.context, dt_s);
-            state.begin(one.member, own_s);
+            state.begin(&mut one.member, own_s);
             let more = times(one.member.strain(one.member.free(), own_s));
             state.parts = one.parts * more;
             state.begun_s = if more == 1 { own_s } else { 0.0 };
@@ -341,24 +365,6 @@ impl ClusterStepper {
         Ok(())
     }
 
-    /// Keeps what a macro step starts from.
-    fn keep(&mut self, all: &mut [Participant<'_>]) {
-        self.kept.resize_with(all.len(), ContactMemory::default);
-        for (one, kept) in all.iter_mut().zip(&mut self.kept) {
-            one.member.keep();
-            kept.clone_from(one.memory);
-        }
-    }
-
-    /// Goes back to the start of the macro step.
-    fn go_back(&mut self, all: &mut [Participant<'_>]) {
-        for ((one, kept), state) in all.iter_mut().zip(&self.kept).zip(&mut self.progress) {
-            one.member.go_back();
-            one.memory.clone_from(kept);
-            state.begun_s = 0.0;
-        }
-    }
-
     /// What pairs and links gave in the last macro step, by participants and partners.
     pub fn totals(&self) -> &[PairTotal] {
         &self.totals
@@ -421,7 +427,7 @@ impl ClusterStepper {
         for_each(threads, all, &mut self.progress, &Participant::size, &|one, state| {
             let own_s = h_s * f64::from(state.share);
             if state.part == 0 && state.begun_s != own_s {
-                state.begin(one.member, own_s);
+                state.begin(&mut one.member, own_s);
             }
         });
         self.first_failure()?;
@@ -429,11 +435,11 @@ impl ClusterStepper {
             if state.part == 0 {
                 let own_s = h_s * f64::from(state.share);
                 state.begun_s = 0.0;
-                state.start(&*one.member);
+                state.start(&one.member);
                 self.outside.act(place, one, [own_s, self.macro_s], state);
             }
             state.part += 1;
-            state.look(&*one.member);
+            state.look(&one.member);
         }
         Ok(())
     }
@@ -471,7 +477,7 @@ impl ClusterStepper {
         let Self { progress, tearing, .. } = self;
         for (place, (one, state)) in all.iter().zip(progress).enumerate() {
             if state.part == 0 {
-                tearing.note_own(place, one.member, h_s * f64::from(state.share));
+                tearing.note_own(place, &one.member, h_s * f64::from(state.share));
             }
         }
         Ok(())

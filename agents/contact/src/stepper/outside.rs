@@ -6,7 +6,8 @@
 use super::memory::Partner;
 use super::progress::Progress;
 use super::ties::{FineStep, RowOwner, Ties};
-use super::{ClusterMember, Participant};
+use super::{ClusterMember, GuardedMember, Participant};
+use crate::cluster::Response;
 use crate::cluster::{Hold, JointRow, Side};
 use glam::DVec3;
 
@@ -96,7 +97,7 @@ impl Outside {
         state: &mut Progress,
     ) {
         let Self { known, scratch, residual, .. } = self;
-        let (member, forces) = (&*one.member, one.context.forces);
+        let (member, forces) = (&one.member, one.context.forces);
         scratch.clear();
         if forces.is_empty() && !known.iter().any(|known| known.member == place) {
             return state.push(&[]);
@@ -186,9 +187,9 @@ impl Ties {
 }
 
 /// Replaces impulses on the blocks of a member by the velocities that they make: A⁻¹ of them.
-pub(super) fn respond(member: &dyn ClusterMember, impulses: &mut [DVec3], residual: &mut Vec<DVec3>) {
-    if let Some(response) = member.response() {
-        return response.respond(impulses);
+pub(super) fn respond(member: &GuardedMember<'_>, impulses: &mut [DVec3], residual: &mut Vec<DVec3>) {
+    if let Some(lent) = member.lent() {
+        return lent.respond(impulses);
     }
     // block Gauss–Seidel: exact after one sweep where no blocks are coupled, as of rigid bodies
     residual.clear();

@@ -9,6 +9,7 @@ use super::springs::{Name, Pull};
 use super::ties::{FineStep, Ties};
 use super::yielding::{Frame, SLIP_SHARE, Slides, SlidingRow};
 use crate::cluster::{Hold, JointRow, Side, Spring};
+use crate::stepper::ClusterMember;
 use glam::DVec3;
 
 impl Ties {

@@ -2,7 +2,7 @@
 //!
 //! In: a member, its context, its memory. Out: which others it may touch. Never here: the step.
 
-use super::{ClusterMember, ContactMemory};
+use super::{ClusterMember, ContactMemory, GuardedMember};
 use crate::StepContext;
 use crate::law::Law;
 use metachron_core::{AgentId, Grip};
@@ -12,7 +12,7 @@ pub struct Participant<'a> {
     /// The agent's number.
     pub id: AgentId,
     /// The body.
-    pub member: &'a mut dyn ClusterMember,
+    pub member: GuardedMember<'a>,
     /// What it sees at the start of the macro step.
     pub context: StepContext<'a>,
     /// The laws of its pairs other than [`Law::Cluster`], by rising numbers: a pair with one is not the cluster's.

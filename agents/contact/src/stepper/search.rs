@@ -13,7 +13,7 @@ use super::domain::Domain;
 use super::memory::Partner;
 use super::scene::{ClusterScene, Passage};
 use super::spin_friction::Spin;
-use super::{Participant, Progress, Role};
+use super::{ClusterMember, Participant, Progress, Role};
 use crate::cluster::Contact;
 use boxes::Boxes;
 pub(super) use facing::velocity;
@@ -314,7 +314,7 @@ impl Search {
     fn touch(&mut self, round: &Round<'_, '_>, pair: Pair<'_>, reaching: Reaching) -> Meeting {
         let Reaching { reach_m, swept_m } = reaching;
         let Self { touches: into, scratch, sweep, .. } = self;
-        let body = &*round.all[pair.member].member;
+        let body = &round.all[pair.member].member;
         let (now, end) = (Meeting::default(), Meeting { after_s: round.h_s, ..Meeting::default() });
         let Some(skin) = body.skin() else { return now };
         if let Some(reach_m) = swept_m {

@@ -7,8 +7,8 @@ use super::joints::Aimed;
 use super::progress::Progress;
 use super::search::{Judge, Round, Search};
 use super::ties::Ties;
-use super::{ClusterReport, ClusterStepper, On, Participant, Role, times};
-use crate::cluster::{Member, Problem, ProblemError, StepForm};
+use super::{ClusterMember, ClusterReport, ClusterStepper, On, Participant, Role, times};
+use crate::cluster::{Member, Problem, ProblemError, Response, StepForm};
 use glam::DVec3;
 use metachron_core::{ParallelFor, StepError, recycled};
 
@@ -113,7 +113,7 @@ impl ClusterStepper {
         threads: &dyn ParallelFor,
         report: &mut ClusterReport,
     ) -> Result<(), StepError> {
-        let Self { solver, search, ties, progress, members, .. } = self;
+        let Self { solver, search, ties, progress, members, lent, .. } = self;
         // what no row touches and knows how it would move does so, and makes no problem larger
         let mut count = 0..;
         progress.iter_mut().for_each(|state| state.place = (!state.unanswered.is_empty()).then_some(0));
@@ -121,11 +121,12 @@ impl ClusterStepper {
         sides.filter(|side| !side.terms().is_empty()).for_each(|side| progress[side.member].place = Some(0));
         let involved = progress.iter_mut().filter(|state| state.place.is_some());
         involved.for_each(|state| state.place = count.next());
-        let mut list = recycled(std::mem::take(members));
-        let taking = all.iter().zip(&*progress).filter(|(_, state)| state.place.is_some());
-        list.extend(taking.map(|(one, state)| Member {
+        let (mut list, mut lenders) = (recycled(std::mem::take(members)), recycled(std::mem::take(lent)));
+        let taking = || all.iter().zip(&*progress).filter(|(_, state)| state.place.is_some());
+        lenders.extend(taking().map(|(one, _)| one.member.lent()));
+        list.extend(taking().zip(&lenders).map(|((one, state), lender)| Member {
             blocks: one.member.blocks(),
-            response: one.member.response(),
+            response: lender.as_ref().map(|lender| lender as &dyn Response),
             free: &state.seen,
             unanswered: &state.unanswered,
             now: &state.before,
@@ -136,12 +137,15 @@ impl ClusterStepper {
         solver.set_form(if list.iter().all(has_factor) { StepForm::Direct } else { StepForm::Iterative });
         let problem = Problem { h_s, members: &list, contacts: &search.contacts, rows: &ties.rows, threads };
         let outcome = solver.solve(&problem).map(|solution| solution.report);
-        *members = recycled(list);
+        (*members, *lent) = (recycled(list), recycled(lenders));
         let places = &mut self.places;
         places.clear();
         places.extend(progress.iter().enumerate().filter_map(|(member, state)| state.place.map(|_| member)));
         move_sides(search, ties, |place| places.get(place).copied());
-        let took = outcome.map_err(|error| refused(&error, h_s))?;
+        let took = outcome.map_err(|error| {
+            blame(&error, all, places);
+            refused(&error, h_s)
+        })?;
         // a blow that would make energy is none
         for (contact, rebounds) in search.contacts.iter_mut().zip(&solver.solution().rebounds) {
             if !rebounds {
@@ -205,6 +209,15 @@ fn move_sides(search: &mut Search, ties: &mut Ties, to: impl Fn(usize) -> Option
     for side in sides.filter(|side| !side.terms().is_empty()) {
         side.member = to(side.member).unwrap_or(side.member);
     }
+}
+
+/// Blames the participant whose matrix or velocities are none, of the members at these `places`.
+fn blame(error: &ProblemError, all: &[Participant<'_>], places: &[usize]) {
+    let (ProblemError::Member { member, .. } | ProblemError::NotPositiveDefinite { member, .. }) = *error else {
+        return;
+    };
+    let blamed = places.get(member).and_then(|place| all.get(*place));
+    blamed.into_iter().for_each(|one| one.member.reject(error.to_string()));
 }
 
 fn refused(error: &ProblemError, dt_s: f64) -> StepError {

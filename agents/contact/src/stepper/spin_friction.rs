@@ -7,6 +7,7 @@ use super::Participant;
 use super::search::Search;
 use super::ties::Ties;
 use crate::cluster::{Hold, JointRow, Pressed, Side};
+use crate::stepper::ClusterMember;
 use glam::DVec3;
 
 /// The rows of spins of a fine step, in the order of those behind the rows of joints.

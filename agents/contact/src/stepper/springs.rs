@@ -11,6 +11,7 @@ use super::yielding::{Slides, YieldLimit};
 use crate::AnchorSpring;
 use crate::agent::tool_extrapolation_s;
 use crate::cluster::{Hold, JointRow, Side, Spring};
+use crate::stepper::ClusterMember;
 use glam::{DQuat, DVec3};
 use metachron_core::{AgentId, Anchor, Body, shortest_turn};
 

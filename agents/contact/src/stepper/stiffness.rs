@@ -6,7 +6,7 @@
 use super::memory::Partner;
 use super::pair_total::PairTotal;
 use super::participant::place_of;
-use super::{ClusterStepper, Drive, Participant, Role};
+use super::{ClusterMember, ClusterStepper, Drive, Participant, Role};
 use crate::cluster::Side;
 use glam::DVec3;
 

@@ -7,7 +7,7 @@ use super::member::{Pose, Slid};
 use super::memory::Partner;
 use super::springs::{Name, Pull};
 use super::ties::{FineStep, Ties};
-use super::{Participant, Progress};
+use super::{ClusterMember, Participant, Progress};
 use crate::cluster::JointRow;
 use crate::joint::{Joint, JointKind};
 use crate::law::Link;

@@ -118,13 +118,21 @@ impl Scales {
         let [parts, cube_parts] = [0, 1].map(|at| plan.parts_in(roles[at], wanted_s[at]));
         let [id, cube_id] = [0, 1].map(AgentId);
         let context = StepContext::alone(id, *time);
-        let first =
-            Participant { id, member, context, laws: &[], memory: of_agent, parts, alone_s: wanted_s[0], grips: held };
+        let first = Participant {
+            id,
+            member: member.into(),
+            context,
+            laws: &[],
+            memory: of_agent,
+            parts,
+            alone_s: wanted_s[0],
+            grips: held,
+        };
         let context = StepContext::alone(cube_id, *time);
         let (member, alone_s) = (cube, wanted_s[1]);
         let second = Participant {
             id: cube_id,
-            member,
+            member: member.into(),
             context,
             laws: &[],
             memory: of_cube,

@@ -126,7 +126,16 @@ impl Clocks {
         let context = StepContext { neighbours: &neighbours, hands, links, ..StepContext::alone(id, *time) };
         let mut list: Vec<Participant<'_>> = Vec::with_capacity(8);
         let member = agent.member().unwrap();
-        list.push(Participant { id, member, context, laws: &laws, memory, parts: 1, alone_s: dt.as_secs_f64(), grips });
+        list.push(Participant {
+            id,
+            member: member.into(),
+            context,
+            laws: &laws,
+            memory,
+            parts: 1,
+            alone_s: dt.as_secs_f64(),
+            grips,
+        });
         let sides = [Some(&mut *pairs)];
         let round = move || {
             let (mut list, mut sides) = (list, sides);

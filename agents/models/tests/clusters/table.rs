@@ -195,7 +195,16 @@ impl Table {
                 StepContext { neighbours: &neighbours, hands, links, ..StepContext::alone(AgentId(id), self.time) };
             let member = agent.member().unwrap();
             let parts = plan.parts_in(role, wanted_s);
-            all.push(Participant { id: AgentId(id), member, context, laws, memory, parts, alone_s: wanted_s, grips });
+            all.push(Participant {
+                id: AgentId(id),
+                member: member.into(),
+                context,
+                laws,
+                memory,
+                parts,
+                alone_s: wanted_s,
+                grips,
+            });
         }
         let mut report = ClusterReport::default();
         if let Some(doubling) = &mut self.doubling {

@@ -168,7 +168,7 @@ impl StepHarness {
             let parts = plan.parts_in(role, step_s);
             all.extend(agent.member().map(|member| Participant {
                 id,
-                member,
+                member: member.into(),
                 context,
                 laws: &[],
                 memory,

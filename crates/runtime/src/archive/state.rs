@@ -138,7 +138,7 @@ impl AgentRunner {
     }
 
     fn archive_parts(&mut self, archive: &mut Archive<'_>) -> Result<(), ArchiveError> {
-        self.agent.archive(archive)?;
+        self.model.archive(archive)?;
         archive_values!(archive, self.pace, self.loads, self.open, self.was_near, self.withheld)?;
         archive_values!(archive, self.announced, self.turn_period)?;
         self.led.archive(archive)?;

@@ -135,10 +135,17 @@ impl Led {
     pub fn release_parked(&mut self) {
         self.seats.extract_if(.., |seat| seat.actor.is_parked()).for_each(|mut seat| {
             if seat.actor.shared.gauges.has_left() {
+                seat.actor.vanish();
                 seat.actor.forget();
             }
             seat.actor.return_turns();
         });
+    }
+
+    /// Lets those return that have refused the step that was made last, each by itself.
+    pub(super) fn release_refusing(&mut self) {
+        let refusing = self.seats.extract_if(.., |seat| seat.actor.model.take_refused());
+        refusing.for_each(|seat| seat.actor.return_turns());
     }
 
     /// Adds `actor` and all it leads.
@@ -195,7 +202,7 @@ impl AgentRunner {
     /// Shows the last states of those it leads and lets them return: it makes no more turns.
     pub fn disband(&mut self, timeline: &Timeline, wall: Duration) {
         self.conclude_led(timeline, Took { begun: wall, ended: wall });
-        self.release_all();
+        self.release_together();
         if self.shared.gauges.has_left() {
             self.forget();
         }
@@ -204,6 +211,13 @@ impl AgentRunner {
     /// Lets all it leads return, each by itself: those that belong together find together again.
     pub fn release_all(&mut self) {
         self.led.seats.drain(..).for_each(|seat| seat.actor.return_turns());
+    }
+
+    /// Lets all it leads return, led by the lowest of them: they go on as one without it.
+    pub(super) fn release_together(&mut self) {
+        let mut leaving: Vec<Seat> = self.led.seats.drain(..).collect();
+        leaving.iter_mut().for_each(|seat| seat.group = 1);
+        return_groups(leaving);
     }
 
     /// Admits nobody any more.

@@ -4,7 +4,7 @@
 //!
 //! admit      agents that want to be led
 //! gather     each to the leader's time: one that is behind steps alone, one that is ahead waits
-//! step       all that are at one time as one problem ([`super`]); where that fails they part, to fail alone or not at all
+//! step       all that are at one time as one problem ([`super::macro_step`]); where that fails, without those who are to blame ([`super::exclusion`])
 //! write, conclude    the state of each by its own writer
 //! part       those that have lost touch make their own turns again; several that still belong together are led by the lowest number
 //!

@@ -1,14 +1,14 @@
 //! Supervisor of a pool's workers: starts, watches, replaces and joins them.
 //!
-//! In: the pool's shared state. Out: a thread for each worker's place, until the end. A step that does not return costs one agent and one
-//! thread: the agent is parked with the reason, and another worker takes the place. Never here: turns.
+//! In: the pool's shared state. Out: a thread for each worker's place, until the end. A step that lasts too long costs one thread: its agent is
+//! stalled, and another worker takes the place; the first one ends with that step. Never here: turns.
 
 use super::super::cluster::return_arrivals;
 use super::super::handle::AgentHandle;
 use super::super::priority::Priority;
 use super::super::sleep::Halt;
+use super::super::watchdog::{Seen, Watchdog, WatchdogWord, WatchedTurn};
 use super::shared::PoolState;
-use super::watchdog::{WatchdogWord, WatchedTurn};
 use super::worker::Worker;
 use metachron_core::AgentId;
 use std::io;
@@ -17,19 +17,24 @@ use std::sync::mpsc::{Receiver, Sender, channel};
 use std::thread::{self, JoinHandle};
 use std::time::Duration;
 
-/// A worker is given up when it is found in the same turn this many times in a row: after a suspension of the whole machine it is found so
-/// only once.
-const CHECKS_MAX: u32 = 4;
-
 /// All workers and their state.
 pub(super) struct Supervisor {
     state: Arc<PoolState>,
     workers: Vec<WorkerRecord>,
+    team: Team,
     started: u32,
-    patience: Duration,
-    priority: Priority,
     sender: Sender<Message>,
     messages: Receiver<Message>,
+}
+
+/// What a supervisor begins with.
+pub(super) struct Team {
+    /// How many workers there are to be.
+    pub places: usize,
+    pub watchdog: Watchdog,
+    pub priority: Priority,
+    /// Workers in whose places others work: their turns have not ended.
+    pub stuck: Vec<WorkerRecord>,
 }
 
 /// A message to the supervisor.
@@ -41,12 +46,11 @@ pub(super) enum Message {
 }
 
 /// One worker.
-struct WorkerRecord {
+pub(super) struct WorkerRecord {
     number: u32,
-    watchdog: Arc<WatchdogWord>,
+    pub watchdog: Arc<WatchdogWord>,
     thread: Option<JoinHandle<()>>,
-    seen: Option<WatchedTurn>,
-    checks: u32,
+    seen: Seen,
 }
 
 /// Reports that a worker has ended, for whatever reason.
@@ -63,10 +67,10 @@ impl Drop for EndNotice {
 }
 
 impl Supervisor {
-    /// Starts a worker for each of `places`; a step that takes longer than `patience` is given up.
-    pub fn start(state: Arc<PoolState>, places: usize, patience: Duration, priority: Priority) -> io::Result<Self> {
-        let (sender, messages) = channel();
-        let mut supervisor = Self { state, workers: Vec::new(), started: 0, patience, priority, sender, messages };
+    /// Starts a worker for each place.
+    pub fn start(state: Arc<PoolState>, team: Team) -> io::Result<Self> {
+        let ((sender, messages), places) = (channel(), team.places);
+        let mut supervisor = Self { state, workers: Vec::new(), team, started: 0, sender, messages };
         for at in 0..places {
             match supervisor.start_worker(at) {
                 Ok(worker) => supervisor.workers.push(worker),
@@ -85,16 +89,17 @@ impl Supervisor {
         self.sender.clone()
     }
 
-    /// Watches the workers until the run is to end, and ends it.
-    pub fn watch(mut self) {
+    /// Watches the workers until the run is to end, and ends it; those whose turns do not end are left.
+    pub fn watch(mut self) -> Vec<WorkerRecord> {
         let why = loop {
-            match self.messages.recv_timeout(self.patience / CHECKS_MAX) {
+            match self.messages.recv_timeout(self.team.watchdog.limit.interval()) {
                 Ok(Message::Stop(why)) => break why,
                 Ok(Message::Ended(number)) => self.on_ended(number),
                 Err(_) => self.check(),
             }
         };
         self.join_all(why);
+        self.team.stuck
     }
 
     fn start_worker(&mut self, at: usize) -> io::Result<WorkerRecord> {
@@ -102,26 +107,27 @@ impl Supervisor {
         self.started += 1;
         let (state, notice) = (Arc::clone(&self.state), EndNotice { number, sender: self.sender.clone() });
         let body = {
-            let (watchdog, priority) = (Arc::clone(&watchdog), self.priority);
+            let (word, watchdog, priority) = (Arc::clone(&watchdog), self.team.watchdog.clone(), self.team.priority);
             move || {
                 let _notice = notice;
                 // a refusal was already reported to the caller of `Priority::ask`
                 drop(priority.take());
-                Worker::new(state, at, watchdog).work();
+                Worker::new(state, at, word, watchdog).work();
             }
         };
         let thread = thread::Builder::new().name(format!("pool:{at}")).spawn(body)?;
-        Ok(WorkerRecord { number, watchdog, thread: Some(thread), seen: None, checks: 0 })
+        Ok(WorkerRecord { number, watchdog, thread: Some(thread), seen: Seen::default() })
     }
 
     fn check(&mut self) {
+        let watchdog = self.team.watchdog.clone();
+        self.team.stuck.retain_mut(|worker| {
+            watchdog.judge(&worker.watchdog, &mut worker.seen);
+            !worker.has_ended()
+        });
         for at in 0..self.workers.len() {
             let worker = &mut self.workers[at];
-            let turn = worker.watchdog.current();
-            worker.checks = if turn.is_some() && turn == worker.seen { worker.checks + 1 } else { 0 };
-            worker.seen = turn;
-            if let Some(turn) = turn.filter(|turn| worker.checks >= CHECKS_MAX && worker.watchdog.give_up(*turn)) {
-                self.park_stuck(turn.agent(), self.patience);
+            if watchdog.judge(&worker.watchdog, &mut worker.seen) {
                 self.replace(at);
             }
         }
@@ -139,7 +145,8 @@ impl Supervisor {
     /// If the system gives no more threads, the other workers continue without this one.
     fn replace(&mut self, at: usize) {
         if let Ok(worker) = self.start_worker(at) {
-            self.workers[at] = worker;
+            let before = std::mem::replace(&mut self.workers[at], worker);
+            self.team.stuck.extend(Some(before).filter(|worker| !worker.has_ended()));
         }
     }
 
@@ -166,26 +173,49 @@ impl Supervisor {
         drop(worker.and_then(|worker| worker.thread.take()).map(JoinHandle::join));
     }
 
-    /// Waits for the workers until a timeout, for a cut that after which a step is given up anyway: one that takes longer counts as hung, and
-    /// its thread is left behind.
+    /// Waits for the workers: for a cut until only those are left whose turns are stalled, at the end until a timeout, where a step that takes longer
+    /// counts as hung. The threads of these are left behind.
     fn join_all(&mut self, why: Halt) {
         let mut patience = Duration::ZERO;
-        while self.workers.iter().any(|worker| worker.thread.is_some()) {
-            let turns = self.workers.iter().filter_map(|worker| worker.watchdog.current());
+        let watchdog = self.team.watchdog.clone();
+        loop {
+            self.team.stuck.retain(|worker| !worker.has_ended());
+            let mut missing = self.workers.iter().filter(|worker| worker.thread.is_some()).peekable();
+            if missing.peek().is_none() && (why == Halt::Cut || self.team.stuck.is_empty()) {
+                break;
+            }
+            let turns = missing.chain(&self.team.stuck).filter_map(|worker| worker.watchdog.current());
             patience = match why {
                 Halt::End => self.state.sleep.end_patience(turns.map(WatchedTurn::agent)),
-                Halt::Cut => self.patience,
+                Halt::Cut => watchdog.limit.interval(),
             };
-            match self.messages.recv_timeout(patience) {
-                Ok(Message::Ended(number)) => self.join(number),
-                Ok(Message::Stop(_)) => {}
-                Err(_) => break,
+            match (self.messages.recv_timeout(patience), why) {
+                (Ok(Message::Ended(number)), _) => self.join(number),
+                (Ok(Message::Stop(_)), _) => {}
+                (Err(_), Halt::End) => break,
+                (Err(_), Halt::Cut) => self.set_stuck_aside(),
             }
         }
-        for worker in self.workers.iter().filter(|worker| worker.thread.is_some()) {
-            if let Some(turn) = worker.watchdog.current().filter(|turn| worker.watchdog.give_up(*turn)) {
-                self.park_stuck(turn.agent(), patience);
-            }
+        if why == Halt::Cut {
+            return;
         }
+        let left = self.workers.iter().filter(|worker| worker.thread.is_some()).chain(&self.team.stuck);
+        left.filter_map(|worker| worker.watchdog.current()).for_each(|turn| self.park_stuck(turn.agent(), patience));
+    }
+
+    /// Waits no longer for workers whose turns are stalled.
+    fn set_stuck_aside(&mut self) {
+        let watchdog = &self.team.watchdog;
+        for worker in self.workers.iter_mut().filter(|worker| worker.thread.is_some()) {
+            watchdog.judge(&worker.watchdog, &mut worker.seen);
+        }
+        let stuck = self.workers.extract_if(.., |worker| worker.thread.is_some() && worker.watchdog.is_stalled());
+        self.team.stuck.extend(stuck);
+    }
+}
+
+impl WorkerRecord {
+    fn has_ended(&self) -> bool {
+        self.thread.as_ref().is_none_or(JoinHandle::is_finished)
     }
 }

@@ -6,19 +6,19 @@ use super::*;
 use metachron_core::{AgentId, SimTime};
 use std::collections::BTreeSet;
 
-fn pool(spawns: Vec<AgentSpawn>, workers: usize, patience: Duration) -> Box<Pool> {
-    running(Pool::with_workers(spawns, system(), workers, patience, Priority::Normal).unwrap())
+fn pool(spawns: Vec<AgentSpawn>, workers: usize, limit: Duration) -> Box<Pool> {
+    running(Pool::with_workers(spawns, system(), workers, StallLimit::of(limit), Priority::Normal).unwrap())
 }
 
 const LONG: Duration = Duration::from_secs(60);
 const SHORT: Duration = Duration::from_millis(200);
 
-fn parked(agent: &AgentHandle) -> bool {
-    matches!(agent.state(), AgentState::Parked(_))
+fn stalled(agent: &AgentHandle) -> bool {
+    agent.state() == AgentState::Stalled
 }
 
 #[test]
-fn a_step_that_never_returns_parks_its_agent_only() {
+fn a_step_that_never_returns_stalls_its_agent_only() {
     for workers in [1, 3] {
         let hung = |step| Dummy { fault: Some((step, Fault::Hang)), ..Dummy::new(1.0) };
         let mut spawns: Vec<_> = (0..20).map(|_| Dummy::new(1.0).at(200.0)).collect();
@@ -27,26 +27,26 @@ fn a_step_that_never_returns_parks_its_agent_only() {
         let run = pool(spawns, workers, SHORT);
         let is_hung = |at: usize| at.is_multiple_of(5);
         let each = |wanted: bool| run.agents().iter().enumerate().filter(move |(at, _)| is_hung(*at) == wanted);
-        eventually("all four are parked", || each(true).all(|(_, agent)| parked(agent)));
+        eventually("all four are stalled", || each(true).all(|(_, agent)| stalled(agent)));
         let before = run.agents().iter().map(|a| a.stats().steps).collect::<Vec<_>>();
         eventually("the others go on", || each(false).all(|(at, a)| a.stats().steps >= before[at] + 20));
         let stats = run.shutdown();
         for (at, agent) in stats.iter().enumerate() {
-            let state = AgentState::Parked("a step did not end within 0.2 s".into());
+            let state = AgentState::Parked("a step did not end within 0.4 s".into());
             assert_eq!(agent.state, if is_hung(at) { state } else { AgentState::Running }, "{at} of {workers}");
         }
     }
 }
 
 #[test]
-fn agents_led_by_a_hung_agent_are_parked_with_it() {
+fn agents_led_by_a_hung_agent_are_stalled_with_it() {
     let log = Log::default();
     let bonded = |id: u32| Dummy { fault: (id == 0).then_some((100, Fault::Hang)), ..Dummy::member(1.0, &log) };
     let mut spawns: Vec<_> = (0..3).map(|id| bonded(id).at(500.0)).collect();
     spawns.push(Dummy::new(1.0).at(500.0));
     let run = pool(spawns, 2, SHORT);
     eventually("they are one", || run.agents().iter().skip(1).take(2).all(|a| a.led_by() == Some(AgentId(0))));
-    eventually("all three are parked", || run.agents().iter().take(3).all(parked));
+    eventually("all three are stalled", || run.agents().iter().take(3).all(stalled));
     let before = run.agents()[3].stats().steps;
     eventually("an unrelated agent goes on", || run.agents()[3].stats().steps >= before + 20);
     assert_eq!(run.shutdown()[3].state, AgentState::Running);

@@ -10,8 +10,8 @@ use super::super::cpu::CpuShare;
 use super::super::turn_order::{PartKind, TurnOrder, in_force};
 use super::super::turn_parts::Begun;
 use super::super::turns::Took;
+use super::super::watchdog::{Watchdog, WatchdogWord};
 use super::shared::PoolState;
-use super::watchdog::WatchdogWord;
 use metachron_core::AgentId;
 use std::sync::Arc;
 use std::thread;
@@ -31,33 +31,49 @@ const BALANCE_TURNS: u32 = 64;
 pub(super) struct Worker {
     state: Arc<PoolState>,
     at: usize,
-    watchdog: Arc<WatchdogWord>,
+    word: Arc<WatchdogWord>,
+    watchdog: Watchdog,
     cpu: CpuShare,
     turns: u32,
     timeline: Timeline,
     /// The last reading of the clock.
     now: Duration,
     awake_since: Duration,
-    given_up: bool,
+    /// Another one works in its place: a turn of its has lasted too long.
+    is_replaced: bool,
     order: Option<Arc<TurnOrder>>,
     /// The agent of the last turn, if it waits for another one.
     last: Option<Box<AgentRunner>>,
 }
 
 impl Worker {
-    pub fn new(state: Arc<PoolState>, at: usize, watchdog: Arc<WatchdogWord>) -> Self {
+    pub fn new(state: Arc<PoolState>, at: usize, word: Arc<WatchdogWord>, watchdog: Watchdog) -> Self {
         let (now, timeline, order) = (state.clock.now(), state.timeline.read(), state.order());
         let (cpu, awake_since) = (CpuShare::new(), now);
-        Self { state, at, watchdog, cpu, turns: 0, timeline, now, awake_since, given_up: false, order, last: None }
+        Self {
+            state,
+            at,
+            word,
+            watchdog,
+            cpu,
+            turns: 0,
+            timeline,
+            now,
+            awake_since,
+            is_replaced: false,
+            order,
+            last: None,
+        }
     }
 
-    /// Works until the run is to end, or until the worker is given up.
+    /// Works until the run is to end, or until another one works in its place.
     pub fn work(mut self) {
         self.state.sleep.wakeup().inspect(|wakeup| wakeup.register(self.at));
-        while !self.state.sleep.stopping() && !self.given_up {
+        while !self.state.sleep.stopping() && !self.is_replaced {
             self.round();
         }
         self.last.take().into_iter().for_each(|actor| self.state.put(self.at, actor, self.now));
+        self.word.leave();
     }
 
     /// Makes the next turn, or sleeps until one is due.
@@ -75,11 +91,11 @@ impl Worker {
     /// Makes turns of `actor` for as long as it is behind, but for [`CATCH_UP_MAX`] at most; returns it if it waits for another one.
     ///
     /// If all agents are behind, the data of one are still in the cache for its second turn, but no longer after the turns of all others.
-    fn catch_up(&mut self, actor: Box<AgentRunner>, timeline: &Timeline) -> Option<Box<AgentRunner>> {
+    fn catch_up(&mut self, mut actor: Box<AgentRunner>, timeline: &Timeline) -> Option<Box<AgentRunner>> {
         let until = self.now + CATCH_UP_MAX;
         actor.fetch();
         let mut waiting = self.turn(actor, timeline);
-        while self.now < until {
+        while self.now < until && !self.is_replaced {
             let now = self.now;
             let is_behind = |actor: &mut Box<AgentRunner>| actor.pace.due(timeline).is_some_and(|due| due <= now);
             let Some(actor) = waiting.take_if(is_behind) else { break };
@@ -93,15 +109,15 @@ impl Worker {
         self.cpu.open();
         self.turns = self.turns.wrapping_add(1);
         let began = self.now;
-        let watched = self.watchdog.begin(self.turns, actor.id());
+        let watched = self.word.begin(self.turns, actor.id());
         let order = in_force(&mut self.order);
         let held = order.as_deref().map(TurnOrder::hold);
         // a part uses the piece that is in force when its place in the order comes
         let timeline = &held.as_ref().map_or(*timeline, |_| self.state.timeline.read());
         let Begun { effort, mut held } = actor.begin_in(timeline, began, held);
-        if !self.watchdog.end(watched) {
-            self.given_up = true;
-            return None;
+        if !self.word.end(watched) {
+            self.is_replaced = true;
+            self.watchdog.resume(actor.id());
         }
         if actor.open.is_some() {
             actor.served += actor.pace.dt();
@@ -207,9 +223,10 @@ mod tests {
         let AssembledRun { actors, all: RunAgents { handles, sleep, .. } } = assemble(spawns, Helpers::none()).unwrap();
         sleep.set_workers(1);
         let clock = Arc::clone(clock) as Arc<dyn Clock>;
+        let watchdog = Watchdog { handles: handles.clone(), sleep: Arc::clone(&sleep), limit: Arc::default() };
         let state = Arc::new(PoolState::new(clock, sleep, handles, actors, 1));
         state.timeline.drive(Duration::ZERO, TimelineCommand::Run);
-        Worker::new(state, 0, Arc::default())
+        Worker::new(state, 0, Arc::default(), watchdog)
     }
 
     /// Increase of the allocated heap, in bytes.

@@ -31,7 +31,7 @@ fn threads_of_those_that_have_left_are_joined() {
 #[test]
 fn threads_carry_the_names_of_their_agents() {
     let run = Threads::start(vec![Dummy::new(1.0).at(60.0)], Arc::new(SystemClock::new()), Priority::Normal).unwrap();
-    let names: Vec<_> = run.threads.values().filter_map(|t| t.thread().name()).collect();
+    let names: Vec<_> = run.threads.values().filter_map(|t| t.thread.thread().name()).collect();
     assert_eq!(names, ["agent:dummy at 60"]);
 }
 
@@ -42,8 +42,10 @@ fn an_agent_that_is_behind_yields_its_core_after_a_while_and_goes_on() {
     let (clock, timeline) = (Arc::new(ManualClock::new()), Arc::new(SharedTimeline::new()));
     timeline.drive(Duration::ZERO, TimelineCommand::Run);
     clock.advance(Duration::from_millis(50));
-    let (batch, awake) = (CpuBatch::default(), Duration::ZERO);
-    let mut thread = AgentThread { clock, timeline, batch, order: None, awake };
+    let (batch, awake, word) = (CpuBatch::default(), Duration::ZERO, Arc::default());
+    let watchdog =
+        Watchdog { handles: all.handles.clone(), sleep: Arc::clone(&all.sleep), limit: Arc::<StallLimit>::default() };
+    let mut thread = AgentThread { clock, timeline, batch, order: None, awake, watchdog, word, turns: 0 };
     let mut steps_after = |awake: Duration| {
         thread.awake = awake;
         assert_eq!(thread.wait_or_turn(&mut actor), Next::Due);

@@ -212,6 +212,7 @@ impl Shown {
             }
             None => match &row.state {
                 AgentState::Running => return response,
+                AgentState::Stalled => format!("{} is in a step that lasts too long", row.name),
                 AgentState::Resting => format!("{} is at rest", row.name),
                 AgentState::Parked(why) => format!("{} is parked: {why}", row.name),
                 AgentState::Gone => format!("{} is gone", row.name),

@@ -334,6 +334,8 @@ pub enum AgentState {
     /// Stepping.
     #[default]
     Running,
+    /// In a step that lasts too long.
+    Stalled,
     /// Asleep until touched.
     Resting,
     /// Stopped, for this reason.

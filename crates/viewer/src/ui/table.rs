@@ -156,6 +156,7 @@ fn dash() -> String {
 fn state_text(row: &AgentRow) -> String {
     match &row.state {
         AgentState::Running => row.led_by.as_ref().map_or_else(|| "running".to_owned(), |by| format!("with {by}")),
+        AgentState::Stalled => "stalled".to_owned(),
         AgentState::Resting => "resting".to_owned(),
         AgentState::Parked(reason) => format!("parked: {reason}"),
         AgentState::Gone => "gone".to_owned(),
@@ -169,6 +170,7 @@ fn accessible_text(row: &AgentRow, texts: &[String; COLUMNS.len()]) -> String {
 fn state_color(state: &AgentState, palette: &Palette) -> Color32 {
     match state {
         AgentState::Running => palette.good,
+        AgentState::Stalled => palette.warn,
         AgentState::Resting | AgentState::Gone => palette.weak,
         AgentState::Parked(_) => palette.bad,
     }
@@ -184,6 +186,7 @@ fn cell_color(row: &AgentRow, index: usize, palette: &Palette) -> Color32 {
         2 if behind => palette.warn,
         7 if stale => palette.warn,
         10 if matches!(row.state, AgentState::Parked(_)) => palette.bad,
+        10 if row.state == AgentState::Stalled => palette.warn,
         10 => palette.weak,
         _ => palette.text.gamma_multiply(0.9),
     }

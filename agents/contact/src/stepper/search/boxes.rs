@@ -3,6 +3,7 @@
 //! In: members, how fast each may move. Out: their boxes, pairs whose boxes may meet. Never here: places of skins.
 
 use super::super::Participant;
+use crate::stepper::ClusterMember;
 use metachron_geometry::Aabb;
 
 /// Bodies whose boxes come closer than this within the time looked ahead belong together, metres.

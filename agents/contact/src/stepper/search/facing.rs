@@ -6,6 +6,7 @@ use super::super::Progress;
 use super::super::remote;
 use super::{LOOK_M, Owner, Pair, Round};
 use crate::cluster::{Contact, Side};
+use crate::stepper::ClusterMember;
 use glam::DVec3;
 use metachron_geometry::{CollisionShape, ContactSide, Place, Touch};
 

@@ -5,6 +5,7 @@
 
 use super::sweep::FAR_M;
 use super::{Against, MET_M, Meeting, Pair, Reaching, Round, Search};
+use crate::stepper::ClusterMember;
 use crate::stepper::memory::Partner;
 use crate::stepper::scene::Passage;
 use glam::{DQuat, DVec3};

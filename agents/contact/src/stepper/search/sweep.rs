@@ -4,6 +4,7 @@
 //! the start.
 
 use super::{Against, Pair, Round};
+use crate::stepper::ClusterMember;
 use glam::DVec3;
 use metachron_geometry::narrow_phase::{NarrowPhaseScratch, SweptReach, SweptShape, first_touch};
 use metachron_geometry::{ShapePose, Touch};
@@ -75,7 +76,7 @@ impl Sweep {
 
 /// The skin of a member now and at the end of the fine step.
 fn swept<'a>(round: &Round<'a, '_>, member: usize, nodes: &'a mut Vec<DVec3>) -> Option<SweptShape<'a>> {
-    let body = &*round.all[member].member;
+    let body = &round.all[member].member;
     let end = body.skin_after(round.moved(member), round.h_s, nodes)?;
     Some(SweptShape { start: body.skin()?, end })
 }

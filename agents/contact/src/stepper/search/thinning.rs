@@ -5,6 +5,7 @@
 
 use super::{Judge, Owner, Pair, Round};
 use crate::cluster::Contact;
+use crate::stepper::ClusterMember;
 use crate::stepper::memory::Partner;
 use glam::DVec3;
 use metachron_geometry::Touch;

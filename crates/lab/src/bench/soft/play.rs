@@ -85,7 +85,16 @@ impl Play {
             let member = agent.member().context("a body that touches nothing")?;
             let (id, parts) = (AgentId(id), plan.parts_in(role, wanted_s));
             let context = StepContext::alone(id, *time);
-            all.push(Participant { id, member, context, laws: &[], memory, parts, alone_s: wanted_s, grips });
+            all.push(Participant {
+                id,
+                member: member.into(),
+                context,
+                laws: &[],
+                memory,
+                parts,
+                alone_s: wanted_s,
+                grips,
+            });
         }
         let report = stepper.step(scene, &mut all, dt, &PlainLoop)?;
         *time += dt;

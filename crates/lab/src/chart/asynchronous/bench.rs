@@ -238,8 +238,16 @@ impl Cluster {
         let laws: Vec<(AgentId, Law)> = context.neighbours.iter().map(|other| (other.id, other.law)).collect();
         let Some(member) = agent.member() else { return agent.step(dt, &context).map(drop) };
         let id = context.me;
-        let mut list =
-            vec![Participant { id, member, context, laws: &laws, memory, parts: 1, alone_s: dt.as_secs_f64(), grips }];
+        let mut list = vec![Participant {
+            id,
+            member: member.into(),
+            context,
+            laws: &laws,
+            memory,
+            parts: 1,
+            alone_s: dt.as_secs_f64(),
+            grips,
+        }];
         let sides = &mut [Some(pairs)];
         let dt_s = dt.as_secs_f64();
         remotes.join(&mut list, sides, stepper, MacroStep { dt_s, parts: 1 });

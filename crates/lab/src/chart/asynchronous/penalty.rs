@@ -5,7 +5,7 @@
 
 use glam::DVec3;
 use metachron_contact::Neighbour;
-use metachron_contact::stepper::{KnownImpulse, Matter, Participant};
+use metachron_contact::stepper::{ClusterMember, KnownImpulse, Matter, Participant};
 use metachron_geometry::narrow_phase::{NarrowPhaseScratch, touches};
 use metachron_geometry::{ContactSide, Touch};
 

@@ -1,0 +1,58 @@
+//! Who is taken out of a cluster whose step was not made, so that the others make it in the same turn.
+//!
+//! In: a leader, the reason of a failure, models that are broken or have refused. Out: a leader whose cluster steps again, or why that is parked.
+//! One whose code has panicked is parked; one that has refused steps by itself, to fail alone or not at all. Never here: the step
+//! ([`super::macro_step`]), agents that lose touch ([`super::seats`]).
+
+use super::super::agent_runner::{AgentRunner, StepOutcome};
+use super::Span;
+use metachron_core::SimSpan;
+
+impl AgentRunner {
+    /// Plans nothing but takes those out of its cluster that are to blame for `reason`; where that is nobody, all part.
+    ///
+    /// # Errors
+    /// Why it is to be parked itself.
+    pub fn exclude(&mut self, reason: String) -> Result<(), String> {
+        if let Some(broken) = self.model.broken() {
+            return Err(broken.to_owned());
+        }
+        if self.led.is_empty() {
+            return Err(reason);
+        }
+        let led = self.led.len();
+        self.led.each(|actor| {
+            if let Some(broken) = actor.model.broken().map(str::to_owned) {
+                actor.park(broken);
+            }
+        });
+        self.led.release_parked();
+        self.led.release_refusing();
+        if self.model.take_refused() {
+            self.release_together();
+        }
+        if self.led.len() == led {
+            self.release_all();
+        }
+        Ok(())
+    }
+
+    /// Makes a step of the `wanted` length after one that was not made for `reason`, without those who are to blame; how many step with it.
+    ///
+    /// # Errors
+    /// Why it is to be parked itself.
+    pub fn step_without_failed(&mut self, reason: String, wanted: SimSpan) -> Result<(StepOutcome, u32), String> {
+        let mut reason = reason;
+        // each time fewer are left
+        loop {
+            self.exclude(reason)?;
+            match self.step_alone(Span::Wanted(wanted)) {
+                Ok(outcome) => {
+                    let time = self.pace.time();
+                    return Ok((outcome, self.led.members_at(time).count() as u32));
+                }
+                Err(again) => reason = again,
+            }
+        }
+    }
+}

@@ -1,0 +1,42 @@
+//! The thread that looks whether turns of agents' threads last too long.
+//!
+//! In: what each thread does. Out: judgements of the watchdog, four times within the time that a turn may last. Never here: what follows from them.
+
+use super::super::agent_runner::AgentRunner;
+use super::super::spawn::RunError;
+use super::super::watchdog::{Seen, Watchdog, WatchdogWord};
+use metachron_core::AgentId;
+use std::collections::BTreeMap;
+use std::sync::mpsc::{RecvTimeoutError, Sender, channel};
+use std::sync::{Arc, Mutex, PoisonError};
+use std::thread::{self, JoinHandle};
+
+/// A thread that gives back its agent when it ends, if it has it.
+pub(super) struct Ended {
+    pub thread: JoinHandle<Option<Box<AgentRunner>>>,
+    pub word: Arc<WatchdogWord>,
+}
+
+/// What the agents' threads are doing, for the one that watches them.
+pub(super) type Words = Arc<Mutex<BTreeMap<AgentId, Arc<WatchdogWord>>>>;
+
+/// Starts the thread that looks whether turns last too long; it ends where it is told to, or nobody can.
+pub(super) fn watch(watchdog: Watchdog, words: Words) -> Result<Sender<()>, RunError> {
+    let (unwatched, end) = channel();
+    let body = move || {
+        let mut seen: BTreeMap<AgentId, Seen> = BTreeMap::new();
+        while end.recv_timeout(watchdog.limit.interval()) == Err(RecvTimeoutError::Timeout) {
+            let words: Vec<_> = {
+                let words = words.lock().unwrap_or_else(PoisonError::into_inner);
+                words.iter().map(|(id, word)| (*id, Arc::clone(word))).collect()
+            };
+            seen.retain(|id, _| words.binary_search_by_key(id, |(id, _)| *id).is_ok());
+            for (id, word) in words {
+                watchdog.judge(&word, seen.entry(id).or_default());
+            }
+        }
+    };
+    let name = "agents:watch".to_owned();
+    let thread = thread::Builder::new().name(name.clone()).spawn(body);
+    thread.map(|_| unwatched).map_err(|error| RunError::NoThread { name, error })
+}

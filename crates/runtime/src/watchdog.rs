@@ -1,0 +1,245 @@
+//! Turns in progress, and those that last too long.
+//!
+//! In: turns, from the threads that make them. Out: the turn in progress of each, and which agents' turns have lasted longer than they may: these
+//! are stalled until their turn ends, and readers of their events hear of it. A thread that ends a turn and the watchdog that finds it late
+//! compete for one atomic word: whoever comes later finds it decided. Never here: what becomes of a thread whose turn does not end.
+
+use super::agents::Agents;
+use super::handle::{AgentHandle, Shared};
+use super::sleep::SleepRegistry;
+use metachron_core::AgentId;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicU64, Ordering::Relaxed, Ordering::SeqCst};
+use std::time::{Duration, Instant};
+
+/// How long a turn of one agent may last if the scene does not say, wall time, and as how many of its steps at least.
+const ALLOWED_DEFAULT: Duration = Duration::from_millis(250);
+const ALLOWED_STEPS: u32 = 10;
+/// As often as it is looked within that time: after a suspension of the whole machine a turn is found the same only once.
+pub(super) const CHECKS: u32 = 4;
+/// A turn that has lasted for so long is not waited for any more.
+pub const STALLED_FOR_GOOD: Duration = Duration::from_secs(5);
+/// The turn of a cluster makes the steps of all its members, and may last so many times as long at most.
+const MEMBERS_MAX: u32 = 25;
+
+/// What one thread does.
+#[derive(Debug, Default)]
+pub(super) struct WatchdogWord {
+    /// The turn in progress: its number and, in the low half, the agent's number plus one; with [`STALLED`] once that lasts too long. [`IDLE`]
+    /// between turns.
+    word: AtomicU64,
+}
+
+/// A turn in progress; equal values are the same turn.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) struct WatchedTurn(u64);
+
+const IDLE: u64 = 0;
+const STALLED: u64 = 1 << 63;
+/// The thread makes no more turns.
+const ENDED: u64 = u64::MAX;
+
+impl WatchedTurn {
+    /// The agent of the turn.
+    pub const fn agent(self) -> AgentId {
+        AgentId((self.0 as u32).wrapping_sub(1))
+    }
+}
+
+impl WatchdogWord {
+    /// Turn number `turn` begins, of `id`.
+    pub fn begin(&self, turn: u32, id: AgentId) -> WatchedTurn {
+        let word = (u64::from(turn & 0x3fff_ffff) << 32) | u64::from(id.0.wrapping_add(1));
+        // read by the watchdog only, and its timeout is long
+        self.word.store(word, Relaxed);
+        WatchedTurn(word)
+    }
+
+    /// `turn` has ended; whether in time.
+    pub fn end(&self, turn: WatchedTurn) -> bool {
+        let in_time = self.word.compare_exchange(turn.0, IDLE, SeqCst, SeqCst).is_ok();
+        if !in_time {
+            self.word.store(IDLE, SeqCst);
+        }
+        in_time
+    }
+
+    /// The turn in progress, if there is one.
+    pub fn current(&self) -> Option<WatchedTurn> {
+        let word = self.word.load(SeqCst);
+        (word != IDLE && word != ENDED).then_some(WatchedTurn(word & !STALLED))
+    }
+
+    /// Whether the turn in progress has lasted too long.
+    pub fn is_stalled(&self) -> bool {
+        let word = self.word.load(SeqCst);
+        word != ENDED && word & STALLED != 0
+    }
+
+    /// Notes that `turn` lasts too long, if it is still in progress; whether it is.
+    fn stall(&self, turn: WatchedTurn) -> bool {
+        self.word.compare_exchange(turn.0, turn.0 | STALLED, SeqCst, SeqCst).is_ok()
+    }
+
+    /// Its thread makes no more turns.
+    pub fn leave(&self) {
+        self.word.store(ENDED, SeqCst);
+    }
+
+    /// Whether its thread makes no more turns.
+    pub fn has_ended(&self) -> bool {
+        self.word.load(SeqCst) == ENDED
+    }
+}
+
+/// How long turns may last, shared by who sets it and who watches.
+#[derive(Debug)]
+pub(super) struct StallLimit(AtomicU64);
+
+impl Default for StallLimit {
+    fn default() -> Self {
+        Self::of(ALLOWED_DEFAULT)
+    }
+}
+
+impl StallLimit {
+    pub fn of(limit: Duration) -> Self {
+        Self(AtomicU64::new(limit.as_nanos() as u64))
+    }
+
+    pub fn set(&self, limit: Duration) {
+        self.0.store(limit.as_nanos() as u64, Relaxed);
+    }
+
+    fn get(&self) -> Duration {
+        Duration::from_nanos(self.0.load(Relaxed))
+    }
+
+    /// How long to wait between two checks.
+    pub fn interval(&self) -> Duration {
+        self.get() / CHECKS
+    }
+}
+
+/// How often a thread was found in the turn in which it is.
+#[derive(Debug, Default)]
+pub(super) struct Seen {
+    turn: Option<WatchedTurn>,
+    checks: u32,
+    since: Option<Instant>,
+}
+
+/// Who judges turns.
+#[derive(Debug, Clone)]
+pub(super) struct Watchdog {
+    pub handles: Agents,
+    pub sleep: Arc<SleepRegistry>,
+    pub limit: Arc<StallLimit>,
+}
+
+impl Watchdog {
+    /// How long a turn of `id` may last.
+    pub fn allowed(&self, id: AgentId) -> Duration {
+        let dt = self.handles.of(id).map_or(Duration::ZERO, |agent| Duration::from_nanos(agent.dt_ns()));
+        let members = self.turned_by(id).take(MEMBERS_MAX as usize).count().max(1) as u32;
+        self.limit.get().max(dt * ALLOWED_STEPS) * members
+    }
+
+    /// Looks at a thread: whether its turn is found to have lasted too long now.
+    pub fn judge(&self, word: &WatchdogWord, seen: &mut Seen) -> bool {
+        let turn = word.current();
+        if turn.is_none() || turn != seen.turn {
+            *seen = Seen { turn, checks: 0, since: turn.map(|_| Instant::now()) };
+            return false;
+        }
+        seen.checks += 1;
+        let (Some(turn), Some(since)) = (turn, seen.since) else { return false };
+        let lasts = since.elapsed();
+        if word.is_stalled() {
+            self.each_live(turn.agent(), |shared| shared.gauges.set_stalled_for(lasts));
+            return false;
+        }
+        if seen.checks < CHECKS || lasts < self.allowed(turn.agent()) || !word.stall(turn) {
+            return false;
+        }
+        let culprit = self.culprit(turn.agent());
+        self.each_live(turn.agent(), |shared| {
+            shared.gauges.stall(lasts, Some(shared.id) == culprit);
+            self.sleep.changed.mark(shared.id);
+        });
+        // it may have ended meanwhile
+        if !word.is_stalled() {
+            self.resume(turn.agent());
+        }
+        true
+    }
+
+    /// A turn of `id` that was stalled has ended.
+    pub fn resume(&self, id: AgentId) {
+        self.each_live(id, |shared| {
+            shared.gauges.resume();
+            self.sleep.changed.mark(shared.id);
+        });
+    }
+
+    /// Of the agents whose turns `id` makes the one whose code runs now; `id` where that of none does.
+    fn culprit(&self, id: AgentId) -> Option<AgentId> {
+        let runs = |agent: &&AgentHandle| agent.live().is_some_and(|shared| shared.calls.is_running());
+        Some(self.turned_by(id).find(runs).map_or(id, AgentHandle::id))
+    }
+
+    /// Why nothing can be done between turns: names the agent whose step does not end; `None` where no turn is stalled.
+    pub fn complaint(&self) -> Option<String> {
+        let stalled = |agent: &&AgentHandle| agent.live().is_some_and(|shared| shared.gauges.is_stalled());
+        let first = self.handles.iter().find(stalled)?;
+        let culprit = self.culprit(self.sleep.leader(first.id())).and_then(|id| self.handles.of(id)).unwrap_or(first);
+        Some(format!("agent \"{}\", whose step does not end,", culprit.name()))
+    }
+
+    /// Waits until no turn is stalled, no longer than one may last.
+    ///
+    /// # Errors
+    /// The complaint, where one still is.
+    pub fn await_stalled(&self) -> Result<(), String> {
+        let (begun, limit) = (Instant::now(), self.limit.get());
+        while let Some(complaint) = self.complaint() {
+            if begun.elapsed() >= limit {
+                return Err(complaint);
+            }
+            std::thread::sleep(limit / 50);
+        }
+        Ok(())
+    }
+
+    /// The agents whose turns `id` makes, itself among them.
+    fn turned_by(&self, id: AgentId) -> impl Iterator<Item = &AgentHandle> {
+        self.handles.iter().filter(move |agent| self.sleep.leader(agent.id()) == id)
+    }
+
+    fn each_live(&self, id: AgentId, visit: impl Fn(&Shared)) {
+        self.turned_by(id).filter_map(AgentHandle::live).for_each(|shared| visit(&shared));
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn either_the_step_returns_or_it_is_stalled() {
+        let word = WatchdogWord::default();
+        assert_eq!(word.current(), None);
+        let first = word.begin(1, AgentId(7));
+        assert_eq!(word.current().map(WatchedTurn::agent), Some(AgentId(7)));
+        assert!(word.end(first));
+        assert!(!word.stall(first), "it is over");
+        let second = word.begin(2, AgentId(7));
+        assert_ne!(first, second);
+        assert!(word.stall(second) && word.is_stalled());
+        assert_eq!(word.current(), Some(second), "it goes on");
+        assert!(!word.end(second), "it was stalled");
+        assert!(word.current().is_none() && !word.is_stalled());
+        word.leave();
+        assert!(word.has_ended() && word.current().is_none() && !word.is_stalled());
+    }
+}
