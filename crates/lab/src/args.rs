@@ -157,7 +157,10 @@ pub struct BenchArgs {
     /// For agents: only cases of at most this many agents
     #[arg(long, value_name = "N")]
     pub agents: Option<usize>,
-    /// For soft: show another engine's rows beside ours, from the file that python/peers/soft.py writes
+    /// For contact: only this scene; may be repeated
+    #[arg(long, value_name = "NAME")]
+    pub only: Vec<String>,
+    /// For soft and contact: show another engine's rows beside ours, from the file that python/peers/soft.py or contact.py writes
     #[arg(long, value_name = "FILE", value_hint = ValueHint::FilePath)]
     pub peers: Option<PathBuf>,
     /// How long each case runs; for pile: simulated seconds
@@ -182,6 +185,8 @@ pub enum BenchSubject {
     Select,
     /// A thousand boxes as agents that step in clusters while they touch, compared with one rapier3d world of the same boxes
     Pile,
+    /// Steps of scenes in which contact decides: towers, piles, jams, folds, ropes, bins: time, factors, depth, drift and energy made
+    Contact,
     /// Steps of soft bodies: cubes of tissue by number of nodes, held, lying, loaded and shaken, a sheet, a tube whose wall gives
     Soft,
     /// Pictures on this machine's adapter, by triangles, pixels and shading

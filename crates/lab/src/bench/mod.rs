@@ -5,11 +5,16 @@
 pub(super) mod agents;
 mod bare;
 pub(super) mod cast;
+mod contact;
 mod machine;
+mod peers;
 mod pile;
+mod plain_world;
+mod play;
 mod render;
 mod rod;
 mod select;
+mod shaken_floor;
 mod shown;
 mod soft;
 mod subject;
@@ -27,6 +32,7 @@ pub fn command(args: &BenchArgs) -> anyhow::Result<Exit> {
         BenchSubject::Rod => subject::run::<rod::Rod>(args),
         BenchSubject::Select => subject::run::<select::Select>(args),
         BenchSubject::Pile => subject::run::<pile::Pile>(args),
+        BenchSubject::Contact => subject::run::<contact::Contact>(args),
         BenchSubject::Soft => subject::run::<soft::Soft>(args),
         BenchSubject::Render => subject::run::<render::Render>(args),
     }

@@ -10,21 +10,15 @@ use super::super::args::BenchArgs;
 use super::super::chart::figure::{Axis, Colour, Figure, Layer, Mark, Panel};
 use super::super::chart::table::Table;
 use super::machine::{others_cpu, own_cpu};
+use super::plain_world::{Frame, Settings, world_of};
 use super::subject::{Progress, Subject};
-use anyhow::{Context, bail};
-use glam::{DQuat, DVec3};
-use metachron_geometry::Solid;
-use metachron_models::rigid::RigidSpec;
+use anyhow::bail;
 use metachron_render::{Size, Style};
 use metachron_runtime::AgentStats;
 use metachron_scene::{Source, load};
 use metachron_session::{Drawing, End, Headless, Session, play_headless};
 use metachron_world::kinds::ExecutorKind;
 use metachron_world::{Scene, Spec};
-use rapier3d::dynamics::{FrictionModel, IntegrationParameters, RigidBodyBuilder, SpringCoefficients};
-use rapier3d::geometry::{ColliderBuilder, SharedShape};
-use rapier3d::parry::math::{Pose, Rotation, Vec3};
-use rapier3d::pipeline::PhysicsWorld;
 use serde::{Deserialize, Serialize};
 
 /// The subject.
@@ -159,53 +153,19 @@ fn agents(scene: &Scene, executor: ExecutorKind, seconds: f64) -> anyhow::Result
     Ok(Row { who, here: true, boxes, sim_s: outcome.sim_s, dropped_s, cpu_s, steps_per_cpu_s, share: f64::NAN })
 }
 
-/// Solver settings of the plain world.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Settings {
-    /// rapier3d's defaults; only the size of the bodies is set.
-    Own,
-    /// Those by which columns of six boxes of 0.2 m sink by 0.1 mm instead of 8.7 (docs/throughput.md).
-    Careful,
-}
-
-impl Settings {
-    fn parameters(self) -> IntegrationParameters {
-        let length_unit = 2.0 * BOX_RADIUS_M as f32;
-        if self == Self::Own {
-            return IntegrationParameters { length_unit, ..IntegrationParameters::default() };
-        }
-        let stiff = SpringCoefficients::new(300.0, 10.0);
-        IntegrationParameters {
-            length_unit,
-            num_solver_iterations: 4,
-            num_internal_stabilization_iterations: 2,
-            contact_softness: stiff,
-            static_contact_softness: stiff,
-            friction_model: FrictionModel::Simplified,
-            normalized_max_linear_velocity: f32::MAX,
-            ..IntegrationParameters::default()
-        }
-    }
-}
-
 /// Half the diagonal of a box of the scene, metres.
 const BOX_RADIUS_M: f64 = 0.034_64;
 
 /// Measures the same boxes in one world; `spent` receives the CPU time used after each step.
 fn plain(scene: &Scene, seconds: f64, settings: Settings, spent: &mut Spent) -> anyhow::Result<Row> {
-    let mut world = PhysicsWorld { gravity: scene.gravity.as_vec3(), ..PhysicsWorld::default() };
-    world.integration_parameters = settings.parameters();
-    world.integration_parameters.dt = (1.0 / STEP_HZ) as f32;
-    for solid in scene.obstacles.iter() {
-        let shape = shape(&solid.solid)?.friction(solid.friction as f32).restitution(solid.restitution as f32);
-        world.colliders.insert(shape.position(pose(solid.position, solid.rotation)));
-    }
-    let mut boxes = 0;
+    let mut bodies = Vec::with_capacity(scene.agents.len());
     for member in &scene.agents {
         let Spec::Rigid(spec) = &member.spec else { bail!("`{}` is not a rigid body", member.name) };
-        insert(&mut world, spec, settings)?;
-        boxes += 1;
+        bodies.push(spec);
     }
+    let boxes = bodies.len();
+    let frame = Frame { settings, step_s: 1.0 / STEP_HZ, radius_m: BOX_RADIUS_M, gravity: scene.gravity };
+    let mut world = world_of(bodies, &scene.obstacles, frame)?;
     let steps = (seconds * STEP_HZ).round();
     let from = own_cpu();
     for _ in 0..steps as u64 {
@@ -219,34 +179,6 @@ fn plain(scene: &Scene, seconds: f64, settings: Settings, spent: &mut Spent) -> 
         Settings::Careful => "one rapier3d world, careful settings".to_owned(),
     };
     Ok(Row { who, here: true, boxes, sim_s, dropped_s: 0.0, cpu_s, steps_per_cpu_s, share: f64::NAN })
-}
-
-fn insert(world: &mut PhysicsWorld, spec: &RigidSpec, settings: Settings) -> anyhow::Result<()> {
-    let mut body = RigidBodyBuilder::dynamic()
-        .pose(pose(spec.position, spec.rotation))
-        .linvel(spec.velocity.as_vec3())
-        .angvel(spec.spin.as_vec3())
-        .can_sleep(false);
-    if settings == Settings::Careful {
-        let foreseen = body.soft_ccd_prediction(2.0 * BOX_RADIUS_M as f32);
-        body = foreseen.allow_fast_rotation(true).gyroscopic_forces_enabled(true);
-    }
-    let shape = shape(&spec.solid)?.mass(spec.mass_kg as f32);
-    world.insert(body, shape.friction(spec.friction as f32).restitution(spec.restitution as f32));
-    Ok(())
-}
-
-fn shape(solid: &Solid) -> anyhow::Result<ColliderBuilder> {
-    match solid {
-        Solid::Box { half_extents_m: half } => Ok(ColliderBuilder::cuboid(half.x as f32, half.y as f32, half.z as f32)),
-        Solid::Plane => Ok(ColliderBuilder::new(SharedShape::halfspace(Vec3::Z))),
-        _ => None.context("the single rapier3d world supports boxes and planes only"),
-    }
-}
-
-fn pose(position: DVec3, rotation: DQuat) -> Pose {
-    let turned = rotation.as_quat();
-    Pose::from_parts(position.as_vec3(), Rotation::from_xyzw(turned.x, turned.y, turned.z, turned.w))
 }
 
 #[cfg(test)]

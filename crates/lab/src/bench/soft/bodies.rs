@@ -51,7 +51,7 @@ fn soft(shape: SoftShape, matter: SoftMatter, position: DVec3) -> SoftSpec {
 }
 
 /// The cube, free just above the floor, of so many cells along each edge.
-pub(super) fn cube(cells: u32) -> SoftSpec {
+pub(in super::super) fn cube(cells: u32) -> SoftSpec {
     let shape = SoftShape::Box { size_m: DVec3::splat(CUBE_M), segments: [cells; 3] };
     soft(shape, TISSUE, DVec3::new(-0.5 * CUBE_M, -0.5 * CUBE_M, ABOVE_M))
 }
@@ -81,7 +81,7 @@ pub(super) fn hung_sheet(cells: u32) -> SoftSpec {
 }
 
 /// The same sheet, free, limp and nearly upright on the floor, so that it falls on its lower edge and folds; it touches itself.
-pub(super) fn falling_sheet(cells: u32) -> SoftSpec {
+pub(in super::super) fn falling_sheet(cells: u32) -> SoftSpec {
     /// From level, radians.
     const UPRIGHT_RAD: f64 = 1.45;
     let matter = SoftMatter { young_pa: 2e4, poisson: 0.3, damping_per_s: 2.0, ..TISSUE };

@@ -3,16 +3,17 @@
 //! In: cubes of tissue held, lying, loaded and shaken, a sheet hung and folded, the demonstration's tube with both kinds of wall.
 //! Out: rows of CPU time a step on one core, and how far the cube sags. Never here: how a step is made, how peers are run.
 
-mod bodies;
-mod peers;
-mod play;
-mod shaken_floor;
+pub(super) mod bodies;
+mod peer;
 
 use super::super::args::BenchArgs;
 use super::super::chart::figure::{Axis, Colour, Figure, Layer, Mark, Panel, span};
 use super::super::chart::power::exponent;
 use super::super::chart::table::Table;
 use super::machine::processor;
+use super::peers::Peers;
+use super::play::{Bound, Play, Series};
+use super::shaken_floor::ShakenFloor;
 use super::subject::{Progress, Subject};
 use anyhow::Context;
 use bodies::{CUBE_M, DemoTube};
@@ -21,10 +22,8 @@ use metachron_console::output::message;
 use metachron_contact::Agent;
 use metachron_models::rod::WallModel;
 use metachron_models::soft::{SoftBody, SoftMatter, SoftSpec};
-use peers::Peers;
-use play::{Bound, Play, Series};
+use peer::Cube;
 use serde::Serialize;
-use shaken_floor::ShakenFloor;
 use std::time::Duration;
 
 /// The subject.
@@ -112,7 +111,7 @@ impl Subject for Soft {
     const NAME: &'static str = "soft";
 
     fn measure(args: &BenchArgs, progress: &Progress) -> anyhow::Result<Vec<Row>> {
-        let peers = args.peers.as_deref().map(|path| Peers::read(path, &TESTS)).transpose()?;
+        let peers = args.peers.as_deref().map(|path| Peers::<Cube>::read(path, &TESTS)).transpose()?;
         if let Some(Peers { engine, machine, .. }) = peers.as_ref().filter(|_| !args.quiet) {
             message(&format!("beside {engine} on {machine}"));
         }
@@ -218,7 +217,7 @@ fn cases(quick: bool) -> Vec<Case> {
 }
 
 /// A row among those before it and beside the other engine's.
-fn placed(row: Row, before: &[Row], peers: Option<&Peers>) -> Row {
+fn placed(row: Row, before: &[Row], peers: Option<&Peers<Cube>>) -> Row {
     let plain = match row.test.as_str() {
         LYING | LOADED | SHAKEN | BOTH => Some(HELD),
         FOLDED => Some(HUNG),

@@ -2,7 +2,7 @@
 //!
 //! In: time. Out: a box whose top is at z = 0 and whose acceleration is 0.3 g cos ω t along x. Never here: what lies on it.
 
-use super::super::super::chart::GRAVITY;
+use super::super::chart::GRAVITY;
 use glam::{DQuat, DVec3};
 use metachron_contact::cluster::Side;
 use metachron_contact::stepper::{ClusterMember, MaterialPoint, Role};

@@ -1,0 +1,328 @@
+//! `bench contact`: the cost and the quality of contact in scenes that decide them, beside rapier3d and MuJoCo.
+//!
+//! In: towers, piles, jams, soft bodies that fold or are shaken, joints, bins of unlike bodies. Out: rows of CPU time a step on one core,
+//! factors, depth at landing and at rest, drift, energy made. Never here: how a step is made, how peers are run.
+
+mod course;
+mod peer;
+mod rigid_scenes;
+mod soft_scenes;
+mod stage;
+
+use super::super::args::BenchArgs;
+use super::super::chart::figure::{Axis, Colour, Figure, Layer, Mark, Panel, span};
+use super::super::chart::table::Table;
+use super::machine::processor;
+use super::peers::Peers;
+use super::subject::{Progress, Subject};
+use anyhow::Context;
+use course::Course;
+use metachron_console::output::{BadInput, message};
+use peer::PeerRun;
+use serde::Serialize;
+use stage::Stage;
+
+/// The subject.
+pub(super) struct Contact;
+
+/// A run of one engine.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub(super) struct Row {
+    pub test: String,
+    pub engine: String,
+    pub bodies: usize,
+    /// The most contacts of a step; NaN of another engine's file.
+    pub contacts: f64,
+    /// Macro steps.
+    pub steps: usize,
+    pub ms_per_step_p50: f64,
+    pub ms_per_step_p99: f64,
+    pub ms_most: f64,
+    /// CPU time of all steps, seconds.
+    pub cpu_s: f64,
+    /// Ratio of that to the peer's for the same test; NaN without one.
+    pub over_peer: f64,
+    /// For each macro step; NaN of other engines.
+    pub fine_steps: f64,
+    pub solves: f64,
+    pub factors: f64,
+    pub products: f64,
+    /// Solves in all steps that came to no end.
+    pub cut: u32,
+    /// The deepest overlap before and within the last half second, metres.
+    pub landing_m: f64,
+    pub rest_m: f64,
+    /// How far bodies went in the last half second, the mean and the most, metres.
+    pub drift_mean_m: f64,
+    pub drift_most_m: f64,
+    /// By how much the highest body sank, metres.
+    pub sank_m: f64,
+    /// The most energy above its least so far, and how much was lost, J; NaN of another engine's file.
+    pub made_j: f64,
+    pub lost_j: f64,
+    pub machine: String,
+}
+
+/// A scene with its variant.
+struct Case {
+    /// The name of the scene, for `--only`.
+    scene: &'static str,
+    /// What follows it in the name of the test; empty for a scene of one case.
+    variant: String,
+    seconds: f64,
+    stage: Box<dyn Fn() -> anyhow::Result<Stage>>,
+}
+
+impl Case {
+    fn new(
+        scene: &'static str,
+        variant: impl Into<String>,
+        seconds: f64,
+        stage: impl Fn() -> anyhow::Result<Stage> + 'static,
+    ) -> Self {
+        Self { scene, variant: variant.into(), seconds, stage: Box::new(stage) }
+    }
+
+    fn name(&self) -> String {
+        if self.variant.is_empty() { self.scene.to_owned() } else { format!("{}, {}", self.scene, self.variant) }
+    }
+
+    /// The rows of our engine and of rapier3d, where it takes the scene.
+    fn measure(&self) -> anyhow::Result<Vec<Row>> {
+        let stage = (self.stage)()?;
+        let ours = Course::of_cluster(&mut stage.play()?, self.seconds)?;
+        let mut rows = vec![row(self.name(), "metachron", &ours)];
+        if let Some(mut world) = stage.plain_world() {
+            let theirs = Course::of_plain_world(&mut world, self.seconds);
+            let unknown = f64::NAN;
+            let plain = row(self.name(), "rapier3d", &theirs);
+            rows.push(Row { solves: unknown, factors: unknown, products: unknown, ..plain });
+        }
+        Ok(rows)
+    }
+}
+
+/// The boxes of towers are aside by up to so much, millimetres, and rebound by so much.
+const TOWERS_MM: [f64; 3] = [12.0, 25.0, 35.0];
+const TOWER_RESTITUTIONS: [f64; 2] = [0.0, 0.2];
+
+/// All cases; with `quick` fewer and smaller ones.
+fn cases(quick: bool) -> Vec<Case> {
+    let mut all = Vec::new();
+    for off_mm in TOWERS_MM {
+        for restitution in TOWER_RESTITUTIONS {
+            let seconds = if quick { 1.0 } else { 3.0 };
+            all.push(Case::new("tower", format!("off by {off_mm} mm, e {restitution}"), seconds, move || {
+                Ok(rigid_scenes::tower(1e-3 * off_mm).rebounding(restitution))
+            }));
+        }
+    }
+    let pendulum_s = if quick { 2.0 } else { 20.0 };
+    all.push(Case::new("pendulum", "", pendulum_s, || Ok(rigid_scenes::pendulum())));
+    for (heap, restitution) in [(false, 0.0), (false, 0.1), (true, 0.0)] {
+        let together = if heap { "a heap" } else { "one problem" };
+        let seconds = if quick { 0.4 } else { 1.5 };
+        all.push(Case::new("pile", format!("{together}, e {restitution}"), seconds, move || {
+            Ok(rigid_scenes::pile(heap)?.rebounding(restitution))
+        }));
+    }
+    for seed in 1..=if quick { 2 } else { 20 } {
+        all.push(Case::new("bin", format!("seed {seed}"), 2.0, move || Ok(soft_scenes::bin(seed))));
+    }
+    all.extend(from_prototype(quick));
+    all.push(Case::new("overlap", "", 0.5, rigid_scenes::overlap));
+    all
+}
+
+/// Those of large clusters by which ways of solving them were chosen.
+fn from_prototype(quick: bool) -> Vec<Case> {
+    let seconds = |full: f64| if quick { 0.3 } else { full };
+    let of = |scene: &'static str, full_s: f64, stage: fn() -> Stage| {
+        Case::new(scene, "", seconds(full_s), move || Ok(stage()))
+    };
+    let mut all = vec![
+        of("mess_small", 1.5, || rigid_scenes::mess(6)),
+        of("bricks", 1.0, || rigid_scenes::bricks(10, 10)),
+        of("softpile", 1.0, || soft_scenes::soft_pile(300, 6)),
+        of("sheet", 1.2, || soft_scenes::sheet(30)),
+        of("shaken", 2.0, || soft_scenes::shaken(10)),
+        of("four", 1.5, || soft_scenes::four([9, 6, 3])),
+        of("ropes", 1.5, || soft_scenes::ropes(10, 4)),
+        of("stack", 2.0, || rigid_scenes::stack(1000.0)),
+        of("chain", 2.0, || rigid_scenes::chain(100.0)),
+    ];
+    if !quick {
+        all.push(of("mess", 0.6, || rigid_scenes::mess(10)));
+    }
+    all
+}
+
+/// Those of the cases that are asked for; all where none is named.
+fn chosen(all: Vec<Case>, only: &[String]) -> anyhow::Result<Vec<Case>> {
+    for name in only {
+        if !all.iter().any(|case| case.scene == name) {
+            let mut scenes: Vec<_> = all.iter().map(|case| case.scene).collect();
+            scenes.dedup();
+            let known = scenes.join(", ");
+            return Err(
+                BadInput(format!("--only {name} is no scene of bench contact; expected one of: {known}")).into()
+            );
+        }
+    }
+    Ok(all.into_iter().filter(|case| only.is_empty() || only.iter().any(|name| name == case.scene)).collect())
+}
+
+/// A run as a row, without a peer.
+fn row(test: String, engine: &str, course: &Course) -> Row {
+    let each = |count: u32| f64::from(count) / course.ms.len() as f64;
+    Row {
+        test,
+        engine: engine.to_owned(),
+        bodies: course.bodies,
+        contacts: f64::from(course.contacts),
+        steps: course.ms.len(),
+        ms_per_step_p50: course.ms_at(0.5),
+        ms_per_step_p99: course.ms_at(0.99),
+        ms_most: course.ms_at(1.0),
+        cpu_s: course.cpu_s(),
+        over_peer: f64::NAN,
+        fine_steps: each(course.fine_steps),
+        solves: each(course.solves),
+        factors: each(course.factors),
+        products: each(course.products),
+        cut: course.cut,
+        landing_m: course.landing_m,
+        rest_m: course.rest_m,
+        drift_mean_m: course.drift_mean_m,
+        drift_most_m: course.drift_most_m,
+        sank_m: course.sank_m,
+        made_j: course.made_j,
+        lost_j: course.lost_j,
+        machine: processor(),
+    }
+}
+
+/// Rows with the peer's run of the same test behind them, and their time over its.
+fn beside(rows: Vec<Row>, peers: Option<&Peers<PeerRun>>) -> Vec<Row> {
+    let Some((peers, run)) = peers.and_then(|peers| Some((peers, peers.of(&rows.first()?.test)?))) else { return rows };
+    let mut rows: Vec<_> = rows.into_iter().map(|row| Row { over_peer: row.cpu_s / run.cpu_s, ..row }).collect();
+    rows.push(Row {
+        contacts: f64::NAN,
+        bodies: run.bodies,
+        steps: run.steps,
+        ms_per_step_p50: run.ms_p50,
+        ms_per_step_p99: run.ms_p99,
+        ms_most: run.ms_most,
+        cpu_s: run.cpu_s,
+        over_peer: 1.0,
+        fine_steps: f64::NAN,
+        solves: f64::NAN,
+        factors: f64::NAN,
+        products: f64::NAN,
+        landing_m: run.landing_m,
+        rest_m: run.rest_m,
+        drift_mean_m: run.drift_mean_m,
+        drift_most_m: run.drift_most_m,
+        sank_m: run.sank_m,
+        made_j: run.made_j,
+        lost_j: f64::NAN,
+        machine: peers.machine.clone(),
+        ..row(run.test.clone(), &peers.engine, &Course::default())
+    });
+    rows
+}
+
+impl Subject for Contact {
+    type Row = Row;
+    const NAME: &'static str = "contact";
+
+    fn measure(args: &BenchArgs, progress: &Progress) -> anyhow::Result<Vec<Row>> {
+        let names: Vec<_> = cases(false).iter().map(Case::name).collect();
+        let names: Vec<_> = names.iter().map(String::as_str).collect();
+        let peers = args.peers.as_deref().map(|path| Peers::<PeerRun>::read(path, &names)).transpose()?;
+        if let Some(Peers { engine, machine, .. }) = peers.as_ref().filter(|_| !args.quiet) {
+            message(&format!("beside {engine} on {machine}"));
+        }
+        let cases = chosen(cases(args.quick), &args.only)?;
+        let total = cases.len() as f64;
+        let mut rows = Vec::new();
+        for (at, case) in cases.into_iter().enumerate() {
+            if !progress.continues(at as f64 / total, case.name()) {
+                break;
+            }
+            let case = Case { seconds: args.seconds.unwrap_or(case.seconds), ..case };
+            let found = case.measure().with_context(|| case.name())?;
+            // a shorter run is none that the peer's can be held against
+            let peers = peers.as_ref().filter(|_| !args.quick && args.seconds.is_none());
+            rows.extend(beside(found, peers));
+        }
+        Ok(rows)
+    }
+
+    fn table(rows: &[Row]) -> Table {
+        let mut table = Table::new(&[
+            "test",
+            "engine",
+            "p50_ms",
+            "p99_ms",
+            "most_ms",
+            "cpu_s",
+            "over_peer",
+            "fine",
+            "solves",
+            "factors",
+            "products",
+            "cut",
+            "landing_mm",
+            "rest_mm",
+            "drift_mm",
+            "most_mm",
+            "sank_mm",
+            "made_j",
+        ]);
+        table.rows.extend(rows.iter().map(|row| {
+            vec![
+                row.test.clone().into(),
+                row.engine.clone().into(),
+                (row.ms_per_step_p50, 3).into(),
+                (row.ms_per_step_p99, 3).into(),
+                (row.ms_most, 2).into(),
+                (row.cpu_s, 3).into(),
+                (row.over_peer, 2).into(),
+                (row.fine_steps, 2).into(),
+                (row.solves, 2).into(),
+                (row.factors, 2).into(),
+                (row.products, 1).into(),
+                (f64::from(row.cut), 0).into(),
+                (row.landing_m * 1e3, 3).into(),
+                (row.rest_m * 1e3, 3).into(),
+                (row.drift_mean_m * 1e3, 3).into(),
+                (row.drift_most_m * 1e3, 3).into(),
+                (row.sank_m * 1e3, 2).into(),
+                (row.made_j, 5).into(),
+            ]
+        }));
+        table
+    }
+
+    fn figure(rows: &[Row]) -> Figure {
+        let ours: Vec<_> = rows.iter().filter(|row| row.engine == "metachron").collect();
+        let times = || ours.iter().flat_map(|row| [row.ms_per_step_p50, row.ms_per_step_p99]);
+        let (least, most) = span(times(), true);
+        let bar = |(at, row): (usize, &&Row)| Layer {
+            label: row.test.clone(),
+            colour: Colour::LINES[at % Colour::LINES.len()],
+            mark: Mark::Cells(vec![[at as f64 + 0.1, at as f64 + 0.9, row.ms_per_step_p50, row.ms_per_step_p99]]),
+        };
+        let panel = Panel {
+            title: String::new(),
+            x: Axis::linear("", 0.0, ours.len().max(1) as f64),
+            y: Axis::log("CPU time per step, ms: the median and the 99th percentile", least, most),
+            layers: ours.iter().enumerate().map(bar).collect(),
+        };
+        Figure { title: "Steps in which contact decides".to_owned(), panels: vec![panel], columns: 1 }
+    }
+}
+
+#[cfg(test)]
+mod tests;
