@@ -297,9 +297,6 @@ pub(super) const SMOOTHING: f64 = 0.125;
 pub(super) struct MetricsWriter {
     turns: u64,
     steps: u64,
-    misses: u64,
-    lengthened: u64,
-    stepped: SimSpan,
     late: Histogram,
     work_s: Option<f64>,
     turn_s: Option<f64>,
@@ -327,25 +324,13 @@ pub(super) struct Entry {
 impl MetricsWriter {
     pub fn new() -> Self {
         let window = (SimTime::ZERO, 0);
-        Self {
-            turns: 0,
-            steps: 0,
-            misses: 0,
-            lengthened: 0,
-            stepped: SimSpan::ZERO,
-            late: Histogram::default(),
-            work_s: None,
-            turn_s: None,
-            window,
-            first_window: true,
-        }
+        Self { turns: 0, steps: 0, late: Histogram::default(), work_s: None, turn_s: None, window, first_window: true }
     }
 
     /// Writes or reads the counts, but for the times by which turns were late.
     pub fn archive(&mut self, archive: &mut Archive<'_>) -> Result<(), ArchiveError> {
-        let Self { turns, steps, misses, lengthened, stepped, work_s, turn_s, window, first_window, .. } = self;
-        archive_values!(archive, *turns, *steps, *misses, *lengthened, *stepped)?;
-        archive_values!(archive, *work_s, *turn_s, *window, *first_window)
+        let Self { turns, steps, work_s, turn_s, window, first_window, .. } = self;
+        archive_values!(archive, *turns, *steps, *work_s, *turn_s, *window, *first_window)
     }
 
     /// Turns recorded so far.
@@ -362,17 +347,14 @@ impl MetricsWriter {
     pub fn write(&mut self, gauges: &Metrics, pace: &AgentClock, entry: Entry) {
         self.turns += 1;
         self.steps += u64::from(entry.steps);
-        self.misses += u64::from(entry.missed);
-        self.stepped += entry.span;
-        if is_longer(entry.span, entry.steps, pace.wanted()) {
-            self.lengthened += u64::from(entry.steps);
-        }
         self.late.record(entry.late);
         let work_s = smoothed(&mut self.work_s, entry.work_s);
         gauges.steps.store(self.steps, Relaxed);
-        gauges.misses.store(self.misses, Relaxed);
-        gauges.lengthened.store(self.lengthened, Relaxed);
-        gauges.stepped.store(self.stepped.as_nanos(), Relaxed);
+        add(&gauges.misses, u64::from(entry.missed));
+        add(&gauges.stepped, entry.span.as_nanos());
+        if is_longer(entry.span, entry.steps, pace.wanted()) {
+            add(&gauges.lengthened, u64::from(entry.steps));
+        }
         gauges.work_s.set(work_s);
         self.pace(gauges, pace);
         // the step just made covers the time up to the agent's own
@@ -416,6 +398,11 @@ impl MetricsWriter {
             self.flush(gauges);
         }
     }
+}
+
+/// Adds to a count that no other thread writes: an atomic addition would cost more.
+fn add(count: &AtomicU64, more: u64) {
+    count.store(count.load(Relaxed) + more, Relaxed);
 }
 
 /// Whether so many steps that take a span together are longer than the one that was asked for, by more than each is rounded, a nanosecond.

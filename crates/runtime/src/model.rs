@@ -84,9 +84,8 @@ impl Model {
         }
         let mark = &shared.calls;
         mark.take_refused();
-        let member = contained(|| Ok(mark.during(|| agent.member())))
-            .inspect_err(|reason| *broken = Some(reason.as_str().into()))?;
-        Ok(member.map(|member| GuardedMember::new(member, mark)))
+        contained(|| Ok(mark.during(|| agent.member()).map(|member| GuardedMember::new(member, mark))))
+            .inspect_err(|reason| *broken = Some(reason.as_str().into()))
     }
 
     /// Its step by itself.

@@ -30,7 +30,7 @@ pub struct GuardedMember<'a> {
     inner: &'a mut dyn ClusterMember,
     /// `None` of one whose code nobody watches: its panics are its caller's, and its answers are taken as they are.
     mark: Option<&'a CallMark>,
-    /// How many blocks its step has that is begun.
+    /// How many blocks it has, of a member that is watched.
     blocks: usize,
 }
 
@@ -92,8 +92,13 @@ impl<'a, M: ClusterMember> From<&'a mut M> for GuardedMember<'a> {
 
 impl<'a> GuardedMember<'a> {
     /// `inner`, whose calls `mark` marks.
+    ///
+    /// # Panics
+    /// Where `inner` does.
     pub fn new(inner: &'a mut dyn ClusterMember, mark: &'a CallMark) -> Self {
-        Self { inner, mark: Some(mark), blocks: 0 }
+        // points of it are asked for before it begins a step
+        let blocks = mark.during(|| inner.velocities().len());
+        Self { inner, mark: Some(mark), blocks }
     }
 
     /// Whether a call of it has unwound: its state is not known then.

@@ -3,7 +3,7 @@
 use glam::{DMat3, DVec3};
 use metachron_contact::cluster::{Block, Side, SideTerm};
 use metachron_contact::stepper::{ClusterMember, Locked, MaterialPoint, Pose, Role};
-use metachron_contact::{Agent, SetMotion, StepContext};
+use metachron_contact::{Agent, Inputs, SetMotion, StepContext};
 use metachron_core::{AgentId, Anchor, Archive, ArchiveError, Body, Bounds, SimSpan, Snapshot, StepError, StepReport};
 use metachron_geometry::{CollisionShape, ContactSide, Place, PlacedShape, ShapePose, Solid};
 use metachron_models::rigid::{RigidBody, RigidSpec};
@@ -183,6 +183,10 @@ impl Agent for Rogue {
     fn resolution(&self) -> Option<metachron_core::Resolution> {
         self.switch.panics(Kind::Resolution);
         None
+    }
+
+    fn inputs(&self) -> Inputs {
+        self.body.inputs()
     }
 
     fn set_motion(&mut self, motion: &SetMotion) -> bool {
