@@ -92,7 +92,7 @@ const RINGS: [(&str, usize); 18] = [
     ("agents/geometry", 14),
     ("agents/contact", 14),
     ("agents/models", 17),
-    ("crates/runtime", 14),
+    ("crates/runtime", 15),
     ("crates/world", 20),
     ("crates/scene", 30),
     ("crates/devices", 0),

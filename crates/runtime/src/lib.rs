@@ -93,7 +93,7 @@ pub use handle::{AgentHandle, state_hash};
 pub use lockstep::Lockstep;
 pub use machine::{DrawPrice, Machine, OTHER_STEP_US, ObjectPrice, PRESETS, StepPrice};
 pub use mailbox::{Command, KEYS, Keyed, SendError};
-pub use metrics::{AgentState, AgentStats, Spread};
+pub use metrics::{AgentState, AgentStats, STALLED_FOR_GOOD, Spread};
 pub use pool::Pool;
 pub use priority::{Priority, PriorityRefused};
 pub use probe::{SAMPLES_MAX, Sample, WatchedPoint};
@@ -104,7 +104,6 @@ pub use streams::Heard;
 pub use threads::{AUTO_THREADS_MAX, THREADS_MAX, Threads};
 pub use turn_order::{Held, OrderLog, PartKind, TurnOrder, TurnPart};
 pub use turns::{TURNS_KEPT, Turn};
-pub use watchdog::STALLED_FOR_GOOD;
 
 use archive::refuse_absent;
 use metachron_core::{AgentId, Archive, ArchiveError, SimTime};

@@ -151,6 +151,9 @@ const PARKED: u8 = 2;
 const GONE: u8 = 3;
 const STALLED: u8 = 4;
 
+/// A turn that has lasted for so long is not waited for any more.
+pub const STALLED_FOR_GOOD: Duration = Duration::from_secs(5);
+
 /// The readable side of an agent's metrics.
 #[derive(Debug, Default)]
 pub(super) struct Metrics {

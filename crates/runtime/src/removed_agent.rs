@@ -8,9 +8,8 @@ use super::agent_runner::AgentRunner;
 use super::cluster::Led;
 use super::events::EventKind;
 use super::mailbox::SendError;
-use super::metrics::AgentState;
+use super::metrics::{AgentState, STALLED_FOR_GOOD};
 use super::spawn::RunAgents;
-use super::watchdog::STALLED_FOR_GOOD;
 use metachron_core::{AgentId, Snapshot};
 use std::sync::{Arc, LazyLock};
 

@@ -17,8 +17,6 @@ const ALLOWED_DEFAULT: Duration = Duration::from_millis(250);
 const ALLOWED_STEPS: u32 = 10;
 /// As often as it is looked within that time: after a suspension of the whole machine a turn is found the same only once.
 pub(super) const CHECKS: u32 = 4;
-/// A turn that has lasted for so long is not waited for any more.
-pub const STALLED_FOR_GOOD: Duration = Duration::from_secs(5);
 /// The turn of a cluster makes the steps of all its members, and may last so many times as long at most.
 const MEMBERS_MAX: u32 = 25;
 

@@ -82,7 +82,7 @@ impl AgentRunner {
         let all = std::iter::once(&mut *self).chain(led.members_at(time));
         let parts = wishes.iter().map(|wish| plan.parts_in(wish.role, wish.step_s));
         for (actor, parts) in all.zip(parts) {
-            if let Some((participant, pairs)) = actor.participant((time, dt), parts) {
+            if let Some((participant, pairs)) = actor.participant(time, dt, parts) {
                 list.push(participant);
                 sides.push(pairs);
             }
@@ -125,12 +125,12 @@ impl AgentRunner {
             self.note_errors(doubling, dt);
         }
         let made = made?;
-        let report = self.note_made(stepper, (plan, dt), &made);
+        let report = self.note_made(stepper, plan, dt, &made);
         Ok(StepOutcome { report: StepReport { at_rest: concluded.unwrap_or(false), ..report }, dt })
     }
 
     /// Notes what a macro step was that has been made.
-    fn note_made(&mut self, stepper: Box<ClusterStepper>, (plan, dt): (Plan, SimSpan), made: &Made) -> StepReport {
+    fn note_made(&mut self, stepper: Box<ClusterStepper>, plan: Plan, dt: SimSpan, made: &Made) -> StepReport {
         let Made { report, extra } = made;
         self.note_pairs(&stepper, dt);
         self.note_events(&stepper, dt);
@@ -143,11 +143,7 @@ impl AgentRunner {
     }
 
     /// What it brings into a step from a time on, of which it makes so many parts, and its asynchronous pairs.
-    fn participant(
-        &mut self,
-        (time, dt): (SimTime, SimSpan),
-        parts: u32,
-    ) -> Option<(Participant<'_>, Option<&mut Pairs>)> {
+    fn participant(&mut self, time: SimTime, dt: SimSpan, parts: u32) -> Option<(Participant<'_>, Option<&mut Pairs>)> {
         let id = self.shared.id;
         let Self { model, observer, loads, links, shared, cluster, .. } = self;
         let ClusterSeat { memory, grips, asynchronous, .. } = &mut **cluster.as_mut()?;
