@@ -1,8 +1,10 @@
 //! What only threads do; `live_tests.rs` holds what every executor does.
 
 use super::super::SystemClock;
+use super::super::agent_runner::Next;
 use super::super::clock::ManualClock;
 use super::super::testing::{Dummy, eventually, running};
+use super::agent_thread::CATCH_UP_MAX;
 use super::*;
 
 #[test]
