@@ -112,7 +112,7 @@ impl Cut {
         let own = self.own_states(&present)?;
         let mut state = RunState::empty(present);
         let mut runners = runners_of(&mut self.all, &mut made, &state.present);
-        let read = state.archive(&mut runners, archive).and_then(|()| archive.finish());
+        let read = caught(|| state.archive(&mut runners, archive).and_then(|()| archive.finish()));
         if let Err(error) = read {
             drop(runners);
             own.iter().for_each(|(at, own)| self.take_back(*at, own));
@@ -121,6 +121,7 @@ impl Cut {
         // before they are found: nobody finds one that is back in a state of another time
         for (runner, shown) in runners.into_iter().flatten().zip(&state.shown) {
             runner.writer.replace(Arc::clone(&shown.newest));
+            runner.shared.gauges.set_values(&shown.metrics);
         }
         self.admit(&state.present, made);
         self.show(&mut state);

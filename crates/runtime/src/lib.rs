@@ -126,7 +126,7 @@ pub trait Run: Send {
     fn timeline(&self) -> Timeline;
 
     /// Sets how long a turn of one agent may last, wall time, > 0, before the agent counts as stalled ([`AgentState::Stalled`]): 250 ms, but ten
-    /// of its steps at least, and a cluster's so many times as long as it has members. Nothing in lockstep, whose turns are its caller's.
+    /// of its steps at least, and a cluster's so many times as long as it has members, 25 at most. Nothing in lockstep, whose turns are its caller's.
     fn set_stall_limit(&mut self, limit: Duration) {
         let _ = limit;
     }

@@ -182,6 +182,22 @@ pub(super) struct Metrics {
     reason: ArcSwapOption<String>,
 }
 
+/// What a checkpoint has of [`Metrics`].
+#[derive(Debug, Clone, Default, serde::Serialize, serde::Deserialize)]
+pub(super) struct MetricsValues {
+    counts: [u64; 7],
+    gauges: [f64; 4],
+    state: u8,
+    reason: Option<String>,
+}
+
+impl MetricsValues {
+    /// Whether an agent can be in that condition.
+    pub const fn is_sound(&self) -> bool {
+        matches!(self.state, RUNNING | RESTING | PARKED | GONE)
+    }
+}
+
 impl Metrics {
     pub fn state(&self) -> AgentState {
         match self.state.load(Relaxed) {
@@ -252,24 +268,33 @@ impl Metrics {
         }
     }
 
-    /// Writes or reads them; CPU time and the times by which turns were late go on being counted.
-    pub fn archive(&self, archive: &mut Archive<'_>) -> Result<(), ArchiveError> {
+    /// The numbers and the condition, but CPU time and the times by which turns were late.
+    pub fn values(&self) -> MetricsValues {
+        MetricsValues {
+            counts: self.counts().map(|count| count.load(Relaxed)),
+            gauges: self.gauges().map(Gauge::get),
+            // between turns none is stalled
+            state: if self.is_stalled() { RUNNING } else { self.state.load(Relaxed) },
+            reason: self.reason.load().as_deref().cloned(),
+        }
+    }
+
+    /// Takes such values over; called between turns.
+    pub fn set_values(&self, values: &MetricsValues) {
+        self.counts().iter().zip(values.counts).for_each(|(count, value)| count.store(value, Relaxed));
+        self.gauges().iter().zip(values.gauges).for_each(|(gauge, value)| gauge.set(value));
+        self.reason.store(values.reason.clone().map(Arc::new));
+        self.state.store(values.state, Relaxed);
+    }
+
+    const fn counts(&self) -> [&AtomicU64; 7] {
         let Self { steps, misses, lengthened, stepped, dt, dropped, rested, .. } = self;
-        for count in [steps, misses, lengthened, stepped, dt, dropped, rested] {
-            let mut value = count.load(Relaxed);
-            archive.value(&mut value)?;
-            count.store(value, Relaxed);
-        }
-        for gauge in [&self.rate_hz, &self.mean_hz, &self.work_s, &self.work] {
-            let mut value = gauge.get();
-            archive.value(&mut value)?;
-            gauge.set(value);
-        }
-        let (mut state, mut reason) = (self.state.load(Relaxed), self.reason.load().as_deref().cloned());
-        archive_values!(archive, state, reason)?;
-        self.reason.store(reason.map(Arc::new));
-        self.state.store(state, Relaxed);
-        Ok(())
+        [steps, misses, lengthened, stepped, dt, dropped, rested]
+    }
+
+    const fn gauges(&self) -> [&Gauge; 4] {
+        let Self { rate_hz, mean_hz, work_s, work, .. } = self;
+        [rate_hz, mean_hz, work_s, work]
     }
 
     /// CPU time of turns so far, seconds.

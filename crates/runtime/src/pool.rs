@@ -70,7 +70,7 @@ impl Pool {
         let workers = workers.clamp(1, all.handles.len().max(1));
         all.sleep.set_workers(workers);
         let (sleep, handles) = (Arc::clone(&all.sleep), all.handles.clone());
-        let watchdog = Watchdog { handles: handles.clone(), sleep: Arc::clone(&sleep), limit: Arc::new(limit) };
+        let watchdog = Watchdog::new(&handles, limit);
         let state = Arc::new(PoolState::new(clock, sleep, handles, actors, workers));
         state.timeline.drive(Duration::ZERO, TimelineCommand::Pause);
         let team = Team { places: workers, watchdog: watchdog.clone(), priority, stuck: Vec::new() };

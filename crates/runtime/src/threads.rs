@@ -75,8 +75,7 @@ impl Threads {
         timeline.drive(Duration::ZERO, TimelineCommand::Pause);
         let (farewells, ended) = channel();
         let (threads, ended_agents, order) = (BTreeMap::new(), BTreeMap::new(), None);
-        let limit = Arc::<StallLimit>::default();
-        let watchdog = Watchdog { handles: all.handles.clone(), sleep: Arc::clone(&all.sleep), limit };
+        let watchdog = Watchdog::new(&all.handles, StallLimit::default());
         let words = Words::default();
         let unwatched = watch(watchdog.clone(), Arc::clone(&words))?;
         let mut run = Self {

@@ -49,4 +49,17 @@ impl VirtualEvents {
         let due = self.due.iter().map(|Reverse((_, agent))| *agent);
         due.chain(self.jobs.iter().map(|Reverse((_, owner))| *owner)).filter(|owner| *owner != FRAME)
     }
+
+    /// A turn that cannot be in progress at `now`: it begins later, or its jobs are not there.
+    pub fn impossible_turn(&self, now: Duration) -> Option<Turn> {
+        let mut jobs = vec![0; self.phases.len()];
+        let owners = self.jobs.iter().filter_map(|Reverse((_, owner))| usize::try_from(*owner).ok());
+        owners.for_each(|owner| jobs.get_mut(owner).into_iter().for_each(|count| *count += 1));
+        let turns = self.phases.iter().zip(jobs).filter_map(|((phase, _), jobs)| match phase {
+            Phase::Busy(turn) => Some((*turn, jobs)),
+            _ => None,
+        });
+        let is_impossible = |(turn, jobs): &(Turn, u32)| turn.since > now || turn.jobs == 0 || turn.jobs != *jobs;
+        turns.filter(is_impossible).map(|(turn, _)| turn).next()
+    }
 }

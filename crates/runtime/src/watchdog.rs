@@ -8,16 +8,16 @@ use super::agents::Agents;
 use super::handle::{AgentHandle, Shared};
 use super::sleep::SleepRegistry;
 use metachron_core::AgentId;
-use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering::Relaxed, Ordering::SeqCst};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
 /// How long a turn of one agent may last if the scene does not say, wall time, and as how many of its steps at least.
 const ALLOWED_DEFAULT: Duration = Duration::from_millis(250);
 const ALLOWED_STEPS: u32 = 10;
-/// As often as it is looked within that time: after a suspension of the whole machine a turn is found the same only once.
+/// How often a turn is looked at within that time: a suspension of the whole machine counts as one look.
 pub(super) const CHECKS: u32 = 4;
-/// The turn of a cluster makes the steps of all its members, and may last so many times as long at most.
+/// The turn of a cluster makes the steps of all its members: it may last as many times as long as it has members, and no more than this.
 const MEMBERS_MAX: u32 = 25;
 
 /// What one thread does.
@@ -127,15 +127,31 @@ pub(super) struct Seen {
     since: Option<Instant>,
 }
 
-/// Who judges turns.
+/// An agent that is stalled by a turn.
+#[derive(Debug, Clone, Copy)]
+struct StalledBy {
+    agent: AgentId,
+    /// The agent whose turn it is.
+    turn_of: AgentId,
+}
+
+/// The judge of turns; copies judge as one.
 #[derive(Debug, Clone)]
 pub(super) struct Watchdog {
-    pub handles: Agents,
-    pub sleep: Arc<SleepRegistry>,
+    handles: Agents,
+    sleep: Arc<SleepRegistry>,
     pub limit: Arc<StallLimit>,
+    /// All that are stalled: a turn that ends may have released some of them before.
+    stalled: Arc<Mutex<Vec<StalledBy>>>,
 }
 
 impl Watchdog {
+    /// One for the turns of `handles`, which may last as long as `limit` says.
+    pub fn new(handles: &Agents, limit: StallLimit) -> Self {
+        let sleep = Arc::clone(&handles.sleep);
+        Self { handles: handles.clone(), sleep, limit: Arc::new(limit), stalled: Arc::default() }
+    }
+
     /// How long a turn of `id` may last.
     pub fn allowed(&self, id: AgentId) -> Duration {
         let dt = self.handles.of(id).map_or(Duration::ZERO, |agent| Duration::from_nanos(agent.dt_ns()));
@@ -161,6 +177,8 @@ impl Watchdog {
             return false;
         }
         let culprit = self.culprit(turn.agent());
+        let turned = self.turned_by(turn.agent()).map(|agent| StalledBy { agent: agent.id(), turn_of: turn.agent() });
+        self.stalled().extend(turned);
         self.each_live(turn.agent(), |shared| {
             shared.gauges.stall(lasts, Some(shared.id) == culprit);
             self.sleep.changed.mark(shared.id);
@@ -172,12 +190,21 @@ impl Watchdog {
         true
     }
 
-    /// A turn of `id` that was stalled has ended.
+    /// A turn of `id` that was stalled has ended: whom it stalled goes on, led by it still or not.
     pub fn resume(&self, id: AgentId) {
-        self.each_live(id, |shared| {
-            shared.gauges.resume();
-            self.sleep.changed.mark(shared.id);
+        self.stalled().retain(|stalled| {
+            if stalled.turn_of != id {
+                return true;
+            }
+            let live = self.handles.of(stalled.agent).and_then(AgentHandle::live);
+            live.iter().for_each(|shared| shared.gauges.resume());
+            self.sleep.changed.mark(stalled.agent);
+            false
         });
+    }
+
+    fn stalled(&self) -> MutexGuard<'_, Vec<StalledBy>> {
+        self.stalled.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
     /// Of the agents whose turns `id` makes the one whose code runs now; `id` where that of none does.
@@ -221,7 +248,30 @@ impl Watchdog {
 
 #[cfg(test)]
 mod tests {
+    use super::super::helpers::Helpers;
+    use super::super::metrics::AgentState;
+    use super::super::spawn::{AssembledRun, assemble};
+    use super::super::testing::{Dummy, eventually};
     use super::*;
+    use std::cell::RefCell;
+
+    #[test]
+    fn agents_that_a_stalled_turn_released_go_on_when_it_ends() {
+        let spawns = vec![Dummy::new(1.0).at(1e5), Dummy::new(1.0).at(1e5)];
+        let AssembledRun { all, .. } = assemble(spawns, Helpers::none()).unwrap();
+        let watchdog = Watchdog::new(&all.handles, StallLimit::of(Duration::from_millis(1)));
+        all.sleep.follow(AgentId(1), Some(AgentId(0)));
+        let (word, seen) = (WatchdogWord::default(), RefCell::new(Seen::default()));
+        let turn = word.begin(1, AgentId(0));
+        eventually("it is stalled", || watchdog.judge(&word, &mut seen.borrow_mut()));
+        let states = || all.handles.iter().map(AgentHandle::state).collect::<Vec<_>>();
+        assert_eq!(states(), [AgentState::Stalled, AgentState::Stalled]);
+        // its cluster parts in the turn
+        all.sleep.follow(AgentId(1), None);
+        assert!(!word.end(turn));
+        watchdog.resume(AgentId(0));
+        assert_eq!(states(), [AgentState::Running, AgentState::Running]);
+    }
 
     #[test]
     fn either_the_step_returns_or_it_is_stalled() {

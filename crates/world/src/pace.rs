@@ -20,7 +20,7 @@ pub enum Pace {
     /// As fast as objects can step, and no faster: none is late, gives up time or makes longer steps than it was asked for, however slow the
     /// machine is, and a rate that control may lower is kept. So time passes in [`World::advance`]; where [`World::drive`] lets it run, it
     /// passes as beside the clock on the wall, and who is too slow for that is behind until time stops. In lockstep steps take no virtual
-    /// time: what the declared machine says makes no difference to any bit.
+    /// time: what the declared machine says of steps makes no difference to any bit.
     Free,
 }
 
@@ -61,7 +61,7 @@ impl World {
     }
 
     /// The most simulated time that one of its objects has not lived, though time has passed: what it dropped, and what it is behind now. Zero as
-    /// long as the declared machine of lockstep, or this one, is fast enough; always, after [`World::advance`], at [`Pace::Free`].
+    /// long as the declared machine of lockstep, or this one, is fast enough; at [`Pace::Free`] it does not grow.
     #[must_use]
     pub fn given_up(&self) -> SimSpan {
         let now = self.time();

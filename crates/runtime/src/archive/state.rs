@@ -8,6 +8,7 @@ use super::super::agent_runner::{AgentRunner, contained};
 use super::super::broad_phase::BroadPhaseState;
 use super::super::cluster::{Place, Placed, check_places};
 use super::super::mailbox::PendingCommands;
+use super::super::metrics::MetricsValues;
 use super::super::observation::Seen;
 use super::super::sleep::SleepState;
 use super::super::spawn::RunAgents;
@@ -36,6 +37,7 @@ pub(super) struct RunState {
 #[derive(Default)]
 pub(super) struct ShownState {
     pub newest: Arc<Snapshot>,
+    pub metrics: MetricsValues,
     /// What it has not obeyed yet.
     pub commands: Option<PendingCommands>,
     pub seen: Vec<Seen>,
@@ -104,6 +106,16 @@ impl RunState {
         if !self.timeline.is_sound() {
             return mismatch("the timeline", format!("{:?}", self.timeline), "one that can be in force".to_owned());
         }
+        if let Some(turn) = self.events.as_ref().and_then(|events| events.impossible_turn(self.now)) {
+            return mismatch(
+                "a turn in progress",
+                format!("{turn:?}"),
+                "one that began before, and has its jobs".to_owned(),
+            );
+        }
+        if !self.shown.iter().all(|shown| shown.metrics.is_sound()) {
+            return mismatch("the condition of an agent", "none".to_owned(), "one that agents can be in".to_owned());
+        }
         for (runner, shown) in runners.iter().flatten().zip(&self.shown) {
             runner.observer.check_seen(&shown.seen, &self.present)?;
         }
@@ -115,6 +127,7 @@ impl ShownState {
     fn of(runner: &AgentRunner, present: &[bool]) -> Self {
         Self {
             newest: runner.shared.slot.latest(),
+            metrics: runner.shared.gauges.values(),
             commands: runner.shared.mail.waiting(),
             seen: runner.observer.seen(present),
         }
@@ -122,7 +135,7 @@ impl ShownState {
 
     fn archive(&mut self, archive: &mut Archive<'_>) -> Result<(), ArchiveError> {
         archive.snapshot(&mut self.newest)?;
-        archive.value(&mut self.commands)?;
+        archive_values!(archive, self.metrics, self.commands)?;
         archive.list(&mut self.seen, Seen::default, Seen::archive)
     }
 }
@@ -143,7 +156,6 @@ impl AgentRunner {
         archive_values!(archive, self.announced, self.turn_period)?;
         self.led.archive(archive)?;
         self.metrics.archive(archive)?;
-        self.shared.gauges.archive(archive)?;
         archive.fixed("whether it has a governor", self.governor.is_some())?;
         self.governor.iter_mut().try_for_each(|governor| governor.archive(archive))?;
         archive.fixed("whether it is a member of clusters", self.cluster.is_some())?;

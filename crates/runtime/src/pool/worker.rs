@@ -216,6 +216,7 @@ mod tests {
     use super::super::super::helpers::Helpers;
     use super::super::super::spawn::{AssembledRun, RunAgents, assemble};
     use super::super::super::testing::Dummy;
+    use super::super::super::watchdog::StallLimit;
     use super::super::super::{Clock, ManualClock};
     use super::*;
 
@@ -223,7 +224,7 @@ mod tests {
         let AssembledRun { actors, all: RunAgents { handles, sleep, .. } } = assemble(spawns, Helpers::none()).unwrap();
         sleep.set_workers(1);
         let clock = Arc::clone(clock) as Arc<dyn Clock>;
-        let watchdog = Watchdog { handles: handles.clone(), sleep: Arc::clone(&sleep), limit: Arc::default() };
+        let watchdog = Watchdog::new(&handles, StallLimit::default());
         let state = Arc::new(PoolState::new(clock, sleep, handles, actors, 1));
         state.timeline.drive(Duration::ZERO, TimelineCommand::Run);
         Worker::new(state, 0, Arc::default(), watchdog)

@@ -45,8 +45,7 @@ fn an_agent_that_is_behind_yields_its_core_after_a_while_and_goes_on() {
     timeline.drive(Duration::ZERO, TimelineCommand::Run);
     clock.advance(Duration::from_millis(50));
     let (batch, awake, word) = (CpuBatch::default(), Duration::ZERO, Arc::default());
-    let watchdog =
-        Watchdog { handles: all.handles.clone(), sleep: Arc::clone(&all.sleep), limit: Arc::<StallLimit>::default() };
+    let watchdog = Watchdog::new(&all.handles, StallLimit::default());
     let mut thread = AgentThread { clock, timeline, batch, order: None, awake, watchdog, word, turns: 0 };
     let mut steps_after = |awake: Duration| {
         thread.awake = awake;

@@ -24,15 +24,14 @@ pub(super) type Words = Arc<Mutex<BTreeMap<AgentId, Arc<WatchdogWord>>>>;
 pub(super) fn watch(watchdog: Watchdog, words: Words) -> Result<Sender<()>, RunError> {
     let (unwatched, end) = channel();
     let body = move || {
-        let mut seen: BTreeMap<AgentId, Seen> = BTreeMap::new();
+        // by the word, as a thread that takes another's place counts its turns anew
+        let mut seen: BTreeMap<AgentId, (Arc<WatchdogWord>, Seen)> = BTreeMap::new();
         while end.recv_timeout(watchdog.limit.interval()) == Err(RecvTimeoutError::Timeout) {
-            let words: Vec<_> = {
-                let words = words.lock().unwrap_or_else(PoisonError::into_inner);
-                words.iter().map(|(id, word)| (*id, Arc::clone(word))).collect()
-            };
-            seen.retain(|id, _| words.binary_search_by_key(id, |(id, _)| *id).is_ok());
+            let words = words.lock().unwrap_or_else(PoisonError::into_inner).clone();
+            seen.retain(|id, (word, _)| words.get(id).is_some_and(|now| Arc::ptr_eq(now, word)));
             for (id, word) in words {
-                watchdog.judge(&word, seen.entry(id).or_default());
+                let (word, seen) = seen.entry(id).or_insert_with(|| (word, Seen::default()));
+                watchdog.judge(word, seen);
             }
         }
     };

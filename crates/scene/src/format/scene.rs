@@ -25,7 +25,7 @@ pub struct SceneFile {
     /// How the operating system schedules the threads of agents. Default `normal`.
     pub priority: Option<PriorityKind>,
     /// How long the turn of an object may last before the object counts as stalled, seconds on the clock of the wall. Default 0.25.
-    /// Ten of its steps are always allowed, and a cluster's turn so many times as long as it has members.
+    /// Ten of its steps are always allowed, and a cluster's turn as many times as long as it has members, 25 at most; a checkpoint waits for a stalled turn as long.
     #[schemars(range(min = 0.001, max = 3600.0))]
     pub stall_s: Option<f64>,
     /// Time at which states are drawn. Default `interpolate`.
