@@ -101,6 +101,7 @@ fn kind(what: &Happening) -> &'static str {
         Happening::AttachmentGave => "attachment_gave",
         Happening::RateMissed => "rate_missed",
         Happening::Carved(_) => "carved",
+        Happening::Rewound => "rewound",
         _ => "unknown",
     }
 }

@@ -19,6 +19,7 @@ mod rollout;
 mod scene;
 mod sensor;
 mod soft;
+mod start;
 mod state;
 #[cfg_attr(not(feature = "view"), path = "no_view.rs")]
 mod view;

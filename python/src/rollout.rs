@@ -12,7 +12,7 @@ use crate::state::Points;
 use glam::DVec3;
 use metachron::core::{Anchor, Body, SimSpan};
 use metachron::world::kinds::ExecutorKind;
-use metachron::world::{self, Command, World, WorldError};
+use metachron::world::{self, Command, Pace, World, WorldError};
 use numpy::ndarray::{Array3, Array4, Axis, Ix3};
 use numpy::{AllowTypeChange, PyArray1, PyArrayLikeDyn};
 use pyo3::exceptions::{PyRuntimeError, PyTypeError, PyValueError};
@@ -68,7 +68,7 @@ struct Motion {
     velocities: Vec<f64>,
 }
 
-/// Plays a world in lockstep for each row of `actions`: forces on one object, N, (worlds, steps, 3).
+/// Plays a world in lockstep at the free pace for each row of `actions`: forces on one object, N, (worlds, steps, 3).
 ///
 /// `step` is required. A world is the same, bit for bit, on any number of threads.
 #[pyfunction]
@@ -146,6 +146,7 @@ impl Plan {
     /// Plays one world to its end, or until all is over.
     fn play_one(&self, number: usize, is_over: &AtomicBool) -> Result<Played, WorldError> {
         let world = World::start(&self.scene, ExecutorKind::Lockstep)?;
+        world.set_pace(Pace::Free)?;
         let on = world.object(&self.on)?;
         let observed: Result<Vec<_>, _> = self.observe.iter().map(|name| world.object(name)).collect();
         let observed = observed?;

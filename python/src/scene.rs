@@ -8,6 +8,7 @@ use crate::object::Names;
 use crate::raised;
 use crate::sensor::mount;
 use crate::soft::soft;
+use crate::start::started;
 use crate::world::World;
 use metachron::contact::joint::JointKind;
 use metachron::geometry::Solid;
@@ -172,13 +173,18 @@ impl Scene {
     }
 
     /// Starts a world of it, whose time stands at first. Raises `ValueError` for what cannot be built.
-    #[pyo3(signature = (executor = "lockstep"))]
-    pub fn start(&self, py: Python<'_>, executor: &str) -> PyResult<World> {
+    ///
+    /// At the pace `"free"`, the default in lockstep, time waits for objects: none gives up time or makes longer steps than it was asked for. At
+    /// `"real-time"`, the default on other executors, it passes beside the clock, and an object that is too slow for it does; in lockstep that
+    /// is by what the scene's declared machine costs.
+    #[pyo3(signature = (executor = "lockstep", pace = None))]
+    pub fn start(&self, py: Python<'_>, executor: &str, pace: Option<&str>) -> PyResult<World> {
         let text = match &self.inner {
             Inner::Built(_) => None,
             Inner::Read(_, text) => Some((**text).clone()),
         };
-        World::start(py, &self.resolved()?, executor, text)
+        let scene = self.resolved()?;
+        World::of(started(py, &scene, executor, pace)?, &scene, text)
     }
 }
 

@@ -14,6 +14,7 @@ use crate::object::{Named, NamedJoint, Object};
 use crate::queries::{Contact, Hit};
 use crate::raised;
 use crate::scene::{Scene, part};
+use crate::start;
 use crate::state::State;
 use crate::view::Pictures;
 use glam::{DQuat, DVec3};
@@ -62,10 +63,6 @@ struct Joint {
     body: world::Object,
 }
 
-/// The executors, as Python names them.
-const EXECUTORS: [ExecutorKind; 4] =
-    [ExecutorKind::Lockstep, ExecutorKind::Threads, ExecutorKind::Pool, ExecutorKind::Auto];
-
 /// Where on an object, under which key, for how long.
 const ANCHORED: [&str; 5] = ["arc", "local", "vertex", "key", "expires"];
 
@@ -81,16 +78,6 @@ fn apart<T: Send>(work: impl FnOnce() -> T + Send) -> T {
 }
 
 impl World {
-    /// Starts a scene.
-    pub fn start(py: Python<'_>, scene: &world::Scene, executor: &str, text: Option<SceneText>) -> PyResult<Self> {
-        let Some(kind) = EXECUTORS.into_iter().find(|kind| kind.name() == executor) else {
-            let known = EXECUTORS.map(ExecutorKind::name).join(", ");
-            return Err(PyValueError::new_err(format!("there is no executor {executor:?}; expected one of {known}")));
-        };
-        let inner = py.detach(|| world::World::start(scene, kind)).map_err(raised::world)?;
-        Self::of(inner, scene, text)
-    }
-
     /// A world that was started of this scene.
     pub fn of(inner: world::World, scene: &world::Scene, text: Option<SceneText>) -> PyResult<Self> {
         let joints = scene.joints.iter().zip(&scene.joint_names).map(|(joint, name)| {
@@ -139,11 +126,16 @@ impl World {
 
 #[pymethods]
 impl World {
-    /// `Scene.from_toml(text_or_path).start(executor)`.
+    /// `Scene.from_toml(text_or_path).start(executor, pace)`.
     #[staticmethod]
-    #[pyo3(signature = (text_or_path, executor = "lockstep"))]
-    fn from_toml(py: Python<'_>, text_or_path: &Bound<'_, PyAny>, executor: &str) -> PyResult<Self> {
-        Scene::from_toml(text_or_path)?.start(py, executor)
+    #[pyo3(signature = (text_or_path, executor = "lockstep", pace = None))]
+    fn from_toml(
+        py: Python<'_>,
+        text_or_path: &Bound<'_, PyAny>,
+        executor: &str,
+        pace: Option<&str>,
+    ) -> PyResult<Self> {
+        Scene::from_toml(text_or_path)?.start(py, executor, pace)
     }
 
     /// The object of this name. Raises `KeyError`.
@@ -179,6 +171,18 @@ impl World {
         self.inner.executor().name()
     }
 
+    /// How time passes: `"free"` where it waits for objects, else `"real-time"`, whatever its speed.
+    #[getter]
+    fn pace(&self, py: Python<'_>) -> &'static str {
+        start::pace(py.detach(|| self.inner.is_free()))
+    }
+
+    /// The most simulated time that one of its objects has not lived, s: what it dropped, and what it is behind now. 0 at the pace `"free"`.
+    #[getter]
+    fn dropped(&self, py: Python<'_>) -> f64 {
+        py.detach(|| self.inner.given_up().as_secs_f64())
+    }
+
     /// Equal numbers mean the same states of all objects, bit for bit.
     fn hash(&self) -> u64 {
         self.inner.hash()
@@ -198,7 +202,8 @@ impl World {
         py.detach(|| world.restore(&checkpoint.inner)).map_err(raised::checkpoint)
     }
 
-    /// Lets so much simulated time pass: at once in lockstep, in real time on other executors. Other threads of Python run meanwhile.
+    /// Lets so much simulated time pass: at once in lockstep, on other executors in real time or, at the pace `"free"`, as fast as objects can
+    /// step. Other threads of Python run meanwhile.
     fn advance(&self, py: Python<'_>, seconds: f64) -> PyResult<()> {
         let (world, span) = (self.at_home()?, span("the time to advance by", seconds)?);
         let (mut asked, mut interrupted) = (Instant::now(), Ok(()));
@@ -213,7 +218,7 @@ impl World {
         interrupted
     }
 
-    /// Lets time pass from now on, so many simulated seconds a second, 0.001 ... 100. Not in lockstep.
+    /// Lets time pass from now on, so many simulated seconds a second, 0.001 ... 100; the pace is no longer `"free"`. Not in lockstep.
     #[pyo3(signature = (speed = 1.0))]
     fn run(&self, py: Python<'_>, speed: f64) -> PyResult<()> {
         if self.inner.executor() == ExecutorKind::Lockstep {

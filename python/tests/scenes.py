@@ -11,6 +11,21 @@ shape = "ball"
 radius_m = 0.1
 """
 
+# the text of a scene with one object whose steps of 1 ms take 3 ms each, and another in time
+SLOW = """format = 1
+[[object]]
+name = "slow"
+model = "synthetic"
+rate_hz = 1000
+cost_us = 3000
+
+[[object]]
+name = "quick"
+model = "synthetic"
+rate_hz = 100
+cost_us = 10
+"""
+
 
 def falling(height: float = 10.0) -> mc.Scene:
     """A ball of 0.2 kg in free fall."""

@@ -51,6 +51,8 @@ def test_parts_that_cannot_be_are_named() -> None:
     wrong(lambda: mc.Scene.from_toml(TOML).add("b", mc.Ball(0.1)), "complete")
     with pytest.raises(ValueError, match="expected one of lockstep, threads, pool, auto"):
         scenes.floating().start("gpu")  # type: ignore[arg-type]
+    with pytest.raises(ValueError, match="there is no pace \"slow\"; expected one of real-time, free"):
+        scenes.floating().start("lockstep", "slow")  # type: ignore[arg-type]
     with pytest.raises(TypeError, match="field 'at': expected three numbers"):
         scene().add("a", mc.Ball(0.1, at=[1.0, 2.0]))
     with pytest.raises(TypeError, match="got a dict"):
@@ -65,6 +67,10 @@ def test_commands_that_cannot_be_say_why() -> None:
         world.force("ball", [np.nan, 0.0, 0.0])
     with pytest.raises(ValueError, match="Arc.*Local"):
         world.force("ball", [1.0, 0.0, 0.0], arc=0.1)
+    with pytest.raises(ValueError, match=r'"ball" \(model "rigid"\) takes no poses; it takes springs, forces'):
+        world.pose("ball", [1.0, 0.0, 0.0])
+    with pytest.raises(ValueError, match="takes no carving"):
+        world.carve("ball", [0.0, 0.0, 0.0], 0.1)
     with pytest.raises(ValueError, match="keys are 0 to 7"):
         world.force("ball", [1.0, 0.0, 0.0], key=8)
     with pytest.raises(ValueError, match="expires is -1.0 s"):
@@ -121,3 +127,7 @@ def test_a_stopped_world_stays_readable_and_takes_nothing_up() -> None:
     assert world.state("ball").positions[0, 2] == height
     with pytest.raises(RuntimeError, match="stopped"):
         world.add("more", mc.Ball(0.1))
+    with pytest.raises(RuntimeError, match="stopped"):
+        world.force("ball", [1.0, 0.0, 0.0])
+    with pytest.raises(RuntimeError, match="stopped"):
+        world.set_state("ball", world.state("ball"))

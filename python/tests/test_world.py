@@ -257,6 +257,25 @@ def test_equal_worlds_have_equal_hashes_however_their_time_passes() -> None:
     assert hashes[0] == hashes[1]
 
 
+@pytest.mark.parametrize("executor", ["lockstep", "threads", "pool"])
+def test_at_the_free_pace_an_object_makes_every_step_however_slow_it_is(executor: Literal["lockstep", "threads", "pool"]) -> None:
+    with mc.World.from_toml(scenes.SLOW, executor, "free") as world:
+        for _ in range(2):
+            world.advance(0.1)
+        assert (world.pace, world.time, world.dropped) == ("free", 0.2, 0.0)
+        assert [world.state(name).steps for name in ("slow", "quick")] == [200, 20]
+
+
+def test_what_a_declared_machine_is_too_slow_for_is_said() -> None:
+    assert mc.World.from_toml(scenes.SLOW).pace == "free"
+    assert mc.World.from_toml(scenes.SLOW, "threads").pace == "real-time"
+    world = mc.World.from_toml(scenes.SLOW, pace="real-time")
+    world.advance(0.5)
+    # a step of 1 ms takes 3 ms
+    assert world.pace == "real-time"
+    assert 0.2 < world.dropped < 0.5
+
+
 @pytest.fixture
 def interruptible() -> Iterator[None]:
     """Ctrl-C raises KeyboardInterrupt: a shell that starts tests in the background has it ignored, and Python leaves that so."""

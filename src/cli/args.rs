@@ -234,6 +234,15 @@ pub enum StyleWord {
     Depth,
 }
 
+/// A value of `--pace`.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
+pub enum PaceWord {
+    /// Beside the clock, virtual in lockstep
+    RealTime,
+    /// As fast as agents can step
+    Free,
+}
+
 /// `run`.
 #[derive(Debug, Args)]
 pub struct RunArgs {
@@ -265,6 +274,11 @@ pub struct RunArgs {
     /// virtual time with declared costs (lockstep: the same bits on every run)
     #[arg(long, env = "METACHRON_EXECUTOR", value_parser = PossibleValuesParser::new(["auto", "threads", "pool", "lockstep"]))]
     pub executor: Option<String>,
+    /// How time passes: beside the clock (real-time, the default: who is too slow for it makes longer steps and gives up time; in lockstep the
+    /// declared machine may be), or free, as fast as agents can step: none gives up time or makes longer steps than it was asked for, and
+    /// rates are kept (without a window and devices only)
+    #[arg(long, default_value = "real-time")]
+    pub pace: PaceWord,
     /// Size of the picture or the window in pixels, each 1 to 8192; pictures are 1280x720 where no size is given
     #[arg(long, value_name = "WxH", env = "METACHRON_SIZE", value_parser = size)]
     pub size: Option<[u32; 2]>,

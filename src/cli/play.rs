@@ -27,7 +27,7 @@ use metachron_viewer::ui::WindowError;
 #[cfg(feature = "viewer")]
 use metachron_viewer::{WindowFailure, WindowPlan, play_in_window};
 use metachron_world::kinds::ExecutorKind;
-use metachron_world::{Reading, RecordingFile, Scene, SceneText, Sensor};
+use metachron_world::{Pace, Reading, RecordingFile, Scene, SceneText, Sensor};
 use std::path::{Path, PathBuf};
 
 /// Begins to write down what is done to the run.
@@ -54,6 +54,9 @@ const PICTURE_SIZE: [u32; 2] = [1280, 720];
 /// Errors of the models, the executor or the adapter.
 pub(super) fn play(request: &Request, go_on: GoOn<'_>) -> anyhow::Result<Played> {
     let mut session = Session::open(request.scene.clone())?;
+    if request.pace != Pace::RealTime {
+        session.set_pace(request.pace)?;
+    }
     if !request.quiet {
         session.report_start_up(metachron_console::output::message);
     }
@@ -237,6 +240,7 @@ fn played(scene: &Scene, outcome: Outcome, picture: Option<PathBuf>) -> Played {
         policy: outcome.policy.to_owned(),
         law: outcome.law.to_owned(),
         executor: outcome.executor.to_owned(),
+        pace: outcome.pace,
         adapter: outcome.adapter,
         frames: outcome.finished,
         sim_s: outcome.sim_s,
@@ -304,6 +308,9 @@ fn agent(scene: &Scene, agent: &AgentOutcome) -> AgentReport {
         cpu_s: stats.cpu_s,
         age_ms: quantiles(stats.age),
         late_ms: quantiles(stats.late),
+        lived_s: stats.lived.as_secs_f64(),
+        given_up_s: agent.given_up_s,
+        lengthened: stats.lengthened,
         dropped_ms: stats.dropped.as_secs_f64() * 1e3,
         rested_ms: stats.rested.as_secs_f64() * 1e3,
         led_by: stats.led_by.map(|id| scene.name_of(id).to_owned()),

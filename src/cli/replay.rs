@@ -11,7 +11,7 @@ use metachron_console::output::{BadInput, message};
 use metachron_core::{SimSpan, SimTime};
 use metachron_scene::{Source, load};
 use metachron_session::Session;
-use metachron_world::{RecordError, Recording};
+use metachron_world::{Pace, RecordError, Recording};
 use std::path::Path;
 
 /// Repeats a recording.
@@ -37,6 +37,8 @@ pub(super) fn command(args: &ReplayArgs) -> anyhow::Result<Exit> {
         scene: load(&source, &overrides)?,
         quiet: args.output.quiet,
         overrides,
+        // the recording says how time passed
+        pace: Pace::RealTime,
         window: false,
         end: Some(RunLength::Recording),
         size: args.size,

@@ -3,7 +3,7 @@
 //! In: arguments. Out: a picture, a report, rows of frames, verdicts on goals.
 //! Never here: the loop itself.
 
-use super::args::{OutputArgs, RunArgs, StyleWord};
+use super::args::{OutputArgs, PaceWord, RunArgs, StyleWord};
 use super::devices::{self, DeviceWish};
 use super::exports::ExportPaths;
 use super::play::{GoOn, play};
@@ -18,7 +18,7 @@ use metachron_render::{Colouring, Style};
 use metachron_scene::{Source, load};
 use metachron_session::FrameRecord;
 use metachron_session::report::{Report, Verdict};
-use metachron_world::Scene;
+use metachron_world::{Pace, Scene};
 use std::fs::File;
 use std::io::{BufWriter, Write};
 use std::path::{Path, PathBuf};
@@ -39,6 +39,8 @@ pub struct Request {
     pub quiet: bool,
     /// The overrides applied to it, in rising precedence.
     pub overrides: Vec<(String, String)>,
+    /// How time passes.
+    pub pace: Pace,
     /// Whether a window is requested; where none can be opened the run goes headless.
     pub window: bool,
     /// When the run ends by itself; `None`: a window stays open, a headless run takes 10 s.
@@ -185,6 +187,10 @@ fn request(args: &RunArgs, matches: Option<&ArgMatches>) -> anyhow::Result<Reque
         source,
         quiet: args.output.quiet,
         overrides,
+        pace: match args.pace {
+            PaceWord::RealTime => Pace::RealTime,
+            PaceWord::Free => Pace::Free,
+        },
         window: !args.headless,
         end,
         size: args.size,
@@ -226,6 +232,14 @@ pub(super) fn stem(name: &str) -> String {
 fn check_inputs(args: &RunArgs) -> anyhow::Result<()> {
     if args.oracle && !args.headless {
         let why = "--oracle runs the scene twice without a window; add --headless";
+        return Err(BadInput(why.to_owned()).into());
+    }
+    if args.pace == PaceWord::Free && !args.headless {
+        let why = "--pace free lets time wait for agents, which a window does not; add --headless";
+        return Err(BadInput(why.to_owned()).into());
+    }
+    if args.pace == PaceWord::Free && !args.device.is_empty() {
+        let why = "--pace free lets time wait for agents, and a hand at a device does not; leave one of the two out";
         return Err(BadInput(why.to_owned()).into());
     }
     let output = &args.output;

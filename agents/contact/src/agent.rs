@@ -5,7 +5,7 @@
 
 use crate::joint::Motor;
 use crate::stepper::ClusterMember;
-use crate::{Law, Link};
+use crate::{Inputs, Law, Link};
 use glam::{DQuat, DVec3};
 use metachron_core::{
     AgentId, Anchor, Archive, ArchiveError, Body, Removed, Resolution, SimSpan, SimTime, Snapshot, StepError,
@@ -75,9 +75,10 @@ pub trait Agent: Send {
         Err(format!("a {} takes no state", self.model()))
     }
 
-    /// Whether it is led by poses ([`StepContext::pose`]): it then moves as they say, whatever touches it.
-    fn takes_poses(&self) -> bool {
-        false
+    /// What it takes of what users do to it, the same for as long as it lives: the runtime refuses any command that needs more. A model names
+    /// here the springs, forces, torques and poses that its steps look at, and the methods above that it has of its own; by default nothing.
+    fn inputs(&self) -> Inputs {
+        Inputs::NONE
     }
 
     /// Writes the state into `into`, all of it except `time`, which the runtime stamps.
@@ -88,7 +89,8 @@ pub trait Agent: Send {
     ///
     /// # Errors
     /// [`ArchiveError::Refused`] by a model that does not save its state, as this one does where a model has nothing else;
-    /// [`ArchiveError`] for a state of another agent. After an error while reading the agent must not step again.
+    /// [`ArchiveError`] for a state of another agent. After an error while reading it reads what it has written itself just before, and goes on from
+    /// that.
     fn archive(&mut self, archive: &mut Archive<'_>) -> Result<(), ArchiveError> {
         let _ = archive;
         Err(ArchiveError::Refused { what: format!("model \"{}\"", self.model()) })

@@ -45,6 +45,7 @@ pub mod agent;
 pub mod asynchronous;
 pub mod audit;
 pub mod cluster;
+pub mod inputs;
 pub mod joint;
 pub mod law;
 pub mod laws;
@@ -53,5 +54,6 @@ pub mod stepper;
 
 pub use agent::{Agent, AnchorForce, AnchorSpring, Carving, Neighbour, PoseGoal, SetMotion, SetMotor, StepContext};
 pub use asynchronous::acknowledged;
+pub use inputs::{Input, Inputs};
 pub use law::{Law, Link};
 pub use push_out::PUSH_OUT_SHARE;

@@ -79,6 +79,12 @@ pub enum ArchiveError {
         /// How many.
         left: usize,
     },
+    /// A model panicked while its state was written or read.
+    #[error("{reason}")]
+    Panicked {
+        /// With what.
+        reason: String,
+    },
     /// An error within a part that has a name.
     #[error("{part}: {reason}")]
     Within {
@@ -249,7 +255,7 @@ impl<'a> Archive<'a> {
     ///
     /// # Errors
     /// [`ArchiveError::Left`] where not all was read.
-    pub fn finish(self) -> Result<(), ArchiveError> {
+    pub fn finish(&self) -> Result<(), ArchiveError> {
         match self.bytes {
             Bytes::Read { left, .. } if !left.is_empty() => Err(ArchiveError::Left { left: left.len() }),
             _ => Ok(()),

@@ -31,6 +31,7 @@ use metachron_core::{
 
 mod bits;
 mod carrying;
+mod inputs;
 mod physics;
 
 pub use carrying::Load;
@@ -91,6 +92,8 @@ pub enum Promise {
     Archive,
     /// A body that rests on it gives it its weight, within 1 %, and stays, whatever the rates of both.
     Carries,
+    /// What [`Agent::inputs`] names it takes, and nothing else.
+    Inputs,
     /// Nothing is allocated once the sizes settle.
     Allocation,
     /// A state that is not finite is refused, never written.
@@ -153,6 +156,7 @@ pub fn check(suite: &Suite<'_>) -> Vec<Breach> {
         (Promise::SameBits, bits::same_bits),
         (Promise::Archive, bits::archive),
         (Promise::Carries, carrying::carries),
+        (Promise::Inputs, inputs::inputs),
         (Promise::Allocation, bits::allocation),
         (Promise::Finite, bits::finite),
     ];

@@ -3,7 +3,7 @@
 //! In: two power laws and their range of spacings. Out: work in microseconds, a residual in metres.
 //! Never here: a clock. A step burns its cost in arithmetic, so its microseconds are nominal: see [`Synthetic`].
 
-use metachron_contact::{Agent, StepContext};
+use metachron_contact::{Agent, Input, Inputs, StepContext};
 use metachron_core::{
     Archive, ArchiveError, Body, Resolution, ResolutionRange, SimSpan, Snapshot, StepError, StepReport, archive_values,
     check_span,
@@ -133,6 +133,10 @@ impl Agent for Synthetic {
 
     fn resolution(&self) -> Option<Resolution> {
         Some(self.resolution)
+    }
+
+    fn inputs(&self) -> Inputs {
+        Inputs::of(&[Input::Resolution])
     }
 
     fn set_resolution(&mut self, wanted: Resolution) {

@@ -33,7 +33,7 @@ pub struct ContactMessage {
     pub force_n: Vec3,
 }
 
-/// Something else that happened to an object: it rests, wakes, failed, was removed, tore.
+/// Something else that happened to an object: it rests, wakes, failed, was removed, tore, went back with its world.
 #[derive(Debug, Clone, Copy, PartialEq, Message)]
 pub struct StateMessage {
     /// The object.

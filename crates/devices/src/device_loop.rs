@@ -14,7 +14,7 @@ use super::histogram::Histogram;
 use super::report::DeviceReport;
 use super::tank::{EnergyTank, Handle};
 use glam::DVec3;
-use metachron_contact::AnchorSpring;
+use metachron_contact::{AnchorSpring, Input};
 use metachron_core::{Anchor, Body, SimSpan, SimTime, Wrench};
 use metachron_runtime::Keyed;
 use metachron_world::{Command, Object, World, WorldError};
@@ -76,7 +76,7 @@ impl DeviceLoop {
         let object = world.object(name)?;
         let refused = |reason: &str| WorldError::Refused { name: name.to_owned(), reason: reason.to_owned() };
         let is_tool = matches!(world.latest(object)?.body, Body::Tool(_));
-        let is_kinematic = world.agents().of(object.id()).is_some_and(metachron_runtime::AgentHandle::takes_poses);
+        let is_kinematic = world.agents().of(object.id()).is_some_and(|agent| agent.inputs().has(Input::Pose));
         if !(is_tool || is_kinematic) {
             return Err(refused("a device leads kinematic bodies and tools"));
         }

@@ -224,6 +224,7 @@ impl PerfettoFile {
             Happening::AttachmentGave => ("attachment gave", None),
             Happening::RateMissed => ("rate missed", None),
             Happening::Carved(_) => ("carved", None),
+            Happening::Rewound => ("rewound", None),
             _ => ("event", None),
         }
     }

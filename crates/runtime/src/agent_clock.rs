@@ -5,6 +5,7 @@
 //! peers makes longer steps while it is behind, so that its contact keeps its time. Past the lag cap its time jumps to the present without
 //! a step: the gap is dropped and counted, so that an overloaded agent runs at the rate it can reach, and never falls further behind.
 //! Near peers time never jumps: it is postponed ("put off"), and the interaction continues unchanged, but slower.
+//! At the free pace time waits for agents ([`TimelineCommand::Free`]): none is late, and none of this happens.
 //! Never here: sleeping, the step itself. Theory: the periodic task of real-time scheduling, release and deadline.
 
 mod timeline;

@@ -344,10 +344,11 @@ impl AgentRunner {
     pub fn run_governor(&mut self, timeline: &Timeline, open: &PendingTurn, work_s: f64) -> Result<(), String> {
         let Some(governor) = &mut self.governor else { return Ok(()) };
         let wanted_period_s = 1.0 / (self.shared.wanted_hz() * timeline.speed());
+        let is_timed = !timeline.is_free();
         let Demand { dt, resolution } = governor.after_step(&TurnMeasure {
-            work_s,
+            work_s: if is_timed { work_s } else { 0.0 },
             wanted_period_s,
-            real_period_s: self.turn_period.period_s.map_or(wanted_period_s, f64::from),
+            real_period_s: self.turn_period.period_s.filter(|_| is_timed).map_or(wanted_period_s, f64::from),
             lateness_s: open.start.late.as_secs_f64(),
             dropped: open.start.dropped,
             dt: open.dt,

@@ -1,50 +1,23 @@
-//! The state of agents and of a lockstep run, written and read back: all that the next bit needs.
+//! The state of agents and of a run, written and read back: all that the next bit needs.
 //!
-//! In: an archive, a run between two events. Out: the same run later, or another of the same agents. Never here: files, what models
-//! save of themselves ([`metachron_contact::Agent::archive`]). Not saved: CPU times, percentiles, samples of watched points, storage.
+//! In: an archive, a run between two turns. Out: the same run later, or another of the same agents; of a state that is refused nothing, and
+//! the run as it was. Never here: files, what models save of themselves ([`metachron_contact::Agent::archive`]). Not saved: CPU times,
+//! percentiles, samples of watched points, storage.
+
+mod state;
 
 use super::agent_clock::Timeline;
 use super::agent_runner::AgentRunner;
-use super::cluster::{Place, Placed, check_places};
-use super::handle::Shared;
-use super::lockstep::Phase;
-use super::sleep::SleepRegistry;
+use super::cluster::{Place, Placed};
+use super::events::EventKind;
 use super::spawn::{AgentSpawn, RunAgents};
 use super::turn_order::{PartKind, TurnOrder};
-use metachron_core::{AgentId, Archive, ArchiveError, archive_values};
-use std::cmp::Reverse;
-use std::collections::{BTreeMap, BinaryHeap};
+use super::virtual_events::VirtualEvents;
+use metachron_core::{AgentId, Archive, ArchiveError};
+use state::{RunState, caught};
+use std::collections::BTreeMap;
 use std::sync::Arc;
 use std::time::Duration;
-
-impl AgentRunner {
-    /// Writes or reads it, without the agents that it leads.
-    fn archive(&mut self, archive: &mut Archive<'_>) -> Result<(), ArchiveError> {
-        self.agent.archive(archive)?;
-        self.publish_form();
-        archive_values!(archive, self.pace, self.loads, self.open, self.was_near, self.withheld)?;
-        archive_values!(archive, self.announced, self.turn_period)?;
-        self.led.archive(archive)?;
-        self.metrics.archive(archive)?;
-        archive.fixed("whether it has a governor", self.governor.is_some())?;
-        self.governor.iter_mut().try_for_each(|governor| governor.archive(archive))?;
-        archive.fixed("whether it is a member of clusters", self.cluster.is_some())?;
-        self.cluster.iter_mut().try_for_each(|seat| seat.archive(archive))?;
-        self.archive_states(archive)
-    }
-
-    /// The states that it has published and written, and those of others that it has seen.
-    fn archive_states(&mut self, archive: &mut Archive<'_>) -> Result<(), ArchiveError> {
-        let Self { writer, observer, peers, .. } = self;
-        let mut newest = writer.slot().latest();
-        archive.snapshot(&mut newest)?;
-        if archive.is_reading() {
-            writer.replace(newest);
-        }
-        archive.option(writer.filled_mut(), Arc::default, |state, archive| archive.snapshot(state))?;
-        observer.archive(peers, archive)
-    }
-}
 
 /// Makes an agent that joined the run of a state which is read, and that is not in the run which reads it: what it joined as, by its number.
 pub type Absent<'a> = &'a mut dyn FnMut(AgentId) -> Result<AgentSpawn, ArchiveError>;
@@ -85,85 +58,175 @@ pub(super) struct Cut {
     /// By their numbers; `None` of one that has left and is not kept.
     pub all: Vec<Option<Placed>>,
     pub run_agents: RunAgents,
-    /// How many agents the state that was read or written is of, those that had left included: all others have left.
-    pub counted: usize,
     pub timeline: Timeline,
     pub now: Duration,
+    /// The most agents that the executor can run.
+    pub most: usize,
 }
+
+/// Agents that are not in the run, made for a state that has them, by their numbers.
+type Made = BTreeMap<usize, Box<AgentRunner>>;
+
+/// What an agent kept to itself before a state was read into it, by its number.
+type OwnStates = Vec<(usize, Vec<u8>)>;
 
 impl Cut {
     /// The agents of `run_agents`, taken from their places.
     pub const fn new(all: Vec<Option<Placed>>, run_agents: RunAgents, timeline: Timeline, now: Duration) -> Self {
-        Self { all, run_agents, counted: 0, timeline, now }
+        Self { all, run_agents, timeline, now, most: usize::MAX }
     }
 
-    /// Writes or reads agents, places and time: what every executor has. What lockstep has besides follows.
-    pub fn archive(&mut self, archive: &mut Archive<'_>, absent: Absent<'_>) -> Result<(), ArchiveError> {
+    /// Writes or reads agents, places, time and what executors in virtual time have besides: `events`; out come those of a state that was read.
+    ///
+    /// # Errors
+    /// Those of [`super::Run::archive`]; all is as it was then.
+    pub fn archive(
+        &mut self,
+        archive: &mut Archive<'_>,
+        absent: Absent<'_>,
+        events: Option<VirtualEvents>,
+    ) -> Result<Option<VirtualEvents>, ArchiveError> {
         let handles = &self.run_agents.handles;
         if self.all.iter().zip(handles).any(|(placed, agent)| placed.is_none() && agent.live().is_some()) {
             let what = "an agent whose step does not end, or whose thread panicked,";
             return Err(ArchiveError::Refused { what: what.to_owned() });
         }
-        let mut present: Vec<bool> = handles.iter().map(|agent| !agent.has_left()).collect();
-        archive.value(&mut present)?;
-        self.counted = present.len();
         if archive.is_reading() {
-            self.admit(&present, absent)?;
+            return self.read(archive, absent);
         }
-        let Self { all, run_agents, counted, timeline, now } = self;
-        archive_agents(&mut all[..*counted], &present, archive)?;
-        archive_sleep(&run_agents.sleep, *counted, archive)?;
-        run_agents.peers.broad_phase.archive(*counted, all.len(), archive)?;
-        let of = all[..*counted].iter();
-        let mut places: Vec<Place> =
-            of.map(|one| one.as_ref().filter(|one| !one.has_left()).map_or(Place::Home, |one| one.place)).collect();
-        archive.value(&mut places)?;
-        check_places(&places, &all[..*counted])?;
-        let places = places.into_iter().chain(std::iter::repeat(Place::Home));
-        all.iter_mut().zip(places).for_each(|(one, place)| one.iter_mut().for_each(|one| one.place = place));
-        archive_values!(archive, *timeline, *now)
+        let Self { all, run_agents, timeline, now, .. } = self;
+        let mut state = RunState { timeline: *timeline, now: *now, events, ..RunState::of(all, run_agents) };
+        archive.value(&mut state.present)?;
+        let mut none = Made::new();
+        let mut runners = runners_of(&mut self.all, &mut none, &state.present);
+        state.archive(&mut runners, archive)?;
+        Ok(None)
     }
 
-    /// Lets those be in the run that are `present` in the state which is read, and no others. Nothing is changed before all that are absent are
-    /// made.
-    fn admit(&mut self, present: &[bool], absent: Absent<'_>) -> Result<(), ArchiveError> {
-        let Self { all, run_agents, .. } = self;
-        let mut made = BTreeMap::new();
-        for (at, _) in present.iter().enumerate().filter(|(_, present)| **present) {
-            // one that is there, or that left and is kept
-            if all.get(at).is_some_and(Option::is_some) {
+    /// Reads and checks a state whole, and only then shows anything of it. What agents keep to themselves is read in place: where the state is
+    /// refused they take back what they had.
+    fn read(&mut self, archive: &mut Archive<'_>, absent: Absent<'_>) -> Result<Option<VirtualEvents>, ArchiveError> {
+        let mut present = Vec::new();
+        archive.value(&mut present)?;
+        let mut made = self.make(&present, absent)?;
+        let own = self.own_states(&present)?;
+        let mut state = RunState::empty(present);
+        let mut runners = runners_of(&mut self.all, &mut made, &state.present);
+        let read = state.archive(&mut runners, archive).and_then(|()| archive.finish());
+        if let Err(error) = read {
+            drop(runners);
+            own.iter().for_each(|(at, own)| self.take_back(*at, own));
+            return Err(error);
+        }
+        // before they are found: nobody finds one that is back in a state of another time
+        for (runner, shown) in runners.into_iter().flatten().zip(&state.shown) {
+            runner.writer.replace(Arc::clone(&shown.newest));
+        }
+        self.admit(&state.present, made);
+        self.show(&mut state);
+        (self.timeline, self.now) = (state.timeline, state.now);
+        Ok(state.events)
+    }
+
+    /// Makes those that are `present` in a state and not in the run.
+    fn make(&self, present: &[bool], absent: Absent<'_>) -> Result<Made, ArchiveError> {
+        let Self { all, run_agents, most, .. } = self;
+        let mismatch = |what, found, expected| ArchiveError::Mismatch { what, found, expected };
+        let numbers = || present.iter().enumerate().filter(|(_, present)| **present).map(|(at, _)| at);
+        if numbers().count() > *most {
+            return Err(mismatch("the number of agents", numbers().count().to_string(), format!("at most {most}")));
+        }
+        let mut made = Made::new();
+        // one that is there, or that left and is kept, is not absent
+        for at in numbers().filter(|at| all.get(*at).is_none_or(Option::is_none)) {
+            let id = AgentId(at as u32);
+            let runner = caught(|| {
+                let spawn = absent(id)?;
+                let joins = run_agents.check_joining(&spawn);
+                joins
+                    .map_err(|error| mismatch("an agent that joined", error.to_string(), "one that can".to_owned()))?;
+                Ok(run_agents.revive(id, spawn))
+            });
+            made.insert(at, runner?);
+        }
+        Ok(made)
+    }
+
+    /// What those keep to themselves now that a state is read into.
+    fn own_states(&mut self, present: &[bool]) -> Result<OwnStates, ArchiveError> {
+        let there = self.all.iter_mut().zip(present).enumerate().filter(|(_, (_, present))| **present);
+        there
+            .filter_map(|(at, (one, _))| Some((at, one.as_mut()?)))
+            .map(|(at, one)| Ok((at, one.runner.own_state()?)))
+            .collect()
+    }
+
+    /// Makes an agent as it was when it had the bytes `own`. One whose model does not read what it has written itself is parked: it makes its own
+    /// turns then, none, and so do those that it led.
+    fn take_back(&mut self, at: usize, own: &[u8]) {
+        let (id, sleep) = (AgentId(at as u32), &self.run_agents.sleep);
+        let Some(Err(error)) = self.all[at].as_mut().map(|placed| placed.runner.take_back(own)) else { return };
+        for Placed { runner, place } in self.all.iter_mut().flatten() {
+            let is_led = matches!(*place, Place::Led { leader, .. } | Place::Waiting { leader, .. } if leader == id);
+            if runner.id() == id {
+                *place = Place::Home;
+                runner.park(error.to_string());
+            } else if is_led {
+                *place = Place::Returning;
+            } else {
                 continue;
             }
-            let spawn = absent(AgentId(at as u32))?;
-            run_agents.check_joining(&spawn).map_err(|error| ArchiveError::Mismatch {
-                what: "an agent that joined",
-                found: error.to_string(),
-                expected: "one that can".to_owned(),
-            })?;
-            made.insert(at, spawn);
+            sleep.follow(runner.id(), None);
+            sleep.notify(runner.id());
         }
-        run_agents.reach(present.len());
+    }
+
+    /// Lets those be in the run that are `present` in the state which was read, and no others.
+    fn admit(&mut self, present: &[bool], made: Made) {
+        let Self { all, run_agents, .. } = self;
+        run_agents.reach(present.len(), |at| made.get(&at).map(|runner| &runner.shared));
         all.resize_with(run_agents.handles.len(), || None);
-        for (at, spawn) in made {
-            all[at] = Some(Placed { runner: run_agents.revive(AgentId(at as u32), spawn), place: Place::Home });
+        for (at, runner) in made {
+            run_agents.handles[at].record.begin(&runner.shared);
+            all[at] = Some(Placed { runner, place: Place::Home });
         }
-        let there = run_agents.handles.iter().zip(present).filter(|(_, present)| **present);
-        there.for_each(|(agent, _)| agent.record.set_left(false));
         let present = present.iter().copied().chain(std::iter::repeat(false));
-        for (one, _) in all.iter_mut().zip(present).filter(|(_, present)| !present) {
+        for ((one, agent), present) in all.iter_mut().zip(&run_agents.handles).zip(present) {
+            if present {
+                agent.record.set_left(false);
+                continue;
+            }
             if let Some(placed) = one.as_mut().filter(|placed| !placed.has_left()) {
                 placed.runner.take_out();
             }
             *one = one.take().and_then(Placed::kept);
         }
-        Ok(())
     }
 
-    /// As [`Self::archive`], where no events follow, and none are heard of.
+    /// Shows what was read, of agents that are all there. Commands come after who sleeps: one that is sent meanwhile wakes who is to obey it.
+    fn show(&mut self, state: &mut RunState) {
+        let Self { all, run_agents: RunAgents { peers, sleep, .. }, .. } = self;
+        for (one, present) in all.iter_mut().zip(&state.present) {
+            one.iter_mut().filter(|_| *present).for_each(|placed| placed.runner.publish_form());
+        }
+        peers.broad_phase.set_state(state.broad_phase.as_ref(), all.len());
+        sleep.set_state(&state.sleep);
+        let places = state.places.iter().copied().chain(std::iter::repeat(Place::Home));
+        all.iter_mut().zip(places).for_each(|(one, place)| one.iter_mut().for_each(|one| one.place = place));
+        let there = all.iter_mut().zip(&state.present).filter(|(_, present)| **present);
+        for (Placed { runner, .. }, shown) in there.filter_map(|(one, _)| one.as_mut()).zip(&mut state.shown) {
+            runner.observer.see(peers, &shown.seen);
+            runner.shared.mail.replace(shown.commands.take());
+            if runner.shared.mail.has_pending() && !sleep.is_woken(runner.id()) {
+                sleep.wake(runner.id());
+            }
+            runner.tell_rewound();
+        }
+    }
+
+    /// As [`Self::archive`], of a run in real time, which has no events to come.
     pub fn archive_whole(&mut self, archive: &mut Archive<'_>, absent: Absent<'_>) -> Result<(), ArchiveError> {
-        self.archive(archive, absent)?;
-        let mut events: Option<VirtualEvents> = None;
-        archive.option(&mut events, VirtualEvents::default, VirtualEvents::archive)
+        self.archive(archive, absent, None).map(drop)
     }
 
     /// As [`Self::archive_in_real_time`], of a run whose turns are noted in `order`.
@@ -173,9 +236,10 @@ impl Cut {
         order: Option<&TurnOrder>,
         absent: Absent<'_>,
     ) -> Result<(), ArchiveError> {
+        self.archive_in_real_time(archive, absent)?;
         let noted = order.filter(|_| archive.is_reading());
         noted.inspect(|order| order.hold().note(PartKind::Restore, AgentId(0), self.now));
-        self.archive_in_real_time(archive, absent)
+        Ok(())
     }
 
     /// The same for an executor in real time, whose clock reads the present `now`: its time passes or stands as before.
@@ -192,24 +256,6 @@ impl Cut {
     }
 }
 
-/// The events to come of a run in virtual time.
-#[derive(Default)]
-pub(super) struct VirtualEvents {
-    /// Due times of turns.
-    pub due: BinaryHeap<Reverse<(Duration, u32)>>,
-    /// Service of the cores, and the jobs in progress.
-    pub served: u128,
-    pub jobs: BinaryHeap<Reverse<(u128, u32)>>,
-    /// For each agent its phase and how many turns it has made.
-    pub phases: Vec<(Phase, u64)>,
-}
-
-impl VirtualEvents {
-    pub fn archive(&mut self, archive: &mut Archive<'_>) -> Result<(), ArchiveError> {
-        archive_values!(archive, self.due, self.served, self.jobs, self.phases)
-    }
-}
-
 /// Says that no agent is absent: of what is written, and of runs of the same agents.
 ///
 /// # Errors
@@ -219,7 +265,32 @@ pub(super) fn refuse_absent(id: AgentId) -> Result<AgentSpawn, ArchiveError> {
     Err(ArchiveError::Mismatch { what: "an agent that joined", found, expected })
 }
 
+/// The runners of those that are `present` in a state, for each number: those of the run, and those that were made for it.
+fn runners_of<'a>(
+    all: &'a mut [Option<Placed>],
+    made: &'a mut Made,
+    present: &[bool],
+) -> Vec<Option<&'a mut AgentRunner>> {
+    let mut made = made.iter_mut().peekable();
+    let mut all = all.iter_mut();
+    let runner = |(at, present): (usize, &bool)| {
+        let here = all.next().and_then(Option::as_mut).map(|placed| &mut *placed.runner);
+        let made = made.next_if(|(number, _)| **number == at).map(|(_, runner)| &mut **runner);
+        here.or(made).filter(|_| *present)
+    };
+    present.iter().enumerate().map(runner).collect()
+}
+
+impl AgentRunner {
+    /// Tells readers of its events that it went back, and what it touches where it went back to.
+    fn tell_rewound(&self) {
+        self.tell(EventKind::Rewound);
+        self.cluster.iter().for_each(|seat| seat.tell_contacts(self.pace.time(), &self.shared.streams));
+    }
+}
+
 impl Placed {
+    /// Whether its agent has left.
     fn has_left(&self) -> bool {
         self.runner.shared.gauges.has_left()
     }
@@ -227,34 +298,4 @@ impl Placed {
     fn kept(self) -> Option<Self> {
         self.runner.kept().map(|runner| Self { runner, ..self })
     }
-}
-
-/// Writes or reads the agents of a run that are `present`, by rising numbers.
-fn archive_agents(all: &mut [Option<Placed>], present: &[bool], archive: &mut Archive<'_>) -> Result<(), ArchiveError> {
-    let there = all.iter_mut().zip(present).filter(|(_, present)| **present);
-    for Placed { runner, .. } in there.filter_map(|(one, _)| one.as_mut()) {
-        let shared = Arc::clone(&runner.shared);
-        archive.within(format_args!("agent \"{}\"", shared.name()), |archive| {
-            let Shared { gauges, mail, .. } = &*shared;
-            runner.archive(archive)?;
-            gauges.archive(archive)?;
-            mail.archive(archive)
-        })?;
-    }
-    Ok(())
-}
-
-/// Writes or reads who rests and who leads whom, of the first `agents`.
-fn archive_sleep(sleep: &SleepRegistry, agents: usize, archive: &mut Archive<'_>) -> Result<(), ArchiveError> {
-    let mut state = sleep.state();
-    archive.value(&mut state)?;
-    if !archive.is_reading() {
-        return Ok(());
-    }
-    if state.signals.len() != agents {
-        let (found, expected) = (state.signals.len().to_string(), agents.to_string());
-        return Err(ArchiveError::Mismatch { what: "the number of agents that may sleep", found, expected });
-    }
-    sleep.set_state(&state);
-    Ok(())
 }

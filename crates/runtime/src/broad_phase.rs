@@ -14,8 +14,8 @@ pub(super) use neighbour_list::NeighbourList;
 use super::table::Table;
 use arc_swap::ArcSwapOption;
 use glam::DVec3;
-use metachron_core::{AgentId, Archive, ArchiveError, Bounds, SimSpan, SimTime};
-use published_bounds::{MovingBox, PublishedBounds, ReadBounds};
+use metachron_core::{AgentId, Bounds, SimSpan, SimTime};
+use published_bounds::{BoxWords, MovingBox, PublishedBounds, ReadBounds};
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering::SeqCst};
 use std::sync::{Arc, OnceLock};
 
@@ -37,6 +37,23 @@ pub(super) struct BroadPhase {
     /// Number of entries ever written.
     noted: AtomicU64,
     calls: Table<Calls>,
+}
+
+/// What a [`BroadPhase`] knows between turns.
+#[derive(Debug, Clone, serde::Serialize, serde::Deserialize)]
+pub(super) struct BroadPhaseState {
+    bounds: Vec<Option<BoxWords>>,
+    log: Vec<u64>,
+    noted: u64,
+    callers: Vec<Vec<AgentId>>,
+}
+
+impl BroadPhaseState {
+    /// Whether it is of so many agents.
+    pub fn is_of(&self, count: usize) -> bool {
+        let are_known = self.callers.iter().flatten().all(|from| (from.0 as usize) < count);
+        [self.bounds.len(), self.callers.len()] == [count; 2] && self.log.len() as u64 == LOG_LENGTH && are_known
+    }
 }
 
 /// Agents that have given impulses to one agent, or belong with it, since its last query: a bit each, on pages allocated on first use, since most agents never
@@ -168,28 +185,32 @@ impl BroadPhase {
         (0..self.calls.len() as u32).for_each(|to| self.take_callers(AgentId(to), |_| {}));
     }
 
-    /// Writes or reads what the first `of` agents have published of where they are and whom they have called; called between turns. Nobody has
-    /// called the others then.
-    pub fn archive(&self, of: usize, archive: &mut Archive<'_>) -> Result<(), ArchiveError> {
-        self.bounds.iter().take(of).try_for_each(|bounds| bounds.archive(archive))?;
-        for word in self.log.iter().chain([&self.noted]) {
-            let mut value = word.load(SeqCst);
-            archive.value(&mut value)?;
-            word.store(value, SeqCst);
-        }
-        (of..self.calls.len()).for_each(|to| self.take_callers(AgentId(to as u32), |_| {}));
-        for to in (0..of as u32).map(AgentId) {
+    /// What agents have published of where they are, and whom they have called; called between turns.
+    pub fn state(&self) -> BroadPhaseState {
+        let callers = |to: u32| {
             let mut callers = Vec::new();
-            self.take_callers(to, |from| callers.push(from));
-            let before = callers.clone();
-            let outcome = archive.value(&mut callers);
-            if outcome.is_err() {
-                callers = before;
-            }
-            callers.iter().for_each(|from| self.call(to, *from));
-            outcome?;
+            self.take_callers(AgentId(to), |from| callers.push(from));
+            callers.iter().for_each(|from| self.call(AgentId(to), *from));
+            callers
+        };
+        BroadPhaseState {
+            bounds: self.bounds.iter().map(PublishedBounds::words).collect(),
+            log: self.log.iter().map(|word| word.load(SeqCst)).collect(),
+            noted: self.noted.load(SeqCst),
+            callers: (0..self.calls.len() as u32).map(callers).collect(),
         }
-        Ok(())
+    }
+
+    /// Puts that of the first agents into it; nobody has called the others then. Called between turns.
+    pub fn set_state(&self, state: &BroadPhaseState) {
+        self.bounds.iter().zip(&state.bounds).for_each(|(bounds, words)| bounds.set_words(*words));
+        self.log.iter().zip(&state.log).for_each(|(word, value)| word.store(*value, SeqCst));
+        self.noted.store(state.noted, SeqCst);
+        let callers = state.callers.iter().map(Vec::as_slice).chain(std::iter::repeat(&[][..]));
+        for (to, callers) in (0..self.calls.len() as u32).map(AgentId).zip(callers) {
+            self.take_callers(to, |_| {});
+            callers.iter().for_each(|from| self.call(to, *from));
+        }
     }
 
     fn log_speed(&self, id: AgentId) {

@@ -46,6 +46,8 @@ pub enum EventKind {
     RateMissed,
     /// Cells of it were removed.
     Carved(Removed),
+    /// The run went back to a state that was saved; what follows happens from the time of that on. What it touches there begins anew.
+    Rewound,
 }
 
 /// A contact when it began, in its first step, when it grew, or when it ended.
@@ -91,6 +93,7 @@ fn words(event: &AgentEvent) -> [u64; WORDS] {
         EventKind::ContactGrew(contact) => (9, Some(contact)),
         EventKind::Gone => (10, None),
         EventKind::RateMissed => (8, None),
+        EventKind::Rewound => (12, None),
         EventKind::Carved(Removed { cells, triangles, mass_kg, momentum }) => {
             words[1] = 11 | u64::from(cells) << 32;
             words[2] = u64::from(triangles.cast_unsigned());
@@ -135,6 +138,7 @@ fn event(words: &[u64; WORDS]) -> Option<AgentEvent> {
             mass_kg: f64::from_bits(words[3]),
             momentum: vector(4),
         }),
+        12 => EventKind::Rewound,
         _ => return None,
     };
     Some(AgentEvent { at: SimTime::from_nanos(words[0]), kind })
@@ -159,6 +163,7 @@ mod tests {
             EventKind::AttachmentGave,
             EventKind::RateMissed,
             EventKind::Gone,
+            EventKind::Rewound,
             EventKind::Carved(Removed { cells: 10, triangles: -24, mass_kg: 0.25, momentum: DVec3::NEG_Y }),
         ]
     }

@@ -127,6 +127,7 @@ impl Follower {
     }
 
     fn end(&mut self) {
+        self.end_turns();
         let actors = self.followed.drain(..).filter_map(|one| one.actor);
         actors.for_each(|mut actor| actor.close_account(&self.timeline, self.now));
         close_remaining(&self.all.handles, &self.timeline, self.now);
@@ -223,6 +224,11 @@ impl Run for Follower {
     /// In the middle of a turn its state cannot be written.
     fn archive(&mut self, archive: &mut Archive<'_>, absent: Absent<'_>) -> Result<(), ArchiveError> {
         self.cut(|cut| cut.archive_whole(archive, absent))
+    }
+
+    /// No turn is in progress between two calls.
+    fn end_turns(&mut self) {
+        self.all.sleep.end();
     }
 
     fn shutdown(mut self: Box<Self>) -> Vec<AgentStats> {

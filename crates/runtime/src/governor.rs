@@ -23,12 +23,13 @@ pub trait Governor: Send {
 /// Measurements of a turn.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct TurnMeasure {
-    /// Wall time the turn took, seconds, waiting for a core included; virtual in lockstep.
+    /// Wall time the turn took, seconds, waiting for a core included; virtual in lockstep. Zero at the free pace, where turns take none of the
+    /// simulated time, however long they take: no rate has to be lowered for them.
     pub work_s: f64,
     /// Wall time between turns at the requested rate, seconds, at the timeline's present speed.
     pub wanted_period_s: f64,
     /// Wall time between the starts of the last turns, seconds, smoothed over about eight of them; equal to `wanted_period_s`
-    /// as long as there is nothing to measure (first turn, after a rest, a pause or a change of speed).
+    /// as long as there is nothing to measure (first turn, after a rest, a pause or a change of speed, at the free pace).
     pub real_period_s: f64,
     /// How long after its release the turn began, wall seconds, ≥ 0.
     pub lateness_s: f64,

@@ -18,8 +18,8 @@ use super::slot::LatestSlot;
 use super::spawn::AgentSpawn;
 use super::streams::{EventStreams, Heard, Rings};
 use super::turns::Turn;
-use metachron_contact::Law;
 use metachron_contact::stepper::ClusterScene;
+use metachron_contact::{Input, Inputs, Law};
 use metachron_core::{AgentId, Body, HASH_START, SimSpan, SimTime, Snapshot};
 use metachron_geometry::CollisionShape;
 use std::sync::atomic::Ordering::Relaxed;
@@ -54,8 +54,8 @@ pub(super) struct Identity {
     pub wanted_hz: f64,
     /// Where its joints are, if there is one whose first body it is and that can have a motor.
     pub motored: Option<Arc<ClusterScene>>,
-    /// Whether poses lead it ([`metachron_contact::Agent::takes_poses`]).
-    pub takes_poses: bool,
+    /// What it takes of what users do to it ([`metachron_contact::Agent::inputs`]).
+    pub inputs: Inputs,
     /// Whether the run began with it. Nothing outside can make such an agent again as it was, with its governor and its ties: where it leaves it
     /// keeps them and its model, and comes back with a state that is read.
     pub is_first: bool,
@@ -66,13 +66,14 @@ pub(super) struct Identity {
 impl Identity {
     /// That of the agent that is to be started, whose name it takes.
     pub fn of(id: AgentId, spawn: &mut AgentSpawn, is_first: bool) -> Self {
+        let inputs = spawn.agent.inputs();
         let is_motored = spawn.scene.joints_of(id).any(|(_, joint)| joint.takes_motor());
         Self {
             name: std::mem::take(&mut spawn.name).into(),
             model: spawn.agent.model(),
             wanted_hz: spawn.rate_hz,
             motored: is_motored.then(|| Arc::clone(&spawn.scene)),
-            takes_poses: spawn.agent.takes_poses(),
+            inputs: inputs.with(Input::Resolution, inputs.has(Input::Resolution) && spawn.range.is_some()),
             is_first,
             handover: spawn.agent.member().is_some().then(Handover::default),
         }
@@ -93,8 +94,8 @@ impl Shared {
         self.identity.wanted_hz
     }
 
-    pub const fn takes_poses(&self) -> bool {
-        self.identity.takes_poses
+    pub const fn inputs(&self) -> Inputs {
+        self.identity.inputs
     }
 
     /// Whether the run began with it.
@@ -107,9 +108,22 @@ impl Shared {
         self.gauges.has_left() && !self.is_first()
     }
 
-    fn has_motor(&self, joint: u32) -> bool {
-        let mut joints = self.identity.motored.iter().flat_map(|scene| scene.joints_of(self.id));
-        joints.any(|(number, it)| number == joint && it.takes_motor())
+    /// The numbers of the joints that it drives.
+    fn driven(&self) -> impl Iterator<Item = u32> + '_ {
+        let joints = self.identity.motored.iter().flat_map(|scene| scene.joints_of(self.id));
+        joints.filter(|(_, joint)| joint.takes_motor()).map(|(number, _)| number)
+    }
+
+    /// Checks that it takes what needs these, now.
+    fn check_takes(&self, needs: Inputs) -> Result<(), SendError> {
+        let Identity { name, model, inputs, .. } = &self.identity;
+        if self.sleep.has_ended() {
+            return Err(SendError::Ended(Arc::clone(name)));
+        }
+        match inputs.lacks(needs) {
+            Some(lacks) => Err(SendError::NotTaken { name: Arc::clone(name), model, lacks, takes: *inputs }),
+            None => Ok(()),
+        }
     }
 
     pub const fn handover(&self) -> Option<&Handover> {
@@ -142,6 +156,8 @@ impl Shared {
             age: self.ages().as_ref().map_or_else(Spread::default, |ages| ages.spread()),
             late: gauges.late(),
             misses: gauges.misses.load(Relaxed),
+            lived: span(&gauges.stepped) + span(&gauges.rested),
+            lengthened: gauges.lengthened.load(Relaxed),
             dropped: span(&gauges.dropped),
             rested: span(&gauges.rested),
             state: gauges.state(),
@@ -198,10 +214,10 @@ impl AgentHandle {
         self.live().map_or(REMOVED, |shared| shared.model())
     }
 
-    /// Whether it is kinematic: poses lead it, and no force moves it.
+    /// What it takes of what users do to it; nothing once it has left.
     #[must_use]
-    pub fn takes_poses(&self) -> bool {
-        self.live().is_some_and(|shared| shared.takes_poses())
+    pub fn inputs(&self) -> Inputs {
+        self.live().map_or(Inputs::NONE, |shared| shared.inputs())
     }
 
     /// Its newest state. There is one from the start on.
@@ -215,6 +231,19 @@ impl AgentHandle {
     pub fn lived_to(&self) -> SimTime {
         let woken_at = self.live().map_or(0, |shared| shared.gauges.woken_at.load(Relaxed));
         self.latest().moment().max(SimTime::from_nanos(woken_at))
+    }
+
+    /// The simulated time that it has not lived, where time is at `now`: what it dropped, and what it is behind. Zero of one that has failed or
+    /// left.
+    #[must_use]
+    pub fn given_up(&self, now: SimTime) -> SimSpan {
+        let Some(shared) = self.live() else { return SimSpan::ZERO };
+        let dropped = SimSpan::from_nanos(shared.gauges.dropped.load(Relaxed));
+        match shared.gauges.state() {
+            AgentState::Running => dropped + now.since(self.lived_to()),
+            AgentState::Resting => dropped,
+            AgentState::Parked(_) | AgentState::Gone => SimSpan::ZERO,
+        }
     }
 
     /// Its newest state; `None` where it has left.
@@ -286,14 +315,13 @@ impl AgentHandle {
     /// # Errors
     /// [`SendError`]: nothing was delivered.
     pub fn send(&self, command: Command) -> Result<(), SendError> {
-        let shared = self.live().filter(|_| !self.has_left()).ok_or(SendError::NoAgent(self.id()))?;
+        let shared = self.present()?;
+        shared.check_takes(command.needs())?;
         if let Command::Motor(Keyed { key: joint, .. }) = command
-            && !shared.has_motor(joint)
+            && !shared.driven().any(|driven| driven == joint)
         {
-            return Err(SendError::NoMotor { agent: self.id(), joint });
-        }
-        if matches!(command, Command::Pose(_)) && !shared.takes_poses() {
-            return Err(SendError::NotKinematic(self.id()));
+            let (name, drives) = (Arc::clone(&shared.identity.name), shared.driven().collect());
+            return Err(SendError::NoMotor { name, joint, drives });
         }
         shared.mail.send(command)?;
         shared.sleep.wake(self.id());
@@ -301,11 +329,20 @@ impl AgentHandle {
     }
 
     /// Lets it take another state before its next step, and wakes it; a state that does not fit changes nothing.
-    pub fn set_state(&self, state: Body) {
-        if let Some(shared) = self.live() {
-            shared.mail.set_state(state);
-            shared.sleep.wake(self.id());
-        }
+    ///
+    /// # Errors
+    /// Those of [`Self::send`].
+    pub fn set_state(&self, state: Body) -> Result<(), SendError> {
+        let shared = self.present()?;
+        shared.check_takes(Inputs::of(&[Input::State]))?;
+        shared.mail.set_state(state);
+        shared.sleep.wake(self.id());
+        Ok(())
+    }
+
+    /// The agent, unless it has left.
+    fn present(&self) -> Result<Live, SendError> {
+        self.live().filter(|_| !self.has_left()).ok_or(SendError::NoAgent(self.id()))
     }
 
     /// Lets it leave the run at its next turn.

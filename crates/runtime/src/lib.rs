@@ -75,6 +75,7 @@ mod threads;
 mod turn_order;
 mod turn_parts;
 mod turns;
+mod virtual_events;
 mod worker_wakeup;
 
 pub use agent_clock::{AgentClock, LAG_CAP, Start};
@@ -141,6 +142,10 @@ pub trait Run: Send {
     /// [`SendError::NoAgent`].
     fn remove(&mut self, id: AgentId) -> Result<(), SendError>;
 
+    /// Lets no further turn begin and waits for those in progress (with a timeout): what a recording of the run is to have has happened then. From
+    /// now on commands are refused ([`SendError::Ended`]).
+    fn end_turns(&mut self);
+
     /// Ends the run: waits for the turns in progress (with a timeout) and returns every agent's statistics. Existing handles keep showing
     /// the last states.
     fn shutdown(self: Box<Self>) -> Vec<AgentStats>;
@@ -152,8 +157,8 @@ pub trait Run: Send {
     /// another can read.
     ///
     /// # Errors
-    /// [`ArchiveError::Refused`] where a step does not end, and by agents and governors that do not save their state: nothing is changed then.
-    /// Any error while reading leaves a run that is not usable any more.
+    /// [`ArchiveError::Refused`] where a step does not end, and by agents and governors that do not save their state; any other for a state that
+    /// is not one of this run, or that a model does not read. The run goes on as it was then: all is read and checked before anything is shown.
     fn archive(&mut self, archive: &mut Archive<'_>, absent: Absent<'_>) -> Result<(), ArchiveError>;
 
     /// Writes the state of the run ([`Run::archive`]).

@@ -2,7 +2,7 @@
 //!
 //! In: agents and a [`Machine`]. Out: a run that is bit-identical every time. Events happen in the order (time, ends before starts,
 //! number): a turn sees the states published when it starts, and its own state is seen when its declared cost has passed, on cores that all
-//! turns and the frame loop share. Never here: a wall clock, except for the CPU time that is reported.
+//! turns and the frame loop share; at the free pace at once. Never here: a wall clock, except for the CPU time that is reported.
 
 mod cores;
 
@@ -10,7 +10,7 @@ use super::Run;
 use super::agent_clock::{Timeline, TimelineCommand};
 use super::agent_runner::{AgentRunner, Effort, Next};
 use super::agents::Agents;
-use super::archive::{Absent, Cut, VirtualEvents};
+use super::archive::{Absent, Cut};
 use super::cluster::{Place, Placed, close_remaining, hand_over, put_back, take_apart};
 use super::cpu::CpuBatch;
 use super::handle::AgentHandle;
@@ -20,6 +20,7 @@ use super::mailbox::SendError;
 use super::metrics::AgentStats;
 use super::spawn::{AgentSpawn, AssembledRun, RunAgents, RunError, assemble};
 use super::turns::Took;
+use super::virtual_events::{FRAME, Phase, Turn, VirtualEvents};
 use cores::Cores;
 use metachron_core::{AgentId, Archive, ArchiveError};
 use std::cmp::Reverse;
@@ -50,30 +51,6 @@ struct AgentEntry {
     phase: Phase,
     turns: u64,
 }
-
-#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
-pub(super) enum Phase {
-    Waiting,
-    /// In a turn.
-    Busy(Turn),
-    Resting,
-    Led,
-    Parked,
-}
-
-/// A turn that goes on.
-#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
-pub(super) struct Turn {
-    /// When it began.
-    since: Duration,
-    /// Its jobs that have not ended.
-    jobs: u32,
-    /// How many cores it keeps busy in the mean, ≥ 1.
-    cores: f64,
-}
-
-/// The number of the frame loop's own job: above every agent's, so that agents' jobs come first at equal end times.
-const FRAME: u32 = u32::MAX;
 
 impl Lockstep {
     /// Begins a run at virtual time zero.
@@ -150,7 +127,9 @@ impl Lockstep {
     fn next_event(&mut self, limit: Duration) -> Option<Event> {
         self.wake_sleepers();
         let end = self.cores.until_end().map(|span| self.now.saturating_add(span));
-        let due = self.due.peek().map(|&Reverse((due, _))| due);
+        // at the free pace a turn that is due at the end belongs to the time after it, as no turn is in progress there
+        let begins = |due: &Duration| *due < limit || !self.timeline.is_free();
+        let due = self.due.peek().map(|&Reverse((due, _))| due).filter(begins);
         let at = end.into_iter().chain(due).min()?;
         if at > limit {
             return None;
@@ -183,7 +162,8 @@ impl Lockstep {
         let Some(actor) = &mut entry.actor else { return };
         match actor.begin(&self.timeline, self.now) {
             Some(Effort { work, steps }) => {
-                let slower = self.machine.slower(self.now);
+                // at the free pace turns take no time
+                let slower = if self.timeline.is_free() { 0.0 } else { self.machine.slower(self.now) };
                 let price =
                     |model, work| duration(self.machine.step_s(model, work, agent as u64, entry.turns) * slower);
                 self.jobs.clear();
@@ -261,6 +241,7 @@ impl Lockstep {
 
     /// Ends all agents, whatever their phase.
     fn end(&mut self) {
+        self.end_turns();
         let actors = self.entries.drain(..).filter_map(|entry| entry.actor);
         actors.for_each(|mut actor| actor.close_account(&self.timeline, self.now));
         close_remaining(&self.all.handles, &self.timeline, self.now);
@@ -273,18 +254,16 @@ impl Lockstep {
         archive: &mut Archive<'_>,
         absent: Absent<'_>,
     ) -> Result<(), ArchiveError> {
-        let (own, own_now) = (self.timeline, self.now);
-        let read = cut.archive(archive, absent);
-        self.entries.resize_with(cut.all.len(), || AgentEntry { actor: None, phase: Phase::Parked, turns: 0 });
-        read?;
         let phases = self.entries.iter().map(|entry| (entry.phase, entry.turns)).collect();
         let (served, jobs) = self.cores.jobs();
-        let mut events = Some(VirtualEvents { due: self.due.clone(), served, jobs, phases });
-        archive.option(&mut events, VirtualEvents::default, VirtualEvents::archive)?;
+        let events = VirtualEvents { due: self.due.clone(), served, jobs, phases };
+        let events = cut.archive(archive, absent, Some(events))?;
         if !archive.is_reading() {
             return Ok(());
         }
+        let (own, own_now) = (self.timeline, self.now);
         (self.timeline, self.now) = (cut.timeline, cut.now);
+        self.entries.resize_with(cut.all.len(), || AgentEntry { actor: None, phase: Phase::Parked, turns: 0 });
         let Some(VirtualEvents { due, served, jobs, phases }) = events else {
             // a world in real time stands still where it was cut; whether this one does is its own matter
             self.timeline = own.set_to(own_now, cut.now, cut.timeline.sim_at(cut.now), &cut.timeline);
@@ -297,21 +276,12 @@ impl Lockstep {
             cut.all.iter().flatten().for_each(|placed| self.all.sleep.notify(placed.runner.id()));
             return Ok(());
         };
-        if phases.len() != cut.counted {
-            let (found, expected) = (phases.len().to_string(), cut.counted.to_string());
-            return Err(ArchiveError::Mismatch { what: "the number of agents with phases", found, expected });
-        }
         self.cores.set_jobs(served, jobs);
         self.due = due;
         let phases = phases.into_iter().chain(std::iter::repeat((Phase::Parked, 0)));
         self.entries.iter_mut().zip(phases).for_each(|(entry, (phase, turns))| {
             (entry.phase, entry.turns) = (phase, turns);
         });
-        let owners = self.due.iter().map(|Reverse((_, agent))| *agent).chain(self.cores.owners());
-        if let Some(agent) = owners.filter(|owner| *owner != FRAME).find(|owner| *owner as usize >= cut.counted) {
-            let (found, expected) = (agent.to_string(), format!("below {}", cut.counted));
-            return Err(ArchiveError::Mismatch { what: "the number of an agent with a turn", found, expected });
-        }
         Ok(())
     }
 
@@ -413,7 +383,12 @@ impl Run for Lockstep {
         let mut cut = Cut::new(all, self.all.clone(), self.timeline, self.now);
         let outcome = self.archive_all(&mut cut, archive, absent);
         let homes = put_back(cut.all, &self.all.handles);
-        self.entries.iter_mut().zip(homes).for_each(|(entry, home)| entry.actor = home);
+        for (entry, home) in self.entries.iter_mut().zip(homes) {
+            entry.actor = home;
+            if entry.actor.as_ref().is_some_and(|actor| actor.is_parked()) {
+                entry.phase = Phase::Parked;
+            }
+        }
         if archive.is_reading() && self.due.is_empty() {
             self.schedule_all();
         }
@@ -423,6 +398,11 @@ impl Run for Lockstep {
     fn remove(&mut self, id: AgentId) -> Result<(), SendError> {
         let home = self.entries.get_mut(id.0 as usize).map(|entry| &mut entry.actor);
         self.all.leave(id, home.unwrap_or(&mut None))
+    }
+
+    /// No turn is in progress between two calls.
+    fn end_turns(&mut self) {
+        self.all.sleep.end();
     }
 
     fn shutdown(mut self: Box<Self>) -> Vec<AgentStats> {

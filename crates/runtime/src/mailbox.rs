@@ -3,13 +3,14 @@
 //! In: [`Command`]s from any thread. Out: the newest of each kind, once. Storage is bounded: one place per kind, which a newer command
 //! overwrites. Never here: the execution of commands ([`crate::agent_runner`] does).
 
-use metachron_contact::{AnchorForce, AnchorSpring, Carving, PoseGoal, SetMotion, SetMotor};
-use metachron_core::{AgentId, Anchor, Archive, ArchiveError, Body, Resolution, SimSpan};
+use glam::DVec3;
+use metachron_contact::{AnchorForce, AnchorSpring, Carving, Input, Inputs, PoseGoal, SetMotion, SetMotor};
+use metachron_core::{AgentId, Anchor, Body, Resolution, SimSpan};
 use std::sync::atomic::{
     AtomicBool,
     Ordering::{Acquire, Release},
 };
-use std::sync::{Mutex, OnceLock, PoisonError};
+use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 
 /// A command to an agent.
 #[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
@@ -29,9 +30,9 @@ pub enum Command {
     Motor(Keyed<SetMotor>),
     /// A kinematic body is led to a pose; `None` lets it go its own way again.
     Pose(Keyed<PoseGoal>),
-    /// Another place or velocity, before its next step; an agent that cannot take it stays as it is.
+    /// Another place or velocity, before its next step.
     SetMotion(SetMotion),
-    /// The pressure of what fills the agent, inside minus outside, Pa; an agent that nothing fills, or that refuses it, stays as it is.
+    /// The pressure of what fills the agent, inside minus outside, Pa; an agent that refuses this pressure stays as it is.
     SetPressure(f64),
     /// Its cells in a region of space are removed before its next step; an agent that has none there, or no others, stays as it is.
     Carve(Carving),
@@ -48,6 +49,28 @@ pub struct Keyed<T> {
     pub what: Option<T>,
     /// For how long it acts, in the agent's time, from when the agent takes it; `None` until it is taken back.
     pub lasts: Option<SimSpan>,
+}
+
+impl Command {
+    /// What an agent must take that takes this.
+    #[must_use]
+    pub fn needs(&self) -> Inputs {
+        let acts =
+            |force: &AnchorForce| Inputs::of(&[Input::Force]).with(Input::Torque, force.torque_n_m != DVec3::ZERO);
+        match self {
+            Self::SetDt(_) | Self::Motor(_) | Self::Wake => Inputs::NONE,
+            Self::Retune(_) => Inputs::of(&[Input::Resolution]),
+            Self::Spring(_) => Inputs::of(&[Input::Spring]),
+            Self::Force(Keyed { what, .. }) => what.as_ref().map_or(Inputs::of(&[Input::Force]), acts),
+            Self::Impulse(impulse) => acts(impulse),
+            Self::Pose(_) => Inputs::of(&[Input::Pose]),
+            Self::SetMotion(SetMotion { position_m, rotation, velocity_m_s, spin_rad_s }) => Inputs::NONE
+                .with(Input::Place, position_m.is_some() || rotation.is_some())
+                .with(Input::Velocity, velocity_m_s.is_some() || spin_rad_s.is_some()),
+            Self::SetPressure(_) => Inputs::of(&[Input::Pressure]),
+            Self::Carve(_) => Inputs::of(&[Input::Carving]),
+        }
+    }
 }
 
 impl<T> Keyed<T> {
@@ -75,17 +98,33 @@ pub enum SendError {
         "an agent takes {KEYS} springs, {KEYS} forces, and impulses at {KEYS} points and {KEYS} carved regions a step; keys are 0 to 7"
     )]
     TooMany,
-    /// Poses lead only what is not moved by forces.
-    #[error("it is moved by what acts on it; only a kinematic body is led by poses")]
-    NotKinematic(AgentId),
+    /// The agent takes no such command ([`metachron_contact::Agent::inputs`]).
+    #[error("\"{name}\" (model \"{model}\") takes no {}; it takes {takes}", lacks.name())]
+    NotTaken {
+        /// The agent's name.
+        name: Arc<str>,
+        /// Its model.
+        model: &'static str,
+        /// What the command needs.
+        lacks: Input,
+        /// What the agent takes.
+        takes: Inputs,
+    },
     /// There is no joint of that number that can have a motor and whose first agent this is.
-    #[error("joint {joint} has no motor on agent {}: it must be a hinge or a slide, and the agent the first of the two that it joins", agent.0)]
+    #[error(
+        "\"{name}\" drives no joint {joint}: a motor is of a hinge or a slide, and for the first of the two that it joins; the joints that it drives are {drives:?}"
+    )]
     NoMotor {
-        /// The agent.
-        agent: AgentId,
+        /// The agent's name.
+        name: Arc<str>,
         /// The joint's number.
         joint: u32,
+        /// The numbers of the joints that it drives.
+        drives: Vec<u32>,
     },
+    /// The run has ended, or ends.
+    #[error("the run of \"{0}\" has ended: it takes no command any more")]
+    Ended(Arc<str>),
 }
 
 /// The newest command of each kind, waiting for one agent.
@@ -98,7 +137,7 @@ pub(super) struct Mailbox {
 }
 
 /// Contents of a mailbox.
-#[derive(Debug, Default, serde::Serialize, serde::Deserialize)]
+#[derive(Debug, Clone, Default, serde::Serialize, serde::Deserialize)]
 pub(super) struct PendingCommands {
     /// The newest requested resolution.
     pub set_resolution: Option<Resolution>,
@@ -164,19 +203,19 @@ impl Mailbox {
         Ok(())
     }
 
-    /// Writes or reads the commands that wait.
-    pub fn archive(&self, archive: &mut Archive<'_>) -> Result<(), ArchiveError> {
-        let mut is_full = self.has_pending();
-        archive.value(&mut is_full)?;
-        if is_full {
-            let pending = self.pending.get_or_init(Box::default);
-            archive.value(&mut *pending.lock().unwrap_or_else(PoisonError::into_inner))?;
-        } else if archive.is_reading() {
-            // what waits now was sent after
-            self.clear();
-        }
-        self.full.store(is_full, Release);
-        Ok(())
+    /// What waits, if anything does.
+    pub fn waiting(&self) -> Option<PendingCommands> {
+        let pending = self.pending.get().filter(|_| self.has_pending())?;
+        Some(pending.lock().unwrap_or_else(PoisonError::into_inner).clone())
+    }
+
+    /// Lets `commands` wait in place of all that waits now.
+    pub fn replace(&self, commands: Option<PendingCommands>) {
+        let Some(commands) = commands else { return self.clear() };
+        let _ = self.put(|pending| {
+            *pending = commands;
+            Ok(())
+        });
     }
 
     /// Forgets what waits; called between turns.

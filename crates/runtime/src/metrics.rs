@@ -74,6 +74,10 @@ pub struct AgentStats {
     pub late: Spread,
     /// Turns published after the end of their step.
     pub misses: u64,
+    /// Simulated time that it has lived: the sum of its steps, and its time at rest.
+    pub lived: SimSpan,
+    /// Steps of these that were longer than the step asked of it then.
+    pub lengthened: u64,
     /// Simulated time dropped because it could not be made up.
     pub dropped: SimSpan,
     /// Simulated time at rest.
@@ -112,6 +116,8 @@ impl AgentStats {
             age: times,
             late: times,
             misses: 0,
+            lived: none,
+            lengthened: 0,
             dropped: none,
             rested: none,
             state: AgentState::Gone,
@@ -147,6 +153,9 @@ const GONE: u8 = 3;
 pub(super) struct Metrics {
     pub steps: AtomicU64,
     pub misses: AtomicU64,
+    pub lengthened: AtomicU64,
+    /// The sum of its steps, nanoseconds.
+    pub stepped: AtomicU64,
     pub dt: AtomicU64,
     pub dropped: AtomicU64,
     pub rested: AtomicU64,
@@ -205,7 +214,8 @@ impl Metrics {
 
     /// Writes or reads them; CPU time and the times by which turns were late go on being counted.
     pub fn archive(&self, archive: &mut Archive<'_>) -> Result<(), ArchiveError> {
-        for count in [&self.steps, &self.misses, &self.dt, &self.dropped, &self.rested] {
+        let Self { steps, misses, lengthened, stepped, dt, dropped, rested, .. } = self;
+        for count in [steps, misses, lengthened, stepped, dt, dropped, rested] {
             let mut value = count.load(Relaxed);
             archive.value(&mut value)?;
             count.store(value, Relaxed);
@@ -251,6 +261,8 @@ pub(super) struct MetricsWriter {
     turns: u64,
     steps: u64,
     misses: u64,
+    lengthened: u64,
+    stepped: SimSpan,
     late: Histogram,
     work_s: Option<f64>,
     turn_s: Option<f64>,
@@ -263,6 +275,8 @@ pub(super) struct MetricsWriter {
 pub(super) struct Entry {
     /// Steps of its own that it made.
     pub steps: u32,
+    /// How long they took together.
+    pub span: SimSpan,
     /// Simulated time at the turn's end.
     pub now: SimTime,
     /// How late it began.
@@ -280,6 +294,8 @@ impl MetricsWriter {
             turns: 0,
             steps: 0,
             misses: 0,
+            lengthened: 0,
+            stepped: SimSpan::ZERO,
             late: Histogram::default(),
             work_s: None,
             turn_s: None,
@@ -290,8 +306,9 @@ impl MetricsWriter {
 
     /// Writes or reads the counts, but for the times by which turns were late.
     pub fn archive(&mut self, archive: &mut Archive<'_>) -> Result<(), ArchiveError> {
-        let Self { turns, steps, misses, work_s, turn_s, window, first_window, .. } = self;
-        archive_values!(archive, *turns, *steps, *misses, *work_s, *turn_s, *window, *first_window)
+        let Self { turns, steps, misses, lengthened, stepped, work_s, turn_s, window, first_window, .. } = self;
+        archive_values!(archive, *turns, *steps, *misses, *lengthened, *stepped)?;
+        archive_values!(archive, *work_s, *turn_s, *window, *first_window)
     }
 
     /// Turns recorded so far.
@@ -309,10 +326,16 @@ impl MetricsWriter {
         self.turns += 1;
         self.steps += u64::from(entry.steps);
         self.misses += u64::from(entry.missed);
+        self.stepped += entry.span;
+        if is_longer(entry.span, entry.steps, pace.wanted()) {
+            self.lengthened += u64::from(entry.steps);
+        }
         self.late.record(entry.late);
         let work_s = smoothed(&mut self.work_s, entry.work_s);
         gauges.steps.store(self.steps, Relaxed);
         gauges.misses.store(self.misses, Relaxed);
+        gauges.lengthened.store(self.lengthened, Relaxed);
+        gauges.stepped.store(self.stepped.as_nanos(), Relaxed);
         gauges.work_s.set(work_s);
         self.pace(gauges, pace);
         // the step just made covers the time up to the agent's own
@@ -356,6 +379,11 @@ impl MetricsWriter {
             self.flush(gauges);
         }
     }
+}
+
+/// Whether so many steps that take a span together are longer than the one that was asked for, by more than each is rounded, a nanosecond.
+fn is_longer(span: SimSpan, steps: u32, wanted: SimSpan) -> bool {
+    span.as_nanos() > u64::from(steps) * (wanted.as_nanos() + 1)
 }
 
 fn smoothed(held: &mut Option<f64>, new: f64) -> f64 {

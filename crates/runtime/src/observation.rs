@@ -6,15 +6,14 @@
 
 use super::agent_record::Live;
 use super::agents::Agents;
-use super::broad_phase::{BroadPhase, NeighbourList, PlannedStep};
+use super::broad_phase::{BroadPhase, BroadPhaseState, NeighbourList, PlannedStep};
 use super::cluster::Membership;
 use super::handle::{AgentHandle, Shared};
 use super::helpers::Helpers;
 use super::slot::SlotWriter;
-use metachron_contact::Neighbour;
 use metachron_contact::asynchronous::{PairClock, computes};
-use metachron_contact::{Law, acknowledged};
-use metachron_core::{AgentId, Archive, ArchiveError, Snapshot};
+use metachron_contact::{Input, Law, Neighbour, acknowledged};
+use metachron_core::{AgentId, Archive, ArchiveError, Snapshot, archive_values};
 use metachron_geometry::{CollisionShape, ShapeKind};
 use std::sync::atomic::{
     AtomicBool,
@@ -63,15 +62,17 @@ impl BroadPhaseSlot {
         self.made.get().inspect(|broad_phase| broad_phase.clear());
     }
 
-    /// Writes or reads what the first `of` of `agents` have published; called between turns.
-    pub fn archive(&self, of: usize, agents: usize, archive: &mut Archive<'_>) -> Result<(), ArchiveError> {
-        let mut is_used = self.get().is_some();
-        archive.value(&mut is_used)?;
-        if !is_used {
-            self.end();
-            return Ok(());
+    /// What agents have published in it; `None` where it is not in use. Called between turns.
+    pub fn state(&self) -> Option<BroadPhaseState> {
+        self.get().map(BroadPhase::state)
+    }
+
+    /// Puts that into it, for so many agents; called between turns.
+    pub fn set_state(&self, state: Option<&BroadPhaseState>, agents: usize) {
+        match state {
+            Some(state) => self.begin(agents).set_state(state),
+            None => self.end(),
         }
-        self.begin(agents).archive(of, archive)
     }
 }
 
@@ -89,6 +90,16 @@ pub(super) struct Observer {
     neighbour_list: Option<Box<NeighbourList>>,
     /// Agents to be seen in addition to the linked ones.
     wanted: Vec<AgentId>,
+}
+
+/// One that an agent sees, as it is saved.
+#[derive(Debug, Clone)]
+pub(super) struct Seen {
+    id: AgentId,
+    /// Whether it steps as one with the agent.
+    is_member: bool,
+    /// Its state when it was seen last.
+    snapshot: Arc<Snapshot>,
 }
 
 /// Source of one neighbour's states.
@@ -110,7 +121,7 @@ impl Source {
 impl Shared {
     /// By which it is settled who computes its asynchronous pairs: never what moves as it is led, which nothing that it is given moves.
     fn clock(&self) -> PairClock {
-        let step_s = if self.takes_poses() { f64::INFINITY } else { self.wanted_hz().recip() };
+        let step_s = if self.inputs().has(Input::Pose) { f64::INFINITY } else { self.wanted_hz().recip() };
         PairClock { id: self.id, step_s }
     }
 
@@ -194,29 +205,59 @@ impl Observer {
         self.me
     }
 
-    /// Writes or reads whom it sees, each in the state in which it was seen last.
-    pub fn archive(&mut self, peers: &Peers, archive: &mut Archive<'_>) -> Result<(), ArchiveError> {
-        let links = self.links as usize;
-        let mut ids: Vec<AgentId> = self.neighbours[links..].iter().map(|neighbour| neighbour.id).collect();
-        archive.value(&mut ids)?;
-        if archive.is_reading() {
-            self.neighbours.truncate(links);
-            self.sources.truncate(links);
-            ids.iter().for_each(|id| self.list(peers, *id));
-            check_seen(&ids, &self.neighbours[links..])?;
-        }
-        for (neighbour, source) in self.neighbours.iter_mut().zip(&mut self.sources) {
-            let mut is_member = source.is_member;
-            archive.value(&mut is_member)?;
-            if is_member != source.is_member {
-                source.is_member = is_member;
-                set_member(neighbour, peers, self.me, is_member);
-            }
-            archive.snapshot(&mut neighbour.snapshot)?;
-        }
+    /// Writes or reads whom it has found near it.
+    pub fn archive(&mut self, archive: &mut Archive<'_>) -> Result<(), ArchiveError> {
         let me = self.me;
         let first = || Box::new(NeighbourList::new(me));
         archive.option(&mut self.neighbour_list, first, |list, archive| list.archive(archive))
+    }
+
+    /// Whom it sees, each as it was seen last: those that it is linked to, and of the others those that are `present`. One that has left is seen
+    /// until the next turn.
+    pub fn seen(&self, present: &[bool]) -> Vec<Seen> {
+        let links = self.links as usize;
+        let is_present = |id: AgentId| present.get(id.0 as usize).is_some_and(|present| *present);
+        let all = self.neighbours.iter().zip(&self.sources).enumerate();
+        let seen = all.filter(|(at, (neighbour, _))| *at < links || is_present(neighbour.id));
+        seen.map(|(_, (neighbour, source))| Seen {
+            id: neighbour.id,
+            is_member: source.is_member,
+            snapshot: Arc::clone(&neighbour.snapshot),
+        })
+        .collect()
+    }
+
+    /// Checks that it can see those in a run of those that are `present`.
+    ///
+    /// # Errors
+    /// [`ArchiveError::Mismatch`].
+    pub fn check_seen(&self, seen: &[Seen], present: &[bool]) -> Result<(), ArchiveError> {
+        let linked = self.neighbours.iter().take(self.links as usize).map(|neighbour| neighbour.id);
+        let is_linked = linked.clone().eq(seen.iter().take(linked.len()).map(|seen| seen.id));
+        let others = seen.iter().skip(linked.len()).map(|seen| seen.id);
+        let wrong = |id: &AgentId| *id == self.me || !present.get(id.0 as usize).is_some_and(|present| *present);
+        let found = match others.clone().find(wrong) {
+            None if is_linked => return Ok(()),
+            None => format!("{:?}", seen.iter().map(|seen| seen.id.0).collect::<Vec<_>>()),
+            Some(id) => id.0.to_string(),
+        };
+        let expected = "that of an agent that it sees".to_owned();
+        Err(ArchiveError::Mismatch { what: "the number of a neighbour", found, expected })
+    }
+
+    /// Sees those from now on, as they were seen then; called between turns, where all of them are there.
+    pub fn see(&mut self, peers: &Peers, seen: &[Seen]) {
+        let links = self.links as usize;
+        self.neighbours.truncate(links);
+        self.sources.truncate(links);
+        seen.iter().skip(links).for_each(|seen| self.list(peers, seen.id));
+        for ((neighbour, source), seen) in self.neighbours.iter_mut().zip(&mut self.sources).zip(seen) {
+            if seen.is_member != source.is_member {
+                source.is_member = seen.is_member;
+                set_member(neighbour, peers, self.me, seen.is_member);
+            }
+            neighbour.snapshot.clone_from(&seen.snapshot);
+        }
     }
 
     /// Sees but those that it is linked to: it has left.
@@ -335,14 +376,18 @@ impl Observer {
     }
 }
 
-/// Checks that all agents that are to be seen exist.
-fn check_seen(ids: &[AgentId], seen: &[Neighbour]) -> Result<(), ArchiveError> {
-    match ids.iter().find(|id| !seen.iter().any(|neighbour| neighbour.id == **id)) {
-        None => Ok(()),
-        Some(id) => {
-            let (found, expected) = (id.0.to_string(), "that of an agent".to_owned());
-            Err(ArchiveError::Mismatch { what: "the number of a neighbour", found, expected })
-        }
+impl Default for Seen {
+    /// One that is to be read.
+    fn default() -> Self {
+        Self { id: AgentId(0), is_member: false, snapshot: Arc::default() }
+    }
+}
+
+impl Seen {
+    /// Writes or reads it.
+    pub fn archive(&mut self, archive: &mut Archive<'_>) -> Result<(), ArchiveError> {
+        archive_values!(archive, self.id, self.is_member)?;
+        archive.snapshot(&mut self.snapshot)
     }
 }
 

@@ -112,7 +112,7 @@ impl Pool {
     }
 
     fn end(&mut self) {
-        self.halt(Halt::End);
+        self.end_turns();
         let (timeline, now) = (self.state.timeline.read(), self.state.clock.now());
         self.state.clear(|mut actor| actor.close_account(&timeline, now));
         close_remaining(&self.state.handles, &timeline, now);
@@ -196,6 +196,11 @@ impl Run for Pool {
 
     fn record(&mut self, order: Arc<TurnOrder>, begun: Option<&mut Archive<'_>>) -> Result<(), ArchiveError> {
         self.record_between_turns(order, begun)
+    }
+
+    fn end_turns(&mut self) {
+        self.all.sleep.end();
+        self.halt(Halt::End);
     }
 
     fn shutdown(mut self: Box<Self>) -> Vec<AgentStats> {

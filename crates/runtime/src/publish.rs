@@ -18,7 +18,7 @@ impl AgentRunner {
     pub fn record_step(&mut self, open: &PendingTurn, timeline: &Timeline, wall: Duration, work_s: f64) -> bool {
         let now = timeline.sim_at(wall);
         let missed = now > self.pace.scene_time() && !timeline.is_free();
-        let entry = Entry { steps: self.own_steps(), now, late: open.start.late, missed, work_s };
+        let entry = Entry { steps: self.own_steps(), span: open.dt, now, late: open.start.late, missed, work_s };
         // metrics first: a state that is visible is accounted for
         self.metrics.write(&self.shared.gauges, &self.pace, entry);
         self.withheld = self.faults.loses(self.id(), self.metrics.turns());

@@ -82,6 +82,7 @@ pub(super) struct SleepRegistry {
     /// An agent was notified: the lockstep loop serves it.
     notified: AtomicBool,
     stop: AtomicBool,
+    ended: AtomicBool,
     /// Simulated nanoseconds at which an agent near peers was last far behind, plus one; zero for never.
     far_behind: AtomicU64,
     /// Wake-up of the workers, where agents have no threads of their own.
@@ -91,7 +92,7 @@ pub(super) struct SleepRegistry {
 }
 
 /// What a [`SleepRegistry`] knows of its agents between turns.
-#[derive(Debug, Clone, PartialEq, serde::Serialize, serde::Deserialize)]
+#[derive(Debug, Clone, Default, PartialEq, serde::Serialize, serde::Deserialize)]
 pub(super) struct SleepState {
     pub signals: Vec<SignalState>,
     notified: bool,
@@ -114,6 +115,7 @@ impl SleepRegistry {
             signals: Table::of(agents),
             notified: AtomicBool::new(false),
             stop: AtomicBool::new(false),
+            ended: AtomicBool::new(false),
             far_behind: AtomicU64::new(0),
             wakeup: OnceLock::new(),
             changed: DirtySet::default(),
@@ -335,6 +337,16 @@ impl SleepRegistry {
     /// Takes that back, once all have ended: the run goes on with others.
     pub fn go_on(&self) {
         self.stop.store(false, Release);
+    }
+
+    /// Notes that the run ends for good.
+    pub fn end(&self) {
+        self.ended.store(true, Release);
+    }
+
+    /// Whether the run ends for good, or has ended.
+    pub fn has_ended(&self) -> bool {
+        self.ended.load(Acquire)
     }
 
     /// Whether threads have been asked to end.

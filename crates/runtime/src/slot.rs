@@ -117,11 +117,12 @@ impl<T: Default> SlotWriter<T> {
         Arc::clone(&self.slot)
     }
 
-    /// Fills a value that no reader holds, to be published later. `fill` gets an old value and must overwrite all of it. A filled value
-    /// that is not yet published is filled again.
+    /// Fills a value that nobody else holds, to be published later. `fill` gets an old value and must overwrite all of it. A filled value
+    /// that is not yet published is filled again, unless somebody has kept it.
     pub fn fill<R>(&mut self, fill: impl FnOnce(&mut T) -> R) -> R {
-        let mut free = self.filled.take().unwrap_or_else(|| self.take_spare());
-        let result = fill(Arc::get_mut(&mut free).expect("no reader holds a spare value"));
+        self.spare.extend(self.filled.take());
+        let mut free = self.take_spare();
+        let result = fill(Arc::get_mut(&mut free).expect("nobody holds a spare value"));
         self.filled = Some(free);
         result
     }
@@ -151,7 +152,7 @@ impl<T: Default> SlotWriter<T> {
         self.spare = Vec::new();
     }
 
-    /// The value that is filled and not yet published, to be replaced; it is shared with nobody when the next is filled.
+    /// The value that is filled and not yet published, to be kept or replaced.
     pub(super) fn filled_mut(&mut self) -> &mut Option<Arc<T>> {
         &mut self.filled
     }
@@ -240,6 +241,18 @@ mod tests {
         assert!(writer.publish());
         assert!(!writer.publish(), "once");
         assert_eq!(slot.latest()[0], 9);
+    }
+
+    #[test]
+    fn a_filled_value_that_somebody_has_kept_is_not_written_to() {
+        let mut writer = writer();
+        writer.fill(|block| *block = vec![1]);
+        let kept = writer.filled_mut().clone().unwrap();
+        writer.fill(|block| *block = vec![2]);
+        assert_eq!((kept[0], writer.filled().unwrap()[0]), (1, 2));
+        assert!(writer.publish());
+        writer.fill(|block| *block = vec![3]);
+        assert_eq!((kept[0], writer.slot().latest()[0]), (1, 2));
     }
 
     #[test]

@@ -245,23 +245,26 @@ impl RunAgents {
         Ok(Box::new(actor))
     }
 
-    /// Adds numbers of agents that have left until there are `count`: nothing more is known of them.
-    pub fn reach(&self, count: usize) {
+    /// Adds numbers of agents until there are `count`: those of agents that were `made`, and others of which nothing is known but that they have left.
+    pub fn reach<'a>(&self, count: usize, made: impl Fn(usize) -> Option<&'a Arc<Shared>>) {
         for number in self.handles.len()..count {
             let id = AgentId(number as u32);
-            let handle = AgentHandle { record: Arc::new(AgentRecord::unknown(id)) };
+            let unknown = || AgentHandle { record: Arc::new(AgentRecord::unknown(id)) };
+            let handle = made(number).map_or_else(unknown, AgentHandle::of);
             self.reserve(&handle);
             self.sleep.close(id);
             self.handles.push(handle);
         }
     }
 
-    /// An agent that joined the run as `spawn` says, has left and is not kept, again; its state is read next.
+    /// An agent that joined the run of a state as `spawn` says, and is not in this one: its state is read next, and nobody finds it before it is
+    /// admitted.
     pub fn revive(&self, id: AgentId, mut spawn: AgentSpawn) -> Box<AgentRunner> {
-        let record = &self.handles[id.0 as usize].record;
-        let writer = SlotWriter::of(Arc::clone(&record.slot));
+        let writer = match self.handles.of(id) {
+            Some(known) => SlotWriter::of(Arc::clone(&known.record.slot)),
+            None => SlotWriter::new(Snapshot::default()),
+        };
         let shared = Arc::new(shared(id, &mut spawn, &self.sleep, &writer, false));
-        record.begin(&shared);
         Box::new(actor(shared, Seated { spawn, jointed: Vec::new(), writer }, &self.peers))
     }
 

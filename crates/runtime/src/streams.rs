@@ -61,10 +61,12 @@ impl Heard {
         // one that has come back tells anew
         match now {
             None => *self = Self::default(),
-            Some(streams) if streams.0.get().map(Arc::as_ptr) != self.rings.as_ref().map(Arc::as_ptr) => {
-                *self = streams.listen(of);
+            Some(streams) => {
+                let are_its = |rings: &Arc<Rings>| streams.0.get().is_some_and(|now| Arc::ptr_eq(now, rings));
+                if !self.rings.as_ref().is_some_and(are_its) {
+                    *self = streams.listen(of);
+                }
             }
-            Some(_) => {}
         }
         lost
     }

@@ -8,7 +8,7 @@ use glam::{DQuat, DVec3};
 use metachron_contact::asynchronous::{GivenAt, Ledgers};
 use metachron_contact::cluster::Side;
 use metachron_contact::stepper::{ClusterMember, Role};
-use metachron_contact::{Agent, StepContext};
+use metachron_contact::{Agent, Input, Inputs, StepContext};
 use metachron_core::{
     AgentId, Body, Bounds, N_MAX, Resolution, ResolutionRange, RigidState, SimSpan, SimTime, Snapshot, StepError,
     StepReport,
@@ -273,6 +273,10 @@ impl Agent for Dummy {
         self.record(self.time, context);
         let at_rest = self.rest_from.is_some_and(|from| self.steps >= from);
         Ok(StepReport { work: self.work, substeps: 1, at_rest })
+    }
+
+    fn inputs(&self) -> Inputs {
+        Inputs::of(&[Input::Spring, Input::Force, Input::Resolution])
     }
 
     fn resolution(&self) -> Option<Resolution> {

@@ -36,6 +36,10 @@ pub const THREADS_MAX: usize = 1000;
 /// pool, 100 cost 10 and 6 (`docs/throughput.md`).
 pub const AUTO_THREADS_MAX: usize = 64;
 
+/// An agent that is behind keeps its core for this long, then yields it: of a thousand threads that have more to do than two cores can, each waits
+/// for tenths of a second then. The system's own slices, milliseconds each, would let it wait for seconds.
+const CATCH_UP_MAX: Duration = Duration::from_micros(20);
+
 /// A thread that gives back its agent when it ends, if it has it.
 type Ended = JoinHandle<Option<Box<AgentRunner>>>;
 
@@ -110,6 +114,7 @@ impl Threads {
             timeline: Arc::clone(&self.timeline),
             batch: CpuBatch::default(),
             order: self.order.clone(),
+            awake: Duration::ZERO,
         };
         let farewell = EndNotice { id: shared.id, ended: self.farewells.clone() };
         let builder = thread::Builder::new().name(name.clone());
@@ -162,9 +167,9 @@ impl Threads {
     }
 
     fn end(&mut self) {
-        let homes = self.halt(Halt::End);
+        self.end_turns();
         let (timeline, now) = (self.timeline.read(), self.clock.now());
-        homes.into_iter().flatten().for_each(|mut actor| actor.close_account(&timeline, now));
+        std::mem::take(&mut self.ended_agents).into_values().for_each(|mut actor| actor.close_account(&timeline, now));
         close_remaining(&self.all.handles, &timeline, now);
     }
 }
@@ -187,6 +192,7 @@ impl CutBetweenTurns for Threads {
         let homes = self.halt(Halt::Cut);
         let all = take_apart(homes.into_iter(), &self.all.handles);
         let mut cut = Cut::new(all, self.all.clone(), self.timeline.read(), self.clock.now());
+        cut.most = THREADS_MAX;
         let outcome = act(&mut cut, &mut self.order);
         if cut.timeline != self.timeline.read() {
             self.timeline.set(cut.timeline);
@@ -249,6 +255,12 @@ impl Run for Threads {
         self.record_between_turns(order, begun)
     }
 
+    fn end_turns(&mut self) {
+        self.all.sleep.end();
+        let homes = self.halt(Halt::End).into_iter();
+        self.ended_agents = (0..).map(AgentId).zip(homes).filter_map(|(id, home)| Some((id, home?))).collect();
+    }
+
     fn shutdown(mut self: Box<Self>) -> Vec<AgentStats> {
         self.end();
         self.all.handles.iter().map(AgentHandle::stats).collect()
@@ -274,6 +286,8 @@ struct AgentThread {
     timeline: Arc<SharedTimeline>,
     batch: CpuBatch,
     order: Option<Arc<TurnOrder>>,
+    /// How long it has made turns since it last slept or yielded its core.
+    awake: Duration,
 }
 
 impl AgentThread {
@@ -349,9 +363,16 @@ impl AgentThread {
         let timeline = self.timeline.read();
         let now = self.clock.now();
         match actor.pace.due(&timeline) {
+            Some(due) if due <= now && self.awake >= CATCH_UP_MAX => {
+                drop(held);
+                thread::yield_now();
+                self.awake = Duration::ZERO;
+                Next::Due
+            }
             Some(due) if due <= now => self.turn(actor, &timeline, now, held),
             Some(due) => {
                 drop(held);
+                self.awake = Duration::ZERO;
                 thread::park_timeout(due - now);
                 Next::Due
             }
@@ -394,6 +415,7 @@ impl AgentThread {
         drop(held);
         let wall = started.elapsed();
         actor.count(wall);
+        self.awake += wall;
         if self.batch.add(wall) {
             self.settle(actor);
         }

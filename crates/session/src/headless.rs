@@ -91,9 +91,8 @@ pub fn play_headless(
     session.hold();
     #[cfg(feature = "picture")]
     warm_up(&mut session, &mut plan)?;
-    session.begin();
+    let mut due = session.begin();
     let period = session.period();
-    let mut due = session.now();
     #[cfg(feature = "picture")]
     let mut film = film(&plan, period, due)?;
     let mut interrupted = false;
@@ -110,21 +109,21 @@ pub fn play_headless(
         let record = frame_seen_by(&mut session, &camera, format, &mut plan.drawing, false)?;
         #[cfg(feature = "picture")]
         if let Some(film) = &mut film {
-            unwritten = film.push(session.now(), pictured(&session, &camera, &mut plan.drawing)?).err();
+            unwritten = film.push(session.shown(due), pictured(&session, &camera, &mut plan.drawing)?).err();
         }
         interrupted = !go_on(&record, done);
-        due = (due + period).max(session.now());
+        due = session.shown(due + period);
     }
     // the picture shows the state at the end of the run, however long drawing takes
     session.hold();
     #[cfg(feature = "picture")]
     {
-        unwritten = unwritten.or(film.and_then(|film| film.finish(session.now()).err()));
+        unwritten = unwritten.or(film.and_then(|film| film.finish(session.shown(due)).err()));
         unwritten = keep_unwritten(unwritten, write_picture(&mut session, &mut plan))?;
     }
     let adapter = plan.drawing.adapter();
-    let unwritten = unwritten.or(session.end_recording().err().map(SessionError::from));
-    Ok(Outcome { unwritten: unwritten.map(Arc::new), ..session.end(adapter, interrupted) })
+    let outcome = session.end(adapter, interrupted);
+    Ok(Outcome { unwritten: unwritten.map(Arc::new).or(outcome.unwritten), ..outcome })
 }
 
 /// The first file that could not be written: `before`, or the picture. Other errors end the run without an outcome.

@@ -87,6 +87,8 @@ pub struct ProbeOutcome {
 pub struct AgentOutcome {
     /// Its statistics.
     pub stats: AgentStats,
+    /// Simulated time that it has not lived, seconds: what it dropped, and what it was behind at the end.
+    pub given_up_s: f64,
     /// The resolution it was last drawn at; `None` where it has no picture.
     pub picture: Option<Resolution>,
     /// How it meets its error tolerance; `None` without one.
@@ -104,6 +106,8 @@ pub struct Outcome {
     pub law: &'static str,
     /// The executor.
     pub executor: &'static str,
+    /// How time passed at the end: `free` where it waited for agents, else `real-time`, whatever its speed.
+    pub pace: &'static str,
     /// The adapter that drew; `None` where nothing was drawn.
     pub adapter: Option<String>,
     /// Target time of a frame, milliseconds.

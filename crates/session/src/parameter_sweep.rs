@@ -11,10 +11,9 @@ use crate::fit::{Path, Setting};
 use metachron_core::{AgentId, SimSpan};
 use metachron_models::rod::Integrator;
 use metachron_runtime::AgentState;
-use metachron_scene::format::MODELS;
 use metachron_world::couplings::Faults;
 use metachron_world::kinds::ExecutorKind;
-use metachron_world::{Member, Probe, Scene};
+use metachron_world::{Member, Pace, Probe, Scene};
 use std::time::Duration;
 
 /// A recorded point: its agent, and where on it.
@@ -84,6 +83,7 @@ pub fn play_points(
 ) -> Result<Option<Played>, SessionError> {
     let machine = metachron_world::machine(scene);
     let mut session = Session::open(watched(scene, points, seconds))?;
+    session.set_pace(Pace::Free)?;
     let looks = (seconds / LOOK_S).ceil().max(1.0);
     for look in 1..=looks as u32 {
         session.wait_until(Duration::from_secs_f64(seconds * f64::from(look) / looks));
@@ -115,7 +115,7 @@ pub fn play_points(
     }))
 }
 
-/// The scene in virtual time with `points` recorded, with free steps and without injected faults.
+/// The scene in virtual time with `points` recorded, without injected faults.
 fn watched(scene: &Scene, points: &[Point], seconds: f64) -> Scene {
     let mut scene = scene.clone();
     let every = |agent: AgentId| {
@@ -134,8 +134,5 @@ fn watched(scene: &Scene, points: &[Point], seconds: f64) -> Scene {
         member.faults = Faults::default();
     }
     scene.executor = ExecutorKind::Lockstep;
-    let machine = &mut scene.machine;
-    machine.steps = MODELS.map(|model| (model.to_owned(), Some(0.0), Some(0.0))).to_vec();
-    machine.noise = Some(0.0);
     scene
 }

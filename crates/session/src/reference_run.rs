@@ -2,7 +2,7 @@
 //!
 //! In: a scene and the [`Trace`] of its run. Out: an [`ReferenceComparison`]. Never here: arguments, progress bars.
 //!
-//! In the second run every agent makes the same steps, a quarter of the shortest requested by any agent, in virtual time at no cost,
+//! In the second run every agent makes the same steps, a quarter of the shortest requested by any agent, in virtual time at the free pace,
 //! without faults and without control of rates and resolutions. The difference of both runs is the error of different clocks, of longer
 //! steps, of coarser divisions and of late frames together.
 //!
@@ -16,10 +16,9 @@ use super::session::Session;
 use super::trace::{Trace, TracedState, points};
 use glam::DVec3;
 use metachron_core::{AgentId, SimSpan, SimTime, Snapshot};
-use metachron_scene::format::MODELS;
-use metachron_world::Scene;
 use metachron_world::couplings::Faults;
 use metachron_world::kinds::ExecutorKind;
+use metachron_world::{Pace, Scene};
 use std::collections::BTreeMap;
 use std::time::Duration;
 
@@ -102,6 +101,8 @@ fn compare_runs(
     let dt_s = common.agents.first().map_or(STEP_MAX_S, |member| member.pace.dt.as_secs_f64());
     let mut moved = Session::open(moved(&common))?;
     let mut session = Session::open(common)?;
+    moved.set_pace(Pace::Free)?;
+    session.set_pace(Pace::Free)?;
     let mut sensitivity_m = 0.0_f64;
     let empty = Trace::default();
     let trace = outcome.trace.as_ref().unwrap_or(&empty);
@@ -135,7 +136,7 @@ fn compare_runs(
     Ok(ReferenceComparison { dt_s, sim_s, states, pairs, sensitivity_m, interrupted: cut.is_some() })
 }
 
-/// The same scene with one clock for all agents, free steps and no faults.
+/// The same scene with one clock for all agents, free pictures and no faults.
 fn common_clock(scene: &Scene) -> Scene {
     let mut scene = scene.clone();
     let shortest = scene.agents.iter().map(|m| m.pace.dt.as_secs_f64()).fold(f64::INFINITY, f64::min);
@@ -149,7 +150,6 @@ fn common_clock(scene: &Scene) -> Scene {
     }
     scene.executor = ExecutorKind::Lockstep;
     let machine = &mut scene.machine;
-    machine.steps = MODELS.map(|model| (model.to_owned(), Some(0.0), Some(0.0))).to_vec();
     (machine.draw_setup_ms, machine.draw_object_us) = (Some(0.0), Some(0.0));
     (machine.draw_triangle_us, machine.draw_pixel_ns) = (Some(0.0), Some(0.0));
     (machine.cull_object_ns, machine.choose_object_ns) = (Some(0.0), Some(0.0));

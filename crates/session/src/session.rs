@@ -8,6 +8,7 @@ mod cameras;
 mod choose;
 mod gather;
 mod limit;
+mod pace;
 mod record;
 mod recording;
 mod rewind;
@@ -31,7 +32,7 @@ use metachron_lod::control::{FrameWork, Law, ObjectView, PictureControl, Policy,
 #[cfg(feature = "picture")]
 use metachron_render::Gpu;
 use metachron_render::{Camera, Level, Picture, SceneView};
-use metachron_runtime::{AgentHandle, Agents, Command, Keyed, Machine, Reader, TimelineCommand};
+use metachron_runtime::{AgentHandle, Agents, Command, Keyed, Machine, Reader};
 use metachron_world::kinds::{ExecutorKind, LawKind};
 use metachron_world::{Govern, Scene, World, WorldError, machine};
 use rewind::Rewind;
@@ -339,40 +340,13 @@ impl Session {
         &self.levels
     }
 
-    /// Waits until the wall time `until`, while the agents run.
-    pub fn wait_until(&mut self, until: Duration) {
-        self.world.wait_until(until);
-    }
-
-    /// Pauses real time until [`Session::begin`]. Virtual time passes only while the caller waits.
-    pub fn hold(&mut self) {
-        if !self.is_virtual() {
-            self.world.drive(TimelineCommand::Pause);
-        }
-    }
-
-    /// Starts real time, and virtual time that was paused for a window.
-    pub fn begin(&mut self) {
-        if !self.is_virtual() {
-            self.begun = self.now();
-        }
-        if !self.world.timeline().runs_at(self.now()) {
-            self.world.drive(TimelineCommand::Run);
-        }
-    }
-
-    /// Changes the flow of time: pause, run, speed, single step.
-    pub fn drive(&mut self, drive: TimelineCommand) {
-        self.world.drive(drive);
-    }
-
     /// Attaches the user spring to an agent, or releases it (`None`). An agent that does not exist gives an error.
     pub fn hand(&self, to: AgentId, pull: Option<AnchorSpring>) -> Result<(), WorldError> {
         self.world.command(self.world.object_of(to)?, Command::Spring(Keyed::first(pull)))
     }
 
-    /// Sets the pressure of what fills an agent, inside minus outside, Pa; one that nothing fills stays as it is. An agent that does not exist
-    /// and a number that is not finite give an error.
+    /// Sets the pressure of what fills an agent, inside minus outside, Pa. An agent that nothing fills or that does not exist and a number that is
+    /// not finite give an error.
     pub fn set_pressure(&self, of: AgentId, pressure_pa: f64) -> Result<(), WorldError> {
         self.world.command(self.world.object_of(of)?, Command::SetPressure(pressure_pa))
     }
@@ -424,7 +398,7 @@ impl Session {
         }
     }
 
-    /// Ends the run.
+    /// Ends the run, and with its last states the recording.
     #[must_use]
     pub fn end(mut self, adapter: Option<String>, interrupted: bool) -> Outcome {
         self.gather();
@@ -432,8 +406,12 @@ impl Session {
         let handles = self.world.agents().clone();
         let clamp = self.clamp();
         let (scene, policy, law) = (self.scene.name.clone(), self.policy_name(), self.law_name());
+        let pace = if self.world.is_free() { "free" } else { "real-time" };
+        let given_up = |agent: &AgentHandle| agent.given_up(self.sim_now()).as_secs_f64();
+        let given_up_s: Vec<_> = handles.iter().map(given_up).collect();
         let (wall_s, sim_s) = (self.now().saturating_sub(self.begun).as_secs_f64(), self.sim_now().as_secs_f64());
         let stats = self.world.stop();
+        let unwritten = self.world.end_recording().err().map(|error| Arc::new(error.into()));
         let tolerance = |at: usize| error_control::tolerance_status(&self.error_statuses, AgentId(at as u32));
         let last: Vec<_> = handles.iter().map(AgentHandle::latest).collect();
         let drawn = |at: usize| self.levels.get(at).map(|level| level.resolution);
@@ -442,6 +420,7 @@ impl Session {
             policy,
             law,
             executor: self.scene.executor.name(),
+            pace,
             adapter,
             target_ms: 1e3 / self.control.target_hz(),
             frames: self.records,
@@ -456,7 +435,12 @@ impl Session {
             agents: stats
                 .into_iter()
                 .enumerate()
-                .map(|(at, stats)| AgentOutcome { picture: drawn(at), tolerance: tolerance(at), stats })
+                .map(|(at, stats)| AgentOutcome {
+                    picture: drawn(at),
+                    tolerance: tolerance(at),
+                    given_up_s: given_up_s[at],
+                    stats,
+                })
                 .collect(),
             couplings: self.couplings.all().to_vec(),
             events: events(last.iter().map(|state| &**state)),
@@ -467,7 +451,7 @@ impl Session {
             clamp,
             unpriced: self.unpriced,
             interrupted,
-            unwritten: None,
+            unwritten,
         }
     }
 

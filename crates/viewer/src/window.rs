@@ -25,7 +25,6 @@ use metachron_session::{Finished, FrameRecord, Outcome, REWIND_BYTES, Session};
 use scene_files::WatchedFiles;
 use std::collections::BTreeMap;
 use std::path::PathBuf;
-use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 /// A run in a window.
@@ -64,10 +63,7 @@ pub fn play_in_window(session: Session, plan: WindowPlan, go_on: GoOn<'_>) -> Re
     let options = WindowOptions { size: plan.size, screenshots: plan.screenshots.clone(), lose_device_after: None };
     let mut simulation = WindowSimulation::new(session, plan, go_on);
     match run_window(&mut simulation, &options) {
-        Ok(_) => {
-            let unwritten = simulation.session.end_recording().err().map(|error| Arc::new(error.into()));
-            Ok(Outcome { unwritten, ..simulation.session.end(simulation.adapter, simulation.stopped) })
-        }
+        Ok(_) => Ok(simulation.session.end(simulation.adapter, simulation.stopped)),
         Err(error @ WindowError::Gone(_)) => {
             Err(WindowFailure::Gone(Box::new(simulation.session.end(simulation.adapter, true)), error))
         }

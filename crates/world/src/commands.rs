@@ -8,9 +8,8 @@ use super::log::Mode;
 use super::object::Object;
 use super::recording::Entry;
 use super::world::World;
-use glam::DVec3;
 use metachron_core::{Anchor, Body, Snapshot};
-use metachron_runtime::{Command, Keyed};
+use metachron_runtime::{AgentHandle, Command, Keyed, SendError};
 
 /// Why a replay refuses what is asked of it.
 pub(super) const REPLAYED: &str = "a replay does what its recording says, and nothing else";
@@ -19,38 +18,45 @@ impl World {
     /// Sends a command to an object, which obeys at its next step.
     ///
     /// # Errors
-    /// [`WorldError::Foreign`]; [`WorldError::NoPoint`] for a material point that it does not have; [`WorldError::Refused`] for numbers outside
-    /// their range and for a joint that it cannot drive. Nothing was done then.
+    /// [`WorldError::NotTaken`] and [`WorldError::NoMotor`] for what the object does not take, with what it takes; [`WorldError::NoPoint`] for a
+    /// material point that it does not have; [`WorldError::Refused`] for numbers outside their range; [`WorldError::Foreign`],
+    /// [`WorldError::Gone`] and [`WorldError::Stopped`]. Nothing was done then.
     pub fn command(&self, object: Object, command: Command) -> Result<(), WorldError> {
         let agent = self.agent(object)?;
-        let refused = |reason: String| WorldError::Refused { name: agent.name().to_owned(), reason };
-        let state = agent.latest();
-        if agent.takes_poses() && matches!(command, Command::Force(_) | Command::Impulse(_) | Command::Spring(_)) {
-            return Err(refused("it is kinematic: no force moves it; lead it by poses".to_owned()));
-        }
-        match command {
-            Command::Force(Keyed { what: Some(force), .. }) | Command::Impulse(force) => {
-                self.check_point(object, &state, force.anchor)?;
-                if force.torque_n_m != DVec3::ZERO && matches!(state.body, Body::Soft(_)) {
-                    return Err(refused("its vertices do not turn, so a torque has nothing to act on".to_owned()));
-                }
-            }
-            Command::Spring(Keyed { what: Some(spring), .. }) => self.check_point(object, &state, spring.anchor)?,
-            Command::Carve(_) if !agent.form().is_some_and(|form| form.has_cells()) => {
-                return Err(refused("only solids and sheets have cells that can be removed".to_owned()));
-            }
-            _ => {}
+        let point = match command {
+            Command::Force(Keyed { what: Some(force), .. }) | Command::Impulse(force) => Some(force.anchor),
+            Command::Spring(Keyed { what: Some(spring), .. }) => Some(spring.anchor),
+            _ => None,
+        };
+        if let Some(point) = point.filter(|_| agent.inputs().lacks(command.needs()).is_none()) {
+            self.check_point(object, &agent.latest(), point)?;
         }
         if self.shared.log.is_replayed() {
-            return Err(refused(REPLAYED.to_owned()));
+            return Err(WorldError::Refused { name: agent.name().to_owned(), reason: REPLAYED.to_owned() });
         }
-        let note = |log: &mut Mode, sent: &Result<(), String>| {
+        let note = |log: &mut Mode, sent: &Result<(), SendError>| {
             if sent.is_ok() {
                 log.note(|| Entry::Command(object.id(), command));
             }
         };
-        let send = || agent.send(command).map_err(|error| error.to_string());
-        self.shared.log.in_order(|| self.between_calls(), send, note).map_err(refused)
+        let sent = self.shared.log.in_order(|| self.between_calls(), || agent.send(command), note);
+        sent.map_err(|error| self.unsent(agent, error))
+    }
+
+    /// Why an agent was not sent something.
+    pub(super) fn unsent(&self, agent: &AgentHandle, error: SendError) -> WorldError {
+        let name = || agent.name().to_owned();
+        match error {
+            SendError::NotTaken { .. } => WorldError::NotTaken(error),
+            SendError::Ended(_) => WorldError::Stopped,
+            SendError::NoAgent(_) => WorldError::Gone { name: name() },
+            SendError::NoMotor { joint, drives, .. } => {
+                let drives: Vec<_> = drives.into_iter().map(|joint| self.joint_name(joint)).collect();
+                let drives = if drives.is_empty() { "none".to_owned() } else { drives.join(", ") };
+                WorldError::NoMotor { name: name(), joint: self.joint_name(joint), drives }
+            }
+            other => WorldError::Refused { name: name(), reason: other.to_string() },
+        }
     }
 
     fn check_point(&self, object: Object, state: &Snapshot, anchor: Anchor) -> Result<(), WorldError> {

@@ -2,7 +2,7 @@
 
 use super::builder::SceneBuildError;
 use metachron_core::{AgentId, Anchor};
-use metachron_runtime::RunError;
+use metachron_runtime::{RunError, SendError};
 
 /// Why a world could not be started, or refuses something.
 #[derive(Debug, thiserror::Error)]
@@ -43,7 +43,7 @@ pub enum WorldError {
         /// The name.
         name: String,
     },
-    /// A world that was stopped takes nothing up.
+    /// A world that was stopped takes nothing any more.
     #[error("the world has been stopped")]
     Stopped,
     /// An object cannot be built.
@@ -58,6 +58,21 @@ pub enum WorldError {
         anchor: Anchor,
         /// Which points it has.
         wanted: String,
+    },
+    /// The object takes no such command.
+    #[error(transparent)]
+    NotTaken(SendError),
+    /// The object drives no such joint.
+    #[error(
+        "\"{name}\" has no motor on joint {joint}: it must be a hinge or a slide, and \"{name}\" the first of the two that it joins; the joints that \"{name}\" drives: {drives}"
+    )]
+    NoMotor {
+        /// The object's name.
+        name: String,
+        /// The joint's name, or its number where it has none.
+        joint: String,
+        /// The joints that it drives.
+        drives: String,
     },
     /// A command was refused.
     #[error("\"{name}\" takes no such command: {reason}")]

@@ -6,7 +6,7 @@ use super::object::{Object, Touched, WorldTag};
 use super::world::World;
 use glam::DVec3;
 use metachron_core::{ContactPartner, Removed, SimTime};
-use metachron_runtime::{AgentEvent, ContactEvent, EventKind, Heard};
+use metachron_runtime::{AgentEvent, AgentHandle, AgentState, ContactEvent, EventKind, Heard};
 
 /// Something that happened.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -43,6 +43,9 @@ pub enum Happening {
     RateMissed,
     /// Cells of it were removed.
     Carved(Removed),
+    /// The world went back to a checkpoint ([`World::restore`]), in which the object is: what follows happens from its time there on. Whatever the
+    /// filter, this comes before all that follows; what the object touches there begins then, as if it had not touched it before.
+    Rewound,
 }
 
 /// A contact that begins or ends.
@@ -114,6 +117,7 @@ impl EventFilter {
                 let of_it = matches!(contact.with, Touched::Object(other) if self.object == Some(other));
                 self.contacts && (concerns(event.object) || of_it)
             }
+            Happening::Rewound => concerns(event.object),
             _ => self.states && concerns(event.object),
         }
     }
@@ -124,38 +128,83 @@ impl EventFilter {
 pub struct Events {
     world: World,
     filter: EventFilter,
-    /// How far each object was heard.
-    heard: Vec<Heard>,
+    /// By their numbers.
+    objects: Vec<HeardObject>,
     lost: u64,
-    found: Vec<Event>,
+    found: Vec<Found>,
     /// Contacts that have begun as the filter sees them.
     begun: Vec<(Object, Touched)>,
 }
 
+/// How far an object was heard.
+#[derive(Debug)]
+struct HeardObject {
+    heard: Heard,
+    /// How often the world had gone back when the last event that was heard happened.
+    rewinds: u64,
+}
+
+/// An event, and how often the world had gone back when it happened: what happened before a world went back comes first, whatever the time.
+#[derive(Debug, Clone, Copy)]
+struct Found {
+    rewinds: u64,
+    event: Event,
+}
+
 impl Events {
     pub(super) fn new(world: World, filter: EventFilter) -> Self {
-        let heard = world.agents().iter().map(|agent| agent.listen()).collect();
-        Self { world, filter, heard, lost: 0, found: Vec::new(), begun: Vec::new() }
+        let rewinds = world.rewinds();
+        let objects = world.agents().iter().map(|agent| HeardObject { heard: agent.listen(), rewinds }).collect();
+        Self { world, filter, objects, lost: 0, found: Vec::new(), begun: Vec::new() }
     }
 
-    /// All that happened since the last call, by their times. It never waits.
+    /// All that happened since the last call, by their times; where the world went back meanwhile, what happened before that comes first, then
+    /// [`Happening::Rewound`] of each object. It never waits.
     pub fn drain(&mut self) -> impl Iterator<Item = Event> + '_ {
-        let Self { world, filter, heard, lost, found, begun } = self;
-        found.clear();
-        let tag = world.tag();
+        self.found.clear();
+        // looked up first: where it is counted, all objects have been told of it
+        let (world, rewinds) = (self.world.clone(), self.world.rewinds());
+        let known = self.objects.len();
         // what joined since is heard from its first drain on
-        heard.extend(world.agents().iter().skip(heard.len()).map(|agent| agent.listen()));
-        for (agent, heard) in world.agents().iter().zip(heard) {
-            let object = tag.object(agent.id());
-            *lost += agent.hear_events(heard, |event| {
-                let event = event_of(tag, object, &event);
-                if filter.takes(&event) && is_news(begun, &event, filter.above_n) {
-                    found.push(event);
-                }
-            });
+        let joined = world.agents().iter().skip(known);
+        self.objects.extend(joined.map(|agent| HeardObject { heard: agent.listen(), rewinds }));
+        let count = self.objects.len();
+        world.agents().iter().take(count).for_each(|agent| self.hear(agent, rewinds));
+        let rank = |found: &Found| (found.rewinds, found.event.what != Happening::Rewound);
+        self.found.sort_by_key(|found| (rank(found), found.event.at, found.event.object));
+        self.found.drain(..).map(|found| found.event)
+    }
+
+    /// Takes in what an object tells, in a world that has gone back so often by now.
+    fn hear(&mut self, agent: &AgentHandle, rewinds: u64) {
+        let Self { world, filter, objects, lost, found, begun } = self;
+        let HeardObject { heard, rewinds: own } = &mut objects[agent.id().0 as usize];
+        let (tag, first) = (world.tag(), found.len());
+        let object = tag.object(agent.id());
+        let overwritten = agent.hear_events(heard, |event| {
+            let event = event_of(tag, object, &event);
+            *own += u64::from(event.what == Happening::Rewound);
+            if is_news(begun, &event, filter) {
+                found.push(Found { rewinds: *own, event });
+            }
+        });
+        *lost += overwritten;
+        let missed = rewinds.saturating_sub(*own);
+        if missed == 0 {
+            return;
         }
-        found.sort_by_key(|event| (event.at, event.object));
-        found.drain(..)
+        *own = rewinds;
+        if agent.state() == AgentState::Gone {
+            return;
+        }
+        // that event was overwritten before all that was heard now, or the object has left before and came back with the world
+        let event = Event { object, at: agent.latest().moment(), what: Happening::Rewound };
+        let before = if overwritten > 0 { first } else { found.len() };
+        found[before..].iter_mut().for_each(|found| found.rewinds += missed);
+        begun.retain(|(whose, _)| *whose != object);
+        if filter.takes(&event) {
+            found.push(Found { rewinds, event });
+        }
     }
 
     /// How many events were overwritten before they were drained: an object keeps its newest 128.
@@ -165,12 +214,18 @@ impl Events {
     }
 }
 
-/// Whether a contact begins or ends as one that sees only those above some newtons sees it; other events are always news.
-fn is_news(begun: &mut Vec<(Object, Touched)>, event: &Event, above_n: f64) -> bool {
+/// Whether an event is news under a filter: contacts begin and end as one that sees only those above some newtons sees them.
+fn is_news(begun: &mut Vec<(Object, Touched)>, event: &Event, filter: &EventFilter) -> bool {
+    if matches!(event.what, Happening::Rewound | Happening::Gone) {
+        begun.retain(|(whose, _)| *whose != event.object);
+    }
+    if !filter.takes(event) {
+        return false;
+    }
     let Happening::Contact(contact) = event.what else { return true };
     let name = (event.object, contact.with);
     let known = begun.iter().position(|begun| *begun == name);
-    let loud = contact.force_n.length() >= above_n;
+    let loud = contact.force_n.length() >= filter.above_n;
     match (known, contact.begins) {
         (Some(_), true) => false,
         (None, true) => {
@@ -203,6 +258,7 @@ fn event_of(tag: WorldTag, object: Object, event: &AgentEvent) -> Event {
         EventKind::AttachmentGave => Happening::AttachmentGave,
         EventKind::RateMissed => Happening::RateMissed,
         EventKind::Carved(removed) => Happening::Carved(removed),
+        EventKind::Rewound => Happening::Rewound,
         _ => Happening::Rests,
     };
     Event { object, at: event.at, what }

@@ -180,9 +180,9 @@ impl JoinedTable {
         }
     }
 
-    /// Keeps those of a checkpoint that was read.
-    pub fn keep(&self, parts: &JoinedParts) {
-        self.lock().parts.retain(|id, _| parts.contains_key(id));
+    /// Keeps those of agents that are there.
+    pub fn sweep(&self, agents: &Agents) {
+        self.lock().sweep(agents);
     }
 
     fn lock(&self) -> MutexGuard<'_, Table> {

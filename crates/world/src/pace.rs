@@ -4,10 +4,10 @@
 
 use super::error::WorldError;
 use super::kinds::ExecutorKind;
-use super::world::World;
+use super::recording::Entry;
+use super::world::{State, World};
 use metachron_core::{SimSpan, SimTime};
 use metachron_runtime::{AgentHandle, AgentState, SPEED_RANGE, TimelineCommand};
-use std::sync::atomic::Ordering::{Acquire, Relaxed};
 use std::time::Duration;
 
 /// How fast a world's time passes.
@@ -17,8 +17,10 @@ pub enum Pace {
     RealTime,
     /// So many seconds a second, within [`SPEED_RANGE`].
     Factor(f64),
-    /// As fast as objects can step, and no faster: none is late, none gives up time, however slow the machine is. So time passes in
-    /// [`World::advance`]; where [`World::drive`] lets it run, it passes as beside the clock on the wall.
+    /// As fast as objects can step, and no faster: none is late, gives up time or makes longer steps than it was asked for, however slow the
+    /// machine is, and a rate that control may lower is kept. So time passes in [`World::advance`]; where [`World::drive`] lets it run, it
+    /// passes as beside the clock on the wall, and who is too slow for that is behind until time stops. In lockstep steps take no virtual
+    /// time: what the declared machine says makes no difference to any bit.
     Free,
 }
 
@@ -40,21 +42,35 @@ impl World {
     /// # Errors
     /// [`WorldError::BadPace`] for a factor outside its range; the pace is then as it was.
     pub fn set_pace(&self, pace: Pace) -> Result<(), WorldError> {
-        let factor = match pace {
-            Pace::Factor(factor) => factor,
-            Pace::RealTime | Pace::Free => 1.0,
+        let asked = match pace {
+            Pace::Factor(factor) if !(SPEED_RANGE.0..=SPEED_RANGE.1).contains(&factor) => {
+                return Err(WorldError::BadPace { factor });
+            }
+            Pace::Factor(factor) => TimelineCommand::Speed(factor),
+            Pace::RealTime => TimelineCommand::Speed(1.0),
+            Pace::Free => TimelineCommand::Free,
         };
-        if !(SPEED_RANGE.0..=SPEED_RANGE.1).contains(&factor) {
-            return Err(WorldError::BadPace { factor });
-        }
-        self.shared.is_free.store(pace == Pace::Free, Relaxed);
-        self.drive(TimelineCommand::Speed(factor));
+        self.drive(asked);
         Ok(())
+    }
+
+    /// Whether time passes at [`Pace::Free`].
+    #[must_use]
+    pub fn is_free(&self) -> bool {
+        self.timeline().has_free_pace()
+    }
+
+    /// The most simulated time that one of its objects has not lived, though time has passed: what it dropped, and what it is behind now. Zero as
+    /// long as the declared machine of lockstep, or this one, is fast enough; always, after [`World::advance`], at [`Pace::Free`].
+    #[must_use]
+    pub fn given_up(&self) -> SimSpan {
+        let now = self.time();
+        self.agents().iter().map(|agent| agent.given_up(now)).max().unwrap_or(SimSpan::ZERO)
     }
 
     /// Lets the world live for `span`, whatever its pace, then stops its time: it stands still.
     ///
-    /// In lockstep every step that is due by then has been made; its clock counts whole nanoseconds, so that at a factor that does not divide
+    /// In lockstep every step that is due by then, at [`Pace::Free`] before then, has been made; its clock counts whole nanoseconds, so that at a factor that does not divide
     /// `span` it lives longer by less than so many nanoseconds. On threads and in the pool each object that neither rests nor has failed
     /// has lived to the end at least; one whose step is longer than what was left is ahead by less than that step.
     /// A world that was stopped stays as it is; one that another thread pauses waits until it runs again, and one that another thread puts back
@@ -86,7 +102,7 @@ impl World {
 
     /// The same on the clock of the wall.
     fn advance_real(&self, span: SimSpan, goes_on: &mut dyn FnMut() -> bool) -> bool {
-        if !self.shared.is_free.load(Relaxed) {
+        if !self.is_free() {
             self.drive(TimelineCommand::Step(span));
             return self.wait_for_all(TimelineCommand::Step, POLL_INTERVAL, goes_on);
         }
@@ -99,18 +115,25 @@ impl World {
             }
             left = SimSpan::from_nanos(left.as_nanos() - slice.as_nanos());
         }
+        // the leap is over: what is woken from now on goes on from here
+        self.drive(TimelineCommand::Step(SimSpan::ZERO));
         true
     }
 
-    /// Lets virtual time pass, which does so in calls alone: where it was stopped, it is let go so far.
+    /// Lets virtual time pass, which does so in calls alone: where it was stopped, it is let go so far. One call: no other thread puts the world
+    /// back between what it looks at and what it does.
     fn advance_virtual(&self, span: SimSpan) {
-        if self.timeline().until().is_some() {
-            self.drive(TimelineCommand::Step(span));
+        let State::Running(run) = &mut *self.state() else { return };
+        let run = run.as_mut();
+        if run.timeline().until().is_some() {
+            let step = TimelineCommand::Step(span);
+            self.let_pass(run, || Entry::Drive(step), |run| run.drive(step));
         }
-        let (now, timeline) = (self.now(), self.timeline());
+        let (now, timeline) = (run.now(), run.timeline());
         // a step that was begun before is made first; a replay lets time go as its recording says
         let left = timeline.until().map_or(span, |end| end.since(timeline.sim_at(now)).max(span));
-        self.wait_until(now + timeline.wall_span(left));
+        let until = now + timeline.wall_span(left);
+        self.let_pass(run, || Entry::Wait(until), |run| run.wait_until(until));
     }
 
     /// Waits until all objects have lived to where time stops; it stops at once where they are not to go on, and `false` is returned. One that
@@ -121,7 +144,7 @@ impl World {
         poll: Duration,
         goes_on: &mut dyn FnMut() -> bool,
     ) -> bool {
-        let mut put_back = self.shared.put_back.load(Acquire);
+        let mut put_back = self.rewinds();
         let Some(mut end) = self.timeline().until() else { return true };
         let mut asked = end;
         while !self.has_stopped() {
@@ -129,7 +152,7 @@ impl World {
                 self.drive(TimelineCommand::Pause);
                 return false;
             }
-            let often = self.shared.put_back.load(Acquire);
+            let often = self.rewinds();
             if often != put_back {
                 // time stops elsewhere since
                 let Some(until) = self.timeline().until() else { return true };

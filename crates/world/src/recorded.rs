@@ -108,13 +108,20 @@ impl World {
         })
     }
 
-    /// Ends the recording, as [`World::stop`] does; returns whether there was one.
+    /// Ends the recording, as [`World::stop`] does; returns whether there was one. Of a world that was stopped it says once what became of the
+    /// one that ended with it.
     ///
     /// # Errors
     /// [`RecordError::Write`] if not all of it could be written.
     pub fn end_recording(&self) -> Result<bool, RecordError> {
         // what is done after it is in neither
-        let _calls = self.state();
+        let mut calls = self.state();
+        let ended = if let State::Stopped(stopped) = &mut *calls { stopped.recorded.take() } else { None };
+        ended.unwrap_or_else(|| self.close_recording())
+    }
+
+    /// Ends the recording between two parts of turns, for who keeps others from calls.
+    pub(super) fn close_recording(&self) -> Result<bool, RecordError> {
         let order = self.shared.log.order();
         let _held = order.as_deref().map(TurnOrder::between);
         let recorder = self.shared.log.take_recorder();

@@ -110,8 +110,8 @@ impl Player {
         joined.expect(&checkpoint.joined);
         let mut archive = Archive::reader(&checkpoint.state);
         let absent = &mut |id| joining.absent(id, &checkpoint.joined);
-        let restored = run.follower()?.restore(&mut archive, part.wall, absent).and_then(|()| archive.finish());
-        joined.keep(&checkpoint.joined);
+        let restored = run.follower()?.restore(&mut archive, part.wall, absent);
+        joined.sweep(run.run().agents());
         restored.map_err(|error| error.to_string())
     }
 
@@ -134,7 +134,7 @@ impl Player {
             Entry::Command(to, command) => self.run.run().send(to, command).map_err(|error| error.to_string())?,
             Entry::SetState(id, state) => {
                 let agent = self.run.run().agents().of(id).ok_or_else(|| format!("there is no agent {}", id.0))?;
-                agent.set_state(*state);
+                agent.set_state(*state).map_err(|error| error.to_string())?;
             }
             Entry::Add(name, part) => self.add(name, *part)?,
             Entry::Remove(id) => self.run.run_mut().remove(id).map_err(|error| error.to_string())?,
@@ -186,8 +186,8 @@ impl Player {
         let Self { run, joining, joined, .. } = self;
         joined.expect(&checkpoint.joined);
         let outcome = read_state(run.run_mut(), checkpoint, joining);
-        joined.keep(&checkpoint.joined);
-        outcome
+        joined.sweep(run.run().agents());
+        outcome.map_err(|error| error.to_string())
     }
 
     fn restore(&mut self, bytes: &[u8]) -> Result<(), String> {
@@ -235,6 +235,10 @@ impl Run for Player {
 
     fn archive(&mut self, archive: &mut Archive<'_>, absent: Absent<'_>) -> Result<(), ArchiveError> {
         self.run.run_mut().archive(archive, absent)
+    }
+
+    fn end_turns(&mut self) {
+        self.run.run_mut().end_turns();
     }
 
     fn shutdown(self: Box<Self>) -> Vec<AgentStats> {

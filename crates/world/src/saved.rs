@@ -12,7 +12,6 @@ use super::recording::Entry;
 use super::world::{Shared, State, World};
 use metachron_core::Archive;
 use metachron_runtime::{AgentHandle, AgentState, Run};
-use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::atomic::Ordering::Release;
 
 impl World {
@@ -64,12 +63,13 @@ impl World {
 
     /// Puts the world back into the state of `checkpoint`, of this world or of another of the same scene: what it would have done after, it does
     /// again, in lockstep to the bit. Objects that joined since are taken out, with the event [`Gone`](super::Happening::Gone); those that left since
-    /// are there again. An [`Object`](super::Object) is valid where what it names is there: of one that came back again.
+    /// are there again. An [`Object`](super::Object) is valid where what it names is there: of one that came back again. Readers of
+    /// events are told [`Rewound`](super::Happening::Rewound) of each object that is there.
     ///
     /// # Errors
     /// [`CheckpointError::OtherScene`], also where an object of this world has the number of another that joined the checkpoint's,
-    /// [`CheckpointError::Own`], [`CheckpointError::Replay`] and [`CheckpointError::Stopped`] leave the world as it was. After
-    /// [`CheckpointError::Unusable`] it is stopped.
+    /// [`CheckpointError::Own`], [`CheckpointError::Replay`], [`CheckpointError::Stopped`] and [`CheckpointError::Unreadable`]. The world goes on as it
+    /// was after each of them.
     pub fn restore(&self, checkpoint: &Checkpoint) -> Result<(), CheckpointError> {
         let Shared { identity, joined, log, .. } = &*self.shared;
         identity.check(&checkpoint.of)?;
@@ -82,19 +82,22 @@ impl World {
             checkpoint.check_saved()?;
         }
         self.check_joined(checkpoint)?;
-        // in real time the turns in progress end before it is read
-        self.in_order(|| (), |log, ()| log.note(|| Entry::Restore(checkpoint.to_bytes())));
         joined.expect(&checkpoint.joined);
+        let note = || self.in_order(|| (), |log, ()| log.note(|| Entry::Restore(checkpoint.to_bytes())));
+        // in real time the order of turns says when it was read, and whether it was
+        let is_virtual = self.executor() == ExecutorKind::Lockstep;
+        if !is_virtual {
+            note();
+        }
         let outcome = read_state(run.as_mut(), checkpoint, &self.joining());
-        joined.keep(&checkpoint.joined);
+        joined.sweep(self.agents());
+        outcome?;
+        if is_virtual {
+            note();
+        }
         self.see(run.as_ref());
         self.shared.put_back.fetch_add(1, Release);
-        let Err(reason) = outcome else { return Ok(()) };
-        let (now, time, timeline) = (run.now(), run.sim_now(), run.timeline());
-        let broken = std::mem::replace(&mut *state, State::Stopped { now, time, timeline });
-        // what it has become is not accounted for
-        let _ = catch_unwind(AssertUnwindSafe(|| drop(broken)));
-        Err(CheckpointError::Unusable { reason })
+        Ok(())
     }
 
     /// Checks that what joined the world of a checkpoint is in this one, or can be made, under the numbers that it had.
@@ -115,15 +118,11 @@ impl World {
     }
 }
 
-/// Reads the state of a run; a broken one may break any promise of those that read it.
-pub(super) fn read_state(run: &mut dyn Run, from: &Checkpoint, joining: &Joining) -> Result<(), String> {
-    let read = catch_unwind(AssertUnwindSafe(|| {
-        let mut archive = Archive::reader(&from.state);
-        run.archive(&mut archive, &mut |id| joining.absent(id, &from.joined))?;
-        archive.finish()
-    }));
-    match read {
-        Ok(outcome) => outcome.map_err(|error| error.to_string()),
-        Err(_) => Err("its numbers do not fit together".to_owned()),
-    }
+/// Reads the state of a run.
+///
+/// # Errors
+/// [`CheckpointError::Unreadable`]; the run goes on as it was.
+pub(super) fn read_state(run: &mut dyn Run, from: &Checkpoint, joining: &Joining) -> Result<(), CheckpointError> {
+    let absent = &mut |id| joining.absent(id, &from.joined);
+    run.archive(&mut Archive::reader(&from.state), absent).map_err(CheckpointError::Unreadable)
 }

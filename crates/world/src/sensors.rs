@@ -151,6 +151,12 @@ impl World {
         Ok(JointRef { body: self.object_of(a)?, number })
     }
 
+    /// A joint as messages name it: by its name, or by its number where it has none.
+    pub(super) fn joint_name(&self, joint: u32) -> String {
+        let name = self.instruments().joint_names.get(joint as usize).filter(|name| !name.is_empty());
+        name.map_or_else(|| joint.to_string(), |name| format!("\"{name}\""))
+    }
+
     /// The sensors of the scene.
     #[must_use]
     pub fn sensors(&self) -> &[Sensor] {

@@ -4,10 +4,13 @@
 
 use super::commands::REPLAYED;
 use super::error::WorldError;
+use super::log::Mode;
 use super::object::Object;
 use super::recording::Entry;
 use super::world::World;
+use metachron_contact::Input;
 use metachron_core::Body;
+use metachron_runtime::SendError;
 
 /// How many entries a list of a state has.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -27,36 +30,42 @@ impl World {
     /// next solve with, a state has not.
     ///
     /// # Errors
-    /// [`WorldError::Foreign`]; [`WorldError::Refused`] for a state of another kind or length, with the numbers expected, and for numbers that are
-    /// not finite. The object stays as it is then, and where it has divided itself otherwise before it takes the state up.
+    /// [`WorldError::NotTaken`] for an object that takes no state; [`WorldError::Refused`] for a state of another kind or length, with what was
+    /// expected, and for numbers that are not finite; [`WorldError::Foreign`], [`WorldError::Gone`] and [`WorldError::Stopped`]. The object stays
+    /// as it is then, and where it has divided itself otherwise before it takes the state up.
     pub fn set_state(&self, object: Object, state: &Body) -> Result<(), WorldError> {
         let agent = self.agent(object)?;
-        let refused = |reason: String| Err(WorldError::Refused { name: agent.name().to_owned(), reason });
-        let now = agent.latest();
-        let is_alike = std::mem::discriminant(state) == std::mem::discriminant(&now.body);
-        if !is_alike || matches!(state, Body::Nothing | Body::Tool(_)) || agent.takes_poses() {
-            return refused(
-                "it takes states of rigid bodies, tubes and soft bodies that are of its own kind".to_owned(),
-            );
-        }
-        let is_carried = matches!(&now.body, Body::Soft(soft) if soft.nodes.is_some());
-        let (found, wanted) = (list_lengths(state, is_carried), list_lengths(&now.body, is_carried));
-        if found != wanted {
-            return refused(format!("the state has {}; expected {}", enumerate(&found), enumerate(&wanted)));
-        }
-        if !state.is_finite() {
-            return refused("every number of a state must be finite".to_owned());
+        let refused = |reason: String| WorldError::Refused { name: agent.name().to_owned(), reason };
+        if agent.inputs().has(Input::State) {
+            check_fits(state, &agent.latest().body).map_err(refused)?;
         }
         if self.shared.log.is_replayed() {
-            return refused(REPLAYED.to_owned());
+            return Err(refused(REPLAYED.to_owned()));
         }
-        self.shared.log.in_order(
-            || self.between_calls(),
-            || agent.set_state(state.clone()),
-            |log, ()| log.note(|| Entry::SetState(object.id(), Box::new(state.clone()))),
-        );
-        Ok(())
+        let note = |log: &mut Mode, set: &Result<(), SendError>| {
+            if set.is_ok() {
+                log.note(|| Entry::SetState(object.id(), Box::new(state.clone())));
+            }
+        };
+        let set = self.shared.log.in_order(|| self.between_calls(), || agent.set_state(state.clone()), note);
+        set.map_err(|error| self.unsent(agent, error))
     }
+}
+
+/// Checks that an object whose state is `now` can take the state `new`.
+///
+/// # Errors
+/// What does not fit, and what was expected.
+fn check_fits(new: &Body, now: &Body) -> Result<(), String> {
+    if std::mem::discriminant(new) != std::mem::discriminant(now) {
+        return Err(format!("the state is that of {}; expected that of {}", kind(new), kind(now)));
+    }
+    let is_carried = matches!(now, Body::Soft(soft) if soft.nodes.is_some());
+    let (found, wanted) = (list_lengths(new, is_carried), list_lengths(now, is_carried));
+    if found != wanted {
+        return Err(format!("the state has {}; expected {}", enumerate(&found), enumerate(&wanted)));
+    }
+    if new.is_finite() { Ok(()) } else { Err("every number of a state must be finite".to_owned()) }
 }
 
 /// The lists of a state that an object takes, of which a cage or a lattice carries the vertices if `is_carried`.
@@ -74,6 +83,17 @@ fn list_lengths(body: &Body, is_carried: bool) -> Vec<ListLength> {
         }
         Body::Soft(soft) => vec![of("positions", soft.positions.len()), of("velocities", soft.velocities.len())],
         Body::Nothing | Body::Rigid(_) | Body::Tool(_) => Vec::new(),
+    }
+}
+
+/// What a state is of.
+const fn kind(body: &Body) -> &'static str {
+    match body {
+        Body::Nothing => "nothing that has matter",
+        Body::Curve(_) => "a tube",
+        Body::Rigid(_) => "a rigid body",
+        Body::Soft(_) => "a soft body",
+        Body::Tool(_) => "a tool",
     }
 }
 

@@ -14,7 +14,7 @@ use super::joined::JoinedTable;
 use super::kinds::ExecutorKind;
 use super::log::{Log, Mode, logged};
 use super::object::{Object, WorldTag};
-use super::recording::Entry;
+use super::recording::{Entry, RecordError};
 use super::sensors::Instruments;
 use glam::DVec3;
 use metachron_contact::stepper::ClusterScene;
@@ -23,7 +23,10 @@ use metachron_runtime::{
     AgentHandle, AgentState, AgentStats, Agents, Lockstep, Pool, Run, SystemClock, Threads, Timeline, TimelineCommand,
     state_hash, wait_until,
 };
-use std::sync::atomic::{AtomicBool, AtomicU64, Ordering::Relaxed};
+use std::sync::atomic::{
+    AtomicU64,
+    Ordering::{Acquire, Relaxed},
+};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError, TryLockError};
 use std::time::Duration;
 
@@ -54,8 +57,6 @@ pub(super) struct Shared {
     pub identity: SceneIdentity,
     /// The clock of executors in real time.
     pub clock: Arc<SystemClock>,
-    /// Whether its time waits for its objects ([`super::Pace::Free`]).
-    pub is_free: AtomicBool,
     /// How often it was put back into the state of a checkpoint.
     pub put_back: AtomicU64,
     /// What is written down of it, or followed.
@@ -71,7 +72,23 @@ impl std::fmt::Debug for World {
 /// What makes agents step, or where its time stood when it ended.
 pub(super) enum State {
     Running(Box<dyn Run>),
-    Stopped { now: Duration, time: SimTime, timeline: Timeline },
+    Stopped(Stopped),
+}
+
+/// Where the time of a world stood when it ended.
+pub(super) struct Stopped {
+    now: Duration,
+    time: SimTime,
+    timeline: Timeline,
+    /// What became of the recording that ended with it, until somebody asks; whether there was one.
+    pub recorded: Option<Result<bool, RecordError>>,
+}
+
+impl State {
+    /// That of a world whose `run` has ended.
+    pub fn stopped(run: &dyn Run, recorded: Option<Result<bool, RecordError>>) -> Self {
+        Self::Stopped(Stopped { now: run.now(), time: run.sim_now(), timeline: run.timeline(), recorded })
+    }
 }
 
 /// What a world has besides its run.
@@ -133,7 +150,6 @@ impl World {
             executor,
             identity,
             clock,
-            is_free: AtomicBool::new(false),
             put_back: AtomicU64::new(0),
             log,
         };
@@ -224,7 +240,7 @@ impl World {
         };
         match &*state {
             State::Running(run) => run.sim_now(),
-            State::Stopped { time, .. } => *time,
+            State::Stopped(stopped) => stopped.time,
         }
     }
 
@@ -251,7 +267,7 @@ impl World {
     pub fn now(&self) -> Duration {
         match &*self.state() {
             State::Running(run) => run.now(),
-            State::Stopped { now, .. } => *now,
+            State::Stopped(stopped) => stopped.now,
         }
     }
 
@@ -275,7 +291,7 @@ impl World {
     pub fn timeline(&self) -> Timeline {
         match &*self.state() {
             State::Running(run) => run.timeline(),
-            State::Stopped { timeline, .. } => *timeline,
+            State::Stopped(stopped) => stopped.timeline,
         }
     }
 
@@ -295,19 +311,18 @@ impl World {
         self.see(run.as_ref());
     }
 
-    /// Ends the run for all clones: waits for the turns in progress (boundedly) and returns the metrics of every agent.
-    /// Latest states stay readable.
+    /// Ends the run for all clones: waits for the turns in progress (boundedly) and returns the metrics of every agent. A recording ends with
+    /// these turns, in the states that are final; [`World::end_recording`] says what became of it. Latest states stay readable.
     pub fn stop(&self) -> Vec<AgentStats> {
-        // who wants to know whether it is complete has ended it before
-        drop(self.end_recording());
         let mut state = self.state();
-        let ended = match &*state {
-            State::Running(run) => State::Stopped { now: run.now(), time: run.sim_now(), timeline: run.timeline() },
-            State::Stopped { .. } => return self.shared.agents.iter().map(AgentHandle::stats).collect(),
+        let State::Running(run) = &mut *state else {
+            return self.shared.agents.iter().map(AgentHandle::stats).collect();
         };
+        run.end_turns();
+        let ended = State::stopped(run.as_ref(), Some(self.close_recording()));
         match std::mem::replace(&mut *state, ended) {
             State::Running(run) => run.shutdown(),
-            State::Stopped { .. } => unreachable!("it ran a moment ago, and the lock is held"),
+            State::Stopped(_) => unreachable!("it ran a moment ago, and the lock is held"),
         }
     }
 
@@ -335,8 +350,13 @@ impl World {
         known.ok_or(WorldError::Foreign)
     }
 
+    /// How often it was put back into the state of a checkpoint.
+    pub(super) fn rewinds(&self) -> u64 {
+        self.shared.put_back.load(Acquire)
+    }
+
     pub(super) fn has_stopped(&self) -> bool {
-        matches!(*self.state(), State::Stopped { .. })
+        matches!(*self.state(), State::Stopped(_))
     }
 
     /// [`Log::in_order`] for who has the run.
@@ -352,11 +372,16 @@ impl World {
     /// Does something with a world in lockstep that runs; nothing with one that was stopped.
     fn with_run(&self, entry: impl FnOnce() -> Entry, act: impl FnOnce(&mut dyn Run)) {
         if let State::Running(run) = &mut *self.state() {
-            self.shared.log.note(entry);
-            self.see(run.as_ref());
-            act(run.as_mut());
-            self.see(run.as_ref());
+            self.let_pass(run.as_mut(), entry, act);
         }
+    }
+
+    /// The same for who has the run.
+    pub(super) fn let_pass(&self, run: &mut dyn Run, entry: impl FnOnce() -> Entry, act: impl FnOnce(&mut dyn Run)) {
+        self.shared.log.note(entry);
+        self.see(run);
+        act(run);
+        self.see(run);
     }
 
     /// Notes the time for those that ask while it passes.

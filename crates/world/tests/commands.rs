@@ -2,12 +2,13 @@
 
 use glam::{DQuat, DVec3};
 use metachron_contact::joint::{JointKind, Motor, MotorGoal};
-use metachron_core::{Anchor, Body, RigidState, SimSpan, SoftState};
+use metachron_contact::{Agent, StepContext};
+use metachron_core::{Anchor, Body, Resolution, RigidState, SimSpan, Snapshot, SoftState, StepError, StepReport};
 use metachron_geometry::Solid;
 use metachron_models::soft::Side;
 use metachron_world::Command;
 use metachron_world::kinds::ExecutorKind;
-use metachron_world::{Object, Rigid, Scene, Soft, Tube, World, WorldError};
+use metachron_world::{Custom, Object, Rigid, Scene, Soft, Tube, World, WorldError};
 
 const RATES_HZ: [f64; 3] = [60.0, 240.0, 1000.0];
 const CENTRE: Anchor = Anchor::Local(DVec3::ZERO);
@@ -138,9 +139,9 @@ fn a_tube_is_moved_as_a_whole_and_one_that_is_held_is_not() {
     let [free, held] = world.objects(["free", "held"]).unwrap();
     let at_start = world.latest(held).unwrap();
     let turn = DQuat::from_rotation_z(std::f64::consts::FRAC_PI_2);
-    for object in [free, held] {
-        world.command(object, Command::teleport(DVec3::Z * 3.0, turn)).unwrap();
-    }
+    world.command(free, Command::teleport(DVec3::Z * 3.0, turn)).unwrap();
+    let refused = world.command(held, Command::teleport(DVec3::Z * 3.0, turn));
+    assert!(matches!(refused, Err(WorldError::NotTaken(_))), "{refused:?}");
     world.advance(SimSpan::from_millis(100));
     let frame = world.frame();
     assert!((frame.point(free, Anchor::Arc(0.2)).unwrap() - DVec3::new(0.0, 0.1, 3.0)).length() < 1e-9);
@@ -171,7 +172,176 @@ fn a_motor_turns_its_hinge_as_long_as_it_was_sent_for() {
     world.command(wheel, Command::motor(0, motor)).unwrap();
     world.advance(SimSpan::from_millis(2000));
     assert!((state(&world, wheel).spin.z - 3.0).abs() < 1e-6);
-    assert!(matches!(world.command(wheel, Command::motor(1, motor)), Err(WorldError::Refused { .. })));
+}
+
+#[test]
+fn a_motor_for_a_joint_that_an_object_does_not_drive_names_the_joints() {
+    let hinge = JointKind::Revolute { axis: DVec3::Z, range_rad: None, motor: None };
+    let scene = Scene::builder()
+        .add("upper", Rigid::ball(0.1).at([0.0, 0.0, 1.0]))
+        .add("lower", Rigid::ball(0.1).at([0.0, 0.0, 0.5]))
+        .joint("upper", None, hinge, [0.0, 0.0, 1.2])
+        .joint_name("shoulder")
+        .joint("lower", Some("upper"), hinge, [0.0, 0.0, 0.75])
+        .joint_name("elbow")
+        .build()
+        .unwrap();
+    let world = World::start(&scene, ExecutorKind::Lockstep).unwrap();
+    let upper = world.object("upper").unwrap();
+    let motor = Motor { goal: MotorGoal::Velocity(1.0), max_effort: 1.0 };
+    let elbow = world.joint("elbow").unwrap().number();
+    let error = world.command(upper, Command::motor(elbow, motor)).unwrap_err();
+    let said = error.to_string();
+    assert!(matches!(error, WorldError::NoMotor { .. }), "{said}");
+    assert!(said.contains("\"upper\" has no motor on joint \"elbow\""), "{said}");
+    assert!(said.ends_with("\"upper\" drives: \"shoulder\""), "{said}");
+    assert!(world.command(upper, Command::motor(7, motor)).unwrap_err().to_string().contains("joint 7:"));
+}
+
+/// An agent of a model that takes nothing.
+struct Idle;
+
+impl Agent for Idle {
+    fn model(&self) -> &'static str {
+        "idle"
+    }
+
+    fn step(&mut self, _dt: SimSpan, _context: &StepContext<'_>) -> Result<StepReport, StepError> {
+        Ok(StepReport { work: 1.0, substeps: 1, at_rest: false })
+    }
+
+    fn write_snapshot(&self, into: &mut Snapshot) {
+        into.clear();
+    }
+}
+
+/// An object, and what it takes as its documentation says it.
+struct Taker {
+    name: &'static str,
+    model: &'static str,
+    point: Anchor,
+    takes: &'static [&'static str],
+}
+
+const TAKERS: [Taker; 6] = [
+    Taker {
+        name: "ball",
+        model: "rigid",
+        point: CENTRE,
+        takes: &["springs", "forces", "torques", "other places", "other velocities", "other states"],
+    },
+    Taker { name: "lift", model: "rigid", point: CENTRE, takes: &["poses", "other places"] },
+    Taker {
+        name: "hose",
+        model: "tube",
+        point: Anchor::Arc(0.1),
+        takes: &[
+            "springs",
+            "forces",
+            "torques",
+            "other places",
+            "other velocities",
+            "other states",
+            "pressures",
+            "other resolutions",
+        ],
+    },
+    Taker {
+        name: "held",
+        model: "tube",
+        point: Anchor::Arc(0.1),
+        takes: &["springs", "forces", "torques", "other velocities", "other states", "pressures", "other resolutions"],
+    },
+    Taker {
+        name: "block",
+        model: "solid",
+        point: Anchor::Vertex(0),
+        takes: &["springs", "forces", "other places", "other velocities", "other states", "carving"],
+    },
+    Taker { name: "idle", model: "idle", point: CENTRE, takes: &[] },
+];
+
+/// A world of [`TAKERS`].
+fn takers(executor: ExecutorKind) -> World {
+    let tube = |y: f64| Tube::along(&[[-0.2, y, 1.0], [0.2, y, 1.0]]).radius_m(0.01).segments(4);
+    let scene = Scene::builder()
+        .gravity([0.0; 3])
+        .add("ball", Rigid::ball(0.05))
+        .add("lift", Rigid::cuboid([0.1; 3]).kinematic().at([1.0, 0.0, 0.0]))
+        .add("hose", tube(0.0))
+        .add("held", tube(0.5).clamp([true, false]))
+        .add("block", Soft::cuboid([0.1; 3], [2; 3]).young_pa(1e4).at([2.0, 0.0, 0.0]))
+        .add("idle", Custom::new(|_| Box::new(Idle)))
+        .build()
+        .unwrap();
+    World::start(&scene, executor).unwrap()
+}
+
+#[test]
+fn a_command_that_its_object_does_not_take_names_it_its_model_and_what_it_takes() {
+    let world = takers(ExecutorKind::Lockstep);
+    for Taker { name, model, point, takes } in TAKERS {
+        let object = world.object(name).unwrap();
+        let finer = Resolution { eps_m: 0.05, n: 1 };
+        let commands = [
+            ("springs", Command::spring(point, DVec3::Z, 1.0, 0.1)),
+            ("springs", Command::spring(point, DVec3::Z, 1.0, 0.1).taken_back()),
+            ("forces", Command::force(point, DVec3::X)),
+            ("forces", Command::impulse(point, DVec3::X * 1e-3)),
+            ("torques", Command::torque(point, DVec3::X * 1e-3)),
+            ("poses", Command::pose(DVec3::X, DQuat::IDENTITY)),
+            ("other places", Command::teleport(DVec3::X * 3.0, DQuat::IDENTITY)),
+            ("other velocities", Command::velocity(DVec3::X, DVec3::ZERO)),
+            ("pressures", Command::SetPressure(10.0)),
+            ("carving", Command::carve(DVec3::X * 9.0, DVec3::X * 9.0, 0.01)),
+            ("other resolutions", Command::Retune(finer)),
+        ];
+        for (needs, command) in commands {
+            let sent = world.command(object, command);
+            if takes.contains(&needs) {
+                assert!(sent.is_ok(), "{name}, {needs}: {sent:?}");
+                continue;
+            }
+            let error = sent.expect_err(needs);
+            let said = error.to_string();
+            assert!(matches!(error, WorldError::NotTaken(_)), "{said}");
+            let lacks = if takes.contains(&"forces") || needs != "torques" { needs } else { "forces" };
+            let begins = format!("\"{name}\" (model \"{model}\") takes no {lacks}; it takes ");
+            assert!(said.starts_with(&begins) && takes.iter().all(|word| said.contains(word)), "{said}");
+        }
+        // what all take
+        world.command(object, Command::SetDt(SimSpan::from_millis(2))).unwrap();
+        world.command(object, Command::Wake).unwrap();
+        let state = world.latest(object).unwrap().body.clone();
+        let set = world.set_state(object, &state);
+        assert_eq!(set.is_ok(), takes.contains(&"other states"), "{name}: {set:?}");
+        assert!(set.is_ok() || matches!(set, Err(WorldError::NotTaken(_))));
+    }
+    world.advance(SimSpan::from_millis(20));
+    assert!(world.agents().iter().all(|agent| agent.steps() > 0));
+}
+
+#[test]
+fn a_world_that_was_stopped_takes_no_commands() {
+    for executor in [ExecutorKind::Lockstep, ExecutorKind::Threads, ExecutorKind::Pool] {
+        let world = takers(executor);
+        world.advance(SimSpan::from_millis(20));
+        let ball = world.object("ball").unwrap();
+        let state = world.latest(ball).unwrap().body.clone();
+        world.command(ball, Command::force(CENTRE, DVec3::X)).unwrap();
+        world.stop();
+        let hash = world.hash();
+        for sent in [
+            world.command(ball, Command::force(CENTRE, DVec3::X)),
+            world.command(ball, Command::Wake),
+            world.set_state(ball, &state),
+        ] {
+            assert!(matches!(sent, Err(WorldError::Stopped)), "{executor:?}: {sent:?}");
+        }
+        let sent = world.agents()[0].send(Command::Wake).unwrap_err();
+        assert_eq!(sent.to_string(), "the run of \"ball\" has ended: it takes no command any more");
+        assert_eq!(world.hash(), hash, "{executor:?}");
+    }
 }
 
 #[test]
@@ -217,7 +387,7 @@ fn a_body_a_tube_and_a_rope_go_back_to_the_states_that_they_had() {
         assert!((velocity - then_m_s).length() < 0.2 + 0.2 * then_m_s.length(), "{velocity} instead of {then_m_s}");
     }
     let refused = |object, state: &Body| world.set_state(object, state).unwrap_err().to_string();
-    assert!(refused(objects[0], &states[1]).contains("own kind"));
+    assert!(refused(objects[0], &states[1]).contains("that of a tube; expected that of a rigid body"));
     let Body::Soft(mut short) = states[2].clone() else { panic!("a rope") };
     short.velocities.pop();
     assert!(refused(objects[2], &Body::Soft(short)).contains("8 velocities; expected 9 positions, 9 velocities"));

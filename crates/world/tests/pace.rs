@@ -196,12 +196,14 @@ fn what_is_woken_between_two_advances_lives_through_the_next_one_whole() {
     let column = Rigid::cuboid([0.2, 0.2, 0.5]).mass_kg(10.0).at([0.0, 0.0, 0.5]);
     let scene = Scene::builder().fixed("floor", Solid::Plane).add("column", column);
     let scene = scene.add("ball", Rigid::ball(0.05).mass_kg(0.1).at([0.0, 0.0, 1.05]).rate_hz(1000.0)).build().unwrap();
-    for executor in REAL {
+    // woken as the next one begins, and well before
+    for (executor, wait_ms) in REAL.into_iter().flat_map(|executor| [0, 20].map(|wait_ms| (executor, wait_ms))) {
         let world = free(&scene, executor);
         world.advance(ms(3000));
         let (ball, column) = (world.object("ball").unwrap(), world.object("column").unwrap());
         assert_eq!(world.agents().of(ball.id()).unwrap().state(), AgentState::Resting, "{executor:?}");
         world.remove(column).unwrap();
+        world.wait_until(world.now() + std::time::Duration::from_millis(wait_ms));
         world.advance(ms(400));
         let Body::Rigid(state) = world.latest(ball).unwrap().body else { panic!("a rigid body") };
         let height_m = state.position.z;

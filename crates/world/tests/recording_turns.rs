@@ -5,11 +5,16 @@ mod kept;
 use glam::{DQuat, DVec3};
 use kept::recorded;
 use metachron_contact::joint::JointKind;
-use metachron_core::{Anchor, SimSpan, SimTime};
+use metachron_contact::{Agent, StepContext};
+use metachron_core::{Anchor, SimSpan, SimTime, Snapshot, StepError, StepReport};
 use metachron_geometry::Solid;
-use metachron_runtime::{Demand, Governor, TurnMeasure};
+use metachron_runtime::{Demand, Governor, TimelineCommand, TurnMeasure};
 use metachron_world::kinds::ExecutorKind;
-use metachron_world::{Command, EventFilter, Happening, Member, Pace, Recording, Rigid, Scene, Tube, World};
+use metachron_world::{Command, Custom, EventFilter, Happening, Member, Pace, Recording, Rigid, Scene, Tube, World};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering::SeqCst};
+use std::thread;
+use std::time::Duration;
 
 const fn ms(count: u64) -> SimSpan {
     SimSpan::from_millis(count)
@@ -49,12 +54,12 @@ const EXECUTORS: [ExecutorKind; 2] = [ExecutorKind::Threads, ExecutorKind::Pool]
 fn play(world: &World) {
     let [left, arm, still, tube] = world.objects(["left", "arm", "still", "tube"]).unwrap();
     let hand = world.clone();
-    let pushes = std::thread::spawn(move || {
+    let pushes = thread::spawn(move || {
         for at in 0..40 {
             let push = Command::force(Anchor::Local(DVec3::ZERO), DVec3::Y * f64::from(at % 3)).key(1).for_ms(30);
             hand.command(arm, push).unwrap();
             hand.command(left, Command::impulse(Anchor::Local(DVec3::ZERO), DVec3::X * 0.01)).unwrap();
-            std::thread::sleep(std::time::Duration::from_millis(5));
+            thread::sleep(Duration::from_millis(5));
         }
     });
     world.advance(ms(700));
@@ -180,4 +185,64 @@ fn a_replay_of_turns_takes_what_governors_answered_from_the_recording() {
     let again = World::replay_governed(&scene, others, recording, None).unwrap();
     again.advance(ms(60_000));
     assert_eq!((again.replayed(), Some(again.hash())), (Some(Ok(1.0)), hash));
+}
+
+/// Where the steps of an agent wait.
+#[derive(Debug, Default)]
+struct Gate {
+    stepping: AtomicBool,
+    open: AtomicBool,
+}
+
+/// An agent whose steps end once its gate is open.
+struct Gated {
+    gate: Arc<Gate>,
+    steps: u64,
+}
+
+impl Agent for Gated {
+    fn model(&self) -> &'static str {
+        "gated"
+    }
+
+    fn step(&mut self, _dt: SimSpan, _context: &StepContext<'_>) -> Result<StepReport, StepError> {
+        self.gate.stepping.store(true, SeqCst);
+        while !self.gate.open.load(SeqCst) {
+            thread::sleep(Duration::from_millis(1));
+        }
+        self.steps += 1;
+        Ok(StepReport { work: 1.0, substeps: 1, at_rest: false })
+    }
+
+    fn write_snapshot(&self, into: &mut Snapshot) {
+        into.steps = self.steps;
+    }
+}
+
+#[test]
+fn a_recording_that_ends_with_its_world_has_the_steps_that_were_in_progress() {
+    for executor in EXECUTORS {
+        let gate = Arc::<Gate>::default();
+        let gated = Arc::clone(&gate);
+        let custom = Custom::new(move |_| Box::new(Gated { gate: Arc::clone(&gated), steps: 0 })).rate_hz(10.0);
+        let scene = Scene::builder().add("gated", custom).build().unwrap();
+        let world = World::start(&scene, executor).unwrap();
+        let kept = recorded(&world);
+        world.drive(TimelineCommand::Run);
+        while !gate.stepping.load(SeqCst) {
+            thread::yield_now();
+        }
+        world.drive(TimelineCommand::Pause);
+        let ends = world.clone();
+        let stopped = thread::spawn(move || ends.stop());
+        // long enough for a recording that does not wait for the step to end without it
+        thread::sleep(Duration::from_millis(50));
+        gate.open.store(true, SeqCst);
+        let steps = stopped.join().unwrap()[0].steps;
+        assert!(world.end_recording().unwrap(), "{executor:?}: it says once that there was a recording");
+        assert!(!world.end_recording().unwrap(), "{executor:?}");
+        let recording = kept.read().unwrap();
+        assert_eq!((steps, recording.hash()), (1, Some(world.hash())), "{executor:?}");
+        assert_eq!(replayed(&scene, recording).hash(), world.hash(), "{executor:?}");
+    }
 }

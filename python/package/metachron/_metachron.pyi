@@ -14,6 +14,7 @@ from .typing import Array, Numbers
 __all__ = ["Checkpoint", "Contact", "Event", "Events", "Export", "Hit", "Object", "Rollout", "Scene", "State", "World", "replay", "rollout"]
 
 _Executor = Literal["lockstep", "threads", "pool", "auto"]
+_Pace = Literal["real-time", "free"]
 
 class _Point(TypedDict, total=False):
     """A material point: one of three, or none for the centre of mass of a rigid body."""
@@ -101,8 +102,13 @@ class Scene:
     def sensor(self, name: str, on: Sensor) -> Self:
         """Adds a sensor, which `World.sensor` reads."""
 
-    def start(self, executor: _Executor = "lockstep") -> World:
-        """Starts a world of it, whose time stands at first. Raises `ValueError` for what cannot be built."""
+    def start(self, executor: _Executor = "lockstep", pace: _Pace | None = None) -> World:
+        """Starts a world of it, whose time stands at first. Raises `ValueError` for what cannot be built.
+
+        At the pace `"free"`, the default in lockstep, time waits for objects: none gives up time or makes longer steps than it was asked for. At
+        `"real-time"`, the default on other executors, it passes beside the clock, and an object that is too slow for it does; in lockstep that
+        is by what the scene's declared machine costs.
+        """
 
 @final
 class Checkpoint:
@@ -124,8 +130,8 @@ class World:
     """A world that runs; any thread may read and command it. In a `with` block it stops at the end."""
 
     @staticmethod
-    def from_toml(text_or_path: str | PathLike[str], executor: _Executor = "lockstep") -> World:
-        """`Scene.from_toml(text_or_path).start(executor)`."""
+    def from_toml(text_or_path: str | PathLike[str], executor: _Executor = "lockstep", pace: _Pace | None = None) -> World:
+        """`Scene.from_toml(text_or_path).start(executor, pace)`."""
 
     def object(self, name: str) -> Object:
         """The object of this name. Raises `KeyError`."""
@@ -144,6 +150,14 @@ class World:
     def executor(self) -> str:
         """The executor that runs it."""
 
+    @property
+    def pace(self) -> str:
+        """How time passes: `"free"` where it waits for objects, else `"real-time"`, whatever its speed."""
+
+    @property
+    def dropped(self) -> float:
+        """The most simulated time that one of its objects has not lived, s: what it dropped, and what it is behind now. 0 at the pace `"free"`."""
+
     def hash(self) -> int:
         """Equal numbers mean the same states of all objects, bit for bit."""
 
@@ -155,10 +169,11 @@ class World:
         joined since are taken out, those that left since are there again."""
 
     def advance(self, seconds: float) -> None:
-        """Lets so much simulated time pass: at once in lockstep, in real time on other executors. Other threads of Python run meanwhile."""
+        """Lets so much simulated time pass: at once in lockstep, on other executors in real time or, at the pace `"free"`, as fast as objects can
+        step. Other threads of Python run meanwhile."""
 
     def run(self, speed: float = 1.0) -> None:
-        """Lets time pass from now on, so many simulated seconds a second, 0.001 ... 100. Not in lockstep."""
+        """Lets time pass from now on, so many simulated seconds a second, 0.001 ... 100; the pace is no longer `"free"`. Not in lockstep."""
 
     def pause(self) -> None:
         """Stops time."""
@@ -374,6 +389,7 @@ class Event:
         "attachment_gave",
         "rate_missed",
         "carved",
+        "rewound",
         "unknown",
     ]: ...
     @property
@@ -468,7 +484,7 @@ def replay(path: str | PathLike[str], scene: Scene | None = None, *, until: floa
     """
 
 def rollout(scene: Scene, on: str, actions: ArrayLike, **keywords: Unpack[_Rollout]) -> Rollout:
-    """Plays a world in lockstep for each row of `actions`: forces on one object, N, (worlds, steps, 3).
+    """Plays a world in lockstep at the free pace for each row of `actions`: forces on one object, N, (worlds, steps, 3).
 
     `step` is required. A world is the same, bit for bit, on any number of threads.
     """

@@ -60,6 +60,7 @@ pub struct AgentId(pub u32);
 fn main() {
     check("a reader sees whole states that only rise, and the newest that was published before", slot_is_read_whole);
     check("a state that a reader keeps is never written to", slot_keeps_what_is_held);
+    check("a state that is written and not yet shown is not written to again while it is kept", slot_leaves_what_is_kept);
     check("who takes the news of a state sees it, and no news is lost", news_come_after_the_state);
     check("nobody sleeps through a summons", no_worker_sleeps_through_a_notification);
     check("words are read whole or not at all, and newer ones after those that were seen", words_are_read_whole);
@@ -120,6 +121,23 @@ fn slot_keeps_what_is_held() {
     });
     (1..=3).for_each(|value| publish(&mut writer, value));
     reader.join().unwrap();
+}
+
+fn slot_leaves_what_is_kept() {
+    let mut writer = SlotWriter::new([0; 2]);
+    writer.fill(|state| *state = [1; 2]);
+    // as a checkpoint does that is taken between two turns
+    let kept = Arc::clone(writer.filled_mut().as_ref().unwrap());
+    let keeper = thread::spawn(move || {
+        assert_eq!(*kept, [1; 2]);
+        thread::yield_now();
+        assert_eq!(*kept, [1; 2]);
+    });
+    writer.fill(|state| *state = [2; 2]);
+    assert!(writer.publish(), "a cell is free");
+    (3..=4).for_each(|value| publish(&mut writer, value));
+    keeper.join().unwrap();
+    assert_eq!(*writer.slot().latest(), [4; 2]);
 }
 
 fn news_come_after_the_state() {

@@ -1,6 +1,6 @@
 //! What one agent's trouble does to the others: nothing.
 
-use crate::play::{Folder, agent, lockstep, number, report_of};
+use crate::play::{Folder, agent, lockstep, metachron, number, report_of};
 use serde_json::Value;
 
 /// Four agents of 0.4 ms a step at 240 Hz and one of `cost_us`.
@@ -49,6 +49,35 @@ fn a_run_on_threads_steps_every_agent_at_real_rates() {
     }
     assert!(number(&report, "/cpu_s") > 0.0);
     assert!(number(&report, "/sim_s") >= 0.5);
+}
+
+#[test]
+fn the_first_line_says_what_an_agent_gave_up_and_at_the_free_pace_none_gives_up_anything() {
+    let scene = company(9000);
+    let run = |executor: &str, pace: &str| {
+        let (report, fixed) = (scene.file("report.json"), ["run", scene.scene(), "--headless", "--frames", "31"]);
+        let asked = ["--executor", executor, "--pace", pace, "--set", "target.frame_hz=60", "--report", &report];
+        let done = metachron(&[&fixed[..], &asked].concat());
+        assert_eq!(done.status.code(), Some(0), "{}", String::from_utf8_lossy(&done.stderr));
+        let line = String::from_utf8(done.stdout).unwrap().lines().next().unwrap_or_default().to_owned();
+        (line, serde_json::from_slice::<Value>(&std::fs::read(report).unwrap()).unwrap())
+    };
+    let (line, late) = run("lockstep", "real-time");
+    let hog = |report: &Value, pointer: &str| number(agent(report, "hog"), pointer);
+    assert!(line.contains("1 of 5 agents gave up time, most of all hog"), "{line}");
+    // of 31 frames at 60 Hz it lives what steps of 9 ms have time for
+    assert!(hog(&late, "/given_up_s") > 0.2 && hog(&late, "/lived_s") < 0.3, "{late}");
+    for executor in ["lockstep", "threads", "pool"] {
+        let (line, report) = run(executor, "free");
+        assert!(line.ends_with(&format!("({executor} at the free pace, adaptive)")), "{line}");
+        assert_eq!(report["pace"], "free");
+        for name in ["a", "b", "c", "d", "hog"] {
+            let one = agent(&report, name);
+            assert_eq!((number(one, "/given_up_s"), number(one, "/lengthened")), (0.0, 0.0), "{executor} {name}");
+            // 31 frames of 1/60 s, the last step to its end
+            assert!((124.0..126.0).contains(&number(one, "/steps")), "{executor} {name}: {one}");
+        }
+    }
 }
 
 /// The report without what is measured by a real clock.

@@ -18,7 +18,7 @@ impl ClusterStepper {
     /// Starts every contact from what the last step gave.
     pub(super) fn recall(&mut self, all: &[Participant<'_>], h_s: f64) {
         for (owner, contact) in self.search.owners.iter_mut().zip(&mut self.search.contacts) {
-            let place = all[owner.member].memory.recall(owner.partner, owner.key.anywhere());
+            let place = all[owner.member].memory.recall(owner.partner, owner.key);
             (contact.warm_n_s, contact.owed_slip_m) = (place.force_n * h_s, place.owed_slip_m);
             contact.load_n_s = place.load_n * h_s;
             owner.spin = Spin { radius_m: owner.spin.radius_m, ..place.spin };

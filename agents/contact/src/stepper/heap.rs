@@ -7,6 +7,7 @@
 
 use super::domain::{Domain, assign};
 use super::pair_total::total_of;
+use super::participant::place_of;
 use super::progress::Progress;
 use super::search::Search;
 use super::{ClusterReport, ClusterScene, Locked, PairTotal, Participant, Partner};
@@ -215,7 +216,7 @@ impl Heap {
             total.add(impulse_n_s, depth_m);
             wrenches[member].force_n += impulse_n_s;
             if let Partner::Agent(id) = partner
-                && let Ok(other) = all.binary_search_by_key(&id, |one| one.id)
+                && let Some(other) = place_of(all, id)
             {
                 wrenches[other].force_n -= impulse_n_s;
             }
@@ -271,8 +272,7 @@ impl World {
     fn take(&mut self, all: &[Participant<'_>], domains: &[Domain], progress: &[Progress], h_s: f64) {
         let Self { physics, bodies, origin_m, .. } = self;
         bodies.retain(|known| {
-            let at = all.binary_search_by_key(&known.id, |one| one.id);
-            let stays = at.is_ok_and(|at| domains[at] == Domain::Heap);
+            let stays = place_of(all, known.id).is_some_and(|at| domains[at] == Domain::Heap);
             if !stays {
                 physics.remove_body(known.handle);
             }
@@ -342,7 +342,7 @@ impl World {
             // normals point from the first collider of a pair to the second
             let sign = if self.side(pair.collider1) == Some(first_side) { -1.0 } else { 1.0 };
             let member = |side: Side| match side {
-                Side::Body(id) => all.binary_search_by_key(&id, |one| one.id).ok(),
+                Side::Body(id) => place_of(all, id),
                 Side::Static(_) => None,
             };
             let [Some(first), second] = sides.map(member) else { continue };

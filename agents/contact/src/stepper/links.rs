@@ -6,8 +6,9 @@
 use super::Participant;
 use super::member::MaterialPoint;
 use super::memory::Partner;
+use super::participant::place_of;
 use super::springs::{End, Name, Pull};
-use super::ties::{FineStep, Holders, Ties, place_of};
+use super::ties::{FineStep, Holders, Ties};
 use super::yielding::{Frame, YieldLimit};
 use crate::agent::tool_extrapolation_s;
 use crate::law::{Law, Link};

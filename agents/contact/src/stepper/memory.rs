@@ -157,8 +157,9 @@ impl ContactMemory {
         &mut self.pairs[at]
     }
 
-    /// What the place `key` of the pair with `partner` remembers; nothing of a new one.
+    /// What the place `key` of the pair with `partner` remembers, wherever on a skin or a mesh it is now; nothing of a new one.
     pub(super) fn recall(&self, partner: Partner, key: TouchKey) -> Remembered {
+        let key = key.anywhere();
         let pair = self.pairs.binary_search_by_key(&partner, |pair| pair.partner).ok().map(|at| &self.pairs[at]);
         let place = pair.and_then(|pair| {
             let at = pair.places.binary_search_by_key(&key, |place| place.key).ok()?;
@@ -303,6 +304,18 @@ mod tests {
         memory.turn(now);
         assert_eq!(memory.recall(partner, key(70_000)).force_n, DVec3::ZERO);
         assert!(memory.pairs.is_empty());
+    }
+
+    #[test]
+    fn a_corner_that_slides_over_a_mesh_is_recalled_on_its_next_triangle() {
+        let mut memory = ContactMemory::default();
+        let partner = Partner::Static(0);
+        let on_triangle =
+            |number| TouchKey { kind: TouchKind::MeshTriangle, parts: [number, 0], ..TouchKey::default() };
+        let place = Remembered { key: on_triangle(7).anywhere(), force_n: DVec3::Z, ..Remembered::default() };
+        memory.pair(partner).next.push(place);
+        memory.turn(SimTime::ZERO);
+        assert_eq!([7, 8].map(|number| memory.recall(partner, on_triangle(number)).force_n), [DVec3::Z; 2]);
     }
 
     #[test]

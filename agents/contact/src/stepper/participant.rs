@@ -27,6 +27,15 @@ pub struct Participant<'a> {
     pub grips: &'a mut Vec<Grip>,
 }
 
+/// The place of the agent `id` among the participants of a step: two lists one after the other, each by rising numbers, as remote members
+/// follow all others.
+pub(super) fn place_of(all: &[Participant<'_>], id: AgentId) -> Option<usize> {
+    let here = all.partition_point(|one| !one.member.is_remote());
+    let (here, remote) = all.split_at(here);
+    let found = here.binary_search_by_key(&id, |one| one.id);
+    found.or_else(|_| remote.binary_search_by_key(&id, |one| one.id).map(|at| here.len() + at)).ok()
+}
+
 impl Participant<'_> {
     /// How many blocks of three velocities it has.
     #[must_use]

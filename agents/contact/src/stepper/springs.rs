@@ -5,7 +5,8 @@
 
 use super::member::MaterialPoint;
 use super::memory::Partner;
-use super::ties::{FineStep, Holders, RowOwner, Ties, place_of};
+use super::participant::place_of;
+use super::ties::{FineStep, Holders, RowOwner, Ties};
 use super::yielding::{Slides, YieldLimit};
 use crate::AnchorSpring;
 use crate::agent::tool_extrapolation_s;

@@ -5,7 +5,7 @@
 
 use super::memory::Partner;
 use super::pair_total::PairTotal;
-use super::ties::place_of;
+use super::participant::place_of;
 use super::{ClusterStepper, Drive, Participant, Role};
 use crate::cluster::Side;
 use glam::DVec3;

@@ -141,11 +141,3 @@ pub(super) fn is_rigid(row: &JointRow) -> bool {
 pub(super) fn place_key(row: u32) -> TouchKey {
     TouchKey { place: row, ..TouchKey::default() }
 }
-
-/// The place of the agent `id` among the participants.
-pub(super) fn place_of(all: &[Participant<'_>], id: AgentId) -> Option<usize> {
-    let here = all.partition_point(|one| !one.member.is_remote());
-    let (here, remote) = all.split_at(here);
-    let found = here.binary_search_by_key(&id, |one| one.id);
-    found.or_else(|_| remote.binary_search_by_key(&id, |one| one.id).map(|at| here.len() + at)).ok()
-}

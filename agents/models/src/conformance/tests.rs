@@ -5,7 +5,7 @@ use crate::rigid::{KinematicBody, Led, RigidSpec};
 use glam::{DQuat, DVec3};
 use metachron_contact::cluster::Side;
 use metachron_contact::stepper::{ClusterMember, Role};
-use metachron_contact::{Agent, AnchorSpring, StepContext};
+use metachron_contact::{Agent, AnchorSpring, Input, Inputs, SetMotion, StepContext};
 use metachron_core::{Anchor, Body, CurveState, Resolution, SimSpan, Snapshot, StepError, StepReport, check_span};
 use metachron_geometry::{CollisionShape, ContactSide, Place, PlacedShape, Solid};
 use std::sync::Arc;
@@ -58,6 +58,15 @@ impl Agent for Row {
         self.speed -= G * dt_s * lost;
         self.steps += 1;
         Ok(StepReport { work: 1.0, substeps: 1, at_rest: false })
+    }
+
+    fn set_motion(&mut self, motion: &SetMotion) -> bool {
+        self.speed = motion.velocity_m_s.map_or(self.speed, |v| v.z);
+        motion.velocity_m_s.is_some()
+    }
+
+    fn inputs(&self) -> Inputs {
+        Inputs::of(&[Input::Resolution]).with(Input::Velocity, !self.breaks(Promise::Inputs))
     }
 
     fn resolution(&self) -> Option<Resolution> {
@@ -139,6 +148,7 @@ fn every_broken_promise_is_reported_and_no_other() {
         Promise::Retune,
         Promise::Residual,
         Promise::SameBits,
+        Promise::Inputs,
         Promise::Allocation,
         Promise::Finite,
     ];

@@ -8,7 +8,7 @@ use super::motion::{Flight, Motion};
 use super::{RigidError, RigidSpec};
 use glam::{DQuat, DVec3};
 use metachron_contact::stepper::ClusterMember;
-use metachron_contact::{Agent, SetMotion, StepContext};
+use metachron_contact::{Agent, Input, Inputs, SetMotion, StepContext};
 use metachron_core::{
     Archive, ArchiveError, Body, Bounds, RigidState, SimSpan, Snapshot, StepError, StepReport, archive_values,
     check_span,
@@ -119,6 +119,11 @@ impl Agent for RigidBody {
             self.rest();
         }
         Ok(StepReport { work: 1.0, substeps: 1, at_rest: self.at_rest })
+    }
+
+    fn inputs(&self) -> Inputs {
+        use Input::{Force, Place, Spring, State, Torque, Velocity};
+        Inputs::of(&[Spring, Force, Torque, Place, Velocity, State])
     }
 
     fn set_motion(&mut self, set: &SetMotion) -> bool {

@@ -12,7 +12,7 @@ use crate::trajectory::{Pose as Pace, Script};
 use glam::{DQuat, DVec3};
 use metachron_contact::cluster::Side;
 use metachron_contact::stepper::{ClusterMember, MaterialPoint, Pose, Role};
-use metachron_contact::{Agent, PoseGoal, SetMotion, StepContext};
+use metachron_contact::{Agent, Input, Inputs, PoseGoal, SetMotion, StepContext};
 use metachron_core::{
     Anchor, Archive, ArchiveError, Body, Bounds, Inertia, RigidState, SimSpan, SimTime, Snapshot, StepError,
     StepReport, archive_values, check_span, shortest_turn,
@@ -249,8 +249,8 @@ impl Agent for KinematicBody {
         true
     }
 
-    fn takes_poses(&self) -> bool {
-        true
+    fn inputs(&self) -> Inputs {
+        Inputs::of(&[Input::Pose, Input::Place])
     }
 
     /// Its estimate of its own error is the rounding of its coordinates.

@@ -16,7 +16,7 @@ use crate::limits::{QUIET_ACCELERATION_M_S2, QUIET_S, QUIET_SPEED_M_S};
 use crate::set_motion::{WholeMotion, check_nodes};
 use glam::DVec3;
 use metachron_contact::stepper::ClusterMember;
-use metachron_contact::{Agent, AnchorSpring, Carving, SetMotion, StepContext};
+use metachron_contact::{Agent, AnchorSpring, Carving, Input, Inputs, SetMotion, StepContext};
 use metachron_core::{
     Archive, ArchiveError, Body, Bounds, Grip, Removed, Resolution, SimSpan, Snapshot, StepError, StepReport,
     check_span,
@@ -240,6 +240,13 @@ impl Agent for SoftBody {
 
     fn resolution(&self) -> Option<Resolution> {
         self.present_resolution()
+    }
+
+    fn inputs(&self) -> Inputs {
+        use Input::{Carving, Force, Place, Resolution, Spring, State, Velocity};
+        let all = Inputs::of(&[Spring, Force, Velocity, State]);
+        let all = all.with(Place, !self.mesh.is_held()).with(Carving, self.form.has_cells());
+        all.with(Resolution, self.present_resolution().is_some() && self.spec.resolutions().is_some())
     }
 
     /// A body of which parts are held stays where it is, and takes velocities.

@@ -15,7 +15,7 @@ use super::{ToolError, ToolSpec};
 use crate::trajectory::{PointMotion, Pose, Script};
 use glam::{DQuat, DVec3};
 use metachron_contact::stepper::ClusterMember;
-use metachron_contact::{Agent, AnchorSpring, StepContext};
+use metachron_contact::{Agent, AnchorSpring, Input, Inputs, StepContext};
 use metachron_core::{
     AgentId, Anchor, Archive, ArchiveError, Body, Bounds, GRASP_BELOW, SimSpan, Snapshot, StepError, StepReport,
     ToolState, archive_values, check_span, shortest_turn,
@@ -222,6 +222,10 @@ impl Agent for Tool {
         self.move_jaws(context, dt_s);
         self.at_rest = self.try_rest();
         Ok(StepReport { work: 1.0, substeps: 1, at_rest: self.at_rest })
+    }
+
+    fn inputs(&self) -> Inputs {
+        Inputs::of(&[Input::Spring, Input::Force])
     }
 
     fn shift_clock(&mut self, by_s: f64) {

@@ -147,10 +147,7 @@ fn agents(scene: &Scene, executor: ExecutorKind, seconds: f64) -> anyhow::Result
     let dropped_s = outcome.agents.iter().map(|a| a.stats.dropped.as_secs_f64()).sum::<f64>() / boxes.max(1) as f64;
     let who = format!("agents, {}", executor.name());
     // the simulated time of the steps made, however long they were: time that agents lag behind is not counted
-    let made_s = |s: &AgentStats| {
-        let lived_s = if s.steps == 0 { 0.0 } else { s.steps as f64 / s.mean_hz };
-        (lived_s - s.dropped.as_secs_f64() - s.late.p50_s).max(0.0)
-    };
+    let made_s = |s: &AgentStats| s.lived.as_secs_f64() - s.rested.as_secs_f64();
     let made_s = outcome.agents.iter().map(|a| made_s(&a.stats)).sum::<f64>() / boxes.max(1) as f64;
     let steps_per_cpu_s = made_s * STEP_HZ / cpu_s;
     Ok(Row { who, here: true, boxes, sim_s: outcome.sim_s, dropped_s, cpu_s, steps_per_cpu_s, share: f64::NAN })

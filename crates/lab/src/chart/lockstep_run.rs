@@ -1,32 +1,15 @@
 //! Agents in a run of their own in virtual time, by the program's own runtime, clusters included.
 //!
-//! In: agents with rates. Out: a run whose steps cost nothing, and its agents' newest states. Never here: measurements.
+//! In: agents with rates. Out: a run at the free pace, and its agents' newest states. Never here: measurements.
 
 use metachron_contact::audit::Member;
 use metachron_core::{AgentId, Snapshot};
-use metachron_runtime::{AgentSpawn, DrawPrice, Lockstep, Machine, Run, RunError, StepPrice};
+use metachron_runtime::{AgentSpawn, Lockstep, Machine, Run, RunError, TimelineCommand};
 use std::sync::Arc;
 use std::time::Duration;
 
 /// A run.
 pub(super) struct LockstepRun(Lockstep);
-
-/// A machine on which every step takes no time.
-fn free_machine() -> Machine {
-    let free = |model: &'static str| StepPrice { model: model.into(), base_us: 0.0, unit_us: 0.0 };
-    Machine {
-        cores: 64,
-        steps: ["tube", "rigid", "tool", "synthetic"].map(free).to_vec(),
-        draw: DrawPrice {
-            setup_ms: 0.0,
-            pixel_ns: 0.0,
-            enlarge_ns: 0.0,
-            objects: Default::default(),
-            strokes: Default::default(),
-        },
-        ..Machine::default()
-    }
-}
 
 impl LockstepRun {
     /// Begins a run.
@@ -34,7 +17,9 @@ impl LockstepRun {
     /// # Errors
     /// The runtime's refusal.
     pub(super) fn start(spawns: Vec<AgentSpawn>) -> Result<Self, RunError> {
-        Ok(Self(Lockstep::start(spawns, free_machine())?))
+        let mut run = Lockstep::start(spawns, Machine::default())?;
+        run.drive(TimelineCommand::Free);
+        Ok(Self(run))
     }
 
     /// Goes on until all agents have reached `seconds`.

@@ -24,8 +24,10 @@ pub struct Timeline {
     sim: SimTime,
     speed: f64,
     until: Option<SimTime>,
-    /// Since when simulated time waits for agents, so that no step is late; `None` where it does not.
-    free_since: Option<SimTime>,
+    /// Whether simulated time waits for agents, so that no step is late ([`TimelineCommand::Free`]).
+    free: bool,
+    /// Where simulated time was before it leapt; `None` where it has not.
+    leapt_from: Option<SimTime>,
     piece: u64,
 }
 
@@ -36,20 +38,36 @@ pub enum TimelineCommand {
     Pause,
     /// Simulated time runs on.
     Run,
-    /// Simulated seconds per wall second; clamped to [`SPEED_RANGE`], NaN changes nothing.
+    /// Simulated seconds per wall second from now on; clamped to [`SPEED_RANGE`], NaN changes nothing.
     Speed(f64),
     /// Simulated time runs on for exactly this span, then stops: a frame span for a single step. Steps requested while one is in progress
     /// add up.
     Step(SimSpan),
     /// Simulated time is so much later at once, and stops there: the steps up to then are made as fast as they can, and none is late.
     Leap(SimSpan),
+    /// Simulated time waits for agents from now on, until a speed is set: none is late, gives up time or lengthens a step, however slow the
+    /// machine is. In virtual time, turns take none of it; elsewhere one that is too slow for the clock is behind until time stops for it.
+    Free,
 }
 
 impl Timeline {
     /// A timeline at wall speed, both times from zero.
     #[must_use]
     pub const fn new() -> Self {
-        Self { wall: Duration::ZERO, sim: SimTime::ZERO, speed: 1.0, until: None, free_since: None, piece: 0 }
+        Self {
+            wall: Duration::ZERO,
+            sim: SimTime::ZERO,
+            speed: 1.0,
+            until: None,
+            free: false,
+            leapt_from: None,
+            piece: 0,
+        }
+    }
+
+    /// Whether it can be in force: one that was read may be of any numbers.
+    pub fn is_sound(&self) -> bool {
+        (SPEED_RANGE.0..=SPEED_RANGE.1).contains(&self.speed)
     }
 
     /// The simulated time at wall time `wall`.
@@ -63,10 +81,10 @@ impl Timeline {
         self.until.map_or(free, |end| free.min(end))
     }
 
-    /// The simulated time at which an agent goes on that wakes at wall time `wall`: where time waits for agents, it takes part from its start.
+    /// The simulated time at which an agent goes on that wakes at wall time `wall`: where time has leapt, it takes part from before that.
     #[must_use]
     pub fn wakes_at(&self, wall: Duration) -> SimTime {
-        self.free_since.unwrap_or_else(|| self.sim_at(wall))
+        self.leapt_from.unwrap_or_else(|| self.sim_at(wall))
     }
 
     /// The wall time at which simulated time reaches `sim`; `None` if it stops before.
@@ -117,10 +135,16 @@ impl Timeline {
         self.until
     }
 
-    /// Whether simulated time waits for agents ([`TimelineCommand::Leap`]): no step is late then.
+    /// Whether simulated time waits for agents ([`TimelineCommand::Free`], [`TimelineCommand::Leap`]): no step is late then.
     #[must_use]
     pub const fn is_free(&self) -> bool {
-        self.free_since.is_some()
+        self.free || self.leapt_from.is_some()
+    }
+
+    /// Whether it does so until a speed is set ([`TimelineCommand::Free`]).
+    #[must_use]
+    pub const fn has_free_pace(&self) -> bool {
+        self.free
     }
 
     /// The piece that begins at wall time `to` with the simulated time `sim`, and runs, stands or has as far to go as this one at wall time
@@ -128,8 +152,8 @@ impl Timeline {
     #[must_use]
     pub fn set_to(&self, from: Duration, to: Duration, sim: SimTime, other: &Self) -> Self {
         let until = self.until.map(|end| sim + end.since(self.sim_at(from)));
-        let free_since = self.free_since.map(|_| sim);
-        Self { wall: to, sim, until, free_since, piece: self.piece.max(other.piece) + 1, ..*self }
+        let leapt_from = self.leapt_from.map(|_| sim);
+        Self { wall: to, sim, until, leapt_from, piece: self.piece.max(other.piece) + 1, ..*self }
     }
 
     /// The number of this piece: it changes with every change to the timeline.
@@ -145,16 +169,19 @@ impl Timeline {
         let mut next = Self { wall, sim, piece: self.piece + 1, ..*self };
         match drive {
             TimelineCommand::Pause => next.until = Some(sim),
-            TimelineCommand::Run => (next.until, next.free_since) = (None, None),
+            TimelineCommand::Run => (next.until, next.leapt_from) = (None, None),
             TimelineCommand::Speed(speed) if speed.is_nan() => return *self,
-            TimelineCommand::Speed(speed) => next.speed = speed.clamp(SPEED_RANGE.0, SPEED_RANGE.1),
+            TimelineCommand::Speed(speed) => {
+                (next.speed, next.free) = (speed.clamp(SPEED_RANGE.0, SPEED_RANGE.1), false);
+            }
+            TimelineCommand::Free => (next.speed, next.free) = (1.0, true),
             TimelineCommand::Step(span) => {
-                (next.until, next.free_since) = (Some(self.until.unwrap_or(sim) + span), None);
+                (next.until, next.leapt_from) = (Some(self.until.unwrap_or(sim) + span), None);
             }
             TimelineCommand::Leap(span) => {
                 let since = self.until.unwrap_or(sim);
                 next.sim = since + span;
-                (next.until, next.free_since) = (Some(next.sim), Some(since));
+                (next.until, next.leapt_from) = (Some(next.sim), Some(since));
             }
         }
         next

@@ -6,7 +6,7 @@
 
 use super::super::seqlock::{ReadOutcome, Seqlock};
 use glam::DVec3;
-use metachron_core::{Archive, ArchiveError, Bounds, SimTime};
+use metachron_core::{Bounds, SimTime};
 
 /// A box around an agent's matter at one moment, and how fast it may grow in every direction after and before it.
 #[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
@@ -53,6 +53,9 @@ pub(super) enum ReadBounds {
 #[repr(align(64))]
 pub(super) struct PublishedBounds(Seqlock<5>);
 
+/// A box as it is stored.
+pub(super) type BoxWords = [u64; 5];
+
 /// Read attempts while a box is being written. A write takes 10 ns.
 const TRIES: u32 = 8;
 
@@ -67,17 +70,14 @@ impl PublishedBounds {
         self.0.write(words(reach));
     }
 
-    /// Writes or reads the box, to the bit; called between turns.
-    pub fn archive(&self, archive: &mut Archive<'_>) -> Result<(), ArchiveError> {
-        let mut words = match self.0.read() {
-            ReadOutcome::Complete(words) => Some(words),
-            ReadOutcome::Empty | ReadOutcome::Torn => None,
-        };
-        archive.value(&mut words)?;
-        if archive.is_reading() {
-            words.map_or_else(|| self.0.clear(), |words| self.0.write(words));
-        }
-        Ok(())
+    /// The box, to the bit; `None` where none was ever written. Called between turns.
+    pub fn words(&self) -> Option<BoxWords> {
+        if let ReadOutcome::Complete(words) = self.0.read() { Some(words) } else { None }
+    }
+
+    /// Puts that in its place; called between turns.
+    pub fn set_words(&self, words: Option<BoxWords>) {
+        words.map_or_else(|| self.0.clear(), |words| self.0.write(words));
     }
 
     /// Forgets it; called between turns.
@@ -98,7 +98,7 @@ impl PublishedBounds {
     }
 }
 
-fn words(reach: &MovingBox) -> [u64; 5] {
+fn words(reach: &MovingBox) -> BoxWords {
     let (low, high) = (reach.low, reach.high);
     [
         pair(down(low.x), down(low.y)),
@@ -109,7 +109,7 @@ fn words(reach: &MovingBox) -> [u64; 5] {
     ]
 }
 
-fn reach([a, b, c, speed, time]: [u64; 5]) -> MovingBox {
+fn reach([a, b, c, speed, time]: BoxWords) -> MovingBox {
     let first = |word: u64| f64::from(f32::from_bits((word >> 32) as u32));
     let second = |word: u64| f64::from(f32::from_bits(word as u32));
     MovingBox {

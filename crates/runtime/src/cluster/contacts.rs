@@ -67,6 +67,13 @@ impl ClusterSeat {
             goes_on
         });
     }
+
+    /// Tells that all contacts that are there begin: of one that went back to `now`, where readers have none of it.
+    pub fn tell_contacts(&self, now: SimTime, streams: &EventStreams) {
+        for contact in &self.contacts {
+            streams.event(&AgentEvent { at: now, kind: EventKind::ContactBegan(event(contact)) });
+        }
+    }
 }
 
 fn event(contact: &ContactState) -> ContactEvent {

@@ -58,16 +58,20 @@ fn take(mut runner: Box<AgentRunner>, place: Place, all: &mut [Option<Placed>]) 
     }
 }
 
-/// Checks that places which were read are such as runners can have.
-pub(in super::super) fn check_places(places: &[Place], all: &[Option<Placed>]) -> Result<(), ArchiveError> {
-    let has_handover = |placed: &Placed| placed.runner.shared.handover().is_some();
-    let leads = |leader: AgentId| all.get(leader.0 as usize).is_some_and(|at| at.as_ref().is_some_and(has_handover));
+/// Checks that places are such as the runners of those that are there can have.
+///
+/// # Errors
+/// [`ArchiveError::Mismatch`].
+pub(in super::super) fn check_places(places: &[Place], all: &[Option<&mut AgentRunner>]) -> Result<(), ArchiveError> {
+    let has_handover =
+        |at: usize| all.get(at).and_then(Option::as_ref).is_some_and(|runner| runner.shared.handover().is_some());
+    let leads = |leader: AgentId| has_handover(leader.0 as usize);
     let is_led = |at: usize| matches!(places[at], Place::Led { .. });
     let is_sound = |(at, place): (usize, &Place)| match *place {
         Place::Home => true,
         Place::Led { leader, .. } => leads(leader) && !is_led(leader.0 as usize) && (leader.0 as usize) < at,
         Place::Waiting { leader, .. } => leads(leader) && leader.0 as usize != at,
-        Place::Returning => all[at].as_ref().is_some_and(has_handover),
+        Place::Returning => has_handover(at),
     };
     if places.len() == all.len() && places.iter().enumerate().all(is_sound) {
         return Ok(());

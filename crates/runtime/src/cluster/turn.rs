@@ -70,13 +70,14 @@ impl AgentRunner {
     fn catch_up(&mut self, time: SimTime, timeline: &Timeline, wall: Duration) -> Result<u32, String> {
         let mut steps = 0;
         while self.pace.time() < time {
-            let span = portion(time.since(self.pace.time()), self.pace.dt());
+            let span = portion(time.since(self.pace.time()), self.pace.dt(), timeline.is_free());
             let StepOutcome { dt, .. } = self.step_alone(Span::AtMost(span))?;
             self.write_snapshot(self.pace.time() + dt, false)?;
             self.pace.advance_by(dt);
             let work_s = self.shared.gauges.work_s.get();
             let entry = Entry {
                 steps: self.own_steps(),
+                span: dt,
                 now: timeline.sim_at(wall),
                 late: Duration::ZERO,
                 missed: false,
@@ -159,9 +160,34 @@ impl AgentRunner {
     }
 }
 
-/// How much of what is `left` to catch up one step takes, where steps are `dt` long: no step is a sliver.
-fn portion(left: SimSpan, dt: SimSpan) -> SimSpan {
+/// How much of what is `left` to catch up one step takes, where steps are `dt` long: no step is a sliver. Where `none_longer` is, the last two
+/// are half of it each.
+fn portion(left: SimSpan, dt: SimSpan, none_longer: bool) -> SimSpan {
     let half_more = SimSpan::from_nanos(dt.as_nanos() / 2);
+    if none_longer && left > dt && left <= dt + half_more {
+        return SimSpan::from_nanos(left.as_nanos().div_ceil(2));
+    }
     let longest = SimSpan::from_secs_f64(DT_MAX_S).unwrap_or(dt);
     if left <= dt + half_more { left.min(longest) } else { dt }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn where_no_step_may_be_longer_what_is_left_is_caught_up_by_none_that_is() {
+        let dt = SimSpan::from_nanos(1001);
+        for total in 1..4000 {
+            let (mut left, mut steps) = (SimSpan::from_nanos(total), 0);
+            while left > SimSpan::ZERO {
+                let span = portion(left, dt, true);
+                assert!(span > SimSpan::ZERO && span <= dt.min(left), "{span:?} of {left:?}");
+                left = SimSpan::from_nanos(left.as_nanos() - span.as_nanos());
+                steps += 1;
+            }
+            assert_eq!(steps, total.div_ceil(1001), "no sliver of {total} ns");
+        }
+        assert_eq!(portion(SimSpan::from_nanos(1400), dt, false), SimSpan::from_nanos(1400));
+    }
 }

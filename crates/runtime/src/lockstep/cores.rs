@@ -38,11 +38,6 @@ impl Cores {
         (self.served, self.jobs) = (served, jobs);
     }
 
-    /// The owners of the jobs in progress.
-    pub fn owners(&self) -> impl Iterator<Item = u32> {
-        self.jobs.iter().map(|Reverse((_, owner))| *owner)
-    }
-
     /// Starts the job of `owner`, which takes `work` on a core of its own.
     pub fn start(&mut self, owner: u32, work: Duration) {
         self.jobs.push(Reverse((self.served + work.as_nanos() * PICOS_PER_NANO, owner)));

@@ -1,6 +1,7 @@
 //! What only threads do; `live_tests.rs` holds what every executor does.
 
 use super::super::SystemClock;
+use super::super::clock::ManualClock;
 use super::super::testing::{Dummy, eventually, running};
 use super::*;
 
@@ -32,4 +33,37 @@ fn threads_carry_the_names_of_their_agents() {
     let run = Threads::start(vec![Dummy::new(1.0).at(60.0)], Arc::new(SystemClock::new()), Priority::Normal).unwrap();
     let names: Vec<_> = run.threads.values().filter_map(|t| t.thread().name()).collect();
     assert_eq!(names, ["agent:dummy at 60"]);
+}
+
+#[test]
+fn an_agent_that_is_behind_yields_its_core_after_a_while_and_goes_on() {
+    let AssembledRun { mut actors, all } = assemble(vec![Dummy::new(1.0).at(1e5)], Helpers::none()).unwrap();
+    let mut actor = actors[0].take().unwrap();
+    let (clock, timeline) = (Arc::new(ManualClock::new()), Arc::new(SharedTimeline::new()));
+    timeline.drive(Duration::ZERO, TimelineCommand::Run);
+    clock.advance(Duration::from_millis(50));
+    let (batch, awake) = (CpuBatch::default(), Duration::ZERO);
+    let mut thread = AgentThread { clock, timeline, batch, order: None, awake };
+    let mut steps_after = |awake: Duration| {
+        thread.awake = awake;
+        assert_eq!(thread.wait_or_turn(&mut actor), Next::Due);
+        (all.handles[0].steps(), thread.awake.is_zero())
+    };
+    assert_eq!(steps_after(Duration::ZERO), (1, false));
+    assert_eq!(steps_after(CATCH_UP_MAX), (1, true), "others come first");
+    assert_eq!(steps_after(Duration::ZERO), (2, false));
+}
+
+/// With the system's slices alone, of milliseconds, one in ten of them makes all of the turns that are counted here.
+#[test]
+fn agents_that_are_all_behind_take_turns() {
+    let spawns = (0..200).map(|_| Dummy::new(1.0).at(1e5)).collect();
+    let run = running(Threads::start(spawns, Arc::new(SystemClock::new()), Priority::Normal).unwrap());
+    let steps = || run.agents().iter().map(AgentHandle::steps).collect::<Vec<_>>();
+    eventually("all have begun", || steps().iter().all(|made| *made > 0));
+    let (before, each) = (steps(), 200);
+    let made = || steps().iter().zip(&before).map(|(now, then)| now - then).collect::<Vec<_>>();
+    eventually("they have gone on", || made().iter().sum::<u64>() >= 200 * each);
+    let least = made().into_iter().min();
+    assert!(least >= Some(each / 10), "{least:?} of {each} turns");
 }

@@ -28,6 +28,8 @@ pub struct Report {
     pub law: String,
     /// The executor of the agents.
     pub executor: String,
+    /// How time passed at the end: `free` where it waited for agents, else `real-time`, whatever its speed.
+    pub pace: &'static str,
     /// The adapter that drew; `None` where nothing was drawn.
     pub adapter: Option<String>,
     /// Frames made.
@@ -111,7 +113,15 @@ pub struct AgentReport {
     pub age_ms: Quantiles,
     /// Lateness of the starts of its turns.
     pub late_ms: Quantiles,
-    /// Simulated milliseconds that could not be made up.
+    /// Simulated seconds that it has lived, ≥ 0: its steps, longer ones by their length, and its time at rest. It may be more than `sim_s` by
+    /// less than a step: a state covers the step that leads to it.
+    pub lived_s: f64,
+    /// Simulated seconds since its start that it has not lived, ≥ 0: what it dropped, and what it was behind when the run ended; 0 where it failed.
+    pub given_up_s: f64,
+    /// Steps, of `steps`, that were longer than was asked for then, by its rate or by control within the range that the scene allows: those of
+    /// an agent that is late are, by up to 2.5 times near others.
+    pub lengthened: u64,
+    /// Simulated milliseconds that could not be made up, ≥ 0.
     pub dropped_ms: f64,
     /// Simulated milliseconds at rest.
     pub rested_ms: f64,
@@ -372,6 +382,7 @@ impl Report {
             policy: name(),
             law: name(),
             executor: name(),
+            pace: "real-time",
             adapter: None,
             frames: 0,
             sim_s: 0.0,

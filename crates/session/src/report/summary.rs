@@ -13,8 +13,13 @@ impl Report {
     pub fn summary_text(&self) -> String {
         let mut out = String::new();
         let Self { scene, policy, executor, frames, sim_s, wall_s, cpu_s, target_ms, summary, .. } = self;
-        let _ =
-            writeln!(out, "{scene}: {frames} frames, {sim_s:.2} s simulated in {wall_s:.2} s ({executor}, {policy})");
+        let pace = if self.pace == "free" { " at the free pace" } else { "" };
+        let _ = write!(
+            out,
+            "{scene}: {frames} frames, {sim_s:.2} s simulated in {wall_s:.2} s ({executor}{pace}, {policy})"
+        );
+        given_up(&mut out, &self.agents);
+        let _ = writeln!(out);
         frame_line(&mut out, summary, *target_ms);
         let drawn = self.adapter.as_ref().map_or("not drawn".to_owned(), |adapter| format!("drawn by  {adapter}"));
         let _ = writeln!(out, "{drawn}; agents' CPU {cpu_s:.2} s; state {}", self.state_hash);
@@ -37,6 +42,24 @@ impl Report {
             reference_table(&mut out, oracle);
         }
         out
+    }
+}
+
+/// How much time agents have not lived, and how many steps were longer than asked for, where there is any: the rest of the first line.
+fn given_up(out: &mut String, agents: &[AgentReport]) {
+    // one that is on time may be in the middle of a step
+    let is_short = |agent: &&AgentReport| agent.given_up_s > 2e-3 * agent.dt_ms;
+    let most = agents.iter().filter(is_short).max_by(|a, b| a.given_up_s.total_cmp(&b.given_up_s));
+    if let Some(most) = most {
+        let (count, all) = (agents.iter().filter(is_short).count(), agents.len());
+        let (lived_s, given_up_s) = (most.lived_s, most.given_up_s);
+        let _ = write!(out, "; {count} of {all} agents gave up time, most of all {}: {given_up_s:.3} s", most.name);
+        let _ = write!(out, ", it lived {lived_s:.3} s");
+    }
+    let sum = |of: fn(&AgentReport) -> u64| agents.iter().map(of).sum::<u64>();
+    let (longer, steps) = (sum(|agent| agent.lengthened), sum(|agent| agent.steps));
+    if longer > 0 {
+        let _ = write!(out, "; {longer} of {steps} steps were longer than asked for");
     }
 }
 

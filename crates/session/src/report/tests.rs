@@ -7,6 +7,7 @@ const NAMES: &[&str] = &[
     "/scene",
     "/policy",
     "/executor",
+    "/pace",
     "/adapter",
     "/frames",
     "/sim_s",
@@ -39,6 +40,9 @@ const NAMES: &[&str] = &[
     "/agents/0/cpu_s",
     "/agents/0/age_ms/p50",
     "/agents/0/age_ms/p99",
+    "/agents/0/lived_s",
+    "/agents/0/given_up_s",
+    "/agents/0/lengthened",
     "/agents/0/dropped_ms",
     "/agents/0/parked",
     "/agents/0/energy_j",
@@ -134,4 +138,26 @@ fn the_report_includes_the_choice_summary() {
     ] {
         assert!(json.pointer(path).is_some(), "{path} is missing");
     }
+}
+
+#[test]
+fn the_first_line_says_who_has_given_up_time_and_how_many_steps_were_longer() {
+    let on_time = AgentReport { dt_ms: 4.0, lived_s: 0.998, given_up_s: 0.004, steps: 250, ..AgentReport::default() };
+    let late = AgentReport {
+        name: "late".to_owned(),
+        lived_s: 0.25,
+        given_up_s: 0.75,
+        steps: 30,
+        lengthened: 20,
+        ..on_time.clone()
+    };
+    let first_line = |agents| {
+        let report = Report { agents, ..Report::template() };
+        report.summary_text().lines().next().unwrap_or_default().to_owned()
+    };
+    let whole = first_line(vec![on_time.clone()]);
+    assert!(whole.ends_with(')'), "{whole}");
+    let line = first_line(vec![on_time, late]);
+    let said = "; 1 of 2 agents gave up time, most of all late: 0.750 s, it lived 0.250 s; 20 of 280 steps were longer than asked for";
+    assert_eq!(line, format!("{whole}{said}"));
 }

@@ -17,6 +17,7 @@ impl WindowSimulation<'_> {
             TimelineCommand::Run => self.running = true,
             TimelineCommand::Pause | TimelineCommand::Step(_) | TimelineCommand::Leap(_) => self.running = false,
             TimelineCommand::Speed(speed) => self.speed = speed,
+            TimelineCommand::Free => self.speed = 1.0,
         }
         if put_back {
             let timeline = self.session.world().timeline();

@@ -12,7 +12,7 @@ use super::{Tube, nearest_resolution};
 use crate::set_motion::WholeMotion;
 use glam::DVec3;
 use metachron_contact::stepper::ClusterMember;
-use metachron_contact::{Agent, SetMotion, StepContext};
+use metachron_contact::{Agent, Input, Inputs, SetMotion, StepContext};
 use metachron_core::{
     Archive, ArchiveError, Body, Grip, Resolution, SimSpan, SimTime, Snapshot, StepError, StepReport, check_span,
 };
@@ -46,6 +46,11 @@ impl Tube {
     fn record_grips(&mut self, dt: f64) {
         self.grips.clear();
         self.grips.extend(self.ties.iter().map(|tie| Grip { by: tie.by, force_n: tie.impulse / dt }));
+    }
+
+    /// Whether it is held somewhere, so that nothing puts it elsewhere.
+    fn stays(&self) -> bool {
+        self.matter.held.contains(&true) || !self.spec.attachments.is_empty()
     }
 
     /// Whether the tube is at rest after a step of `dt` seconds; it is then stopped exactly.
@@ -101,15 +106,22 @@ impl Agent for Tube {
         self.script_from_s += by_s;
     }
 
+    fn inputs(&self) -> Inputs {
+        use Input::{Force, Place, Pressure, Resolution, Spring, State, Torque, Velocity};
+        let all = Inputs::of(&[Spring, Force, Torque, Place, Velocity, State, Pressure, Resolution]);
+        all.with(Place, !self.stays())
+    }
+
     fn set_pressure_pa(&mut self, pressure_pa: f64) -> bool {
         Self::set_pressure_pa(self, pressure_pa).is_ok()
     }
 
     /// A tube of which an end or a part is held stays where it is, and takes velocities.
     fn set_motion(&mut self, set: &SetMotion) -> bool {
-        let Self { now, matter, division, spec, .. } = self;
+        let stays = self.stays();
+        let Self { now, matter, division, .. } = self;
         let whole = WholeMotion::new(set, division.node_lengths_m().zip(now.x.iter().copied()));
-        if whole.shifts() && (matter.held.contains(&true) || !spec.attachments.is_empty()) {
+        if whole.shifts() && stays {
             return false;
         }
         let count = now.q.len();

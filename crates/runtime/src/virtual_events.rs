@@ -1,0 +1,52 @@
+//! What a run in virtual time knows of the turns to come: the phases of its agents, due turns, jobs in progress.
+//!
+//! In: nothing. Out: plain values, as an archive has them. Never here: when an event happens ([`super::lockstep`]).
+
+use std::cmp::Reverse;
+use std::collections::BinaryHeap;
+use std::time::Duration;
+
+/// Where an agent is between the events of its turns.
+#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
+pub(super) enum Phase {
+    Waiting,
+    /// In a turn.
+    Busy(Turn),
+    Resting,
+    Led,
+    Parked,
+}
+
+/// A turn that goes on.
+#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
+pub(super) struct Turn {
+    /// When it began.
+    pub since: Duration,
+    /// Its jobs that have not ended.
+    pub jobs: u32,
+    /// How many cores it keeps busy in the mean, ≥ 1.
+    pub cores: f64,
+}
+
+/// The events to come of a run in virtual time.
+#[derive(Default, serde::Serialize, serde::Deserialize)]
+pub(super) struct VirtualEvents {
+    /// Due times of turns.
+    pub due: BinaryHeap<Reverse<(Duration, u32)>>,
+    /// Service of the cores, and the jobs in progress.
+    pub served: u128,
+    pub jobs: BinaryHeap<Reverse<(u128, u32)>>,
+    /// For each agent its phase and how many turns it has made.
+    pub phases: Vec<(Phase, u64)>,
+}
+
+/// The number of the frame loop's own job: above every agent's, so that agents' jobs come first at equal end times.
+pub(super) const FRAME: u32 = u32::MAX;
+
+impl VirtualEvents {
+    /// The agents whose turns are due or in progress.
+    pub fn owners(&self) -> impl Iterator<Item = u32> {
+        let due = self.due.iter().map(|Reverse((_, agent))| *agent);
+        due.chain(self.jobs.iter().map(|Reverse((_, owner))| *owner)).filter(|owner| *owner != FRAME)
+    }
+}
