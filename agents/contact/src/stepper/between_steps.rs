@@ -3,11 +3,14 @@
 //! In: what participants remember; a solution. Out: contacts that start from it; memories, totals of pairs. Never here: rows of joints as they
 //! are laid out, the solve.
 
+use super::impacts::Struck;
 use super::memory::{Partner, Remembered};
 use super::pair_total::total_of;
+use super::search::Owner;
 use super::spin_friction::Spin;
 use super::ties::place_key;
-use super::{ClusterMember, ClusterStepper, Participant, search};
+use super::{ClusterMember, ClusterStepper, Outside, PairTotal, Participant, search};
+use crate::cluster::Contact;
 use glam::DVec3;
 use metachron_core::{SimSpan, Wrench};
 
@@ -25,35 +28,32 @@ impl ClusterStepper {
     /// Notes what the next step starts from.
     pub(super) fn remember(&mut self, all: &mut [Participant<'_>], h_s: f64, last: bool, dt: SimSpan) {
         self.remember_spins(all, h_s);
-        let Self { solver, search, ties, joints, outside, tearing, yielding, efforts, .. } = self;
+        let Self { solver, search, ties, joints, outside, tearing, yielding, efforts, impacts, .. } = self;
         let solution = solver.solution();
+        let mut sums = ContactSums { totals: &mut self.totals, wrenches: &mut self.wrenches, outside };
         for (k, (owner, contact)) in search.owners.iter().zip(&search.contacts).enumerate() {
             let impulse = solution.contacts_n_s[k];
             let owed_slip_m = contact.owed_slip_after(impulse, solution.contacts_m_s[k], h_s);
-            // a blow is over
-            let (lasting, spin) =
-                if contact.restitution > 0.0 { (DVec3::ZERO, Spin::default()) } else { (impulse, owner.spin) };
             let load_n = contact.load_n_s / h_s;
-            let place = Remembered { key: owner.key.anywhere(), force_n: lasting / h_s, load_n, owed_slip_m, spin };
+            let (force_n, spin) = (impulse / h_s, owner.spin);
+            let place = Remembered { key: owner.key.anywhere(), force_n, load_n, owed_slip_m, spin };
             all[owner.member].memory.pair(owner.partner).next.push(place);
-            outside.note(all, owner.member, &contact.sides[1], -impulse);
             if impulse != DVec3::ZERO {
-                let total = total_of(&mut self.totals, owner.member, owner.partner);
-                total.add(impulse, -contact.gap_m);
-                let skin = all[owner.member].member.skin();
-                let point_m = skin.map_or(DVec3::NAN, |skin| skin.point(&owner.place, -contact.normal));
-                let given = std::iter::once((owner.member, impulse)).chain(owner.other.map(|at| (at, -impulse)));
-                for (member, impulse_n_s) in given {
-                    give(&mut self.wrenches[member], &all[member].member, impulse_n_s, point_m);
-                }
-                if impulse.length() > total.most_n_s {
-                    (total.most_n_s, total.point_m, total.normal) = (impulse.length(), point_m, contact.normal);
-                    total.inverse_mass_per_kg = solver.inverse_masses(k, self.progress[owner.member].place);
-                }
+                sums.add(all, Gave { owner, contact, impulse }, || {
+                    solver.inverse_masses(k, self.progress[owner.member].place)
+                });
             } else if contact.gap_m < self.depth_m {
                 // no nearer than what bears something lies deep: the two touch, though nothing presses them together now
-                total_of(&mut self.totals, owner.member, owner.partner);
+                total_of(sums.totals, owner.member, owner.partner);
             }
+        }
+        for Struck { owner, contact, impulse_n_s, inverse_mass_per_kg } in &impacts.struck {
+            sums.add(all, Gave { owner, contact, impulse: *impulse_n_s }, || *inverse_mass_per_kg);
+        }
+        for (row, impulse) in &impacts.jolts {
+            let owner = &ties.owners[*row];
+            outside.note(all, owner.member, &ties.rows[*row].sides[1], -*impulse);
+            tearing.note(owner, *impulse);
         }
         for ((owner, row), impulse) in ties.owners.iter().zip(&ties.rows).zip(&solution.rows_n_s) {
             outside.note(all, owner.member, &row.sides[1], -*impulse);
@@ -98,6 +98,40 @@ impl ClusterStepper {
             owner.spin.owed_rad = row.owed_slip_after(impulse, a - b, most, h_s).dot(normal);
             owner.spin.torque_n_m = impulse.dot(normal) / h_s;
             outside.note(all, owner.member, &row.sides[1], -impulse);
+        }
+    }
+}
+
+/// What contacts give in a macro step: sums by pairs, by bodies, and by remote members.
+struct ContactSums<'a> {
+    totals: &'a mut Vec<PairTotal>,
+    wrenches: &'a mut [Wrench],
+    outside: &'a mut Outside,
+}
+
+/// What a contact gave, N·s.
+struct Gave<'a> {
+    owner: &'a Owner,
+    contact: &'a Contact,
+    impulse: DVec3,
+}
+
+impl ContactSums<'_> {
+    /// Adds what a contact gave; the inverse masses of its sides are asked for where it is the strongest of its pair.
+    fn add(&mut self, all: &[Participant<'_>], gave: Gave<'_>, inverse_mass_per_kg: impl FnOnce() -> [f64; 2]) {
+        let Gave { owner, contact, impulse } = gave;
+        self.outside.note(all, owner.member, &contact.sides[1], -impulse);
+        let total = total_of(self.totals, owner.member, owner.partner);
+        total.add(impulse, -contact.gap_m);
+        let skin = all[owner.member].member.skin();
+        let point_m = skin.map_or(DVec3::NAN, |skin| skin.point(&owner.place, -contact.normal));
+        let given = std::iter::once((owner.member, impulse)).chain(owner.other.map(|at| (at, -impulse)));
+        for (member, impulse_n_s) in given {
+            give(&mut self.wrenches[member], &all[member].member, impulse_n_s, point_m);
+        }
+        if impulse.length() > total.most_n_s {
+            (total.most_n_s, total.point_m, total.normal) = (impulse.length(), point_m, contact.normal);
+            total.inverse_mass_per_kg = inverse_mass_per_kg();
         }
     }
 }

@@ -9,9 +9,9 @@ use super::{ClusterMember, ClusterStepper, Participant, Role};
 const DIVIDED_MAX: u32 = 64;
 
 impl ClusterStepper {
-    /// Gives shorter steps to rigid members where blows follow each other in a fine step; whether they do.
-    pub(super) fn divide_blows(&mut self, all: &[Participant<'_>]) -> bool {
-        let Some(wanted) = self.rebounds.wanted_parts() else { return false };
+    /// Gives shorter steps to rigid members where impacts of a flying body follow each other in a fine step; whether they do.
+    pub(super) fn divide_impacts(&mut self, all: &[Participant<'_>]) -> bool {
+        let Some(wanted) = self.impacts.wanted_parts() else { return false };
         for (one, state) in all.iter().zip(&mut self.progress) {
             if one.member.role() == Role::Rigid {
                 state.parts = state.parts.max(wanted);

@@ -46,7 +46,9 @@ pub(super) struct Progress {
     pub touched: bool,
     pub held: bool,
     pub bears: bool,
-    /// What its blocks are to be carried by for blows that act later than its step begins, N·s² (eq. 27); empty for none.
+    /// Its velocities after the impacts of the fine step so far; empty for none.
+    pub struck: Vec<DVec3>,
+    /// By how much it is elsewhere than if the impacts of the fine step had come at its start, metres and radians (eq. 27); empty for none.
     pub late: Vec<DVec3>,
     /// Work of its steps within the macro step, in the unit of its model.
     pub work: f64,
@@ -71,7 +73,6 @@ impl Progress {
         self.given.clear();
         self.given.resize(now.len(), DVec3::ZERO);
         self.before.clone_from(&self.start);
-        self.late.clear();
         self.owed.clear();
         self.unanswered.clear();
         self.unanswered.resize(member.unanswered().len(), DVec3::ZERO);
@@ -100,7 +101,9 @@ impl Progress {
 
     /// Finds v̄(p), û and what they leave unanswered, of the fine step that begins (eq. 24).
     pub fn look(&mut self, member: &dyn ClusterMember) {
-        let Self { share, part, start, gain, given, before, known, seen, unanswered, owed, .. } = self;
+        let Self { share, part, start, gain, given, before, known, seen, unanswered, owed, struck, late, .. } = self;
+        struck.clear();
+        late.clear();
         let each = f64::from(*share).recip();
         unanswered.iter_mut().zip(member.unanswered()).for_each(|(r, more)| *r += *more * each);
         unanswered.iter_mut().zip(&*owed).for_each(|(r, more)| *r += *more * each);
@@ -109,6 +112,30 @@ impl Progress {
         known.extend(start.iter().zip(&*gain).zip(&*given).map(|((v, gain), given)| *v + *gain * s + *given));
         seen.clear();
         seen.extend(known.iter().zip(&*before).map(|(known, before)| *known * p - *before * (p - 1.0)));
+    }
+
+    /// The velocities at which an impact finds it: of its place, before what acts in the fine step but other impacts.
+    pub fn at_impact(&self) -> &[DVec3] {
+        if self.struck.is_empty() { &self.before } else { &self.struck }
+    }
+
+    /// Takes a share of the velocities that an impact leads to, `after_s` seconds into the fine step, with that share of what they leave
+    /// unanswered. It is moved by (27) from then on, also where its places are sought.
+    pub fn strike(&mut self, solved: &[DVec3], left: &[DVec3], share: f64, after_s: f64) {
+        if self.struck.is_empty() {
+            self.struck.extend_from_slice(&self.before);
+        }
+        self.late.resize(solved.len(), DVec3::ZERO);
+        let each = f64::from(self.part).recip();
+        for (at, solved) in solved.iter().enumerate() {
+            let change = (*solved - self.struck[at]) * share;
+            self.struck[at] += change;
+            self.given[at] += change * each;
+            self.known[at] += change * each;
+            self.seen[at] += change;
+            self.late[at] -= change * after_s;
+        }
+        self.unanswered.iter_mut().zip(left).for_each(|(r, more)| *r += *more * share);
     }
 
     /// Finds at which velocity its place moves by the last solve: where it `flies` if nothing holds it, in the mean of the fine step.

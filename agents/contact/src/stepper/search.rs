@@ -10,14 +10,16 @@ mod sweep;
 mod thinning;
 
 use super::domain::Domain;
+use super::impacts::APART_M;
 use super::memory::Partner;
 use super::scene::{ClusterScene, Passage};
 use super::spin_friction::Spin;
 use super::{ClusterMember, Participant, Progress, Role};
 use crate::cluster::Contact;
 use boxes::Boxes;
-pub(super) use facing::velocity;
+use facing::late_gap_m;
 use facing::{Skinned, closes, taken_up};
+pub(super) use facing::{solved_gap_m, velocity};
 use glam::DVec3;
 use metachron_geometry::narrow_phase::{NarrowPhaseScratch, StaticSolid, TouchKey, self_touches, touches};
 use metachron_geometry::{CollisionShape, Place, Touch};
@@ -46,8 +48,10 @@ pub(super) struct Owner {
     pub spin: Spin,
     /// The point of the participant's skin.
     pub place: Place,
-    /// When its sides meet, seconds from the start of the fine step; `None` where they do not rebound, or where that is not decided yet.
-    pub meets_s: Option<f64>,
+    /// Newton's coefficient of restitution of its pair, 0 to 1.
+    pub restitution: f64,
+    /// Its gap at the start of the fine step, metres.
+    pub starts_m: f64,
 }
 
 impl Owner {
@@ -124,6 +128,11 @@ impl<'a> Round<'a, '_> {
         matches!(self.judge, Judge::Foreseen)
     }
 
+    /// Whether a member may have come to move otherwise than the round before knew.
+    fn moves(&self, member: usize) -> bool {
+        !matches!(self.judge, Judge::Struck) || !self.progress[member].struck.is_empty()
+    }
+
     /// The velocities at which a member's place moves, as far as this round knows.
     fn moved(&self, member: usize) -> &'a [DVec3] {
         let state = &self.progress[member];
@@ -180,6 +189,8 @@ struct Look {
 pub(super) enum Judge {
     /// Those at the start and without contact, each side's alone too.
     Foreseen,
+    /// Those that impacts have led to so far.
+    Struck,
     /// Those of a solution.
     Solved,
 }
@@ -206,7 +217,7 @@ impl Search {
         self.thinning.begin();
         self.boxes.place(all, |member| {
             let (body, state) = (&all[member].member, &progress[member]);
-            body.speed_bound(&state.before).max(body.speed_bound(&state.seen))
+            [&state.before, &state.seen].map(|v| body.speed_bound(v))
         });
         self.boxes.near(NEAR_STEPS, h_s, &mut self.near);
         let apart =
@@ -221,7 +232,11 @@ impl Search {
         if (0..all.len()).all(|member| self.is_heap(member)) {
             return false;
         }
-        self.boxes.place(all, |member| all[member].member.speed_bound(round.moved(member)));
+        self.boxes.place(all, |member| {
+            let (body, late) = (&all[member].member, &round.progress[member].late);
+            let late_m = if late.is_empty() { 0.0 } else { body.speed_bound(late) };
+            [body.speed_bound(round.moved(member)) + late_m / h_s; 2]
+        });
         let mut pairs = std::mem::take(&mut self.again);
         pairs.clear();
         self.boxes.meeting(h_s, &mut pairs);
@@ -273,28 +288,29 @@ impl Search {
         let Round { all, h_s, .. } = *round;
         let Pair { member, against } = pair;
         let (Some(skin), Some(reach)) = (all[member].member.skin(), self.boxes.of(member)) else { return };
-        let (partner, form, bounds, their_m_s) = match against {
-            Against::Own => (Partner::Own, skin.form, reach.skin, reach.speed_m_s),
-            Against::Static { number, solid } => (Partner::Static(number), &solid.form, solid.bounds(), 0.0),
+        let (partner, form, bounds, [now_m_s, most_m_s]) = match against {
+            Against::Own => (Partner::Own, skin.form, reach.skin, [reach.now_m_s, reach.speed_m_s]),
+            Against::Static { number, solid } => (Partner::Static(number), &solid.form, solid.bounds(), [0.0; 2]),
             Against::Member(other) => {
                 let (Some(skin), Some(there)) = (all[other].member.skin(), self.boxes.of(other)) else { return };
-                (Partner::Agent(all[other].id), skin.form, there.skin, there.speed_m_s)
+                (Partner::Agent(all[other].id), skin.form, there.skin, [there.now_m_s, there.speed_m_s])
             }
         };
-        if skin.form.senses(form) {
+        let moves = |member: usize| round.moves(member);
+        if skin.form.senses(form) || !(moves(member) || pair.other().is_some_and(moves)) {
             return;
         }
-        let way_m = (reach.speed_m_s + their_m_s) * h_s;
+        let way_m = (reach.speed_m_s + most_m_s) * h_s;
         if !round.foresees() && !self.may_have_passed(member, partner, way_m) {
             return;
         }
         let reach_m = LOOK_M + way_m;
         self.touches.clear();
         let meets = reach.skin.grown(reach_m).meets(bounds);
-        // a blow acts where the sides meet, what goes far meets what is not near yet
-        let rebounds = skin.form.restitution_with(form) > 0.0 && way_m > 10.0 * MET_M;
-        let far_m = (reach_m > FAR_M).then_some(LOOK_M);
-        let swept_m = if rebounds { Some(MET_M) } else { far_m };
+        let restitution = skin.form.restitution_with(form);
+        // an impact acts where the sides meet, and a body that goes far meets others that are not near yet
+        let impact = restitution > 0.0 && (reach.now_m_s + now_m_s) * h_s > APART_M;
+        let swept_m = (impact || reach_m > FAR_M).then_some(LOOK_M);
         let at = if meets { self.touch(round, pair, Reaching { reach_m, swept_m }) } else { Meeting::default() };
         let clear_m = if at.after_s > 0.0 { 0.0 } else { reach_m };
         let spin = Spin { radius_m: skin.form.spin_radius_with_m(form), ..Spin::default() };
@@ -305,7 +321,8 @@ impl Search {
             key: TouchKey::default(),
             spin,
             place: Place::Point(DVec3::NAN),
-            meets_s: None,
+            restitution,
+            starts_m: 0.0,
         };
         self.take(round, pair, Found { owner, skins: [skin.form, form], at, clear_m });
     }
@@ -357,25 +374,30 @@ impl Search {
                 continue;
             }
             let opening_m_s = facing.opening_m_s(touch.normal, |member| round.moved(member));
-            let gap_m = touch.gap_m + facing.recess_m - opening_m_s * after_s;
+            let late_m = late_gap_m(&facing.sides, touch.normal, |member| &round.progress[member].late);
+            let at_start_m = if swept { opening_m_s * after_s + late_m } else { 0.0 };
+            let gap_m = touch.gap_m + facing.recess_m - at_start_m;
             let touch = Touch { gap_m, ..*touch };
-            let ends_m = gap_m + opening_m_s * round.h_s;
+            let owner = Owner { starts_m: gap_m, ..owner };
+            let ends_m = gap_m + late_m + opening_m_s * round.h_s;
             let taken = match round.judge {
                 Judge::Foreseen if swept => ends_m < LOOK_M,
                 Judge::Foreseen => closes(&touch, &facing, round.progress, round.h_s),
-                Judge::Solved => match owners[..*known].binary_search_by_key(&owner.name(), Owner::name) {
-                    Err(_) => ends_m < 0.0,
-                    // on its way it meets another place than the one it was kept from
-                    Ok(at) if swept && ends_m < -LOOK_M => {
-                        let Contact { warm_n_s, load_n_s, owed_slip_m, .. } = contacts[at];
-                        let found = taken_up(round, &owner, &touch, &Skinned { facing: &facing, skins });
-                        contacts[at] = Contact { warm_n_s, load_n_s, owed_slip_m, ..found };
-                        owners[at].meets_s = None;
-                        *moved = true;
-                        false
+                Judge::Struck | Judge::Solved => {
+                    match owners[..*known].binary_search_by_key(&owner.name(), Owner::name) {
+                        Err(_) => ends_m < 0.0,
+                        // on its way it meets another place than the one it was kept from
+                        Ok(at) if swept && ends_m < -LOOK_M => {
+                            let Contact { warm_n_s, load_n_s, owed_slip_m, .. } = contacts[at];
+                            let found = taken_up(round, &owner, &touch, &Skinned { facing: &facing, skins });
+                            contacts[at] = Contact { warm_n_s, load_n_s, owed_slip_m, ..found };
+                            owners[at].starts_m = gap_m;
+                            *moved = true;
+                            false
+                        }
+                        Ok(_) => false,
                     }
-                    Ok(_) => false,
-                },
+                }
             };
             if taken && thinning.note(round, pair, &owner, &touch) {
                 owners.push(owner);
@@ -390,12 +412,12 @@ impl Search {
         }
     }
 
-    /// Keeps the contacts of those owners for which `keep` is true; the pairs of others are looked at again after the solve.
-    pub fn retain(&mut self, keep: impl Fn(&Owner) -> bool) {
+    /// Keeps the contacts at those places for which `keep` is true; the pairs of others are looked at again after the solve.
+    pub fn retain(&mut self, keep: impl Fn(usize) -> bool) {
         let Self { contacts, owners, looks, .. } = self;
         let mut kept = 0;
         for at in 0..contacts.len() {
-            if !keep(&owners[at]) {
+            if !keep(at) {
                 let pair = (owners[at].member, owners[at].partner);
                 if let Ok(look) = looks.binary_search_by_key(&pair, |look| (look.member, look.partner)) {
                     looks[look].clear_m = 0.0;
@@ -408,6 +430,15 @@ impl Search {
         }
         contacts.truncate(kept);
         owners.truncate(kept);
+    }
+
+    /// Finds the gaps of all contacts anew where impacts that came later than the start of the step have moved bodies, of the gap then and by how
+    /// much that has changed.
+    pub fn move_late(&mut self, progress: &[Progress], gap_m: impl Fn(f64, f64) -> f64) {
+        for (contact, owner) in self.contacts.iter_mut().zip(&self.owners) {
+            let late_m = late_gap_m(&contact.sides, contact.normal, |member| &progress[member].late);
+            contact.gap_m = gap_m(owner.starts_m, late_m);
+        }
     }
 
     /// Contacts in the order of their names: sums are then the same whatever found them first.

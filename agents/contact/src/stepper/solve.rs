@@ -5,10 +5,10 @@
 
 use super::joints::Aimed;
 use super::progress::Progress;
-use super::search::{Judge, Round, Search};
-use super::ties::Ties;
+use super::guarded::Lent;
+use super::search::{Judge, Round};
 use super::{ClusterMember, ClusterReport, ClusterStepper, On, Participant, Role, times};
-use crate::cluster::{Member, Problem, ProblemError, Response, StepForm};
+use crate::cluster::{Contact, JointRow, Member, Problem, ProblemError, Report, Response, Solver, StepForm};
 use glam::DVec3;
 use metachron_core::{ParallelFor, StepError, recycled};
 
@@ -64,7 +64,7 @@ impl ClusterStepper {
                 macro_s,
                 progress,
                 depth_m,
-                rebounds,
+                impacts,
                 ..
             } = &mut *self;
             let solution = solver.solution();
@@ -81,9 +81,10 @@ impl ClusterStepper {
             }
             let Aimed { miss_m, turn_rad } = joints.aim(all, ties, |member| &progress[member].solved[..], h_s);
             let joints_done = miss_m < joint_miss_m(*depth_m) || miss_m > last_miss_m;
+            let landed = impacts.land(search, progress);
             let look = Round { scene: on.scene, all, progress, h_s, judge: Judge::Solved };
             // what is added is solved
-            let passed = round < ROUNDS_MAX && search.add_passed(&look);
+            let passed = round < ROUNDS_MAX && search.add_passed(&look) | landed;
             // with other contacts joints start anew
             last_miss_m = if passed { f64::INFINITY } else { miss_m };
             let holds = miss_m < joint_miss_m(*depth_m);
@@ -94,11 +95,6 @@ impl ClusterStepper {
             missed_m = if holds { *joints_missed_m } else { miss_m };
             if round == ROUNDS_MAX || !passed && joints_done {
                 break;
-            }
-            rebounds.stop(search);
-            if rebounds.wanted_parts().is_some() {
-                // the step is made again in shorter ones
-                return Ok(());
             }
         }
         self.joints_missed_m = missed_m;
@@ -113,56 +109,15 @@ impl ClusterStepper {
         threads: &dyn ParallelFor,
         report: &mut ClusterReport,
     ) -> Result<(), StepError> {
-        let Self { solver, search, ties, progress, members, lent, .. } = self;
-        // what no row touches and knows how it would move does so, and makes no problem larger
-        let mut count = 0..;
-        progress.iter_mut().for_each(|state| state.place = (!state.unanswered.is_empty()).then_some(0));
-        let sides = search.contacts.iter().flat_map(|c| &c.sides).chain(ties.rows.iter().flat_map(|row| &row.sides));
-        sides.filter(|side| !side.terms().is_empty()).for_each(|side| progress[side.member].place = Some(0));
-        let involved = progress.iter_mut().filter(|state| state.place.is_some());
-        involved.for_each(|state| state.place = count.next());
-        let (mut list, mut lenders) = (recycled(std::mem::take(members)), recycled(std::mem::take(lent)));
-        let taking = || all.iter().zip(&*progress).filter(|(_, state)| state.place.is_some());
-        lenders.extend(taking().map(|(one, _)| one.member.lent()));
-        list.extend(taking().zip(&lenders).map(|((one, state), lender)| Member {
-            blocks: one.member.blocks(),
-            response: lender.as_ref().map(|lender| lender as &dyn Response),
-            free: &state.seen,
-            unanswered: &state.unanswered,
-            now: &state.before,
-            share: f64::from(state.part),
-        }));
-        move_sides(search, ties, |member| progress[member].place);
-        let has_factor = |member: &Member<'_>| member.response.is_some() || member.free.len() <= FACTORED_BLOCKS_MAX;
-        solver.set_form(if list.iter().all(has_factor) { StepForm::Direct } else { StepForm::Iterative });
-        let problem = Problem { h_s, members: &list, contacts: &search.contacts, rows: &ties.rows, threads };
-        let outcome = solver.solve(&problem).map(|solution| solution.report);
-        (*members, *lent) = (recycled(list), recycled(lenders));
-        let places = &mut self.places;
-        places.clear();
-        places.extend(progress.iter().enumerate().filter_map(|(member, state)| state.place.map(|_| member)));
-        move_sides(search, ties, |place| places.get(place).copied());
-        let took = outcome.map_err(|error| {
-            blame(&error, all, places);
-            refused(&error, h_s)
-        })?;
-        // a blow that would make energy is none
-        for (contact, rebounds) in search.contacts.iter_mut().zip(&solver.solution().rebounds) {
-            if !rebounds {
-                contact.restitution = 0.0;
-            }
-        }
+        let Self { solver, search, ties, progress, members, lent, places, .. } = self;
+        let (contacts, rows) = (&mut search.contacts[..], &mut ties.rows[..]);
+        let posed = Posed { contacts, rows, h_s, threads, free: |state| &state.seen, open: |state| &state.unanswered };
+        report.add(&posed.solve(solver, all, progress, Store { members, lent, places })?);
         for state in &mut *progress {
             let Progress { solved, seen, place, .. } = state;
             solved.clear();
             solved.extend_from_slice(place.map_or(&seen[..], |place| solver.solution().velocities(place)));
         }
-        report.factors += took.factors as u32;
-        report.products += took.products as u32;
-        report.passes += took.passes as u32;
-        report.solves += 1;
-        report.convex += u32::from(took.passes > 0);
-        report.cut += u32::from(took.cut);
         Ok(())
     }
 
@@ -173,8 +128,7 @@ impl ClusterStepper {
         progress.iter_mut().for_each(|state| state.bears = false);
         let mut hold = |both: &mut dyn Iterator<Item = usize>| both.for_each(|member| progress[member].bears = true);
         for (k, impulse) in solution.contacts_n_s.iter().enumerate() {
-            // a blow is over when the step begins: the flight after it is free
-            if *impulse != DVec3::ZERO && search.contacts[k].restitution == 0.0 {
+            if *impulse != DVec3::ZERO {
                 hold(&mut search.owners[k].both());
             }
         }
@@ -190,22 +144,97 @@ impl ClusterStepper {
 
     /// Gives every member the impulses found.
     fn give(&mut self, report: &mut ClusterReport) {
-        let Self { solver, search, progress, rebounds, .. } = self;
+        let Self { solver, search, progress, .. } = self;
         for state in &mut *progress {
             let left = state.place.map_or(&[][..], |place| solver.solution().unanswered(place));
             state.take(left);
         }
-        rebounds.note_late(search, &solver.solution().contacts_n_s, progress);
         progress.iter_mut().filter(|state| state.bears).for_each(Progress::hold);
         report.contacts = search.contacts.len() as u32;
         report.depth_m = search.contacts.iter().map(|contact| -contact.gap_m).fold(report.depth_m, f64::max);
     }
 }
 
+/// A problem among the members of a cluster: some contacts and rows, members at some velocities.
+pub(super) struct Posed<'a> {
+    pub contacts: &'a mut [Contact],
+    pub rows: &'a mut [JointRow],
+    /// The step, seconds.
+    pub h_s: f64,
+    pub threads: &'a dyn ParallelFor,
+    /// The velocities of a member without the impulses sought, and the momentum that they leave open; what has some takes part.
+    pub free: fn(&Progress) -> &[DVec3],
+    pub open: fn(&Progress) -> &[DVec3],
+}
+
+/// Reusable storage of a problem, and the participant of each of its members.
+pub(super) struct Store<'a> {
+    pub members: &'a mut Vec<Member<'static>>,
+    pub lent: &'a mut Vec<Option<Lent<'static>>>,
+    pub places: &'a mut Vec<usize>,
+}
+
+impl Posed<'_> {
+    /// Solves it; every participant knows its place in the answer then, if it has one.
+    pub fn solve(
+        self,
+        solver: &mut Solver,
+        all: &[Participant<'_>],
+        progress: &mut [Progress],
+        store: Store<'_>,
+    ) -> Result<Report, StepError> {
+        let Self { contacts, rows, h_s, threads, free, open } = self;
+        let Store { members, lent, places } = store;
+        // what no row touches and knows how it would move does so, and makes no problem larger
+        let mut count = 0..;
+        progress.iter_mut().for_each(|state| state.place = (!open(state).is_empty()).then_some(0));
+        let sides = contacts.iter().flat_map(|c| &c.sides).chain(rows.iter().flat_map(|row| &row.sides));
+        sides.filter(|side| !side.terms().is_empty()).for_each(|side| progress[side.member].place = Some(0));
+        let involved = progress.iter_mut().filter(|state| state.place.is_some());
+        involved.for_each(|state| state.place = count.next());
+        let (mut list, mut lenders) = (recycled(std::mem::take(members)), recycled(std::mem::take(lent)));
+        let taking = || all.iter().zip(&*progress).filter(|(_, state)| state.place.is_some());
+        lenders.extend(taking().map(|(one, _)| one.member.lent()));
+        list.extend(taking().zip(&lenders).map(|((one, state), lender)| Member {
+            blocks: one.member.blocks(),
+            response: lender.as_ref().map(|lender| lender as &dyn Response),
+            free: free(state),
+            unanswered: open(state),
+            now: &state.before,
+            share: f64::from(state.part),
+        }));
+        move_sides(contacts, rows, |member| progress[member].place);
+        let has_factor = |member: &Member<'_>| member.response.is_some() || member.free.len() <= FACTORED_BLOCKS_MAX;
+        solver.set_form(if list.iter().all(has_factor) { StepForm::Direct } else { StepForm::Iterative });
+        let problem = Problem { h_s, members: &list, contacts, rows, threads };
+        let outcome = solver.solve(&problem).map(|solution| solution.report);
+        (*members, *lent) = (recycled(list), recycled(lenders));
+        places.clear();
+        places.extend(progress.iter().enumerate().filter_map(|(member, state)| state.place.map(|_| member)));
+        move_sides(contacts, rows, |place| places.get(place).copied());
+        outcome.map_err(|error| {
+            blame(&error, all, places);
+            refused(&error, h_s)
+        })
+    }
+}
+
+impl ClusterReport {
+    /// Counts a solve.
+    pub(super) fn add(&mut self, took: &Report) {
+        self.factors += took.factors as u32;
+        self.products += took.products as u32;
+        self.passes += took.passes as u32;
+        self.solves += 1;
+        self.convex += u32::from(took.passes > 0);
+        self.cut += u32::from(took.cut);
+    }
+}
+
 /// Counts the members of all sides anew.
-fn move_sides(search: &mut Search, ties: &mut Ties, to: impl Fn(usize) -> Option<usize>) {
-    let contacts = search.contacts.iter_mut().flat_map(|contact| &mut contact.sides);
-    let sides = contacts.chain(ties.rows.iter_mut().flat_map(|row| &mut row.sides));
+fn move_sides(contacts: &mut [Contact], rows: &mut [JointRow], to: impl Fn(usize) -> Option<usize>) {
+    let contacts = contacts.iter_mut().flat_map(|contact| &mut contact.sides);
+    let sides = contacts.chain(rows.iter_mut().flat_map(|row| &mut row.sides));
     for side in sides.filter(|side| !side.terms().is_empty()) {
         side.member = to(side.member).unwrap_or(side.member);
     }

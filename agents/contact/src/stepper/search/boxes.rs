@@ -16,6 +16,8 @@ pub(super) struct Reach {
     pub skin: Aabb,
     /// The fastest speed of any point of it, m/s.
     pub speed_m_s: f64,
+    /// The same as the step begins.
+    pub now_m_s: f64,
     /// How long a step it makes alone, seconds.
     alone_s: f64,
 }
@@ -29,12 +31,13 @@ pub(super) struct Boxes {
 }
 
 impl Boxes {
-    /// Places the boxes of `all` anew; `speed_m_s` says how fast each member may move.
-    pub fn place(&mut self, all: &[Participant<'_>], speed_m_s: impl Fn(usize) -> f64) {
+    /// Places the boxes of `all` anew; `speeds_m_s` says how fast each member moves as the step begins, and how fast without contact.
+    pub fn place(&mut self, all: &[Participant<'_>], speeds_m_s: impl Fn(usize) -> [f64; 2]) {
         self.reaches.clear();
         let reach = |(member, one): (usize, &Participant<'_>)| {
             let skin = one.member.skin()?.bounds();
-            Some(Reach { skin, speed_m_s: speed_m_s(member), alone_s: one.alone_s })
+            let [now_m_s, later_m_s] = speeds_m_s(member);
+            Some(Reach { skin, speed_m_s: now_m_s.max(later_m_s), now_m_s, alone_s: one.alone_s })
         };
         self.reaches.extend(all.iter().enumerate().map(reach));
         self.along_x.clear();

@@ -4,7 +4,7 @@
 
 use super::super::Progress;
 use super::super::remote;
-use super::{LOOK_M, Owner, Pair, Round};
+use super::{Judge, LOOK_M, Owner, Pair, Round};
 use crate::cluster::{Contact, Side};
 use crate::stepper::ClusterMember;
 use glam::DVec3;
@@ -56,6 +56,22 @@ impl Facing {
     }
 }
 
+/// By how much impacts of the fine step that came later than its start change the gap of a contact (eq. 27), metres.
+pub(in super::super) fn late_gap_m<'a>(sides: &[Side; 2], normal: DVec3, late: impl Fn(usize) -> &'a [DVec3]) -> f64 {
+    let [a, b] = sides.each_ref().map(|side| match side.terms() {
+        [] => DVec3::ZERO,
+        _ if late(side.member).is_empty() => DVec3::ZERO,
+        _ => side.velocity(late(side.member)),
+    });
+    (a - b).dot(normal)
+}
+
+/// The gap of a contact for the solve of a step whose impacts change it by `late_m`. Sides that this brings into each other are so at the start
+/// of the step alone: they are pushed apart by no more than they lie in each other.
+pub(in super::super) fn solved_gap_m(gap_m: f64, late_m: f64) -> f64 {
+    (gap_m + late_m).max(gap_m.min(0.0))
+}
+
 /// The velocity of a side with the velocities `of` its member, m/s; zero for one that does not move.
 pub(in super::super) fn velocity<'a>(side: &Side, of: impl Fn(usize) -> &'a [DVec3]) -> DVec3 {
     if side.terms().is_empty() { DVec3::ZERO } else { side.velocity(of(side.member)) }
@@ -82,12 +98,15 @@ pub(super) struct Skinned<'a> {
 /// A contact of the problem; from what is stepped elsewhere it comes out in that one's steps.
 pub(super) fn taken_up(round: &Round<'_, '_>, owner: &Owner, touch: &Touch, sides: &Skinned<'_>) -> Contact {
     let late_s = owner.other.map_or(0.0, |other| round.all[other].member.answers_after_s());
-    let found = contact(touch, sides.facing, sides.skins, round.progress);
+    let found = contact(touch, sides.facing, sides.skins);
+    let late_m = late_gap_m(&found.sides, found.normal, |member| &round.progress[member].late);
+    let collides = matches!(round.judge, Judge::Struck);
+    let gap_m = if collides { touch.gap_m + late_m } else { solved_gap_m(touch.gap_m, late_m) };
     let let_go_m_s = remote::slower_push_out(touch, round.scene.depth_m(), round.h_s, late_s);
-    Contact { surface_m_s: found.surface_m_s + let_go_m_s, ..found }
+    Contact { gap_m, surface_m_s: found.surface_m_s + let_go_m_s, ..found }
 }
 
-fn contact(touch: &Touch, facing: &Facing, skins: [&CollisionShape; 2], progress: &[Progress]) -> Contact {
+fn contact(touch: &Touch, facing: &Facing, skins: [&CollisionShape; 2]) -> Contact {
     let Facing { sides, led_m_s, .. } = *facing;
     let surface_m_s = led_m_s[1] - led_m_s[0];
     let tangent = touch.normal.any_orthonormal_vector();
@@ -97,9 +116,7 @@ fn contact(touch: &Touch, facing: &Facing, skins: [&CollisionShape; 2], progress
         tangents: [tangent, touch.normal.cross(tangent)],
         gap_m: touch.gap_m,
         friction: skins[0].friction_with(skins[1]),
-        restitution: skins[0].restitution_with(skins[1]),
-        approach_m_s: -facing.opening_m_s(touch.normal, |member| &progress[member].before),
-        gained_m_s: 0.0,
+        parting_m_s: 0.0,
         surface_m_s,
         owed_slip_m: DVec3::ZERO,
         warm_n_s: DVec3::ZERO,

@@ -5,7 +5,7 @@
 
 use super::{Against, Pair, Round};
 use crate::stepper::ClusterMember;
-use glam::DVec3;
+use glam::{DQuat, DVec3};
 use metachron_geometry::narrow_phase::{NarrowPhaseScratch, SweptReach, SweptShape, first_touch};
 use metachron_geometry::{ShapePose, Touch};
 
@@ -67,18 +67,33 @@ impl Sweep {
                 (first_touch(&here, &there, reach, scratch, into), way(&there))
             }
         };
-        let ways = [way(&here), their_way];
+        let other = if let Against::Member(other) = pair.against { late_m(round, other) } else { DVec3::ZERO };
+        let (ways, late) = ([way(&here), their_way], [late_m(round, pair.member), other]);
         share.map_or(Sweeping::Passes, |share| {
-            Sweeping::Meets(Meeting { after_s: share * round.h_s, ways: ways.map(|way| way * share) })
+            let ways = [0, 1].map(|side| ways[side] * share + late[side]);
+            Sweeping::Meets(Meeting { after_s: share * round.h_s, ways })
         })
     }
 }
 
-/// The skin of a member now and at the end of the fine step.
+/// The skin of a member now and at the end of the fine step: after impacts, on the way on which it is then.
 fn swept<'a>(round: &Round<'a, '_>, member: usize, nodes: &'a mut Vec<DVec3>) -> Option<SweptShape<'a>> {
     let body = &round.all[member].member;
-    let end = body.skin_after(round.moved(member), round.h_s, nodes)?;
-    Some(SweptShape { start: body.skin()?, end })
+    let mut shape = SweptShape { end: body.skin_after(round.moved(member), round.h_s, nodes)?, start: body.skin()? };
+    for placed in [&mut shape.start, &mut shape.end] {
+        if let (ShapePose::Solid { position, rotation }, &[way_m, turn]) =
+            (&mut placed.view, &round.progress[member].late[..])
+        {
+            *position += way_m;
+            *rotation = DQuat::from_scaled_axis(turn) * *rotation;
+        }
+    }
+    Some(shape)
+}
+
+/// By how much impacts that came later than the start of the step have moved the way of a solid, metres.
+fn late_m(round: &Round<'_, '_>, member: usize) -> DVec3 {
+    round.progress[member].late.first().copied().unwrap_or_default()
 }
 
 /// How far a solid or a tool goes, metres; what bends has no place of its own.

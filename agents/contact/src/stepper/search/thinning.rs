@@ -3,7 +3,7 @@
 //! In: the contacts found of a pair, the cells that carry their places. Out: which of them are kept. Never here: how they were found.
 //! Theory: docs/theory/contact.md, section 3.
 
-use super::{Judge, Owner, Pair, Round};
+use super::{Owner, Pair, Round};
 use crate::cluster::Contact;
 use crate::stepper::ClusterMember;
 use crate::stepper::memory::Partner;
@@ -82,7 +82,7 @@ impl Thinning {
             cells,
             axis: nearest_axis(touch.normal),
         });
-        if matches!(round.judge, Judge::Solved) && patch.is_some_and(|patch| self.full.binary_search(&patch).is_ok()) {
+        if !round.foresees() && patch.is_some_and(|patch| self.full.binary_search(&patch).is_ok()) {
             return false;
         }
         let load_n =

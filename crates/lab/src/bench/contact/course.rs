@@ -35,8 +35,8 @@ pub(super) struct Course {
     pub made_j: f64,
     pub lost_j: f64,
     /// What energies are sums over: the least so far and the first.
-    least_j: f64,
-    first_j: f64,
+    pub least_j: f64,
+    pub first_j: f64,
 }
 
 impl Course {

@@ -123,7 +123,7 @@ fn cases(quick: bool) -> Vec<Case> {
         let together = if heap { "a heap" } else { "one problem" };
         let seconds = if quick { 0.4 } else { 1.5 };
         all.push(Case::new("pile", format!("{together}, e {restitution}"), seconds, move || {
-            Ok(rigid_scenes::pile(heap)?.rebounding(restitution))
+            Ok(rigid_scenes::pile("pile", heap)?.rebounding(restitution))
         }));
     }
     for seed in 1..=if quick { 2 } else { 20 } {

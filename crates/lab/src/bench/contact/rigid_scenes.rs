@@ -46,9 +46,9 @@ fn hinge_about(axis: DVec3) -> JointKind {
     JointKind::Revolute { axis, range_rad: None, motor: None }
 }
 
-/// The scene `pile`; as one problem where `heap` is off, because a rule of its own keeps a body out of rapier3d's heap.
-pub(super) fn pile(heap: bool) -> anyhow::Result<Stage> {
-    let scene = load(&Source::open("pile")?, &[])?;
+/// The scene `pile`, by its name or path; as one problem where `heap` is off, because a rule of its own keeps a body out of rapier3d's heap.
+pub(super) fn pile(source: &str, heap: bool) -> anyhow::Result<Stage> {
+    let scene = load(&Source::open(source)?, &[])?;
     let mut bodies = Vec::with_capacity(scene.agents.len());
     for member in &scene.agents {
         let Spec::Rigid(spec) = &member.spec else { bail!("`{}` is not a rigid body", member.name) };
