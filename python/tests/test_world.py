@@ -111,7 +111,7 @@ def test_a_pose_leads_a_plate_that_feels_its_load_and_a_state_is_set_back() -> N
     world.set_state("ball", before)
     world.advance(0.01)
     assert world.state("ball").positions[0] == pytest.approx(before.positions[0], abs=0.01)
-    with pytest.raises(ValueError, match="own kind"):
+    with pytest.raises(ValueError, match="takes no other states"):
         world.set_state("plate", before)
     with pytest.raises(KeyError, match="no sensor"):
         world.sensor("nose")
