@@ -10,11 +10,11 @@ defaults (Newton, pyramidal cones, Euler). The boxes of `pile` are scattered as 
 """
 
 import argparse
-import json
 import math
-import platform
 import sys
 import time
+
+import report
 
 GRAVITY = 9.81
 # The part of a run in which bodies are held to lie still, seconds before its end.
@@ -145,18 +145,6 @@ SCENES = [
 ]
 
 
-def processor():
-    """The processor's name, as the benchmark gives it."""
-    try:
-        with open("/proc/cpuinfo", encoding="utf-8") as lines:
-            for line in lines:
-                if line.startswith("model name"):
-                    return line.split(":", 1)[1].strip()
-    except OSError:
-        pass
-    return platform.processor() or platform.machine()
-
-
 def share(sorted_list, of):
     return sorted_list[round(of * (len(sorted_list) - 1))]
 
@@ -211,10 +199,7 @@ def main():
     parser.add_argument("out", nargs="?", help="where the JSON goes; standard output where not given")
     parser.add_argument("--only", action="append", default=[], help="only tests whose names begin with this")
     arguments = parser.parse_args()
-    try:
-        import mujoco
-    except ImportError:
-        sys.exit("this needs MuJoCo's Python module, which is not installed: pip install mujoco")
+    mujoco = report.load_mujoco()
     rows = []
     for test, seconds, scene in SCENES:
         if arguments.only and not any(test.startswith(name) for name in arguments.only):
@@ -225,17 +210,7 @@ def main():
             continue
         rows.append(row)
         print(f"{test}: {row['ms_p50']} ms a step, {row['cpu_s']} s in all", file=sys.stderr)
-    lines = ",\n".join(f"    {json.dumps(row)}" for row in rows)
-    heads = f'  "engine": {json.dumps(f"MuJoCo {mujoco.__version__}")},\n  "machine": {json.dumps(processor())},\n'
-    text = "{\n" + heads + f'  "rows": [\n{lines}\n  ]\n}}\n'
-    if arguments.out is None:
-        sys.stdout.write(text)
-        return
-    try:
-        with open(arguments.out, "w", encoding="utf-8") as out:
-            out.write(text)
-    except OSError as error:
-        sys.exit(f"{arguments.out} cannot be written: {error.strerror}")
+    report.write(f"MuJoCo {mujoco.__version__}", rows, arguments.out)
 
 
 if __name__ == "__main__":

@@ -10,10 +10,10 @@ the lattice into tetrahedra, which are stiffer than the cells of metachron: its 
 """
 
 import argparse
-import json
-import platform
 import sys
 import time
+
+import report
 
 SIZE_M = 0.1
 MASS_KG = 1.05
@@ -48,18 +48,6 @@ CUBE = """
 def integrator(mujoco):
     """The integrator that takes elasticity implicitly: `discrete` where there is one, else `implicitfast`."""
     return "discrete" if hasattr(mujoco.mjtIntegrator, "mjINT_DISCRETE") else "implicitfast"
-
-
-def processor():
-    """The processor's name, as `metachron bench soft` gives it."""
-    try:
-        with open("/proc/cpuinfo", encoding="utf-8") as lines:
-            for line in lines:
-                if line.startswith("model name"):
-                    return line.split(":", 1)[1].strip()
-    except OSError:
-        pass
-    return platform.processor() or platform.machine()
 
 
 def run(mujoco, nodes_along):
@@ -106,10 +94,7 @@ def main():
     parser = argparse.ArgumentParser(description=__doc__.split("\n", 1)[0])
     parser.add_argument("out", nargs="?", help="where the JSON goes; standard output where not given")
     arguments = parser.parse_args()
-    try:
-        import mujoco
-    except ImportError:
-        sys.exit("this needs MuJoCo's Python module, which is not installed: pip install mujoco")
+    mujoco = report.load_mujoco()
     rows = []
     for nodes_along in EDGES:
         row, took_s = run(mujoco, nodes_along)
@@ -117,18 +102,7 @@ def main():
         print(f"{row['nodes']} nodes: {row['ms_a_step']} ms a step, sag {row['sag_m'] * 1e3:.3f} mm", file=sys.stderr)
         if took_s > PATIENCE_S:
             break
-    engine = f"MuJoCo {mujoco.__version__}, flex, {integrator(mujoco)}"
-    lines = ",\n".join(f"    {json.dumps(row)}" for row in rows)
-    heads = f'  "engine": {json.dumps(engine)},\n  "machine": {json.dumps(processor())},\n'
-    text = "{\n" + heads + f'  "rows": [\n{lines}\n  ]\n}}\n'
-    if arguments.out is None:
-        sys.stdout.write(text)
-        return
-    try:
-        with open(arguments.out, "w", encoding="utf-8") as out:
-            out.write(text)
-    except OSError as error:
-        sys.exit(f"{arguments.out} cannot be written: {error.strerror}")
+    report.write(f"MuJoCo {mujoco.__version__}, flex, {integrator(mujoco)}", rows, arguments.out)
 
 
 if __name__ == "__main__":

@@ -3,11 +3,11 @@
 //! In: sizes, seeds. Out: stages. Never here: rigid bodies alone, measurements.
 
 use super::super::super::chart::GRAVITY;
-use super::super::soft::bodies::{cube, falling_sheet};
+use super::super::soft::bodies::{self, cube, falling_sheet};
 use super::rigid_scenes::STEP_S;
 use super::stage::{Body, Stage, block, drawn, rigid, walls};
 use glam::{DQuat, DVec3};
-use metachron_geometry::{ContactTraits, Solid};
+use metachron_geometry::Solid;
 use metachron_models::rigid::RigidSpec;
 use metachron_models::rod::{Material, Section, TubeSpec};
 use metachron_models::soft::{MaterialLaw, SoftMatter, SoftShape, SoftSpec};
@@ -22,20 +22,7 @@ fn soft(shape: SoftShape, position: DVec3, young_pa: f64) -> SoftSpec {
         damping_s: 0.0,
         law: MaterialLaw::Corotational,
     };
-    SoftSpec {
-        shape,
-        nodes: None,
-        matter,
-        position,
-        rotation: DQuat::IDENTITY,
-        velocity: DVec3::ZERO,
-        held: Vec::new(),
-        friction: 0.5,
-        traits: ContactTraits::default(),
-        gravity: DVec3::NEG_Z * GRAVITY,
-        self_contact: false,
-        sleep: false,
-    }
+    bodies::soft(shape, matter, position)
 }
 
 fn solid(middle: DVec3, size_m: DVec3, segments: [u32; 3], young_pa: f64) -> SoftSpec {

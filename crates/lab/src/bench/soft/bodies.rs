@@ -33,7 +33,8 @@ const TISSUE: SoftMatter = SoftMatter {
     law: MaterialLaw::Corotational,
 };
 
-fn soft(shape: SoftShape, matter: SoftMatter, position: DVec3) -> SoftSpec {
+/// A free soft body.
+pub(in super::super) fn soft(shape: SoftShape, matter: SoftMatter, position: DVec3) -> SoftSpec {
     SoftSpec {
         shape,
         nodes: None,
