@@ -1,4 +1,4 @@
-//! What an agent takes of what users do to it.
+//! The kinds of input from users that an agent takes.
 //!
 //! In: the kinds that a model names ([`super::Agent::inputs`]), and those that a command needs. Out: which of these the agent does not take, in words.
 //! Never here: commands themselves, what a model makes of them.

@@ -67,7 +67,7 @@ pub(super) struct Cut {
 /// Agents that are not in the run, made for a state that has them, by their numbers.
 type Made = BTreeMap<usize, Box<AgentRunner>>;
 
-/// What an agent kept to itself before a state was read into it, by its number.
+/// The bytes of what each agent kept to itself before a state was read into it, by numbers.
 type OwnStates = Vec<(usize, Vec<u8>)>;
 
 impl Cut {

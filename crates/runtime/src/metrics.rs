@@ -182,7 +182,7 @@ pub(super) struct Metrics {
     reason: ArcSwapOption<String>,
 }
 
-/// What a checkpoint has of [`Metrics`].
+/// The part of [`Metrics`] that a checkpoint has.
 #[derive(Debug, Clone, Default, serde::Serialize, serde::Deserialize)]
 pub(super) struct MetricsValues {
     counts: [u64; 7],

@@ -23,7 +23,7 @@ pub(super) struct Model {
     broken: Option<Box<str>>,
 }
 
-/// What a model says of itself once, at the start.
+/// The traits of a model, asked once at the start.
 #[derive(Debug)]
 pub(super) struct Traits {
     pub model: &'static str,
@@ -73,7 +73,7 @@ impl Model {
         drop(self.call(|agent| black_box(agent.resolution())));
     }
 
-    /// It as a member of clusters, for a step that begins; `None` of one that is none.
+    /// The model as a member of clusters, for a step that begins; `None` of a model that is no member.
     ///
     /// # Errors
     /// As [`Self::call`].
@@ -135,7 +135,7 @@ impl Drop for Model {
     }
 }
 
-/// What is left of a model that is freed.
+/// The remains of a model that is freed.
 struct Nothing;
 
 impl Agent for Nothing {

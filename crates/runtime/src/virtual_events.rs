@@ -1,4 +1,4 @@
-//! What a run in virtual time knows of the turns to come: the phases of its agents, due turns, jobs in progress.
+//! The turns to come of a run in virtual time: the phases of its agents, due turns, jobs in progress.
 //!
 //! In: nothing. Out: plain values, as an archive has them. Never here: when an event happens ([`super::lockstep`]).
 

@@ -20,7 +20,7 @@ pub(super) const CHECKS: u32 = 4;
 /// The turn of a cluster makes the steps of all its members: it may last as many times as long as it has members, and no more than this.
 const MEMBERS_MAX: u32 = 25;
 
-/// What one thread does.
+/// The turn that one thread makes.
 #[derive(Debug, Default)]
 pub(super) struct WatchdogWord {
     /// The turn in progress: its number and, in the low half, the agent's number plus one; with [`STALLED`] once that lasts too long. [`IDLE`]

@@ -190,7 +190,7 @@ fn reject(what: String) {
     resume_unwind(Box::new(BadAnswer(what)));
 }
 
-/// What is wrong with the lists of a member, after a step was begun or ended, and with where its skin is. Its matrix is looked through where it
+/// The fault in the lists of a member after a step was begun or ended, or in the place of its skin, if there is one. Its matrix is looked through where it
 /// is used.
 fn lengths_fault(member: &dyn ClusterMember) -> Option<String> {
     let (size, free, unanswered) = (member.velocities().len(), member.free().len(), member.unanswered().len());
@@ -239,7 +239,7 @@ fn skin_fault(skin: &Option<PlacedShape<'_>>) -> Option<String> {
     (!is_sound).then(|| "a skin that is not finite".to_owned())
 }
 
-/// Of an answer that any is as good as any other.
+/// Finds no fault: every answer will do.
 fn any<T>(_: &T) -> Option<String> {
     None
 }

@@ -17,7 +17,7 @@ use metachron_core::{Archive, ArchiveError, Snapshot, archive_values};
 use std::sync::Arc;
 use std::time::Duration;
 
-/// What a state has besides that which agents keep to themselves.
+/// The parts of a state that agents do not keep to themselves.
 pub(super) struct RunState {
     /// For each number whether its agent is there.
     pub present: Vec<bool>,
@@ -33,12 +33,12 @@ pub(super) struct RunState {
     pub events: Option<VirtualEvents>,
 }
 
-/// What an agent shows others, has been sent by them and has seen of them.
+/// The part of an agent that it shows others, was sent by them or has seen of them.
 #[derive(Default)]
 pub(super) struct ShownState {
     pub newest: Arc<Snapshot>,
     pub metrics: MetricsValues,
-    /// What it has not obeyed yet.
+    /// Commands that it has not obeyed yet.
     pub commands: Option<PendingCommands>,
     pub seen: Vec<Seen>,
 }
@@ -183,7 +183,7 @@ impl AgentRunner {
     }
 }
 
-/// What `visit` does; a panic in a model of somebody else is an error.
+/// Runs `visit`; a panic in the code of a model is an error.
 pub(super) fn caught<T>(visit: impl FnOnce() -> Result<T, ArchiveError>) -> Result<T, ArchiveError> {
     contained(|| Ok(visit())).unwrap_or_else(|reason| Err(ArchiveError::Panicked { reason }))
 }

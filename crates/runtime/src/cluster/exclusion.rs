@@ -1,4 +1,4 @@
-//! Who is taken out of a cluster whose step was not made, so that the others make it in the same turn.
+//! Members are taken out of a cluster whose step was not made, so that the others make it in the same turn.
 //!
 //! In: a leader, the reason of a failure, models that are broken or have refused. Out: a leader whose cluster steps again, or why that is parked.
 //! One whose code has panicked is parked; one that has refused steps by itself, to fail alone or not at all. Never here: the step
@@ -9,7 +9,7 @@ use super::Span;
 use metachron_core::SimSpan;
 
 impl AgentRunner {
-    /// Plans nothing but takes those out of its cluster that are to blame for `reason`; where that is nobody, all part.
+    /// Takes the members out of its cluster that are to blame for `reason`; where none is, all part.
     ///
     /// # Errors
     /// Why it is to be parked itself.

@@ -1,4 +1,4 @@
-//! One macro step of a cluster: all members as one problem, or nobody where one of them fails.
+//! One macro step of a cluster: all members as one problem, or none of them where one fails.
 //!
 //! In: the members at the leader's time, their plan. Out: the members a macro step later; after a failure they are where they were, and those whose
 //! fault it is are known by their models ([`super::super::model`]). Never here: what becomes of these ([`super::exclusion`]), who is a member.
@@ -14,7 +14,7 @@ use metachron_contact::stepper::{
 use metachron_core::{ParallelFor, SimSpan, SimTime, StepReport, recycled};
 use std::sync::Arc;
 
-/// What a macro step is made with.
+/// The parts of a macro step that is being made.
 struct Making<'l, 'a> {
     scene: &'l ClusterScene,
     list: &'l mut Vec<Participant<'a>>,
@@ -27,7 +27,7 @@ struct Making<'l, 'a> {
     dt: SimSpan,
 }
 
-/// What a macro step was, and the work of the same in halves where that was made.
+/// The report of a macro step, and the work of the same in halves where that was made.
 struct Made {
     report: ClusterReport,
     extra: f64,
@@ -142,7 +142,7 @@ impl AgentRunner {
         StepReport { work: report.work + extra, substeps: report.fine_steps, at_rest: false }
     }
 
-    /// What it brings into a step from a time on, of which it makes so many parts, and its asynchronous pairs.
+    /// Its part in a step of `dt` from `time`, of which it makes so many parts, and its asynchronous pairs.
     fn participant(&mut self, time: SimTime, dt: SimSpan, parts: u32) -> Option<(Participant<'_>, Option<&mut Pairs>)> {
         let id = self.shared.id;
         let Self { model, observer, loads, links, shared, cluster, .. } = self;

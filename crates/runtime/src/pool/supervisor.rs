@@ -27,7 +27,7 @@ pub(super) struct Supervisor {
     messages: Receiver<Message>,
 }
 
-/// What a supervisor begins with.
+/// The settings with which a supervisor begins.
 pub(super) struct Team {
     /// How many workers there are to be.
     pub places: usize,

@@ -17,10 +17,10 @@ pub(super) struct Ended {
     pub word: Arc<WatchdogWord>,
 }
 
-/// What the agents' threads are doing, for the one that watches them.
+/// The turns in progress of the agents' threads, for the watching thread.
 pub(super) type Words = Arc<Mutex<BTreeMap<AgentId, Arc<WatchdogWord>>>>;
 
-/// Starts the thread that looks whether turns last too long; it ends where it is told to, or nobody can.
+/// Starts the thread that looks whether turns last too long; it ends when the sender sends, or is dropped.
 pub(super) fn watch(watchdog: Watchdog, words: Words) -> Result<Sender<()>, RunError> {
     let (unwatched, end) = channel();
     let body = move || {
