@@ -76,6 +76,8 @@ pub(super) struct ClusterSeat {
     doubling: Option<Box<StepDoubling>>,
     /// The error of the last row of repeated steps, metres (control.md, eq. 31).
     drift_m: f64,
+    /// How many steps of its own the last step had.
+    parts: u32,
     /// Its part in the last step, and how those were solved that it has led.
     state: Option<ClusterState>,
     solves: ClusterSolves,
@@ -158,6 +160,7 @@ impl ClusterSeat {
             schedule: DoublingSchedule::default(),
             doubling: None,
             drift_m: 0.0,
+            parts: 1,
             state: None,
             solves: ClusterSolves::default(),
             participants: Vec::new(),
