@@ -10,6 +10,7 @@ use super::agent_clock::Timeline;
 use super::agent_runner::AgentRunner;
 use super::cluster::{Place, Placed};
 use super::events::EventKind;
+use super::handle::AgentHandle;
 use super::spawn::{AgentSpawn, RunAgents};
 use super::turn_order::{PartKind, TurnOrder};
 use super::virtual_events::VirtualEvents;
@@ -162,16 +163,26 @@ impl Cut {
             .collect()
     }
 
-    /// Makes an agent as it was when it had the bytes `own`. One whose model does not read what it has written itself is parked: it makes its own
-    /// turns then, none, and so do those that it led.
+    /// Makes an agent as it was when it had the bytes `own`. One whose model does not read what it has written itself is parked.
     fn take_back(&mut self, at: usize, own: &[u8]) {
+        if let Some(Err(error)) = self.all[at].as_mut().map(|placed| placed.runner.take_back(own)) {
+            self.park(at, &error.to_string());
+        }
+    }
+
+    /// Parks an agent: it makes its own turns then, none, and so do those that it led.
+    pub fn park(&mut self, at: usize, reason: &str) {
         let (id, sleep) = (AgentId(at as u32), &self.run_agents.sleep);
-        let Some(Err(error)) = self.all[at].as_mut().map(|placed| placed.runner.take_back(own)) else { return };
+        if self.all.get(at).is_none_or(Option::is_none) {
+            // its leader makes a step that does not end, and lets it return after that
+            let live = self.run_agents.handles.of(id).and_then(AgentHandle::live);
+            live.into_iter().for_each(|shared| shared.gauges.park(reason.to_owned()));
+        }
         for Placed { runner, place } in self.all.iter_mut().flatten() {
             let is_led = matches!(*place, Place::Led { leader, .. } | Place::Waiting { leader, .. } if leader == id);
             if runner.id() == id {
                 *place = Place::Home;
-                runner.park(error.to_string());
+                runner.park(reason.to_owned());
             } else if is_led {
                 *place = Place::Returning;
             } else {
