@@ -5,6 +5,7 @@
 
 use super::Member;
 use super::assemble::Govern;
+use super::checkpoint::Checkpoint;
 use super::recording::{Entry, RecordError, Recorder, Recording};
 use metachron_core::{AgentId, Archive, ArchiveError};
 use metachron_runtime::{Agents, Demand, Governor, OrderLog, TurnMeasure, TurnOrder, TurnPart, state_hash};
@@ -89,6 +90,26 @@ impl Log {
                 }
             }
         }
+    }
+
+    /// Puts all into the state of `checkpoint` by `act`, and writes down that they were: of a state that is refused nothing.
+    ///
+    /// # Errors
+    /// Those of `act`.
+    pub fn restore<E>(&self, checkpoint: &Checkpoint, act: impl FnOnce() -> Result<(), E>) -> Result<(), E> {
+        if let Mode::Recorded(recorder, _) = &mut *self.mode() {
+            recorder.set_restoring(Some(checkpoint.to_bytes()));
+        }
+        let outcome = act();
+        // in real time the order of turns says when it was: there the state is written down before the part that it is in
+        let note = |mode: &mut Mode, (): &()| match mode {
+            Mode::Recorded(recorder, _) if outcome.is_ok() => recorder.note_restored(),
+            Mode::Recorded(recorder, _) => recorder.set_restoring(None),
+            _ if outcome.is_ok() => mode.note_begun(),
+            _ => {}
+        };
+        self.in_order(|| None::<()>, || (), note);
+        outcome
     }
 
     pub fn is_recorded(&self) -> bool {

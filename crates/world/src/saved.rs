@@ -8,7 +8,6 @@ use super::assemble::Govern;
 use super::checkpoint::{Checkpoint, CheckpointError};
 use super::joined::Joining;
 use super::kinds::ExecutorKind;
-use super::recording::Entry;
 use super::world::{Shared, State, World};
 use metachron_core::Archive;
 use metachron_runtime::{AgentHandle, AgentState, Run};
@@ -84,18 +83,9 @@ impl World {
         }
         self.check_joined(checkpoint)?;
         joined.expect(&checkpoint.joined);
-        let note = || self.in_order(|| (), |log, ()| log.note(|| Entry::Restore(checkpoint.to_bytes())));
-        // in real time the order of turns says when it was read, and whether it was
-        let is_virtual = self.executor() == ExecutorKind::Lockstep;
-        if !is_virtual {
-            note();
-        }
-        let outcome = read_state(run.as_mut(), checkpoint, &self.joining());
+        let outcome = log.restore(checkpoint, || read_state(run.as_mut(), checkpoint, &self.joining()));
         joined.sweep(self.agents());
         outcome?;
-        if is_virtual {
-            note();
-        }
         self.see(run.as_ref());
         self.shared.put_back.fetch_add(1, Release);
         Ok(())
