@@ -10,6 +10,7 @@ use super::recording::{Entry, RecordError, Recorder, Recording};
 use metachron_core::{AgentId, Archive, ArchiveError};
 use metachron_runtime::{Agents, Demand, Governor, OrderLog, TurnMeasure, TurnOrder, TurnPart, state_hash};
 use std::collections::{BTreeMap, VecDeque};
+use std::convert::Infallible;
 use std::sync::atomic::{
     AtomicBool,
     Ordering::{Acquire, Release},
@@ -64,12 +65,15 @@ impl Log {
 
     /// Does something to the world and writes it down: no part of a turn is made between the two, and no recording begins or ends. `wait` is for
     /// those who do not have the run: it keeps calls in lockstep from letting time pass, which is written down before it is done.
-    pub fn in_order<T, G>(
+    ///
+    /// # Errors
+    /// Those of `wait`; nothing is done then.
+    pub fn in_order<T, G, E>(
         &self,
-        wait: impl Fn() -> Option<G>,
+        wait: impl Fn() -> Result<G, E>,
         act: impl FnOnce() -> T,
         note: impl FnOnce(&mut Mode, &T),
-    ) -> T {
+    ) -> Result<T, E> {
         loop {
             if let Some(order) = self.order() {
                 let _held = order.between();
@@ -77,16 +81,16 @@ impl Log {
                 if self.mode().order().is_some_and(|now| Arc::ptr_eq(now, &order)) {
                     let done = act();
                     note(&mut self.mode(), &done);
-                    return done;
+                    return Ok(done);
                 }
             } else {
                 let was_recorded = self.is_recorded();
-                let _waits = if was_recorded { wait() } else { None };
+                let _waits = was_recorded.then(&wait).transpose()?;
                 let mut mode = self.mode();
                 if mode.order().is_none() && was_recorded == matches!(*mode, Mode::Recorded(..)) {
                     let done = act();
                     note(&mut mode, &done);
-                    return done;
+                    return Ok(done);
                 }
             }
         }
@@ -108,7 +112,7 @@ impl Log {
             _ if outcome.is_ok() => mode.note_begun(),
             _ => {}
         };
-        self.in_order(|| None::<()>, || (), note);
+        let Ok(()) = self.in_order(|| Ok::<_, Infallible>(()), || (), note);
         outcome
     }
 

@@ -147,6 +147,14 @@ pub enum RecordError {
         /// The system's error.
         error: std::io::Error,
     },
+    /// An object's step in lockstep has kept the thread that lets time pass for too long. The recording goes on.
+    #[error("the recording cannot end in a step: that of \"{name}\" has lasted for {:.1} s", lasts.as_secs_f64())]
+    Stalled {
+        /// The object.
+        name: String,
+        /// For how long, wall time.
+        lasts: Duration,
+    },
     /// What it was written to took no more: it is complete up to there.
     #[error("the recording could not be written on: {0}")]
     Write(std::io::Error),

@@ -48,7 +48,7 @@ impl World {
     /// that it may last ([`Scene::stall_limit`]), [`CheckpointError::Stopped`]. The world goes on as it
     /// was.
     pub fn checkpoint(&self) -> Result<Checkpoint, CheckpointError> {
-        let mut state = self.state();
+        let mut state = self.state().map_err(|waited| CheckpointError::Refused(waited.into()))?;
         let State::Running(run) = &mut *state else { return Err(CheckpointError::Stopped) };
         self.cut(run.as_mut())
     }
@@ -73,7 +73,7 @@ impl World {
     pub fn restore(&self, checkpoint: &Checkpoint) -> Result<(), CheckpointError> {
         let Shared { identity, joined, log, .. } = &*self.shared;
         identity.check(&checkpoint.of)?;
-        let mut state = self.state();
+        let mut state = self.state().map_err(|waited| CheckpointError::Unreadable(waited.into()))?;
         let State::Running(run) = &mut *state else { return Err(CheckpointError::Stopped) };
         if log.is_replayed() {
             return Err(CheckpointError::Replay);

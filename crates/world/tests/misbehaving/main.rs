@@ -2,6 +2,7 @@
 //! the world takes checkpoints, goes back, and lets objects join and leave.
 
 mod coupled;
+mod lockstep_stalls;
 mod rogue;
 mod stalls;
 
