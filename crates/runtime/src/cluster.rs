@@ -93,6 +93,12 @@ pub(super) struct ClusterSeat {
     ids: Vec<AgentId>,
 }
 
+/// What solves the steps that a seat leads, and what repeats them.
+pub(super) struct Steppers {
+    stepper: Option<Box<ClusterStepper>>,
+    doubling: Option<Box<StepDoubling>>,
+}
+
 /// The step that a member wants.
 #[derive(Debug, Clone, Copy)]
 struct Wish {
@@ -213,6 +219,16 @@ impl ClusterSeat {
         archive.option(&mut self.doubling, Box::default, |doubling, archive| doubling.archive(archive))?;
         archive.option(&mut self.asynchronous, Box::default, |pairs, archive| pairs.archive(archive))?;
         archive.option(&mut self.remotes, Box::default, |remotes, archive| remotes.archive(archive))
+    }
+
+    /// Takes out what solves and repeats its steps: a state that is read makes them anew.
+    pub fn take_steppers(&mut self) -> Steppers {
+        Steppers { stepper: self.stepper.take(), doubling: self.doubling.take() }
+    }
+
+    /// Puts that back.
+    pub fn put_steppers(&mut self, Steppers { stepper, doubling }: Steppers) {
+        (self.stepper, self.doubling) = (stepper, doubling);
     }
 
     /// What the turns that it leads took on helpers, as far as it is not accounted for.
