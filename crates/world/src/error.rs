@@ -1,7 +1,6 @@
 //! Why a world could not be started, or refuses something.
 
 use super::builder::SceneBuildError;
-use super::world::Waited;
 use metachron_core::{AgentId, Anchor, ArchiveError};
 use metachron_runtime::{RunError, SendError};
 use std::time::Duration;
@@ -126,6 +125,13 @@ pub enum WorldError {
         /// The names that there are.
         known: String,
     },
+}
+
+/// The agent whose step in lockstep has kept another thread for too long: it is waited for no longer.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Waited {
+    pub name: String,
+    pub lasts: Duration,
 }
 
 impl From<Waited> for WorldError {

@@ -6,14 +6,14 @@
 use super::assemble;
 use super::assemble::Govern;
 use super::checkpoint::{Checkpoint, CheckpointError, SceneIdentity};
-use super::error::WorldError;
+use super::error::{Waited, WorldError};
 use super::joined::{JoinedTable, Joining};
 use super::kinds::ExecutorKind;
 use super::log::{Log, TurnsToLog, logged};
 use super::recording::{Entry, RecordError, Recorder, Recording, SceneText};
 use super::recording_file::RecordingFile;
 use super::replay::{Followed, Player};
-use super::world::{Setting, Shared, State, Waited, World};
+use super::world::{Setting, Shared, State, World};
 use super::{Member, Scene};
 use metachron_core::{Archive, SimTime};
 use metachron_runtime::{Demand, Follower, Governor, Lockstep, Run, SystemClock, TurnMeasure, TurnOrder};

@@ -8,7 +8,7 @@ use super::assemble;
 use super::assemble::Govern;
 use super::call_lock::{CallGuard, CallLock};
 use super::checkpoint::SceneIdentity;
-use super::error::WorldError;
+use super::error::{Waited, WorldError};
 use super::events::{EventFilter, Events};
 use super::frames::{Frame, Frames};
 use super::joined::JoinedTable;
@@ -91,13 +91,6 @@ impl Present {
     fn of(run: &dyn Run) -> Self {
         Self { now: run.now(), time: run.sim_now(), timeline: run.timeline() }
     }
-}
-
-/// The agent whose step in lockstep has kept another thread for too long: it is waited for no longer.
-#[derive(Debug, Clone, PartialEq)]
-pub(super) struct Waited {
-    pub name: String,
-    pub lasts: Duration,
 }
 
 /// So often a waiter finds that a step lasts too long before it gives up: a suspension of the whole machine counts as one look.
