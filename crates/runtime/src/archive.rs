@@ -31,7 +31,7 @@ pub(super) trait CutBetweenTurns {
         act: impl FnOnce(&mut Cut, &mut Option<Arc<TurnOrder>>) -> Result<(), ArchiveError>,
     ) -> Result<(), ArchiveError>;
 
-    /// What it knows of its agents.
+    /// The agents of the run, as it knows them.
     fn agents_of_run(&self) -> &RunAgents;
 
     /// [`super::Run::archive`].
@@ -68,7 +68,7 @@ pub(super) struct Cut {
 /// Agents that are not in the run, made for a state that has them, by their numbers.
 type Made = BTreeMap<usize, Box<AgentRunner>>;
 
-/// What each agent kept to itself before a state was read into it, by numbers.
+/// The state that each agent kept to itself before another one was read into it, by numbers.
 type OwnStates = Vec<(usize, OwnState)>;
 
 impl Cut {

@@ -93,7 +93,7 @@ pub(super) struct ClusterSeat {
     ids: Vec<AgentId>,
 }
 
-/// What solves the steps that a seat leads, and what repeats them.
+/// The solvers of the steps that a seat leads, and those that repeat them.
 pub(super) struct Steppers {
     stepper: Option<Box<ClusterStepper>>,
     doubling: Option<Box<StepDoubling>>,

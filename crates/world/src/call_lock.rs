@@ -44,7 +44,7 @@ impl<T> CallLock<T> {
     /// Waits for the value until `give_up`, which is asked many times a second, says why not.
     ///
     /// # Errors
-    /// What `give_up` says.
+    /// The reason that `give_up` says.
     pub fn lock<E>(&self, mut give_up: impl FnMut() -> Option<E>) -> Result<CallGuard<'_, T>, E> {
         if let Some(value) = self.try_lock() {
             return Ok(value);

@@ -1,4 +1,4 @@
-//! What a world writes down while it runs, or follows: the one place that knows whether it is recorded, replayed or neither.
+//! The log that a world writes while it runs, or follows: the one place that knows whether it is recorded, replayed or neither.
 //!
 //! In: calls and governors' answers. Out: the same into a [`Recorder`], or a governor's answer from a recording instead of its own.
 //! Never here: the file, the calls of a replay ([`super::replay`]).
@@ -36,7 +36,7 @@ pub(super) enum Mode {
     Replayed(Script),
 }
 
-/// What governors are to answer, and how far a replay is.
+/// The answers that governors are to give, and how far a replay is.
 pub(super) struct Script {
     /// For each agent its governor's answers, each after so many turns with none.
     demands: BTreeMap<AgentId, VecDeque<(u32, Demand)>>,
@@ -187,7 +187,7 @@ impl Log {
         self.mode.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// What the governor of `agent` asks for after a turn: what `answer` says, or what the recording says.
+    /// The demand of the governor of `agent` after a turn: what `answer` says, or what the recording says.
     fn demand(&self, agent: AgentId, answer: impl FnOnce() -> Demand) -> Demand {
         if !self.is_heard.load(Acquire) {
             return answer();

@@ -63,7 +63,7 @@ pub(super) struct Shared {
     pub clock: Arc<SystemClock>,
     /// How often it was put back into the state of a checkpoint.
     pub put_back: AtomicU64,
-    /// What is written down of it, or followed.
+    /// The record that is written of it, or followed.
     pub log: Arc<Log>,
 }
 
@@ -73,7 +73,7 @@ impl std::fmt::Debug for World {
     }
 }
 
-/// What makes agents step, or where its time stood when it ended.
+/// The run that makes agents step, or where its time stood when it ended.
 pub(super) enum State {
     Running(Box<dyn Run>),
     Stopped(Stopped),
@@ -99,7 +99,7 @@ const LOOKS: u32 = 4;
 /// Where the time of a world stood when it ended.
 pub(super) struct Stopped {
     present: Present,
-    /// What became of the recording that ended with it, until somebody asks; whether there was one.
+    /// The outcome of the recording that ended with it, until somebody asks; whether there was one.
     pub recorded: Option<Result<bool, RecordError>>,
 }
 
@@ -110,7 +110,7 @@ impl State {
     }
 }
 
-/// What a world has besides its run.
+/// The parts of a world besides its run.
 pub(super) struct Setting {
     pub surroundings: Arc<ClusterScene>,
     pub clock: Arc<SystemClock>,

@@ -44,7 +44,7 @@ pub(super) struct ShownState {
     pub seen: Vec<Seen>,
 }
 
-/// What an agent kept to itself before a state was read into it.
+/// The state that an agent kept to itself before another one was read into it.
 pub(super) struct OwnState {
     parts: OwnParts,
     /// The bytes of all else.

@@ -79,7 +79,7 @@ struct Lent {
     sides: Vec<Option<&'static mut Pairs>>,
 }
 
-/// What came of a macro step.
+/// The outcome of a macro step.
 struct Attempt {
     made: Result<Made, String>,
     /// After one that was made whether all may rest; an error is of who has moved with all others, and is parked where its state is written.

@@ -1,4 +1,4 @@
-//! What a macro step leaves with the members of a cluster: how it was solved, its error, what pairs gave, who still belongs together.
+//! The notes that a macro step leaves with the members of a cluster: how it was solved, its error, what pairs gave, who still belongs together.
 //!
 //! In: a stepper after a macro step. Out: what each member's seat publishes. Never here: the step itself.
 

@@ -1,4 +1,4 @@
-//! What only a pool does; `live_tests.rs` holds what every executor does.
+//! Claims about pools alone; `live_tests.rs` holds what every executor does.
 
 use super::super::governor::{Demand, Governor, TurnMeasure};
 use super::super::sleep::SleepRegistry;

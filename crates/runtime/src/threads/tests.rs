@@ -1,4 +1,4 @@
-//! What only threads do; `live_tests.rs` holds what every executor does.
+//! Claims about threads alone; `live_tests.rs` holds what every executor does.
 
 use super::super::SystemClock;
 use super::super::agent_runner::Next;
