@@ -108,6 +108,7 @@ fn touch(sides: [Side; 2], normal: DVec3) -> Contact {
         owed_slip_m: DVec3::ZERO,
         warm_n_s: DVec3::ZERO,
         load_n_s: 0.0,
+        overlap_m: 0.0,
     }
 }
 

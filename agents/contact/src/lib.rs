@@ -31,6 +31,7 @@
 //!     owed_slip_m: DVec3::ZERO,
 //!     warm_n_s: DVec3::ZERO,
 //!     load_n_s: 0.0,
+//!     overlap_m: 0.0,
 //! };
 //! let contacts = [corner(-0.1, -0.1), corner(0.1, -0.1), corner(-0.1, 0.1), corner(0.1, 0.1)];
 //! let mut solver = Solver::default();

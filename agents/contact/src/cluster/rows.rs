@@ -49,6 +49,8 @@ pub(super) struct Row {
     pub scale: f64,
     /// R of eq. 5, 1/kg.
     pub compliance: f64,
+    /// The most that it gives along its axis, as the velocity by which that moves its sides alone.
+    limit_m_s: f64,
     /// A compliance that is given and does not follow the load.
     given: Option<f64>,
     start: usize,
@@ -94,6 +96,7 @@ impl Row {
             free: DVec3::ZERO,
             scale: 0.0,
             compliance: 0.0,
+            limit_m_s: f64::INFINITY,
             given: None,
             start: 0,
             end: 0,
@@ -122,7 +125,7 @@ impl Row {
         };
         let owed = joint.owed_slip_m * (SLIP_SHARE / h_s);
         let bias = frame.transpose() * (owed - joint.target_m_s) * held;
-        Self { held, given: joint.compliance_per_kg, ..Self::new(law, frame, bias) }
+        Self { held, limit_m_s: joint.limit_m_s, given: joint.compliance_per_kg, ..Self::new(law, frame, bias) }
     }
 
     /// Takes the rebound back.
@@ -255,7 +258,14 @@ impl Rows {
         // also where it is not a number
         let moves = scale > SCALE_MIN;
         row.scale = if moves { scale } else { 1.0 };
-        row.law = if moves { row.law } else { Law::Idle };
+        row.law = match row.law {
+            _ if !moves => Law::Idle,
+            Law::Between { low, high } => {
+                let most = row.limit_m_s / scale;
+                Law::Between { low: low.max(-most), high: high.min(most) }
+            }
+            law => law,
+        };
     }
 
     pub fn len(&self) -> usize {

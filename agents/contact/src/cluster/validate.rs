@@ -73,7 +73,7 @@ fn contact_fault(contact: &Contact) -> Option<&'static str> {
     if !frame.is_finite() || off.to_cols_array().iter().any(|d| d.abs() > SLACK) {
         return Some("normal and tangents are not orthonormal");
     }
-    if !contact.gap_m.is_finite() {
+    if !(contact.gap_m + contact.overlap_m).is_finite() {
         return Some("its gap is not finite");
     }
     if !(contact.friction.is_finite() && contact.friction >= 0.0) {

@@ -17,6 +17,7 @@
 mod arms;
 mod between_steps;
 mod blows;
+mod contact_rows;
 mod divide;
 mod domain;
 mod doubling;
@@ -41,7 +42,6 @@ mod restart;
 mod scene;
 mod search;
 mod solve;
-mod spin_friction;
 mod springs;
 mod stiffness;
 mod tearing;
@@ -51,6 +51,7 @@ mod yielding;
 
 use crate::cluster::{DEPTH_DEFAULT_M, Member, Settings, Solver};
 use blows::Rebounds;
+use contact_rows::ContactRows;
 use divide::times;
 pub use doubling::StepDoubling;
 use glam::DVec3;
@@ -73,7 +74,6 @@ use progress::Progress;
 pub use remote::{RemoteMember, RemoteView};
 pub use scene::{BadDepth, ClusterScene, DEPTH_RANGE_M, Passage};
 use search::{Judge, Round, Search};
-use spin_friction::SpinFriction;
 use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
 use tearing::Tearing;
 pub use tearing::Torn;
@@ -123,7 +123,7 @@ pub struct ClusterStepper {
     search: Search,
     ties: Ties,
     joints: Joints,
-    spins: SpinFriction,
+    contact_rows: ContactRows,
     progress: Vec<Progress>,
     members: Vec<Member<'static>>,
     lent: Vec<Option<Lent<'static>>>,
@@ -162,7 +162,7 @@ impl Default for ClusterStepper {
             search: Search::default(),
             ties: Ties::default(),
             joints: Joints::default(),
-            spins: SpinFriction::default(),
+            contact_rows: ContactRows::default(),
             progress: Vec::new(),
             members: Vec::new(),
             lent: Vec::new(),

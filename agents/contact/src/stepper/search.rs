@@ -9,10 +9,10 @@ mod sense;
 mod sweep;
 mod thinning;
 
+use super::contact_rows::Spin;
 use super::domain::Domain;
 use super::memory::Partner;
 use super::scene::{ClusterScene, Passage};
-use super::spin_friction::Spin;
 use super::{ClusterMember, Participant, Progress, Role};
 use crate::cluster::Contact;
 use boxes::Boxes;
@@ -367,9 +367,9 @@ impl Search {
                     Err(_) => ends_m < 0.0,
                     // on its way it meets another place than the one it was kept from
                     Ok(at) if swept && ends_m < -LOOK_M => {
-                        let Contact { warm_n_s, load_n_s, owed_slip_m, .. } = contacts[at];
+                        let Contact { warm_n_s, load_n_s, overlap_m, owed_slip_m, .. } = contacts[at];
                         let found = taken_up(round, &owner, &touch, &Skinned { facing: &facing, skins });
-                        contacts[at] = Contact { warm_n_s, load_n_s, owed_slip_m, ..found };
+                        contacts[at] = Contact { warm_n_s, load_n_s, overlap_m, owed_slip_m, ..found };
                         owners[at].meets_s = None;
                         *moved = true;
                         false

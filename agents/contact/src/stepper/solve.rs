@@ -44,20 +44,20 @@ impl ClusterStepper {
         let is_open = |state: &Progress| !state.unanswered.is_empty();
         if self.search.contacts.is_empty() && self.ties.rows.is_empty() && !self.progress.iter().any(is_open) {
             // what touches nothing moves as it would
-            self.spins.clear();
+            self.contact_rows.clear();
             self.progress.iter_mut().for_each(Progress::go_on);
             return Ok(());
         }
         let (mut last_miss_m, mut missed_m) = (f64::INFINITY, self.joints_missed_m);
         for round in 1..=ROUNDS_MAX {
-            self.spins.lay(&self.search, all, &mut self.ties, h_s);
+            self.contact_rows.lay(&self.search, all, &mut self.ties, h_s);
             self.solve_once(all, h_s, on.threads, report)?;
             self.note_motion(all);
             let Self {
                 solver,
                 search,
                 ties,
-                spins,
+                contact_rows,
                 joints,
                 joints_ask,
                 joints_missed_m,
@@ -75,7 +75,7 @@ impl ClusterStepper {
             for (row, impulse) in ties.rows.iter_mut().zip(&solution.rows_n_s) {
                 row.warm_n_s = *impulse;
             }
-            for (contact, row) in spins.rows(ties) {
+            for (contact, row) in contact_rows.spins(ties) {
                 let normal = search.contacts[contact].normal;
                 search.owners[contact].spin.torque_n_m = solution.rows_n_s[row].dot(normal) / h_s;
             }

@@ -69,7 +69,7 @@ pub(super) struct Holders {
 /// The rows of a fine step.
 #[derive(Debug, Default)]
 pub(super) struct Ties {
-    /// Behind those with an owner are the spins of contacts.
+    /// Behind those with an owner are those that contacts bring.
     pub rows: Vec<JointRow>,
     /// One for each row but for those.
     pub owners: Vec<RowOwner>,

@@ -17,6 +17,7 @@ mod motors;
 mod organ;
 mod own_model;
 mod own_skin;
+mod overlaps;
 mod passing;
 mod plate;
 mod rebounds;

@@ -104,5 +104,6 @@ fn contact(touch: &Touch, facing: &Facing, skins: [&CollisionShape; 2], progress
         owed_slip_m: DVec3::ZERO,
         warm_n_s: DVec3::ZERO,
         load_n_s: 0.0,
+        overlap_m: 0.0,
     }
 }

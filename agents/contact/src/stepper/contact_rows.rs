@@ -1,20 +1,24 @@
-//! Friction about the normals of contacts, of sides that turn as a whole: a row for each, bounded by what presses its contact.
+//! Rows that contacts bring with them: friction about the normal, of sides that turn as a whole, bounded by what presses the contact; and the
+//! push-out of bodies that began inside each other, bounded by what moves the two alone.
 //!
-//! In: contacts of a fine step with their radii. Out: rows of spins behind those of joints. Never here: where places are, the solve.
+//! In: contacts of a fine step. Out: rows behind those of joints. Never here: where places are, the solve.
 //! Theory: docs/theory/clusters.md, section 2.
 
 use super::Participant;
 use super::search::Search;
 use super::ties::Ties;
 use crate::cluster::{Hold, JointRow, Pressed, Side};
+use crate::push_out::{PUSH_OUT_MAX_M_S, push_out_m_s};
 use crate::stepper::ClusterMember;
 use glam::DVec3;
 
-/// The rows of spins of a fine step, in the order of those behind the rows of joints.
+/// The rows of contacts of a fine step, in the order of those behind the rows of joints.
 #[derive(Debug, Default)]
-pub(super) struct SpinFriction {
-    /// Their contacts.
-    contacts: Vec<usize>,
+pub(super) struct ContactRows {
+    /// The contacts of the rows of spins.
+    spins: Vec<usize>,
+    /// The contacts of the rows that push out, behind them.
+    pushes: Vec<usize>,
 }
 
 /// How one side of a contact turns: its spin, and that beyond its blocks, rad/s.
@@ -33,16 +37,17 @@ pub(super) struct Spin {
     pub owed_rad: f64,
 }
 
-impl SpinFriction {
+impl ContactRows {
     /// Lets go of the rows of the last solve: nothing is solved.
     pub fn clear(&mut self) {
-        self.contacts.clear();
+        self.spins.clear();
+        self.pushes.clear();
     }
 
     /// Lays out the rows anew for the contacts as they are.
     pub fn lay(&mut self, search: &Search, all: &[Participant<'_>], ties: &mut Ties, h_s: f64) {
         ties.rows.truncate(ties.owners.len());
-        self.contacts.clear();
+        self.clear();
         for (contact, (owner, at)) in search.owners.iter().zip(&search.contacts).enumerate() {
             let reach_m = at.friction * owner.spin.radius_m;
             if reach_m <= 0.0 {
@@ -60,13 +65,26 @@ impl SpinFriction {
                 warm_n_s: at.normal * (owner.spin.torque_n_m * h_s),
                 ..JointRow::new([here.side, there.side], hold)
             });
-            self.contacts.push(contact);
+            self.spins.push(contact);
+        }
+        for (contact, at) in search.contacts.iter().enumerate().filter(|(_, at)| at.overlap_m > 0.0) {
+            ties.rows.push(JointRow {
+                target_m_s: at.normal * (at.surface_m_s.dot(at.normal) - push_out_m_s(at.gap_m, h_s)),
+                limit_m_s: PUSH_OUT_MAX_M_S,
+                ..JointRow::new(at.sides, Hold::pushing(at.normal))
+            });
+            self.pushes.push(contact);
         }
     }
 
-    /// The contacts of the rows, with the place of each row among all of the problem.
-    pub fn rows(&self, ties: &Ties) -> impl Iterator<Item = (usize, usize)> + use<'_> {
-        self.contacts.iter().copied().zip(ties.owners.len()..)
+    /// The contacts of the rows of spins, with the place of each row among all of the problem.
+    pub fn spins(&self, ties: &Ties) -> impl Iterator<Item = (usize, usize)> + use<'_> {
+        self.spins.iter().copied().zip(ties.owners.len()..)
+    }
+
+    /// The same of the rows that push out.
+    pub fn pushes(&self, ties: &Ties) -> impl Iterator<Item = (usize, usize)> + use<'_> {
+        self.pushes.iter().copied().zip(ties.owners.len() + self.spins.len()..)
     }
 }
 
