@@ -25,17 +25,19 @@ impl ClusterStepper {
     /// Notes what the next step starts from.
     pub(super) fn remember(&mut self, all: &mut [Participant<'_>], h_s: f64, last: bool, dt: SimSpan) {
         self.remember_spins(all, h_s);
-        let Self { solver, search, ties, joints, outside, tearing, yielding, efforts, .. } = self;
+        let Self { solver, search, ties, joints, outside, tearing, yielding, efforts, impacts, .. } = self;
         let solution = solver.solution();
         for (k, (owner, contact)) in search.owners.iter().zip(&search.contacts).enumerate() {
             let impulse = solution.contacts_n_s[k];
             let owed_slip_m = contact.owed_slip_after(impulse, solution.contacts_m_s[k], h_s);
-            // a blow is over
+            let rebound = impacts.contacts_n_s.get(k).copied().unwrap_or_default();
+            // sides that rebound hold each other no more
             let (lasting, spin) =
-                if contact.restitution > 0.0 { (DVec3::ZERO, Spin::default()) } else { (impulse, owner.spin) };
+                if impacts.rebounds(k) { (DVec3::ZERO, Spin::default()) } else { (impulse, owner.spin) };
             let load_n = contact.load_n_s / h_s;
             let place = Remembered { key: owner.key.anywhere(), force_n: lasting / h_s, load_n, owed_slip_m, spin };
             all[owner.member].memory.pair(owner.partner).next.push(place);
+            let impulse = impulse + rebound;
             outside.note(all, owner.member, &contact.sides[1], -impulse);
             if impulse != DVec3::ZERO {
                 let total = total_of(&mut self.totals, owner.member, owner.partner);
@@ -54,6 +56,11 @@ impl ClusterStepper {
                 // no nearer than what bears something lies deep: the two touch, though nothing presses them together now
                 total_of(&mut self.totals, owner.member, owner.partner);
             }
+        }
+        for (row, impulse) in impacts.rows_n_s.iter().enumerate().take(ties.owners.len()) {
+            let owner = &ties.owners[row];
+            outside.note(all, owner.member, &ties.rows[row].sides[1], -*impulse);
+            tearing.note(owner, *impulse);
         }
         for ((owner, row), impulse) in ties.owners.iter().zip(&ties.rows).zip(&solution.rows_n_s) {
             outside.note(all, owner.member, &row.sides[1], -*impulse);
