@@ -30,14 +30,13 @@ impl ClusterStepper {
         for (k, (owner, contact)) in search.owners.iter().zip(&search.contacts).enumerate() {
             let impulse = solution.contacts_n_s[k];
             let owed_slip_m = contact.owed_slip_after(impulse, solution.contacts_m_s[k], h_s);
-            let rebound = impacts.contacts_n_s.get(k).copied().unwrap_or_default();
             // sides that rebound hold each other no more
             let (lasting, spin) =
-                if impacts.rebounds(k) { (DVec3::ZERO, Spin::default()) } else { (impulse, owner.spin) };
+                if impacts.of(k).is_some() { (DVec3::ZERO, Spin::default()) } else { (impulse, owner.spin) };
             let load_n = contact.load_n_s / h_s;
             let place = Remembered { key: owner.key.anywhere(), force_n: lasting / h_s, load_n, owed_slip_m, spin };
             all[owner.member].memory.pair(owner.partner).next.push(place);
-            let impulse = impulse + rebound;
+            let impulse = impulse + impacts.contacts_n_s.get(k).copied().unwrap_or_default();
             outside.note(all, owner.member, &contact.sides[1], -impulse);
             if impulse != DVec3::ZERO {
                 let total = total_of(&mut self.totals, owner.member, owner.partner);
@@ -57,20 +56,17 @@ impl ClusterStepper {
                 total_of(&mut self.totals, owner.member, owner.partner);
             }
         }
-        for (row, impulse) in impacts.rows_n_s.iter().enumerate().take(ties.owners.len()) {
-            let owner = &ties.owners[row];
-            outside.note(all, owner.member, &ties.rows[row].sides[1], -*impulse);
-            tearing.note(owner, *impulse);
-        }
-        for ((owner, row), impulse) in ties.owners.iter().zip(&ties.rows).zip(&solution.rows_n_s) {
-            outside.note(all, owner.member, &row.sides[1], -*impulse);
-            outside.note_line(owner, *impulse);
-            tearing.note(owner, *impulse);
+        for (k, (owner, row)) in ties.owners.iter().zip(&ties.rows).enumerate() {
+            let impulse = solution.rows_n_s[k];
+            let given = impulse + impacts.rows_n_s.get(k).copied().unwrap_or_default();
+            outside.note(all, owner.member, &row.sides[1], -given);
+            outside.note_line(owner, given);
+            tearing.note(owner, given);
             if let Partner::Link(_) = owner.partner {
-                total_of(&mut self.totals, owner.member, owner.partner).add(*impulse, 0.0);
+                total_of(&mut self.totals, owner.member, owner.partner).add(given, 0.0);
             }
-            let owed_slip_m = owner.owed_slip_m(row, *impulse, &self.progress, h_s);
-            let place = Remembered { owed_slip_m, ..Remembered::new(place_key(owner.key), *impulse / h_s) };
+            let owed_slip_m = owner.owed_slip_m(row, impulse, &self.progress, h_s);
+            let place = Remembered { owed_slip_m, ..Remembered::new(place_key(owner.key), impulse / h_s) };
             all[owner.member].memory.pair(owner.partner).next.push(place);
         }
         joints.note_efforts(ties, &solution.rows_n_s, efforts);

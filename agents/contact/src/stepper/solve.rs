@@ -3,9 +3,9 @@
 //! In: members with what they see, places, rows. Out: every member's impulses. Never here: how places are found, how rows are laid out.
 //! Theory: docs/theory/clusters.md, section 9.
 
+use super::guarded::Lent;
 use super::joints::Aimed;
 use super::progress::Progress;
-use super::guarded::Lent;
 use super::search::{Judge, Round};
 use super::{ClusterMember, ClusterReport, ClusterStepper, On, Participant, Role, times};
 use crate::cluster::{Contact, JointRow, Member, Problem, ProblemError, Report, Response, Solver, StepForm};
@@ -65,7 +65,6 @@ impl ClusterStepper {
                 progress,
                 depth_m,
                 ..
-
             } = &mut *self;
             let solution = solver.solution();
             // the next solve starts from this one
