@@ -35,10 +35,9 @@ pub(super) struct Impacts {
     found: Vec<Impact>,
     /// The flight of each participant, until something holds it.
     flights: Vec<Flight>,
-    /// Participants that touch or are joined, whether any of them collide, and the work of what acts between them.
+    /// Participants that touch or are joined, and the work of what acts between them where any of them collide.
     touching: DisjointSets,
-    collide: Vec<bool>,
-    works: Vec<Work>,
+    works: Vec<Option<Work>>,
     /// The problem, with the contact and the row of the step that each of its own is.
     contacts: Vec<Contact>,
     contacts_of: Vec<usize>,
@@ -243,18 +242,15 @@ impl Impacts {
             }
         }
         self.touching = touching;
-        self.collide.clear();
-        self.collide.resize(progress.len(), false);
-        for impact in &self.found {
-            let body = movers(&search.contacts[impact.at].sides).next();
-            body.into_iter().for_each(|body| self.collide[self.touching.lowest(body)] = true);
-        }
         self.works.clear();
-        self.works.resize(progress.len(), Work::default());
+        self.works.resize(progress.len(), None);
+        for body in self.found.iter().filter_map(|impact| movers(&search.contacts[impact.at].sides).next()) {
+            self.works[self.touching.lowest(body)] = Some(Work::default());
+        }
     }
 
     fn collides(&mut self, sides: &[Side; 2]) -> bool {
-        movers(sides).next().is_some_and(|body| self.collide[self.touching.lowest(body)])
+        movers(sides).next().is_some_and(|body| self.works[self.touching.lowest(body)].is_some())
     }
 
     /// Sets up the solver; the time in which contacts give way by their depth, seconds.
@@ -274,8 +270,8 @@ impl Impacts {
         let struck = |body: usize| progress[body].place.map_or(&[][..], |place| solution.velocities(place));
         // with what the velocities of sides are against each other where they meet, beside those at the start and at the end of the step
         let mut add = |sides: &[Side; 2], [solved, given]: [DVec3; 2], [at_start, at_end]: [DVec3; 2]| {
-            let Some(body) = movers(sides).next() else { return };
-            let work = &mut works[touching.lowest(body)];
+            let body = movers(sides).next();
+            let Some(work) = body.and_then(|body| works[touching.lowest(body)].as_mut()) else { return };
             let stopped = relative(sides, |at| &progress[at].solved);
             let both = relative(sides, |at| &progress[at].before) + stopped - at_start - at_end;
             let change = relative(sides, struck) - stopped;
@@ -300,10 +296,10 @@ impl Impacts {
     /// Gives bodies what impacts change of their velocities, and moves those that fly to where they have come to (eq. 27). Others are where the
     /// solution of the step leaves them.
     fn take(&mut self, all: &[Participant<'_>], search: &Search, ties: &Ties, progress: &mut [Progress]) {
-        let Self { solver, flights, touching, collide, works, contacts_of, rows_of, step_s, .. } = self;
+        let Self { solver, flights, touching, works, contacts_of, rows_of, step_s, .. } = self;
         let solution = solver.solution();
-        let mut share = |body: usize| works[touching.lowest(body)].share();
-        let mut of = |sides: &[Side; 2]| movers(sides).next().map_or(1.0, &mut share);
+        let mut share = |body: usize| works[touching.lowest(body)].map(|work| work.share());
+        let mut of = |sides: &[Side; 2]| movers(sides).next().and_then(&mut share).unwrap_or(0.0);
         self.contacts_n_s.resize(search.contacts.len(), DVec3::ZERO);
         self.rows_n_s.resize(ties.rows.len(), DVec3::ZERO);
         for (at, given) in contacts_of.iter().zip(&solution.contacts_n_s) {
@@ -313,9 +309,8 @@ impl Impacts {
             self.rows_n_s[*at] = *given * of(&ties.rows[*at].sides);
         }
         for (body, state) in progress.iter_mut().enumerate() {
-            let group = touching.lowest(body);
-            let Some(place) = state.place.filter(|_| collide[group]) else { continue };
-            state.strike(solution.velocities(place), works[group].share());
+            let Some((place, share)) = state.place.zip(share(body)) else { continue };
+            state.strike(solution.velocities(place), share);
             match flights[body] {
                 Flight { is_free: true, after_s: Some(after_s), .. } => state.fly_on(after_s, *step_s),
                 _ if all[body].member.role() == Role::Rigid => state.wait(*step_s),
