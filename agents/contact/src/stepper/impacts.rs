@@ -43,7 +43,7 @@ pub(super) struct Impacts {
     contacts_of: Vec<usize>,
     rows: Vec<JointRow>,
     rows_of: Vec<usize>,
-    /// What impacts gave each contact and row of the step beside its solution, N·s; empty where there were none.
+    /// The impulses that impacts gave each contact and row of the step beside its solution, N·s; empty where there were none.
     pub contacts_n_s: Vec<DVec3>,
     pub rows_n_s: Vec<DVec3>,
 }

@@ -169,7 +169,7 @@ impl ClusterStepper {
     }
 }
 
-/// What a problem goes by of a participant.
+/// Where a problem takes velocities or momentum of a participant from.
 pub(super) type Velocities = fn(&Progress) -> &[DVec3];
 
 /// A problem among the participants that have a place in it: some contacts and rows, bodies at some velocities.
