@@ -30,22 +30,23 @@ impl ClusterStepper {
     /// Notes what the next step starts from.
     pub(super) fn remember(&mut self, all: &mut [Participant<'_>], h_s: f64, last: bool, dt: SimSpan) {
         self.remember_spins(all, h_s);
-        let Self { solver, search, ties, contact_rows, joints, outside, tearing, yielding, efforts, .. } = self;
+        let Self { solver, search, ties, contact_rows, joints, outside, tearing, yielding, efforts, impacts, .. } =
+            self;
         let solution = solver.solution();
         let mut pushes = contact_rows.pushes(ties).peekable();
         for (k, (owner, contact)) in search.owners.iter().zip(&search.contacts).enumerate() {
             let impulse = solution.contacts_n_s[k];
             let owed_slip_m = contact.owed_slip_after(impulse, solution.contacts_m_s[k], h_s);
-            // a blow is over
+            // sides that rebound hold each other no more
             let (lasting, spin) =
-                if contact.restitution > 0.0 { (DVec3::ZERO, Spin::default()) } else { (impulse, owner.spin) };
+                if impacts.of(k).is_some() { (DVec3::ZERO, Spin::default()) } else { (impulse, owner.spin) };
             let load_n = contact.load_n_s / h_s;
             let (key, force_n, overlap_m) = (owner.key.anywhere(), lasting / h_s, contact.overlap_m);
             let place = Remembered { key, force_n, load_n, overlap_m, owed_slip_m, spin };
             all[owner.member].memory.pair(owner.partner).next.push(place);
             let push =
                 pushes.next_if(|(pushed, _)| *pushed == k).map_or(DVec3::ZERO, |(_, row)| solution.rows_n_s[row]);
-            let impulse = impulse + push;
+            let impulse = impulse + push + impacts.contacts_n_s.get(k).copied().unwrap_or_default();
             outside.note(all, owner.member, &contact.sides[1], -impulse);
             if impulse != DVec3::ZERO {
                 let total = total_of(&mut self.totals, owner.member, owner.partner);
@@ -65,15 +66,17 @@ impl ClusterStepper {
                 total_of(&mut self.totals, owner.member, owner.partner);
             }
         }
-        for ((owner, row), impulse) in ties.owners.iter().zip(&ties.rows).zip(&solution.rows_n_s) {
-            outside.note(all, owner.member, &row.sides[1], -*impulse);
-            outside.note_line(owner, *impulse);
-            tearing.note(owner, *impulse);
+        for (k, (owner, row)) in ties.owners.iter().zip(&ties.rows).enumerate() {
+            let impulse = solution.rows_n_s[k];
+            let given = impulse + impacts.rows_n_s.get(k).copied().unwrap_or_default();
+            outside.note(all, owner.member, &row.sides[1], -given);
+            outside.note_line(owner, given);
+            tearing.note(owner, given);
             if let Partner::Link(_) = owner.partner {
-                total_of(&mut self.totals, owner.member, owner.partner).add(*impulse, 0.0);
+                total_of(&mut self.totals, owner.member, owner.partner).add(given, 0.0);
             }
-            let owed_slip_m = owner.owed_slip_m(row, *impulse, &self.progress, h_s);
-            let place = Remembered { owed_slip_m, ..Remembered::new(place_key(owner.key), *impulse / h_s) };
+            let owed_slip_m = owner.owed_slip_m(row, impulse, &self.progress, h_s);
+            let place = Remembered { owed_slip_m, ..Remembered::new(place_key(owner.key), impulse / h_s) };
             all[owner.member].memory.pair(owner.partner).next.push(place);
         }
         joints.note_efforts(ties, &solution.rows_n_s, efforts);

@@ -5,9 +5,9 @@
 //! Theory: docs/theory/clusters.md, section 2.
 
 use super::Participant;
-use super::search::Search;
+use super::search::{Owner, Search};
 use super::ties::Ties;
-use crate::cluster::{Hold, JointRow, Pressed, Side};
+use crate::cluster::{Contact, Hold, JointRow, Pressed, Side};
 use crate::push_out::{PUSH_OUT_MAX_M_S, push_out_m_s};
 use crate::stepper::ClusterMember;
 use glam::DVec3;
@@ -49,21 +49,11 @@ impl ContactRows {
         ties.rows.truncate(ties.owners.len());
         self.clear();
         for (contact, (owner, at)) in search.owners.iter().zip(&search.contacts).enumerate() {
-            let reach_m = at.friction * owner.spin.radius_m;
-            if reach_m <= 0.0 {
-                continue;
-            }
-            let (Some(here), Some(there)) = (turns(all, Some(owner.member)), turns(all, owner.other)) else { continue };
-            if [&here, &there].iter().all(|turns| turns.side.terms().is_empty()) {
-                continue;
-            }
-            let hold = Hold::motor(at.normal, f64::INFINITY);
+            let Some(row) = spin_row(all, owner, at, contact) else { continue };
             ties.rows.push(JointRow {
-                target_m_s: there.led_rad_s - here.led_rad_s,
                 owed_slip_m: at.normal * owner.spin.owed_rad,
-                pressed: Some(Pressed { contact, reach_m }),
                 warm_n_s: at.normal * (owner.spin.torque_n_m * h_s),
-                ..JointRow::new([here.side, there.side], hold)
+                ..row
             });
             self.spins.push(contact);
         }
@@ -86,6 +76,23 @@ impl ContactRows {
     pub fn pushes(&self, ties: &Ties) -> impl Iterator<Item = (usize, usize)> + use<'_> {
         self.pushes.iter().copied().zip(ties.owners.len() + self.spins.len()..)
     }
+}
+
+/// The row about the normal of a contact, by the place of that in its problem, that owes nothing; `None` where nothing resists or turns.
+pub(super) fn spin_row(all: &[Participant<'_>], owner: &Owner, at: &Contact, contact: usize) -> Option<JointRow> {
+    let reach_m = at.friction * owner.spin.radius_m;
+    if reach_m <= 0.0 {
+        return None;
+    }
+    let (here, there) = (turns(all, Some(owner.member))?, turns(all, owner.other)?);
+    if [&here, &there].iter().all(|turns| turns.side.terms().is_empty()) {
+        return None;
+    }
+    Some(JointRow {
+        target_m_s: there.led_rad_s - here.led_rad_s,
+        pressed: Some(Pressed { contact, reach_m }),
+        ..JointRow::new([here.side, there.side], Hold::motor(at.normal, f64::INFINITY))
+    })
 }
 
 /// How a member turns, or what never moves; `None` of a body that does not turn as a whole.
