@@ -30,8 +30,29 @@ impl ClusterStepper {
     /// Notes what the next step starts from.
     pub(super) fn remember(&mut self, all: &mut [Participant<'_>], h_s: f64, last: bool, dt: SimSpan) {
         self.remember_spins(all, h_s);
-        let Self { solver, search, ties, contact_rows, joints, outside, tearing, yielding, efforts, impacts, .. } =
-            self;
+        self.remember_contacts(all, h_s);
+        self.remember_ties(all, h_s);
+        let Self { solver, search, ties, outside, .. } = self;
+        for &[a, b] in &search.near {
+            let (now, other) = (all[a].context.time + dt, all[b].id);
+            all[a].memory.meet(other, now);
+        }
+        let mut sensed = search.sensed.as_slice();
+        for (member, one) in all.iter_mut().enumerate() {
+            let (mine, others) = sensed.split_at(sensed.partition_point(|pair| pair.member <= member));
+            sensed = others;
+            let begins = SimSpan::from_secs_f64(outside.after_s).unwrap_or(SimSpan::ZERO);
+            one.memory.sense(mine.iter().map(|pair| pair.partner), one.context.time + begins);
+            one.memory.turn(one.context.time + dt);
+            if last {
+                ties.grips(member, &solver.solution().rows_n_s, h_s, one.grips);
+            }
+        }
+    }
+
+    /// Notes what contacts hand to the next step, and adds up what they gave, push-outs and impacts included.
+    fn remember_contacts(&mut self, all: &mut [Participant<'_>], h_s: f64) {
+        let Self { solver, search, ties, contact_rows, outside, impacts, .. } = self;
         let solution = solver.solution();
         let mut pushes = contact_rows.pushes(ties).peekable();
         for (k, (owner, contact)) in search.owners.iter().zip(&search.contacts).enumerate() {
@@ -66,6 +87,12 @@ impl ClusterStepper {
                 total_of(&mut self.totals, owner.member, owner.partner);
             }
         }
+    }
+
+    /// Notes what rows of ties hand to the next step, and what they gave.
+    fn remember_ties(&mut self, all: &mut [Participant<'_>], h_s: f64) {
+        let Self { solver, ties, joints, outside, tearing, yielding, efforts, impacts, .. } = self;
+        let solution = solver.solution();
         for (k, (owner, row)) in ties.owners.iter().zip(&ties.rows).enumerate() {
             let impulse = solution.rows_n_s[k];
             let given = impulse + impacts.rows_n_s.get(k).copied().unwrap_or_default();
@@ -81,21 +108,6 @@ impl ClusterStepper {
         }
         joints.note_efforts(ties, &solution.rows_n_s, efforts);
         yielding.slip(all, ties, &solution.rows_n_s, &self.progress);
-        for &[a, b] in &search.near {
-            let (now, other) = (all[a].context.time + dt, all[b].id);
-            all[a].memory.meet(other, now);
-        }
-        let mut sensed = search.sensed.as_slice();
-        for (member, one) in all.iter_mut().enumerate() {
-            let (mine, others) = sensed.split_at(sensed.partition_point(|pair| pair.member <= member));
-            sensed = others;
-            let begins = SimSpan::from_secs_f64(outside.after_s).unwrap_or(SimSpan::ZERO);
-            one.memory.sense(mine.iter().map(|pair| pair.partner), one.context.time + begins);
-            one.memory.turn(one.context.time + dt);
-            if last {
-                ties.grips(member, &solution.rows_n_s, h_s, one.grips);
-            }
-        }
     }
 
     /// Notes what the spins of contacts were given.
