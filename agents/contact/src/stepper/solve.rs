@@ -8,7 +8,7 @@ use super::progress::Progress;
 use super::search::{Judge, Round, Search};
 use super::ties::Ties;
 use super::{ClusterMember, ClusterReport, ClusterStepper, On, Participant, Role, times};
-use crate::cluster::{Member, Problem, ProblemError, Response, StepForm};
+use crate::cluster::{Level, Member, Problem, ProblemError, Response, StepForm};
 use glam::DVec3;
 use metachron_core::{ParallelFor, StepError, recycled};
 
@@ -159,10 +159,10 @@ impl ClusterStepper {
         }
         report.factors += took.factors as u32;
         report.products += took.products as u32;
-        report.passes += took.passes as u32;
         report.solves += 1;
-        report.convex += u32::from(took.passes > 0);
-        report.cut += u32::from(took.cut);
+        report.unfinished += u32::from(took.level == Level::Interior);
+        report.level = report.level.max(took.level);
+        report.miss_m_s = report.miss_m_s.max(took.miss_m_s);
         Ok(())
     }
 
