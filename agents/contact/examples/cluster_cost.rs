@@ -59,7 +59,7 @@ fn measure(mut scene: Scene) {
         scene.contacts.len(),
         report.factors,
         resting.factors,
-        if report.cut { " (cut)" } else { "" },
+        if report.miss_m_s < 5e-6 { "" } else { " (unfinished)" },
     );
 }
 

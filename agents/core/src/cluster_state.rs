@@ -26,10 +26,8 @@ pub struct ClusterSolves {
     pub factors: u64,
     /// Products of conjugate gradients: of problems that are solved without factors.
     pub products: u64,
-    /// Convex passes: the way that is taken where Newton's method gives up.
-    pub passes: u64,
-    /// Problems whose solve came to no end.
-    pub cut: u64,
+    /// Problems whose solve ended before all laws of contact held to the tolerance.
+    pub unfinished: u64,
     /// The deepest overlap of the last step, metres, ≥ 0.
     pub depth_m: f64,
     /// The deepest overlap ever, metres, ≥ 0.

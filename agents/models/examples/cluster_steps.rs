@@ -59,7 +59,9 @@ const LIST: [Played; 15] = [
 ];
 
 fn main() {
-    println!("scene                    contacts |  landing ms, factors |  at rest ms, median, factors | solves, cut");
+    println!(
+        "scene                    contacts |  landing ms, factors |  at rest ms, median, factors | solves, unfinished"
+    );
     let wanted = std::env::args().nth(1).unwrap_or_default();
     LIST.iter().filter(|played| played.name.contains(&wanted)).for_each(measure);
 }
@@ -67,7 +69,7 @@ fn main() {
 fn measure(played: &Played) {
     let mut table = (played.table)();
     let [mut times, mut factors] = [[vec![], vec![]], [vec![], vec![]]];
-    let (mut contacts, mut solves, mut cut) = (0, 0, 0);
+    let (mut contacts, mut solves, mut unfinished) = (0, 0, 0);
     while table.time.as_secs_f64() < played.seconds {
         let half = usize::from(table.time.as_secs_f64() > 0.5 * played.seconds);
         let started = Instant::now();
@@ -76,13 +78,13 @@ fn measure(played: &Played) {
         factors[half].push(f64::from(report.factors));
         contacts = contacts.max(report.contacts);
         solves += report.solves;
-        cut += report.cut;
+        unfinished += report.unfinished;
     }
     let mean = |list: &[f64]| list.iter().sum::<f64>() / list.len() as f64;
     let mut sorted = times[1].clone();
     sorted.sort_by(f64::total_cmp);
     println!(
-        "{:25} {contacts:7} | {:11.3}   {:6.2} | {:11.3} {:7.3}  {:6.2}  | {solves:5} {cut:4}",
+        "{:25} {contacts:7} | {:11.3}   {:6.2} | {:11.3} {:7.3}  {:6.2}  | {solves:5} {unfinished:4}",
         played.name,
         mean(&times[0]),
         mean(&factors[0]),

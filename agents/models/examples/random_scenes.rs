@@ -71,7 +71,7 @@ fn play_stacks(name: &str, rates: Rates, seeds: std::ops::RangeInclusive<u64>) {
     let (fine_steps, solves) = (sum(|o| o.fine_steps), sum(|o| o.solves));
     println!(
         "{name}: {} stacks, {} deeper than 8 mm, {} than 4 mm at the end, {} gain 0.1 J, {} thrown, {} through; \
-         factors {:.2} a fine step, convex {:.2} %, cut {:.2} % of solves; {:.3} s a simulated second",
+         factors {:.2} a fine step, unfinished {:.2} % of solves; {:.3} s a simulated second",
         outcomes.len(),
         count(|o| o.faults.deep),
         count(|o| o.faults.stays_deep),
@@ -79,8 +79,7 @@ fn play_stacks(name: &str, rates: Rates, seeds: std::ops::RangeInclusive<u64>) {
         count(|o| o.faults.thrown),
         count(|o| o.faults.through),
         sum(|o| o.factors) / fine_steps,
-        100.0 * sum(|o| o.convex) / solves,
-        100.0 * sum(|o| o.cut) / solves,
+        100.0 * sum(|o| o.unfinished) / solves,
         started.elapsed().as_secs_f64() / (SECONDS * outcomes.len() as f64),
     );
 }

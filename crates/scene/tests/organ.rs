@@ -21,7 +21,7 @@ fn the_finest_organ_is_solved_by_gradients_with_a_rigid_ball_on_it() {
     assert_eq!(marble.cluster.unwrap().leader, leader, "they are one problem");
     let solves = world.agents()[leader.0 as usize].latest().cluster.unwrap().solves.unwrap();
     assert!(solves.contacts > 0 && solves.products > solves.problems, "{solves:?}");
-    assert_eq!(solves.cut, 0, "{solves:?}");
+    assert_eq!(solves.unfinished, 0, "{solves:?}");
     let marble = world.object("marble").unwrap().id();
     assert!(
         organ.pairs.iter().any(|pair| pair.with == marble && pair.contacts > 0),

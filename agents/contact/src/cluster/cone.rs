@@ -1,4 +1,4 @@
-//! Projections on Coulomb's disc, on the friction cone, on a ball and on an interval, with their slopes.
+//! Projections on Coulomb's disc, on a ball and on an interval, with their slopes.
 //!
 //! In: an impulse in the frame of a contact (x along the normal). Out: the nearest allowed one, and how it changes with the first.
 //! Never here: velocities, compliance. Theory: `docs/theory/clusters.md`, eq. 7.
@@ -32,15 +32,6 @@ pub(super) enum Law {
     Idle,
 }
 
-/// How Coulomb's law is read as a projection.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Form {
-    /// The friction's disc has the radius of the pressure sought (eq. 7): Coulomb's law itself.
-    Disc,
-    /// The nearest impulse of the cone: Coulomb's law after the shift of (SF98).
-    Cone,
-}
-
 /// A projection: its value, and its slope as three directions with a number each.
 ///
 /// Of the disc the slope leaves out how the radius grows with the pressure, so that it is symmetric.
@@ -56,17 +47,16 @@ pub(super) struct Projection {
 impl Law {
     /// The allowed impulse for `z`.
     #[inline]
-    pub fn project(&self, form: Form, z: DVec3) -> Projection {
-        match (*self, form) {
-            (Self::Coulomb { friction }, Form::Disc) => disc(friction, z),
-            (Self::Coulomb { friction }, Form::Cone) => cone(friction, z),
-            (Self::Bounded { limit }, _) => ball(limit, z),
-            (Self::Between { low, high }, _) => Projection {
+    pub fn project(&self, z: DVec3) -> Projection {
+        match *self {
+            Self::Coulomb { friction } => disc(friction, z),
+            Self::Bounded { limit } => ball(limit, z),
+            Self::Between { low, high } => Projection {
                 value: DVec3::X * z.x.clamp(low, high),
                 axes: DMat3::IDENTITY,
                 slopes: if z.x >= low && z.x <= high { DVec3::X } else { DVec3::ZERO },
             },
-            (Self::Idle, _) => Projection::NONE,
+            Self::Idle => Projection::NONE,
         }
     }
 }
@@ -105,27 +95,6 @@ fn disc(friction: f64, z: DVec3) -> Projection {
         value: DVec3::new(z.x, radius * along.y, radius * along.z),
         axes: DMat3::from_cols(DVec3::X, along, DVec3::X.cross(along)),
         slopes: DVec3::new(1.0, 0.0, radius / slip),
-    }
-}
-
-/// The nearest impulse of the cone.
-#[inline]
-fn cone(friction: f64, z: DVec3) -> Projection {
-    let slip = tangential(z);
-    if slip <= friction * z.x {
-        return Projection::whole(z);
-    }
-    if z.x <= -friction * slip {
-        return Projection::NONE;
-    }
-    let along = DVec3::new(0.0, z.y / slip, z.z / slip);
-    let edge = (DVec3::X + along * friction) / (1.0 + friction * friction).sqrt();
-    let value = edge * edge.dot(z);
-    let across = DVec3::X.cross(along);
-    Projection {
-        value,
-        axes: DMat3::from_cols(edge, across.cross(edge), across),
-        slopes: DVec3::new(1.0, 0.0, (tangential(value) / slip).min(1.0)),
     }
 }
 

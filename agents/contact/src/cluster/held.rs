@@ -3,7 +3,6 @@
 //! In: the last problem of a solver. Out: velocities of blocks per impulse on them. Never here: the solve, who asks.
 //! Theory: `docs/theory/coupling.md`, eq. 7m.
 
-use super::cone::Form;
 use super::gradients::{Stiffness, Task};
 use super::newton::linearise;
 use super::solver::Solver;
@@ -17,7 +16,7 @@ impl Solver {
     /// W of some blocks of a member of the last problem, row by row, with the contacts and rows that bear something held as they were
     /// solved: J (⊕A/f + JᵀGJ)⁻¹ Jᵀ. `false` where rounding leaves it without a factor.
     pub fn held_compliance(&mut self, member: usize, blocks: &[usize], into: &mut Vec<DMat3>) -> bool {
-        linearise(&mut self.iterate, Form::Disc);
+        linearise(&mut self.iterate);
         let (start, size) = (self.solution.offsets[member], self.iterate.system.members.size());
         for list in &mut self.held {
             list.clear();
@@ -27,15 +26,16 @@ impl Solver {
         into.clear();
         into.resize(blocks.len() * blocks.len(), DMat3::ZERO);
         let super::iterate::Iterate { rows, system, gains, .. } = &mut self.iterate;
+        let contacts = Stiffness { rows, gains, threads: &PlainLoop };
+        if !system.factor(contacts) {
+            return false;
+        }
         for (column, &pushed) in blocks.iter().enumerate() {
             for axis in 0..3 {
                 right[start + pushed] = DVec3::AXES[axis];
                 x.fill(DVec3::ZERO);
                 let goal = LEFT_SHARE * system.members.measure(right).root();
-                let mut task = Task { right, x, left, goal };
-                if !system.step(Stiffness { rows, gains, threads: &PlainLoop }, &mut task) {
-                    return false;
-                }
+                system.solve(contacts, &mut Task { right, x, left, goal });
                 for (row, &block) in blocks.iter().enumerate() {
                     *into[row * blocks.len() + column].col_mut(axis) = x[start + block];
                 }

@@ -1,23 +1,19 @@
-//! The iterate that both ways to a solution share, and the linear step that both take.
+//! The iterate that all levels of a solution share, and the linear step that they take.
 //!
 //! In: rows and matrices of a problem. Out: impulses, velocities, steps of them, and what momentum lacks where equations were not
 //! solved to their end.
 //! Never here: when to stop, how far to step.
 //! Theory: `docs/theory/clusters.md`, eq. 8 and 15–17.
 
-use super::cone::{Form, Projection};
+use super::cone::Projection;
 use super::gradients::{Stiffness, Task};
 use super::problem::Member;
 use super::rows::{Point, Rows};
-use super::skew::{Followed, Linear, Residuals, Skew, Sliding};
+use super::skew::{Followed, Residuals, Skew, Sliding, follow_pressure, follow_slip};
 use super::system::{StepForm, System};
 use glam::{DMat3, DVec3};
 use metachron_core::ParallelFor;
 
-/// The share of the step to a convex pass's own impulses that a look at it may leave, before it is found exactly.
-const LOOK_SHARE: f64 = 0.01;
-/// The share of impulses from which on unanswered ones are not rounding that keeps a solve from its goal.
-const UNANSWERED: f64 = 1e-6;
 /// The share of what an inexact step may leave that friction may be off by from what its pressure allows.
 const FOLLOW_SHARE: f64 = 0.1;
 
@@ -37,7 +33,7 @@ pub(super) struct Iterate {
     pub rows: Rows,
     pub system: System,
     pub state: State,
-    /// The step that [`Self::step`] found.
+    /// The step that [`Self::solve`] found.
     pub step: State,
     /// G of each row.
     pub gains: Vec<DMat3>,
@@ -55,10 +51,10 @@ pub(super) struct Iterate {
     scratch: Vec<DVec3>,
 }
 
-/// Impulses and compliances to which an iterate can go back.
+/// A state and compliances to which an iterate can go back.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Kept {
-    lambda: Vec<DVec3>,
+    state: State,
     compliances: Vec<f64>,
 }
 
@@ -73,26 +69,6 @@ pub(super) enum Refined {
     Unanswered,
 }
 
-/// Where the impulses that a velocity asks for would lead.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct Led {
-    /// The largest difference of a row's velocity along each of its axes, m/s.
-    pub off: DVec3,
-    /// The size of the gradient of eq. 10 (eq. 15), √J.
-    pub gradient: f64,
-    /// Whether the equations for it have been solved.
-    pub answered: bool,
-}
-
-/// The quadratic part of eq. 10 along the step d.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct Quadratic {
-    /// Δvᵀ A d.
-    pub cross: f64,
-    /// dᵀ A d.
-    pub curve: f64,
-}
-
 impl State {
     fn resize(&mut self, rows: usize, blocks: usize) {
         let lists = [
@@ -105,6 +81,13 @@ impl State {
             list.clear();
             list.resize(size, DVec3::ZERO);
         }
+    }
+
+    fn copy(&mut self, other: &Self) {
+        let Self { lambda, change, velocity, left } = self;
+        let lists =
+            [(lambda, &other.lambda), (change, &other.change), (velocity, &other.velocity), (left, &other.left)];
+        lists.into_iter().for_each(|(list, from)| list.clone_from(from));
     }
 
     /// A row's impulse and velocity.
@@ -178,9 +161,9 @@ impl Iterate {
     }
 
     /// Makes impulses those that laws ask for, and velocities theirs where a factor makes them. Returns what that came to.
-    pub fn refine(&mut self, form: Form, members: &[Member<'_>]) -> Refined {
+    pub fn refine(&mut self, members: &[Member<'_>]) -> Refined {
         if self.system.form == StepForm::Direct {
-            if !self.obey(form) {
+            if !self.obey() {
                 return Refined::Kept;
             }
             self.respond(members);
@@ -189,7 +172,7 @@ impl Iterate {
         self.scatter_given();
         let Self { state, scratch, .. } = &mut *self;
         state.left.iter_mut().zip(&*scratch).for_each(|(left, before)| *left -= *before);
-        let changed = self.obey(form);
+        let changed = self.obey();
         self.scatter_given();
         let Self { system, state, scratch, .. } = &mut *self;
         state.left.iter_mut().zip(&*scratch).for_each(|(left, now)| *left += *now);
@@ -202,11 +185,11 @@ impl Iterate {
     }
 
     /// Makes impulses those that laws ask for at the velocities as they are; returns whether any was not.
-    fn obey(&mut self, form: Form) -> bool {
+    fn obey(&mut self) -> bool {
         let Self { rows, state, .. } = self;
         let mut any = false;
         for (row, (impulse, velocity)) in rows.rows.iter().zip(state.lambda.iter_mut().zip(&state.velocity)) {
-            let asked = row.natural_map(form, Point { impulse: *impulse, velocity: *velocity }).value;
+            let asked = row.natural_map(Point { impulse: *impulse, velocity: *velocity }).value;
             any |= asked != *impulse;
             *impulse = asked;
         }
@@ -223,39 +206,26 @@ impl Iterate {
         self.press();
         let mut any = false;
         for (row, impulse) in self.rows.rows.iter().zip(&mut self.state.lambda) {
-            let allowed = row.law.project(Form::Disc, *impulse).value;
+            let allowed = row.law.project(*impulse).value;
             any |= allowed != *impulse;
             *impulse = allowed;
         }
         any
     }
 
-    /// Whether velocities answer the impulses: not where a matrix is none of a body.
-    pub fn answered(&mut self) -> bool {
-        self.scatter_given();
-        let Self { system, state, scratch, .. } = self;
-        let given = system.members.measure(scratch).root();
-        let left = system.members.measure(&state.left);
-        left.fastest_m_s <= system.still_m_s || left.root() <= UNANSWERED * given
-    }
-
-    /// Stores what [`Self::restore`] goes back to.
+    /// Stores what [`Self::go_back`] goes back to.
     pub fn keep(&self, kept: &mut Kept) {
-        kept.lambda.clone_from(&self.state.lambda);
+        kept.state.copy(&self.state);
         kept.compliances.clear();
         kept.compliances.extend(self.rows.rows.iter().map(|row| row.compliance));
     }
 
-    /// Goes back to impulses and compliances as they were.
-    pub fn restore(&mut self, members: &[Member<'_>], kept: &Kept) {
-        self.state.lambda.clone_from(&kept.lambda);
-        self.restore_compliances(kept);
-        self.respond(members);
-    }
-
-    /// Goes back to compliances as they were, and stays where it is.
-    pub fn restore_compliances(&mut self, kept: &Kept) {
+    /// Goes back to where it was.
+    pub fn go_back(&mut self, kept: &Kept) {
+        self.exact = false;
+        self.state.copy(&kept.state);
         self.rows.rows.iter_mut().zip(&kept.compliances).for_each(|(row, compliance)| row.compliance = *compliance);
+        self.press();
     }
 
     /// u = b + J Δv.
@@ -264,32 +234,68 @@ impl Iterate {
         self.state.velocity.iter_mut().zip(&self.rows.rows).for_each(|(u, row)| *u += row.free);
     }
 
-    /// The gain and the pull of a row, from its image under a projection at `scale` (eq. 8).
-    pub fn linearise(&mut self, row: usize, image: &Projection, scale: f64) {
-        let yielding = self.rows.rows[row].compliance / scale;
+    /// The gain and the pull of a row from its image under the projection (eq. 8), with how its friction follows its pressure (eq. 8b).
+    pub fn linearise(&mut self, row: usize, image: &Projection) {
+        let of = &self.rows.rows[row];
+        let yielding = of.compliance / of.scale;
         let slopes = image.slopes;
         // (I − P′ (1 − R/w))⁻¹ along each axis of the slope P′
         let factor = (DVec3::ONE - slopes + slopes * yielding).recip();
-        let lambda = self.state.lambda[row];
-        self.gains[row] = image.along_axes(slopes * factor / scale);
-        let missing = image.axes.mul_transpose_vec3(image.value - lambda);
-        self.pull[row] = lambda + image.axes * (missing * factor);
-        self.skews[row] = Skew::NONE;
+        let missing = image.axes.mul_transpose_vec3(image.value - self.state.lambda[row]);
+        let pulled = image.axes * (missing * factor);
+        let followed = if self.follows_pressure() { follow_pressure(of, image, pulled) } else { None };
+        self.gains[row] = image.along_axes(slopes * factor / of.scale);
+        self.pull(row, pulled, followed);
     }
 
-    /// Whether steps know how friction follows its pressure: where a factor is at hand.
+    /// The gain of a row that misses this velocity, and its pull, with how its shift follows its slip where that is followed (eq. C3).
+    pub fn pull_on(&mut self, row: usize, missing: DVec3, gain: DMat3, follows: bool) {
+        let pulled = gain * missing;
+        let at = self.state.point(row);
+        let followed = if follows { follow_slip(&self.rows.rows[row], at, gain, pulled) } else { None };
+        self.gains[row] = gain;
+        self.pull(row, pulled, followed);
+    }
+
+    fn pull(&mut self, row: usize, pulled: DVec3, followed: Option<Followed>) {
+        let Followed { skew, more } = followed.unwrap_or(Followed { skew: Skew::NONE, more: DVec3::ZERO });
+        self.skews[row] = skew;
+        self.pull[row] = self.state.lambda[row] + pulled + more;
+    }
+
+    /// Whether steps know how friction follows its pressure and shifts their slip: where a factor is at hand.
     pub fn follows_pressure(&self) -> bool {
         self.system.form == StepForm::Direct
     }
 
-    /// Adds to a row's gain and pull how its friction follows its pressure (eq. 8b).
-    pub fn follow_pressure(&mut self, row: usize, form: Form, image: &Projection) {
-        let at = self.state.point(row);
-        let linear = Linear { image, gain: self.gains[row], pulled: self.pull[row] - at.impulse };
-        if let Some(Followed { skew, more }) = linear.follow(&self.rows.rows[row], form, at) {
-            self.skews[row] = skew;
-            self.pull[row] += more;
-        }
+    /// What momentum velocities leave unanswered, of impulses that have been changed without them.
+    pub fn remeasure(&mut self) {
+        self.scatter_given();
+        let Self { system, state, step, scratch, .. } = self;
+        system.members.multiply(&state.change, &mut step.left);
+        let sides = scratch.iter().zip(&step.left);
+        state.left.iter_mut().zip(sides).for_each(|(left, (given, av))| *left = *given - *av);
+    }
+
+    /// ‖F‖ of eq. 16, √J. A factor leaves √Σ w |λ − P|² of it.
+    pub fn missed(&self) -> f64 {
+        let of_rows = self.rows.rows.iter().enumerate().map(|(k, row)| {
+            let at = self.state.point(k);
+            row.scale * (at.impulse - row.natural_map(at).value).length_squared()
+        });
+        (of_rows.sum::<f64>() + self.system.members.measure(&self.state.left).squared).sqrt()
+    }
+
+    /// The root of the mean square of what laws and momentum miss, m/s.
+    pub fn mean_miss_m_s(&self) -> f64 {
+        let of_rows = self.rows.rows.iter().enumerate().map(|(k, row)| {
+            let at = self.state.point(k);
+            ((row.natural_map(at).value - at.impulse) * row.scale).length_squared()
+        });
+        let of_blocks = self.system.members.mobilities.iter().zip(&self.state.left);
+        let blocks = of_blocks.map(|(mobility, left)| (*mobility * *left).length_squared());
+        let (rows, blocks) = (of_rows.sum::<f64>(), blocks.sum::<f64>());
+        (rows / self.rows.len().max(1) as f64 + blocks / self.state.left.len().max(1) as f64).sqrt()
     }
 
     /// Jᵀ (λ + c) + r − ⊕A/f Δv into `scratch`.
@@ -302,43 +308,21 @@ impl Iterate {
         scratch.iter_mut().zip(&step.left).for_each(|(right, av)| *right -= *av);
     }
 
-    /// Where the pulls as impulses would lead from here: `step` has the change of velocities. The first look is a rough one.
-    pub fn look_ahead(&mut self, members: &[Member<'_>], exactly: bool) -> Led {
-        self.rows.scatter(&self.pull, &mut self.scratch);
-        let pulled = self.system.members.measure(&self.scratch).root();
-        self.pull_on_members();
-        let Self { rows, system, step, scratch, .. } = self;
-        let gradient = system.members.measure(scratch).root();
-        let goal = if exactly { 0.0 } else { LOOK_SHARE * gradient };
-        if !exactly {
-            step.change.fill(DVec3::ZERO);
-        }
-        system.respond(members, &mut Task { right: scratch, x: &mut step.change, left: &mut step.left, goal });
-        rows.velocities(&step.change, &mut step.velocity);
-        let left = system.members.measure(&step.left);
-        let answered = left.fastest_m_s <= system.still_m_s || left.root() <= goal.max(UNANSWERED * pulled);
-        Led { off: step.velocity.iter().fold(DVec3::ZERO, |worst, u| worst.max(u.abs())), gradient, answered }
-    }
-
-    /// Takes the pulls as impulses, with the velocities that [`Self::look_ahead`] found.
-    pub fn take_pulls(&mut self) {
-        self.exact = false;
-        let Self { state, step, .. } = self;
-        state.lambda.clone_from(&self.pull);
-        state.left.clone_from(&step.left);
-        state.change.iter_mut().zip(&step.change).for_each(|(v, by)| *v += *by);
-        self.update_velocities();
-    }
-
-    /// The step of eq. 8 from gains and pulls, of which up to `goal` may be left, in √J; `false` where there is none.
-    pub fn take_step(&mut self, goal: f64, threads: &dyn ParallelFor) -> bool {
+    /// Factors ⊕A/f + JᵀGJ of the gains as they are, or what serves gradients for it; `false` where rounding leaves none.
+    pub fn factor(&mut self, threads: &dyn ParallelFor) -> bool {
         self.steps += 1;
+        self.system.factor(Stiffness { rows: &self.rows, gains: &self.gains, threads })
+    }
+
+    /// The step of eq. 8 from gains and pulls by the last factor; `goal` says how much of a right side of a size may be left, in √J. `false`
+    /// where there is none.
+    pub fn solve(&mut self, threads: &dyn ParallelFor, goal: impl Fn(f64) -> f64) -> bool {
         self.pull_on_members();
         let Self { rows, system, state, step, scratch, .. } = self;
+        let goal = goal(system.members.measure(scratch).root());
         step.change.fill(DVec3::ZERO);
         let contacts = Stiffness { rows, gains: &self.gains, threads };
-        let solved =
-            system.step(contacts, &mut Task { right: scratch, x: &mut step.change, left: &mut step.left, goal });
+        system.solve(contacts, &mut Task { right: scratch, x: &mut step.change, left: &mut step.left, goal });
         let sliding = Sliding { rows, skews: &self.skews, goal: FOLLOW_SHARE * goal };
         self.residuals.correct(&sliding, &mut step.change, |x| system.solve_again(x));
         // what was left before is part of the right side, and goes
@@ -350,21 +334,12 @@ impl Iterate {
         for (row, impulse) in self.residuals.impulses(&self.skews) {
             step.lambda[row] -= impulse;
         }
-        let finite = solved && step.change.iter().all(|v| v.is_finite());
+        let finite = step.change.iter().all(|v| v.is_finite());
         if !finite {
             // no share of it, not even none, is of use to a later look
             step.resize(self.rows.len(), self.scratch.len());
         }
         finite
-    }
-
-    /// The energy of the members along the step; Δvᵀ A Δv is the same everywhere and left out.
-    pub fn quadratic(&mut self) -> Quadratic {
-        let Self { system, state, step, unanswered, scratch, .. } = self;
-        system.members.multiply(&step.change, scratch);
-        let dot = |a: &[DVec3], b: &[DVec3]| -> f64 { a.iter().zip(b).map(|(a, b)| a.dot(*b)).sum() };
-        let cross = dot(&state.change, scratch) - dot(unanswered, &step.change);
-        Quadratic { cross, curve: dot(&step.change, scratch) }
     }
 
     /// A⁻¹ r of what free velocities leave unanswered, as the storage of a step; what that leaves too.
@@ -374,7 +349,10 @@ impl Iterate {
         step.left.fill(DVec3::ZERO);
         if !unanswered.is_empty() {
             let State { change: x, left, .. } = step;
+            // nothing else than rounding ends this: what it left would be energy that no one counts
+            let still_m_s = std::mem::take(&mut system.still_m_s);
             system.respond(members, &mut Task { right: unanswered, x, left, goal: 0.0 });
+            system.still_m_s = still_m_s;
         }
     }
 

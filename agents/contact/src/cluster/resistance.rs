@@ -3,7 +3,6 @@
 //! In: the last problem of a solver, a velocity of the sides of each contact that is not that of any block. Out: impulses. Never here: the
 //! solve, who moves. Theory: `docs/theory/coupling.md`, eq. 7s.
 
-use super::cone::Form;
 use super::gradients::{Stiffness, Task};
 use super::iterate::Iterate;
 use super::newton::linearise;
@@ -20,7 +19,7 @@ impl Solver {
     /// of each contact, world axes: −S u with S = G − G J (⊕A/f + JᵀGJ)⁻¹ Jᵀ G, all contacts and rows being held as they were solved. `None`
     /// where rounding leaves no factor.
     pub(crate) fn resistance(&mut self, moved_m_s: &[DVec3]) -> Option<&[DVec3]> {
-        linearise(&mut self.iterate, Form::Disc);
+        linearise(&mut self.iterate);
         let Iterate { rows, system, gains, .. } = &mut self.iterate;
         self.resisted.clear();
         self.resisted.resize(rows.len(), DVec3::ZERO);
@@ -34,9 +33,11 @@ impl Solver {
         let [right, x, left] = &mut self.held;
         rows.scatter(&self.resisted, right);
         let goal = LEFT_SHARE * system.members.measure(right).root();
-        if !system.step(Stiffness { rows, gains, threads: &PlainLoop }, &mut Task { right, x, left, goal }) {
+        let contacts = Stiffness { rows, gains, threads: &PlainLoop };
+        if !system.factor(contacts) {
             return None;
         }
+        system.solve(contacts, &mut Task { right, x, left, goal });
         for (k, given) in self.resisted.iter_mut().enumerate() {
             *given = rows.rows[k].frame * (gains[k] * rows.velocity(k, x) - *given);
         }

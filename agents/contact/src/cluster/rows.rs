@@ -3,7 +3,7 @@
 //! In: a problem. Out: products with J and Jᵀ, and what each row needs for its law, in its own frame (x along the normal).
 //! Never here: matrices of members, impulses. Theory: `docs/theory/clusters.md`, eq. 1–6.
 
-use super::cone::{Form, Law, Projection, tangential};
+use super::cone::{Law, Projection, tangential};
 use super::joint::{Hold, JointRow, Pressed};
 use super::problem::{Contact, Problem, SLIP_SHARE};
 use super::side::Side;
@@ -64,6 +64,7 @@ pub(super) struct Point {
 #[derive(Debug, Clone, Default)]
 pub(super) struct Rows {
     pub rows: Vec<Row>,
+    contacts: usize,
     terms: Vec<Term>,
     /// Rows that are bounded by what presses a contact.
     pressed: Vec<PressedRow>,
@@ -118,28 +119,25 @@ impl Row {
 
     /// P(z) of eq. 7 at an iterate; where it gives the impulse back, the law holds.
     #[inline]
-    pub fn natural_map(&self, form: Form, at: Point) -> Projection {
-        self.natural_map_at(form, at, self.compliance)
+    pub fn natural_map(&self, at: Point) -> Projection {
+        self.law.project(at.impulse - (at.velocity + at.impulse * self.compliance) / self.scale)
     }
 
-    /// The same at another compliance.
-    #[inline]
-    pub fn natural_map_at(&self, form: Form, at: Point, compliance: f64) -> Projection {
-        let mut velocity = at.velocity + at.impulse * compliance;
-        if form == Form::Cone {
-            velocity.x += self.shift_of(velocity);
-        }
-        self.law.project(form, at.impulse - velocity / self.scale)
-    }
-
-    /// μ |ũ_t|, which makes the law one of complementarity of cones (SF98); zero without a cone.
+    /// s = μ |ũ_t| of a contact, which makes its law one of complementarity of cones (SF98); zero of all else.
     pub fn shift(&self, at: Point) -> f64 {
-        self.shift_of(at.velocity + at.impulse * self.compliance)
+        match self.law {
+            Law::Coulomb { friction } => friction * tangential(at.velocity + at.impulse * self.compliance),
+            _ => 0.0,
+        }
     }
 
-    fn shift_of(&self, yielding: DVec3) -> f64 {
+    /// By how much s changes with ũ.
+    pub fn shift_by(&self, at: Point, velocity: DVec3) -> f64 {
         match self.law {
-            Law::Coulomb { friction } => friction * tangential(yielding),
+            Law::Coulomb { friction } => {
+                let slip = (at.velocity + at.impulse * self.compliance).with_x(0.0);
+                friction * slip.normalize_or_zero().dot(velocity)
+            }
             _ => 0.0,
         }
     }
@@ -164,11 +162,6 @@ impl Row {
             self.compliance
         }
     }
-
-    /// A softer row: a share of the scale instead of a compliance that follows the load.
-    pub fn softened(&self, share: f64) -> f64 {
-        self.given.unwrap_or(share * self.scale)
-    }
 }
 
 impl Rows {
@@ -177,6 +170,7 @@ impl Rows {
         self.rows.clear();
         self.terms.clear();
         self.pressed.clear();
+        self.contacts = problem.contacts.len();
         for contact in problem.contacts {
             self.push(Row::of_contact(contact, problem), &contact.sides, offsets);
         }
@@ -235,6 +229,11 @@ impl Rows {
             }
             law => law,
         };
+    }
+
+    /// How many of them are contacts.
+    pub fn contacts(&self) -> usize {
+        self.contacts
     }
 
     pub fn len(&self) -> usize {

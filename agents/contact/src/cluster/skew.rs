@@ -4,7 +4,7 @@
 //! Each sliding contact adds a matrix of rank one, so the unknowns are one number for each, found by minimal residuals (SS86) with the
 //! symmetric factor in the place of the whole matrix. Theory: `docs/theory/clusters.md`, eq. 8b.
 
-use super::cone::{Form, Law, Projection};
+use super::cone::{Law, Projection};
 use super::rows::{Point, Row, Rows};
 use glam::DMat3;
 use glam::DVec3;
@@ -51,14 +51,7 @@ pub(super) struct Residuals {
     numbers: Vec<f64>,
 }
 
-/// A row as it is without a skew: its image, the symmetric gain, and the change of its impulse if no velocity changed.
-pub(super) struct Linear<'a> {
-    pub image: &'a Projection,
-    pub gain: DMat3,
-    pub pulled: DVec3,
-}
-
-/// What the exact slope adds to that.
+/// What the exact slope of a row adds to its symmetric gain.
 pub(super) struct Followed {
     pub skew: Skew,
     pub more: DVec3,
@@ -68,26 +61,23 @@ impl Skew {
     pub const NONE: Self = Self { gives: DVec3::ZERO, sees: DVec3::ZERO };
 }
 
-impl Linear<'_> {
-    /// How the friction of a sliding contact follows its pressure, or how its shift follows its slip; `None` for all else.
-    pub fn follow(&self, row: &Row, form: Form, at: Point) -> Option<Followed> {
-        let Self { image, gain, pulled } = *self;
-        let Law::Coulomb { friction } = row.law else { return None };
-        let slides = image.slopes.x == 1.0 && image.slopes.y == 0.0 && friction > 0.0;
-        if !slides {
-            return None;
-        }
-        let (w, r) = (row.scale, row.compliance);
-        if form == Form::Disc {
-            let gives = image.axes.y_axis * friction;
-            return Some(Followed { skew: Skew { gives, sees: DVec3::X / r }, more: gives * (1.0 - r / w) * pulled.x });
-        }
-        let slip = (at.velocity + at.impulse * r).with_x(0.0).try_normalize()?;
-        let pushed = gain.x_axis;
-        let gives = pushed * (w * friction / (1.0 + r * friction * slip.dot(pushed)));
-        let sees = (slip - gain * slip * r) / w;
-        Some(Followed { skew: Skew { gives, sees }, more: gives * (-r / w * slip.dot(pulled)) })
-    }
+/// How the friction of a sliding contact follows its pressure, of a row with this image; `None` for all else.
+pub(super) fn follow_pressure(row: &Row, image: &Projection, pulled: DVec3) -> Option<Followed> {
+    let Law::Coulomb { friction } = row.law else { return None };
+    let slides = image.slopes.x == 1.0 && image.slopes.y == 0.0 && friction > 0.0;
+    let (w, r) = (row.scale, row.compliance);
+    let gives = image.axes.y_axis * friction;
+    slides.then(|| Followed { skew: Skew { gives, sees: DVec3::X / r }, more: gives * (1.0 - r / w) * pulled.x })
+}
+
+/// How the shift of a contact follows its slip, of a row of this gain; `pulled` is the change of its impulse if no velocity changed.
+pub(super) fn follow_slip(row: &Row, at: Point, gain: DMat3, pulled: DVec3) -> Option<Followed> {
+    let Law::Coulomb { friction } = row.law else { return None };
+    let r = row.compliance;
+    let slip = (at.velocity + at.impulse * r).with_x(0.0).try_normalize()?;
+    let pushed = gain.x_axis;
+    let gives = pushed * (friction / (1.0 + r * friction * slip.dot(pushed)));
+    Some(Followed { skew: Skew { gives, sees: slip - gain * slip * r }, more: gives * (-r * slip.dot(pulled)) })
 }
 
 impl Residuals {

@@ -1,13 +1,12 @@
-//! The solve of one contact problem: set-up, the primal-dual way, the convex way behind it, the guard.
+//! The solve of one contact problem: set-up, levels of which each improves on the last, the guard.
 //!
 //! In: a problem, with the impulses of the last step in it. Out: impulses, velocities and a report. Never here: search for contacts,
-//! keys, steps of members. Theory: `docs/theory/clusters.md`.
+//! keys, steps of members. Theory: `docs/theory/clusters.md`, sections 3 to 5.
 
-use super::cone::Form;
-use super::convex::{self, Passes, Stores};
 use super::error::ProblemError;
+use super::interior::Interior;
 use super::iterate::{Iterate, Kept, State};
-use super::newton::{self, Aim};
+use super::newton::{self, Aim, Patience};
 use super::passivity;
 use super::problem::{Member, Problem};
 use super::system::StepForm;
@@ -24,16 +23,27 @@ pub struct Settings {
     pub tolerance_m_s: f64,
     /// How deep contacts rest, metres, > 0: their compliance follows from it. Smaller takes more steps.
     pub depth_m: f64,
-    /// The most passes of the convex way, ≥ 1. One leaves what slides floating by μ |u_t| h.
-    pub passes: usize,
-    /// Leaves the primal-dual way out, for comparison.
-    pub convex_only: bool,
     /// How the equations of a step are solved.
     pub form: StepForm,
     /// The velocity by which what velocities leave unanswered in the iterative form may change a block by itself, m/s, > 0 (eq. 17). By
     /// factors momentum is balanced to rounding.
     pub still_m_s: f64,
+    /// The most steps of a solve, each a factor or what serves gradients for one; `None` for as many as the tolerance takes. After five from
+    /// interior points an answer is safe, and contacts are some hundredths of a millimetre deeper.
+    pub factors_max: Option<u32>,
 }
+
+/// Below this miss the impulses of the last step nearly hold, m/s, and Newton's method may find the rest. Without a factor it comes nearer
+/// from further off, and its steps are cheaper than those from interior points.
+const NEAR_M_S: f64 = 0.03;
+/// Below this miss, m/s, it is tried from interior points, and then at each tenth of the miss at which it failed.
+const POLISH_M_S: f64 = 1e-3;
+const POLISH_AGAIN: f64 = 0.1;
+/// How long it goes on. By gradients, which do not know how friction follows its pressure, it comes nearer by a quarter a step.
+const PATIENCE: Patience = Patience { steps: usize::MAX, stale: 4, left: 0.5 };
+const PATIENCE_BY_GRADIENTS: Patience = Patience { steps: usize::MAX, stale: 6, left: 0.9 };
+/// The most steps of a solve without a budget: of 1000 problems at random none took 150.
+const STEPS_MAX: usize = 400;
 
 /// How deep contacts rest where nothing else is said, metres.
 pub const DEPTH_DEFAULT_M: f64 = 20e-6;
@@ -41,41 +51,39 @@ pub const DEPTH_DEFAULT_M: f64 = 20e-6;
 impl Default for Settings {
     fn default() -> Self {
         let (form, depth_m) = (StepForm::Direct, DEPTH_DEFAULT_M);
-        Self { tolerance_m_s: 5e-6, depth_m, passes: 60, convex_only: false, form, still_m_s: 5e-8 }
+        Self { tolerance_m_s: 5e-6, depth_m, form, still_m_s: 5e-8, factors_max: None }
     }
 }
 
-/// How an answer was found.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub enum Way {
-    /// The impulses of the last step still hold: no Newton step was needed.
+/// How far a solve went, the dearest last. All laws hold to the tolerance but at [`Level::Interior`].
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Default)]
+pub enum Level {
+    /// The impulses of the last step still hold.
     #[default]
     Kept,
-    /// By primal-dual Newton.
-    PrimalDual,
-    /// By convex passes.
-    Convex,
+    /// Newton's method found the rest from them.
+    Near,
+    /// Interior points led to where all laws hold.
+    Polished,
+    /// Interior points, as far as the budget went: inside all bounds, with momentum and passivity as everywhere; the miss says how far off.
+    Interior,
 }
 
 /// What a solve took, and how good its answer is.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Report {
-    /// The way that the answer comes from.
-    pub way: Way,
-    /// Factors of the coupled matrix, those of ways that gave up included; none in the iterative form.
+    /// How far it went.
+    pub level: Level,
+    /// Factors of the coupled matrix; none in the iterative form.
     pub factors: usize,
     /// Products of conjugate gradients with a matrix of the members' size, all for scales, steps and responses; none in the direct form.
     pub products: usize,
-    /// Convex passes that were finished.
-    pub passes: usize,
-    /// The largest miss of a law by the answer given, m/s (eq. 9).
-    pub residual_m_s: f64,
+    /// What laws and momentum miss at most by the answer given, m/s (eq. 9); infinite where numbers overflowed and nothing is given.
+    pub miss_m_s: f64,
     /// The most work that the answer does but for push-out, J (eq. 12); above zero by rounding only.
     pub work_j: f64,
     /// What all impulses were multiplied by to be passive; 1 but for answers that are far off.
     pub ray: f64,
-    /// Whether no way came to its end: the answer is that of a softer contact or of fewer passes.
-    pub cut: bool,
 }
 
 /// The answer of a solve; rows are counted as the problem gives them.
@@ -125,7 +133,7 @@ pub struct Solver {
     pub(super) iterate: Iterate,
     warm: Vec<DVec3>,
     compliances: Vec<f64>,
-    stores: Stores,
+    interior: Interior,
     kept: Kept,
     pub(super) solution: Solution,
     /// Storage of [`Self::held_compliance`] and [`Self::resistance`], and what the latter found.
@@ -142,6 +150,11 @@ impl Solver {
     /// Solves the equations of steps by this form from now on.
     pub fn set_form(&mut self, form: StepForm) {
         self.settings.form = form;
+    }
+
+    /// Ends each solve after so many steps from now on.
+    pub fn set_factors_max(&mut self, most: Option<u32>) {
+        self.settings.factors_max = most;
     }
 
     /// Lets contacts rest `depth_m` metres deep from now on, > 0.
@@ -166,8 +179,8 @@ impl Solver {
             self.run(problem)
         } else {
             self.iterate.respond(problem.members);
-            let products = self.iterate.system.products();
-            Report { products, cut: !self.iterate.answered(), ..Report::resting() }
+            let (products, miss_m_s) = (self.iterate.system.products(), newton::miss_m_s(&mut self.iterate));
+            Report { products, miss_m_s, ..Report::resting() }
         };
         self.hand_out(problem);
         Ok(&self.solution)
@@ -210,7 +223,7 @@ impl Solver {
                 rows.press(&self.warm);
             }
             let row = &rows.rows[k];
-            let warm = row.law.project(Form::Disc, row.frame.transpose() * warm * row.held).value;
+            let warm = row.law.project(row.frame.transpose() * warm * row.held).value;
             self.warm.push(warm);
             self.compliances.push(row.compliance_under(warm.length().max(load_n_s), yield_m_s));
         }
@@ -227,12 +240,10 @@ impl Solver {
         self.iterate.begin(members);
     }
 
-    /// The ways in their order, then the guard.
+    /// The levels in their order, then the guard.
     fn run(&mut self, problem: &Problem<'_>) -> Report {
-        let rigid = self.iterate.system.members.rigid.iter().all(|rigid| *rigid);
         let aim = Aim {
             members: problem.members,
-            form: if rigid && !self.iterate.follows_pressure() { Form::Cone } else { Form::Disc },
             tolerance_m_s: self.settings.tolerance_m_s,
             yield_m_s: self.settings.yield_m_s(problem.h_s),
             threads: problem.threads,
@@ -241,44 +252,54 @@ impl Solver {
         let ray = passivity::guard(&mut self.iterate, problem.members, &self.solution.velocities);
         (report.factors, report.products) = (self.iterate.system.factors(), self.iterate.system.products());
         (report.work_j, report.ray) = (ray.work_j, ray.share);
-        report.residual_m_s = newton::largest_miss(&self.iterate, Form::Disc);
-        report
-    }
-
-    /// Impulses in their cones by the first way that finds them.
-    fn find(&mut self, aim: &Aim<'_>) -> Report {
-        let mut report = Report::resting();
-        if !self.settings.convex_only && self.primal_dual(aim) {
-            report.way = if self.iterate.steps > 0 { Way::PrimalDual } else { Way::Kept };
-        } else {
-            let passes = self.convex(aim);
-            report = Report { way: Way::Convex, passes: passes.finished, cut: !passes.settled, ..report };
+        if ray.share < 1.0 {
+            report.miss_m_s = newton::miss_m_s(&mut self.iterate);
         }
-        report.cut |= !self.settle(aim.members) || !self.iterate.answered();
         report
     }
 
-    /// The primal-dual way, in the form that serves these members best, then in the other.
-    fn primal_dual(&mut self, aim: &Aim<'_>) -> bool {
-        let other = if aim.form == Form::Cone { Form::Disc } else { Form::Cone };
-        [aim.form, other].into_iter().any(|form| {
-            self.start(aim.members);
-            newton::solve(&mut self.iterate, &Aim { form, ..*aim })
-        })
+    /// Impulses in their cones, as near to where all laws hold as the budget goes.
+    fn find(&mut self, aim: &Aim<'_>) -> Report {
+        self.start(aim.members);
+        let level = self.improve(aim);
+        let finite = self.settle(aim.members);
+        let miss_m_s = if finite { newton::miss_m_s(&mut self.iterate) } else { f64::INFINITY };
+        Report { level, miss_m_s, ..Report::resting() }
     }
 
-    /// The convex way; passes that have not settled are a start from which the primal-dual way may find the rest.
-    fn convex(&mut self, aim: &Aim<'_>) -> Passes {
-        self.start(aim.members);
-        let mut passes = convex::solve(&mut self.iterate, &mut self.stores, aim, self.settings.passes);
-        if !passes.settled && passes.finished > 0 && !self.settings.convex_only {
-            self.iterate.keep(&mut self.kept);
-            passes.settled = newton::solve(&mut self.iterate, &Aim { form: Form::Cone, ..*aim });
-            if !passes.settled {
-                self.iterate.restore(aim.members, &self.kept);
+    /// One loop, each level of which is the start of the next.
+    fn improve(&mut self, aim: &Aim<'_>) -> Level {
+        let Self { iterate, interior, kept, settings, .. } = self;
+        let last = iterate.steps + settings.factors_max.map_or(STEPS_MAX, |most| most as usize);
+        let direct = settings.form == StepForm::Direct;
+        let mut patience = if direct { PATIENCE } else { PATIENCE_BY_GRADIENTS };
+        if settings.factors_max.is_some() {
+            patience.stale = 1;
+        }
+        let mut try_below_m_s = if direct { NEAR_M_S } else { f64::INFINITY };
+        let mut entered = false;
+        loop {
+            let (miss_m_s, before) = (newton::miss_m_s(iterate), iterate.steps);
+            if miss_m_s < try_below_m_s.max(aim.tolerance_m_s) {
+                iterate.keep(kept);
+                // what Newton's method has not finished is of no use: half of a budget is kept for what is
+                patience.steps = (last - before) / if entered { 1 } else { 2 };
+                if newton::solve(iterate, aim, patience) {
+                    let near = if iterate.steps == before { Level::Kept } else { Level::Near };
+                    return if entered { Level::Polished } else { near };
+                }
+                iterate.go_back(kept);
+                try_below_m_s = POLISH_AGAIN * miss_m_s;
+            }
+            if !entered {
+                interior.begin(iterate);
+                (entered, try_below_m_s) = (true, try_below_m_s.min(POLISH_M_S));
+            }
+            if iterate.steps >= last || !interior.step(iterate, aim) {
+                interior.finish(iterate);
+                return Level::Interior;
             }
         }
-        passes
     }
 
     /// Impulses into their cones, and the velocities that these make; `false` where numbers have overflowed and there is no answer.

@@ -115,8 +115,8 @@ impl System {
         self.gradients.solve(&operator, &mut Task { right: &self.right, x, left, goal: *goal });
     }
 
-    /// Solves with ⊕ A/f + Jᵀ G J: a Newton step; `false` where rounding leaves it without a solution.
-    pub fn step(&mut self, contacts: Stiffness<'_>, task: &mut Task<'_>) -> bool {
+    /// Factors ⊕ A/f + Jᵀ G J, or what of it is near; `false` where rounding leaves it without a factor.
+    pub fn factor(&mut self, contacts: Stiffness<'_>) -> bool {
         if !self.coupled {
             match self.form {
                 StepForm::Direct => self.direct.couple(&self.members, contacts.rows),
@@ -125,23 +125,26 @@ impl System {
             self.coupled = true;
         }
         match self.form {
+            StepForm::Direct => self.direct.factor(contacts),
+            StepForm::Iterative => self.gradients.precondition(contacts),
+        }
+    }
+
+    /// Solves with ⊕ A/f + Jᵀ G J as it was factored.
+    pub fn solve(&mut self, contacts: Stiffness<'_>, task: &mut Task<'_>) {
+        match self.form {
             StepForm::Direct => {
-                if !self.direct.factor(contacts) {
-                    return false;
-                }
                 task.x.copy_from_slice(task.right);
                 self.direct.solve(task.x);
                 task.left.fill(DVec3::ZERO);
             }
             StepForm::Iterative => {
-                if !self.gradients.precondition(contacts) {
-                    return false;
-                }
-                let operator = Operator { members: &self.members, contacts: Some(contacts), still_m_s: self.still_m_s };
+                // a goal says how exact a step is worth to be
+                let still_m_s = if task.goal > 0.0 { 0.0 } else { self.still_m_s };
+                let operator = Operator { members: &self.members, contacts: Some(contacts), still_m_s };
                 self.gradients.solve(&operator, task);
             }
         }
-        true
     }
 
     /// x ← (⊕ A/f + Jᵀ G J)⁻¹ x of the last step, where it was by a factor.

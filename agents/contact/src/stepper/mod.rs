@@ -49,7 +49,7 @@ mod ties;
 mod weighing;
 mod yielding;
 
-use crate::cluster::{DEPTH_DEFAULT_M, Member, Settings, Solver, multiply};
+use crate::cluster::{DEPTH_DEFAULT_M, Level, Member, Settings, Solver, multiply};
 use contact_rows::ContactRows;
 use divide::times;
 pub use doubling::StepDoubling;
@@ -101,14 +101,14 @@ pub struct ClusterReport {
     pub factors: u32,
     /// Products of conjugate gradients in all fine steps: of the iterative form, which makes no factors.
     pub products: u32,
-    /// Convex passes in all fine steps.
-    pub passes: u32,
     /// Solves in all fine steps.
     pub solves: u32,
-    /// Those of them that went the convex way.
-    pub convex: u32,
-    /// Those of them that came to no end.
-    pub cut: u32,
+    /// Those of them that ended within interior points, before all laws held.
+    pub unfinished: u32,
+    /// The dearest level of a solve.
+    pub level: Level,
+    /// What laws and momentum miss at most by the answer of any solve, m/s (clusters.md, eq. 9).
+    pub miss_m_s: f64,
     /// The deepest overlap seen, metres.
     pub depth_m: f64,
     /// Work of all members, in the unit of [`metachron_core::StepReport::work`].
@@ -195,6 +195,12 @@ impl ClusterStepper {
     pub fn archive(&mut self, archive: &mut Archive<'_>) -> Result<(), ArchiveError> {
         self.solver.archive(archive)?;
         self.heap.archive(archive)
+    }
+
+    /// The most steps of each solve from now on, each a factor or what serves gradients for one; `None` for as many as the laws take. Momentum is
+    /// exact and no answer makes energy at any number.
+    pub fn set_factors_max(&mut self, most: Option<u32>) {
+        self.solver.set_factors_max(most);
     }
 
     /// The macro step that was made last, seconds.

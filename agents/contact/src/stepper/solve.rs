@@ -8,7 +8,7 @@ use super::joints::Aimed;
 use super::progress::Progress;
 use super::search::{Judge, Round};
 use super::{ClusterMember, ClusterReport, ClusterStepper, On, Participant, Role, times};
-use crate::cluster::{Contact, JointRow, Member, Problem, ProblemError, Report, Response, Solver, StepForm};
+use crate::cluster::{Contact, JointRow, Level, Member, Problem, ProblemError, Report, Response, Solver, StepForm};
 use glam::DVec3;
 use metachron_core::{ParallelFor, StepError, recycled};
 
@@ -229,10 +229,10 @@ impl ClusterReport {
     pub(super) fn add(&mut self, took: &Report) {
         self.factors += took.factors as u32;
         self.products += took.products as u32;
-        self.passes += took.passes as u32;
         self.solves += 1;
-        self.convex += u32::from(took.passes > 0);
-        self.cut += u32::from(took.cut);
+        self.unfinished += u32::from(took.level == Level::Interior);
+        self.level = self.level.max(took.level);
+        self.miss_m_s = self.miss_m_s.max(took.miss_m_s);
     }
 }
 

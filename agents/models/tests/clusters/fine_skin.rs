@@ -26,7 +26,7 @@ fn a_skin_of_many_triangles_has_no_more_contacts_than_its_cage_tells_apart_and_s
     let [coarse, fine, finer] = [12, 36, 72].map(rested);
     for found in [coarse, fine, finer] {
         // six cells across its dent are 13 patches of 16 contacts at most
-        assert!(found.contacts < 13 * 16 && found.cut == 0, "{found:?}");
+        assert!(found.contacts < 13 * 16 && found.unfinished == 0, "{found:?}");
         assert!(found.rest_m < 2e-5 && found.gain_j < 1e-6 && (found.weight - 1.0).abs() < 5e-3, "{found:?}");
     }
     assert!(finer.contacts <= 2 * fine.contacts, "{fine:?} {finer:?}");

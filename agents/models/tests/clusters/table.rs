@@ -58,7 +58,7 @@ pub struct Findings {
     pub weight: f64,
     pub steps: u32,
     pub factors: u32,
-    pub cut: u32,
+    pub unfinished: u32,
     /// The most contacts of a step.
     pub contacts: u32,
     /// The highest place of any centre of mass at the end, and the lowest, metres.
@@ -314,7 +314,7 @@ impl Table {
             least_j = least_j.min(energy_j);
             findings.steps += report.fine_steps;
             findings.factors += report.factors;
-            findings.cut += report.cut;
+            findings.unfinished += report.unfinished;
             findings.contacts = findings.contacts.max(report.contacts);
             if rests {
                 findings.rest_m = findings.rest_m.max(report.depth_m);

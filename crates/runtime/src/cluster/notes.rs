@@ -32,14 +32,13 @@ impl AgentRunner {
     pub(super) fn note_solves(&mut self, report: &ClusterReport, dt: SimSpan) {
         let (leader, step_s) = (self.shared.id, dt.as_secs_f64());
         let Some(seat) = &mut self.cluster else { return };
-        let ClusterReport { contacts, factors, products, passes, cut, depth_m, .. } = *report;
+        let ClusterReport { contacts, factors, products, unfinished, depth_m, .. } = *report;
         let solves = &mut seat.solves;
         solves.contacts = contacts;
         solves.problems += u64::from(report.fine_steps);
         solves.factors += u64::from(factors);
         solves.products += u64::from(products);
-        solves.passes += u64::from(passes);
-        solves.cut += u64::from(cut);
+        solves.unfinished += u64::from(unfinished);
         (solves.depth_m, solves.deepest_m) = (depth_m, solves.deepest_m.max(depth_m));
         let mut solves = Some(*solves);
         self.each_member(|actor| {

@@ -177,10 +177,8 @@ pub struct ClusterRow {
     pub factors: f64,
     /// Products of conjugate gradients with the coupled matrix, for each problem: large soft bodies are solved by these, without factors.
     pub products: f64,
-    /// Convex passes in the run: the way that is taken where Newton's method gives up.
-    pub passes: u64,
-    /// Problems whose solve came to no end.
-    pub cut: u64,
+    /// Problems whose solve ended before all laws of contact held to the tolerance.
+    pub unfinished: u64,
     /// The deepest overlap of the last step, metres.
     pub depth_m: f64,
     /// The deepest overlap of the run, metres.

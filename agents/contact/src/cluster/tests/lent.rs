@@ -2,7 +2,7 @@
 
 use super::random::{COUNT, FINE, distance, random_case, velocities};
 use super::slow::Dense;
-use super::{Body, Case};
+use super::{Body, Case, is_open};
 use crate::cluster::{Member, Problem, Response, Settings, Solution, Solver, StepForm};
 use glam::DVec3;
 use metachron_core::PlainLoop;
@@ -63,7 +63,7 @@ fn members_that_lend_a_factor_get_the_velocities_of_those_that_do_not() {
             asked += times;
             let compliances = own.compliances_per_kg.iter().zip(&lent.compliances_per_kg);
             let same = compliances.fold(0.0_f64, |off, (a, b)| off.max((a / b - 1.0).abs())) < 1e-5;
-            if own.report.cut || lent.report.cut || !same {
+            if is_open(&own.report) || is_open(&lent.report) || !same {
                 continue;
             }
             let apart = distance(&velocities(&case, &own), &velocities(&case, &lent));

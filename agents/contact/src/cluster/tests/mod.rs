@@ -13,7 +13,7 @@ mod scenes;
 mod sliding;
 mod slow;
 
-use super::{Block, Contact, JointRow, Member, Problem, Side, SideTerm};
+use super::{Block, Contact, JointRow, Level, Member, Problem, Report, Side, SideTerm};
 use glam::{DMat3, DVec3};
 use metachron_core::PlainLoop;
 
@@ -140,6 +140,11 @@ impl Lattice {
         }
         Body { blocks, free: vec![DVec3::ZERO; places.len()], unanswered: Vec::new() }
     }
+}
+
+/// Whether a solve ended before all laws held.
+pub fn is_open(report: &Report) -> bool {
+    report.level == Level::Interior || report.miss_m_s > 1e-5
 }
 
 /// A contact of two sides along a normal, with tangents of its own.

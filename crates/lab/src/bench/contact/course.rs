@@ -22,7 +22,7 @@ pub(super) struct Course {
     pub solves: u32,
     pub factors: u32,
     pub products: u32,
-    pub cut: u32,
+    pub unfinished: u32,
     pub contacts: u32,
     pub landing_m: f64,
     pub rest_m: f64,
@@ -90,7 +90,7 @@ impl Course {
         self.solves += report.solves;
         self.factors += report.factors;
         self.products += report.products;
-        self.cut += report.cut;
+        self.unfinished += report.unfinished;
         self.contacts = self.contacts.max(report.contacts);
     }
 
