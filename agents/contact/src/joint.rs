@@ -1,6 +1,6 @@
 //! Joints between rigid bodies: the data a scene gives, and their checks.
 //!
-//! In: two bodies, two anchors and a kind. Out: a checked [`Joint`]. Never here: how a joint is solved (`stepper/`).
+//! In: two bodies, two anchors and a kind. Out: a checked [`Joint`]. Never here: how a joint is solved (`constraint/`).
 
 use glam::{DQuat, DVec3};
 use metachron_core::AgentId;

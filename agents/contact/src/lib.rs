@@ -43,18 +43,22 @@
 //! ```
 
 pub mod agent;
-pub mod asynchronous;
 pub mod audit;
 pub mod cluster;
+pub mod constraint;
+pub mod detect;
+mod impact;
 pub mod inputs;
 pub mod joint;
 pub mod law;
 pub mod laws;
+pub mod member;
 pub mod push_out;
-pub mod stepper;
+pub mod remote;
+pub mod step;
 
 pub use agent::{Agent, AnchorForce, AnchorSpring, Carving, Neighbour, PoseGoal, SetMotion, SetMotor, StepContext};
-pub use asynchronous::acknowledged;
 pub use inputs::{Input, Inputs};
 pub use law::{Law, Link};
 pub use push_out::PUSH_OUT_SHARE;
+pub use remote::acknowledged;

@@ -41,7 +41,7 @@ use document::Document;
 use format::{ContactsFile, SceneFile, WorldFile};
 use glam::DVec3;
 use metachron_contact::cluster::DEPTH_DEFAULT_M;
-use metachron_contact::stepper::DEPTH_RANGE_M;
+use metachron_contact::detect::DEPTH_RANGE_M;
 use metachron_world::Scene;
 use metachron_world::kinds::ExecutorKind;
 use std::ops::RangeInclusive;

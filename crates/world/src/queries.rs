@@ -8,7 +8,7 @@ use super::events::touched;
 use super::object::{Object, Touched};
 use super::world::World;
 use glam::{DQuat, DVec3};
-use metachron_contact::stepper::Matter;
+use metachron_contact::remote::Matter;
 use metachron_core::{ContactPartner, ContactState, SimTime};
 use metachron_geometry::narrow_phase::{NarrowPhaseScratch, touches};
 use metachron_geometry::{

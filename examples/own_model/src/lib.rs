@@ -7,7 +7,7 @@
 
 use metachron::contact::StepContext;
 use metachron::contact::cluster::{Block, ProblemError, Side, SideTerm};
-use metachron::contact::stepper::{ClusterMember, Pose, Role};
+use metachron::contact::member::{ClusterMember, Pose, Role};
 use metachron::core::{Archive, ArchiveError, Bounds, RigidState, StepError, StepReport, archive_values, check_span};
 use metachron::geometry::{CollisionShape, ContactSide, Place, PlacedShape, ShapeKind, ShapePose, SolidShape};
 use metachron::glam::DMat3;

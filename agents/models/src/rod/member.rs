@@ -16,7 +16,7 @@ use super::tube::Tube;
 use super::wall::{Sections, Wall};
 use glam::{DMat3, DVec2, DVec3};
 use metachron_contact::cluster::{Block, Response, SIDE_TERMS_MAX, Side, SideTerm};
-use metachron_contact::stepper::{ClusterMember, MaterialPoint, OwnAttachment, OwnSpring, Role, Slid};
+use metachron_contact::member::{ClusterMember, MaterialPoint, OwnAttachment, OwnSpring, Role, Slid};
 use metachron_contact::{Agent, StepContext};
 use metachron_core::{Anchor, Archive, ArchiveError, SimSpan, SimTime, StepError, archive_values};
 use metachron_geometry::narrow_phase::RestShape;

@@ -10,7 +10,7 @@ use crate::limits::{QUIET_ACCELERATION_M_S2, QUIET_S, QUIET_SPEED_M_S};
 use glam::{DQuat, DVec3};
 use metachron_contact::Agent;
 use metachron_contact::cluster::{Block, Response, Side, SideTerm};
-use metachron_contact::stepper::{ClusterMember, MaterialPoint, Role};
+use metachron_contact::member::{ClusterMember, MaterialPoint, Role};
 use metachron_core::{Anchor, Archive, ArchiveError, StepError};
 use metachron_geometry::narrow_phase::RestShape;
 use metachron_geometry::{Carried, ContactSide, Place, PlacedShape, ShapePose};

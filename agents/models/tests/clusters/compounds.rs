@@ -3,7 +3,7 @@
 use crate::bodies::rigid;
 use crate::table::{GRAVITY, Table, placed, plane};
 use glam::{DQuat, DVec3};
-use metachron_contact::stepper::Partner;
+use metachron_contact::member::Partner;
 use metachron_geometry::{CompoundPart, Solid};
 use metachron_models::rigid::{RigidBody, RigidSpec};
 

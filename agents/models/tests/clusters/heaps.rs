@@ -4,7 +4,7 @@ use crate::bodies::{block, cube, rigid, solid};
 use crate::table::{GRAVITY, Table, placed, plane};
 use glam::{DQuat, DVec3};
 use metachron_contact::AnchorSpring;
-use metachron_contact::stepper::Partner;
+use metachron_contact::member::Partner;
 use metachron_core::Anchor;
 use metachron_geometry::Solid;
 use metachron_models::rigid::{RigidBody, RigidSpec};

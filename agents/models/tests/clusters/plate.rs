@@ -2,7 +2,7 @@
 
 use glam::{DMat3, DQuat, DVec3};
 use metachron_contact::cluster::{Block, Side};
-use metachron_contact::stepper::{ClusterMember, Role};
+use metachron_contact::member::{ClusterMember, Role};
 use metachron_contact::{Agent, StepContext};
 use metachron_core::{Body, Bounds, RigidState, SimSpan, Snapshot, StepError, StepReport};
 use metachron_geometry::{CollisionShape, ContactSide, Place, PlacedShape, ShapeKind, ShapePose, Solid, SolidShape};

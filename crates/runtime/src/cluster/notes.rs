@@ -4,7 +4,8 @@
 
 use super::attachments::held_by_links;
 use super::{AgentRunner, ClusterSeat};
-use metachron_contact::stepper::{ClusterReport, ClusterStepper, PairTotal, Partner, StepDoubling};
+use metachron_contact::member::Partner;
+use metachron_contact::step::{ClusterReport, ClusterStepper, PairTotal, StepDoubling};
 use metachron_core::step_doubling::drift_m;
 use metachron_core::{AgentId, ClusterState, JointEffort, PairKind, PairState, SimSpan, SimTime};
 

@@ -6,9 +6,11 @@
 
 use super::penalty::{Overlaps, Penalty};
 use glam::DVec3;
-use metachron_contact::asynchronous::{MacroStep, PairClock, Pairs, Remotes, computes, part};
 use metachron_contact::audit::Member;
-use metachron_contact::stepper::{ClusterScene, ClusterStepper, ContactMemory, Participant};
+use metachron_contact::detect::ClusterScene;
+use metachron_contact::member::{ContactMemory, Participant};
+use metachron_contact::remote::{MacroStep, PairClock, Pairs, Remotes, computes, part};
+use metachron_contact::step::ClusterStepper;
 use metachron_contact::{Agent, AnchorSpring, Law, Link, Neighbour, StepContext};
 use metachron_core::{AgentId, Body, Grip, PlainLoop, SimSpan, Snapshot, StepError};
 use metachron_geometry::CollisionShape;

@@ -5,7 +5,9 @@
 
 use glam::DVec3;
 use metachron_contact::Neighbour;
-use metachron_contact::stepper::{ClusterMember, KnownImpulse, Matter, Participant};
+use metachron_contact::member::{ClusterMember, Participant};
+use metachron_contact::remote::Matter;
+use metachron_contact::step::KnownImpulse;
 use metachron_geometry::narrow_phase::{NarrowPhaseScratch, touches};
 use metachron_geometry::{ContactSide, Touch};
 

@@ -1,0 +1,66 @@
+//! What pairs of a cluster and links gave in a macro step.
+//!
+//! In: impulses of contacts and rows. Out: a sum of each pair, by participants and partners. Never here: which rows there are, the solve.
+
+use crate::member::memory::Partner;
+use glam::DVec3;
+
+/// What a pair of bodies, or a link, gave in a macro step.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct PairTotal {
+    /// The participant of lower number, by its place in the list.
+    pub member: usize,
+    /// What it touched, or by which of its links it is held.
+    pub partner: Partner,
+    /// The impulse on the participant, world axes, N·s.
+    pub impulse_n_s: DVec3,
+    /// Places that bore something, or rows of the link, counted in every fine step; zero for a pair that only touches.
+    pub contacts: u32,
+    /// The deepest overlap, metres, ≥ 0.
+    pub depth_m: f64,
+    /// The most that one contact gave, N·s; zero for links and in heaps.
+    pub most_n_s: f64,
+    /// Where that contact is, metres; not a number for links and in heaps.
+    pub point_m: DVec3,
+    /// Its normal, towards the participant, of length 1; zero for links and in heaps.
+    pub normal: DVec3,
+    /// How easily the participant and its partner give way at that contact along its normal, 1/kg, ≥ 0 (coupling.md, eq. 7h).
+    pub inverse_mass_per_kg: [f64; 2],
+    /// How much more the pair bears along that normal for each metre that a side which a user leads is led on towards the other, N/m, ≥ 0
+    /// (coupling.md, eq. 7s). 0 where a user leads neither, in heaps, and where neither gives way.
+    pub stiffness_n_m: f64,
+}
+
+impl PairTotal {
+    /// Adds the impulse of a contact or of a link's row.
+    pub(crate) fn add(&mut self, impulse_n_s: DVec3, depth_m: f64) {
+        self.impulse_n_s += impulse_n_s;
+        self.depth_m = self.depth_m.max(depth_m);
+        self.contacts += 1;
+    }
+}
+
+/// The total of a pair, made where it is new.
+pub(crate) fn total_of(totals: &mut Vec<PairTotal>, member: usize, partner: Partner) -> &mut PairTotal {
+    let order = |total: &PairTotal| (total.member, total.partner);
+    let at = totals.binary_search_by_key(&(member, partner), order).unwrap_or_else(|at| {
+        let (impulse_n_s, contacts, depth_m) = (DVec3::ZERO, 0, 0.0);
+        totals.insert(
+            at,
+            PairTotal {
+                member,
+                partner,
+                impulse_n_s,
+                contacts,
+                depth_m,
+                most_n_s: 0.0,
+                point_m: DVec3::NAN,
+                normal: DVec3::ZERO,
+                inverse_mass_per_kg: [0.0; 2],
+                stiffness_n_m: 0.0,
+            },
+        );
+        at
+    });
+    &mut totals[at]
+}
