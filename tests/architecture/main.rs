@@ -90,7 +90,7 @@ const DENIED: [&str; 29] = [
 const RINGS: [(&str, usize); 18] = [
     ("agents/core", 0),
     ("agents/geometry", 14),
-    ("agents/contact", 14),
+    ("agents/contact", 5),
     ("agents/models", 17),
     ("crates/runtime", 15),
     ("crates/world", 20),

@@ -4,12 +4,10 @@
 //! Theory: docs/theory/clusters.md, eq. 29; docs/theory/rod.md, eq. 21.
 
 use crate::cluster::{Hold, JointRow, Side, Spring};
-use crate::constraint::spring::{Name, Pull};
-use crate::constraint::yielding::{Frame, SLIP_SHARE, Slides, SlidingRow};
-use crate::constraint::{FineStep, Ties};
-use crate::member::ClusterMember;
-use crate::member::OwnSpring;
+use crate::constraint::yielding::SLIP_SHARE;
+use crate::constraint::{FineStep, Frame, Name, Pull, Slides, SlidingRow, Ties};
 use crate::member::memory::Partner;
+use crate::member::{ClusterMember, OwnSpring};
 use glam::DVec3;
 
 impl Ties {

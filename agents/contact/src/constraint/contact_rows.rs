@@ -7,8 +7,7 @@
 use crate::cluster::{Contact, Hold, JointRow, Pressed, Side};
 use crate::constraint::Ties;
 use crate::detect::{Owner, Search};
-use crate::member::ClusterMember;
-use crate::member::Participant;
+use crate::member::{ClusterMember, Participant};
 use crate::push_out::{PUSH_OUT_MAX_M_S, push_out_m_s};
 use glam::DVec3;
 
@@ -25,16 +24,6 @@ pub(crate) struct ContactRows {
 struct Turns {
     side: Side,
     led_rad_s: DVec3,
-}
-
-/// The spin friction of a contact as it is remembered, about its normal.
-#[derive(Debug, Clone, Copy, PartialEq, Default, serde::Serialize, serde::Deserialize)]
-pub(crate) struct Spin {
-    /// The radius of the patch that resists, metres.
-    pub radius_m: f64,
-    /// The torque of the last step or solve, N·m, and the angle owed (eq. 13).
-    pub torque_n_m: f64,
-    pub owed_rad: f64,
 }
 
 impl ContactRows {

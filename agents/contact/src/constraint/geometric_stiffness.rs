@@ -8,37 +8,14 @@
 //! arm: it takes no energy, and a turn that steps can follow has none of it.
 
 use crate::cluster::{Hold, JointRow, Side};
-use crate::constraint::spring::{End, Name};
-use crate::constraint::{FineStep, RowOwner, Ties};
-use crate::member::ClusterMember;
-use crate::member::Participant;
+use crate::constraint::{ArmPull, Arms, End, FineStep, Name, RowOwner, Ties};
+use crate::member::{ClusterMember, Participant};
 use glam::DVec3;
 
 /// Of h² times the stiffness of a force, the share that a body's inertia has to reach: ¼ is where steps begin to throw it.
 const INERTIA_SHARE: f64 = 0.5;
 /// The key of the first row of added inertia of a tie.
 const ADDED: u32 = 8;
-
-/// The forces of a fine step at arms.
-#[derive(Debug, Default)]
-pub(crate) struct Arms {
-    pulls: Vec<ArmPull>,
-    /// Of each participant, how much inertia its pulls ask for, in shares of what it has.
-    asked: Vec<f64>,
-}
-
-/// A force at an arm of a body.
-#[derive(Debug, Clone, Copy)]
-struct ArmPull {
-    owner: RowOwner,
-    /// The body, and its spin.
-    member: usize,
-    turns: Side,
-    /// Along the arm, of length 1.
-    axis: DVec3,
-    /// The inertia that it asks for across the arm, kg m².
-    inertia_kg_m2: f64,
-}
 
 impl Arms {
     pub fn clear(&mut self) {

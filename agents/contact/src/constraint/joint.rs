@@ -10,17 +10,13 @@
 
 use crate::cluster::{Hold, JointRow, Side, SideTerm};
 use crate::constraint::motor::Motored;
-use crate::constraint::spring::{End, Name, Pull};
-use crate::constraint::yielding::{Frame, Slides, SlidingRow, YieldLimit};
-use crate::constraint::{FineStep, RowOwner, Ties};
+use crate::constraint::{End, FineStep, Frame, Name, Pull, RowOwner, Slides, SlidingRow, Ties, YieldLimit};
 use crate::detect::ClusterScene;
-use crate::detect::velocity;
 use crate::joint::{Joint, JointKind};
-use crate::member::ClusterMember;
-use crate::member::Participant;
 use crate::member::memory::Partner;
 use crate::member::participant::place_of;
-use crate::member::{MaterialPoint, Pose};
+use crate::member::state::velocity;
+use crate::member::{ClusterMember, MaterialPoint, Participant, Pose};
 use crate::push_out::PUSH_OUT_MAX_M_S;
 use glam::{DQuat, DVec3};
 use metachron_core::{Anchor, shortest_turn};

@@ -4,15 +4,11 @@
 //! Theory: docs/theory/clusters.md, eq. 14.
 
 use crate::agent::tool_extrapolation_s;
-use crate::constraint::spring::{End, Name, Pull};
-use crate::constraint::yielding::{Frame, YieldLimit};
-use crate::constraint::{FineStep, Holders, Ties};
+use crate::constraint::{End, FineStep, Frame, Holders, Name, Pull, Ties, YieldLimit};
 use crate::law::{Law, Link};
-use crate::member::ClusterMember;
-use crate::member::MaterialPoint;
-use crate::member::Participant;
 use crate::member::memory::Partner;
 use crate::member::participant::place_of;
+use crate::member::{ClusterMember, MaterialPoint, Participant};
 use glam::DVec3;
 use metachron_core::{Anchor, Body};
 

@@ -12,15 +12,15 @@ pub(crate) mod spring;
 pub(crate) mod tearing;
 pub(crate) mod yielding;
 
-use crate::cluster::{Hold, JointRow};
-use crate::constraint::geometric_stiffness::Arms;
-use crate::constraint::yielding::SlidingRow;
-use crate::detect::velocity;
-use crate::member::Participant;
+use crate::cluster::{Hold, JointRow, Side};
+use crate::law::Link;
 use crate::member::memory::Partner;
-use crate::member::state::Progress;
+use crate::member::state::{Progress, velocity};
+use crate::member::{ClusterMember, MaterialPoint, Participant, Pose};
+use glam::DQuat;
 use glam::DVec3;
 pub use joint::JointTotal;
+use metachron_core::Anchor;
 use metachron_core::{AgentId, Grip};
 use metachron_geometry::narrow_phase::TouchKey;
 pub use tearing::Torn;
@@ -154,4 +154,151 @@ pub(crate) fn is_rigid(row: &JointRow) -> bool {
 /// The name of a row in the memory of its pair.
 pub(crate) fn place_key(row: u32) -> TouchKey {
     TouchKey { place: row, ..TouchKey::default() }
+}
+
+/// One end of a spring.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct End {
+    /// The participant; `None` where the end is led from outside.
+    pub member: Option<usize>,
+    pub point: MaterialPoint,
+}
+
+/// What is between two ends.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Pull {
+    pub stiffness_n_m: f64,
+    pub damping_n_s_m: f64,
+    pub rest_m: f64,
+}
+
+/// A name for a spring between others, so that its rows are told apart and remembered.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Name {
+    /// The participant that remembers it.
+    pub member: usize,
+    pub partner: Partner,
+    pub hold: Option<Holders>,
+    /// The force above which it tears, N; infinite where it never does.
+    pub tears_above_n: f64,
+    pub yields: YieldLimit,
+}
+
+impl Name {
+    /// What neither tears nor yields.
+    pub fn lasting(member: usize, partner: Partner, hold: Option<Holders>) -> Self {
+        Self { member, partner, hold, tears_above_n: f64::INFINITY, yields: YieldLimit::NONE }
+    }
+
+    pub fn row(self, key: u32, other: Option<usize>) -> RowOwner {
+        let Self { member, partner, hold, tears_above_n, .. } = self;
+        RowOwner { member, other, partner, key, hold, tears_above_n, owes: false }
+    }
+}
+
+impl End {
+    pub fn side(&self) -> Side {
+        self.member.map_or(Side::FIXED, |member| self.point.side.of_member(member))
+    }
+}
+
+impl Pull {
+    /// By how much its spring slips for each unit of velocity by which it gives way: what its damper bears it need not.
+    pub(crate) fn slips_per_m_s(&self, h_s: f64) -> Option<f64> {
+        (self.stiffness_n_m > 0.0).then(|| h_s + self.damping_n_s_m / self.stiffness_n_m)
+    }
+}
+
+/// In which way a row slips.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) enum Slides {
+    /// The point at an end moves.
+    Point(Frame),
+    /// A length grows by what side 0 moves along the axis from side 1 to it.
+    Length {
+        /// World axes, of length 1.
+        axis: DVec3,
+    },
+}
+
+/// What an attachment gives at most, and where it keeps its slip.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct YieldLimit {
+    /// The most force, N; infinite where it never yields.
+    pub above_n: f64,
+    pub frame: Frame,
+}
+
+impl YieldLimit {
+    /// Of what never yields.
+    pub const NONE: Self = Self { above_n: f64::INFINITY, frame: Frame::WORLD };
+}
+
+/// The axes in which a moved point is kept.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Frame {
+    /// From the world's axes.
+    pub to_own: DQuat,
+    /// −1 where the near end's point moves instead, by the opposite.
+    pub sign: f64,
+}
+
+impl Frame {
+    /// The world's axes at the far end.
+    pub const WORLD: Self = Self { to_own: DQuat::IDENTITY, sign: 1.0 };
+
+    /// The axes of a far end in this pose.
+    pub fn of(far: &Pose) -> Self {
+        Self { to_own: far.rotation.conjugate(), sign: 1.0 }
+    }
+
+    /// The axes that a link keeps its slip in, of its ends' participants.
+    pub fn of_link(all: &[Participant<'_>], ends: [usize; 2], link: &Link) -> Self {
+        let axes = |member: usize, sign: f64| {
+            let pose = all[member].member.pose(&[], 0.0);
+            pose.map_or(Self::WORLD, |pose| Self { sign, ..Self::of(&pose) })
+        };
+        match (link.here, link.there) {
+            (_, Anchor::Local(_)) => axes(ends[1], 1.0),
+            (Anchor::Local(_), _) => axes(ends[0], -1.0),
+            _ => Self::WORLD,
+        }
+    }
+}
+
+/// A row that may slip.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct SlidingRow {
+    /// Its place among the rows of the fine step.
+    pub row: usize,
+    pub slides: Slides,
+    /// By how much it slips for each unit of velocity by which it gives way, seconds.
+    pub per_m_s: f64,
+    /// What it may be off without having slipped, metres.
+    pub free_m: f64,
+    /// The force of its attachment at which it yields, N.
+    pub yields_above_n: f64,
+    /// Its place among the springs of its member that yield, where it is one of them.
+    pub own: Option<usize>,
+}
+
+/// The forces of a fine step at arms.
+#[derive(Debug, Default)]
+pub(crate) struct Arms {
+    pulls: Vec<ArmPull>,
+    /// Of each participant, how much inertia its pulls ask for, in shares of what it has.
+    asked: Vec<f64>,
+}
+
+/// A force at an arm of a body.
+#[derive(Debug, Clone, Copy)]
+struct ArmPull {
+    owner: RowOwner,
+    /// The body, and its spin.
+    member: usize,
+    turns: Side,
+    /// Along the arm, of length 1.
+    axis: DVec3,
+    /// The inertia that it asks for across the arm, kg m².
+    inertia_kg_m2: f64,
 }

@@ -6,65 +6,17 @@
 use crate::AnchorSpring;
 use crate::agent::tool_extrapolation_s;
 use crate::cluster::{Hold, JointRow, Side, Spring};
-use crate::constraint::yielding::{Slides, YieldLimit};
-use crate::constraint::{FineStep, Holders, RowOwner, Ties};
-use crate::member::ClusterMember;
-use crate::member::MaterialPoint;
+use crate::constraint::{End, FineStep, Holders, Name, Pull, Slides, Ties};
 use crate::member::memory::Partner;
 use crate::member::participant::place_of;
+use crate::member::{ClusterMember, MaterialPoint};
 use glam::{DQuat, DVec3};
 use metachron_core::{AgentId, Anchor, Body, shortest_turn};
-
-/// One end of a spring.
-#[derive(Debug, Clone, Copy)]
-pub(crate) struct End {
-    /// The participant; `None` where the end is led from outside.
-    pub member: Option<usize>,
-    pub point: MaterialPoint,
-}
-
-/// What is between two ends.
-#[derive(Debug, Clone, Copy)]
-pub(crate) struct Pull {
-    pub stiffness_n_m: f64,
-    pub damping_n_s_m: f64,
-    pub rest_m: f64,
-}
 
 /// Keys of the rows of a tie: along the line between its ends, across it, and of turns.
 const ALONG: u32 = 0;
 const ACROSS: u32 = 1;
 const TURN: u32 = 2;
-
-/// A name for a spring between others, so that its rows are told apart and remembered.
-#[derive(Debug, Clone, Copy)]
-pub(crate) struct Name {
-    /// The participant that remembers it.
-    pub member: usize,
-    pub partner: Partner,
-    pub hold: Option<Holders>,
-    /// The force above which it tears, N; infinite where it never does.
-    pub tears_above_n: f64,
-    pub yields: YieldLimit,
-}
-
-impl Name {
-    /// What neither tears nor yields.
-    pub fn lasting(member: usize, partner: Partner, hold: Option<Holders>) -> Self {
-        Self { member, partner, hold, tears_above_n: f64::INFINITY, yields: YieldLimit::NONE }
-    }
-
-    pub fn row(self, key: u32, other: Option<usize>) -> RowOwner {
-        let Self { member, partner, hold, tears_above_n, .. } = self;
-        RowOwner { member, other, partner, key, hold, tears_above_n, owes: false }
-    }
-}
-
-impl End {
-    pub fn side(&self) -> Side {
-        self.member.map_or(Side::FIXED, |member| self.point.side.of_member(member))
-    }
-}
 
 impl Ties {
     /// Lays out the springs of users and grasps, and the drives.

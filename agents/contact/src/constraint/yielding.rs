@@ -4,30 +4,16 @@
 //! Never here: the bound itself, which is the row's ([`Hold::limited`]). Theory: docs/theory/clusters.md, eq. 29.
 
 use crate::cluster::JointRow;
-use crate::constraint::spring::{Name, Pull};
-use crate::constraint::{FineStep, Ties};
-use crate::joint::{Joint, JointKind};
-use crate::law::Link;
+use crate::constraint::{FineStep, Frame, Name, Pull, Slides, SlidingRow, Ties};
 use crate::member::memory::Partner;
 use crate::member::state::Progress;
-use crate::member::{ClusterMember, Participant};
-use crate::member::{Pose, Slid};
-use glam::{DQuat, DVec3};
-use metachron_core::Anchor;
+use crate::member::{ClusterMember, Participant, Slid};
+use glam::DVec3;
 
 /// A row whose force is this share of the most that it gives has yielded, but for the accuracy of a solve.
 const ALL_SHARE: f64 = 1.0 - 1e-6;
 /// A spring slips by what it would give this share of the most for, or more: less is the accuracy of a solve.
 pub(crate) const SLIP_SHARE: f64 = 1e-6;
-
-/// How an attachment holds that has slipped.
-#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
-pub struct Slip {
-    /// Which one.
-    pub(crate) partner: Partner,
-    /// How far, at an end without axes as [`Frame`] says; of a body's own attachment nothing, for each of its springs slips by itself.
-    slid: Slid,
-}
 
 /// An attachment that began to yield in a macro step.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -43,98 +29,10 @@ pub struct Yielded {
     pub force_n: f64,
 }
 
-/// In which way a row slips.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) enum Slides {
-    /// The point at an end moves.
-    Point(Frame),
-    /// A length grows by what side 0 moves along the axis from side 1 to it.
-    Length {
-        /// World axes, of length 1.
-        axis: DVec3,
-    },
-}
-
-/// What an attachment gives at most, and where it keeps its slip.
-#[derive(Debug, Clone, Copy)]
-pub(crate) struct YieldLimit {
-    /// The most force, N; infinite where it never yields.
-    pub above_n: f64,
-    pub frame: Frame,
-}
-
-impl YieldLimit {
-    /// Of what never yields.
-    pub const NONE: Self = Self { above_n: f64::INFINITY, frame: Frame::WORLD };
-}
-
-/// The axes in which a moved point is kept.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct Frame {
-    /// From the world's axes.
-    pub to_own: DQuat,
-    /// −1 where the near end's point moves instead, by the opposite.
-    pub sign: f64,
-}
-
-/// A row that may slip.
-#[derive(Debug, Clone, Copy)]
-pub(crate) struct SlidingRow {
-    /// Its place among the rows of the fine step.
-    pub row: usize,
-    pub slides: Slides,
-    /// By how much it slips for each unit of velocity by which it gives way, seconds.
-    pub per_m_s: f64,
-    /// What it may be off without having slipped, metres.
-    pub free_m: f64,
-    /// The force of its attachment at which it yields, N.
-    pub yields_above_n: f64,
-    /// Its place among the springs of its member that yield, where it is one of them.
-    pub own: Option<usize>,
-}
-
 /// What yields, in one macro step.
 #[derive(Debug, Default)]
 pub(crate) struct Yielding {
     begun: Vec<Yielded>,
-}
-
-impl Slip {
-    /// One that has not slipped.
-    pub(crate) const fn none(partner: Partner) -> Self {
-        Self { partner, slid: Slid { moved_m: DVec3::ZERO, longer_m: 0.0 } }
-    }
-
-    /// The joint as it holds now.
-    pub(crate) fn joint(&self, joint: &Joint) -> Joint {
-        let kind = match joint.kind {
-            JointKind::Spring { stiffness_n_m, damping_n_s_m, rest_m } => {
-                JointKind::Spring { stiffness_n_m, damping_n_s_m, rest_m: (rest_m + self.slid.longer_m).max(0.0) }
-            }
-            JointKind::Rope { length_m } => JointKind::Rope { length_m: length_m + self.slid.longer_m },
-            kind => kind,
-        };
-        Joint { anchor_b_m: joint.anchor_b_m + self.slid.moved_m, kind, ..*joint }
-    }
-
-    /// The link as it holds now. Between two points without axes of their own nothing of it moves: [`Self::beside`] says how far apart
-    /// they rest.
-    pub(crate) fn link(&self, link: &Link) -> Link {
-        let (here, there) = match (link.here, link.there) {
-            (here, Anchor::Local(there)) => (here, Anchor::Local(there + self.slid.moved_m)),
-            (Anchor::Local(here), there) => (Anchor::Local(here + self.slid.moved_m), there),
-            ends => ends,
-        };
-        Link { here, there, rest_m: (link.rest_m + self.slid.longer_m).max(0.0), ..*link }
-    }
-
-    /// How far from its place the far end of a link holds, world axes, metres: between two points without axes of their own.
-    pub(crate) fn beside(&self, link: &Link) -> DVec3 {
-        match (link.here, link.there) {
-            (Anchor::Local(_), _) | (_, Anchor::Local(_)) => DVec3::ZERO,
-            _ => self.slid.moved_m,
-        }
-    }
 }
 
 impl Slides {
@@ -144,36 +42,6 @@ impl Slides {
             Self::Point(Frame { to_own, sign }) => Slid { moved_m: to_own * by_m * sign, longer_m: 0.0 },
             Self::Length { axis } => Slid { moved_m: DVec3::ZERO, longer_m: by_m.dot(axis) },
         }
-    }
-}
-
-impl Frame {
-    /// The world's axes at the far end.
-    pub const WORLD: Self = Self { to_own: DQuat::IDENTITY, sign: 1.0 };
-
-    /// The axes of a far end in this pose.
-    pub fn of(far: &Pose) -> Self {
-        Self { to_own: far.rotation.conjugate(), sign: 1.0 }
-    }
-
-    /// The axes that a link keeps its slip in, of its ends' participants.
-    pub fn of_link(all: &[Participant<'_>], ends: [usize; 2], link: &Link) -> Self {
-        let axes = |member: usize, sign: f64| {
-            let pose = all[member].member.pose(&[], 0.0);
-            pose.map_or(Self::WORLD, |pose| Self { sign, ..Self::of(&pose) })
-        };
-        match (link.here, link.there) {
-            (_, Anchor::Local(_)) => axes(ends[1], 1.0),
-            (Anchor::Local(_), _) => axes(ends[0], -1.0),
-            _ => Self::WORLD,
-        }
-    }
-}
-
-impl Pull {
-    /// By how much its spring slips for each unit of velocity by which it gives way: what its damper bears it need not.
-    pub(crate) fn slips_per_m_s(&self, h_s: f64) -> Option<f64> {
-        (self.stiffness_n_m > 0.0).then(|| h_s + self.damping_n_s_m / self.stiffness_n_m)
     }
 }
 
@@ -207,7 +75,8 @@ impl Yielding {
             if !row.gives_all(impulse_n_s, ALL_SHARE) {
                 continue;
             }
-            let [a, b] = row.sides.map(|side| crate::detect::velocity(&side, |member| &progress[member].solved[..]));
+            let [a, b] =
+                row.sides.map(|side| crate::member::state::velocity(&side, |member| &progress[member].solved[..]));
             let given = impulse_n_s * row.compliance_per_kg.unwrap_or(0.0);
             // it gives way against its force, and never along it
             let against = -impulse_n_s.normalize_or_zero();

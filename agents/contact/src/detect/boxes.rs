@@ -2,8 +2,7 @@
 //!
 //! In: members, how fast each may move. Out: their boxes, pairs whose boxes may meet. Never here: places of skins.
 
-use crate::member::ClusterMember;
-use crate::member::Participant;
+use crate::member::{ClusterMember, Participant};
 use metachron_geometry::Aabb;
 
 /// Bodies whose boxes come closer than this within the time looked ahead belong together, metres.

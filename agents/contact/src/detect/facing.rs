@@ -3,9 +3,9 @@
 //! In: touches, members. Out: contacts of the problem. Never here: which touches there are.
 
 use crate::cluster::{Contact, Side};
-use crate::detect::{LOOK_M, Owner, Pair, Round};
+use crate::detect::pair::{LOOK_M, Owner, Pair, Round};
 use crate::member::ClusterMember;
-use crate::member::state::Progress;
+use crate::member::state::{Progress, velocity};
 use crate::push_out::push_out_m_s;
 use glam::DVec3;
 use metachron_geometry::{CollisionShape, ContactSide, Place, Touch};
@@ -54,11 +54,6 @@ impl Facing {
         });
         a - b
     }
-}
-
-/// The velocity of a side with the velocities `of` its member, m/s; zero for one that does not move.
-pub(crate) fn velocity<'a>(side: &Side, of: impl Fn(usize) -> &'a [DVec3]) -> DVec3 {
-    if side.terms().is_empty() { DVec3::ZERO } else { side.velocity(of(side.member)) }
 }
 
 /// Whether a gap may close within the step, by the motion of both or of either alone, as it is or as it would be without contact: what

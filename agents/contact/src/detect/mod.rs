@@ -6,104 +6,30 @@
 mod boxes;
 pub(crate) mod domain;
 mod facing;
+mod pair;
 mod scene;
 mod sensor;
 mod sweep;
 mod thinning;
 
 use crate::cluster::Contact;
-use crate::constraint::contact_rows::Spin;
 use crate::detect::domain::Domain;
-use crate::member::memory::Partner;
-use crate::member::state::Progress;
-use crate::member::{ClusterMember, Participant, Role};
+use crate::member::memory::{Partner, Spin};
+use crate::member::{ClusterMember, Role};
 use boxes::Boxes;
-pub(crate) use facing::velocity;
 use facing::{Skinned, closes, taken_up};
 use glam::DVec3;
-use metachron_geometry::narrow_phase::{NarrowPhaseScratch, StaticSolid, TouchKey, self_touches, touches};
+use metachron_geometry::narrow_phase::{NarrowPhaseScratch, TouchKey, self_touches, touches};
 use metachron_geometry::{CollisionShape, Place, Touch};
+use pair::{Against, LOOK_M, Pair, Reaching};
+pub(crate) use pair::{Judge, Owner, Round};
 pub use scene::{BadDepth, ClusterScene, DEPTH_RANGE_M, Passage};
 pub(crate) use sensor::Sensed;
 use sweep::{FAR_M, Meeting, Sought, Sweep, Sweeping};
 use thinning::Thinning;
 
-/// A place is taken up if its gap may close below this within the step, metres.
-const LOOK_M: f64 = 4e-4;
-/// Sides that are closer than this have met, metres.
-const MET_M: f64 = 1e-6;
 /// How many steps ahead bodies look for each other.
 const NEAR_STEPS: f64 = 2.0;
-
-/// Where a contact belongs.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct Owner {
-    /// The participant that remembers it: the lower number, side 0.
-    pub member: usize,
-    pub partner: Partner,
-    /// The participant on side 1, where there is one.
-    pub other: Option<usize>,
-    /// The name of the place within its pair.
-    pub key: TouchKey,
-    /// Its friction about the normal.
-    pub spin: Spin,
-    /// The point of the participant's skin.
-    pub place: Place,
-    /// Newton's coefficient of restitution of its pair, 0 to 1.
-    pub restitution: f64,
-}
-
-impl Owner {
-    fn name(&self) -> (usize, Partner, TouchKey) {
-        (self.member, self.partner, self.key)
-    }
-
-    /// The pair that it belongs to.
-    pub const fn pair(&self) -> (usize, Partner) {
-        (self.member, self.partner)
-    }
-
-    /// Its participants.
-    pub fn both(&self) -> impl Iterator<Item = usize> + use<> {
-        std::iter::once(self.member).chain(self.other)
-    }
-}
-
-/// What a round of the search goes by.
-pub(crate) struct Round<'a, 'p> {
-    pub scene: &'a ClusterScene,
-    pub all: &'a [Participant<'p>],
-    pub progress: &'a [Progress],
-    pub h_s: f64,
-    pub judge: Judge,
-}
-
-/// What a member is searched against.
-#[derive(Clone, Copy)]
-enum Against<'a> {
-    /// Another member.
-    Member(usize),
-    /// A static solid, with its number.
-    Static { number: u32, solid: &'a StaticSolid },
-    /// The member itself.
-    Own,
-}
-
-/// A member and what it is searched against.
-#[derive(Clone, Copy)]
-struct Pair<'a> {
-    member: usize,
-    against: Against<'a>,
-}
-
-/// How far a pair is searched.
-#[derive(Clone, Copy)]
-struct Reaching {
-    /// From where it is, metres.
-    reach_m: f64,
-    /// On its way, at the moment at which it is this near; `None` for a pair that is searched where it is.
-    swept_m: Option<f64>,
-}
 
 /// Places found of a pair.
 struct Found<'a> {
@@ -113,19 +39,6 @@ struct Found<'a> {
     at: Meeting,
     /// No place was left out that is nearer than this, metres.
     clear_m: f64,
-}
-
-impl<'a> Round<'a, '_> {
-    /// Whether it is the one before the solve.
-    fn foresees(&self) -> bool {
-        matches!(self.judge, Judge::Foreseen)
-    }
-
-    /// The velocities at which a member's place moves, as far as this round knows.
-    fn moved(&self, member: usize) -> &'a [DVec3] {
-        let state = &self.progress[member];
-        if self.foresees() { &state.seen } else { &state.going }
-    }
 }
 
 /// Reusable storage, and what was found.
@@ -170,15 +83,6 @@ struct Look {
     partner: Partner,
     /// No place of the two that was left out is nearer than this, metres.
     clear_m: f64,
-}
-
-/// By which velocities a place is judged.
-#[derive(Clone, Copy)]
-pub(crate) enum Judge {
-    /// Those at the start and without contact, each side's alone too.
-    Foreseen,
-    /// Those of a solution.
-    Solved,
 }
 
 impl Search {
@@ -419,17 +323,6 @@ impl Search {
         for Named { owner, contact } in sorted.drain(..) {
             owners.push(owner);
             contacts.push(contact);
-        }
-    }
-}
-
-impl Pair<'_> {
-    /// The member on side 1; `None` for a static solid.
-    fn other(&self) -> Option<usize> {
-        match self.against {
-            Against::Member(other) => Some(other),
-            Against::Own => Some(self.member),
-            Against::Static { .. } => None,
         }
     }
 }

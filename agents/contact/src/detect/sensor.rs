@@ -3,9 +3,9 @@
 //! In: members with the velocities they would have. Out: pairs that touch where a fine step begins, or that meet on their way through it.
 //! Never here: forces, how often a pair has touched (`../memory.rs`).
 
-use crate::detect::Passage;
+use crate::detect::pair::{Against, MET_M, Pair, Reaching, Round};
 use crate::detect::sweep::FAR_M;
-use crate::detect::{Against, MET_M, Meeting, Pair, Reaching, Round, Search};
+use crate::detect::{Meeting, Passage, Search};
 use crate::member::ClusterMember;
 use crate::member::memory::Partner;
 use glam::{DQuat, DVec3};

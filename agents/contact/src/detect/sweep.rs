@@ -3,7 +3,7 @@
 //! In: a pair with the velocities at which its places move. Out: when it meets, and its places at that moment. Never here: what is near from
 //! the start.
 
-use crate::detect::{Against, Pair, Round};
+use crate::detect::pair::{Against, Pair, Round};
 use crate::member::ClusterMember;
 use glam::DVec3;
 use metachron_geometry::narrow_phase::{NarrowPhaseScratch, SweptReach, SweptShape, first_touch};

@@ -4,7 +4,7 @@
 //! Theory: docs/theory/contact.md, section 3.
 
 use crate::cluster::Contact;
-use crate::detect::{Judge, Owner, Pair, Round};
+use crate::detect::pair::{Judge, Owner, Pair, Round};
 use crate::member::ClusterMember;
 use crate::member::memory::Partner;
 use glam::DVec3;

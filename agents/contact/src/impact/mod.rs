@@ -6,11 +6,10 @@
 mod meeting;
 
 use crate::cluster::{Contact, JointRow, Settings, Side, Solution, Solver};
-use crate::constraint::contact_rows;
-use crate::constraint::{Ties, is_rigid};
-use crate::detect::{Owner, Search, velocity};
+use crate::constraint::{Ties, contact_rows, is_rigid};
+use crate::detect::{Owner, Search};
 use crate::member::memory::Partner;
-use crate::member::state::Progress;
+use crate::member::state::{Progress, velocity};
 use crate::member::{ClusterMember, Participant, Role};
 use crate::push_out::PUSH_OUT_SHARE;
 use crate::step::solve::{Posed, Velocities};

@@ -3,9 +3,11 @@
 //! In: contacts with their impulses. Out: the same for the next step. Never here: contacts that are new.
 //! A pair is remembered by its lower number, so that nothing has to be moved when clusters join or part.
 
-use crate::constraint::contact_rows::Spin;
-use crate::constraint::yielding::Slip;
+use crate::joint::{Joint, JointKind};
+use crate::law::Link;
+use crate::member::Slid;
 use glam::DVec3;
+use metachron_core::Anchor;
 use metachron_core::{AgentId, ContactPartner, SensorTouch, SimSpan, SimTime};
 use metachron_geometry::narrow_phase::{TouchKey, TouchKind};
 
@@ -35,6 +37,25 @@ pub enum Partner {
     Line(u32),
     /// The far end of an attachment that is the body's own, by its number among those of the body.
     Attachment(u32),
+}
+
+/// The spin friction of a contact as it is remembered, about its normal.
+#[derive(Debug, Clone, Copy, PartialEq, Default, serde::Serialize, serde::Deserialize)]
+pub(crate) struct Spin {
+    /// The radius of the patch that resists, metres.
+    pub radius_m: f64,
+    /// The torque of the last step or solve, N·m, and the angle owed (eq. 13).
+    pub torque_n_m: f64,
+    pub owed_rad: f64,
+}
+
+/// How an attachment holds that has slipped.
+#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
+pub struct Slip {
+    /// Which one.
+    pub(crate) partner: Partner,
+    /// How far, at an end without axes as the frame of its rows says; of a body's own attachment nothing, for each of its springs slips by itself.
+    pub(crate) slid: Slid,
 }
 
 /// What a contact or a joint hands to the next step.
@@ -142,6 +163,44 @@ impl Clone for ContactMemory {
         slips.clone_from(&from.slips);
         unfinished.clone_from(&from.unfinished);
         sensed.clone_from(&from.sensed);
+    }
+}
+
+impl Slip {
+    /// One that has not slipped.
+    pub(crate) const fn none(partner: Partner) -> Self {
+        Self { partner, slid: Slid { moved_m: DVec3::ZERO, longer_m: 0.0 } }
+    }
+
+    /// The joint as it holds now.
+    pub(crate) fn joint(&self, joint: &Joint) -> Joint {
+        let kind = match joint.kind {
+            JointKind::Spring { stiffness_n_m, damping_n_s_m, rest_m } => {
+                JointKind::Spring { stiffness_n_m, damping_n_s_m, rest_m: (rest_m + self.slid.longer_m).max(0.0) }
+            }
+            JointKind::Rope { length_m } => JointKind::Rope { length_m: length_m + self.slid.longer_m },
+            kind => kind,
+        };
+        Joint { anchor_b_m: joint.anchor_b_m + self.slid.moved_m, kind, ..*joint }
+    }
+
+    /// The link as it holds now. Between two points without axes of their own nothing of it moves: [`Self::beside`] says how far apart
+    /// they rest.
+    pub(crate) fn link(&self, link: &Link) -> Link {
+        let (here, there) = match (link.here, link.there) {
+            (here, Anchor::Local(there)) => (here, Anchor::Local(there + self.slid.moved_m)),
+            (Anchor::Local(here), there) => (Anchor::Local(here + self.slid.moved_m), there),
+            ends => ends,
+        };
+        Link { here, there, rest_m: (link.rest_m + self.slid.longer_m).max(0.0), ..*link }
+    }
+
+    /// How far from its place the far end of a link holds, world axes, metres: between two points without axes of their own.
+    pub(crate) fn beside(&self, link: &Link) -> DVec3 {
+        match (link.here, link.there) {
+            (Anchor::Local(_), _) | (_, Anchor::Local(_)) => DVec3::ZERO,
+            _ => self.slid.moved_m,
+        }
     }
 }
 

@@ -3,6 +3,7 @@
 //! In: its velocities at the start of its step and without contact, impulses. Out: the velocities at which its place moves. Never here:
 //! contacts, the problem. Theory: docs/theory/clusters.md, section 9 (eq. 24 to 26).
 
+use crate::cluster::Side;
 use crate::member::ClusterMember;
 use glam::DVec3;
 use metachron_core::StepError;
@@ -167,4 +168,9 @@ impl Progress {
             self.before[at] = self.known[at] + change;
         }
     }
+}
+
+/// The velocity of a side with the velocities `of` its member, m/s; zero for one that does not move.
+pub(crate) fn velocity<'a>(side: &Side, of: impl Fn(usize) -> &'a [DVec3]) -> DVec3 {
+    if side.terms().is_empty() { DVec3::ZERO } else { side.velocity(of(side.member)) }
 }

@@ -6,8 +6,7 @@
 use crate::cluster::{Hold, Side};
 use crate::laws::{Line, LineLaw, LineStep};
 use crate::member::{ClusterMember, Participant};
-use crate::remote::Matter;
-use crate::remote::state_of;
+use crate::remote::{Matter, state_of};
 use crate::step::{ClusterStepper, KnownImpulse, LineRow};
 use crate::{Law, Link, Neighbour};
 use glam::DVec3;

@@ -18,15 +18,16 @@ mod member;
 mod published_shape;
 mod weighing;
 
+use crate::cluster::Side;
+use crate::member::memory::Partner;
+use crate::member::{ClusterMember, ContactMemory, Participant};
+use crate::step::{ClusterStepper, KnownImpulse};
+use crate::{Law, Neighbour, StepContext};
 pub use ledgers::{GivenAt, Ledgers, TakenImpulse, acknowledged};
 pub use local::LocalQuery;
 pub use member::{RemoteMember, RemoteView};
 pub use published_shape::Matter;
 
-use crate::cluster::Side;
-use crate::member::{ClusterMember, ContactMemory, Participant, Partner};
-use crate::step::{ClusterStepper, KnownImpulse};
-use crate::{Law, Neighbour, StepContext};
 use glam::DVec3;
 use lines::Lines;
 use metachron_core::archive_values;

@@ -3,8 +3,7 @@
 //! In: impulses that partners gave before, forces of users, ends of transmission lines; the impulses of a solve. Out: velocities that known impulses make,
 //! rows of lines, sums of what remote members were given. Never here: ledgers, waves. Theory: docs/theory/coupling.md, eq. 3, 4c and 10.
 
-use crate::cluster::Response;
-use crate::cluster::{Hold, JointRow, Side};
+use crate::cluster::{Hold, JointRow, Response, Side};
 use crate::constraint::{FineStep, RowOwner, Ties};
 use crate::member::memory::Partner;
 use crate::member::state::Progress;

@@ -5,12 +5,12 @@
 //! Never here: bodies that bend, which touch none of the heap; rows of springs and joints: these are solved before, as if nothing touched.
 //! Theory: docs/theory/clusters.md, section 9.
 
-use crate::detect::ClusterScene;
-use crate::detect::Search;
 use crate::detect::domain::{Domain, assign};
+use crate::detect::{ClusterScene, Search};
+use crate::member::memory::Partner;
 use crate::member::participant::place_of;
 use crate::member::state::Progress;
-use crate::member::{ClusterMember, Locked, Participant, Partner};
+use crate::member::{ClusterMember, Locked, Participant};
 use crate::step::pair_total::total_of;
 use crate::step::{ClusterReport, PairTotal};
 use glam::{DMat3, DQuat, DVec3};

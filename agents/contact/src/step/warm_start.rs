@@ -3,10 +3,8 @@
 //! In: what participants remember; a solution. Out: contacts that start from it; memories, totals of pairs. Never here: rows of joints as they
 //! are laid out, the solve.
 
-use crate::constraint::contact_rows::Spin;
 use crate::constraint::place_key;
-use crate::detect;
-use crate::member::memory::{Partner, Remembered};
+use crate::member::memory::{Partner, Remembered, Spin};
 use crate::member::{ClusterMember, Participant};
 use crate::step::ClusterStepper;
 use crate::step::pair_total::total_of;
@@ -121,7 +119,8 @@ impl ClusterStepper {
             let owner = &mut search.owners[contact];
             let (normal, pressed) = (search.contacts[contact].normal, row.pressed.map_or(0.0, |by| by.reach_m));
             let most = pressed * solution.contacts_n_s[contact].dot(normal);
-            let [a, b] = row.sides.map(|side| detect::velocity(&side, |member| &progress[member].solved[..]));
+            let [a, b] =
+                row.sides.map(|side| crate::member::state::velocity(&side, |member| &progress[member].solved[..]));
             owner.spin.owed_rad = row.owed_slip_after(impulse, a - b, most, h_s).dot(normal);
             owner.spin.torque_n_m = impulse.dot(normal) / h_s;
             outside.note(all, owner.member, &row.sides[1], -impulse);
