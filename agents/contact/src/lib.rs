@@ -38,7 +38,7 @@
 //! let given: DVec3 = solution.contacts_n_s.iter().sum();
 //! assert!((given.z - mass_kg * 9.81 * h_s).abs() < 0.001); // the floor carries the box …
 //! assert!((given.x + 0.3 * given.z).abs() < 1e-4); // … and slows it by Coulomb's law
-//! assert!(!solution.report.cut);
+//! assert!(solution.report.miss_m_s < 1e-6);
 //! # Ok::<(), metachron_contact::cluster::ProblemError>(())
 //! ```
 
