@@ -5,17 +5,17 @@
 
 mod meeting;
 
-use crate::cluster::{Contact, JointRow, Settings, Side, Solution, Solver};
+use crate::cluster::{Contact, JointRow, Report, Settings, Side, Solution, Solver};
 use crate::constraint::{Ties, contact_rows, is_rigid};
 use crate::detect::{Owner, Search};
 use crate::member::memory::Partner;
+use crate::member::problem::{Posed, ProblemMembers, Velocities};
 use crate::member::state::{Progress, velocity};
 use crate::member::{ClusterMember, Participant, Role};
 use crate::push_out::PUSH_OUT_SHARE;
-use crate::step::solve::{Posed, Velocities};
-use crate::step::{ClusterReport, ClusterStepper, On};
 use glam::DVec3;
 use meeting::{Closing, Meeting, Work};
+use metachron_core::ParallelFor;
 use metachron_core::{DisjointSets, StepError};
 
 /// By which share of the speed that an impact loses its contact gives way (eq. 5), and the least by which it does, m/s.
@@ -66,43 +66,50 @@ struct Flight {
     after_s: Option<f64>,
 }
 
-impl ClusterStepper {
-    /// Lets contacts that close fast rebound, after the solve of a fine step by which they close no more.
-    pub(crate) fn rebound(
-        &mut self,
-        on: On<'_>,
-        all: &[Participant<'_>],
-        may_fly: bool,
-        report: &mut ClusterReport,
-    ) -> Result<(), StepError> {
-        let Self { impacts, search, ties, solver, progress, members, lent, places, depth_m, .. } = self;
-        impacts.clear();
+/// A fine step after its solve.
+pub(crate) struct SolvedStep<'a, 'p> {
+    pub all: &'a [Participant<'p>],
+    pub search: &'a Search,
+    pub ties: &'a Ties,
+    pub solution: &'a Solution,
+    pub members: &'a mut ProblemMembers,
+    pub progress: &'a mut [Progress],
+    pub threads: &'a dyn ParallelFor,
+    /// How deep contacts rest, metres.
+    pub depth_m: f64,
+    /// Whether bodies may be where a flight brings them: another solve would stop those that pass into others.
+    pub may_fly: bool,
+}
+
+impl Impacts {
+    /// Lets contacts that close fast rebound, after the solve of a fine step by which they close no more; `None` where none does.
+    pub fn rebound(&mut self, step: SolvedStep<'_, '_>) -> Result<Option<Report>, StepError> {
+        let SolvedStep { all, search, ties, solution, members, progress, threads, depth_m, may_fly } = step;
+        self.clear();
         for state in &mut *progress {
             state.jump.clear();
             state.late.clear();
         }
-        impacts.depth_m = *depth_m;
-        impacts.find(search, progress);
-        if impacts.found.is_empty() {
-            return Ok(());
+        self.depth_m = depth_m;
+        self.find(search, progress);
+        if self.found.is_empty() {
+            return Ok(None);
         }
         let flies =
             |(one, state): (&Participant<'_>, &Progress)| may_fly && one.member.role() == Role::Rigid && !state.touched;
-        impacts.note_flights(all.iter().zip(&*progress).map(flies), search, ties);
-        impacts.pose(all, search, ties, progress);
-        let h_s = impacts.aim();
-        let (contacts, rows, threads) = (&mut impacts.contacts[..], &mut impacts.rows[..], on.threads);
+        self.note_flights(all.iter().zip(&*progress).map(flies), search, ties);
+        self.pose(all, search, ties, progress);
+        let h_s = self.aim();
+        let (contacts, rows) = (&mut self.contacts[..], &mut self.rows[..]);
         let (free, open): (Velocities, Velocities) = (|state| &state.solved, |_| &[]);
-        let posed = Posed { all, progress, places, contacts, rows, h_s, threads, free, open };
-        report.add(&posed.solve(&mut impacts.solver, members, lent)?);
-        impacts.weigh(search, ties, solver.solution(), progress);
-        impacts.take(all, search, ties, progress);
-        impacts.land(search, progress);
-        Ok(())
+        let took =
+            Posed { all, progress, contacts, rows, h_s, threads, free, open }.solve(&mut self.solver, members)?;
+        self.weigh(search, ties, solution, progress);
+        self.take(all, search, ties, progress);
+        self.land(search, progress);
+        Ok(Some(took))
     }
-}
 
-impl Impacts {
     /// Begins a fine step. Its problem goes by the velocities at its end, and would stop too early sides that fly and meet in a later one: it
     /// has none of their contacts.
     pub fn begin(&mut self, [macro_s, step_s]: [f64; 2], search: &mut Search, ties: &Ties, progress: &[Progress]) {

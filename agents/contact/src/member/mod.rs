@@ -5,6 +5,7 @@
 pub(crate) mod guarded;
 pub(crate) mod memory;
 pub(crate) mod participant;
+pub(crate) mod problem;
 pub(crate) mod state;
 
 use crate::StepContext;

@@ -3,9 +3,9 @@
 //! In: the last solve, blocks of a participant, what partners give it. Out: velocities, accelerations and W of these blocks. Never here:
 //! who the partners are, which blocks. Theory: docs/theory/coupling.md, section 3 (eq. 7m).
 
+use crate::member::problem::respond;
 use crate::member::{ClusterMember, Participant};
 use crate::step::ClusterStepper;
-use crate::step::external::respond;
 use glam::DVec3;
 use metachron_core::{LocalBlock, LocalModel};
 

@@ -3,15 +3,13 @@
 //! In: impulses that partners gave before, forces of users, ends of transmission lines; the impulses of a solve. Out: velocities that known impulses make,
 //! rows of lines, sums of what remote members were given. Never here: ledgers, waves. Theory: docs/theory/coupling.md, eq. 3, 4c and 10.
 
-use crate::cluster::{Hold, JointRow, Response, Side};
+use crate::cluster::{Hold, JointRow, Side};
 use crate::constraint::{FineStep, RowOwner, Ties};
 use crate::member::memory::Partner;
+use crate::member::problem::respond;
 use crate::member::state::Progress;
-use crate::member::{ClusterMember, GuardedMember, Participant};
+use crate::member::{ClusterMember, Participant};
 use glam::DVec3;
-
-/// Sweeps by which a member without a factor answers known impulses; each at least halves what is left of an M-matrix's.
-const SWEEPS_MAX: usize = 400;
 
 /// An impulse that a partner gave before the macro step: it acts evenly over it.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -181,40 +179,6 @@ impl Ties {
             let (member, partner, tears_above_n) = (line.member, Partner::Line(number), f64::INFINITY);
             let owner = RowOwner { member, other: None, partner, key: 0, hold: None, tears_above_n, owes: false };
             self.push(step, row, owner);
-        }
-    }
-}
-
-/// Replaces impulses on the blocks of a member by the velocities that they make: A⁻¹ of them.
-pub(crate) fn respond(member: &GuardedMember<'_>, impulses: &mut [DVec3], residual: &mut Vec<DVec3>) {
-    if let Some(lent) = member.lent() {
-        return lent.respond(impulses);
-    }
-    // block Gauss–Seidel: exact after one sweep where no blocks are coupled, as of rigid bodies
-    residual.clear();
-    residual.extend_from_slice(impulses);
-    impulses.fill(DVec3::ZERO);
-    let blocks = member.blocks();
-    for _ in 0..SWEEPS_MAX {
-        let mut change = 0.0_f64;
-        for at in 0..impulses.len() {
-            let mut right = residual[at];
-            let mut own = glam::DMat3::ZERO;
-            for block in blocks {
-                if block.row == at && block.column == at {
-                    own += block.value;
-                } else if block.row == at {
-                    right -= block.value * impulses[block.column];
-                } else if block.column == at {
-                    right -= block.value.transpose() * impulses[block.row];
-                }
-            }
-            let value = own.inverse() * right;
-            change = change.max((value - impulses[at]).length() / value.length().max(f64::MIN_POSITIVE));
-            impulses[at] = value;
-        }
-        if change <= f64::EPSILON {
-            break;
         }
     }
 }

@@ -17,16 +17,16 @@
 
 mod divide;
 mod doubling;
-pub(crate) mod external;
+mod external;
 mod pair_total;
 mod plan;
 mod restart;
 mod rigid_pile;
-pub(crate) mod solve;
+mod solve;
 mod stiffness;
 mod warm_start;
 
-use crate::cluster::{DEPTH_DEFAULT_M, Level, Member, Settings, Solver, multiply};
+use crate::cluster::{DEPTH_DEFAULT_M, Level, Settings, Solver, multiply};
 use crate::constraint::contact_rows::ContactRows;
 use crate::constraint::joint::Joints;
 use crate::constraint::tearing::Tearing;
@@ -34,7 +34,7 @@ use crate::constraint::yielding::Yielding;
 use crate::constraint::{FineStep, JointTotal, Ties, Torn, Yielded};
 use crate::detect::{ClusterScene, Judge, Round, Search};
 use crate::impact::Impacts;
-use crate::member::guarded::Lent;
+use crate::member::problem::ProblemMembers;
 use crate::member::state::Progress;
 use crate::member::{ClusterMember, ContactMemory, Participant, Role};
 use divide::times;
@@ -92,8 +92,7 @@ pub struct ClusterStepper {
     pub(crate) joints: Joints,
     pub(crate) contact_rows: ContactRows,
     pub(crate) progress: Vec<Progress>,
-    pub(crate) members: Vec<Member<'static>>,
-    pub(crate) lent: Vec<Option<Lent<'static>>>,
+    pub(crate) members: ProblemMembers,
     pub(crate) totals: Vec<PairTotal>,
     /// What contacts gave each participant in the macro step, N·s and N·m·s.
     pub(crate) wrenches: Vec<Wrench>,
@@ -106,8 +105,6 @@ pub struct ClusterStepper {
     pub(crate) is_kept: bool,
     pub(crate) impacts: Impacts,
     pub(crate) heap: Heap,
-    /// The participant of each member of the problem.
-    pub(crate) places: Vec<usize>,
     pub(crate) outside: Outside,
     /// Storage of local models, and of how the sides of contacts are moved.
     pub(crate) local: [Vec<DVec3>; 2],
@@ -131,8 +128,7 @@ impl Default for ClusterStepper {
             joints: Joints::default(),
             contact_rows: ContactRows::default(),
             progress: Vec::new(),
-            members: Vec::new(),
-            lent: Vec::new(),
+            members: ProblemMembers::default(),
             totals: Vec::new(),
             wrenches: Vec::new(),
             efforts: Vec::new(),
@@ -142,7 +138,6 @@ impl Default for ClusterStepper {
             is_kept: false,
             impacts: Impacts::default(),
             heap: Heap::default(),
-            places: Vec::new(),
             outside: Outside::default(),
             local: Default::default(),
             moved_m_s: Vec::new(),

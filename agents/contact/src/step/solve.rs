@@ -3,20 +3,19 @@
 //! In: members with what they see, places, rows. Out: every member's impulses. Never here: how places are found, how rows are laid out.
 //! Theory: docs/theory/clusters.md, section 9.
 
-use crate::cluster::{Contact, JointRow, Level, Member, Problem, ProblemError, Report, Response, Solver, StepForm};
+use crate::cluster::{Level, Report};
 use crate::constraint::joint::Aimed;
 use crate::detect::{Judge, Round};
-use crate::member::guarded::Lent;
+use crate::impact::SolvedStep;
+use crate::member::problem::{Posed, Velocities};
 use crate::member::state::Progress;
 use crate::member::{ClusterMember, Participant, Role};
 use crate::step::{ClusterReport, ClusterStepper, On, times};
 use glam::DVec3;
-use metachron_core::{ParallelFor, StepError, recycled};
+use metachron_core::{ParallelFor, StepError};
 
 /// The most solves of a fine step: what is struck reaches what it strikes one body further in each, and joints converge.
 const ROUNDS_MAX: u32 = 6;
-/// A member of more blocks that lends no factor gets none: the problem is solved by conjugate gradients.
-const FACTORED_BLOCKS_MAX: usize = 200;
 /// Joints hold to this share of the depth of contacts, in metres and radians.
 const JOINT_SHARE: f64 = 0.25;
 /// From so many fine steps on, joints that do not hold ask for more only while that brings what they miss below this share of it.
@@ -113,7 +112,7 @@ impl ClusterStepper {
         threads: &dyn ParallelFor,
         report: &mut ClusterReport,
     ) -> Result<(), StepError> {
-        let Self { solver, search, ties, progress, members, lent, places, .. } = self;
+        let Self { solver, search, ties, progress, members, .. } = self;
         // what no row touches and knows how it would move does so, and makes no problem larger
         let mut count = 0..;
         progress.iter_mut().for_each(|state| state.place = (!state.unanswered.is_empty()).then_some(0));
@@ -121,17 +120,42 @@ impl ClusterStepper {
         sides.filter(|side| !side.terms().is_empty()).for_each(|side| progress[side.member].place = Some(0));
         let involved = progress.iter_mut().filter(|state| state.place.is_some());
         involved.for_each(|state| state.place = count.next());
-        places.clear();
-        places.extend(progress.iter().enumerate().filter_map(|(member, state)| state.place.map(|_| member)));
+        members.places.clear();
+        members.places.extend(progress.iter().enumerate().filter_map(|(member, state)| state.place.map(|_| member)));
         let (contacts, rows) = (&mut search.contacts[..], &mut ties.rows[..]);
         let (free, open): (Velocities, Velocities) = (|state| &state.seen, |state| &state.unanswered);
-        let posed = Posed { all, progress, places, contacts, rows, h_s, threads, free, open };
-        report.add(&posed.solve(solver, members, lent)?);
+        let posed = Posed { all, progress, contacts, rows, h_s, threads, free, open };
+        report.add(&posed.solve(solver, members)?);
         for state in &mut *progress {
             let Progress { solved, seen, place, .. } = state;
             solved.clear();
             solved.extend_from_slice(place.map_or(&seen[..], |place| solver.solution().velocities(place)));
         }
+        Ok(())
+    }
+
+    /// Lets contacts that close fast rebound.
+    fn rebound(
+        &mut self,
+        on: On<'_>,
+        all: &[Participant<'_>],
+        may_fly: bool,
+        report: &mut ClusterReport,
+    ) -> Result<(), StepError> {
+        let Self { impacts, search, ties, solver, progress, members, depth_m, .. } = self;
+        let (solution, depth_m, threads) = (solver.solution(), *depth_m, on.threads);
+        let took = impacts.rebound(SolvedStep {
+            all,
+            search,
+            ties,
+            solution,
+            members,
+            progress,
+            threads,
+            depth_m,
+            may_fly,
+        })?;
+        took.iter().for_each(|took| report.add(took));
         Ok(())
     }
 
@@ -173,58 +197,6 @@ impl ClusterStepper {
     }
 }
 
-/// Where a problem takes velocities or momentum of a participant from.
-pub(crate) type Velocities = fn(&Progress) -> &[DVec3];
-
-/// A problem among the participants that have a place in it: some contacts and rows, bodies at some velocities.
-pub(crate) struct Posed<'a, 'p> {
-    pub all: &'a [Participant<'p>],
-    pub progress: &'a [Progress],
-    /// The participant of each place.
-    pub places: &'a [usize],
-    pub contacts: &'a mut [Contact],
-    pub rows: &'a mut [JointRow],
-    pub h_s: f64,
-    pub threads: &'a dyn ParallelFor,
-    /// The velocities of a participant without the impulses sought, and the momentum that they leave open.
-    pub free: Velocities,
-    pub open: Velocities,
-}
-
-impl Posed<'_, '_> {
-    /// Solves it, with storage for its members.
-    pub fn solve(
-        self,
-        solver: &mut Solver,
-        members: &mut Vec<Member<'static>>,
-        lent: &mut Vec<Option<Lent<'static>>>,
-    ) -> Result<Report, StepError> {
-        let Self { all, progress, places, contacts, rows, h_s, threads, free, open } = self;
-        let (mut list, mut lenders) = (recycled(std::mem::take(members)), recycled(std::mem::take(lent)));
-        let taking = || places.iter().map(|at| (&all[*at], &progress[*at]));
-        lenders.extend(taking().map(|(one, _)| one.member.lent()));
-        list.extend(taking().zip(&lenders).map(|((one, state), lender)| Member {
-            blocks: one.member.blocks(),
-            response: lender.as_ref().map(|lender| lender as &dyn Response),
-            free: free(state),
-            unanswered: open(state),
-            now: &state.before,
-            share: f64::from(state.part),
-        }));
-        move_sides(contacts, rows, |member| progress[member].place);
-        let has_factor = |member: &Member<'_>| member.response.is_some() || member.free.len() <= FACTORED_BLOCKS_MAX;
-        solver.set_form(if list.iter().all(has_factor) { StepForm::Direct } else { StepForm::Iterative });
-        let problem = Problem { h_s, members: &list, contacts, rows, threads };
-        let outcome = solver.solve(&problem).map(|solution| solution.report);
-        (*members, *lent) = (recycled(list), recycled(lenders));
-        move_sides(contacts, rows, |place| places.get(place).copied());
-        outcome.map_err(|error| {
-            blame(&error, all, places);
-            refused(&error, h_s)
-        })
-    }
-}
-
 impl ClusterReport {
     /// Counts a solve.
     pub(crate) fn add(&mut self, took: &Report) {
@@ -235,26 +207,4 @@ impl ClusterReport {
         self.level = self.level.max(took.level);
         self.miss_m_s = self.miss_m_s.max(took.miss_m_s);
     }
-}
-
-/// Counts the members of all sides anew.
-fn move_sides(contacts: &mut [Contact], rows: &mut [JointRow], to: impl Fn(usize) -> Option<usize>) {
-    let contacts = contacts.iter_mut().flat_map(|contact| &mut contact.sides);
-    let sides = contacts.chain(rows.iter_mut().flat_map(|row| &mut row.sides));
-    for side in sides.filter(|side| !side.terms().is_empty()) {
-        side.member = to(side.member).unwrap_or(side.member);
-    }
-}
-
-/// Blames the participant whose matrix or velocities are none, of the members at these `places`.
-fn blame(error: &ProblemError, all: &[Participant<'_>], places: &[usize]) {
-    let (ProblemError::Member { member, .. } | ProblemError::NotPositiveDefinite { member, .. }) = *error else {
-        return;
-    };
-    let blamed = places.get(member).and_then(|place| all.get(*place));
-    blamed.into_iter().for_each(|one| one.member.reject(error.to_string()));
-}
-
-fn refused(error: &ProblemError, dt_s: f64) -> StepError {
-    StepError::Diverged { model: "cluster", dt_s, what: error.to_string() }
 }
