@@ -257,8 +257,8 @@ impl Joint {
             JointKind::Prismatic { axis, range_m, .. } => {
                 let axis = a.1 * axis.normalize();
                 let along = between.dot(axis);
-                let outside = range_m.map_or(0.0, |[low, high]| along - along.clamp(low, high));
-                (between - axis * (along - outside)).length()
+                let external = range_m.map_or(0.0, |[low, high]| along - along.clamp(low, high));
+                (between - axis * (along - external)).length()
             }
             JointKind::Spring { .. } => 0.0,
             JointKind::Rope { length_m } => (between.length() - length_m).max(0.0),

@@ -5,12 +5,12 @@
 
 use crate::cluster::{Hold, JointRow, Side, Spring};
 use crate::constraint::yielding::SLIP_SHARE;
-use crate::constraint::{FineStep, Frame, Name, Pull, Slides, SlidingRow, Ties};
+use crate::constraint::{ConstraintRows, FineStep, Frame, Name, Pull, Slides, SlidingRow};
 use crate::member::memory::Partner;
 use crate::member::{ClusterMember, OwnSpring};
 use glam::DVec3;
 
-impl Ties {
+impl ConstraintRows {
     /// Lays out the springs to the world that are members' own and yield.
     pub fn gather_own_springs(&mut self, step: &FineStep<'_, '_>) {
         for (member, one) in step.all.iter().enumerate() {

@@ -5,7 +5,7 @@
 //! Theory: docs/theory/clusters.md, section 2.
 
 use crate::cluster::{Contact, Hold, JointRow, Pressed, Side};
-use crate::constraint::Ties;
+use crate::constraint::ConstraintRows;
 use crate::detect::{Owner, Search};
 use crate::member::{ClusterMember, Participant};
 use crate::push_out::{PUSH_OUT_MAX_M_S, push_out_m_s};
@@ -34,12 +34,12 @@ impl ContactRows {
     }
 
     /// Lays out the rows anew for the contacts as they are.
-    pub fn lay(&mut self, search: &Search, all: &[Participant<'_>], ties: &mut Ties, h_s: f64) {
-        ties.rows.truncate(ties.owners.len());
+    pub fn lay(&mut self, search: &Search, all: &[Participant<'_>], constraints: &mut ConstraintRows, h_s: f64) {
+        constraints.rows.truncate(constraints.owners.len());
         self.clear();
         for (contact, (owner, at)) in search.owners.iter().zip(&search.contacts).enumerate() {
             let Some(row) = spin_row(all, owner, at, contact) else { continue };
-            ties.rows.push(JointRow {
+            constraints.rows.push(JointRow {
                 owed_slip_m: at.normal * owner.spin.owed_rad,
                 warm_n_s: at.normal * (owner.spin.torque_n_m * h_s),
                 ..row
@@ -47,7 +47,7 @@ impl ContactRows {
             self.spins.push(contact);
         }
         for (contact, at) in search.contacts.iter().enumerate().filter(|(_, at)| at.overlap_m > 0.0) {
-            ties.rows.push(JointRow {
+            constraints.rows.push(JointRow {
                 target_m_s: at.normal * (at.surface_m_s.dot(at.normal) - push_out_m_s(at.gap_m, h_s)),
                 limit_m_s: PUSH_OUT_MAX_M_S,
                 ..JointRow::new(at.sides, Hold::pushing(at.normal))
@@ -57,13 +57,13 @@ impl ContactRows {
     }
 
     /// The contacts of the rows of spins, with the place of each row among all of the problem.
-    pub fn spins(&self, ties: &Ties) -> impl Iterator<Item = (usize, usize)> + use<'_> {
-        self.spins.iter().copied().zip(ties.owners.len()..)
+    pub fn spins(&self, constraints: &ConstraintRows) -> impl Iterator<Item = (usize, usize)> + use<'_> {
+        self.spins.iter().copied().zip(constraints.owners.len()..)
     }
 
     /// The same of the rows that push out.
-    pub fn pushes(&self, ties: &Ties) -> impl Iterator<Item = (usize, usize)> + use<'_> {
-        self.pushes.iter().copied().zip(ties.owners.len() + self.spins.len()..)
+    pub fn pushes(&self, constraints: &ConstraintRows) -> impl Iterator<Item = (usize, usize)> + use<'_> {
+        self.pushes.iter().copied().zip(constraints.owners.len() + self.spins.len()..)
     }
 }
 

@@ -8,7 +8,7 @@
 //! arm: it takes no energy, and a turn that steps can follow has none of it.
 
 use crate::cluster::{Hold, JointRow, Side};
-use crate::constraint::{ArmPull, Arms, End, FineStep, Name, RowOwner, Ties};
+use crate::constraint::{ConstraintRows, End, FineStep, ForceAtArm, GeometricStiffness, Name, RowOwner};
 use crate::member::{ClusterMember, Participant};
 use glam::DVec3;
 
@@ -17,7 +17,7 @@ const INERTIA_SHARE: f64 = 0.5;
 /// The key of the first row of added inertia of a tie.
 const ADDED: u32 = 8;
 
-impl Arms {
+impl GeometricStiffness {
     pub fn clear(&mut self) {
         self.pulls.clear();
     }
@@ -34,16 +34,16 @@ impl Arms {
             let stiffness = 0.5 * (force_n.dot(arm) + force_n.length() * arm.length());
             let owner = RowOwner { hold: None, ..name.row(ADDED + at as u32, Some(member)) };
             let inertia_kg_m2 = INERTIA_SHARE * h_s * h_s * stiffness;
-            self.pulls.push(ArmPull { owner, member, turns: pose.turns.of_member(member), axis, inertia_kg_m2 });
+            self.pulls.push(ForceAtArm { owner, member, turns: pose.turns.of_member(member), axis, inertia_kg_m2 });
         }
     }
 }
 
-impl Ties {
+impl ConstraintRows {
     /// Adds the inertia that bodies lack for the forces noted.
     pub fn add_inertia(&mut self, step: &FineStep<'_, '_>) {
         let FineStep { all, progress, .. } = *step;
-        let Arms { pulls, mut asked } = std::mem::take(&mut self.arms);
+        let GeometricStiffness { pulls, mut asked } = std::mem::take(&mut self.geometric_stiffness);
         asked.clear();
         asked.resize(all.len(), 0.0);
         for pull in &pulls {
@@ -53,18 +53,18 @@ impl Ties {
             let lacking = 1.0 - asked[pull.member].recip();
             if lacking > 0.0 && pull.inertia_kg_m2 > 0.0 {
                 let row = JointRow {
-                    target_m_s: pull.turns.velocity(&progress[pull.member].before),
+                    target_m_s: pull.turns.velocity(&progress[pull.member].v_before),
                     compliance_per_kg: Some((pull.inertia_kg_m2 * lacking).recip()),
                     ..JointRow::new([pull.turns, Side::FIXED], Hold::across(pull.axis))
                 };
                 self.push(step, row, pull.owner);
             }
         }
-        self.arms = Arms { pulls, asked };
+        self.geometric_stiffness = GeometricStiffness { pulls, asked };
     }
 }
 
-impl ArmPull {
+impl ForceAtArm {
     /// The trace of the inertia asked for over that of the body: no direction lacks more.
     fn share(&self, all: &[Participant<'_>]) -> f64 {
         let Some(spin) = self.turns.terms().first().map(|term| term.block) else { return 0.0 };

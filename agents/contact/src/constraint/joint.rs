@@ -10,7 +10,7 @@
 
 use crate::cluster::{Hold, JointRow, Side, SideTerm};
 use crate::constraint::motor::Motored;
-use crate::constraint::{End, FineStep, Frame, Name, Pull, RowOwner, Slides, SlidingRow, Ties, YieldLimit};
+use crate::constraint::{ConstraintRows, End, FineStep, Frame, Name, Pull, RowOwner, Slides, SlidingRow, YieldLimit};
 use crate::detect::ClusterScene;
 use crate::joint::{Joint, JointKind};
 use crate::member::memory::Partner;
@@ -144,7 +144,7 @@ struct Jointed<'a> {
 
 impl Joints {
     /// Lays out all joints between participants.
-    pub fn gather(&mut self, scene: &ClusterScene, step: &FineStep<'_, '_>, ties: &mut Ties) {
+    pub fn gather(&mut self, scene: &ClusterScene, step: &FineStep<'_, '_>, constraints: &mut ConstraintRows) {
         let FineStep { all, progress, .. } = *step;
         self.held.clear();
         self.parts.clear();
@@ -160,14 +160,14 @@ impl Joints {
                 let joint = one.memory.slipped(Partner::Joint(number)).joint(joint);
                 let set = one.context.motors.iter().find(|set| set.joint == number);
                 let joint = set.map_or(joint, |set| joint.with_motor(set.motor));
-                self.hold(step, &Jointed { number, joint: &joint, a, b }, ties);
+                self.hold(step, &Jointed { number, joint: &joint, a, b }, constraints);
             }
         }
-        self.aim(all, ties, |member| &progress[member].before[..], step.h_s);
+        self.aim(all, constraints, |member| &progress[member].v_before[..], step.h_s);
     }
 
     /// Lays out one joint.
-    fn hold(&mut self, step: &FineStep<'_, '_>, jointed: &Jointed<'_>, ties: &mut Ties) {
+    fn hold(&mut self, step: &FineStep<'_, '_>, jointed: &Jointed<'_>, constraints: &mut ConstraintRows) {
         let Jointed { number, joint, a: first, b: second } = *jointed;
         let all = step.all;
         let at = |member: usize| all[member].member.pose(&[], 0.0);
@@ -185,7 +185,7 @@ impl Joints {
         let lasting = Name::lasting(first, Partner::Joint(number), None);
         let name = Name { tears_above_n: joint.tears_above_n, yields, ..lasting };
         if let JointKind::Spring { stiffness_n_m, damping_n_s_m, rest_m } = joint.kind {
-            ties.spring(step, &ends, &Pull { stiffness_n_m, damping_n_s_m, rest_m }, name);
+            constraints.spring(step, &ends, &Pull { stiffness_n_m, damping_n_s_m, rest_m }, name);
             return;
         }
         let points = Together { sides: [ends[0].side(), ends[1].side()], name };
@@ -193,23 +193,28 @@ impl Joints {
         let turns = [a.turns.of_member(first), second.map_or(Side::FIXED, |at| b.turns.of_member(at))];
         let turns = Together { sides: turns, name: lasting };
         // as in the last step
-        ties.arms.note(step, &ends, all[name.member].memory.recall(name.partner, TouchKey::default()).force_n, name);
+        constraints.geometric_stiffness.note(
+            step,
+            &ends,
+            all[name.member].memory.recall(name.partner, TouchKey::default()).force_n,
+            name,
+        );
         let now = joint.off(&a, &b);
-        let (axis, rows) = (joint.axis(&a, anchors[1] - anchors[0]), [ties.rows.len(); 2]);
+        let (axis, rows) = (joint.axis(&a, anchors[1] - anchors[0]), [constraints.rows.len(); 2]);
         let (members, rotations) = ((first, second), [a.rotation, b.rotation]);
         self.held.push(Held { number, joint: *joint, axis, rows, members, now, rotations });
-        self.lay_all(step, ties, &Parts { points, turns, axis, lasting });
-        self.held.iter_mut().next_back().into_iter().for_each(|held| held.rows[1] = ties.rows.len());
+        self.lay_all(step, constraints, &Parts { points, turns, axis, lasting });
+        self.held.iter_mut().next_back().into_iter().for_each(|held| held.rows[1] = constraints.rows.len());
     }
 
     /// Lays out the rows of the joint that was noted last.
-    fn lay_all(&mut self, step: &FineStep<'_, '_>, ties: &mut Ties, parts: &Parts) {
+    fn lay_all(&mut self, step: &FineStep<'_, '_>, constraints: &mut ConstraintRows, parts: &Parts) {
         let Parts { points, turns, axis, lasting } = *parts;
         let held = self.held.len() - 1;
         let Held { joint, members: (_, second), now, .. } = self.held[held];
         let (mut key, mut driven) = (0, None);
         let mut push = |way: Way, of: Together, hold: Hold| {
-            self.lay(step, ties, &LaidRow { held, way, hold, of, owner: of.name.row(key, second) });
+            self.lay(step, constraints, &LaidRow { held, way, hold, of, owner: of.name.row(key, second) });
             key += 1;
         };
         match joint.kind {
@@ -242,22 +247,22 @@ impl Joints {
         if let Some((motor, Together { sides, .. })) = driven {
             let turns = matches!(joint.kind, JointKind::Revolute { .. });
             self.drives |= motor.moves();
-            let before = |member: usize| &step.progress[member].before[..];
+            let before = |member: usize| &step.progress[member].v_before[..];
             let [of_a, of_b] = sides.map(|side| velocity(&side, before).dot(axis));
             let inverse_mass = sides.iter().map(|side| own_inverse_mass(step.all, side, axis)).sum();
             let speed = of_b - of_a;
             let motored = Motored { sides, axis, travel: now.travel, speed, inverse_mass, turns };
             let row = motor.row(&motored, step.h_s);
-            ties.motor(step, row, lasting.row(MOTOR, second));
+            constraints.motor(step, row, lasting.row(MOTOR, second));
         }
     }
 
     /// Lays out one row of a joint.
-    fn lay(&mut self, step: &FineStep<'_, '_>, ties: &mut Ties, laid: &LaidRow) {
+    fn lay(&mut self, step: &FineStep<'_, '_>, constraints: &mut ConstraintRows, laid: &LaidRow) {
         let LaidRow { held, way, hold, of: Together { sides, name }, owner } = *laid;
-        let row = ties.rows.len();
+        let row = constraints.rows.len();
         let YieldLimit { above_n, frame } = name.yields;
-        if !ties.push(step, JointRow::new(sides, hold.limited(above_n * step.h_s)), owner) {
+        if !constraints.push(step, JointRow::new(sides, hold.limited(above_n * step.h_s)), owner) {
             return;
         }
         self.parts.push(Part { held, row, way });
@@ -266,14 +271,14 @@ impl Joints {
             _ => Slides::Point(frame),
         };
         let (per_m_s, free_m) = (step.h_s, step.joint_miss_m);
-        ties.slides(SlidingRow { row, slides, per_m_s, free_m, yields_above_n: above_n, own: None });
+        constraints.slides(SlidingRow { row, slides, per_m_s, free_m, yields_above_n: above_n, own: None });
     }
 
     /// Adds to `totals` what motors and stops gave b against a along the ways that their joints leave free.
-    pub fn note_efforts(&self, ties: &Ties, rows_n_s: &[DVec3], totals: &mut Vec<JointTotal>) {
+    pub fn note_efforts(&self, constraints: &ConstraintRows, rows_n_s: &[DVec3], totals: &mut Vec<JointTotal>) {
         for held in self.held.iter().filter(|held| held.joint.takes_motor()) {
             let rows = held.rows[0]..held.rows[1];
-            let along = rows.filter(|row| matches!(ties.rows[*row].hold, Hold::Along { .. }));
+            let along = rows.filter(|row| matches!(constraints.rows[*row].hold, Hold::Along { .. }));
             let given = along.map(|row| -rows_n_s[row].dot(held.axis)).fold(0.0, |sum, given| sum + given);
             let (member, joint) = (held.members.0, held.number);
             match totals.iter_mut().find(|total| total.joint == joint) {
@@ -288,7 +293,7 @@ impl Joints {
     pub fn aim<'v>(
         &self,
         all: &[Participant<'_>],
-        ties: &mut Ties,
+        constraints: &mut ConstraintRows,
         velocities: impl Fn(usize) -> &'v [DVec3],
         h_s: f64,
     ) -> Aimed {
@@ -305,7 +310,7 @@ impl Joints {
                 }
             };
             then = Some((part.held, off));
-            let row = &mut ties.rows[part.row];
+            let row = &mut constraints.rows[part.row];
             let wanted = part.way.wanted(part.way.off(&held.now, row), row, h_s);
             let miss = part.way.off(&off, row) - wanted;
             let [a, b] = row.sides.map(|side| velocity(&side, &velocities));

@@ -4,7 +4,7 @@
 //! Theory: docs/theory/clusters.md, eq. 14.
 
 use crate::agent::tool_extrapolation_s;
-use crate::constraint::{End, FineStep, Frame, Holders, Name, Pull, Ties, YieldLimit};
+use crate::constraint::{ConstraintRows, End, FineStep, Frame, Holders, Name, Pull, YieldLimit};
 use crate::law::{Law, Link};
 use crate::member::memory::Partner;
 use crate::member::participant::place_of;
@@ -12,7 +12,7 @@ use crate::member::{ClusterMember, MaterialPoint, Participant};
 use glam::DVec3;
 use metachron_core::{Anchor, Body};
 
-impl Ties {
+impl ConstraintRows {
     /// Lays out all links. Both agents see a link: of two participants the lower number takes it.
     pub fn gather_links(&mut self, step: &FineStep<'_, '_>) {
         let all = step.all;

@@ -63,7 +63,7 @@ impl RowOwner {
         if !self.owes {
             return DVec3::ZERO;
         }
-        let [a, b] = row.sides.map(|side| velocity(&side, |member| &progress[member].solved[..]));
+        let [a, b] = row.sides.map(|side| velocity(&side, |member| &progress[member].v_solved[..]));
         row.owed_slip_after(impulse_n_s, a - b, row.hold.most_n_s(impulse_n_s), h_s)
     }
 
@@ -82,7 +82,7 @@ pub(crate) struct Holders {
 
 /// The rows of a fine step.
 #[derive(Debug, Default)]
-pub(crate) struct Ties {
+pub(crate) struct ConstraintRows {
     /// Behind those with an owner are those that contacts bring.
     pub rows: Vec<JointRow>,
     /// One for each row but for those.
@@ -90,12 +90,12 @@ pub(crate) struct Ties {
     /// Those that may slip.
     pub sliding: Vec<SlidingRow>,
     /// The forces at arms that come with them.
-    pub arms: Arms,
+    pub geometric_stiffness: GeometricStiffness,
 }
 
-impl Ties {
+impl ConstraintRows {
     pub fn clear(&mut self) {
-        self.arms.clear();
+        self.geometric_stiffness.clear();
         self.rows.clear();
         self.owners.clear();
         self.sliding.clear();
@@ -284,15 +284,15 @@ pub(crate) struct SlidingRow {
 
 /// The forces of a fine step at arms.
 #[derive(Debug, Default)]
-pub(crate) struct Arms {
-    pulls: Vec<ArmPull>,
+pub(crate) struct GeometricStiffness {
+    pulls: Vec<ForceAtArm>,
     /// Of each participant, how much inertia its pulls ask for, in shares of what it has.
     asked: Vec<f64>,
 }
 
 /// A force at an arm of a body.
 #[derive(Debug, Clone, Copy)]
-struct ArmPull {
+struct ForceAtArm {
     owner: RowOwner,
     /// The body, and its spin.
     member: usize,

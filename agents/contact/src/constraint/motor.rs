@@ -4,7 +4,7 @@
 //! rows (`joints.rs`). Theory: docs/theory/clusters.md, section 8.
 
 use crate::cluster::{Hold, JointRow, Side, Spring};
-use crate::constraint::{FineStep, RowOwner, Ties};
+use crate::constraint::{ConstraintRows, FineStep, RowOwner};
 use crate::joint::{Motor, MotorGoal};
 use glam::DVec3;
 use std::f64::consts::TAU;
@@ -26,7 +26,7 @@ pub(crate) struct Motored {
     pub turns: bool,
 }
 
-impl Ties {
+impl ConstraintRows {
     /// Lays out the row of a motor. What it gives is not what holds its joint together.
     pub fn motor(&mut self, step: &FineStep<'_, '_>, row: JointRow, owner: RowOwner) {
         let owes = row.compliance_per_kg.is_none();

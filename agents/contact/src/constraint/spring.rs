@@ -6,7 +6,7 @@
 use crate::AnchorSpring;
 use crate::agent::tool_extrapolation_s;
 use crate::cluster::{Hold, JointRow, Side, Spring};
-use crate::constraint::{End, FineStep, Holders, Name, Pull, Slides, Ties};
+use crate::constraint::{ConstraintRows, End, FineStep, Holders, Name, Pull, Slides};
 use crate::member::memory::Partner;
 use crate::member::participant::place_of;
 use crate::member::{ClusterMember, MaterialPoint};
@@ -18,7 +18,7 @@ const ALONG: u32 = 0;
 const ACROSS: u32 = 1;
 const TURN: u32 = 2;
 
-impl Ties {
+impl ConstraintRows {
     /// Lays out the springs of users and grasps, and the drives.
     pub fn gather_springs(&mut self, step: &FineStep<'_, '_>) {
         for (member, one) in step.all.iter().enumerate() {
@@ -108,10 +108,10 @@ impl Ties {
         let sides = [a.side(), b.side()];
         let apart = a.point.position - b.point.position;
         let led_m_s = b.point.led_m_s - a.point.led_m_s;
-        let push = |ties: &mut Self, key: u32, hold: Hold, law: Spring| {
+        let push = |constraints: &mut Self, key: u32, hold: Hold, law: Spring| {
             let row = JointRow::new(sides, hold.limited(name.yields.above_n * step.h_s)).with_spring(law, step.h_s);
             let row = JointRow { target_m_s: row.target_m_s + led_m_s, ..row };
-            ties.push(step, row, name.row(key, b.member))
+            constraints.push(step, row, name.row(key, b.member))
         };
         let Pull { stiffness_n_m, damping_n_s_m, rest_m } = *pull;
         let axis = apart.try_normalize().unwrap_or(DVec3::Z);
@@ -120,7 +120,7 @@ impl Ties {
             if push(self, ALONG, Hold::ALL, Spring { stiffness_n_m, damping_n_s_m, stretch_m: apart }) {
                 self.spring_slides(step, pull, name, Slides::Point(name.yields.frame));
             }
-            self.arms.note(step, ends, stretch_m * -stiffness_n_m, name);
+            self.geometric_stiffness.note(step, ends, stretch_m * -stiffness_n_m, name);
             return;
         }
         if push(self, ALONG, Hold::along(axis), Spring { stiffness_n_m, damping_n_s_m, stretch_m }) {
@@ -131,6 +131,6 @@ impl Ties {
             let law = Spring { stiffness_n_m: stiffness_n_m * stretched, damping_n_s_m: 0.0, stretch_m: DVec3::ZERO };
             push(self, ACROSS, Hold::across(axis), law);
         }
-        self.arms.note(step, ends, stretch_m * -stiffness_n_m, name);
+        self.geometric_stiffness.note(step, ends, stretch_m * -stiffness_n_m, name);
     }
 }

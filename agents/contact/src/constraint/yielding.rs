@@ -4,9 +4,9 @@
 //! Never here: the bound itself, which is the row's ([`Hold::limited`]). Theory: docs/theory/clusters.md, eq. 29.
 
 use crate::cluster::JointRow;
-use crate::constraint::{FineStep, Frame, Name, Pull, Slides, SlidingRow, Ties};
+use crate::constraint::{ConstraintRows, FineStep, Frame, Name, Pull, Slides, SlidingRow};
 use crate::member::memory::Partner;
-use crate::member::state::Progress;
+use crate::member::state::{Progress, velocity};
 use crate::member::{ClusterMember, Participant, Slid};
 use glam::DVec3;
 
@@ -45,7 +45,7 @@ impl Slides {
     }
 }
 
-impl Ties {
+impl ConstraintRows {
     /// Notes that the row laid out last slips where it gives all that it may; nothing where it never does.
     pub(crate) fn slides(&mut self, row: SlidingRow) {
         if row.yields_above_n < f64::INFINITY {
@@ -68,15 +68,20 @@ impl Yielding {
     }
 
     /// Lets the rows of a fine step that gave all that they may slip to where they then are (eq. 29).
-    pub fn slip(&mut self, all: &mut [Participant<'_>], ties: &Ties, impulses_n_s: &[DVec3], progress: &[Progress]) {
-        for sliding in &ties.sliding {
+    pub fn slip(
+        &mut self,
+        all: &mut [Participant<'_>],
+        constraints: &ConstraintRows,
+        impulses_n_s: &[DVec3],
+        progress: &[Progress],
+    ) {
+        for sliding in &constraints.sliding {
             let (row, impulse_n_s, owner) =
-                (&ties.rows[sliding.row], impulses_n_s[sliding.row], &ties.owners[sliding.row]);
+                (&constraints.rows[sliding.row], impulses_n_s[sliding.row], &constraints.owners[sliding.row]);
             if !row.gives_all(impulse_n_s, ALL_SHARE) {
                 continue;
             }
-            let [a, b] =
-                row.sides.map(|side| crate::member::state::velocity(&side, |member| &progress[member].solved[..]));
+            let [a, b] = row.sides.map(|side| velocity(&side, |member| &progress[member].v_solved[..]));
             let given = impulse_n_s * row.compliance_per_kg.unwrap_or(0.0);
             // it gives way against its force, and never along it
             let against = -impulse_n_s.normalize_or_zero();

@@ -14,11 +14,11 @@ use metachron_geometry::{CollisionShape, ContactTraits, ShapeKind, ShapePose};
 pub(crate) enum Domain {
     /// The problem's.
     Problem,
-    /// A heap's, but for those with members of the problem.
-    Heap,
+    /// A rigid pile's, but for those with members of the problem.
+    RigidPile,
 }
 
-/// Finds the domain of each member of a cluster with a heap: rapier3d steps rigid bodies with the usual rules for pairs and without friction
+/// Finds the domain of each member of a cluster with a rigid pile: rapier3d steps rigid bodies with the usual rules for pairs and without friction
 /// about normals, of which none passes through another or through a static solid but by its groups.
 pub(crate) fn assign(scene: &ClusterScene, all: &[Participant<'_>], domains: &mut Vec<Domain>) {
     domains.clear();
@@ -31,7 +31,7 @@ pub(crate) fn assign(scene: &ClusterScene, all: &[Participant<'_>], domains: &mu
         let is_rigid = one.member.role() == Role::Rigid && !one.member.is_remote();
         let is_free = || !one.laws.iter().any(|(other, _)| place(*other).is_some());
         if is_rigid && is_solid(one) && is_free() {
-            *domain = Domain::Heap;
+            *domain = Domain::RigidPile;
         }
     }
     for id in scene.passing(|id| place(id).is_some()) {
@@ -115,7 +115,7 @@ mod tests {
                 .collect();
             let mut domains = Vec::new();
             assign(&scene, &all, &mut domains);
-            let expected = [Domain::Problem, Domain::Heap, Domain::Problem, Domain::Problem];
+            let expected = [Domain::Problem, Domain::RigidPile, Domain::Problem, Domain::Problem];
             assert_eq!(domains, expected, "with a remote member of number {remote}");
         }
     }

@@ -60,12 +60,14 @@ impl Facing {
 /// lies on something that the ground stops would else not be seen.
 pub(crate) fn closes(touch: &Touch, facing: &Facing, progress: &[Progress], h_s: f64) -> bool {
     let led = facing.led_m_s.map(|led| led.dot(touch.normal));
-    [(|p: &Progress| &p.before[..]) as fn(&Progress) -> &[DVec3], |p: &Progress| &p.seen[..]].into_iter().any(|of| {
-        let [a, b] =
-            facing.sides.each_ref().map(|side| velocity(side, |member| of(&progress[member])).dot(touch.normal));
-        let (a, b) = (a + led[0], b + led[1]);
-        [a - b, a, -b].into_iter().any(|opening_m_s| touch.gap_m + opening_m_s * h_s < LOOK_M)
-    })
+    [(|p: &Progress| &p.v_before[..]) as fn(&Progress) -> &[DVec3], |p: &Progress| &p.v_predicted[..]].into_iter().any(
+        |of| {
+            let [a, b] =
+                facing.sides.each_ref().map(|side| velocity(side, |member| of(&progress[member])).dot(touch.normal));
+            let (a, b) = (a + led[0], b + led[1]);
+            [a - b, a, -b].into_iter().any(|opening_m_s| touch.gap_m + opening_m_s * h_s < LOOK_M)
+        },
+    )
 }
 
 /// The two sides of a touch, with their skins.

@@ -86,7 +86,7 @@ struct Look {
 }
 
 impl Search {
-    /// Finds all places of a fine step, but for those of a heap among itself and with static solids; `domains` is empty where there is none.
+    /// Finds all places of a fine step, but for those of a rigid pile among itself and with static solids; `domains` is empty where there is none.
     pub fn find(&mut self, round: &Round<'_, '_>, domains: &[Domain]) {
         self.find_near(round);
         self.domains.clear();
@@ -107,7 +107,7 @@ impl Search {
         self.thinning.begin();
         self.boxes.place(all, |member| {
             let (body, state) = (&all[member].member, &progress[member]);
-            body.speed_bound(&state.before).max(body.speed_bound(&state.seen))
+            body.speed_bound(&state.v_before).max(body.speed_bound(&state.v_predicted))
         });
         self.boxes.near(NEAR_STEPS, h_s, &mut self.near);
         let apart =
@@ -119,7 +119,7 @@ impl Search {
     /// whether there are any; contacts are then in a new order.
     pub fn add_passed(&mut self, round: &Round<'_, '_>) -> bool {
         let Round { all, h_s, .. } = *round;
-        if (0..all.len()).all(|member| self.is_heap(member)) {
+        if (0..all.len()).all(|member| self.is_pile(member)) {
             return false;
         }
         self.boxes.place(all, |member| all[member].member.speed_bound(round.moved(member)));
@@ -138,7 +138,7 @@ impl Search {
     fn find_all(&mut self, round: &Round<'_, '_>, pairs: &[[usize; 2]]) {
         let Round { scene, all, .. } = *round;
         for &[a, b] in pairs {
-            if !(self.is_heap(a) && self.is_heap(b))
+            if !(self.is_pile(a) && self.is_pile(b))
                 && all[a].may_touch(&all[b])
                 && [a, b].iter().any(|at| all[*at].member.role() != Role::Kinematic)
                 && !scene.lets_through([all[a].id, all[b].id])
@@ -147,7 +147,7 @@ impl Search {
             }
         }
         for (member, one) in all.iter().enumerate() {
-            if self.is_heap(member) {
+            if self.is_pile(member) {
                 continue;
             }
             if one.member.rest_shape().is_some() {
@@ -165,8 +165,8 @@ impl Search {
         }
     }
 
-    fn is_heap(&self, member: usize) -> bool {
-        self.domains.get(member) == Some(&Domain::Heap)
+    fn is_pile(&self, member: usize) -> bool {
+        self.domains.get(member) == Some(&Domain::RigidPile)
     }
 
     /// Places of a pair.
@@ -186,7 +186,7 @@ impl Search {
             return;
         }
         let way_m = (reach.speed_m_s + their_m_s) * h_s;
-        if !round.foresees() && !self.may_have_passed(member, partner, way_m) {
+        if !round.predicts() && !self.may_have_passed(member, partner, way_m) {
             return;
         }
         let reach_m = LOOK_M + way_m;
@@ -260,8 +260,8 @@ impl Search {
             let touch = Touch { gap_m, ..*touch };
             let ends_m = gap_m + opening_m_s * round.h_s;
             let taken = match round.judge {
-                Judge::Foreseen if swept => ends_m < LOOK_M,
-                Judge::Foreseen => closes(&touch, &facing, round.progress, round.h_s),
+                Judge::Predicted if swept => ends_m < LOOK_M,
+                Judge::Predicted => closes(&touch, &facing, round.progress, round.h_s),
                 Judge::Solved => match owners[..*known].binary_search_by_key(&owner.name(), Owner::name) {
                     Err(_) => ends_m < 0.0,
                     // on its way it meets another place than the one it was kept from
@@ -283,7 +283,7 @@ impl Search {
             }
         }
         thinning.thin(from, contacts, owners);
-        if round.foresees() {
+        if round.predicts() {
             looks.push(Look { member: owner.member, partner: owner.partner, clear_m });
         }
     }

@@ -62,7 +62,7 @@ pub(crate) struct Round<'a, 'p> {
 #[derive(Clone, Copy)]
 pub(crate) enum Judge {
     /// Those at the start and without contact, each side's alone too.
-    Foreseen,
+    Predicted,
     /// Those of a solution.
     Solved,
 }
@@ -96,14 +96,14 @@ pub(crate) struct Reaching {
 
 impl<'a> Round<'a, '_> {
     /// Whether it is the one before the solve.
-    pub(crate) fn foresees(&self) -> bool {
-        matches!(self.judge, Judge::Foreseen)
+    pub(crate) fn predicts(&self) -> bool {
+        matches!(self.judge, Judge::Predicted)
     }
 
     /// The velocities at which a member's place moves, as far as this round knows.
     pub(crate) fn moved(&self, member: usize) -> &'a [DVec3] {
         let state = &self.progress[member];
-        if self.foresees() { &state.seen } else { &state.going }
+        if self.predicts() { &state.v_predicted } else { &state.v_mean }
     }
 }
 

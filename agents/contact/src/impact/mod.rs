@@ -6,7 +6,7 @@
 mod meeting;
 
 use crate::cluster::{Contact, JointRow, Report, Settings, Side, Solution, Solver};
-use crate::constraint::{Ties, contact_rows, is_rigid};
+use crate::constraint::{ConstraintRows, contact_rows, is_rigid};
 use crate::detect::{Owner, Search};
 use crate::member::memory::Partner;
 use crate::member::problem::{Posed, ProblemMembers, Velocities};
@@ -70,7 +70,7 @@ struct Flight {
 pub(crate) struct SolvedStep<'a, 'p> {
     pub all: &'a [Participant<'p>],
     pub search: &'a Search,
-    pub ties: &'a Ties,
+    pub constraints: &'a ConstraintRows,
     pub solution: &'a Solution,
     pub members: &'a mut ProblemMembers,
     pub progress: &'a mut [Progress],
@@ -84,11 +84,11 @@ pub(crate) struct SolvedStep<'a, 'p> {
 impl Impacts {
     /// Lets contacts that close fast rebound, after the solve of a fine step by which they close no more; `None` where none does.
     pub fn rebound(&mut self, step: SolvedStep<'_, '_>) -> Result<Option<Report>, StepError> {
-        let SolvedStep { all, search, ties, solution, members, progress, threads, depth_m, may_fly } = step;
+        let SolvedStep { all, search, constraints, solution, members, progress, threads, depth_m, may_fly } = step;
         self.clear();
         for state in &mut *progress {
-            state.jump.clear();
-            state.late.clear();
+            state.dv_impacts.clear();
+            state.dx_impacts.clear();
         }
         self.depth_m = depth_m;
         self.find(search, progress);
@@ -97,22 +97,28 @@ impl Impacts {
         }
         let flies =
             |(one, state): (&Participant<'_>, &Progress)| may_fly && one.member.role() == Role::Rigid && !state.touched;
-        self.note_flights(all.iter().zip(&*progress).map(flies), search, ties);
-        self.pose(all, search, ties, progress);
+        self.note_flights(all.iter().zip(&*progress).map(flies), search, constraints);
+        self.pose(all, search, constraints, progress);
         let h_s = self.aim();
         let (contacts, rows) = (&mut self.contacts[..], &mut self.rows[..]);
-        let (free, open): (Velocities, Velocities) = (|state| &state.solved, |_| &[]);
+        let (free, open): (Velocities, Velocities) = (|state| &state.v_solved, |_| &[]);
         let took =
             Posed { all, progress, contacts, rows, h_s, threads, free, open }.solve(&mut self.solver, members)?;
-        self.weigh(search, ties, solution, progress);
-        self.take(all, search, ties, progress);
+        self.weigh(search, constraints, solution, progress);
+        self.take(all, search, constraints, progress);
         self.land(search, progress);
         Ok(Some(took))
     }
 
     /// Begins a fine step. Its problem goes by the velocities at its end, and would stop too early sides that fly and meet in a later one: it
     /// has none of their contacts.
-    pub fn begin(&mut self, [macro_s, step_s]: [f64; 2], search: &mut Search, ties: &Ties, progress: &[Progress]) {
+    pub fn begin(
+        &mut self,
+        [macro_s, step_s]: [f64; 2],
+        search: &mut Search,
+        constraints: &ConstraintRows,
+        progress: &[Progress],
+    ) {
         (self.macro_s, self.step_s) = (macro_s, step_s);
         self.clear();
         self.supported.clear();
@@ -121,7 +127,7 @@ impl Impacts {
             return;
         }
         let contacts = search.contacts.iter().map(|contact| (&contact.sides, contact.warm_n_s));
-        let rows = ties.rows.iter().map(|row| (&row.sides, row.warm_n_s));
+        let rows = constraints.rows.iter().map(|row| (&row.sides, row.warm_n_s));
         let bearing = contacts.chain(rows).filter(|(_, warm_n_s)| *warm_n_s != DVec3::ZERO);
         for member in bearing.flat_map(|(sides, _)| movers(sides)) {
             self.supported[member] = true;
@@ -154,7 +160,7 @@ impl Impacts {
         let along = |of: Velocities| {
             contact.sides.each_ref().map(|side| velocity(side, |at| of(&progress[at])).dot(contact.normal))
         };
-        let (now, then) = (along(|state| &state.before), along(|state| &state.seen));
+        let (now, then) = (along(|state| &state.v_before), along(|state| &state.v_predicted));
         let falls = [0, 1].map(|at| (then[at] - now[at]) / step_s);
         let held = contact.sides.each_ref().map(|side| side.terms().is_empty() || supported[side.member]);
         let gains = [0, 1].map(|at| if held[at] { 0.0 } else { falls[at] });
@@ -177,7 +183,7 @@ impl Impacts {
     }
 
     /// Finds which of the bodies that may fly do so.
-    fn note_flights(&mut self, may_fly: impl Iterator<Item = bool>, search: &Search, ties: &Ties) {
+    fn note_flights(&mut self, may_fly: impl Iterator<Item = bool>, search: &Search, constraints: &ConstraintRows) {
         let mut flights = std::mem::take(&mut self.flights);
         flights.clear();
         flights.extend(may_fly.map(|is_free| Flight { is_free, ..Flight::default() }));
@@ -193,14 +199,14 @@ impl Impacts {
             }
         }
         // the rows beyond those of owners are friction of these contacts
-        let held = ties.rows[..ties.owners.len()].iter().filter(|row| row.warm_n_s != DVec3::ZERO);
+        let held = constraints.rows[..constraints.owners.len()].iter().filter(|row| row.warm_n_s != DVec3::ZERO);
         held.flat_map(|row| movers(&row.sides)).for_each(|body| flights[body].is_free = false);
         self.flights = flights;
     }
 
     /// Lays out the problem of velocities: impacts, and all that holds the bodies that collide or that touch them.
-    fn pose(&mut self, all: &[Participant<'_>], search: &Search, ties: &Ties, progress: &[Progress]) {
-        self.join(search, ties, progress);
+    fn pose(&mut self, all: &[Participant<'_>], search: &Search, constraints: &ConstraintRows, progress: &[Progress]) {
+        self.join(search, constraints, progress);
         self.contacts.clear();
         self.contacts_of.clear();
         for (at, contact) in search.contacts.iter().enumerate() {
@@ -218,9 +224,9 @@ impl Impacts {
         }
         self.rows.clear();
         self.rows_of.clear();
-        for (at, row) in ties.rows.iter().enumerate().filter(|(_, row)| is_rigid(row)) {
+        for (at, row) in constraints.rows.iter().enumerate().filter(|(_, row)| is_rigid(row)) {
             if self.collides(&row.sides) {
-                let target_m_s = relative(&row.sides, |body| &progress[body].solved);
+                let target_m_s = relative(&row.sides, |body| &progress[body].v_solved);
                 self.rows.push(JointRow { target_m_s, warm_n_s: DVec3::ZERO, owed_slip_m: DVec3::ZERO, ..*row });
                 self.rows_of.push(at);
             }
@@ -233,17 +239,17 @@ impl Impacts {
 
     /// Whether the sides of a contact touch at the end of the step.
     fn touches(&self, contact: &Contact, progress: &[Progress]) -> bool {
-        let opening_m_s = relative(&contact.sides, |body| &progress[body].solved) - contact.surface_m_s;
+        let opening_m_s = relative(&contact.sides, |body| &progress[body].v_solved) - contact.surface_m_s;
         let ends_m = contact.gap_m + opening_m_s.dot(contact.normal) * self.step_s;
         contact.warm_n_s != DVec3::ZERO || ends_m < self.depth_m
     }
 
     /// Finds which bodies touch or are joined, and which of them collide.
-    fn join(&mut self, search: &Search, ties: &Ties, progress: &[Progress]) {
+    fn join(&mut self, search: &Search, constraints: &ConstraintRows, progress: &[Progress]) {
         let mut touching = std::mem::take(&mut self.touching);
         touching.reset(progress.len());
         let holding = search.contacts.iter().filter(|contact| self.touches(contact, progress));
-        let joined = ties.rows.iter().filter(|row| is_rigid(row));
+        let joined = constraints.rows.iter().filter(|row| is_rigid(row));
         for sides in holding.map(|contact| &contact.sides).chain(joined.map(|row| &row.sides)) {
             let mut both = movers(sides);
             if let (Some(a), Some(b)) = (both.next(), both.next()) {
@@ -273,7 +279,7 @@ impl Impacts {
     }
 
     /// Finds the work of bodies that touch, by what the solution of the step and impacts gave.
-    fn weigh(&mut self, search: &Search, ties: &Ties, step: &Solution, progress: &[Progress]) {
+    fn weigh(&mut self, search: &Search, constraints: &ConstraintRows, step: &Solution, progress: &[Progress]) {
         let Self { solver, found, touching, works, contacts, contacts_of, rows_of, .. } = self;
         let solution = solver.solution();
         let struck = |body: usize| progress[body].place.map_or(&[][..], |place| solution.velocities(place));
@@ -281,8 +287,8 @@ impl Impacts {
         let mut add = |sides: &[Side; 2], [solved, given]: [DVec3; 2], [at_start, at_end]: [DVec3; 2]| {
             let body = movers(sides).next();
             let Some(work) = body.and_then(|body| works[touching.lowest(body)].as_mut()) else { return };
-            let stopped = relative(sides, |at| &progress[at].solved);
-            let both = relative(sides, |at| &progress[at].before) + stopped - at_start - at_end;
+            let stopped = relative(sides, |at| &progress[at].v_solved);
+            let both = relative(sides, |at| &progress[at].v_before) + stopped - at_start - at_end;
             let change = relative(sides, struck) - stopped;
             work.solved_j += 0.5 * solved.dot(both);
             work.slope_j += 0.5 * (given.dot(both) + solved.dot(change));
@@ -298,24 +304,30 @@ impl Impacts {
             add(&search.contacts[*at].sides, [step.contacts_n_s[*at], solution.contacts_n_s[k]], beside);
         }
         for (k, at) in rows_of.iter().enumerate() {
-            add(&ties.rows[*at].sides, [step.rows_n_s[*at], solution.rows_n_s[k]], [DVec3::ZERO; 2]);
+            add(&constraints.rows[*at].sides, [step.rows_n_s[*at], solution.rows_n_s[k]], [DVec3::ZERO; 2]);
         }
     }
 
     /// Gives bodies what impacts change of their velocities, and moves those that fly to where they have come to (eq. 27). Others are where the
     /// solution of the step leaves them.
-    fn take(&mut self, all: &[Participant<'_>], search: &Search, ties: &Ties, progress: &mut [Progress]) {
+    fn take(
+        &mut self,
+        all: &[Participant<'_>],
+        search: &Search,
+        constraints: &ConstraintRows,
+        progress: &mut [Progress],
+    ) {
         let Self { solver, flights, touching, works, contacts_of, rows_of, step_s, .. } = self;
         let solution = solver.solution();
         let mut share = |body: usize| works[touching.lowest(body)].map(|work| work.share());
         let mut of = |sides: &[Side; 2]| movers(sides).next().and_then(&mut share).unwrap_or(0.0);
         self.contacts_n_s.resize(search.contacts.len(), DVec3::ZERO);
-        self.rows_n_s.resize(ties.rows.len(), DVec3::ZERO);
+        self.rows_n_s.resize(constraints.rows.len(), DVec3::ZERO);
         for (at, given) in contacts_of.iter().zip(&solution.contacts_n_s) {
             self.contacts_n_s[*at] = *given * of(&search.contacts[*at].sides);
         }
         for (at, given) in rows_of.iter().zip(&solution.rows_n_s) {
-            self.rows_n_s[*at] = *given * of(&ties.rows[*at].sides);
+            self.rows_n_s[*at] = *given * of(&constraints.rows[*at].sides);
         }
         for (body, state) in progress.iter_mut().enumerate() {
             let Some((place, share)) = state.place.zip(share(body)) else { continue };
@@ -338,7 +350,7 @@ impl Impacts {
                 if !movers(&contact.sides).any(|body| flies(flights[body])) {
                     continue;
                 }
-                let opening_m_s = relative(&contact.sides, |body| &progress[body].going) - contact.surface_m_s;
+                let opening_m_s = relative(&contact.sides, |body| &progress[body].v_mean) - contact.surface_m_s;
                 if contact.gap_m + opening_m_s.dot(contact.normal) * *step_s >= -*depth_m {
                     continue;
                 }
@@ -355,7 +367,7 @@ impl Impacts {
 
     /// Adds to what members do not answer what impacts leave.
     pub fn leave(&self, progress: &mut [Progress]) {
-        for state in progress.iter_mut().filter(|state| !state.jump.is_empty()) {
+        for state in progress.iter_mut().filter(|state| !state.dv_impacts.is_empty()) {
             let left = state.place.map_or(&[][..], |place| self.solver.solution().unanswered(place));
             state.unanswered.iter_mut().zip(left).for_each(|(r, more)| *r += *more);
         }

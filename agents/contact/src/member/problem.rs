@@ -53,7 +53,7 @@ impl Posed<'_, '_> {
             response: lender.as_ref().map(|lender| lender as &dyn Response),
             free: free(state),
             unanswered: open(state),
-            now: &state.before,
+            now: &state.v_before,
             share: f64::from(state.part),
         }));
         move_sides(contacts, rows, |member| progress[member].place);

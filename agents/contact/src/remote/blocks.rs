@@ -36,7 +36,7 @@ pub(crate) fn visit_sides(
 
 /// Adds the blocks of `one` that `other` may move within the next steps of `step_s` seconds.
 pub(crate) fn find(one: &Participant<'_>, other: &Neighbour, step_s: f64, scratch: &mut Scratch) {
-    let Scratch { blocks, matter, narrow, touches: found, .. } = scratch;
+    let Scratch { blocks, shape, narrow, touches: found, .. } = scratch;
     if one.member.role() != Role::Deformable {
         blocks.extend(0..one.member.free().len());
         return;
@@ -47,10 +47,10 @@ pub(crate) fn find(one: &Participant<'_>, other: &Neighbour, step_s: f64, scratc
     }
     let (Some(skin), Some(form), Law::Ledger) = (one.member.skin(), other.form.as_deref(), other.law) else { return };
     let since_s = one.context.time.secs_after(other.snapshot.time) + step_s;
-    if !matter.bring(&other.snapshot.body, since_s) {
+    if !shape.bring(&other.snapshot.body, since_s) {
         return;
     }
-    let Some(theirs) = matter.placed(form) else { return };
+    let Some(theirs) = shape.placed(form) else { return };
     let their_m_s = other.snapshot.bounds.map_or(0.0, |bounds| bounds.speed_m_s);
     let speed_m_s = one.member.speed_bound(one.member.velocities()) + their_m_s;
     let reach_m = NEAR_M + edge_m(skin.form) + STEPS_AHEAD * step_s * speed_m_s;

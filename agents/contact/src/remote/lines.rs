@@ -6,7 +6,7 @@
 use crate::cluster::{Hold, Side};
 use crate::laws::{Line, LineLaw, LineStep};
 use crate::member::{ClusterMember, Participant};
-use crate::remote::{Matter, state_of};
+use crate::remote::{PublishedShape, state_of};
 use crate::step::{ClusterStepper, KnownImpulse, LineRow};
 use crate::{Law, Link, Neighbour};
 use glam::DVec3;
@@ -22,7 +22,7 @@ const STICK_M_S: f64 = 1e-3;
 pub(crate) struct Lines {
     /// By rising numbers of the partners.
     all: Vec<LineAt>,
-    matter: Matter,
+    shape: PublishedShape,
     narrow: NarrowPhaseScratch,
     touches: Vec<Touch>,
 }
@@ -138,7 +138,7 @@ impl Lines {
         let forms = one.member.skin().map(|skin| skin.form).zip(other.form.as_deref());
         let friction = forms.map_or(0.0, |(mine, theirs)| mine.friction_with(theirs));
         let rub = slip * (-friction * line.pushed_n / slip.length().max(STICK_M_S));
-        stepper.outside().known.push(KnownImpulse { member: place, side, impulse: rub * dt_s });
+        stepper.external().known.push(KnownImpulse { member: place, side, impulse: rub * dt_s });
         let row = LineRow {
             member: place,
             side,
@@ -151,12 +151,12 @@ impl Lines {
 
     /// Where another body overlaps a member.
     fn pressed(&mut self, one: &Participant<'_>, other: &Neighbour) -> Option<Pressed> {
-        let Self { matter, narrow, touches: found, .. } = self;
+        let Self { shape, narrow, touches: found, .. } = self;
         let since_s = one.context.time.secs_after(other.snapshot.time);
         let (skin, form) = (one.member.skin()?, other.form.as_deref()?);
         found.clear();
-        if matter.bring(&other.snapshot.body, since_s) {
-            touches(&skin, &matter.placed(form)?, 0.0, narrow, found);
+        if shape.bring(&other.snapshot.body, since_s) {
+            touches(&skin, &shape.placed(form)?, 0.0, narrow, found);
         }
         found.retain(|touch| touch.gap_m < 0.0);
         let deepest = *found.iter().min_by(|a, b| a.gap_m.total_cmp(&b.gap_m))?;
@@ -172,7 +172,7 @@ impl Lines {
         };
         let (mine, theirs) = (middle(|touch| touch.on_a), middle(|touch| touch.on_b));
         let place = mine.map_or(deepest.on_a, Place::Point);
-        let far_m_s = matter.velocity(&other.snapshot.body, &theirs.map_or(deepest.on_b, Place::Point));
+        let far_m_s = shape.velocity(&other.snapshot.body, &theirs.map_or(deepest.on_b, Place::Point));
         Some(Pressed {
             side: one.member.side(&place, ContactSide::first(normal)),
             led_m_s: one.member.led_m_s(&place),
@@ -185,15 +185,15 @@ impl Lines {
 
     /// Sends what the ends at `place` answer, and writes the states of the pairs.
     pub fn answer(&mut self, place: usize, stepper: &mut ClusterStepper, states: &mut Vec<PairState>, dt_s: f64) {
-        let outside = stepper.outside();
+        let external = stepper.external();
         for line in &mut self.all {
             let state = state_of(states, line.with, PairKind::Tlm);
             (state.contacts, state.force_n, state.penetration_m) = (0, 0.0, 0.0);
             if let Some(now) = line.row {
-                debug_assert_eq!(outside.lines[now.number].member, place);
-                let force = outside.line_impulses[now.number] / dt_s;
+                debug_assert_eq!(external.lines[now.number].member, place);
+                let force = external.line_impulses[now.number] / dt_s;
                 // a slack contact pushes nothing into its line
-                if force == DVec3::ZERO && matches!(outside.lines[now.number].hold, Hold::Along { low_n_s: 0.0, .. }) {
+                if force == DVec3::ZERO && matches!(external.lines[now.number].hold, Hold::Along { low_n_s: 0.0, .. }) {
                     line.line.send(now.law.arriving, DVec3::ZERO, dt_s);
                 } else {
                     line.line.answer(&now.law, force, dt_s);
@@ -249,7 +249,7 @@ impl LineAt {
     /// Adds its row, unless it resists nothing yet.
     fn add(&mut self, stepper: &mut ClusterStepper, row: LineRow, now: LineNow) {
         if row.resistance_n_s_m > 0.0 {
-            let lines = &mut stepper.outside().lines;
+            let lines = &mut stepper.external().lines;
             self.row = Some(LineNow { number: lines.len(), ..now });
             lines.push(row);
         }

@@ -28,12 +28,12 @@ impl ClusterStepper {
         if state.held {
             return;
         }
-        into.resize(state.gain.len(), DVec3::ZERO);
+        into.resize(state.dv_free.len(), DVec3::ZERO);
         let own_s = self.fine_s * f64::from(state.share);
         let free = |block: usize| {
-            (state.gain[block] - state.pushed.get(block).copied().unwrap_or(DVec3::ZERO)) * (-1.0 / own_s)
+            (state.dv_free[block] - state.dv_known.get(block).copied().unwrap_or(DVec3::ZERO)) * (-1.0 / own_s)
         };
-        for block in all[place].member.blocks().iter().filter(|block| block.row < state.gain.len()) {
+        for block in all[place].member.blocks().iter().filter(|block| block.row < state.dv_free.len()) {
             into[block.row] += block.value * free(block.column);
             if block.row != block.column {
                 into[block.column] += block.value.transpose() * free(block.row);
@@ -57,13 +57,13 @@ impl ClusterStepper {
         let own_s = self.fine_s * share;
         into.blocks.clear();
         for (at, &block) in blocks.iter().enumerate() {
-            let pushed = state.pushed.get(block).copied().unwrap_or(DVec3::ZERO);
-            let free = (state.gain[block] - pushed) / own_s;
+            let pushed = state.dv_known.get(block).copied().unwrap_or(DVec3::ZERO);
+            let free = (state.dv_free[block] - pushed) / own_s;
             let row = &into.compliance[at * blocks.len()..(at + 1) * blocks.len()];
             let pushed: DVec3 = row.iter().zip(query.lasting).map(|(w, force)| *w * *force).sum();
             // what is held goes on as it does: its contacts take what its forces would change
             let acceleration = if held { DVec3::ZERO } else { free + pushed };
-            into.blocks.push(LocalBlock { slot: member.slot_of(block), velocity: state.before[block], acceleration });
+            into.blocks.push(LocalBlock { slot: member.slot_of(block), velocity: state.v_before[block], acceleration });
         }
     }
 

@@ -7,7 +7,7 @@
 use crate::Neighbour;
 use crate::cluster::{Block, Side, SideTerm};
 use crate::member::{ClusterMember, MaterialPoint, Role};
-use crate::remote::published_shape::Matter;
+use crate::remote::published_shape::PublishedShape;
 use crate::remote::weighing::invert;
 use glam::{DMat3, DVec3};
 use metachron_core::{AgentId, Anchor, Body, Impulse, Inertia, LocalBlock, LocalModel, SimTime, Site, StepError};
@@ -25,7 +25,7 @@ pub struct RemoteMember {
     led: Option<LedMotion>,
     /// The participants that compute their pairs with it.
     partners: Vec<AgentId>,
-    matter: Matter,
+    shape: PublishedShape,
     model: LocalModel,
     blocks: Vec<Block>,
     /// Velocities of the blocks now, at the end of a step without impulses, and how they change a second.
@@ -39,7 +39,7 @@ pub struct RemoteMember {
     flight: Vec<InFlight>,
     /// The time of the snapshot that the matrix was made for.
     seen: Option<SimTime>,
-    kept: (Matter, Vec<DVec3>),
+    kept: (PublishedShape, Vec<DVec3>),
     matrix: Vec<f64>,
 }
 
@@ -73,7 +73,7 @@ impl RemoteMember {
         self.form.clone_from(&neighbour.form);
         self.partners.clear();
         let snapshot = &neighbour.snapshot;
-        let known = self.matter.take(&snapshot.body);
+        let known = self.shape.take(&snapshot.body);
         self.led = match (&snapshot.inertia, &snapshot.body) {
             (Inertia::Immovable, Body::Rigid(state)) => {
                 Some(LedMotion { velocity_m_s: state.velocity, spin_rad_s: state.spin })
@@ -109,12 +109,12 @@ impl RemoteMember {
         let before = if since_s > 0.0 && age_s > 0.0 { (1.0 - since_s / age_s).max(0.0) } else { 0.0 };
         let begun = (since_s / model.step_s).clamp(0.0, 1.0);
         let acts = if model.held { before * begun + (1.0 - before) } else { 1.0 };
-        let Self { matter, deviation, carried, flight, .. } = self;
+        let Self { shape, deviation, carried, flight, .. } = self;
         flight.clear();
         flight.resize(deviation.len(), InFlight::default());
         given(&mut |site, impulse, way| {
             let mut add = |value: Impulse, to: fn(&mut InFlight) -> &mut DVec3| {
-                matter.visit_blocks(site, value, |slot, part| {
+                shape.visit_blocks(site, value, |slot, part| {
                     place_of_slot(model, slot).into_iter().for_each(|place| *to(&mut flight[place]) += part);
                 });
             };
@@ -143,15 +143,15 @@ impl RemoteMember {
         let since_s = time.secs_after(neighbour.snapshot.time).clamp(-FORETOLD_STEPS * step_s, FORETOLD_STEPS * step_s);
         self.now.clear();
         self.go_on(since_s);
-        let Self { model, matter, now, deviation, carried, .. } = self;
-        matter.drift.iter().zip(&mut matter.points).for_each(|(v, x)| *x += *v * since_s);
+        let Self { model, shape, now, deviation, carried, .. } = self;
+        shape.drift.iter().zip(&mut shape.points).for_each(|(v, x)| *x += *v * since_s);
         for (at, block) in model.blocks.iter().enumerate() {
             let row = &model.compliance[at * size..(at + 1) * size];
             let of = |list: &[DVec3]| row.iter().zip(list).map(|(w, impulse)| *w * *impulse).sum::<DVec3>();
             let changed = of(deviation);
             now.push(block.velocity + block.acceleration * since_s + changed);
             let way = block.acceleration * (0.5 * since_s * since_s) + of(carried);
-            matter.shift(block, way, since_s);
+            shape.shift(block, way, since_s);
         }
     }
 
@@ -159,13 +159,13 @@ impl RemoteMember {
     fn go_on(&mut self, for_s: f64) {
         let Some(LedMotion { velocity_m_s, spin_rad_s }) = self.led else { return };
         for (slot, velocity) in [(0, velocity_m_s), (1, spin_rad_s)] {
-            self.matter.shift(&LocalBlock { slot, velocity, acceleration: DVec3::ZERO }, DVec3::ZERO, for_s);
+            self.shape.shift(&LocalBlock { slot, velocity, acceleration: DVec3::ZERO }, DVec3::ZERO, for_s);
         }
     }
 
     /// The velocity of a point of space as if it were the matter of a body that is led, m/s; zero of all others.
     fn led_at(&self, point: DVec3) -> DVec3 {
-        self.led.map_or(DVec3::ZERO, |led| led.velocity_m_s + led.spin_rad_s.cross(point - self.matter.centre))
+        self.led.map_or(DVec3::ZERO, |led| led.velocity_m_s + led.spin_rad_s.cross(point - self.shape.centre))
     }
 
     /// A = W⁻¹ of the local model; none where W is not positive definite.
@@ -218,9 +218,9 @@ impl RemoteMember {
 
     /// The block of a point that is nearest to another point.
     fn nearest(&self, slot: u32) -> Option<usize> {
-        let matter = &self.matter;
-        let from = matter.point(slot)?;
-        let apart = |block: &LocalBlock| matter.point(block.slot).map(|at| at.distance_squared(from));
+        let shape = &self.shape;
+        let from = shape.point(slot)?;
+        let apart = |block: &LocalBlock| shape.point(block.slot).map(|at| at.distance_squared(from));
         let near = self.model.blocks.iter().enumerate().filter_map(|(place, block)| Some((place, apart(block)?)));
         near.min_by(|a, b| a.1.total_cmp(&b.1)).map(|(place, _)| place)
     }
@@ -257,12 +257,12 @@ impl ClusterMember for RemoteMember {
     }
 
     fn skin(&self) -> Option<PlacedShape<'_>> {
-        self.matter.placed(self.form.as_deref()?)
+        self.shape.placed(self.form.as_deref()?)
     }
 
     fn side(&self, place: &Place, contact: ContactSide) -> Side {
         match *place {
-            Place::Point(point) => self.whole(point - self.matter.centre),
+            Place::Point(point) => self.whole(point - self.shape.centre),
             Place::Surface { vertices: [a, b, c], shares } => {
                 self.shared(&[(a, shares[0]), (b, shares[1]), (c, shares[2])], None)
             }
@@ -278,20 +278,20 @@ impl ClusterMember for RemoteMember {
     }
 
     fn anchor(&self, anchor: Anchor) -> Option<MaterialPoint> {
-        let matter = &self.matter;
+        let shape = &self.shape;
         match anchor {
-            Anchor::Local(local) if matter.points.is_empty() => {
-                let arm = matter.rotation * local;
-                let position = matter.centre + arm;
+            Anchor::Local(local) if shape.points.is_empty() => {
+                let arm = shape.rotation * local;
+                let position = shape.centre + arm;
                 Some(MaterialPoint { position, side: self.whole(arm), led_m_s: self.led_at(position) })
             }
-            Anchor::Vertex(vertex) if matter.arc_m.is_empty() => {
-                let position = *matter.points.get(vertex as usize)?;
+            Anchor::Vertex(vertex) if shape.arc_m.is_empty() => {
+                let position = *shape.points.get(vertex as usize)?;
                 Some(MaterialPoint::new(position, self.shared(&[(vertex, 1.0)], None)))
             }
             Anchor::Arc(arc_m) => {
-                let (segment, share) = matter.locate(arc_m)?;
-                let position = matter.points.get(segment)?.lerp(*matter.points.get(segment + 1)?, share);
+                let (segment, share) = shape.locate(arc_m)?;
+                let position = shape.points.get(segment)?.lerp(*shape.points.get(segment + 1)?, share);
                 let slot = 2 * segment as u32;
                 Some(MaterialPoint::new(position, self.shared(&[(slot, 1.0 - share), (slot + 2, share)], None)))
             }
@@ -327,25 +327,25 @@ impl ClusterMember for RemoteMember {
             _ => 0.0,
         };
         let led = self.led.map_or(0.0, |led| led.velocity_m_s.length() + led.spin_rad_s.length() * radius_m);
-        let is_spin = |block: &LocalBlock| self.matter.point(block.slot).is_none() && block.slot % 2 == 1;
+        let is_spin = |block: &LocalBlock| self.shape.point(block.slot).is_none() && block.slot % 2 == 1;
         let of = |(block, v): (&LocalBlock, &DVec3)| v.length() * if is_spin(block) { radius_m } else { 1.0 };
         let blocks = self.model.blocks.iter().zip(v).map(of);
-        if self.matter.points.is_empty() {
+        if self.shape.points.is_empty() {
             led + blocks.sum::<f64>()
         } else {
-            blocks.chain(self.matter.fastest()).fold(0.0, f64::max)
+            blocks.chain(self.shape.fastest()).fold(0.0, f64::max)
         }
     }
 
     fn keep(&mut self) {
-        let Self { matter, now, kept, .. } = self;
-        kept.0.clone_from(matter);
+        let Self { shape, now, kept, .. } = self;
+        kept.0.clone_from(shape);
         kept.1.clone_from(now);
     }
 
     fn go_back(&mut self) {
-        let Self { matter, now, kept, .. } = self;
-        matter.clone_from(&kept.0);
+        let Self { shape, now, kept, .. } = self;
+        shape.clone_from(&kept.0);
         now.clone_from(&kept.1);
     }
 
@@ -355,11 +355,11 @@ impl ClusterMember for RemoteMember {
 
     fn end(&mut self, v: &[DVec3], h_s: f64, _touched: bool) -> Result<(), StepError> {
         self.go_on(h_s);
-        let Self { matter, model, now, .. } = self;
-        matter.drift.iter().zip(&mut matter.points).for_each(|(v, x)| *x += *v * h_s);
+        let Self { shape, model, now, .. } = self;
+        shape.drift.iter().zip(&mut shape.points).for_each(|(v, x)| *x += *v * h_s);
         for (block, v) in model.blocks.iter_mut().zip(v) {
             let at = LocalBlock { velocity: *v, ..*block };
-            matter.shift(&at, DVec3::ZERO, h_s);
+            shape.shift(&at, DVec3::ZERO, h_s);
         }
         now.copy_from_slice(v);
         Ok(())

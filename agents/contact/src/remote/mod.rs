@@ -26,7 +26,7 @@ use crate::{Law, Neighbour, StepContext};
 pub use ledgers::{GivenAt, Ledgers, TakenImpulse, acknowledged};
 pub use local::LocalQuery;
 pub use member::{RemoteMember, RemoteView};
-pub use published_shape::Matter;
+pub use published_shape::PublishedShape;
 
 use glam::DVec3;
 use lines::Lines;
@@ -76,7 +76,7 @@ struct Scratch {
     blocks: Vec<usize>,
     goes_on: Vec<DVec3>,
     carried: Vec<DVec3>,
-    matter: Matter,
+    shape: PublishedShape,
     narrow: NarrowPhaseScratch,
     touches: Vec<Touch>,
 }
@@ -148,7 +148,7 @@ impl Remotes {
         stepper: &mut ClusterStepper,
         step: MacroStep,
     ) {
-        stepper.outside().clear();
+        stepper.external().clear();
         self.all.iter_mut().for_each(|remote| remote.met = false);
         let Some(time) = locals.first().map(|first| first.context.time) else { return };
         for (place, (one, pairs)) in locals.iter_mut().zip(&mut *pairs).enumerate() {
@@ -228,7 +228,7 @@ impl Pairs {
     /// had they come when they acted (eq. 4).
     fn take(&mut self, place: usize, one: &mut Participant<'_>, stepper: &mut ClusterStepper, dt_s: f64) {
         self.ledgers.open(&one.context);
-        let known = &mut stepper.outside().known;
+        let known = &mut stepper.external().known;
         let Self { weight, scratch: Scratch { carried, goes_on: sums, .. }, .. } = self;
         for list in [&mut *carried, &mut *sums] {
             list.clear();
@@ -263,7 +263,7 @@ impl Pairs {
         for state in &mut *states {
             (state.contacts, state.force_n, state.penetration_m) = (0, 0.0, 0.0);
         }
-        for given in stepper.outside().given.iter().filter(|given| given.member == place) {
+        for given in stepper.external().given.iter().filter(|given| given.member == place) {
             let remote = &all[given.remote];
             let Some(other) = context.neighbours.iter().find(|other| other.id == remote.id) else { continue };
             let slot = remote.member.slot_of(given.block);

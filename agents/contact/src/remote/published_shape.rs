@@ -8,7 +8,7 @@ use metachron_geometry::{CollisionShape, Place, PlacedShape, ShapeKind, ShapePos
 
 /// The matter of another agent, where it is as far as it is known.
 #[derive(Debug, Clone, Default)]
-pub struct Matter {
+pub struct PublishedShape {
     /// Centre of mass or tip, of a body that moves as a whole.
     pub(crate) centre: DVec3,
     pub(crate) rotation: DQuat,
@@ -20,7 +20,7 @@ pub struct Matter {
     pub(crate) arc_m: Vec<f64>,
 }
 
-impl Matter {
+impl PublishedShape {
     /// Takes in a published body, `since_s` seconds later as its velocities lead it; whether it has matter.
     pub fn bring(&mut self, body: &Body, since_s: f64) -> bool {
         let known = self.take(body);

@@ -28,7 +28,7 @@ impl ClusterStepper {
     pub(crate) fn divide(&mut self, all: &[Participant<'_>], h_s: f64) -> bool {
         let mut any = false;
         for (one, state) in all.iter().zip(&mut self.progress) {
-            let so_far = one.member.strain(&state.before, h_s * f64::from(state.part));
+            let so_far = one.member.strain(&state.v_before, h_s * f64::from(state.part));
             // what is too much already grows through the rest of its step
             let more = if so_far > 1.0 { times(so_far * f64::from(state.share) / f64::from(state.part)) } else { 1 };
             // what its free motion asked for counts

@@ -4,7 +4,7 @@
 //! rows of lines, sums of what remote members were given. Never here: ledgers, waves. Theory: docs/theory/coupling.md, eq. 3, 4c and 10.
 
 use crate::cluster::{Hold, JointRow, Side};
-use crate::constraint::{FineStep, RowOwner, Ties};
+use crate::constraint::{ConstraintRows, FineStep, RowOwner};
 use crate::member::memory::Partner;
 use crate::member::problem::respond;
 use crate::member::state::Progress;
@@ -54,7 +54,7 @@ pub struct RemoteImpulse {
 
 /// All of it in one macro step.
 #[derive(Debug, Default)]
-pub struct Outside {
+pub struct ExternalImpulses {
     /// What acts on participants.
     pub known: Vec<KnownImpulse>,
     /// Ends of lines at participants.
@@ -69,7 +69,7 @@ pub struct Outside {
     residual: Vec<DVec3>,
 }
 
-impl Outside {
+impl ExternalImpulses {
     /// Forgets what acted in the last macro step.
     pub fn clear(&mut self) {
         self.known.clear();
@@ -166,7 +166,7 @@ impl LineRow {
     }
 }
 
-impl Ties {
+impl ConstraintRows {
     /// Lays out the ends of transmission lines (eq. 10): implicit in the motion of the point, where something moves it.
     pub fn gather_lines(&mut self, step: &FineStep<'_, '_>, lines: &[LineRow]) {
         for (number, line) in (0..).zip(lines).filter(|(_, line)| !line.is_led()) {

@@ -6,7 +6,7 @@
 //! plan      how many steps each member makes within the macro step; more where its free motion would strain it
 //! begin     members whose step begins: matrix and velocities without contact
 //! seen      velocities with the impulses that each has been given since its step began
-//! search    places that may close; which members are a heap, that rapier3d steps
+//! search    places that may close; which members are a rigid pile, that rapier3d steps
 //! tie       springs, links, joints
 //! solve     one problem for all; again with the places that bodies struck would pass, and until joints hold where bodies will be
 //! rebound   contacts that close fast, by their restitution
@@ -31,7 +31,7 @@ use crate::constraint::contact_rows::ContactRows;
 use crate::constraint::joint::Joints;
 use crate::constraint::tearing::Tearing;
 use crate::constraint::yielding::Yielding;
-use crate::constraint::{FineStep, JointTotal, Ties, Torn, Yielded};
+use crate::constraint::{ConstraintRows, FineStep, JointTotal, Torn, Yielded};
 use crate::detect::{ClusterScene, Judge, Round, Search};
 use crate::impact::Impacts;
 use crate::member::problem::ProblemMembers;
@@ -39,13 +39,13 @@ use crate::member::state::Progress;
 use crate::member::{ClusterMember, ContactMemory, Participant, Role};
 use divide::times;
 pub use doubling::StepDoubling;
-pub use external::{KnownImpulse, LineRow, Outside, RemoteImpulse};
+pub use external::{ExternalImpulses, KnownImpulse, LineRow, RemoteImpulse};
 use glam::DVec3;
 use metachron_core::parallel::for_each;
 use metachron_core::{Archive, ArchiveError, ParallelFor, SimSpan, StepError, Wrench, check_span};
 pub use pair_total::PairTotal;
 pub use plan::Plan;
-use rigid_pile::{Heap, Sums};
+use rigid_pile::{RigidPile, Sums};
 use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
 
 /// The surroundings of a macro step, and the threads that make it.
@@ -62,8 +62,8 @@ pub struct ClusterReport {
     pub fine_steps: u32,
     /// Contacts of the last fine step, those that bear nothing included.
     pub contacts: u32,
-    /// Those of them that are a heap's, which rapier3d has; all others are the problem's.
-    pub heap_contacts: u32,
+    /// Those of them that are a rigid pile's, which rapier3d has; all others are the problem's.
+    pub pile_contacts: u32,
     /// Factors of the coupled matrix in all fine steps.
     pub factors: u32,
     /// Products of conjugate gradients in all fine steps: of the iterative form, which makes no factors.
@@ -88,7 +88,7 @@ pub struct ClusterStepper {
     pub(crate) depth_m: f64,
     pub(crate) solver: Solver,
     pub(crate) search: Search,
-    pub(crate) ties: Ties,
+    pub(crate) constraints: ConstraintRows,
     pub(crate) joints: Joints,
     pub(crate) contact_rows: ContactRows,
     pub(crate) progress: Vec<Progress>,
@@ -104,8 +104,8 @@ pub struct ClusterStepper {
     /// Whether that is of this macro step, and members have kept their states.
     pub(crate) is_kept: bool,
     pub(crate) impacts: Impacts,
-    pub(crate) heap: Heap,
-    pub(crate) outside: Outside,
+    pub(crate) pile: RigidPile,
+    pub(crate) external: ExternalImpulses,
     /// Storage of local models, and of how the sides of contacts are moved.
     pub(crate) local: [Vec<DVec3>; 2],
     pub(crate) moved_m_s: Vec<DVec3>,
@@ -124,7 +124,7 @@ impl Default for ClusterStepper {
             depth_m: DEPTH_DEFAULT_M,
             solver: Solver::new(Settings::default()),
             search: Search::default(),
-            ties: Ties::default(),
+            constraints: ConstraintRows::default(),
             joints: Joints::default(),
             contact_rows: ContactRows::default(),
             progress: Vec::new(),
@@ -137,8 +137,8 @@ impl Default for ClusterStepper {
             kept: Vec::new(),
             is_kept: false,
             impacts: Impacts::default(),
-            heap: Heap::default(),
-            outside: Outside::default(),
+            pile: RigidPile::default(),
+            external: ExternalImpulses::default(),
             local: Default::default(),
             moved_m_s: Vec::new(),
             macro_s: 0.0,
@@ -156,7 +156,7 @@ impl ClusterStepper {
     /// [`ArchiveError`] for what is no state of a stepper.
     pub fn archive(&mut self, archive: &mut Archive<'_>) -> Result<(), ArchiveError> {
         self.solver.archive(archive)?;
-        self.heap.archive(archive)
+        self.pile.archive(archive)
     }
 
     /// The most steps of each solve from now on, each a factor or what serves gradients for one; `None` for as many as the laws take. Momentum is
@@ -172,8 +172,8 @@ impl ClusterStepper {
     }
 
     /// What acts on participants of the next step from outside, and what the last one gave to remote members.
-    pub fn outside(&mut self) -> &mut Outside {
-        &mut self.outside
+    pub fn external(&mut self) -> &mut ExternalImpulses {
+        &mut self.external
     }
 
     /// Advances `all`, by rising numbers and at one common time, by `dt`.
@@ -215,7 +215,7 @@ impl ClusterStepper {
         self.solver.set_depth_m(self.depth_m);
         self.joints_missed_m = f64::INFINITY;
         all.iter_mut().for_each(Participant::let_go);
-        self.foresee(all, self.macro_s, threads)?;
+        self.plan(all, self.macro_s, threads)?;
         self.keep(all);
         // each time at least one member makes twice as many steps, at most 64 times as many as it began with
         loop {
@@ -234,7 +234,7 @@ impl ClusterStepper {
     }
 
     /// Begins the first step of every member, in as many parts as its free motion needs.
-    fn foresee(&mut self, all: &mut [Participant<'_>], dt_s: f64, threads: &dyn ParallelFor) -> Result<(), StepError> {
+    fn plan(&mut self, all: &mut [Participant<'_>], dt_s: f64, threads: &dyn ParallelFor) -> Result<(), StepError> {
         for_each(threads, all, &mut self.progress, &Participant::size, &|one, state| {
             let own_s = dt_s / f64::from(one.parts);
             one.member.look(&one.context, dt_s);
@@ -275,54 +275,54 @@ impl ClusterStepper {
         self.wrenches.resize(all.len(), Wrench::default());
         self.tearing.begin();
         self.yielding.begin();
-        self.outside.begin();
+        self.external.begin();
         report.fine_steps = parts;
-        (report.depth_m, report.heap_contacts) = (0.0, 0);
+        (report.depth_m, report.pile_contacts) = (0.0, 0);
         self.fine_s = h_s;
         for fine in 0..parts {
-            self.outside.after_s = f64::from(fine) * h_s;
+            self.external.after_s = f64::from(fine) * h_s;
             self.begin(all, h_s, threads)?;
-            self.find(scene, all, h_s);
-            self.tie(scene, all, h_s, f64::from(fine) * h_s);
-            self.recall(all, h_s);
-            self.impacts.begin([self.macro_s, h_s], &mut self.search, &self.ties, &self.progress);
+            self.detect(scene, all, h_s);
+            self.assemble(scene, all, h_s, f64::from(fine) * h_s);
+            self.warm_start(all, h_s);
+            self.impacts.begin([self.macro_s, h_s], &mut self.search, &self.constraints, &self.progress);
             self.solve(on, all, h_s, report)?;
             if self.divide_joints(all) || self.divide(all, h_s) {
                 return Ok(false);
             }
             let is_last = fine + 1 == parts;
-            self.remember(all, h_s, is_last, dt);
+            self.record(all, h_s, is_last, dt);
             if is_last {
                 self.note_stiffness(all, h_s);
             }
-            self.step_heap(all, h_s, report)?;
-            self.end(all, h_s, threads)?;
-            self.heap.place(all);
+            self.step_pile(all, h_s, report)?;
+            self.integrate(all, h_s, threads)?;
+            self.pile.place(all);
         }
         Ok(true)
     }
 
-    /// Finds where members may touch, but for those that are a heap: their contacts are not the problem's.
-    fn find(&mut self, scene: &ClusterScene, all: &[Participant<'_>], h_s: f64) {
-        let Self { search, heap, progress, .. } = self;
-        let round = Round { scene, all, progress, h_s, judge: Judge::Foreseen };
-        if heap.go_on(scene, all) {
-            search.find(&round, heap.domains());
-            heap.end_if_touched(search);
+    /// Finds where members may touch, but for those that are a rigid pile: their contacts are not the problem's.
+    fn detect(&mut self, scene: &ClusterScene, all: &[Participant<'_>], h_s: f64) {
+        let Self { search, pile, progress, .. } = self;
+        let round = Round { scene, all, progress, h_s, judge: Judge::Predicted };
+        if pile.go_on(scene, all) {
+            search.find(&round, pile.domains());
+            pile.end_if_touched(search);
         }
-        if !heap.is_on() {
+        if !pile.is_on() {
             search.find(&round, &[]);
-            heap.begin(scene, all, search);
-            if heap.is_on() {
-                search.find(&round, heap.domains());
+            pile.begin(scene, all, search);
+            if pile.is_on() {
+                search.find(&round, pile.domains());
             }
         }
         search.sense(&round);
     }
 
-    /// Steps a heap from the velocities that its members have without contact.
-    fn step_heap(&mut self, all: &[Participant<'_>], h_s: f64, report: &mut ClusterReport) -> Result<(), StepError> {
-        self.heap
+    /// Steps a rigid pile from the velocities that its members have without contact.
+    fn step_pile(&mut self, all: &[Participant<'_>], h_s: f64, report: &mut ClusterReport) -> Result<(), StepError> {
+        self.pile
             .step(all, &mut self.progress, h_s, Sums { totals: &mut self.totals, wrenches: &mut self.wrenches })?
             .add_to(report);
         Ok(())
@@ -399,7 +399,7 @@ impl ClusterStepper {
                 let own_s = h_s * f64::from(state.share);
                 state.begun_s = 0.0;
                 state.start(&one.member);
-                self.outside.act(place, one, [own_s, self.macro_s], state);
+                self.external.act(place, one, [own_s, self.macro_s], state);
             }
             state.part += 1;
             state.look(&one.member);
@@ -408,32 +408,32 @@ impl ClusterStepper {
     }
 
     /// Lays out springs, links and joints of a fine step that begins `after_s` seconds into the macro step.
-    fn tie(&mut self, scene: &ClusterScene, all: &[Participant<'_>], h_s: f64, after_s: f64) {
-        let Self { ties, joints, progress, depth_m, .. } = self;
-        ties.clear();
+    fn assemble(&mut self, scene: &ClusterScene, all: &[Participant<'_>], h_s: f64, after_s: f64) {
+        let Self { constraints, joints, progress, depth_m, .. } = self;
+        constraints.clear();
         let step = FineStep { all, progress, h_s, after_s, joint_miss_m: solve::joint_miss_m(*depth_m) };
-        ties.gather_springs(&step);
-        ties.gather_own_springs(&step);
-        ties.gather_links(&step);
-        ties.gather_lines(&step, &self.outside.lines);
-        self.outside.give_led(h_s);
-        joints.gather(scene, &step, ties);
-        ties.add_inertia(&step);
+        constraints.gather_springs(&step);
+        constraints.gather_own_springs(&step);
+        constraints.gather_links(&step);
+        constraints.gather_lines(&step, &self.external.lines);
+        self.external.give_led(h_s);
+        joints.gather(scene, &step, constraints);
+        constraints.add_inertia(&step);
     }
 
     /// Moves all members; the step of some ends (eq. 26, 27).
-    fn end(&mut self, all: &mut [Participant<'_>], h_s: f64, threads: &dyn ParallelFor) -> Result<(), StepError> {
+    fn integrate(&mut self, all: &mut [Participant<'_>], h_s: f64, threads: &dyn ParallelFor) -> Result<(), StepError> {
         for_each(threads, all, &mut self.progress, &Participant::size, &|one, state| {
             let since_s = h_s * f64::from(state.part);
             if state.part < state.share {
-                one.member.move_to(&state.before, since_s);
+                one.member.move_to(&state.v_before, since_s);
             } else {
                 one.member.leave(&state.unanswered);
-                state.failure = one.member.end(&state.before, since_s, state.touched).err();
-                if state.failure.is_none() && !state.late.is_empty() {
+                state.failure = one.member.end(&state.v_before, since_s, state.touched).err();
+                if state.failure.is_none() && !state.dx_impacts.is_empty() {
                     // by the impulses that move it so far; how it has gone is not needed any more
-                    multiply(one.member.blocks(), &state.late, &mut state.going);
-                    one.member.carry(&state.going);
+                    multiply(one.member.blocks(), &state.dx_impacts, &mut state.v_mean);
+                    one.member.carry(&state.v_mean);
                 }
                 state.part = 0;
             }

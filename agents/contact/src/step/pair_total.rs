@@ -18,16 +18,16 @@ pub struct PairTotal {
     pub contacts: u32,
     /// The deepest overlap, metres, ≥ 0.
     pub depth_m: f64,
-    /// The most that one contact gave, N·s; zero for links and in heaps.
+    /// The most that one contact gave, N·s; zero for links and in rigid piles.
     pub most_n_s: f64,
-    /// Where that contact is, metres; not a number for links and in heaps.
+    /// Where that contact is, metres; not a number for links and in rigid piles.
     pub point_m: DVec3,
-    /// Its normal, towards the participant, of length 1; zero for links and in heaps.
+    /// Its normal, towards the participant, of length 1; zero for links and in rigid piles.
     pub normal: DVec3,
     /// How easily the participant and its partner give way at that contact along its normal, 1/kg, ≥ 0 (coupling.md, eq. 7h).
     pub inverse_mass_per_kg: [f64; 2],
     /// How much more the pair bears along that normal for each metre that a side which a user leads is led on towards the other, N/m, ≥ 0
-    /// (coupling.md, eq. 7s). 0 where a user leads neither, in heaps, and where neither gives way.
+    /// (coupling.md, eq. 7s). 0 where a user leads neither, in rigid piles, and where neither gives way.
     pub stiffness_n_m: f64,
 }
 

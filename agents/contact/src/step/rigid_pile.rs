@@ -1,8 +1,8 @@
-//! A heap: rigid bodies that touch in more places than one problem is solved for in time, stepped by rapier3d.
+//! A rigid pile: rigid bodies that touch in more places than one problem is solved for in time, stepped by rapier3d.
 //!
 //! In: members with the velocities that they would have without contact. Out: those that they have with it, where they are then, what each
 //! pair gave. Bodies lie in each other as deep as rapier3d lets them (some tenths of a millimetre), in single precision.
-//! Never here: bodies that bend, which touch none of the heap; rows of springs and joints: these are solved before, as if nothing touched.
+//! Never here: bodies that bend, which touch none of the rigid pile; rows of springs and joints: these are solved before, as if nothing touched.
 //! Theory: docs/theory/clusters.md, section 9.
 
 use crate::detect::domain::{Domain, assign};
@@ -27,7 +27,7 @@ use rapier3d::geometry::{
 use rapier3d::parry::math::{Pose, Rotation, Vec3};
 use rapier3d::pipeline::PhysicsWorld;
 
-/// Rigid bodies become a heap above so many contacts, and are one until they have fewer than the second.
+/// Rigid bodies become a rigid pile above so many contacts, and are one until they have fewer than the second.
 const CONTACTS_MIN: usize = 1000;
 const CONTACTS_LEFT: usize = 500;
 /// No step of rapier3d is longer than this, seconds: what lands sinks by a part of its way in one.
@@ -41,22 +41,22 @@ const FORESEEN_RADII: f64 = 2.0;
 /// How stiff contacts are: so columns of boxes sink by a tenth of a millimetre (docs/throughput.md).
 const STIFF: SpringCoefficients<f32> = SpringCoefficients { natural_frequency: 300.0, damping_ratio: 10.0 };
 
-/// The heap of a cluster, if it has one.
+/// The rigid pile of a cluster, if it has one.
 #[derive(Default)]
-pub(crate) struct Heap {
+pub(crate) struct RigidPile {
     world: Option<Box<World>>,
     /// Of each member; without meaning where there is no heap.
     domains: Vec<Domain>,
 }
 
-/// What a step of a heap was.
+/// What a step of a rigid pile was.
 #[derive(Debug, Clone, Copy, Default)]
-pub(crate) struct HeapReport {
+pub(crate) struct PileReport {
     pub contacts: usize,
     pub depth_m: f64,
 }
 
-/// Where the heap adds what its contacts gave.
+/// Where the rigid pile adds what its contacts gave.
 pub(crate) struct Sums<'a> {
     /// Of pairs.
     pub totals: &'a mut Vec<PairTotal>,
@@ -64,7 +64,7 @@ pub(crate) struct Sums<'a> {
     pub wrenches: &'a mut [Wrench],
 }
 
-/// The bodies of a heap in rapier3d.
+/// The bodies of a rigid pile in rapier3d.
 struct World {
     physics: PhysicsWorld,
     /// Where the origin of rapier3d is: near the bodies, as its numbers are single.
@@ -108,17 +108,17 @@ struct Placed<'a> {
     rotation: DQuat,
 }
 
-impl HeapReport {
+impl PileReport {
     /// Adds it to that of the fine step whose problem has been solved.
     pub fn add_to(self, report: &mut ClusterReport) {
-        report.heap_contacts = self.contacts as u32;
-        report.contacts += report.heap_contacts;
+        report.pile_contacts = self.contacts as u32;
+        report.contacts += report.pile_contacts;
         report.depth_m = report.depth_m.max(self.depth_m);
     }
 }
 
-impl Heap {
-    /// Writes or reads the heap, with all that rapier3d knows of it.
+impl RigidPile {
+    /// Writes or reads the rigid pile, with all that rapier3d knows of it.
     pub fn archive(&mut self, archive: &mut Archive<'_>) -> Result<(), ArchiveError> {
         archive.option(
             &mut self.world,
@@ -137,14 +137,14 @@ impl Heap {
         &self.domains
     }
 
-    /// Makes a heap of the members that can be one, if they touch in so many places and nothing else touches them.
+    /// Makes a rigid pile of the members that can be one, if they touch in so many places and nothing else touches them.
     pub fn begin(&mut self, scene: &ClusterScene, all: &[Participant<'_>], search: &Search) {
         if search.owners.len() <= CONTACTS_MIN {
             return;
         }
         assign(scene, all, &mut self.domains);
-        let is_heap = |member: usize| self.domains[member] == Domain::Heap;
-        let within = search.owners.iter().filter(|owner| owner.both().all(is_heap)).count();
+        let is_pile = |member: usize| self.domains[member] == Domain::RigidPile;
+        let within = search.owners.iter().filter(|owner| owner.both().all(is_pile)).count();
         if within > CONTACTS_MIN && !self.is_touched(search) {
             let centres = || all.iter().filter_map(placed).map(|body| body.centre_m);
             let middle_m = centres().sum::<DVec3>() / centres().count() as f64;
@@ -152,30 +152,30 @@ impl Heap {
         }
     }
 
-    /// Goes on with the heap where it still is one; whether it goes on.
+    /// Goes on with the rigid pile where it still is one; whether it goes on.
     pub fn go_on(&mut self, scene: &ClusterScene, all: &[Participant<'_>]) -> bool {
         self.world = self.world.take().filter(|world| world.contacts > CONTACTS_LEFT);
         if self.is_on() {
             assign(scene, all, &mut self.domains);
-            self.world = self.world.take().filter(|_| self.domains.contains(&Domain::Heap));
+            self.world = self.world.take().filter(|_| self.domains.contains(&Domain::RigidPile));
         }
         self.is_on()
     }
 
-    /// Ends the heap if one of the other members touches it.
+    /// Ends the rigid pile if one of the other members touches it.
     pub fn end_if_touched(&mut self, search: &Search) {
         if self.is_touched(search) {
             self.world = None;
         }
     }
 
-    /// Whether a member of the heap and one of the problem touch.
+    /// Whether a member of the rigid pile and one of the problem touch.
     fn is_touched(&self, search: &Search) -> bool {
         let domains = &self.domains;
         search.owners.iter().any(|owner| owner.other.is_some_and(|other| domains[owner.member] != domains[other]))
     }
 
-    /// Steps the members of the heap by `h_s` seconds from where they are: in, each one's velocities at the end without contact; out, with it.
+    /// Steps the members of the rigid pile by `h_s` seconds from where they are: in, each one's velocities at the end without contact; out, with it.
     /// What pairs gave is added to sums.
     ///
     /// # Errors
@@ -186,14 +186,14 @@ impl Heap {
         progress: &mut [Progress],
         h_s: f64,
         into: Sums<'_>,
-    ) -> Result<HeapReport, StepError> {
-        let Self { world: Some(world), domains } = self else { return Ok(HeapReport::default()) };
+    ) -> Result<PileReport, StepError> {
+        let Self { world: Some(world), domains } = self else { return Ok(PileReport::default()) };
         let Sums { totals, wrenches } = into;
         world.take(all, domains, progress, h_s);
         // spans are whole nanoseconds
         let steps = (h_s / LONGEST_S - 1e-3).max(world.way(progress, h_s)).ceil().clamp(1.0, STEPS_MAX);
         world.physics.integration_parameters.dt = (h_s / steps) as f32;
-        let mut report = HeapReport::default();
+        let mut report = PileReport::default();
         for left in (0..steps as u32).rev() {
             world.physics.step();
             let deepest_m = report.depth_m;
@@ -202,13 +202,13 @@ impl Heap {
         }
         if !world.is_sound() {
             self.world = None;
-            let what = "the heap has no finite answer".to_owned();
+            let what = "the pile has no finite answer".to_owned();
             return Err(StepError::Diverged { model: "cluster", dt_s: h_s, what });
         }
         for known in world.bodies.iter().filter(|known| known.touched) {
             let state = &mut progress[known.member];
             let body = &world.physics.bodies[known.handle];
-            state.before.copy_from_slice(&[body.linvel().as_dvec3(), body.angvel().as_dvec3()]);
+            state.v_before.copy_from_slice(&[body.linvel().as_dvec3(), body.angvel().as_dvec3()]);
             state.hold();
         }
         world.contacts = report.contacts;
@@ -270,11 +270,11 @@ impl World {
         Self { physics, origin_m, bodies: Vec::new(), contacts: usize::MAX, touched: Vec::new(), given: Vec::new() }
     }
 
-    /// Takes up the members of the heap as they are, and what changes their velocities in the step.
+    /// Takes up the members of the rigid pile as they are, and what changes their velocities in the step.
     fn take(&mut self, all: &[Participant<'_>], domains: &[Domain], progress: &[Progress], h_s: f64) {
         let Self { physics, bodies, origin_m, .. } = self;
         bodies.retain(|known| {
-            let stays = place_of(all, known.id).is_some_and(|at| domains[at] == Domain::Heap);
+            let stays = place_of(all, known.id).is_some_and(|at| domains[at] == Domain::RigidPile);
             if !stays {
                 physics.remove_body(known.handle);
             }
@@ -282,7 +282,7 @@ impl World {
         });
         let mut smallest_m = f64::INFINITY;
         for (member, (one, state)) in all.iter().zip(progress).enumerate() {
-            let Some(body) = placed(one).filter(|_| domains[member] == Domain::Heap) else { continue };
+            let Some(body) = placed(one).filter(|_| domains[member] == Domain::RigidPile) else { continue };
             smallest_m = smallest_m.min(body.shape.radius_m);
             let at = match bodies.binary_search_by_key(&one.id, |known| known.id) {
                 Ok(at) => at,
@@ -294,7 +294,7 @@ impl World {
             (bodies[at].member, bodies[at].touched) = (member, false);
             let known = bodies[at];
             let Some(inside) = physics.bodies.get_mut(known.handle) else { continue };
-            let now = [&state.start[0], &state.start[1]].map(|v| v.as_vec3());
+            let now = [&state.v_start[0], &state.v_start[1]].map(|v| v.as_vec3());
             // what is set anew is searched anew
             let pose = body.pose(*origin_m);
             if *inside.position() != pose {
@@ -306,9 +306,9 @@ impl World {
             }
             inside.reset_forces(true);
             inside.reset_torques(true);
-            inside.add_force(((state.before[0] - state.start[0]) * (known.mass_kg / h_s)).as_vec3(), true);
+            inside.add_force(((state.v_before[0] - state.v_start[0]) * (known.mass_kg / h_s)).as_vec3(), true);
             let axes = DMat3::from_quat(body.rotation);
-            let spun = axes * known.inertia * axes.transpose() * (state.before[1] - state.start[1]);
+            let spun = axes * known.inertia * axes.transpose() * (state.v_before[1] - state.v_start[1]);
             inside.add_torque((spun / h_s).as_vec3(), true);
         }
         // the error that rapier3d allows is a share of it
@@ -319,7 +319,7 @@ impl World {
     fn way(&self, progress: &[Progress], h_s: f64) -> f64 {
         let ways = self.bodies.iter().map(|known| {
             let state = &progress[known.member];
-            state.start[0].length().max(state.before[0].length()) * h_s / (0.5 * known.radius_m)
+            state.v_start[0].length().max(state.v_before[0].length()) * h_s / (0.5 * known.radius_m)
         });
         ways.fold(0.0, f64::max)
     }
@@ -335,8 +335,8 @@ impl World {
     }
 
     /// Notes what pairs gave in the last step, along the normals of their contacts; whether its places `count`.
-    fn read(&mut self, all: &[Participant<'_>], counts: bool) -> HeapReport {
-        let mut report = HeapReport::default();
+    fn read(&mut self, all: &[Participant<'_>], counts: bool) -> PileReport {
+        let mut report = PileReport::default();
         let (mut touched, mut given) = (std::mem::take(&mut self.touched), std::mem::take(&mut self.given));
         touched.clear();
         for pair in self.physics.narrow_phase.contact_pairs().filter(|pair| pair.has_any_active_contact()) {

@@ -42,7 +42,7 @@ impl ClusterStepper {
         report.contacts = 0;
         self.joints_ask = 1;
         let is_open = |state: &Progress| !state.unanswered.is_empty();
-        if self.search.contacts.is_empty() && self.ties.rows.is_empty() && !self.progress.iter().any(is_open) {
+        if self.search.contacts.is_empty() && self.constraints.rows.is_empty() && !self.progress.iter().any(is_open) {
             // what touches nothing moves as it would
             self.contact_rows.clear();
             self.progress.iter_mut().for_each(Progress::go_on);
@@ -50,13 +50,13 @@ impl ClusterStepper {
         }
         let (mut last_miss_m, mut missed_m) = (f64::INFINITY, self.joints_missed_m);
         for round in 1..=ROUNDS_MAX {
-            self.contact_rows.lay(&self.search, all, &mut self.ties, h_s);
+            self.contact_rows.lay(&self.search, all, &mut self.constraints, h_s);
             self.solve_once(all, h_s, on.threads, report)?;
             self.note_motion(all);
             let Self {
                 solver,
                 search,
-                ties,
+                constraints,
                 contact_rows,
                 joints,
                 joints_ask,
@@ -71,14 +71,14 @@ impl ClusterStepper {
             for (contact, impulse) in search.contacts.iter_mut().zip(&solution.contacts_n_s) {
                 contact.warm_n_s = *impulse;
             }
-            for (row, impulse) in ties.rows.iter_mut().zip(&solution.rows_n_s) {
+            for (row, impulse) in constraints.rows.iter_mut().zip(&solution.rows_n_s) {
                 row.warm_n_s = *impulse;
             }
-            for (contact, row) in contact_rows.spins(ties) {
+            for (contact, row) in contact_rows.spins(constraints) {
                 let normal = search.contacts[contact].normal;
                 search.owners[contact].spin.torque_n_m = solution.rows_n_s[row].dot(normal) / h_s;
             }
-            let Aimed { miss_m, turn_rad } = joints.aim(all, ties, |member| &progress[member].solved[..], h_s);
+            let Aimed { miss_m, turn_rad } = joints.aim(all, constraints, |member| &progress[member].v_solved[..], h_s);
             let joints_done = miss_m < joint_miss_m(*depth_m) || miss_m > last_miss_m;
             let holds = miss_m < joint_miss_m(*depth_m);
             let made = (*macro_s / h_s).round();
@@ -112,24 +112,25 @@ impl ClusterStepper {
         threads: &dyn ParallelFor,
         report: &mut ClusterReport,
     ) -> Result<(), StepError> {
-        let Self { solver, search, ties, progress, members, .. } = self;
+        let Self { solver, search, constraints, progress, members, .. } = self;
         // what no row touches and knows how it would move does so, and makes no problem larger
         let mut count = 0..;
         progress.iter_mut().for_each(|state| state.place = (!state.unanswered.is_empty()).then_some(0));
-        let sides = search.contacts.iter().flat_map(|c| &c.sides).chain(ties.rows.iter().flat_map(|row| &row.sides));
+        let sides =
+            search.contacts.iter().flat_map(|c| &c.sides).chain(constraints.rows.iter().flat_map(|row| &row.sides));
         sides.filter(|side| !side.terms().is_empty()).for_each(|side| progress[side.member].place = Some(0));
         let involved = progress.iter_mut().filter(|state| state.place.is_some());
         involved.for_each(|state| state.place = count.next());
         members.places.clear();
         members.places.extend(progress.iter().enumerate().filter_map(|(member, state)| state.place.map(|_| member)));
-        let (contacts, rows) = (&mut search.contacts[..], &mut ties.rows[..]);
-        let (free, open): (Velocities, Velocities) = (|state| &state.seen, |state| &state.unanswered);
+        let (contacts, rows) = (&mut search.contacts[..], &mut constraints.rows[..]);
+        let (free, open): (Velocities, Velocities) = (|state| &state.v_predicted, |state| &state.unanswered);
         let posed = Posed { all, progress, contacts, rows, h_s, threads, free, open };
         report.add(&posed.solve(solver, members)?);
         for state in &mut *progress {
-            let Progress { solved, seen, place, .. } = state;
-            solved.clear();
-            solved.extend_from_slice(place.map_or(&seen[..], |place| solver.solution().velocities(place)));
+            let Progress { v_solved, v_predicted, place, .. } = state;
+            v_solved.clear();
+            v_solved.extend_from_slice(place.map_or(&v_predicted[..], |place| solver.solution().velocities(place)));
         }
         Ok(())
     }
@@ -142,12 +143,12 @@ impl ClusterStepper {
         may_fly: bool,
         report: &mut ClusterReport,
     ) -> Result<(), StepError> {
-        let Self { impacts, search, ties, solver, progress, members, depth_m, .. } = self;
+        let Self { impacts, search, constraints, solver, progress, members, depth_m, .. } = self;
         let (solution, depth_m, threads) = (solver.solution(), *depth_m, on.threads);
         let took = impacts.rebound(SolvedStep {
             all,
             search,
-            ties,
+            constraints,
             solution,
             members,
             progress,
@@ -161,7 +162,7 @@ impl ClusterStepper {
 
     /// Finds what the impulses found hold, and how places move by them.
     fn note_motion(&mut self, all: &[Participant<'_>]) {
-        let Self { solver, search, ties, contact_rows, progress, .. } = self;
+        let Self { solver, search, constraints, contact_rows, progress, .. } = self;
         let solution = solver.solution();
         progress.iter_mut().for_each(|state| state.bears = false);
         let mut hold = |both: &mut dyn Iterator<Item = usize>| both.for_each(|member| progress[member].bears = true);
@@ -170,12 +171,12 @@ impl ClusterStepper {
                 hold(&mut search.owners[k].both());
             }
         }
-        for (owner, impulse) in ties.owners.iter().zip(&solution.rows_n_s) {
+        for (owner, impulse) in constraints.owners.iter().zip(&solution.rows_n_s) {
             if *impulse != DVec3::ZERO {
                 hold(&mut owner.both());
             }
         }
-        for (contact, _) in contact_rows.pushes(ties).filter(|(_, row)| solution.rows_n_s[*row] != DVec3::ZERO) {
+        for (contact, _) in contact_rows.pushes(constraints).filter(|(_, row)| solution.rows_n_s[*row] != DVec3::ZERO) {
             hold(&mut search.owners[contact].both());
         }
         for (one, state) in all.iter().zip(progress) {

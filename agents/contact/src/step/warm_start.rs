@@ -5,6 +5,7 @@
 
 use crate::constraint::place_key;
 use crate::member::memory::{Partner, Remembered, Spin};
+use crate::member::state::velocity;
 use crate::member::{ClusterMember, Participant};
 use crate::step::ClusterStepper;
 use crate::step::pair_total::total_of;
@@ -16,7 +17,7 @@ const OVERLAP_SHARE: f64 = 2.0;
 
 impl ClusterStepper {
     /// Starts every contact from what the last step gave.
-    pub(crate) fn recall(&mut self, all: &[Participant<'_>], h_s: f64) {
+    pub(crate) fn warm_start(&mut self, all: &[Participant<'_>], h_s: f64) {
         for (owner, contact) in self.search.owners.iter_mut().zip(&mut self.search.contacts) {
             let place = all[owner.member].memory.recall(owner.partner, owner.key);
             (contact.warm_n_s, contact.owed_slip_m) = (place.force_n * h_s, place.owed_slip_m);
@@ -28,11 +29,11 @@ impl ClusterStepper {
     }
 
     /// Notes what the next step starts from.
-    pub(crate) fn remember(&mut self, all: &mut [Participant<'_>], h_s: f64, last: bool, dt: SimSpan) {
-        self.remember_spins(all, h_s);
-        self.remember_contacts(all, h_s);
-        self.remember_ties(all, h_s);
-        let Self { solver, search, ties, outside, .. } = self;
+    pub(crate) fn record(&mut self, all: &mut [Participant<'_>], h_s: f64, last: bool, dt: SimSpan) {
+        self.record_spins(all, h_s);
+        self.record_contacts(all, h_s);
+        self.record_constraints(all, h_s);
+        let Self { solver, search, constraints, external, .. } = self;
         for &[a, b] in &search.near {
             let (now, other) = (all[a].context.time + dt, all[b].id);
             all[a].memory.meet(other, now);
@@ -41,20 +42,20 @@ impl ClusterStepper {
         for (member, one) in all.iter_mut().enumerate() {
             let (mine, others) = sensed.split_at(sensed.partition_point(|pair| pair.member <= member));
             sensed = others;
-            let begins = SimSpan::from_secs_f64(outside.after_s).unwrap_or(SimSpan::ZERO);
+            let begins = SimSpan::from_secs_f64(external.after_s).unwrap_or(SimSpan::ZERO);
             one.memory.sense(mine.iter().map(|pair| pair.partner), one.context.time + begins);
             one.memory.turn(one.context.time + dt);
             if last {
-                ties.grips(member, &solver.solution().rows_n_s, h_s, one.grips);
+                constraints.grips(member, &solver.solution().rows_n_s, h_s, one.grips);
             }
         }
     }
 
     /// Notes what contacts hand to the next step, and adds up what they gave, push-outs and impacts included.
-    fn remember_contacts(&mut self, all: &mut [Participant<'_>], h_s: f64) {
-        let Self { solver, search, ties, contact_rows, outside, impacts, .. } = self;
+    fn record_contacts(&mut self, all: &mut [Participant<'_>], h_s: f64) {
+        let Self { solver, search, constraints, contact_rows, external, impacts, .. } = self;
         let solution = solver.solution();
-        let mut pushes = contact_rows.pushes(ties).peekable();
+        let mut pushes = contact_rows.pushes(constraints).peekable();
         for (k, (owner, contact)) in search.owners.iter().zip(&search.contacts).enumerate() {
             let impulse = solution.contacts_n_s[k];
             let owed_slip_m = contact.owed_slip_after(impulse, solution.contacts_m_s[k], h_s);
@@ -68,7 +69,7 @@ impl ClusterStepper {
             let push =
                 pushes.next_if(|(pushed, _)| *pushed == k).map_or(DVec3::ZERO, |(_, row)| solution.rows_n_s[row]);
             let impulse = impulse + push + impacts.contacts_n_s.get(k).copied().unwrap_or_default();
-            outside.note(all, owner.member, &contact.sides[1], -impulse);
+            external.note(all, owner.member, &contact.sides[1], -impulse);
             if impulse != DVec3::ZERO {
                 let total = total_of(&mut self.totals, owner.member, owner.partner);
                 total.add(impulse, -contact.gap_m);
@@ -89,15 +90,15 @@ impl ClusterStepper {
         }
     }
 
-    /// Notes what rows of ties hand to the next step, and what they gave.
-    fn remember_ties(&mut self, all: &mut [Participant<'_>], h_s: f64) {
-        let Self { solver, ties, joints, outside, tearing, yielding, efforts, impacts, .. } = self;
+    /// Notes what rows of constraints hand to the next step, and what they gave.
+    fn record_constraints(&mut self, all: &mut [Participant<'_>], h_s: f64) {
+        let Self { solver, constraints, joints, external, tearing, yielding, efforts, impacts, .. } = self;
         let solution = solver.solution();
-        for (k, (owner, row)) in ties.owners.iter().zip(&ties.rows).enumerate() {
+        for (k, (owner, row)) in constraints.owners.iter().zip(&constraints.rows).enumerate() {
             let impulse = solution.rows_n_s[k];
             let given = impulse + impacts.rows_n_s.get(k).copied().unwrap_or_default();
-            outside.note(all, owner.member, &row.sides[1], -given);
-            outside.note_line(owner, given);
+            external.note(all, owner.member, &row.sides[1], -given);
+            external.note_line(owner, given);
             tearing.note(owner, given);
             if let Partner::Link(_) = owner.partner {
                 total_of(&mut self.totals, owner.member, owner.partner).add(given, 0.0);
@@ -106,24 +107,23 @@ impl ClusterStepper {
             let place = Remembered { owed_slip_m, ..Remembered::new(place_key(owner.key), impulse / h_s) };
             all[owner.member].memory.pair(owner.partner).next.push(place);
         }
-        joints.note_efforts(ties, &solution.rows_n_s, efforts);
-        yielding.slip(all, ties, &solution.rows_n_s, &self.progress);
+        joints.note_efforts(constraints, &solution.rows_n_s, efforts);
+        yielding.slip(all, constraints, &solution.rows_n_s, &self.progress);
     }
 
     /// Notes what the spins of contacts were given.
-    fn remember_spins(&mut self, all: &[Participant<'_>], h_s: f64) {
-        let Self { solver, search, ties, contact_rows, outside, progress, .. } = self;
+    fn record_spins(&mut self, all: &[Participant<'_>], h_s: f64) {
+        let Self { solver, search, constraints, contact_rows, external, progress, .. } = self;
         let solution = solver.solution();
-        for (contact, row) in contact_rows.spins(ties) {
-            let (impulse, row) = (solution.rows_n_s[row], &ties.rows[row]);
+        for (contact, row) in contact_rows.spins(constraints) {
+            let (impulse, row) = (solution.rows_n_s[row], &constraints.rows[row]);
             let owner = &mut search.owners[contact];
             let (normal, pressed) = (search.contacts[contact].normal, row.pressed.map_or(0.0, |by| by.reach_m));
             let most = pressed * solution.contacts_n_s[contact].dot(normal);
-            let [a, b] =
-                row.sides.map(|side| crate::member::state::velocity(&side, |member| &progress[member].solved[..]));
+            let [a, b] = row.sides.map(|side| velocity(&side, |member| &progress[member].v_solved[..]));
             owner.spin.owed_rad = row.owed_slip_after(impulse, a - b, most, h_s).dot(normal);
             owner.spin.torque_n_m = impulse.dot(normal) / h_s;
-            outside.note(all, owner.member, &row.sides[1], -impulse);
+            external.note(all, owner.member, &row.sides[1], -impulse);
         }
     }
 }

@@ -257,7 +257,7 @@ impl Cluster {
             // velocities and skin are those of its last step
             let penalty = Penalty { stiffness_n_m, damping_n_s_m, extrapolate, dt_s };
             for other in context.neighbours {
-                overlaps.push_off(&list[0], other, &penalty, &mut stepper.outside().known);
+                overlaps.push_off(&list[0], other, &penalty, &mut stepper.external().known);
             }
         }
         stepper.step(scene, &mut list, dt, &PlainLoop)?;
