@@ -90,7 +90,7 @@ const DENIED: [&str; 29] = [
 const RINGS: [(&str, usize); 18] = [
     ("agents/core", 0),
     ("agents/geometry", 14),
-    ("agents/contact", 4),
+    ("agents/contact", 2),
     ("agents/models", 17),
     ("crates/runtime", 15),
     ("crates/world", 20),

@@ -51,7 +51,6 @@ mod impact;
 pub mod inputs;
 pub mod joint;
 pub mod law;
-pub mod laws;
 pub mod member;
 pub mod push_out;
 pub mod remote;

@@ -4,7 +4,7 @@
 //! Theory: docs/theory/clusters.md, eq. 29; docs/theory/rod.md, eq. 21.
 
 use crate::cluster::{Hold, JointRow, Side, Spring};
-use crate::constraint::yielding::SLIP_SHARE;
+use crate::constraint::failure::SLIP_SHARE;
 use crate::constraint::{ConstraintRows, FineStep, Frame, Name, Pull, Slides, SlidingRow};
 use crate::member::memory::Partner;
 use crate::member::{ClusterMember, OwnSpring};

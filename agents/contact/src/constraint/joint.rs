@@ -1,7 +1,7 @@
 //! Joints of rigid bodies as rows of the cluster's problem.
 //!
 //! In: the joints of a scene, poses of participants. Out: rows whose targets bring both bodies to where the joint holds them at the
-//! end of the step, by the poses that they will then have. Never here: springs (`springs.rs`), contacts.
+//! end of the step, by the poses that they will then have. Never here: springs (`spring.rs`), contacts.
 //!
 //! A row knows velocities: held at zero, they let whatever turns drift off by ω² h² of its arm in each step, and lose what taking
 //! that back takes. So a target contains how far the joint would be off after the step, for velocities near the answer: those of the
@@ -14,8 +14,7 @@ use crate::constraint::{ConstraintRows, End, FineStep, Frame, Name, Pull, RowOwn
 use crate::detect::ClusterScene;
 use crate::joint::{Joint, JointKind};
 use crate::member::memory::Partner;
-use crate::member::participant::place_of;
-use crate::member::state::velocity;
+use crate::member::participant::{place_of, velocity};
 use crate::member::{ClusterMember, MaterialPoint, Participant, Pose};
 use crate::push_out::PUSH_OUT_MAX_M_S;
 use glam::{DQuat, DVec3};

@@ -4,27 +4,25 @@
 
 mod attachment;
 pub(crate) mod contact_rows;
+pub(crate) mod failure;
 pub(crate) mod geometric_stiffness;
 pub(crate) mod joint;
 pub(crate) mod link;
 mod motor;
 pub(crate) mod spring;
-pub(crate) mod tearing;
-pub(crate) mod yielding;
 
 use crate::cluster::{Hold, JointRow, Side};
 use crate::law::Link;
 use crate::member::memory::Partner;
-use crate::member::state::{Progress, velocity};
+use crate::member::participant::{Progress, velocity};
 use crate::member::{ClusterMember, MaterialPoint, Participant, Pose};
+pub use failure::{Torn, Yielded};
 use glam::DQuat;
 use glam::DVec3;
 pub use joint::JointTotal;
 use metachron_core::Anchor;
 use metachron_core::{AgentId, Grip};
 use metachron_geometry::narrow_phase::TouchKey;
-pub use tearing::Torn;
-pub use yielding::Yielded;
 
 /// A fine step as rows are laid out for it.
 #[derive(Clone, Copy)]

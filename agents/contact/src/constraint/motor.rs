@@ -1,7 +1,7 @@
 //! Motors of hinges and slides as rows of the cluster's problem.
 //!
 //! In: what a motor drives its joint to, where the joint is. Out: a row that gives at most what the motor may. Never here: joints' own
-//! rows (`joints.rs`). Theory: docs/theory/clusters.md, section 8.
+//! rows (`joint.rs`). Theory: docs/theory/clusters.md, section 8.
 
 use crate::cluster::{Hold, JointRow, Side, Spring};
 use crate::constraint::{ConstraintRows, FineStep, RowOwner};

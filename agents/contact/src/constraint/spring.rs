@@ -1,6 +1,6 @@
 //! Springs between two points, the springs of users and grasps, drives: rows that are implicit at both ends, whatever the ends are.
 //!
-//! In: what members see of springs on them, what drives them. Out: rows. Never here: contacts, links (`links.rs`), joints.
+//! In: what members see of springs on them, what drives them. Out: rows. Never here: contacts, links (`link.rs`), joints.
 //! Theory: docs/theory/clusters.md, eq. 14.
 
 use crate::AnchorSpring;

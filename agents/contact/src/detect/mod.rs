@@ -3,29 +3,27 @@
 //! In: members with the velocities they have and would have. Out: contacts of the problem, each with its name. Never here: impulses.
 //! Theory: docs/theory/clusters.md, section 9.
 
-mod boxes;
 pub(crate) mod domain;
-mod facing;
 mod pair;
+mod reach;
 mod scene;
 mod sensor;
-mod sweep;
 mod thinning;
 
 use crate::cluster::Contact;
 use crate::detect::domain::Domain;
 use crate::member::memory::{Partner, Spin};
 use crate::member::{ClusterMember, Role};
-use boxes::Boxes;
-use facing::{Skinned, closes, taken_up};
 use glam::DVec3;
 use metachron_geometry::narrow_phase::{NarrowPhaseScratch, TouchKey, self_touches, touches};
 use metachron_geometry::{CollisionShape, Place, Touch};
 use pair::{Against, LOOK_M, Pair, Reaching};
 pub(crate) use pair::{Judge, Owner, Round};
+use pair::{Skinned, closes, taken_up};
+use reach::Boxes;
+use reach::{FAR_M, Meeting, Sought, Sweep, Sweeping};
 pub use scene::{BadDepth, ClusterScene, DEPTH_RANGE_M, Passage};
 pub(crate) use sensor::Sensed;
-use sweep::{FAR_M, Meeting, Sought, Sweep, Sweeping};
 use thinning::Thinning;
 
 /// How many steps ahead bodies look for each other.

@@ -4,7 +4,7 @@
 //! Never here: forces, how often a pair has touched (`../memory.rs`).
 
 use crate::detect::pair::{Against, MET_M, Pair, Reaching, Round};
-use crate::detect::sweep::FAR_M;
+use crate::detect::reach::FAR_M;
 use crate::detect::{Meeting, Passage, Search};
 use crate::member::ClusterMember;
 use crate::member::memory::Partner;

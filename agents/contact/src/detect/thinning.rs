@@ -19,7 +19,7 @@ const EQUAL_M: f64 = 1e-6;
 
 /// Where contacts of a pair move with the same few nodes along the same axis.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
-pub(crate) struct Patch {
+pub(super) struct Patch {
     member: usize,
     partner: Partner,
     /// The cells that carry the places of both sides; `None` for a side whose places move each by itself.
@@ -30,7 +30,7 @@ pub(crate) struct Patch {
 
 /// Reusable storage, and what was thinned.
 #[derive(Default)]
-pub(crate) struct Thinning {
+pub(super) struct Thinning {
     /// The patch of each contact of the pair; `None` where no cell carries it.
     patches: Vec<Option<Patch>>,
     /// What each of them bore in the last step, N.

@@ -9,8 +9,8 @@ use crate::cluster::{Contact, JointRow, Report, Settings, Side, Solution, Solver
 use crate::constraint::{ConstraintRows, contact_rows, is_rigid};
 use crate::detect::{Owner, Search};
 use crate::member::memory::Partner;
+use crate::member::participant::{Progress, velocity};
 use crate::member::problem::{Posed, ProblemMembers, Velocities};
-use crate::member::state::{Progress, velocity};
 use crate::member::{ClusterMember, Participant, Role};
 use crate::push_out::PUSH_OUT_SHARE;
 use glam::DVec3;

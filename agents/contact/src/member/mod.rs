@@ -6,7 +6,6 @@ pub(crate) mod guarded;
 pub(crate) mod memory;
 pub(crate) mod participant;
 pub(crate) mod problem;
-pub(crate) mod state;
 
 use crate::StepContext;
 use crate::cluster::{Block, Response, Side};

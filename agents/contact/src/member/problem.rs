@@ -5,7 +5,7 @@
 
 use crate::cluster::{Contact, JointRow, Member, Problem, ProblemError, Report, Response, Solver, StepForm};
 use crate::member::guarded::Lent;
-use crate::member::state::Progress;
+use crate::member::participant::Progress;
 use crate::member::{ClusterMember, GuardedMember, Participant};
 use glam::DVec3;
 use metachron_core::{ParallelFor, StepError, recycled};

@@ -6,6 +6,7 @@
 use crate::{Neighbour, StepContext};
 use glam::DVec3;
 use metachron_core::{AgentId, Impulse, Ledger, SimTime, Site, Snapshot};
+use metachron_core::{PairKind, PairState};
 
 /// The ledgers of one agent.
 #[derive(Debug, Clone, Default, serde::Serialize, serde::Deserialize)]
@@ -200,4 +201,13 @@ fn copy<'a>(from: impl Iterator<Item = &'a Ledger>, into: &mut Vec<Ledger>) {
         count += 1;
     }
     into.truncate(count);
+}
+
+/// The state of a pair, made where it is new.
+pub(crate) fn state_of(states: &mut Vec<PairState>, with: AgentId, kind: PairKind) -> &mut PairState {
+    let place = states.binary_search_by_key(&with, |state| state.with).unwrap_or_else(|place| {
+        states.insert(place, PairState::new(with, kind));
+        place
+    });
+    &mut states[place]
 }

@@ -4,9 +4,10 @@
 //! of a line ([`crate::laws`]), the other end: it does the same for itself. Theory: docs/theory/coupling.md, eq. 10 to 11.
 
 use crate::cluster::{Hold, Side};
-use crate::laws::{Line, LineLaw, LineStep};
 use crate::member::{ClusterMember, Participant};
-use crate::remote::{PublishedShape, state_of};
+use crate::remote::ledgers::state_of;
+use crate::remote::published_shape::PublishedShape;
+use crate::remote::transmission_line::{Line, LineLaw, LineStep};
 use crate::step::{ClusterStepper, KnownImpulse, LineRow};
 use crate::{Law, Link, Neighbour};
 use glam::DVec3;

@@ -7,8 +7,8 @@
 use crate::Neighbour;
 use crate::cluster::{Block, Side, SideTerm};
 use crate::member::{ClusterMember, MaterialPoint, Role};
+use crate::remote::local::invert;
 use crate::remote::published_shape::PublishedShape;
-use crate::remote::weighing::invert;
 use glam::{DMat3, DVec3};
 use metachron_core::{AgentId, Anchor, Body, Impulse, Inertia, LocalBlock, LocalModel, SimTime, Site, StepError};
 use metachron_geometry::{CollisionShape, ContactSide, Place, PlacedShape, ShapeKind};

@@ -10,17 +10,18 @@
 //!
 //! A step that is not made has taken nothing: the next join finds the same.
 
-mod blocks;
 mod ledgers;
 mod lines;
 mod local;
 mod member;
 mod published_shape;
-mod weighing;
+mod transmission_line;
 
 use crate::cluster::Side;
 use crate::member::memory::Partner;
 use crate::member::{ClusterMember, ContactMemory, Participant};
+use crate::remote::ledgers::state_of;
+use crate::remote::local::Scratch;
 use crate::step::{ClusterStepper, KnownImpulse};
 use crate::{Law, Neighbour, StepContext};
 pub use ledgers::{GivenAt, Ledgers, TakenImpulse, acknowledged};
@@ -32,11 +33,10 @@ use glam::DVec3;
 use lines::Lines;
 use metachron_core::archive_values;
 use metachron_core::{
-    AgentId, Anchor, Archive, ArchiveError, Body, Grip, Impulse, LocalModel, LocalPartner, PairKind, PairState,
-    SimTime, Site, Snapshot,
+    AgentId, Archive, ArchiveError, Body, Grip, Impulse, LocalModel, LocalPartner, PairKind, PairState, SimTime, Site,
+    Snapshot,
 };
-use metachron_geometry::Touch;
-use metachron_geometry::narrow_phase::NarrowPhaseScratch;
+
 use std::sync::Arc;
 
 /// The share of its weight from which on a force counts as bearing a body.
@@ -68,17 +68,6 @@ pub struct Pairs {
     /// one that was held.
     weight: Vec<DVec3>,
     scratch: Scratch,
-}
-
-/// Reusable storage.
-#[derive(Default)]
-struct Scratch {
-    blocks: Vec<usize>,
-    goes_on: Vec<DVec3>,
-    carried: Vec<DVec3>,
-    shape: PublishedShape,
-    narrow: NarrowPhaseScratch,
-    touches: Vec<Touch>,
 }
 
 /// The partners of a cluster's members that are met in its problem.
@@ -240,11 +229,11 @@ impl Pairs {
                     list.get_mut(term.block).into_iter().for_each(|sum| *sum += term.map.transpose() * impulse);
                 }
             };
-            blocks::visit_sides(&one.member, taken.site, taken.impulse, |side, impulse| {
+            local::visit_sides(&one.member, taken.site, taken.impulse, |side, impulse| {
                 known.push(KnownImpulse { member: place, side, impulse });
                 add(sums, &side, impulse);
             });
-            blocks::visit_sides(&one.member, taken.site, taken.carried, |side, way| add(carried, &side, way));
+            local::visit_sides(&one.member, taken.site, taken.carried, |side, way| add(carried, &side, way));
         });
         for ((way, sum), weight) in carried.iter_mut().zip(&*sums).zip(&*weight) {
             let force = *sum / dt_s;
@@ -300,7 +289,7 @@ impl Pairs {
         model.blocks.clear();
         let mut partners = 0;
         for other in context.neighbours.iter().filter(|other| !other.computed_here && by_ledger(&context, other)) {
-            blocks::find(one, other, stepper.macro_s(), scratch);
+            local::find_blocks(one, other, stepper.macro_s(), scratch);
             partner_mut(model, partners, other.id).read = ledgers.read_of(other.id).unwrap_or(SimTime::ZERO);
             partners += 1;
         }
@@ -318,7 +307,7 @@ impl Pairs {
             partner.forces.clear();
             partner.forces.resize(blocks.len(), DVec3::ZERO);
             let add = |site: Site, force: Impulse, list: &mut [DVec3]| {
-                blocks::visit_sides(&one.member, site, force, |side, force| {
+                local::visit_sides(&one.member, site, force, |side, force| {
                     for term in side.terms() {
                         if let Ok(at) = blocks.binary_search(&term.block) {
                             list[at] += term.map.transpose() * force;
@@ -386,15 +375,6 @@ fn partner_mut(model: &mut LocalModel, at: usize, id: AgentId) -> &mut LocalPart
     partner
 }
 
-/// The state of a pair, made where it is new.
-fn state_of(states: &mut Vec<PairState>, with: AgentId, kind: PairKind) -> &mut PairState {
-    let place = states.binary_search_by_key(&with, |state| state.with).unwrap_or_else(|place| {
-        states.insert(place, PairState::new(with, kind));
-        place
-    });
-    &mut states[place]
-}
-
 /// The site of a body that a slot is about, with the impulse there.
 fn site_of(body: &Body, slot: u32, impulse: DVec3) -> Option<(Site, Impulse)> {
     let (linear, angular) =
@@ -411,14 +391,5 @@ fn site_of(body: &Body, slot: u32, impulse: DVec3) -> Option<(Site, Impulse)> {
             }
             Some((Site::Arc(0.5 * (here + curve.arc_m.get(at + 1)?)), angular))
         }
-    }
-}
-
-/// The material point of a site.
-fn anchor_of(site: Site) -> Anchor {
-    match site {
-        Site::Whole => Anchor::Local(DVec3::ZERO),
-        Site::Arc(arc_m) => Anchor::Arc(arc_m),
-        Site::Vertex(vertex) => Anchor::Vertex(vertex),
     }
 }

@@ -3,6 +3,7 @@
 //! In: published bodies, velocities. Out: placed skins, points, which slots an impulse at a site acts on. Never here: how it answers impulses.
 
 use glam::{DQuat, DVec3};
+use metachron_core::Anchor;
 use metachron_core::{Body, Impulse, LocalBlock, Site};
 use metachron_geometry::{CollisionShape, Place, PlacedShape, ShapeKind, ShapePose};
 
@@ -141,5 +142,14 @@ impl PublishedShape {
                 visit(slot + 2, impulse.linear * share);
             }
         }
+    }
+}
+
+/// The material point of a site.
+pub(crate) fn anchor_of(site: Site) -> Anchor {
+    match site {
+        Site::Whole => Anchor::Local(DVec3::ZERO),
+        Site::Arc(arc_m) => Anchor::Arc(arc_m),
+        Site::Vertex(vertex) => Anchor::Vertex(vertex),
     }
 }

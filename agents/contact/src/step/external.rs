@@ -6,8 +6,8 @@
 use crate::cluster::{Hold, JointRow, Side};
 use crate::constraint::{ConstraintRows, FineStep, RowOwner};
 use crate::member::memory::Partner;
+use crate::member::participant::Progress;
 use crate::member::problem::respond;
-use crate::member::state::Progress;
 use crate::member::{ClusterMember, Participant};
 use glam::DVec3;
 
@@ -77,7 +77,7 @@ impl ExternalImpulses {
     }
 
     /// Begins a macro step, for the first time or again.
-    pub(crate) fn begin(&mut self) {
+    pub(super) fn begin(&mut self) {
         self.given.clear();
         self.line_impulses.clear();
         self.line_impulses.resize(self.lines.len(), DVec3::ZERO);
@@ -86,7 +86,7 @@ impl ExternalImpulses {
     /// Lets what acts on the participant at `place` act in its own step of `own_s` seconds within a macro step of `macro_s`: the known
     /// impulses on it and the forces of users, Jᵀ of them. What knows how it answers takes the velocities that they make; what leaves that to
     /// the cluster takes them as momentum.
-    pub(crate) fn act(
+    pub(super) fn act(
         &mut self,
         place: usize,
         one: &Participant<'_>,
@@ -125,7 +125,7 @@ impl ExternalImpulses {
     }
 
     /// Adds what contacts or rows gave a side of theirs, where it is that of a remote member.
-    pub(crate) fn note(&mut self, all: &[Participant<'_>], by: usize, side: &Side, impulse: DVec3) {
+    pub(super) fn note(&mut self, all: &[Participant<'_>], by: usize, side: &Side, impulse: DVec3) {
         if side.terms().is_empty() || impulse == DVec3::ZERO || !all[side.member].member.is_remote() {
             return;
         }
@@ -144,14 +144,14 @@ impl ExternalImpulses {
     }
 
     /// Adds what rows of lines gave.
-    pub(crate) fn note_line(&mut self, owner: &RowOwner, impulse: DVec3) {
+    pub(super) fn note_line(&mut self, owner: &RowOwner, impulse: DVec3) {
         if let Partner::Line(number) = owner.partner {
             self.line_impulses[number as usize] += impulse;
         }
     }
 
     /// Adds what lines give in a fine step of `h_s` seconds at ends that move as they are led: no unknown, as nothing changes how they move.
-    pub(crate) fn give_led(&mut self, h_s: f64) {
+    pub(super) fn give_led(&mut self, h_s: f64) {
         for (line, given) in self.lines.iter().zip(&mut self.line_impulses).filter(|(line, _)| line.is_led()) {
             let asked = line.hold.held_part(line.target_m_s * (line.resistance_n_s_m * h_s));
             *given += asked.clamp_length_max(line.hold.most_n_s(asked));

@@ -3,119 +3,87 @@
 //! In: members at one common time, the static solids, what members remember of each other. Out: members a macro step later.
 //! Never here: which bodies belong to a cluster, threads, clocks. Theory: docs/theory/clusters.md, section 9.
 //!
-//! plan      how many steps each member makes within the macro step; more where its free motion would strain it
-//! begin     members whose step begins: matrix and velocities without contact
-//! seen      velocities with the impulses that each has been given since its step began
-//! search    places that may close; which members are a rigid pile, that rapier3d steps
-//! tie       springs, links, joints
-//! solve     one problem for all; again with the places that bodies struck would pass, and until joints hold where bodies will be
-//! rebound   contacts that close fast, by their restitution
-//! divide    where the solution strains a member too far, all begins again in shorter steps
-//! end       members move; those whose step ends take its velocities
-//! yield     attachments that gave all that they may hold from then on where they have come to
-//! tear      attachments that gave more than they can bear are gone from the next macro step on
+//! plan        how many steps each member makes within the macro step; more where its free motion would strain it
+//! begin       members whose step begins: matrix and velocities without contact; of all, the velocities predicted without the impulses sought
+//! detect      places that may close; which members are a rigid pile, that rapier3d steps
+//! assemble    rows of springs, links, lines and joints
+//! warm start  contacts begin from the impulses of the last step
+//! solve       one problem for all; again with the places that bodies struck would pass, and until joints hold where bodies will be; then contacts
+//!             that close fast rebound
+//! (plan)      where the solution strains a member too far, all begins again in shorter steps
+//! record      impulses that the next step starts from, sums of pairs, what yielded
+//! integrate   members move; those whose step ends take its velocities
+//! tear        attachments that gave more than they can bear are gone from the next macro step on
 
-mod divide;
 mod doubling;
 mod external;
-mod pair_total;
+mod phases;
 mod plan;
-mod restart;
+mod record;
+mod report;
 mod rigid_pile;
 mod solve;
-mod stiffness;
-mod warm_start;
 
-use crate::cluster::{DEPTH_DEFAULT_M, Level, Settings, Solver, multiply};
+use crate::cluster::{DEPTH_DEFAULT_M, Settings, Solver};
 use crate::constraint::contact_rows::ContactRows;
+use crate::constraint::failure::{Tearing, Torn, Yielded, Yielding};
 use crate::constraint::joint::Joints;
-use crate::constraint::tearing::Tearing;
-use crate::constraint::yielding::Yielding;
-use crate::constraint::{ConstraintRows, FineStep, JointTotal, Torn, Yielded};
-use crate::detect::{ClusterScene, Judge, Round, Search};
+use crate::constraint::{ConstraintRows, JointTotal};
+use crate::detect::{ClusterScene, Search};
 use crate::impact::Impacts;
+use crate::member::participant::Progress;
 use crate::member::problem::ProblemMembers;
-use crate::member::state::Progress;
 use crate::member::{ClusterMember, ContactMemory, Participant, Role};
-use divide::times;
 pub use doubling::StepDoubling;
 pub use external::{ExternalImpulses, KnownImpulse, LineRow, RemoteImpulse};
 use glam::DVec3;
-use metachron_core::parallel::for_each;
 use metachron_core::{Archive, ArchiveError, ParallelFor, SimSpan, StepError, Wrench, check_span};
-pub use pair_total::PairTotal;
 pub use plan::Plan;
-use rigid_pile::{RigidPile, Sums};
+pub use report::{ClusterReport, PairTotal};
+use rigid_pile::RigidPile;
 use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
 
 /// The surroundings of a macro step, and the threads that make it.
 #[derive(Clone, Copy)]
-pub(crate) struct On<'a> {
+struct On<'a> {
     pub scene: &'a ClusterScene,
     pub threads: &'a dyn ParallelFor,
-}
-
-/// What a macro step was.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub struct ClusterReport {
-    /// Fine steps that it was made in.
-    pub fine_steps: u32,
-    /// Contacts of the last fine step, those that bear nothing included.
-    pub contacts: u32,
-    /// Those of them that are a rigid pile's, which rapier3d has; all others are the problem's.
-    pub pile_contacts: u32,
-    /// Factors of the coupled matrix in all fine steps.
-    pub factors: u32,
-    /// Products of conjugate gradients in all fine steps: of the iterative form, which makes no factors.
-    pub products: u32,
-    /// Solves in all fine steps.
-    pub solves: u32,
-    /// Those of them that ended within interior points, before all laws held.
-    pub unfinished: u32,
-    /// The dearest level of a solve.
-    pub level: Level,
-    /// What laws and momentum miss at most by the answer of any solve, m/s (clusters.md, eq. 9).
-    pub miss_m_s: f64,
-    /// The deepest overlap seen, metres.
-    pub depth_m: f64,
-    /// Work of all members, in the unit of [`metachron_core::StepReport::work`].
-    pub work: f64,
 }
 
 /// Steps clusters one after the other, and keeps structure and storage between them.
 pub struct ClusterStepper {
     /// How deep contacts rest in the scene of the macro step that is made, metres.
-    pub(crate) depth_m: f64,
+    depth_m: f64,
     pub(crate) solver: Solver,
-    pub(crate) search: Search,
-    pub(crate) constraints: ConstraintRows,
-    pub(crate) joints: Joints,
-    pub(crate) contact_rows: ContactRows,
+    search: Search,
+    constraints: ConstraintRows,
+    joints: Joints,
+    contact_rows: ContactRows,
     pub(crate) progress: Vec<Progress>,
-    pub(crate) members: ProblemMembers,
-    pub(crate) totals: Vec<PairTotal>,
+    members: ProblemMembers,
+    totals: Vec<PairTotal>,
     /// What contacts gave each participant in the macro step, N·s and N·m·s.
-    pub(crate) wrenches: Vec<Wrench>,
-    pub(crate) efforts: Vec<JointTotal>,
-    pub(crate) tearing: Tearing,
-    pub(crate) yielding: Yielding,
+    wrenches: Vec<Wrench>,
+    efforts: Vec<JointTotal>,
+    tearing: Tearing,
+    yielding: Yielding,
     /// What participants remembered when the macro step began.
-    pub(crate) kept: Vec<ContactMemory>,
+    kept: Vec<ContactMemory>,
     /// Whether that is of this macro step, and members have kept their states.
-    pub(crate) is_kept: bool,
-    pub(crate) impacts: Impacts,
-    pub(crate) pile: RigidPile,
-    pub(crate) external: ExternalImpulses,
+    is_kept: bool,
+    impacts: Impacts,
+    pile: RigidPile,
+    external: ExternalImpulses,
     /// Storage of local models, and of how the sides of contacts are moved.
     pub(crate) local: [Vec<DVec3>; 2],
-    pub(crate) moved_m_s: Vec<DVec3>,
+    moved_m_s: Vec<DVec3>,
     /// The macro step that is made and its fine steps, seconds.
     pub(crate) macro_s: f64,
     pub(crate) fine_s: f64,
     /// How many times as many fine steps joints ask for that do not hold, or in which bodies turn too far.
-    pub(crate) joints_ask: u32,
+    joints_ask: u32,
     /// What joints missed in this macro step when they did not hold last, metres or radians.
-    pub(crate) joints_missed_m: f64,
+    joints_missed_m: f64,
 }
 
 impl Default for ClusterStepper {
@@ -233,25 +201,6 @@ impl ClusterStepper {
         Ok(report)
     }
 
-    /// Begins the first step of every member, in as many parts as its free motion needs.
-    fn plan(&mut self, all: &mut [Participant<'_>], dt_s: f64, threads: &dyn ParallelFor) -> Result<(), StepError> {
-        for_each(threads, all, &mut self.progress, &Participant::size, &|one, state| {
-            let own_s = dt_s / f64::from(one.parts);
-            one.member.look(&one.context, dt_s);
-            state.begin(&mut one.member, own_s);
-            let more = times(one.member.strain(one.member.free(), own_s));
-            state.parts = one.parts * more;
-            state.begun_s = if more == 1 { own_s } else { 0.0 };
-        });
-        self.first_failure()
-    }
-
-    /// The failure of the first participant that has failed in what all did at the same time.
-    fn first_failure(&mut self) -> Result<(), StepError> {
-        let failures = self.progress.iter_mut().map(|state| state.failure.take());
-        failures.fold(None, Option::or).map_or(Ok(()), Err)
-    }
-
     /// Makes all fine steps of a macro step; false where it was left because a member needs shorter steps.
     fn advance(
         &mut self,
@@ -300,32 +249,6 @@ impl ClusterStepper {
             self.pile.place(all);
         }
         Ok(true)
-    }
-
-    /// Finds where members may touch, but for those that are a rigid pile: their contacts are not the problem's.
-    fn detect(&mut self, scene: &ClusterScene, all: &[Participant<'_>], h_s: f64) {
-        let Self { search, pile, progress, .. } = self;
-        let round = Round { scene, all, progress, h_s, judge: Judge::Predicted };
-        if pile.go_on(scene, all) {
-            search.find(&round, pile.domains());
-            pile.end_if_touched(search);
-        }
-        if !pile.is_on() {
-            search.find(&round, &[]);
-            pile.begin(scene, all, search);
-            if pile.is_on() {
-                search.find(&round, pile.domains());
-            }
-        }
-        search.sense(&round);
-    }
-
-    /// Steps a rigid pile from the velocities that its members have without contact.
-    fn step_pile(&mut self, all: &[Participant<'_>], h_s: f64, report: &mut ClusterReport) -> Result<(), StepError> {
-        self.pile
-            .step(all, &mut self.progress, h_s, Sums { totals: &mut self.totals, wrenches: &mut self.wrenches })?
-            .add_to(report);
-        Ok(())
     }
 
     /// What pairs and links gave in the last macro step, by participants and partners.
@@ -383,68 +306,5 @@ impl ClusterStepper {
     /// Pairs of participants of the last step that are near each other, by their places in its list.
     pub fn near(&self) -> &[[usize; 2]] {
         &self.search.near
-    }
-
-    /// Begins the steps of members that are at the end of one, and finds what all others see of each other (eq. 24).
-    fn begin(&mut self, all: &mut [Participant<'_>], h_s: f64, threads: &dyn ParallelFor) -> Result<(), StepError> {
-        for_each(threads, all, &mut self.progress, &Participant::size, &|one, state| {
-            let own_s = h_s * f64::from(state.share);
-            if state.part == 0 && state.begun_s != own_s {
-                state.begin(&mut one.member, own_s);
-            }
-        });
-        self.first_failure()?;
-        for (place, (one, state)) in all.iter().zip(&mut self.progress).enumerate() {
-            if state.part == 0 {
-                let own_s = h_s * f64::from(state.share);
-                state.begun_s = 0.0;
-                state.start(&one.member);
-                self.external.act(place, one, [own_s, self.macro_s], state);
-            }
-            state.part += 1;
-            state.look(&one.member);
-        }
-        Ok(())
-    }
-
-    /// Lays out springs, links and joints of a fine step that begins `after_s` seconds into the macro step.
-    fn assemble(&mut self, scene: &ClusterScene, all: &[Participant<'_>], h_s: f64, after_s: f64) {
-        let Self { constraints, joints, progress, depth_m, .. } = self;
-        constraints.clear();
-        let step = FineStep { all, progress, h_s, after_s, joint_miss_m: solve::joint_miss_m(*depth_m) };
-        constraints.gather_springs(&step);
-        constraints.gather_own_springs(&step);
-        constraints.gather_links(&step);
-        constraints.gather_lines(&step, &self.external.lines);
-        self.external.give_led(h_s);
-        joints.gather(scene, &step, constraints);
-        constraints.add_inertia(&step);
-    }
-
-    /// Moves all members; the step of some ends (eq. 26, 27).
-    fn integrate(&mut self, all: &mut [Participant<'_>], h_s: f64, threads: &dyn ParallelFor) -> Result<(), StepError> {
-        for_each(threads, all, &mut self.progress, &Participant::size, &|one, state| {
-            let since_s = h_s * f64::from(state.part);
-            if state.part < state.share {
-                one.member.move_to(&state.v_before, since_s);
-            } else {
-                one.member.leave(&state.unanswered);
-                state.failure = one.member.end(&state.v_before, since_s, state.touched).err();
-                if state.failure.is_none() && !state.dx_impacts.is_empty() {
-                    // by the impulses that move it so far; how it has gone is not needed any more
-                    multiply(one.member.blocks(), &state.dx_impacts, &mut state.v_mean);
-                    one.member.carry(&state.v_mean);
-                }
-                state.part = 0;
-            }
-        });
-        self.first_failure()?;
-        let Self { progress, tearing, .. } = self;
-        for (place, (one, state)) in all.iter().zip(progress).enumerate() {
-            if state.part == 0 {
-                tearing.note_own(place, &one.member, h_s * f64::from(state.share));
-            }
-        }
-        Ok(())
     }
 }

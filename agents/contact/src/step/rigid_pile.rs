@@ -8,11 +8,9 @@
 use crate::detect::domain::{Domain, assign};
 use crate::detect::{ClusterScene, Search};
 use crate::member::memory::Partner;
-use crate::member::participant::place_of;
-use crate::member::state::Progress;
+use crate::member::participant::{Progress, place_of};
 use crate::member::{ClusterMember, Locked, Participant};
-use crate::step::pair_total::total_of;
-use crate::step::{ClusterReport, PairTotal};
+use crate::step::report::{ClusterReport, PairTotal, total_of};
 use glam::{DMat3, DQuat, DVec3};
 use metachron_core::{AgentId, Archive, ArchiveError, StepError, Wrench, archive_values};
 use metachron_geometry::narrow_phase::StaticSolid;
@@ -43,7 +41,7 @@ const STIFF: SpringCoefficients<f32> = SpringCoefficients { natural_frequency: 3
 
 /// The rigid pile of a cluster, if it has one.
 #[derive(Default)]
-pub(crate) struct RigidPile {
+pub(super) struct RigidPile {
     world: Option<Box<World>>,
     /// Of each member; without meaning where there is no heap.
     domains: Vec<Domain>,
@@ -51,13 +49,13 @@ pub(crate) struct RigidPile {
 
 /// What a step of a rigid pile was.
 #[derive(Debug, Clone, Copy, Default)]
-pub(crate) struct PileReport {
+pub(super) struct PileReport {
     pub contacts: usize,
     pub depth_m: f64,
 }
 
 /// Where the rigid pile adds what its contacts gave.
-pub(crate) struct Sums<'a> {
+pub(super) struct Sums<'a> {
     /// Of pairs.
     pub totals: &'a mut Vec<PairTotal>,
     /// Of participants, by their places.

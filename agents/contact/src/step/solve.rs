@@ -3,14 +3,15 @@
 //! In: members with what they see, places, rows. Out: every member's impulses. Never here: how places are found, how rows are laid out.
 //! Theory: docs/theory/clusters.md, section 9.
 
-use crate::cluster::{Level, Report};
 use crate::constraint::joint::Aimed;
 use crate::detect::{Judge, Round};
 use crate::impact::SolvedStep;
+use crate::member::participant::Progress;
 use crate::member::problem::{Posed, Velocities};
-use crate::member::state::Progress;
 use crate::member::{ClusterMember, Participant, Role};
-use crate::step::{ClusterReport, ClusterStepper, On, times};
+use crate::step::plan::times;
+use crate::step::report::ClusterReport;
+use crate::step::{ClusterStepper, On};
 use glam::DVec3;
 use metachron_core::{ParallelFor, StepError};
 
@@ -25,14 +26,14 @@ const MISS_SHRINKS: f64 = 0.7;
 const TURN_MAX_RAD: f64 = 0.15;
 
 /// By how much a joint that holds may be off where contacts are `depth_m` deep, metres.
-pub(crate) fn joint_miss_m(depth_m: f64) -> f64 {
+pub(super) fn joint_miss_m(depth_m: f64) -> f64 {
     JOINT_SHARE * depth_m
 }
 
 impl ClusterStepper {
     /// Solves the problem of a fine step, and again while bodies would pass through each other where nobody looked; gives every member
     /// its impulses (eq. 25).
-    pub(crate) fn solve(
+    pub(super) fn solve(
         &mut self,
         on: On<'_>,
         all: &[Participant<'_>],
@@ -195,17 +196,5 @@ impl ClusterStepper {
         progress.iter_mut().filter(|state| state.bears).for_each(Progress::hold);
         report.contacts = search.contacts.len() as u32;
         report.depth_m = search.contacts.iter().map(|contact| -contact.gap_m).fold(report.depth_m, f64::max);
-    }
-}
-
-impl ClusterReport {
-    /// Counts a solve.
-    pub(crate) fn add(&mut self, took: &Report) {
-        self.factors += took.factors as u32;
-        self.products += took.products as u32;
-        self.solves += 1;
-        self.unfinished += u32::from(took.level == Level::Interior);
-        self.level = self.level.max(took.level);
-        self.miss_m_s = self.miss_m_s.max(took.miss_m_s);
     }
 }

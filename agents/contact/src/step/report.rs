@@ -1,9 +1,37 @@
-//! What pairs of a cluster and links gave in a macro step.
+//! The account of a macro step: of all of it, of each pair, of each participant.
 //!
-//! In: impulses of contacts and rows. Out: a sum of each pair, by participants and partners. Never here: which rows there are, the solve.
+//! In: impulses of contacts and rows, reports of solves. Out: sums, by participants and partners. Never here: which rows there are, the solve.
 
+use crate::cluster::{Level, Report};
 use crate::member::memory::Partner;
 use glam::DVec3;
+
+/// What a macro step was.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct ClusterReport {
+    /// Fine steps that it was made in.
+    pub fine_steps: u32,
+    /// Contacts of the last fine step, those that bear nothing included.
+    pub contacts: u32,
+    /// Those of them that are a rigid pile's, which rapier3d has; all others are the problem's.
+    pub pile_contacts: u32,
+    /// Factors of the coupled matrix in all fine steps.
+    pub factors: u32,
+    /// Products of conjugate gradients in all fine steps: of the iterative form, which makes no factors.
+    pub products: u32,
+    /// Solves in all fine steps.
+    pub solves: u32,
+    /// Those of them that ended within interior points, before all laws held.
+    pub unfinished: u32,
+    /// The dearest level of a solve.
+    pub level: Level,
+    /// What laws and momentum miss at most by the answer of any solve, m/s (clusters.md, eq. 9).
+    pub miss_m_s: f64,
+    /// The deepest overlap seen, metres.
+    pub depth_m: f64,
+    /// Work of all members, in the unit of [`metachron_core::StepReport::work`].
+    pub work: f64,
+}
 
 /// What a pair of bodies, or a link, gave in a macro step.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -33,7 +61,7 @@ pub struct PairTotal {
 
 impl PairTotal {
     /// Adds the impulse of a contact or of a link's row.
-    pub(crate) fn add(&mut self, impulse_n_s: DVec3, depth_m: f64) {
+    pub(super) fn add(&mut self, impulse_n_s: DVec3, depth_m: f64) {
         self.impulse_n_s += impulse_n_s;
         self.depth_m = self.depth_m.max(depth_m);
         self.contacts += 1;
@@ -41,7 +69,7 @@ impl PairTotal {
 }
 
 /// The total of a pair, made where it is new.
-pub(crate) fn total_of(totals: &mut Vec<PairTotal>, member: usize, partner: Partner) -> &mut PairTotal {
+pub(super) fn total_of(totals: &mut Vec<PairTotal>, member: usize, partner: Partner) -> &mut PairTotal {
     let order = |total: &PairTotal| (total.member, total.partner);
     let at = totals.binary_search_by_key(&(member, partner), order).unwrap_or_else(|at| {
         let (impulse_n_s, contacts, depth_m) = (DVec3::ZERO, 0, 0.0);
@@ -63,4 +91,16 @@ pub(crate) fn total_of(totals: &mut Vec<PairTotal>, member: usize, partner: Part
         at
     });
     &mut totals[at]
+}
+
+impl ClusterReport {
+    /// Counts a solve.
+    pub(super) fn add(&mut self, took: &Report) {
+        self.factors += took.factors as u32;
+        self.products += took.products as u32;
+        self.solves += 1;
+        self.unfinished += u32::from(took.level == Level::Interior);
+        self.level = self.level.max(took.level);
+        self.miss_m_s = self.miss_m_s.max(took.miss_m_s);
+    }
 }

@@ -1,14 +1,16 @@
-//! What a fine step starts from of the one before, and leaves to the next: impulses, slip owed, what sensors saw.
+//! What a fine step starts from of the one before, and leaves to the next and to reports: impulses, slip owed, what sensors saw, the stiffness of
+//! contacts.
 //!
 //! In: what participants remember; a solution. Out: contacts that start from it; memories, totals of pairs. Never here: rows of joints as they
-//! are laid out, the solve.
+//! are laid out, the solve. Theory of the stiffness: docs/theory/coupling.md, eq. 7s.
 
+use crate::cluster::Side;
 use crate::constraint::place_key;
 use crate::member::memory::{Partner, Remembered, Spin};
-use crate::member::state::velocity;
-use crate::member::{ClusterMember, Participant};
+use crate::member::participant::{place_of, velocity};
+use crate::member::{ClusterMember, Drive, Participant, Role};
 use crate::step::ClusterStepper;
-use crate::step::pair_total::total_of;
+use crate::step::report::{PairTotal, total_of};
 use glam::DVec3;
 use metachron_core::{SimSpan, Wrench};
 
@@ -17,7 +19,7 @@ const OVERLAP_SHARE: f64 = 2.0;
 
 impl ClusterStepper {
     /// Starts every contact from what the last step gave.
-    pub(crate) fn warm_start(&mut self, all: &[Participant<'_>], h_s: f64) {
+    pub(super) fn warm_start(&mut self, all: &[Participant<'_>], h_s: f64) {
         for (owner, contact) in self.search.owners.iter_mut().zip(&mut self.search.contacts) {
             let place = all[owner.member].memory.recall(owner.partner, owner.key);
             (contact.warm_n_s, contact.owed_slip_m) = (place.force_n * h_s, place.owed_slip_m);
@@ -29,7 +31,7 @@ impl ClusterStepper {
     }
 
     /// Notes what the next step starts from.
-    pub(crate) fn record(&mut self, all: &mut [Participant<'_>], h_s: f64, last: bool, dt: SimSpan) {
+    pub(super) fn record(&mut self, all: &mut [Participant<'_>], h_s: f64, last: bool, dt: SimSpan) {
         self.record_spins(all, h_s);
         self.record_contacts(all, h_s);
         self.record_constraints(all, h_s);
@@ -132,5 +134,93 @@ impl ClusterStepper {
 fn give(wrench: &mut Wrench, member: &dyn ClusterMember, impulse_n_s: DVec3, point_m: DVec3) {
     if let Some(pose) = member.pose(&[], 0.0) {
         wrench.add(impulse_n_s, point_m - pose.centre_m);
+    }
+}
+
+/// The steps in which a pair is resisted.
+#[derive(Clone, Copy)]
+struct Steps {
+    /// The step of the problem, seconds.
+    problem_s: f64,
+    /// The step of the side that makes longer ones, seconds.
+    longer_s: f64,
+}
+
+impl Participant<'_> {
+    /// Whether a user leads it in this step.
+    fn is_led_by_user(&self) -> bool {
+        let is_held = || self.context.hands.iter().any(|spring| spring.by.is_none());
+        self.member.is_led() && (self.context.pose.is_some() || is_held())
+    }
+
+    /// A stiffness within a step along `normal`, with the drive's spring alone where mass and damping of a driven tip resist too: a hand that
+    /// goes on evenly is followed without them.
+    fn drive_settled(&self, within_n_m: f64, normal: DVec3, steps: Steps) -> f64 {
+        let Some((drive, tip)) = self.member.drive().zip(self.member.blocks().first()) else { return within_n_m };
+        let (Drive { stiffness_n_m, damping_n_s_m, .. }, Steps { problem_s, longer_s }) = (drive, steps);
+        let given_kg = normal.dot(tip.value * normal) + problem_s * (damping_n_s_m + problem_s * stiffness_n_m);
+        let give_m_per_n = (within_n_m.recip() - problem_s * longer_s / given_kg).max(0.0);
+        (give_m_per_n + stiffness_n_m.recip()).recip()
+    }
+}
+
+impl ClusterStepper {
+    /// Notes the stiffness of all pairs with a side that a user leads now, one solve for each.
+    pub(super) fn note_stiffness(&mut self, all: &[Participant<'_>], h_s: f64) {
+        if !all.iter().any(Participant::is_led_by_user) {
+            return;
+        }
+        let mut totals = std::mem::take(&mut self.totals);
+        for total in &mut totals {
+            total.stiffness_n_m = self.stiffness_of(all, total, h_s).unwrap_or(0.0);
+        }
+        self.totals = totals;
+    }
+
+    /// The stiffness of a pair; `None` where nothing presses it, or where a user leads neither side.
+    fn stiffness_of(&mut self, all: &[Participant<'_>], total: &PairTotal, problem_s: f64) -> Option<f64> {
+        if self.search.contacts.is_empty() {
+            return None;
+        }
+        let other = match total.partner {
+            Partner::Agent(id) => place_of(all, id),
+            Partner::Static(_) => None,
+            _ => return None,
+        };
+        let both = || std::iter::once(total.member).chain(other);
+        let led = both().find(|&member| all[member].is_led_by_user())?;
+        // side 0 is pressed against side 1
+        let towards = if led == total.member { -total.normal } else { total.normal };
+        self.move_sides(all, led, towards);
+        let Self { solver, search, moved_m_s, progress, .. } = self;
+        let given = solver.resistance(moved_m_s)?;
+        let of_pair =
+            search.owners.iter().zip(given).filter(|(owner, _)| owner.pair() == (total.member, total.partner));
+        let impulse_n_s = of_pair.map(|(_, given)| given.dot(total.normal)).sum::<f64>();
+        let longer_s = both().map(|member| problem_s * f64::from(progress[member].share)).fold(problem_s, f64::max);
+        let within_n_m = impulse_n_s / (problem_s * longer_s);
+        let stiffness_n_m = all[led].drive_settled(within_n_m, total.normal, Steps { problem_s, longer_s });
+        (stiffness_n_m > 0.0 && stiffness_n_m.is_finite()).then_some(stiffness_n_m)
+    }
+
+    /// Sets by which velocities side 0 of each contact moves against side 1 where the member `led` moves by `towards`, m/s, world axes.
+    fn move_sides(&mut self, all: &[Participant<'_>], led: usize, towards: DVec3) {
+        let role = all[led].member.role();
+        let moved = |side: &Side| match role {
+            Role::Kinematic => towards,
+            Role::Rigid | Role::Deformable => side.velocity(&[towards, DVec3::ZERO]),
+        };
+        let Self { search, moved_m_s, .. } = self;
+        moved_m_s.clear();
+        moved_m_s.extend(search.contacts.iter().zip(&search.owners).map(|(contact, owner)| {
+            let [here, there] = &contact.sides;
+            if owner.member == led {
+                moved(here)
+            } else if owner.other == Some(led) {
+                -moved(there)
+            } else {
+                DVec3::ZERO
+            }
+        }));
     }
 }
