@@ -59,7 +59,9 @@ const LIST: [Played; 15] = [
 ];
 
 fn main() {
-    println!("scene                    contacts |  landing ms, factors |  at rest ms, median, factors | solves, unfinished");
+    println!(
+        "scene                    contacts |  landing ms, factors |  at rest ms, median, factors | solves, unfinished"
+    );
     let wanted = std::env::args().nth(1).unwrap_or_default();
     LIST.iter().filter(|played| played.name.contains(&wanted)).for_each(measure);
 }

@@ -127,7 +127,8 @@ impl Interior {
     fn follow(&mut self, iterate: &mut Iterate, yield_m_s: f64) {
         iterate.press();
         let mut moved = false;
-        for ((inside, row), impulse) in self.rows.iter_mut().zip(&mut iterate.rows.rows).zip(&mut iterate.state.lambda) {
+        for ((inside, row), impulse) in self.rows.iter_mut().zip(&mut iterate.rows.rows).zip(&mut iterate.state.lambda)
+        {
             let share = inside.follow(row);
             moved |= share != 1.0;
             *impulse *= share;

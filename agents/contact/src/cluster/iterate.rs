@@ -85,7 +85,8 @@ impl State {
 
     fn copy(&mut self, other: &Self) {
         let Self { lambda, change, velocity, left } = self;
-        let lists = [(lambda, &other.lambda), (change, &other.change), (velocity, &other.velocity), (left, &other.left)];
+        let lists =
+            [(lambda, &other.lambda), (change, &other.change), (velocity, &other.velocity), (left, &other.left)];
         lists.into_iter().for_each(|(list, from)| list.clone_from(from));
     }
 

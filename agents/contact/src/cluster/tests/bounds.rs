@@ -39,19 +39,17 @@ fn every_bound_gives_what_it_takes_or_all_it_has() {
         ("a weight under its yield", Hold::ALL.limited(1.1 * weight), down, DVec3::Z * weight),
         ("a yield aslant", Hold::ALL.limited(0.9 * weight), aslant, aslant / (-G * H_S) * (0.9 * weight)),
         ("an attachment to its last", Hold::ALL, down, DVec3::Z * weight),
-        (
-            "a slide over its yield",
-            Hold::across(DVec3::X).limited(0.5 * weight),
-            aslant,
-            DVec3::Z * (0.5 * weight),
-        ),
+        ("a slide over its yield", Hold::across(DVec3::X).limited(0.5 * weight), aslant, DVec3::Z * (0.5 * weight)),
         ("a row that may give nothing", Hold::ALL.limited(0.0), down, DVec3::ZERO),
     ];
     for (name, hold, free_m_s, wanted_n_s) in rows {
         for (factors_max, slack) in [(Some(8), 1e-3), (None, 1e-4)] {
             let solution = held(hold, free_m_s, factors_max);
             let given = solution.rows_n_s[0];
-            assert!((given - wanted_n_s).length() < slack * weight, "{name}, {factors_max:?}: {given} for {wanted_n_s}");
+            assert!(
+                (given - wanted_n_s).length() < slack * weight,
+                "{name}, {factors_max:?}: {given} for {wanted_n_s}"
+            );
             assert!(given.length() <= hold.most_n_s(given) * (1.0 + 1e-12), "{name}: {given}");
             let answered = free_m_s + given / MASS;
             assert!(solution.velocities(0)[0].distance(answered) < 1e-14, "{name}: momentum is not balanced");

@@ -1,6 +1,6 @@
 //! Rows whose bound is what presses a contact: friction about its normal, in both forms, and in random piles.
 
-use super::{Body, Case, Seeded, contact, rigid, is_open};
+use super::{Body, Case, Seeded, contact, is_open, rigid};
 use crate::cluster::{Hold, JointRow, Pressed, Settings, Side, Solver, StepForm};
 use glam::DVec3;
 
@@ -33,7 +33,10 @@ fn a_body_on_one_point_loses_its_spin_by_reach_times_its_weight_in_both_forms() 
         let most = reach_m * mass * G * H_S / inertia;
         let wanted = spin - spin.clamp(-most, most);
         // what holds gives way by v_s, 4e-4 a second
-        assert!((after - wanted).abs() < 5e-4 && !is_open(&report), "{spin}, {form:?}: {after}, {wanted} wanted, {report:?}");
+        assert!(
+            (after - wanted).abs() < 5e-4 && !is_open(&report),
+            "{spin}, {form:?}: {after}, {wanted} wanted, {report:?}"
+        );
         assert!(after * spin >= -1e-9, "nothing turns back");
     }
 }

@@ -1,6 +1,6 @@
 //! What the solver promises besides its answers: errors that name what is wrong, the same bits, no panic.
 
-use super::{Case, contact, rigid, is_open};
+use super::{Case, contact, is_open, rigid};
 use crate::cluster::{Block, Hold, JointRow, Level, ProblemError, SIDE_TERMS_MAX, Side, SideTerm, Solver};
 use glam::{DMat3, DVec3};
 use metachron_core::PlainLoop;

@@ -1,7 +1,7 @@
 //! Random problems of rigid and soft bodies: laws, passivity, and a slow method that shares data and biases with the solver.
 
 use super::slow::gauss_seidel;
-use super::{Body, Case, JointRow, Lattice, Seeded, contact, rigid, side_velocity, is_open};
+use super::{Body, Case, JointRow, Lattice, Seeded, contact, is_open, rigid, side_velocity};
 use crate::cluster::{Contact, Hold, Settings, Side, SideTerm, Solution, Solver, StepForm};
 use glam::DVec3;
 
@@ -111,13 +111,8 @@ pub fn distance(a: &[Vec<DVec3>], b: &[Vec<DVec3>]) -> f64 {
 }
 
 /// Fine enough that answers may be compared.
-pub const FINE: Settings = Settings {
-    tolerance_m_s: 1e-9,
-    depth_m: 20e-6,
-    form: StepForm::Direct,
-    still_m_s: 1e-12,
-    factors_max: None,
-};
+pub const FINE: Settings =
+    Settings { tolerance_m_s: 1e-9, depth_m: 20e-6, form: StepForm::Direct, still_m_s: 1e-12, factors_max: None };
 
 #[test]
 fn the_laws_hold_in_random_problems_and_no_answer_makes_energy() {

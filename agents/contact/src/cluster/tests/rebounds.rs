@@ -1,6 +1,6 @@
 //! Restitution and moving surfaces: blows in closed form, and no blow that makes energy.
 
-use super::{Body, Case, Seeded, contact, rigid, side_velocity, is_open};
+use super::{Body, Case, Seeded, contact, is_open, rigid, side_velocity};
 use crate::cluster::{Contact, Settings, Side, Solution, Solver};
 use glam::DVec3;
 

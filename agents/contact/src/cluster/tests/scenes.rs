@@ -1,6 +1,6 @@
 //! Scenes with an answer in closed form: rest, slopes, stacks, collisions.
 
-use super::{Body, Case, Lattice, contact, rigid, is_open};
+use super::{Body, Case, Lattice, contact, is_open, rigid};
 use crate::cluster::{Contact, Hold, JointRow, Settings, Side, Solution, Solver, Spring};
 use glam::DVec3;
 
