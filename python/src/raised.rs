@@ -29,9 +29,11 @@ fn exception(error: &WorldError, message: String) -> PyErr {
         | WorldError::NoAgent(_)
         | WorldError::NoSensor { .. }
         | WorldError::NoJoint { .. } => PyKeyError::new_err(message),
-        WorldError::Foreign | WorldError::Gone { .. } | WorldError::Stopped | WorldError::Run(_) => {
-            PyRuntimeError::new_err(message)
-        }
+        WorldError::Foreign
+        | WorldError::Gone { .. }
+        | WorldError::Stopped
+        | WorldError::Stalled { .. }
+        | WorldError::Run(_) => PyRuntimeError::new_err(message),
         _ => PyValueError::new_err(message),
     }
 }

@@ -62,6 +62,25 @@ impl Agents {
         self.all.iter().map(|(_, agent)| agent)
     }
 
+    /// The agent whose step has kept the caller's thread of a run in virtual time for longer than a turn may last
+    /// ([`super::Run::set_stall_limit`]); `None` where none has, and of a run in real time.
+    #[must_use]
+    pub fn stalled_on_caller(&self) -> Option<AgentId> {
+        self.sleep.callers_turn.judge()
+    }
+
+    /// Ends such a run from another thread, as its own thread does not return: the agent and those of its cluster are parked, commands are
+    /// refused, and no further turn begins where this one ends after all. Whether there was such a turn; nothing is done else.
+    #[must_use]
+    pub fn end_stalled(&self) -> bool {
+        let is_stalled = self.sleep.callers_turn.park();
+        if is_stalled {
+            self.sleep.end();
+            self.sleep.stop();
+        }
+        is_stalled
+    }
+
     /// Copies of their handles.
     #[must_use]
     pub fn to_vec(&self) -> Vec<AgentHandle> {

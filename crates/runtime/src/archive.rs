@@ -10,11 +10,12 @@ use super::agent_clock::Timeline;
 use super::agent_runner::AgentRunner;
 use super::cluster::{Place, Placed};
 use super::events::EventKind;
+use super::handle::AgentHandle;
 use super::spawn::{AgentSpawn, RunAgents};
 use super::turn_order::{PartKind, TurnOrder};
 use super::virtual_events::VirtualEvents;
 use metachron_core::{AgentId, Archive, ArchiveError};
-use state::{RunState, caught};
+use state::{OwnState, RunState, caught};
 use std::collections::BTreeMap;
 use std::sync::Arc;
 use std::time::Duration;
@@ -30,7 +31,7 @@ pub(super) trait CutBetweenTurns {
         act: impl FnOnce(&mut Cut, &mut Option<Arc<TurnOrder>>) -> Result<(), ArchiveError>,
     ) -> Result<(), ArchiveError>;
 
-    /// What it knows of its agents.
+    /// The agents of the run, as it knows them.
     fn agents_of_run(&self) -> &RunAgents;
 
     /// [`super::Run::archive`].
@@ -67,8 +68,8 @@ pub(super) struct Cut {
 /// Agents that are not in the run, made for a state that has them, by their numbers.
 type Made = BTreeMap<usize, Box<AgentRunner>>;
 
-/// The bytes of what each agent kept to itself before a state was read into it, by numbers.
-type OwnStates = Vec<(usize, Vec<u8>)>;
+/// The state that each agent kept to itself before another one was read into it, by numbers.
+type OwnStates = Vec<(usize, OwnState)>;
 
 impl Cut {
     /// The agents of `run_agents`, taken from their places.
@@ -109,13 +110,13 @@ impl Cut {
         let mut present = Vec::new();
         archive.value(&mut present)?;
         let mut made = self.make(&present, absent)?;
-        let own = self.own_states(&present)?;
+        let own = self.take_own(&present)?;
         let mut state = RunState::empty(present);
         let mut runners = runners_of(&mut self.all, &mut made, &state.present);
         let read = caught(|| state.archive(&mut runners, archive).and_then(|()| archive.finish()));
         if let Err(error) = read {
             drop(runners);
-            own.iter().for_each(|(at, own)| self.take_back(*at, own));
+            self.take_back(own);
             return Err(error);
         }
         // before they are found: nobody finds one that is back in a state of another time
@@ -153,25 +154,51 @@ impl Cut {
         Ok(made)
     }
 
-    /// What those keep to themselves now that a state is read into.
-    fn own_states(&mut self, present: &[bool]) -> Result<OwnStates, ArchiveError> {
-        let there = self.all.iter_mut().zip(present).enumerate().filter(|(_, (_, present))| **present);
-        there
-            .filter_map(|(at, (one, _))| Some((at, one.as_mut()?)))
-            .map(|(at, one)| Ok((at, one.runner.own_state()?)))
-            .collect()
+    /// Takes out of those what they keep to themselves that a state is read into.
+    ///
+    /// # Errors
+    /// Those of agents that do not save it; all have it then.
+    fn take_own(&mut self, present: &[bool]) -> Result<OwnStates, ArchiveError> {
+        let mut own = OwnStates::new();
+        for at in (0..self.all.len()).filter(|at| present.get(*at) == Some(&true)) {
+            let Some(placed) = &mut self.all[at] else { continue };
+            match placed.runner.take_own() {
+                Ok(taken) => own.push((at, taken)),
+                Err(error) => {
+                    for (at, own) in own {
+                        if let Some(placed) = &mut self.all[at] {
+                            placed.runner.keep_own(own);
+                        }
+                    }
+                    return Err(error);
+                }
+            }
+        }
+        Ok(own)
     }
 
-    /// Makes an agent as it was when it had the bytes `own`. One whose model does not read what it has written itself is parked: it makes its own
-    /// turns then, none, and so do those that it led.
-    fn take_back(&mut self, at: usize, own: &[u8]) {
+    /// Makes agents as they were when that was taken. One whose model does not read what it has written itself is parked.
+    fn take_back(&mut self, own: OwnStates) {
+        for (at, own) in own {
+            if let Some(Err(error)) = self.all[at].as_mut().map(|placed| placed.runner.take_back(own)) {
+                self.park(at, &error.to_string());
+            }
+        }
+    }
+
+    /// Parks an agent: it makes its own turns then, none, and so do those that it led.
+    pub fn park(&mut self, at: usize, reason: &str) {
         let (id, sleep) = (AgentId(at as u32), &self.run_agents.sleep);
-        let Some(Err(error)) = self.all[at].as_mut().map(|placed| placed.runner.take_back(own)) else { return };
+        if self.all.get(at).is_none_or(Option::is_none) {
+            // its leader makes a step that does not end, and lets it return after that
+            let live = self.run_agents.handles.of(id).and_then(AgentHandle::live);
+            live.into_iter().for_each(|shared| shared.gauges.park(reason.to_owned()));
+        }
         for Placed { runner, place } in self.all.iter_mut().flatten() {
             let is_led = matches!(*place, Place::Led { leader, .. } | Place::Waiting { leader, .. } if leader == id);
             if runner.id() == id {
                 *place = Place::Home;
-                runner.park(error.to_string());
+                runner.park(reason.to_owned());
             } else if is_led {
                 *place = Place::Returning;
             } else {

@@ -76,6 +76,8 @@ pub(super) struct ClusterSeat {
     doubling: Option<Box<StepDoubling>>,
     /// The error of the last row of repeated steps, metres (control.md, eq. 31).
     drift_m: f64,
+    /// How many steps of its own the last step had.
+    parts: u32,
     /// Its part in the last step, and how those were solved that it has led.
     state: Option<ClusterState>,
     solves: ClusterSolves,
@@ -89,6 +91,12 @@ pub(super) struct ClusterSeat {
     wishes: Vec<Wish>,
     groups: DisjointSets,
     ids: Vec<AgentId>,
+}
+
+/// The solvers of the steps that a seat leads, and those that repeat them.
+pub(super) struct Steppers {
+    stepper: Option<Box<ClusterStepper>>,
+    doubling: Option<Box<StepDoubling>>,
 }
 
 /// The step that a member wants.
@@ -158,6 +166,7 @@ impl ClusterSeat {
             schedule: DoublingSchedule::default(),
             doubling: None,
             drift_m: 0.0,
+            parts: 1,
             state: None,
             solves: ClusterSolves::default(),
             participants: Vec::new(),
@@ -210,6 +219,16 @@ impl ClusterSeat {
         archive.option(&mut self.doubling, Box::default, |doubling, archive| doubling.archive(archive))?;
         archive.option(&mut self.asynchronous, Box::default, |pairs, archive| pairs.archive(archive))?;
         archive.option(&mut self.remotes, Box::default, |remotes, archive| remotes.archive(archive))
+    }
+
+    /// Takes out what solves and repeats its steps: a state that is read makes them anew.
+    pub fn take_steppers(&mut self) -> Steppers {
+        Steppers { stepper: self.stepper.take(), doubling: self.doubling.take() }
+    }
+
+    /// Puts that back.
+    pub fn put_steppers(&mut self, Steppers { stepper, doubling }: Steppers) {
+        (self.stepper, self.doubling) = (stepper, doubling);
     }
 
     /// What the turns that it leads took on helpers, as far as it is not accounted for.

@@ -17,8 +17,10 @@ use super::spawn::{AgentSpawn, AssembledRun, RunAgents, RunError, assemble};
 use super::turn_order::{PartKind, TurnPart};
 use super::turn_parts::{Prepared, PreparedTurn};
 use super::turns::Took;
+use super::watchdog::UnwatchedTurns;
 use metachron_core::{AgentId, Archive, ArchiveError, SimTime};
-use std::time::Duration;
+use std::sync::Arc;
+use std::time::{Duration, Instant};
 
 /// Agents that do what others did.
 pub struct Follower {
@@ -26,6 +28,8 @@ pub struct Follower {
     now: Duration,
     followed: Vec<Followed>,
     all: RunAgents,
+    unwatched: Arc<UnwatchedTurns>,
+    parts: u64,
 }
 
 /// An agent, and where in a turn it is.
@@ -49,7 +53,8 @@ impl Follower {
         all.set_ordered();
         let followed = actors.into_iter().map(|actor| Followed { actor, ..Followed::default() }).collect();
         let timeline = Timeline::new().after(Duration::ZERO, TimelineCommand::Pause);
-        Ok(Self { timeline, now: Duration::ZERO, followed, all })
+        let unwatched = UnwatchedTurns::new(&all.handles);
+        Ok(Self { timeline, now: Duration::ZERO, followed, all, unwatched, parts: 0 })
     }
 
     /// From now on time passes by `timeline`.
@@ -70,6 +75,8 @@ impl Follower {
             followed.actor = handle.take_returned();
         }
         self.now = wall;
+        self.parts += 1;
+        let turn = self.unwatched.begin(self.parts, agent, Instant::now());
         let done = match kind {
             PartKind::Prepare => followed.prepare(&self.timeline, wall),
             PartKind::Show => followed.show(&self.timeline, wall),
@@ -77,6 +84,7 @@ impl Follower {
             PartKind::Join => followed.join(),
             PartKind::Restore => None,
         };
+        self.unwatched.end(turn);
         followed.actor = followed.actor.take().and_then(AgentRunner::kept);
         let name = handle.name();
         done.ok_or_else(|| {
@@ -202,6 +210,10 @@ impl Run for Follower {
 
     fn timeline(&self) -> Timeline {
         self.timeline
+    }
+
+    fn set_stall_limit(&mut self, limit: Duration) {
+        self.unwatched.set_limit(limit);
     }
 
     fn drive(&mut self, drive: TimelineCommand) {

@@ -310,14 +310,20 @@ impl AgentHandle {
     /// State of its execution.
     #[must_use]
     pub fn state(&self) -> AgentState {
-        self.live().map_or(AgentState::Gone, |shared| shared.gauges.state())
+        self.judged().map_or(AgentState::Gone, |shared| shared.gauges.state())
+    }
+
+    /// The agent, once the turn in progress on a caller's thread is judged.
+    fn judged(&self) -> Option<Live> {
+        self.live().inspect(|shared| {
+            shared.sleep.callers_turn.judge();
+        })
     }
 
     /// How long its turn has lasted, wall time; zero where it is not stalled ([`AgentState::Stalled`]).
     #[must_use]
     pub fn stalled_for(&self) -> Duration {
-        let live = self.live();
-        let stalled = live.filter(|shared| shared.gauges.is_stalled());
+        let stalled = self.judged().filter(|shared| shared.gauges.is_stalled());
         stalled.map_or(Duration::ZERO, |shared| shared.gauges.stalled_for())
     }
 
@@ -382,7 +388,7 @@ impl AgentHandle {
     /// [`crate::EVENTS_KEPT`].
     pub fn hear_events(&self, heard: &mut Heard, mut take: impl FnMut(AgentEvent)) -> u64 {
         let lost = self.hear(heard, |rings| &rings.events, &mut take);
-        let stalls = self.live().map_or(heard.stalls, |shared| shared.gauges.stalls.load(Relaxed));
+        let stalls = self.judged().map_or(heard.stalls, |shared| shared.gauges.stalls.load(Relaxed));
         for _ in heard.stalls..stalls {
             take(AgentEvent { at: self.latest().time, kind: EventKind::Stalled });
         }
@@ -437,7 +443,7 @@ impl AgentHandle {
     /// Its statistics so far. Reading the percentiles of its ages takes microseconds: for a table, not for every draw call.
     #[must_use]
     pub fn stats(&self) -> AgentStats {
-        self.live().map_or_else(|| AgentStats::of_removed(self.id(), self.record.name()), |shared| shared.stats())
+        self.judged().map_or_else(|| AgentStats::of_removed(self.id(), self.record.name()), |shared| shared.stats())
     }
 }
 

@@ -31,6 +31,7 @@ mod agent_runner;
 mod agents;
 mod archive;
 mod broad_phase;
+mod callers_turn;
 mod clock;
 mod cluster;
 mod command;
@@ -126,10 +127,9 @@ pub trait Run: Send {
     fn timeline(&self) -> Timeline;
 
     /// Sets how long a turn of one agent may last, wall time, > 0, before the agent counts as stalled ([`AgentState::Stalled`]): 250 ms, but ten
-    /// of its steps at least, and a cluster's so many times as long as it has members, 25 at most. Nothing in lockstep, whose turns are its caller's.
-    fn set_stall_limit(&mut self, limit: Duration) {
-        let _ = limit;
-    }
+    /// of its steps at least, and a cluster's so many times as long as it has members, 25 at most. In lockstep, whose turns are its caller's, other
+    /// threads that ask for an agent's state judge the turn in progress.
+    fn set_stall_limit(&mut self, limit: Duration);
 
     /// Changes the timeline: pause, run, speed, single step.
     fn drive(&mut self, drive: TimelineCommand);

@@ -2,7 +2,8 @@
 //!
 //! In: agents and a [`Machine`]. Out: a run that is bit-identical every time. Events happen in the order (time, ends before starts,
 //! number): a turn sees the states published when it starts, and its own state is seen when its declared cost has passed, on cores that all
-//! turns and the frame loop share; at the free pace at once. Never here: a wall clock, except for the CPU time that is reported.
+//! turns and the frame loop share; at the free pace at once. Never here: a wall clock, except for the CPU time that is reported and for steps that do
+//! not end ([`super::watchdog`]).
 
 mod cores;
 
@@ -21,10 +22,12 @@ use super::metrics::AgentStats;
 use super::spawn::{AgentSpawn, AssembledRun, RunAgents, RunError, assemble};
 use super::turns::Took;
 use super::virtual_events::{FRAME, Phase, Turn, VirtualEvents};
+use super::watchdog::UnwatchedTurns;
 use cores::Cores;
 use metachron_core::{AgentId, Archive, ArchiveError};
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
+use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 /// Agents in virtual time on a declared machine.
@@ -42,6 +45,8 @@ pub struct Lockstep {
     unsettled: Vec<u32>,
     /// Storage: the jobs of a turn.
     jobs: Vec<Duration>,
+    unwatched: Arc<UnwatchedTurns>,
+    turns: u64,
 }
 
 /// An agent and the phase of its turns.
@@ -68,8 +73,9 @@ impl Lockstep {
         let (timeline, cores) = (Timeline::new(), Cores::new(machine.cores));
         let (due, batch, unsettled) = (BinaryHeap::with_capacity(all.handles.len()), CpuBatch::default(), Vec::new());
         let now = Duration::ZERO;
-        let jobs = Vec::new();
-        let mut run = Self { machine, timeline, now, entries, due, cores, all, batch, unsettled, jobs };
+        let (jobs, turns, unwatched) = (Vec::new(), 0, UnwatchedTurns::new(&all.handles));
+        let mut run =
+            Self { machine, timeline, now, entries, due, cores, all, batch, unsettled, jobs, unwatched, turns };
         run.schedule_all();
         Ok(run)
     }
@@ -143,9 +149,11 @@ impl Lockstep {
         }
     }
 
-    /// Processes events until `limit`, or until the frame's own job has ended.
+    /// Processes events until `limit`, or until the frame's own job has ended, or another thread has ended the run ([`Agents::end_stalled`]).
     fn run(&mut self, limit: Duration) {
-        while let Some(event) = self.next_event(limit) {
+        while !self.all.sleep.stopping()
+            && let Some(event) = self.next_event(limit)
+        {
             match event {
                 Event::Start(agent) => self.begin(agent as usize),
                 Event::End(FRAME) => break,
@@ -160,7 +168,11 @@ impl Lockstep {
         let started = Instant::now();
         let entry = &mut self.entries[agent];
         let Some(actor) = &mut entry.actor else { return };
-        match actor.begin(&self.timeline, self.now) {
+        self.turns += 1;
+        let turn = self.unwatched.begin(self.turns, actor.id(), started);
+        let effort = actor.begin(&self.timeline, self.now);
+        self.unwatched.end(turn);
+        match effort {
             Some(Effort { work, steps }) => {
                 // at the free pace turns take no time
                 let slower = if self.timeline.is_free() { 0.0 } else { self.machine.slower(self.now) };
@@ -346,6 +358,9 @@ impl Run for Lockstep {
             return;
         }
         self.run(until);
+        if self.all.sleep.stopping() {
+            return;
+        }
         self.cores.pass(until - self.now);
         self.now = until;
     }
@@ -357,6 +372,10 @@ impl Run for Lockstep {
 
     fn timeline(&self) -> Timeline {
         self.timeline
+    }
+
+    fn set_stall_limit(&mut self, limit: Duration) {
+        self.unwatched.set_limit(limit);
     }
 
     fn drive(&mut self, drive: TimelineCommand) {

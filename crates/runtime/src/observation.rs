@@ -212,6 +212,11 @@ impl Observer {
         archive.option(&mut self.neighbour_list, first, |list, archive| list.archive(archive))
     }
 
+    /// The agents near it; `None` of one that nothing can touch.
+    pub fn neighbour_list_mut(&mut self) -> &mut Option<Box<NeighbourList>> {
+        &mut self.neighbour_list
+    }
+
     /// Whom it sees, each as it was seen last: those that it is linked to, and of the others those that are `present`. One that has left is seen
     /// until the next turn.
     pub fn seen(&self, present: &[bool]) -> Vec<Seen> {

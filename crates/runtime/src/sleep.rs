@@ -8,6 +8,7 @@
 //! No wake is lost: an agent that goes to rest raises `resting` first and reads `woken` and `touched` after; a caller that wakes it writes
 //! these first and reads `resting` after. With a fence (SeqCst) between, at least one of the two sees the other.
 
+use super::callers_turn::CallersTurnSlot;
 use super::dirty_set::DirtySet;
 use super::sync::Mutex;
 use super::sync::atomic::{
@@ -89,6 +90,7 @@ pub(super) struct SleepRegistry {
     far_behind: AtomicU64,
     /// Wake-up of the workers, where agents have no threads of their own.
     wakeup: OnceLock<WorkerWakeup>,
+    pub callers_turn: CallersTurnSlot,
     /// Agents with new states, for the reader of the run.
     pub changed: DirtySet,
 }
@@ -121,6 +123,7 @@ impl SleepRegistry {
             gate: Mutex::new(()),
             far_behind: AtomicU64::new(0),
             wakeup: OnceLock::new(),
+            callers_turn: CallersTurnSlot::default(),
             changed: DirtySet::default(),
         };
         registry.changed.reach(agents);

@@ -14,7 +14,7 @@ use metachron_core::{
     AgentId, Body, Bounds, N_MAX, Resolution, ResolutionRange, RigidState, SimSpan, SimTime, Snapshot, StepError,
     StepReport,
 };
-use metachron_core::{Impulse, Site};
+use metachron_core::{Archive, ArchiveError, Impulse, Site, archive_values};
 use metachron_geometry::{CollisionShape, ContactSide, Place, PlacedShape, ShapeKind, ShapePose, Solid, SolidShape};
 use std::f64::consts::TAU;
 use std::sync::{Arc, Mutex, PoisonError};
@@ -232,6 +232,7 @@ impl Dummy {
         let taken = &mut self.taken;
         self.ledgers.open(context);
         self.ledgers.take(context, dt_s, |new| *taken += new.impulse.linear.x);
+        self.ledgers.settle();
         if self.steps <= self.impulses {
             for other in context.neighbours.iter().filter(|n| n.form.is_some()) {
                 let push = Impulse { linear: DVec3::X, angular: DVec3::ZERO };
@@ -258,6 +259,10 @@ fn ball_form(radius_m: f64) -> Arc<CollisionShape> {
 impl Agent for Dummy {
     fn model(&self) -> &'static str {
         "synthetic"
+    }
+
+    fn archive(&mut self, archive: &mut Archive<'_>) -> Result<(), ArchiveError> {
+        archive_values!(archive, self.steps, self.x, self.z, self.taken, self.given, self.ledgers)
     }
 
     fn step(&mut self, dt: SimSpan, context: &StepContext<'_>) -> Result<StepReport, StepError> {

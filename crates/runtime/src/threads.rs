@@ -26,9 +26,10 @@ use super::watchdog::{CHECKS, StallLimit, Watchdog, WatchdogWord};
 use agent_thread::AgentThread;
 use metachron_core::{AgentId, Archive, ArchiveError};
 use std::collections::BTreeMap;
+use std::io;
 use std::sync::mpsc::{Receiver, Sender, channel};
 use std::sync::{Arc, MutexGuard, PoisonError};
-use std::thread;
+use std::thread::{self, JoinHandle};
 use std::time::Duration;
 use watch::{Ended, Words, watch};
 
@@ -58,7 +59,14 @@ pub struct Threads {
     words: Words,
     /// Ends the thread that watches.
     unwatched: Sender<()>,
+    spawner: Spawner,
 }
+
+/// Asks the system for a thread.
+type Spawner = fn(thread::Builder, Body) -> io::Result<JoinHandle<Option<Box<AgentRunner>>>>;
+
+/// The work of a thread: it gives its agent back where it has it at its end.
+type Body = Box<dyn FnOnce() -> Option<Box<AgentRunner>> + Send>;
 
 impl Threads {
     /// Gives every agent its thread; simulated time is paused until [`TimelineCommand::Run`]. If the system refuses `priority` ([`Priority::ask`])
@@ -91,23 +99,38 @@ impl Threads {
             watchdog,
             words,
             unwatched,
+            spawner: |builder, body| builder.spawn(body),
         };
         for (actor, id) in actors.into_iter().zip((0..).map(AgentId)) {
             // on an error the run so far is dropped, which ends its threads
-            run.begin(id, actor)?;
+            run.begin(id)?;
+            run.give(id, actor);
         }
         Ok(run)
     }
 
-    /// Gives an agent its thread.
-    fn begin(&mut self, id: AgentId, actor: Option<Box<AgentRunner>>) -> Result<(), RunError> {
+    /// Starts the thread of an agent that is there; it waits for the agent.
+    fn begin(&mut self, id: AgentId) -> Result<(), RunError> {
         let Some(shared) = self.all.handles.of(id).and_then(AgentHandle::live).map(|shared| Arc::clone(&shared)) else {
             return Ok(());
         };
-        let ended = self.spawn(actor, shared)?;
+        let ended = self.spawn(shared)?;
         self.words().insert(id, Arc::clone(&ended.word));
         self.threads.insert(id, ended);
         Ok(())
+    }
+
+    /// Gives an agent that makes turns of its own to its thread.
+    fn give(&mut self, id: AgentId, actor: Option<Box<AgentRunner>>) {
+        let Some(actor) = actor else { return };
+        match self.threads.get(&id).filter(|_| !actor.is_parked()) {
+            Some(ended) => {
+                // its place is free: there is only one of it
+                drop(ended.given.swap(Some(actor)));
+                ended.thread.thread().unpark();
+            }
+            None => drop(self.ended_agents.insert(id, actor)),
+        }
     }
 
     /// Joins the threads that have ended: until then the system keeps their stacks.
@@ -130,7 +153,7 @@ impl Threads {
         self.words.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    fn spawn(&self, actor: Option<Box<AgentRunner>>, shared: Arc<Shared>) -> Result<Ended, RunError> {
+    fn spawn(&self, shared: Arc<Shared>) -> Result<Ended, RunError> {
         let name = format!("agent:{}", shared.name().replace('\0', ""));
         let stage = AgentThread {
             clock: Arc::clone(&self.clock),
@@ -141,8 +164,9 @@ impl Threads {
             watchdog: self.watchdog.clone(),
             word: Arc::default(),
             turns: 0,
+            given: Arc::default(),
         };
-        let word = Arc::clone(&stage.word);
+        let (word, given) = (Arc::clone(&stage.word), Arc::clone(&stage.given));
         let farewell = EndNotice { id: shared.id, ended: self.farewells.clone() };
         let builder = thread::Builder::new().name(name.clone());
         let priority = self.priority;
@@ -152,10 +176,10 @@ impl Threads {
             drop(priority.take());
             // by itself: where the agent is given back before another thread registers this one, no thread is woken
             shared.sleep.set_thread(shared.id, Some(thread::current()));
-            stage.run(actor, &shared)
+            stage.run(&shared)
         };
-        let thread = builder.spawn(body).map_err(|error| RunError::NoThread { name, error })?;
-        Ok(Ended { thread, word })
+        let thread = (self.spawner)(builder, Box::new(body)).map_err(|error| RunError::NoThread { name, error })?;
+        Ok(Ended { thread, word, given })
     }
 
     /// Ends all threads for a cut and waits for them, but for those whose turns are stalled: then all go on. Gives back the agents that make turns
@@ -174,7 +198,7 @@ impl Threads {
             // others may wait for the place in the order of turns that a stalled one has
             if quiet >= CHECKS && self.threads.values().any(|ended| ended.word.is_stalled()) {
                 let complaint = self.watchdog.complaint();
-                self.resume_all().map_err(no_thread)?;
+                self.resume_all();
                 return Err(refused(complaint.unwrap_or_else(|| "a step that does not end".to_owned())));
             }
         }
@@ -182,7 +206,7 @@ impl Threads {
     }
 
     /// Lets all go on again, of which some have not ended.
-    fn resume_all(&mut self) -> Result<(), RunError> {
+    fn resume_all(&mut self) {
         self.all.sleep.go_on();
         // those that end nevertheless have said so before
         while self.threads.values().any(|ended| ended.word.has_ended()) {
@@ -190,7 +214,14 @@ impl Threads {
             self.join(id);
         }
         let homes = self.homes();
-        self.go_on(homes)
+        let cut = self.cut_of(homes);
+        self.go_on(cut);
+    }
+
+    /// All agents, of which `homes` make turns of their own, taken from their places.
+    fn cut_of(&self, homes: Vec<Option<Box<AgentRunner>>>) -> Cut {
+        let all = take_apart(homes.into_iter(), &self.all.handles);
+        Cut { most: THREADS_MAX, ..Cut::new(all, self.all.clone(), self.timeline.read(), self.clock.now()) }
     }
 
     /// Ends all threads and waits for them until a timeout: a step that takes longer counts as hung, and its thread is left behind. Gives back the
@@ -218,18 +249,23 @@ impl Threads {
         homes
     }
 
-    /// Gives the agents their threads again.
-    fn go_on(&mut self, homes: Vec<Option<Box<AgentRunner>>>) -> Result<(), RunError> {
+    /// Gives the agents their threads again. One for which the system gives none is parked, before others go on.
+    fn go_on(&mut self, mut cut: Cut) {
         self.all.sleep.go_on();
-        for (mut actor, id) in homes.into_iter().zip((0..).map(AgentId)) {
-            match actor.take_if(|actor| actor.is_parked()) {
-                Some(actor) => drop(self.ended_agents.insert(id, actor)),
-                // its step has not ended
-                None if self.threads.contains_key(&id) => {}
-                None => self.begin(id, actor)?,
+        let has_ended = |agent: &AgentHandle| agent.live().is_none_or(|shared| shared.gauges.has_ended());
+        let ids: Vec<_> = self.all.handles.iter().filter(|agent| !has_ended(agent)).map(AgentHandle::id).collect();
+        for id in ids {
+            // the step of one that has a thread has not ended
+            if !self.threads.contains_key(&id)
+                && let Err(error) = self.begin(id)
+            {
+                cut.park(id.0 as usize, &error.to_string());
             }
         }
-        Ok(())
+        let homes = put_back(cut.all, &self.all.handles);
+        homes.into_iter().zip((0..).map(AgentId)).for_each(|(actor, id)| self.give(id, actor));
+        // some return from a leader, and their threads wait already
+        self.threads.values().for_each(|ended| ended.thread.thread().unpark());
     }
 
     fn end(&mut self) {
@@ -258,21 +294,14 @@ impl CutBetweenTurns for Threads {
         act: impl FnOnce(&mut Cut, &mut Option<Arc<TurnOrder>>) -> Result<(), ArchiveError>,
     ) -> Result<(), ArchiveError> {
         let homes = self.pause()?;
-        let all = take_apart(homes.into_iter(), &self.all.handles);
-        let mut cut = Cut::new(all, self.all.clone(), self.timeline.read(), self.clock.now());
-        cut.most = THREADS_MAX;
+        let mut cut = self.cut_of(homes);
         let outcome = act(&mut cut, &mut self.order);
         if cut.timeline != self.timeline.read() {
             self.timeline.set(cut.timeline);
         }
-        let gone_on = self.go_on(put_back(cut.all, &self.all.handles));
-        outcome.and(gone_on.map_err(no_thread))
+        self.go_on(cut);
+        outcome
     }
-}
-
-/// A cut after which the system gives no threads again.
-fn no_thread(error: RunError) -> ArchiveError {
-    ArchiveError::Refused { what: format!("a run that cannot go on ({error})") }
 }
 
 impl Run for Threads {
@@ -309,9 +338,14 @@ impl Run for Threads {
         if running >= THREADS_MAX {
             return Err(RunError::TooMany { agents: running + 1, most: THREADS_MAX });
         }
-        let actor = self.all.join(spawn, self.sim_now())?;
+        let mut actor = self.all.join(spawn, self.sim_now())?;
         let id = actor.id();
-        self.begin(id, Some(actor))?;
+        if let Err(error) = self.begin(id) {
+            actor.take_out();
+            drop(actor.kept());
+            return Err(error);
+        }
+        self.give(id, Some(actor));
         Ok(self.all.handles[id.0 as usize].clone())
     }
 

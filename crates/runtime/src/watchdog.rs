@@ -2,13 +2,15 @@
 //!
 //! In: turns, from the threads that make them. Out: the turn in progress of each, and which agents' turns have lasted longer than they may: these
 //! are stalled until their turn ends, and readers of their events hear of it. A thread that ends a turn and the watchdog that finds it late
-//! compete for one atomic word: whoever comes later finds it decided. Never here: what becomes of a thread whose turn does not end.
+//! compete for one atomic word: the later of the two finds it decided. Threads that make turns are watched by another; a turn on the thread of
+//! a caller is judged by the other threads that ask. Never here: what becomes of a thread whose turn does not end.
 
 use super::agents::Agents;
+use super::callers_turn::CallersTurn;
 use super::handle::{AgentHandle, Shared};
 use super::sleep::SleepRegistry;
 use metachron_core::AgentId;
-use std::sync::atomic::{AtomicU64, Ordering::Relaxed, Ordering::SeqCst};
+use std::sync::atomic::{AtomicU64, Ordering::Relaxed, Ordering::Release, Ordering::SeqCst};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
@@ -48,8 +50,8 @@ impl WatchdogWord {
     /// Turn number `turn` begins, of `id`.
     pub fn begin(&self, turn: u32, id: AgentId) -> WatchedTurn {
         let word = (u64::from(turn & 0x3fff_ffff) << 32) | u64::from(id.0.wrapping_add(1));
-        // read by the watchdog only, and its timeout is long
-        self.word.store(word, Relaxed);
+        // who sees the turn sees when it began
+        self.word.store(word, Release);
         WatchedTurn(word)
     }
 
@@ -168,12 +170,16 @@ impl Watchdog {
         }
         seen.checks += 1;
         let (Some(turn), Some(since)) = (turn, seen.since) else { return false };
-        let lasts = since.elapsed();
+        (seen.checks >= CHECKS || word.is_stalled()) && self.judge_after(word, turn, since.elapsed())
+    }
+
+    /// Looks at a thread whose `turn` has lasted for so long: whether that is found to be too long now.
+    fn judge_after(&self, word: &WatchdogWord, turn: WatchedTurn, lasts: Duration) -> bool {
         if word.is_stalled() {
             self.each_live(turn.agent(), |shared| shared.gauges.set_stalled_for(lasts));
             return false;
         }
-        if seen.checks < CHECKS || lasts < self.allowed(turn.agent()) || !word.stall(turn) {
+        if lasts < self.limit.get() || lasts < self.allowed(turn.agent()) || !word.stall(turn) {
             return false;
         }
         let culprit = self.culprit(turn.agent());
@@ -243,6 +249,64 @@ impl Watchdog {
 
     fn each_live(&self, id: AgentId, visit: impl Fn(&Shared)) {
         self.turned_by(id).filter_map(AgentHandle::live).for_each(|shared| visit(&shared));
+    }
+}
+
+/// The turns of a run that makes them on its caller's thread. No thread watches them: who asks from another one judges that in progress.
+#[derive(Debug)]
+pub(super) struct UnwatchedTurns {
+    word: WatchdogWord,
+    /// When the turn in progress began, or the last one, nanoseconds after [`Self::epoch`].
+    began_ns: AtomicU64,
+    epoch: Instant,
+    watchdog: Watchdog,
+}
+
+impl UnwatchedTurns {
+    /// Those of the run of `handles`, judged for as long as they are kept.
+    pub fn new(handles: &Agents) -> Arc<Self> {
+        let (word, began_ns, epoch) = (WatchdogWord::default(), AtomicU64::new(0), Instant::now());
+        let watchdog = Watchdog::new(handles, StallLimit::default());
+        let turns = Arc::new(Self { word, began_ns, epoch, watchdog });
+        handles.sleep.callers_turn.set(&turns);
+        turns
+    }
+
+    pub fn set_limit(&self, limit: Duration) {
+        self.watchdog.limit.set(limit);
+    }
+
+    /// Turn number `turn` of the run begins at `now`, of `id`.
+    pub fn begin(&self, turn: u64, id: AgentId, now: Instant) -> WatchedTurn {
+        self.began_ns.store(now.saturating_duration_since(self.epoch).as_nanos() as u64, Relaxed);
+        self.word.begin(turn as u32, id)
+    }
+
+    /// It has ended.
+    pub fn end(&self, turn: WatchedTurn) {
+        if !self.word.end(turn) {
+            self.watchdog.resume(turn.agent());
+        }
+    }
+}
+
+impl CallersTurn for UnwatchedTurns {
+    fn judge(&self) -> Option<AgentId> {
+        // read first: it began no later than this says
+        let turn = self.word.current()?;
+        let began = self.epoch + Duration::from_nanos(self.began_ns.load(Relaxed));
+        self.watchdog.judge_after(&self.word, turn, began.elapsed());
+        if self.word.is_stalled() { self.watchdog.culprit(turn.agent()) } else { None }
+    }
+
+    fn park(&self) -> bool {
+        let (Some(_), Some(turn)) = (self.judge(), self.word.current()) else { return false };
+        self.watchdog.each_live(turn.agent(), |shared| {
+            let lasts_s = shared.gauges.stalled_for().as_secs_f64();
+            shared.gauges.park(format!("a step did not end within {lasts_s:.1} s"));
+            self.watchdog.sleep.changed.mark(shared.id);
+        });
+        true
     }
 }
 

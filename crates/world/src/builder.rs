@@ -31,7 +31,7 @@ const RATE_DEFAULT_HZ: f64 = 240.0;
 /// Default gravity, m/s².
 const GRAVITY_DEFAULT: DVec3 = DVec3::new(0.0, 0.0, -9.81);
 /// Friction and restitution of rigid bodies and static solids where a part does not say otherwise.
-const SURFACE: (f64, f64) = (0.5, 0.2);
+const SURFACE: (f64, f64) = (0.5, 0.0);
 
 /// Why a scene cannot be built.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]

@@ -20,7 +20,7 @@ impl World {
     /// # Errors
     /// [`WorldError::NotTaken`] and [`WorldError::NoMotor`] for what the object does not take, with what it takes; [`WorldError::NoPoint`] for a
     /// material point that it does not have; [`WorldError::Refused`] for numbers outside their range; [`WorldError::Foreign`],
-    /// [`WorldError::Gone`] and [`WorldError::Stopped`]. Nothing was done then.
+    /// [`WorldError::Gone`] and [`WorldError::Stopped`]; [`WorldError::Stalled`] of a world in lockstep that is recorded. Nothing was done then.
     pub fn command(&self, object: Object, command: Command) -> Result<(), WorldError> {
         let agent = self.agent(object)?;
         let point = match command {
@@ -40,7 +40,7 @@ impl World {
             }
         };
         let sent = self.shared.log.in_order(|| self.between_calls(), || agent.send(command), note);
-        sent.map_err(|error| self.unsent(agent, error))
+        sent?.map_err(|error| self.unsent(agent, error))
     }
 
     /// Why an agent was not sent something.

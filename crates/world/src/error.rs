@@ -1,8 +1,9 @@
 //! Why a world could not be started, or refuses something.
 
 use super::builder::SceneBuildError;
-use metachron_core::{AgentId, Anchor};
+use metachron_core::{AgentId, Anchor, ArchiveError};
 use metachron_runtime::{RunError, SendError};
+use std::time::Duration;
 
 /// Why a world could not be started, or refuses something.
 #[derive(Debug, thiserror::Error)]
@@ -42,6 +43,15 @@ pub enum WorldError {
     SameName {
         /// The name.
         name: String,
+    },
+    /// An object's step in lockstep has kept the thread that lets time pass for longer than a step may last
+    /// ([`Scene::stall_limit`](super::Scene::stall_limit)): the world is waited for no longer, and goes on where that step ends.
+    #[error("the step of \"{name}\" has lasted for {:.1} s, and nothing can be done to the world before it ends", lasts.as_secs_f64())]
+    Stalled {
+        /// The object.
+        name: String,
+        /// For how long, wall time.
+        lasts: Duration,
     },
     /// A world that was stopped takes nothing any more.
     #[error("the world has been stopped")]
@@ -115,6 +125,25 @@ pub enum WorldError {
         /// The names that there are.
         known: String,
     },
+}
+
+/// The agent whose step in lockstep has kept another thread for too long: it is waited for no longer.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Waited {
+    pub name: String,
+    pub lasts: Duration,
+}
+
+impl From<Waited> for WorldError {
+    fn from(Waited { name, lasts }: Waited) -> Self {
+        Self::Stalled { name, lasts }
+    }
+}
+
+impl From<Waited> for ArchiveError {
+    fn from(Waited { name, .. }: Waited) -> Self {
+        Self::Refused { what: format!("agent \"{name}\", whose step does not end,") }
+    }
 }
 
 impl WorldError {

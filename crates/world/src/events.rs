@@ -29,7 +29,8 @@ pub enum Happening {
     Rests,
     /// It moves again after a rest.
     Wakes,
-    /// Its step lasts too long: it stands still until that ends ([`Scene::stall_limit`](super::Scene::stall_limit)). Not told in lockstep.
+    /// Its step lasts too long: it stands still until that ends ([`Scene::stall_limit`](super::Scene::stall_limit)). In lockstep a
+    /// reader on another thread finds it.
     Stalled,
     /// It failed and stands still from now on.
     Failed,

@@ -27,6 +27,7 @@
 
 mod assemble;
 mod builder;
+mod call_lock;
 mod checkpoint;
 mod commands;
 pub mod couplings;

@@ -1,14 +1,16 @@
-//! What a world writes down while it runs, or follows: the one place that knows whether it is recorded, replayed or neither.
+//! The log that a world writes while it runs, or follows: the one place that knows whether it is recorded, replayed or neither.
 //!
 //! In: calls and governors' answers. Out: the same into a [`Recorder`], or a governor's answer from a recording instead of its own.
 //! Never here: the file, the calls of a replay ([`super::replay`]).
 
 use super::Member;
 use super::assemble::Govern;
+use super::checkpoint::Checkpoint;
 use super::recording::{Entry, RecordError, Recorder, Recording};
 use metachron_core::{AgentId, Archive, ArchiveError};
 use metachron_runtime::{Agents, Demand, Governor, OrderLog, TurnMeasure, TurnOrder, TurnPart, state_hash};
 use std::collections::{BTreeMap, VecDeque};
+use std::convert::Infallible;
 use std::sync::atomic::{
     AtomicBool,
     Ordering::{Acquire, Release},
@@ -34,7 +36,7 @@ pub(super) enum Mode {
     Replayed(Script),
 }
 
-/// What governors are to answer, and how far a replay is.
+/// The answers that governors are to give, and how far a replay is.
 pub(super) struct Script {
     /// For each agent its governor's answers, each after so many turns with none.
     demands: BTreeMap<AgentId, VecDeque<(u32, Demand)>>,
@@ -63,12 +65,15 @@ impl Log {
 
     /// Does something to the world and writes it down: no part of a turn is made between the two, and no recording begins or ends. `wait` is for
     /// those who do not have the run: it keeps calls in lockstep from letting time pass, which is written down before it is done.
-    pub fn in_order<T, G>(
+    ///
+    /// # Errors
+    /// Those of `wait`; nothing is done then.
+    pub fn in_order<T, G, E>(
         &self,
-        wait: impl Fn() -> Option<G>,
+        wait: impl Fn() -> Result<G, E>,
         act: impl FnOnce() -> T,
         note: impl FnOnce(&mut Mode, &T),
-    ) -> T {
+    ) -> Result<T, E> {
         loop {
             if let Some(order) = self.order() {
                 let _held = order.between();
@@ -76,19 +81,39 @@ impl Log {
                 if self.mode().order().is_some_and(|now| Arc::ptr_eq(now, &order)) {
                     let done = act();
                     note(&mut self.mode(), &done);
-                    return done;
+                    return Ok(done);
                 }
             } else {
                 let was_recorded = self.is_recorded();
-                let _waits = if was_recorded { wait() } else { None };
+                let _waits = was_recorded.then(&wait).transpose()?;
                 let mut mode = self.mode();
                 if mode.order().is_none() && was_recorded == matches!(*mode, Mode::Recorded(..)) {
                     let done = act();
                     note(&mut mode, &done);
-                    return done;
+                    return Ok(done);
                 }
             }
         }
+    }
+
+    /// Puts all into the state of `checkpoint` by `act`, and writes down that they were: of a state that is refused nothing.
+    ///
+    /// # Errors
+    /// Those of `act`.
+    pub fn restore<E>(&self, checkpoint: &Checkpoint, act: impl FnOnce() -> Result<(), E>) -> Result<(), E> {
+        if let Mode::Recorded(recorder, _) = &mut *self.mode() {
+            recorder.set_restoring(Some(checkpoint.to_bytes()));
+        }
+        let outcome = act();
+        // in real time the order of turns says when it was: there the state is written down before the part that it is in
+        let note = |mode: &mut Mode, (): &()| match mode {
+            Mode::Recorded(recorder, _) if outcome.is_ok() => recorder.note_restored(),
+            Mode::Recorded(recorder, _) => recorder.set_restoring(None),
+            _ if outcome.is_ok() => mode.note_begun(),
+            _ => {}
+        };
+        let Ok(()) = self.in_order(|| Ok::<_, Infallible>(()), || (), note);
+        outcome
     }
 
     pub fn is_recorded(&self) -> bool {
@@ -162,7 +187,7 @@ impl Log {
         self.mode.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// What the governor of `agent` asks for after a turn: what `answer` says, or what the recording says.
+    /// The demand of the governor of `agent` after a turn: what `answer` says, or what the recording says.
     fn demand(&self, agent: AgentId, answer: impl FnOnce() -> Demand) -> Demand {
         if !self.is_heard.load(Acquire) {
             return answer();

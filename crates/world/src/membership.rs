@@ -21,8 +21,8 @@ impl World {
     /// Takes up another object: it lives from its first step on, and touches what it meets. No other object waits for it.
     ///
     /// # Errors
-    /// [`WorldError::SameName`], [`WorldError::Part`], [`WorldError::Build`], [`WorldError::Run`] and [`WorldError::Stopped`]; nothing was done
-    /// then.
+    /// [`WorldError::SameName`], [`WorldError::Part`], [`WorldError::Build`], [`WorldError::Run`], [`WorldError::Stopped`] and
+    /// [`WorldError::Stalled`]; nothing was done then.
     pub fn add(&self, name: impl Into<String>, part: impl Into<Part>) -> Result<Object, WorldError> {
         let name = name.into();
         if name.is_empty() {
@@ -33,7 +33,8 @@ impl World {
             return Err(WorldError::Refused { name, reason: REPLAYED.to_owned() });
         }
         let entry = added(&name, &part);
-        let State::Running(run) = &mut *self.state() else { return Err(WorldError::Stopped) };
+        let mut state = self.state()?;
+        let State::Running(run) = &mut *state else { return Err(WorldError::Stopped) };
         // under the lock: no other thread adds one meanwhile
         if self.object(&name).is_ok() {
             return Err(WorldError::SameName { name });
@@ -63,7 +64,7 @@ impl World {
     /// from then on.
     ///
     /// # Errors
-    /// [`WorldError::Foreign`], [`WorldError::Gone`] and [`WorldError::Stopped`].
+    /// [`WorldError::Foreign`], [`WorldError::Gone`], [`WorldError::Stopped`] and [`WorldError::Stalled`].
     pub fn remove(&self, object: Object) -> Result<(), WorldError> {
         let agent = self.agent(object)?;
         let refused = |reason: String| WorldError::Refused { name: agent.name().to_owned(), reason };
@@ -71,7 +72,8 @@ impl World {
         if log.is_replayed() {
             return Err(refused(REPLAYED.to_owned()));
         }
-        let State::Running(run) = &mut *self.state() else { return Err(WorldError::Stopped) };
+        let mut state = self.state()?;
+        let State::Running(run) = &mut *state else { return Err(WorldError::Stopped) };
         let note = |log: &mut Mode, left: &Result<(), String>| {
             if left.is_ok() {
                 log.note(|| Entry::Remove(object.id()));

@@ -75,7 +75,8 @@ impl World {
     /// rests nor has failed, nor has been in one step for five seconds, has lived to the end at least; one whose step is longer than what was left
     /// is ahead by less than that step.
     /// A world that was stopped stays as it is; one that another thread pauses waits until it runs again, and one that another thread puts back
-    /// ([`World::restore`]) lives from there what was left of the span.
+    /// ([`World::restore`]) lives from there what was left of the span. In lockstep, where another thread is in a step that lasts for five seconds,
+    /// nothing is done: that object is [`AgentState::Stalled`].
     pub fn advance(&self, span: SimSpan) {
         if self.executor() == ExecutorKind::Lockstep {
             return self.advance_virtual(span);
@@ -124,7 +125,8 @@ impl World {
     /// Lets virtual time pass, which does so in calls alone: where it was stopped, it is let go so far. One call: no other thread puts the world
     /// back between what it looks at and what it does.
     fn advance_virtual(&self, span: SimSpan) {
-        let State::Running(run) = &mut *self.state() else { return };
+        let Some(mut state) = self.state_for_good() else { return };
+        let State::Running(run) = &mut *state else { return };
         let run = run.as_mut();
         if run.timeline().until().is_some() {
             let step = TimelineCommand::Step(span);

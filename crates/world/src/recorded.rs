@@ -6,7 +6,7 @@
 use super::assemble;
 use super::assemble::Govern;
 use super::checkpoint::{Checkpoint, CheckpointError, SceneIdentity};
-use super::error::WorldError;
+use super::error::{Waited, WorldError};
 use super::joined::{JoinedTable, Joining};
 use super::kinds::ExecutorKind;
 use super::log::{Log, TurnsToLog, logged};
@@ -66,7 +66,7 @@ impl World {
         scene: Option<SceneText>,
     ) -> Result<(), RecordError> {
         let Shared { log, identity, .. } = &*self.shared;
-        let mut state = self.state();
+        let mut state = self.state().map_err(|waited| RecordError::Begun(CheckpointError::Refused(waited.into())))?;
         let State::Running(run) = &mut *state else { return Err(RecordError::Stopped) };
         if log.is_replayed() {
             return Err(RecordError::Stopped);
@@ -112,10 +112,10 @@ impl World {
     /// one that ended with it.
     ///
     /// # Errors
-    /// [`RecordError::Write`] if not all of it could be written.
+    /// [`RecordError::Write`] if not all of it could be written; [`RecordError::Stalled`], where it goes on.
     pub fn end_recording(&self) -> Result<bool, RecordError> {
         // what is done after it is in neither
-        let mut calls = self.state();
+        let mut calls = self.state().map_err(|Waited { name, lasts }| RecordError::Stalled { name, lasts })?;
         let ended = if let State::Stopped(stopped) = &mut *calls { stopped.recorded.take() } else { None };
         ended.unwrap_or_else(|| self.close_recording())
     }
@@ -169,7 +169,7 @@ impl World {
             Followed::Lockstep(Box::new(Lockstep::start(spawns, assemble::machine(scene)).map_err(WorldError::Run)?))
         };
         let joined = Arc::<JoinedTable>::default();
-        let player = Player {
+        let mut player = Player {
             run,
             recording,
             played: 0,
@@ -182,6 +182,7 @@ impl World {
             identity,
             joined: Arc::clone(&joined),
         };
+        scene.stall_limit.into_iter().for_each(|limit| player.set_stall_limit(limit));
         let setting = Setting { surroundings, clock: Arc::new(SystemClock::new()), log, joined };
         Ok(Self::of_run(scene, lockstep, Box::new(player), setting))
     }

@@ -20,7 +20,7 @@ use std::time::Duration;
 /// The first bytes of every file.
 const MAGIC: [u8; 8] = *b"METACREC";
 /// The version of the format: it changes with what the bytes mean.
-const FORMAT: u32 = 4;
+const FORMAT: u32 = 5;
 /// Bytes of a chunk before its contents: length, its complement and checksum.
 const CHUNK_HEAD: usize = 4 + 4 + 8;
 /// So many entries are written at once: a process that is killed loses the newest ones, about a second of a frame loop.
@@ -146,6 +146,14 @@ pub enum RecordError {
         path: PathBuf,
         /// The system's error.
         error: std::io::Error,
+    },
+    /// An object's step in lockstep has kept the thread that lets time pass for too long. The recording goes on.
+    #[error("the recording cannot end in a step: that of \"{name}\" has lasted for {:.1} s", lasts.as_secs_f64())]
+    Stalled {
+        /// The object.
+        name: String,
+        /// For how long, wall time.
+        lasts: Duration,
     },
     /// What it was written to took no more: it is complete up to there.
     #[error("the recording could not be written on: {0}")]
@@ -343,6 +351,8 @@ pub(super) struct Recorder {
     /// Up to when turns are written, and when states were last hashed.
     written: Duration,
     hashed: Duration,
+    /// The state that all are being put into: it is written down where they were.
+    restoring: Option<Vec<u8>>,
     /// Why no more is written.
     failed: Option<std::io::Error>,
 }
@@ -363,7 +373,8 @@ impl Recorder {
         let begun = begun.and_then(|()| write_chunk(&mut *out, |archive| archive_values!(archive, program, head)));
         begun.map_err(RecordError::Write)?;
         let (entries, silent_turns) = (Vec::new(), BTreeMap::new());
-        Ok(Self { out, entries, silent_turns, written: Duration::ZERO, hashed: Duration::ZERO, failed: None })
+        let (written, hashed) = (Duration::ZERO, Duration::ZERO);
+        Ok(Self { out, entries, silent_turns, written, hashed, restoring: None, failed: None })
     }
 
     /// Writes down what is about to be done. What came before it is complete, and leaves the process if it is much.
@@ -377,7 +388,16 @@ impl Recorder {
     /// Writes down the parts of turns that were made, and now and then what `hash` says that states are then.
     pub fn note_turns(&mut self, parts: &[TurnPart], hash: impl FnOnce() -> u64) {
         let Some(newest) = parts.last().map(|part| part.wall) else { return };
-        self.entries.push(Entry::Turns(PackedTurns::pack(parts)));
+        let restored =
+            self.restoring.as_ref().and_then(|_| parts.iter().position(|part| part.kind == PartKind::Restore));
+        let (before, parts_since) = parts.split_at(restored.unwrap_or(0));
+        if !before.is_empty() {
+            self.entries.push(Entry::Turns(PackedTurns::pack(before)));
+        }
+        if restored.is_some() {
+            self.note_restored();
+        }
+        self.entries.push(Entry::Turns(PackedTurns::pack(parts_since)));
         if newest > self.hashed + CHECK_INTERVAL {
             self.hashed = newest;
             self.entries.push(Entry::Check(hash()));
@@ -386,6 +406,17 @@ impl Recorder {
             self.written = newest;
             self.flush();
         }
+    }
+
+    /// All are about to be put into the state of a checkpoint, whose bytes these are; `None`: they were not.
+    pub fn set_restoring(&mut self, checkpoint: Option<Vec<u8>>) {
+        self.restoring = checkpoint;
+    }
+
+    /// Writes down that they were.
+    pub fn note_restored(&mut self) {
+        let restored = self.restoring.take();
+        self.entries.extend(restored.map(Entry::Restore));
     }
 
     /// Writes down how the governor of `agent` has answered.

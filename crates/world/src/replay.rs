@@ -218,6 +218,10 @@ impl Run for Player {
         self.run.run().timeline()
     }
 
+    fn set_stall_limit(&mut self, limit: Duration) {
+        self.run.run_mut().set_stall_limit(limit);
+    }
+
     /// Without effect: the recording says how time flows.
     fn drive(&mut self, _drive: TimelineCommand) {}
 

@@ -8,7 +8,6 @@ use super::assemble::Govern;
 use super::checkpoint::{Checkpoint, CheckpointError};
 use super::joined::Joining;
 use super::kinds::ExecutorKind;
-use super::recording::Entry;
 use super::world::{Shared, State, World};
 use metachron_core::Archive;
 use metachron_runtime::{AgentHandle, AgentState, Run};
@@ -49,7 +48,7 @@ impl World {
     /// that it may last ([`Scene::stall_limit`]), [`CheckpointError::Stopped`]. The world goes on as it
     /// was.
     pub fn checkpoint(&self) -> Result<Checkpoint, CheckpointError> {
-        let mut state = self.state();
+        let mut state = self.state().map_err(|waited| CheckpointError::Refused(waited.into()))?;
         let State::Running(run) = &mut *state else { return Err(CheckpointError::Stopped) };
         self.cut(run.as_mut())
     }
@@ -74,7 +73,7 @@ impl World {
     pub fn restore(&self, checkpoint: &Checkpoint) -> Result<(), CheckpointError> {
         let Shared { identity, joined, log, .. } = &*self.shared;
         identity.check(&checkpoint.of)?;
-        let mut state = self.state();
+        let mut state = self.state().map_err(|waited| CheckpointError::Unreadable(waited.into()))?;
         let State::Running(run) = &mut *state else { return Err(CheckpointError::Stopped) };
         if log.is_replayed() {
             return Err(CheckpointError::Replay);
@@ -84,18 +83,9 @@ impl World {
         }
         self.check_joined(checkpoint)?;
         joined.expect(&checkpoint.joined);
-        let note = || self.in_order(|| (), |log, ()| log.note(|| Entry::Restore(checkpoint.to_bytes())));
-        // in real time the order of turns says when it was read, and whether it was
-        let is_virtual = self.executor() == ExecutorKind::Lockstep;
-        if !is_virtual {
-            note();
-        }
-        let outcome = read_state(run.as_mut(), checkpoint, &self.joining());
+        let outcome = log.restore(checkpoint, || read_state(run.as_mut(), checkpoint, &self.joining()));
         joined.sweep(self.agents());
         outcome?;
-        if is_virtual {
-            note();
-        }
         self.see(run.as_ref());
         self.shared.put_back.fetch_add(1, Release);
         Ok(())

@@ -38,7 +38,8 @@ pub struct Scene {
     /// How the operating system schedules the threads of agents.
     pub priority: PriorityKind,
     /// How long the turn of an object may last, wall time, before the object counts as stalled; `None` for 250 ms. Ten of its steps are
-    /// always allowed, and a cluster's turn as many times as long as it has members, 25 at most; a checkpoint waits for a stalled turn as long. In lockstep nobody looks.
+    /// always allowed, and a cluster's turn as many times as long as it has members, 25 at most; a checkpoint waits for a stalled turn as long. In
+    /// lockstep other threads that ask for the object's state, or wait for the world, judge the turn in progress.
     pub stall_limit: Option<Duration>,
     /// Time at which states are drawn.
     pub states: StatesKind,

@@ -48,7 +48,7 @@ impl World {
             }
         };
         let set = self.shared.log.in_order(|| self.between_calls(), || agent.set_state(state.clone()), note);
-        set.map_err(|error| self.unsent(agent, error))
+        set?.map_err(|error| self.unsent(agent, error))
     }
 }
 

@@ -6,8 +6,9 @@
 use super::Scene;
 use super::assemble;
 use super::assemble::Govern;
+use super::call_lock::{CallGuard, CallLock};
 use super::checkpoint::SceneIdentity;
-use super::error::WorldError;
+use super::error::{Waited, WorldError};
 use super::events::{EventFilter, Events};
 use super::frames::{Frame, Frames};
 use super::joined::JoinedTable;
@@ -20,14 +21,15 @@ use glam::DVec3;
 use metachron_contact::stepper::ClusterScene;
 use metachron_core::{AgentId, SimTime, Snapshot};
 use metachron_runtime::{
-    AgentHandle, AgentState, AgentStats, Agents, Lockstep, Pool, Run, SystemClock, Threads, Timeline, TimelineCommand,
-    state_hash, wait_until,
+    AgentHandle, AgentState, AgentStats, Agents, Lockstep, Pool, Run, STALLED_FOR_GOOD, SystemClock, Threads, Timeline,
+    TimelineCommand, state_hash, wait_until,
 };
+use std::convert::Infallible;
 use std::sync::atomic::{
-    AtomicU64,
-    Ordering::{Acquire, Relaxed},
+    AtomicBool, AtomicU64,
+    Ordering::{Acquire, Release},
 };
-use std::sync::{Arc, Mutex, MutexGuard, PoisonError, TryLockError};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 
 /// A running world. Clones are the same world; every method takes `&self`.
@@ -40,7 +42,7 @@ pub struct World {
 
 pub(super) struct Shared {
     tag: WorldTag,
-    state: Mutex<State>,
+    state: CallLock<State>,
     agents: Agents,
     /// How many agents the scene has, and those that joined since, in the order of their numbers.
     pub of_scene: usize,
@@ -50,8 +52,10 @@ pub(super) struct Shared {
     /// The static solids and joints.
     pub surroundings: Arc<ClusterScene>,
     instruments: Instruments,
-    /// The time when it was last let pass or had passed, nanoseconds.
-    seen_ns: AtomicU64,
+    /// Where its time stood when it was last let pass or had passed.
+    seen: Mutex<Present>,
+    /// It was stopped while a step in lockstep did not end: who has it next ends it.
+    is_ending: AtomicBool,
     executor: ExecutorKind,
     /// By what checkpoints of its scene are known again.
     pub identity: SceneIdentity,
@@ -59,7 +63,7 @@ pub(super) struct Shared {
     pub clock: Arc<SystemClock>,
     /// How often it was put back into the state of a checkpoint.
     pub put_back: AtomicU64,
-    /// What is written down of it, or followed.
+    /// The record that is written of it, or followed.
     pub log: Arc<Log>,
 }
 
@@ -69,29 +73,44 @@ impl std::fmt::Debug for World {
     }
 }
 
-/// What makes agents step, or where its time stood when it ended.
+/// The run that makes agents step, or where its time stood when it ended.
 pub(super) enum State {
     Running(Box<dyn Run>),
     Stopped(Stopped),
 }
 
-/// Where the time of a world stood when it ended.
-pub(super) struct Stopped {
+/// Where the time of a world stands.
+#[derive(Clone, Copy)]
+pub(super) struct Present {
     now: Duration,
     time: SimTime,
     timeline: Timeline,
-    /// What became of the recording that ended with it, until somebody asks; whether there was one.
+}
+
+impl Present {
+    fn of(run: &dyn Run) -> Self {
+        Self { now: run.now(), time: run.sim_now(), timeline: run.timeline() }
+    }
+}
+
+/// So often a waiter finds that a step lasts too long before it gives up: a suspension of the whole machine counts as one look.
+const LOOKS: u32 = 4;
+
+/// Where the time of a world stood when it ended.
+pub(super) struct Stopped {
+    present: Present,
+    /// The outcome of the recording that ended with it, until somebody asks; whether there was one.
     pub recorded: Option<Result<bool, RecordError>>,
 }
 
 impl State {
     /// That of a world whose `run` has ended.
     pub fn stopped(run: &dyn Run, recorded: Option<Result<bool, RecordError>>) -> Self {
-        Self::Stopped(Stopped { now: run.now(), time: run.sim_now(), timeline: run.timeline(), recorded })
+        Self::Stopped(Stopped { present: Present::of(run), recorded })
     }
 }
 
-/// What a world has besides its run.
+/// The parts of a world besides its run.
 pub(super) struct Setting {
     pub surroundings: Arc<ClusterScene>,
     pub clock: Arc<SystemClock>,
@@ -134,10 +153,10 @@ impl World {
     pub(super) fn of_run(scene: &Scene, executor: ExecutorKind, run: Box<dyn Run>, setting: Setting) -> Self {
         let Setting { surroundings, clock, log, joined } = setting;
         let (agents, gravity, identity) = (run.agents().clone(), scene.gravity, SceneIdentity::of(scene));
-        let (tag, state) = (WorldTag::new(), Mutex::new(State::Running(run)));
+        let seen = Mutex::new(Present::of(&*run));
+        let (tag, state) = (WorldTag::new(), CallLock::new(State::Running(run)));
         let (joint_names, joints) = (scene.joint_names.clone(), Arc::clone(&scene.joints));
         let instruments = Instruments { joint_names, joints, sensors: scene.sensors.clone() };
-        let seen_ns = AtomicU64::new(0);
         let shared = Shared {
             tag,
             state,
@@ -147,7 +166,8 @@ impl World {
             gravity,
             surroundings,
             instruments,
-            seen_ns,
+            seen,
+            is_ending: AtomicBool::new(false),
             executor,
             identity,
             clock,
@@ -230,19 +250,7 @@ impl World {
     /// Simulated time now; in lockstep, while another thread lets it pass, that at which this began: it does not wait for it.
     #[must_use]
     pub fn time(&self) -> SimTime {
-        let state = match self.shared.state.try_lock() {
-            Ok(state) => state,
-            Err(TryLockError::Poisoned(state)) => state.into_inner(),
-            Err(TryLockError::WouldBlock) if self.executor() == ExecutorKind::Lockstep => {
-                return SimTime::from_nanos(self.shared.seen_ns.load(Relaxed));
-            }
-            // in real time nobody keeps it for long
-            Err(TryLockError::WouldBlock) => self.state(),
-        };
-        match &*state {
-            State::Running(run) => run.sim_now(),
-            State::Stopped(stopped) => stopped.time,
-        }
+        self.present().time
     }
 
     /// Hash of the newest states of all objects: equal numbers mean bit-identical states.
@@ -263,16 +271,13 @@ impl World {
         &self.shared.agents
     }
 
-    /// Wall time since the start; virtual in lockstep.
+    /// Wall time since the start; virtual in lockstep, and there as [`World::time`] while another thread lets it pass.
     #[must_use]
     pub fn now(&self) -> Duration {
-        match &*self.state() {
-            State::Running(run) => run.now(),
-            State::Stopped(stopped) => stopped.now,
-        }
+        self.present().now
     }
 
-    /// Waits until the wall time `until`, while the agents run; returns at once if that has passed.
+    /// Waits until the wall time `until`, while the agents run; returns at once if that has passed. In lockstep as [`World::advance`].
     pub fn wait_until(&self, until: Duration) {
         match self.executor() {
             ExecutorKind::Lockstep => self.with_run(|| Entry::Wait(until), |run| run.wait_until(until)),
@@ -287,12 +292,20 @@ impl World {
         }
     }
 
-    /// The timeline in force.
+    /// The timeline in force; in lockstep as [`World::time`] while another thread lets it pass.
     #[must_use]
     pub fn timeline(&self) -> Timeline {
-        match &*self.state() {
-            State::Running(run) => run.timeline(),
-            State::Stopped(stopped) => stopped.timeline,
+        self.present().timeline
+    }
+
+    /// Where its time stands; it does not wait for a call that lets it pass.
+    fn present(&self) -> Present {
+        let is_virtual = self.executor() == ExecutorKind::Lockstep;
+        let state = if is_virtual { self.shared.state.try_lock() } else { self.state().ok() };
+        match state.as_deref() {
+            Some(State::Running(run)) => Present::of(&**run),
+            Some(State::Stopped(stopped)) => stopped.present,
+            None => *self.seen(),
         }
     }
 
@@ -301,7 +314,8 @@ impl World {
         if self.executor() == ExecutorKind::Lockstep {
             return self.with_run(|| Entry::Drive(drive), |run| run.drive(drive));
         }
-        let State::Running(run) = &mut *self.state() else { return };
+        let Some(mut state) = self.state_for_good() else { return };
+        let State::Running(run) = &mut *state else { return };
         self.see(run.as_ref());
         let note = |log: &mut Mode, timeline: &Timeline| log.note(|| Entry::Timeline(*timeline));
         let act = || {
@@ -313,15 +327,29 @@ impl World {
     }
 
     /// Ends the run for all clones: waits for the turns in progress (boundedly) and returns the metrics of every agent. A recording ends with
-    /// these turns, in the states that are final; [`World::end_recording`] says what became of it. Latest states stay readable.
+    /// these turns, in the states that are final; [`World::end_recording`] says what became of it. Latest states stay readable. An object whose
+    /// step does not end is parked; where that keeps another thread in lockstep, the recording ends where its step does.
     pub fn stop(&self) -> Vec<AgentStats> {
-        let mut state = self.state();
-        let State::Running(run) = &mut *state else {
+        loop {
+            match self.state() {
+                Ok(mut state) => return self.end(&mut state),
+                Err(_) if self.agents().end_stalled() => {
+                    self.shared.is_ending.store(true, Release);
+                    return self.agents().iter().map(AgentHandle::stats).collect();
+                }
+                // it has ended meanwhile
+                Err(_) => {}
+            }
+        }
+    }
+
+    fn end(&self, state: &mut State) -> Vec<AgentStats> {
+        let State::Running(run) = state else {
             return self.shared.agents.iter().map(AgentHandle::stats).collect();
         };
         run.end_turns();
         let ended = State::stopped(run.as_ref(), Some(self.close_recording()));
-        match std::mem::replace(&mut *state, ended) {
+        match std::mem::replace(state, ended) {
             State::Running(run) => run.shutdown(),
             State::Stopped(_) => unreachable!("it ran a moment ago, and the lock is held"),
         }
@@ -357,22 +385,26 @@ impl World {
     }
 
     pub(super) fn has_stopped(&self) -> bool {
-        matches!(*self.state(), State::Stopped(_))
+        let is_stopped = |state: CallGuard<'_, State>| matches!(*state, State::Stopped(_));
+        self.shared.is_ending.load(Acquire) || self.shared.state.try_lock().is_some_and(is_stopped)
     }
 
     /// [`Log::in_order`] for who has the run.
     pub(super) fn in_order<T>(&self, act: impl FnOnce() -> T, note: impl FnOnce(&mut Mode, &T)) -> T {
-        self.shared.log.in_order(|| None::<()>, act, note)
+        let Ok(done) = self.shared.log.in_order(|| Ok::<_, Infallible>(()), act, note);
+        done
     }
 
     /// Waits in lockstep until no call lets time pass: a recording there has the order of calls alone.
-    pub(super) fn between_calls(&self) -> Option<MutexGuard<'_, State>> {
-        (self.executor() == ExecutorKind::Lockstep).then(|| self.state())
+    pub(super) fn between_calls(&self) -> Result<Option<CallGuard<'_, State>>, Waited> {
+        (self.executor() == ExecutorKind::Lockstep).then(|| self.state()).transpose()
     }
 
     /// Does something with a world in lockstep that runs; nothing with one that was stopped.
     fn with_run(&self, entry: impl FnOnce() -> Entry, act: impl FnOnce(&mut dyn Run)) {
-        if let State::Running(run) = &mut *self.state() {
+        if let Some(mut state) = self.state_for_good()
+            && let State::Running(run) = &mut *state
+        {
             self.let_pass(run.as_mut(), entry, act);
         }
     }
@@ -387,11 +419,39 @@ impl World {
 
     /// Notes the time for those that ask while it passes.
     pub(super) fn see(&self, run: &dyn Run) {
-        self.shared.seen_ns.store(run.sim_now().as_nanos(), Relaxed);
+        *self.seen() = Present::of(run);
     }
 
-    pub(super) fn state(&self) -> MutexGuard<'_, State> {
-        self.shared.state.lock().unwrap_or_else(PoisonError::into_inner)
+    fn seen(&self) -> MutexGuard<'_, Present> {
+        self.shared.seen.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// The run, once no other call has it. In lockstep a call is waited for as long as its turns end in time.
+    ///
+    /// # Errors
+    /// The agent whose step has lasted too long.
+    pub(super) fn state(&self) -> Result<CallGuard<'_, State>, Waited> {
+        self.state_within(Duration::ZERO)
+    }
+
+    /// As [`Self::state`], for calls that can say nothing: they wait for a step as long as [`World::advance`] does on threads.
+    pub(super) fn state_for_good(&self) -> Option<CallGuard<'_, State>> {
+        self.state_within(STALLED_FOR_GOOD).ok()
+    }
+
+    fn state_within(&self, patience: Duration) -> Result<CallGuard<'_, State>, Waited> {
+        let (agents, mut looks) = (self.agents(), 0);
+        let waited = || {
+            let agent = agents.stalled_on_caller().and_then(|id| agents.of(id));
+            looks = if agent.is_some() { looks + 1 } else { 0 };
+            let (agent, lasts) = agent.filter(|_| looks >= LOOKS).map(|agent| (agent, agent.stalled_for()))?;
+            (lasts >= patience).then(|| Waited { name: agent.name().to_owned(), lasts })
+        };
+        let mut state = self.shared.state.lock(waited)?;
+        if self.shared.is_ending.load(Acquire) {
+            self.end(&mut state);
+        }
+        Ok(state)
     }
 }
 

@@ -3,8 +3,10 @@
 
 #[path = "../examples/rewinds/driver.rs"]
 mod driver;
+mod kept;
 
 use driver::{Amount, Tally, churn, storm};
+use kept::recorded;
 use metachron_contact::{Agent, StepContext};
 use metachron_core::{Archive, ArchiveError, SimSpan, Snapshot, StepError, StepReport};
 use metachron_geometry::Solid;
@@ -148,6 +150,38 @@ fn a_way_back_that_is_refused_changes_nothing() {
         world.restore(&mark).unwrap();
         assert!(world.object("left").is_ok() && world.object("came").is_err(), "{executor:?}");
         world.advance(ms(20));
+    }
+}
+
+#[test]
+fn a_way_back_that_is_refused_leaves_no_trace_in_a_recording() {
+    for executor in EXECUTORS {
+        let mood = Arc::new(AtomicU8::new(READS));
+        let world = World::start(&office(&mood, 1), executor).unwrap();
+        world.advance(ms(60));
+        let mark = world.checkpoint().unwrap();
+        let path = std::env::temp_dir().join(format!("metachron-trace-{}-{executor:?}.bin", std::process::id()));
+        mark.write(&path).unwrap();
+        let bytes = std::fs::read(&path).unwrap();
+        std::fs::remove_file(&path).unwrap();
+        // a recording begins with the state of then, which is another one
+        world.advance(ms(20));
+        for mood_then in [ERRS_ONCE, READS] {
+            let kept = recorded(&world);
+            world.advance(ms(20));
+            mood.store(mood_then, Relaxed);
+            assert_eq!(world.restore(&mark).is_ok(), mood_then == READS, "{executor:?}");
+            world.advance(ms(20));
+            world.end_recording().unwrap();
+            let hash = kept.read().unwrap().hash();
+            let has_it = kept.0.lock().unwrap().windows(bytes.len()).any(|part| part == bytes);
+            assert_eq!(has_it, mood_then == READS, "{executor:?}");
+            let again = World::replay(&office(&mood, 1), kept.read().unwrap(), None).unwrap();
+            while again.replayed().unwrap().unwrap() < 1.0 {
+                again.advance(ms(10));
+            }
+            assert_eq!(Some(again.hash()), hash, "{executor:?}");
+        }
     }
 }
 

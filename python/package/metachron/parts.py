@@ -24,7 +24,7 @@ class _Placed:
     friction: float | None = None
     """Coulomb friction coefficient, >= 0; default 0.5."""
     restitution: float | None = None
-    """Coefficient of restitution, 0 ... 1; default 0.2. Of two that meet the greater counts."""
+    """Coefficient of restitution, 0 ... 1; default 0. Of two that meet the greater counts."""
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -26,6 +26,9 @@ mod sync {
 #[path = "../../../crates/runtime/src/sync.rs"]
 mod sync;
 
+#[path = "../../../crates/runtime/src/callers_turn.rs"]
+#[expect(dead_code, reason = "a model uses what it needs")]
+mod callers_turn;
 #[path = "../../../crates/runtime/src/worker_wakeup.rs"]
 mod worker_wakeup;
 #[path = "../../../crates/runtime/src/dirty_set.rs"]

@@ -23,6 +23,23 @@ struct Taken {
     /// The giver's own time in the last reading.
     read: SimTime,
     forces: Vec<SiteForce>,
+    /// The copy that it is to have once the step in progress is made.
+    #[serde(skip)]
+    reading: Reading,
+}
+
+/// A ledger that a step in progress acts by.
+#[derive(Debug, Clone)]
+struct Reading {
+    /// Storage where nothing was read.
+    ledger: Ledger,
+    is_new: bool,
+}
+
+impl Default for Reading {
+    fn default() -> Self {
+        Self { ledger: Ledger::new(AgentId(0)), is_new: false }
+    }
 }
 
 /// What a partner gave a site a second in the last step, N and N·m.
@@ -52,9 +69,13 @@ impl Ledgers {
         }
     }
 
-    /// Takes all that is new, each impulse once (eq. 2): it will act evenly over the step of `dt_s` seconds that begins (eq. 4c).
+    /// Takes all that is new, each impulse once (eq. 2): it will act evenly over the step of `dt_s` seconds that begins (eq. 4c). A step that
+    /// is not made has taken nothing: until [`Self::settle`] the same is new again.
     pub fn take(&mut self, context: &StepContext<'_>, dt_s: f64, mut apply: impl FnMut(TakenImpulse)) {
-        self.taken.iter_mut().for_each(|taken| taken.forces.clear());
+        for taken in &mut self.taken {
+            taken.forces.clear();
+            taken.reading.is_new = false;
+        }
         for neighbour in context.neighbours {
             let Some(ledger) = neighbour.snapshot.given.iter().find(|ledger| ledger.with == context.me) else {
                 continue;
@@ -68,14 +89,24 @@ impl Ledgers {
             if taken.copy.revision >= ledger.revision {
                 continue;
             }
-            let Taken { copy, forces, .. } = taken;
+            let Taken { copy, forces, reading, .. } = taken;
             ledger.beyond(Some(copy), context.time, |site, impulse, carried| {
                 forces.push(SiteForce { site, force: impulse * dt_s.recip() });
                 apply(TakenImpulse { site, impulse, carried });
             });
-            copy.copy_from(ledger);
-            (copy.with, copy.ahead) = (neighbour.id, None);
-            copy.coming.clear();
+            reading.is_new = true;
+            reading.ledger.copy_from(ledger);
+            (reading.ledger.with, reading.ledger.ahead) = (neighbour.id, None);
+            reading.ledger.coming.clear();
+        }
+    }
+
+    /// The step that took what was new is made.
+    pub fn settle(&mut self) {
+        for Taken { copy, reading, .. } in &mut self.taken {
+            if std::mem::take(&mut reading.is_new) {
+                std::mem::swap(copy, &mut reading.ledger);
+            }
         }
     }
 
@@ -132,7 +163,8 @@ impl Ledgers {
 
     fn taken_mut(&mut self, from: AgentId) -> &mut Taken {
         let place = self.taken.binary_search_by_key(&from, |taken| taken.copy.with).unwrap_or_else(|place| {
-            let taken = Taken { copy: Ledger::new(from), read: SimTime::ZERO, forces: Vec::new() };
+            let (copy, forces, reading) = (Ledger::new(from), Vec::new(), Reading::default());
+            let taken = Taken { copy, read: SimTime::ZERO, forces, reading };
             self.taken.insert(place, taken);
             place
         });

@@ -67,7 +67,10 @@ impl Lines {
 
     /// Lays out the rows of all lines for a macro step of `dt_s` seconds.
     pub fn lay_out(&mut self, place: usize, one: &Participant<'_>, stepper: &mut ClusterStepper, dt_s: f64) {
-        self.all.iter_mut().for_each(|line| line.row = None);
+        for line in &mut self.all {
+            line.row = None;
+            line.line.open();
+        }
         let context = one.context;
         for other in context.neighbours {
             if let (Law::Tlm { stiffness_n_m, damping_n_s_m }, Some(_)) = (other.law, &other.form) {
@@ -79,6 +82,11 @@ impl Lines {
                 self.link(&LinkEnd { place, one, other, link, dt_s }, stepper);
             }
         }
+    }
+
+    /// The step that heard the lines is made.
+    pub fn settle(&mut self) {
+        self.all.iter_mut().for_each(|line| line.line.settle());
     }
 
     /// A link: a line from point to point.

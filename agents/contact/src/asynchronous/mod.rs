@@ -6,7 +6,9 @@
 //!
 //! join     takes what partners gave, sees those that are met here, lays out lines
 //! (step)   the cluster's problem, with partners as remote members
-//! part     books what remote members were given, publishes local models
+//! part     settles what was taken, books what remote members were given, publishes local models
+//!
+//! A step that is not made has taken nothing: the next join finds the same.
 
 mod blocks;
 mod ledgers;
@@ -191,6 +193,11 @@ impl Remotes {
 /// After a macro step that took `dt_s` seconds: books what remote members were given, and makes the local models that partners read.
 /// `all` are the participants of the step, remote members last.
 pub fn part(all: &[Participant<'_>], pairs: &mut [Option<&mut Pairs>], stepper: &mut ClusterStepper, dt_s: f64) {
+    // first of all: the step is made, whatever a member's code does now
+    for pairs in pairs.iter_mut().flatten() {
+        pairs.ledgers.settle();
+        pairs.lines.settle();
+    }
     let locals = all.partition_point(|one| !one.member.is_remote());
     for (place, pairs) in pairs.iter_mut().enumerate().take(locals) {
         let Some(pairs) = pairs else { continue };

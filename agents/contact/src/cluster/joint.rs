@@ -53,6 +53,9 @@ pub struct JointRow {
     pub warm_n_s: DVec3,
     /// The way beyond its target that it has crept while it held, and owes back (eq. 13), world axes, metres or radians.
     pub owed_slip_m: DVec3,
+    /// The most that it gives along an axis, as the velocity by which that moves its sides where nothing else holds them, m/s, ≥ 0; infinite for
+    /// as much as it takes. Bounds of its own count as well.
+    pub limit_m_s: f64,
     /// What bounds its impulse, where that is what presses a contact; bounds of its own count as well.
     pub pressed: Option<Pressed>,
 }
@@ -168,7 +171,8 @@ impl JointRow {
     #[must_use]
     pub fn new(sides: [Side; 2], hold: Hold) -> Self {
         let (target_m_s, warm_n_s, owed_slip_m) = (DVec3::ZERO, DVec3::ZERO, DVec3::ZERO);
-        Self { sides, hold, target_m_s, compliance_per_kg: None, warm_n_s, owed_slip_m, pressed: None }
+        let limit_m_s = f64::INFINITY;
+        Self { sides, hold, target_m_s, compliance_per_kg: None, warm_n_s, owed_slip_m, limit_m_s, pressed: None }
     }
 
     /// The same row as a spring that is implicit at both ends (eq. 14).

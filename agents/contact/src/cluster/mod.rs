@@ -23,13 +23,12 @@
 //!     tangents: [DVec3::X, DVec3::Y],
 //!     gap_m: 0.0,
 //!     friction: 0.3,
-//!     restitution: 0.0,
-//!     approach_m_s: 0.0,
-//!     gained_m_s: 0.0,
+//!     parting_m_s: 0.0,
 //!     surface_m_s: DVec3::ZERO,
 //!     owed_slip_m: DVec3::ZERO,
 //!     warm_n_s: DVec3::ZERO,
 //!     load_n_s: 0.0,
+//!     overlap_m: 0.0,
 //! };
 //! let contacts = [corner(-0.1, -0.1), corner(0.1, -0.1), corner(-0.1, 0.1), corner(0.1, 0.1)];
 //! let mut solver = Solver::default();
@@ -60,7 +59,6 @@ mod newton;
 mod order;
 mod passivity;
 mod problem;
-mod rebound;
 mod resistance;
 mod rows;
 mod scale;

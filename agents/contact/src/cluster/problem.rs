@@ -77,16 +77,13 @@ pub struct Contact {
     pub tangents: [DVec3; 2],
     /// The distance along the normal, metres; a depth is negative.
     pub gap_m: f64,
+    /// How far it lies in that much of it counts as apart, metres, ≥ 0: bodies that began inside each other are held where they are, and pushed out
+    /// by a row of its own (eq. 2a).
+    pub overlap_m: f64,
     /// Coulomb's coefficient μ ≥ 0.
     pub friction: f64,
-    /// Newton's coefficient of restitution e, 0 to 1; 0 too for what is not to rebound in this step, as what rests would hop.
-    pub restitution: f64,
-    /// The speed at which the sides closed along the normal when the step began, that of the surface included, m/s; below zero where
-    /// they parted. Without meaning where nothing rebounds.
-    pub approach_m_s: f64,
-    /// By how much the speed at which they part changes after the blow within the step: what falls on something that lies has all of its
-    /// fall, and two that fall together nothing. Without meaning where nothing rebounds.
-    pub gained_m_s: f64,
+    /// The speed at which the sides must part at least, m/s, ≥ 0: of an impact what its restitution asks for (eq. 3b), else 0.
+    pub parting_m_s: f64,
     /// The velocity of side 1's surface beyond that of its blocks, as of a conveyor or of a solid that is led along a path, world axes,
     /// m/s.
     pub surface_m_s: DVec3,
@@ -120,18 +117,13 @@ impl Contact {
         DMat3::from_cols(self.normal, self.tangents[0], self.tangents[1])
     }
 
-    /// What the gap and the slip owed add to the velocity, in the frame (eq. 2, 3).
+    /// What the gap, the slip owed and a rebound add to the velocity, in the frame (eq. 2, 3, 3b).
     #[must_use]
     pub fn bias_m_s(&self, h_s: f64) -> DVec3 {
-        let normal = if self.gap_m >= 0.0 { self.gap_m / h_s } else { push_out_m_s(self.gap_m, h_s) };
+        let gap_m = self.gap_m + self.overlap_m;
+        let normal = if gap_m >= 0.0 { gap_m / h_s } else { push_out_m_s(gap_m, h_s) };
         let owed = self.owed_slip_m * (SLIP_SHARE / h_s);
-        DVec3::new(normal, self.tangents[0].dot(owed), self.tangents[1].dot(owed))
-    }
-
-    /// The speed at which the sides must part (eq. 3b): of a contact that closes within the step.
-    pub(super) fn rebound_m_s(&self, h_s: f64) -> Option<f64> {
-        let closes = self.approach_m_s > 0.0 && self.gap_m <= self.approach_m_s * h_s;
-        (closes && self.restitution > 0.0).then_some(self.restitution * self.approach_m_s)
+        DVec3::new(normal - self.parting_m_s, self.tangents[0].dot(owed), self.tangents[1].dot(owed))
     }
 
     /// The slip owed after a step that gave `impulse_n_s` and left the sides `velocity_m_s` against each other (eq. 13).

@@ -15,8 +15,6 @@ const COMPLIANCE_MIN: f64 = 1e-7;
 const COMPLIANCE_MAX: f64 = 1e-3;
 /// A compliance gives way by up to this many times the wanted velocity before it is made harder.
 const HARDEN_PAST: f64 = 2.0;
-/// The share of the yield of what lies by which a blow gives way: rebounds are lower by it.
-const BLOW_SHARE: f64 = 2e-3;
 /// The least scale, 1/kg: a row between parts that cannot move has none, and gets no impulse.
 const SCALE_MIN: f64 = 1e-12;
 
@@ -41,14 +39,14 @@ pub(super) struct Row {
     pub bias: DVec3,
     /// The velocity of a surface beyond that of its blocks, taken from the velocity.
     surface: DVec3,
-    /// Along the normal, the bias without the rebound; `None` where nothing rebounds.
-    pub calm: Option<f64>,
     /// b of eq. 1: velocity without impulses, bias included.
     pub free: DVec3,
     /// w of eq. 6, 1/kg.
     pub scale: f64,
     /// R of eq. 5, 1/kg.
     pub compliance: f64,
+    /// The most that it gives along its axis, as the velocity by which that moves its sides alone.
+    limit_m_s: f64,
     /// A compliance that is given and does not follow the load.
     given: Option<f64>,
     start: usize,
@@ -91,28 +89,21 @@ impl Row {
             held: DVec3::ONE,
             bias,
             surface: DVec3::ZERO,
-            calm: None,
             free: DVec3::ZERO,
             scale: 0.0,
             compliance: 0.0,
+            limit_m_s: f64::INFINITY,
             given: None,
             start: 0,
             end: 0,
         }
     }
 
-    /// Of a contact, as if it did not rebound.
     fn of_contact(contact: &Contact, problem: &Problem<'_>) -> Self {
         let frame = contact.frame();
         let surface = frame.transpose() * contact.surface_m_s;
         let law = Law::Coulomb { friction: contact.friction };
         Self { surface, ..Self::new(law, frame, contact.bias_m_s(problem.h_s)) }
-    }
-
-    /// Lets a contact part at this speed, and at what its sides gain after the blow (eq. 3b).
-    fn rebound(&mut self, parting_m_s: f64, gained_m_s: f64) {
-        self.calm = Some(self.bias.x);
-        self.bias.x = -parting_m_s - gained_m_s;
     }
 
     fn of_joint(joint: &JointRow, h_s: f64) -> Self {
@@ -123,15 +114,7 @@ impl Row {
         };
         let owed = joint.owed_slip_m * (SLIP_SHARE / h_s);
         let bias = frame.transpose() * (owed - joint.target_m_s) * held;
-        Self { held, given: joint.compliance_per_kg, ..Self::new(law, frame, bias) }
-    }
-
-    /// Takes the rebound back.
-    pub fn calm_down(&mut self) {
-        if let Some(calm) = self.calm.take() {
-            self.free.x += calm - self.bias.x;
-            self.bias.x = calm;
-        }
+        Self { held, limit_m_s: joint.limit_m_s, given: joint.compliance_per_kg, ..Self::new(law, frame, bias) }
     }
 
     /// P(z) of eq. 7 at an iterate; where it gives the impulse back, the law holds.
@@ -164,14 +147,8 @@ impl Row {
         self.scale * (impulse - image).abs().max_element()
     }
 
-    /// How far it gives way where one at rest does by `yield_m_s`: a blow is over before anything lies on it.
-    fn own_yield_m_s(&self, yield_m_s: f64) -> f64 {
-        if self.calm.is_some() { BLOW_SHARE * yield_m_s } else { yield_m_s }
-    }
-
     /// The compliance that gives way by `yield_m_s` under a load (eq. 5).
     pub fn compliance_under(&self, load_n_s: f64, yield_m_s: f64) -> f64 {
-        let yield_m_s = self.own_yield_m_s(yield_m_s);
         let (least, most) = (COMPLIANCE_MIN * self.scale, COMPLIANCE_MAX * self.scale);
         self.given.unwrap_or_else(|| (yield_m_s / load_n_s).clamp(least, most))
     }
@@ -179,7 +156,7 @@ impl Row {
     /// The compliance, made harder where it gives way too far under an impulse.
     pub fn hardened(&self, impulse: DVec3, yield_m_s: f64) -> f64 {
         let load = impulse.length();
-        if self.given.is_none() && self.compliance * load > HARDEN_PAST * self.own_yield_m_s(yield_m_s) {
+        if self.given.is_none() && self.compliance * load > HARDEN_PAST * yield_m_s {
             self.compliance_under(load, yield_m_s)
         } else {
             self.compliance
@@ -206,11 +183,6 @@ impl Rows {
         }
         for k in 0..self.rows.len() {
             let moving = self.velocity(k, free) - self.rows[k].surface;
-            if let Some(contact) = problem.contacts.get(k)
-                && let Some(parting_m_s) = contact.rebound_m_s(problem.h_s)
-            {
-                self.rows[k].rebound(parting_m_s, contact.gained_m_s);
-            }
             self.rows[k].free = self.rows[k].bias + moving;
         }
     }
@@ -249,7 +221,14 @@ impl Rows {
         // also where it is not a number
         let moves = scale > SCALE_MIN;
         row.scale = if moves { scale } else { 1.0 };
-        row.law = if moves { row.law } else { Law::Idle };
+        row.law = match row.law {
+            _ if !moves => Law::Idle,
+            Law::Between { low, high } => {
+                let most = row.limit_m_s / scale;
+                Law::Between { low: low.max(-most), high: high.min(most) }
+            }
+            law => law,
+        };
     }
 
     /// How many of them are contacts.

@@ -9,7 +9,6 @@ use super::iterate::{Iterate, Kept, State};
 use super::newton::{self, Aim, Patience};
 use super::passivity;
 use super::problem::{Member, Problem};
-use super::rebound;
 use super::system::StepForm;
 use super::validate::validate;
 use crate::push_out::PUSH_OUT_SHARE;
@@ -79,8 +78,6 @@ pub struct Report {
     pub factors: usize,
     /// Products of conjugate gradients with a matrix of the members' size, all for scales, steps and responses; none in the direct form.
     pub products: usize,
-    /// Contacts that did not rebound, as they would have made energy (section 5).
-    pub refused: usize,
     /// What laws and momentum miss at most by the answer given, m/s (eq. 9); infinite where numbers overflowed and nothing is given.
     pub miss_m_s: f64,
     /// The most work that the answer does but for push-out, J (eq. 12); above zero by rounding only.
@@ -100,8 +97,6 @@ pub struct Solution {
     pub contacts_m_s: Vec<DVec3>,
     /// The velocity by which each contact gives way for an impulse, 1/kg: R of eq. 5.
     pub compliances_per_kg: Vec<f64>,
-    /// Whether each contact rebounds: those that would make energy do not, though the problem says so.
-    pub rebounds: Vec<bool>,
     /// What the solve took.
     pub report: Report,
     velocities: Vec<DVec3>,
@@ -245,7 +240,7 @@ impl Solver {
         self.iterate.begin(members);
     }
 
-    /// The levels in their order, again without rebounds that make energy, then the guard.
+    /// The levels in their order, then the guard.
     fn run(&mut self, problem: &Problem<'_>) -> Report {
         let aim = Aim {
             members: problem.members,
@@ -253,18 +248,7 @@ impl Solver {
             yield_m_s: self.settings.yield_m_s(problem.h_s),
             threads: problem.threads,
         };
-        let mut refused = 0;
-        let mut report = loop {
-            let report = self.find(&aim);
-            // each time there are fewer, so this ends
-            match rebound::refuse(&mut self.iterate, aim.tolerance_m_s) {
-                0 => break Report { refused, ..report },
-                more => refused += more,
-            }
-            self.warm.clone_from(&self.iterate.state.lambda);
-            self.compliances.clear();
-            self.compliances.extend(self.iterate.rows.rows.iter().map(|row| row.compliance));
-        };
+        let mut report = self.find(&aim);
         let ray = passivity::guard(&mut self.iterate, problem.members, &self.solution.velocities);
         (report.factors, report.products) = (self.iterate.system.factors(), self.iterate.system.products());
         (report.work_j, report.ray) = (ray.work_j, ray.share);
@@ -339,7 +323,6 @@ impl Solver {
         solution.rows_n_s.clear();
         solution.contacts_m_s.clear();
         solution.compliances_per_kg.clear();
-        solution.rebounds.clear();
         for (k, row) in iterate.rows.rows.iter().enumerate() {
             let impulse = row.frame * iterate.state.lambda[k];
             if k >= problem.contacts.len() {
@@ -349,7 +332,6 @@ impl Solver {
             solution.contacts_n_s.push(impulse);
             solution.contacts_m_s.push(row.frame * (iterate.state.velocity[k] - row.bias));
             solution.compliances_per_kg.push(row.compliance);
-            solution.rebounds.push(row.calm.is_some());
         }
         solution.unanswered.clone_from(&iterate.state.left);
         solution.velocities.iter_mut().zip(&iterate.state.change).for_each(|(v, change)| *v += *change);

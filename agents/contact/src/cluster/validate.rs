@@ -73,16 +73,16 @@ fn contact_fault(contact: &Contact) -> Option<&'static str> {
     if !frame.is_finite() || off.to_cols_array().iter().any(|d| d.abs() > SLACK) {
         return Some("normal and tangents are not orthonormal");
     }
-    if !contact.gap_m.is_finite() {
+    if !(contact.gap_m + contact.overlap_m).is_finite() {
         return Some("its gap is not finite");
     }
     if !(contact.friction.is_finite() && contact.friction >= 0.0) {
         return Some("its friction must be finite and not below zero");
     }
-    if !(0.0..=1.0).contains(&contact.restitution) {
-        return Some("its restitution must be between 0 and 1");
+    if !(contact.parting_m_s >= 0.0 && contact.parting_m_s.is_finite()) {
+        return Some("the speed at which it parts must be at least 0");
     }
-    if !(contact.approach_m_s.is_finite() && contact.gained_m_s.is_finite() && contact.surface_m_s.is_finite()) {
+    if !contact.surface_m_s.is_finite() {
         return Some("its approach or the velocity of its surface is not finite");
     }
     let vectors = contact.owed_slip_m.is_finite() && contact.warm_n_s.is_finite() && contact.load_n_s.is_finite();

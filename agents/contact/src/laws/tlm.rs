@@ -53,6 +53,9 @@ pub struct Line {
     received: VecDeque<(SimTime, DVec3)>,
     /// How much of the other end's integral has arrived here.
     arrived: DVec3,
+    /// The same at the end of the step in progress.
+    #[serde(skip)]
+    arriving: Option<DVec3>,
     sent: DVec3,
     start: DVec3,
     since: SimTime,
@@ -143,17 +146,27 @@ impl Line {
         }
     }
 
+    /// Begins a step: one that was begun before and not made has received nothing.
+    pub const fn open(&mut self) {
+        self.arriving = None;
+    }
+
+    /// The step that began is made, with what [`Self::arriving`] said.
+    pub fn settle(&mut self) {
+        self.arrived = self.arriving.take().unwrap_or(self.arrived);
+    }
+
     /// The average of the wave that arrives in the `h` seconds from `at` on, N: c of the line. Zero before the delay is known.
     ///
-    /// Where the wave of that time is not known yet, the last known value is held; the integral makes up for it later.
+    /// Where the wave of that time is not known yet, the last known value is held; the integral makes up for it later. It has arrived with
+    /// [`Self::settle`].
     pub fn arriving(&mut self, at: SimTime, h: f64) -> DVec3 {
         if self.delay_s == 0.0 {
             return DVec3::ZERO;
         }
         let now = self.integral(at, h - self.delay_s);
-        let mean = (self.arrived - now) / h;
-        self.arrived = now;
-        mean
+        self.arriving = Some(now);
+        (self.arrived - now) / h
     }
 
     /// Sends the response to `arriving`, where this end pushed into the line by `force` (N) for `h` seconds.
@@ -207,6 +220,10 @@ mod tests {
             let (h, other) = (steps[i], 1 - i);
             lines[i].receive(shown[other].0, shown[other].1, i == 0, h);
             let c = lines[i].arriving(t[i], h);
+            // a step that is begun again hears the same
+            lines[i].open();
+            assert_eq!(lines[i].arriving(t[i], h), c);
+            lines[i].settle();
             let z = lines[i].impedance();
             let force = (c.x + z * v[i]) / (1.0 + z * h); // of 1 kg
             lines[i].send(c, DVec3::X * force, h);

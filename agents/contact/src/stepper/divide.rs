@@ -1,4 +1,4 @@
-//! Shorter steps for members that ask for them: after blows, for joints, under strain.
+//! Shorter steps for members that ask for them: for joints, under strain.
 //!
 //! In: members, what a solve made of them. Out: how many steps each makes when the macro step begins anew. Never here: going back to its start.
 //! Theory: docs/theory/clusters.md, section 9.
@@ -9,17 +9,6 @@ use super::{ClusterMember, ClusterStepper, Participant, Role};
 const DIVIDED_MAX: u32 = 64;
 
 impl ClusterStepper {
-    /// Gives shorter steps to rigid members where blows follow each other in a fine step; whether they do.
-    pub(super) fn divide_blows(&mut self, all: &[Participant<'_>]) -> bool {
-        let Some(wanted) = self.rebounds.wanted_parts() else { return false };
-        for (one, state) in all.iter().zip(&mut self.progress) {
-            if one.member.role() == Role::Rigid {
-                state.parts = state.parts.max(wanted);
-            }
-        }
-        true
-    }
-
     /// Gives shorter steps to rigid members where joints ask for them; whether it does.
     pub(super) fn divide_joints(&mut self, all: &[Participant<'_>]) -> bool {
         if self.joints_ask <= 1 {

@@ -185,7 +185,7 @@ pub trait ClusterMember: Send {
     /// Places the skin where it is `t_s` seconds into the step begun, having moved with the velocities `v` from its start.
     fn move_to(&mut self, v: &[DVec3], t_s: f64);
 
-    /// Ends the step begun, of `h_s` seconds, with these velocities. `touched` is false where nothing acted on the body but blows at the
+    /// Ends the step begun, of `h_s` seconds, with these velocities. `touched` is false where nothing acted on the body but impacts at the
     /// start, which account for what `v` is beyond its free velocities: its motion after them is then its own.
     ///
     /// # Errors

@@ -3,7 +3,7 @@
 //! In: contacts with their impulses. Out: the same for the next step. Never here: contacts that are new.
 //! A pair is remembered by its lower number, so that nothing has to be moved when clusters join or part.
 
-use super::spin_friction::Spin;
+use super::contact_rows::Spin;
 use super::yielding::Slip;
 use glam::DVec3;
 use metachron_core::{AgentId, ContactPartner, SensorTouch, SimSpan, SimTime};
@@ -46,6 +46,8 @@ pub(super) struct Remembered {
     pub force_n: DVec3,
     /// The most that it has borne since its pair was last relieved, likewise, N, ≥ 0: the compliance of a contact is for that.
     pub load_n: f64,
+    /// How deep it lies because its bodies began inside each other, metres, ≥ 0 (eq. 2a).
+    pub overlap_m: f64,
     /// The slip owed, world axes, metres.
     pub owed_slip_m: DVec3,
     /// The same of its friction about the normal.
@@ -56,7 +58,7 @@ impl Remembered {
     /// A place that owes nothing.
     pub const fn new(key: TouchKey, force_n: DVec3) -> Self {
         let spin = Spin { radius_m: 0.0, torque_n_m: 0.0, owed_rad: 0.0 };
-        Self { key, force_n, load_n: 0.0, owed_slip_m: DVec3::ZERO, spin }
+        Self { key, force_n, load_n: 0.0, overlap_m: 0.0, owed_slip_m: DVec3::ZERO, spin }
     }
 }
 
@@ -157,7 +159,8 @@ impl ContactMemory {
         &mut self.pairs[at]
     }
 
-    /// What the place `key` of the pair with `partner` remembers, wherever on a skin or a mesh it is now; nothing of a new one.
+    /// What the place `key` of the pair with `partner` remembers, wherever on a skin or a mesh it is now. A new one may lie as deep as it does where
+    /// its pair is new too, or began inside each other.
     pub(super) fn recall(&self, partner: Partner, key: TouchKey) -> Remembered {
         let key = key.anywhere();
         let pair = self.pairs.binary_search_by_key(&partner, |pair| pair.partner).ok().map(|at| &self.pairs[at]);
@@ -165,7 +168,11 @@ impl ContactMemory {
             let at = pair.places.binary_search_by_key(&key, |place| place.key).ok()?;
             Some(pair.places[at])
         });
-        place.unwrap_or(Remembered { key, ..Remembered::default() })
+        place.unwrap_or_else(|| {
+            let places = pair.map_or(&[][..], |pair| &pair.places);
+            let overlaps = places.is_empty() || places.iter().any(|place| place.overlap_m > 0.0);
+            Remembered { key, overlap_m: if overlaps { f64::INFINITY } else { 0.0 }, ..Remembered::default() }
+        })
     }
 
     /// Replaces the places of every pair by those noted since, and forgets pairs that have not been near at `now`.

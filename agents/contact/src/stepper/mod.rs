@@ -6,9 +6,10 @@
 //! plan      how many steps each member makes within the macro step; more where its free motion would strain it
 //! begin     members whose step begins: matrix and velocities without contact
 //! seen      velocities with the impulses that each has been given since its step began
-//! search    places that may close, which of them rebound, and when; which members are a heap, that rapier3d steps
+//! search    places that may close; which members are a heap, that rapier3d steps
 //! tie       springs, links, joints
 //! solve     one problem for all; again with the places that bodies struck would pass, and until joints hold where bodies will be
+//! rebound   contacts that close fast, by their restitution
 //! divide    where the solution strains a member too far, all begins again in shorter steps
 //! end       members move; those whose step ends take its velocities
 //! yield     attachments that gave all that they may hold from then on where they have come to
@@ -16,13 +17,13 @@
 
 mod arms;
 mod between_steps;
-mod blows;
+mod contact_rows;
 mod divide;
 mod domain;
 mod doubling;
-mod foresight;
 mod guarded;
 mod heap;
+mod impacts;
 mod joints;
 mod links;
 mod local;
@@ -41,7 +42,6 @@ mod restart;
 mod scene;
 mod search;
 mod solve;
-mod spin_friction;
 mod springs;
 mod stiffness;
 mod tearing;
@@ -49,14 +49,15 @@ mod ties;
 mod weighing;
 mod yielding;
 
-use crate::cluster::{DEPTH_DEFAULT_M, Level, Member, Settings, Solver};
-use blows::Rebounds;
+use crate::cluster::{DEPTH_DEFAULT_M, Level, Member, Settings, Solver, multiply};
+use contact_rows::ContactRows;
 use divide::times;
 pub use doubling::StepDoubling;
 use glam::DVec3;
 use guarded::Lent;
 pub use guarded::{BadAnswer, CallMark, GuardedMember};
 use heap::{Heap, Sums};
+use impacts::Impacts;
 pub use joints::JointTotal;
 use joints::Joints;
 pub use local::LocalQuery;
@@ -73,7 +74,6 @@ use progress::Progress;
 pub use remote::{RemoteMember, RemoteView};
 pub use scene::{BadDepth, ClusterScene, DEPTH_RANGE_M, Passage};
 use search::{Judge, Round, Search};
-use spin_friction::SpinFriction;
 use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
 use tearing::Tearing;
 pub use tearing::Torn;
@@ -123,7 +123,7 @@ pub struct ClusterStepper {
     search: Search,
     ties: Ties,
     joints: Joints,
-    spins: SpinFriction,
+    contact_rows: ContactRows,
     progress: Vec<Progress>,
     members: Vec<Member<'static>>,
     lent: Vec<Option<Lent<'static>>>,
@@ -137,7 +137,7 @@ pub struct ClusterStepper {
     kept: Vec<ContactMemory>,
     /// Whether that is of this macro step, and members have kept their states.
     is_kept: bool,
-    rebounds: Rebounds,
+    impacts: Impacts,
     heap: Heap,
     /// The participant of each member of the problem.
     places: Vec<usize>,
@@ -162,7 +162,7 @@ impl Default for ClusterStepper {
             search: Search::default(),
             ties: Ties::default(),
             joints: Joints::default(),
-            spins: SpinFriction::default(),
+            contact_rows: ContactRows::default(),
             progress: Vec::new(),
             members: Vec::new(),
             lent: Vec::new(),
@@ -173,7 +173,7 @@ impl Default for ClusterStepper {
             yielding: Yielding::default(),
             kept: Vec::new(),
             is_kept: false,
-            rebounds: Rebounds::default(),
+            impacts: Impacts::default(),
             heap: Heap::default(),
             places: Vec::new(),
             outside: Outside::default(),
@@ -201,6 +201,7 @@ impl ClusterStepper {
     /// exact and no answer makes energy at any number.
     pub fn set_factors_max(&mut self, most: Option<u32>) {
         self.solver.set_factors_max(most);
+        self.impacts.set_factors_max(most);
     }
 
     /// The macro step that was made last, seconds.
@@ -217,8 +218,7 @@ impl ClusterStepper {
     /// Advances `all`, by rising numbers and at one common time, by `dt`.
     ///
     /// A member whose motion would strain it too far makes 2, 4 … 64 times as many steps: its free motion before the solve, and what the
-    /// solve makes of it after, from the start of the macro step; so do all rigid members where blows follow each other, or where joints turn
-    /// far or do not hold. What members do by themselves they do on `threads`, if there are enough of
+    /// solve makes of it after, from the start of the macro step; so do all rigid members where joints turn far or do not hold. What members do by themselves they do on `threads`, if there are enough of
     /// them; the bits are the same on however many.
     ///
     /// # Errors
@@ -324,12 +324,9 @@ impl ClusterStepper {
             self.find(scene, all, h_s);
             self.tie(scene, all, h_s, f64::from(fine) * h_s);
             self.recall(all, h_s);
-            self.rebounds.foresee(all, &mut self.search, &self.ties, &self.progress);
-            if self.divide_blows(all) {
-                return Ok(false);
-            }
+            self.impacts.begin([self.macro_s, h_s], &mut self.search, &self.ties, &self.progress);
             self.solve(on, all, h_s, report)?;
-            if self.divide_blows(all) || self.divide_joints(all) || self.divide(all, h_s) {
+            if self.divide_joints(all) || self.divide(all, h_s) {
                 return Ok(false);
             }
             let is_last = fine + 1 == parts;
@@ -346,9 +343,8 @@ impl ClusterStepper {
 
     /// Finds where members may touch, but for those that are a heap: their contacts are not the problem's.
     fn find(&mut self, scene: &ClusterScene, all: &[Participant<'_>], h_s: f64) {
-        let Self { search, heap, progress, rebounds, .. } = self;
+        let Self { search, heap, progress, .. } = self;
         let round = Round { scene, all, progress, h_s, judge: Judge::Foreseen };
-        rebounds.begin(self.macro_s, h_s, all.len());
         if heap.go_on(scene, all) {
             search.find(&round, heap.domains());
             heap.end_if_touched(search);
@@ -473,8 +469,10 @@ impl ClusterStepper {
             } else {
                 one.member.leave(&state.unanswered);
                 state.failure = one.member.end(&state.before, since_s, state.touched).err();
-                if !state.held && state.failure.is_none() && !state.late.is_empty() {
-                    one.member.carry(&state.late);
+                if state.failure.is_none() && !state.late.is_empty() {
+                    // by the impulses that move it so far; how it has gone is not needed any more
+                    multiply(one.member.blocks(), &state.late, &mut state.going);
+                    one.member.carry(&state.going);
                 }
                 state.part = 0;
             }

@@ -46,7 +46,9 @@ pub(super) struct Progress {
     pub touched: bool,
     pub held: bool,
     pub bears: bool,
-    /// What its blocks are to be carried by for blows that act later than its step begins, N·s² (eq. 27); empty for none.
+    /// By how much impacts change its velocities at the end of the fine step; empty for none.
+    pub jump: Vec<DVec3>,
+    /// By how much it is then elsewhere than if they had done so at its start, metres and radians (eq. 27); empty for none.
     pub late: Vec<DVec3>,
     /// Work of its steps within the macro step, in the unit of its model.
     pub work: f64,
@@ -71,7 +73,6 @@ impl Progress {
         self.given.clear();
         self.given.resize(now.len(), DVec3::ZERO);
         self.before.clone_from(&self.start);
-        self.late.clear();
         self.owed.clear();
         self.unanswered.clear();
         self.unanswered.resize(member.unanswered().len(), DVec3::ZERO);
@@ -100,7 +101,9 @@ impl Progress {
 
     /// Finds v̄(p), û and what they leave unanswered, of the fine step that begins (eq. 24).
     pub fn look(&mut self, member: &dyn ClusterMember) {
-        let Self { share, part, start, gain, given, before, known, seen, unanswered, owed, .. } = self;
+        let Self { share, part, start, gain, given, before, known, seen, unanswered, owed, jump, late, .. } = self;
+        jump.clear();
+        late.clear();
         let each = f64::from(*share).recip();
         unanswered.iter_mut().zip(member.unanswered()).for_each(|(r, more)| *r += *more * each);
         unanswered.iter_mut().zip(&*owed).for_each(|(r, more)| *r += *more * each);
@@ -119,6 +122,34 @@ impl Progress {
         }
     }
 
+    /// Takes a share of the velocities that impacts lead to from those solved.
+    pub fn strike(&mut self, struck: &[DVec3], share: f64) {
+        self.jump.clear();
+        self.jump.extend(struck.iter().zip(&self.solved).map(|(struck, solved)| (*struck - *solved) * share));
+    }
+
+    /// Lets it be where its flight has brought it, in a step of `h_s` seconds with all impulses `after_s` seconds from its start (eq. 27).
+    pub fn fly_on(&mut self, after_s: f64, h_s: f64) {
+        let Self { solved, seen, gain, jump, late, going, .. } = self;
+        late.clear();
+        going.clear();
+        for (((solved, jump), seen), gain) in solved.iter().zip(&*jump).zip(&*seen).zip(&*gain) {
+            let change = *solved + *jump - *seen;
+            late.push(change * -after_s);
+            going.push(*seen + change * (1.0 - after_s / h_s) - *gain * 0.5);
+        }
+        self.bears = false;
+    }
+
+    /// Lets it be where the solution of the step leaves it, whose impacts come at the end of its `h_s` seconds.
+    pub fn wait(&mut self, h_s: f64) {
+        let Self { solved, jump, late, going, .. } = self;
+        late.clear();
+        late.extend(jump.iter().map(|jump| *jump * -h_s));
+        going.clone_from(solved);
+        self.bears = true;
+    }
+
     /// Takes the velocities that it has without impulses.
     pub fn go_on(&mut self) {
         self.before.clone_from(&self.known);
@@ -131,7 +162,7 @@ impl Progress {
         }
         let p = f64::from(self.part);
         for (at, moved) in self.solved.iter().enumerate() {
-            let change = (*moved - self.seen[at]) / p;
+            let change = (*moved + self.jump.get(at).copied().unwrap_or_default() - self.seen[at]) / p;
             self.given[at] += change;
             self.before[at] = self.known[at] + change;
         }

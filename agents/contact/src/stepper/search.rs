@@ -9,10 +9,10 @@ mod sense;
 mod sweep;
 mod thinning;
 
+use super::contact_rows::Spin;
 use super::domain::Domain;
 use super::memory::Partner;
 use super::scene::{ClusterScene, Passage};
-use super::spin_friction::Spin;
 use super::{ClusterMember, Participant, Progress, Role};
 use crate::cluster::Contact;
 use boxes::Boxes;
@@ -46,8 +46,8 @@ pub(super) struct Owner {
     pub spin: Spin,
     /// The point of the participant's skin.
     pub place: Place,
-    /// When its sides meet, seconds from the start of the fine step; `None` where they do not rebound, or where that is not decided yet.
-    pub meets_s: Option<f64>,
+    /// Newton's coefficient of restitution of its pair, 0 to 1.
+    pub restitution: f64,
 }
 
 impl Owner {
@@ -63,12 +63,6 @@ impl Owner {
     /// Its participants.
     pub fn both(&self) -> impl Iterator<Item = usize> + use<> {
         std::iter::once(self.member).chain(self.other)
-    }
-
-    /// The participants that its contact moves.
-    pub fn movers(&self, contact: &Contact) -> impl Iterator<Item = usize> + use<> {
-        let [here, there] = contact.sides.each_ref().map(|side| !side.terms().is_empty());
-        here.then_some(self.member).into_iter().chain(self.other.filter(|_| there))
     }
 }
 
@@ -291,10 +285,8 @@ impl Search {
         let reach_m = LOOK_M + way_m;
         self.touches.clear();
         let meets = reach.skin.grown(reach_m).meets(bounds);
-        // a blow acts where the sides meet, what goes far meets what is not near yet
-        let rebounds = skin.form.restitution_with(form) > 0.0 && way_m > 10.0 * MET_M;
-        let far_m = (reach_m > FAR_M).then_some(LOOK_M);
-        let swept_m = if rebounds { Some(MET_M) } else { far_m };
+        // a body that goes far meets others that are not near yet
+        let swept_m = (reach_m > FAR_M).then_some(LOOK_M);
         let at = if meets { self.touch(round, pair, Reaching { reach_m, swept_m }) } else { Meeting::default() };
         let clear_m = if at.after_s > 0.0 { 0.0 } else { reach_m };
         let spin = Spin { radius_m: skin.form.spin_radius_with_m(form), ..Spin::default() };
@@ -305,7 +297,7 @@ impl Search {
             key: TouchKey::default(),
             spin,
             place: Place::Point(DVec3::NAN),
-            meets_s: None,
+            restitution: skin.form.restitution_with(form),
         };
         self.take(round, pair, Found { owner, skins: [skin.form, form], at, clear_m });
     }
@@ -367,10 +359,9 @@ impl Search {
                     Err(_) => ends_m < 0.0,
                     // on its way it meets another place than the one it was kept from
                     Ok(at) if swept && ends_m < -LOOK_M => {
-                        let Contact { warm_n_s, load_n_s, owed_slip_m, .. } = contacts[at];
+                        let Contact { warm_n_s, load_n_s, overlap_m, owed_slip_m, .. } = contacts[at];
                         let found = taken_up(round, &owner, &touch, &Skinned { facing: &facing, skins });
-                        contacts[at] = Contact { warm_n_s, load_n_s, owed_slip_m, ..found };
-                        owners[at].meets_s = None;
+                        contacts[at] = Contact { warm_n_s, load_n_s, overlap_m, owed_slip_m, ..found };
                         *moved = true;
                         false
                     }
@@ -390,12 +381,12 @@ impl Search {
         }
     }
 
-    /// Keeps the contacts of those owners for which `keep` is true; the pairs of others are looked at again after the solve.
-    pub fn retain(&mut self, keep: impl Fn(&Owner) -> bool) {
+    /// Keeps the contacts for which `keep` is true; the pairs of others are looked at again after the solve.
+    pub fn retain(&mut self, keep: impl Fn(&Contact, &Owner) -> bool) {
         let Self { contacts, owners, looks, .. } = self;
         let mut kept = 0;
         for at in 0..contacts.len() {
-            if !keep(&owners[at]) {
+            if !keep(&contacts[at], &owners[at]) {
                 let pair = (owners[at].member, owners[at].partner);
                 if let Ok(look) = looks.binary_search_by_key(&pair, |look| (look.member, look.partner)) {
                     looks[look].clear_m = 0.0;

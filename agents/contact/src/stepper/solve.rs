@@ -3,12 +3,12 @@
 //! In: members with what they see, places, rows. Out: every member's impulses. Never here: how places are found, how rows are laid out.
 //! Theory: docs/theory/clusters.md, section 9.
 
+use super::guarded::Lent;
 use super::joints::Aimed;
 use super::progress::Progress;
-use super::search::{Judge, Round, Search};
-use super::ties::Ties;
+use super::search::{Judge, Round};
 use super::{ClusterMember, ClusterReport, ClusterStepper, On, Participant, Role, times};
-use crate::cluster::{Level, Member, Problem, ProblemError, Response, StepForm};
+use crate::cluster::{Contact, JointRow, Level, Member, Problem, ProblemError, Report, Response, Solver, StepForm};
 use glam::DVec3;
 use metachron_core::{ParallelFor, StepError, recycled};
 
@@ -44,27 +44,26 @@ impl ClusterStepper {
         let is_open = |state: &Progress| !state.unanswered.is_empty();
         if self.search.contacts.is_empty() && self.ties.rows.is_empty() && !self.progress.iter().any(is_open) {
             // what touches nothing moves as it would
-            self.spins.clear();
+            self.contact_rows.clear();
             self.progress.iter_mut().for_each(Progress::go_on);
             return Ok(());
         }
         let (mut last_miss_m, mut missed_m) = (f64::INFINITY, self.joints_missed_m);
         for round in 1..=ROUNDS_MAX {
-            self.spins.lay(&self.search, all, &mut self.ties, h_s);
+            self.contact_rows.lay(&self.search, all, &mut self.ties, h_s);
             self.solve_once(all, h_s, on.threads, report)?;
             self.note_motion(all);
             let Self {
                 solver,
                 search,
                 ties,
-                spins,
+                contact_rows,
                 joints,
                 joints_ask,
                 joints_missed_m,
                 macro_s,
                 progress,
                 depth_m,
-                rebounds,
                 ..
             } = &mut *self;
             let solution = solver.solution();
@@ -75,30 +74,30 @@ impl ClusterStepper {
             for (row, impulse) in ties.rows.iter_mut().zip(&solution.rows_n_s) {
                 row.warm_n_s = *impulse;
             }
-            for (contact, row) in spins.rows(ties) {
+            for (contact, row) in contact_rows.spins(ties) {
                 let normal = search.contacts[contact].normal;
                 search.owners[contact].spin.torque_n_m = solution.rows_n_s[row].dot(normal) / h_s;
             }
             let Aimed { miss_m, turn_rad } = joints.aim(all, ties, |member| &progress[member].solved[..], h_s);
             let joints_done = miss_m < joint_miss_m(*depth_m) || miss_m > last_miss_m;
-            let look = Round { scene: on.scene, all, progress, h_s, judge: Judge::Solved };
-            // what is added is solved
-            let passed = round < ROUNDS_MAX && search.add_passed(&look);
-            // with other contacts joints start anew
-            last_miss_m = if passed { f64::INFINITY } else { miss_m };
             let holds = miss_m < joint_miss_m(*depth_m);
             let made = (*macro_s / h_s).round();
             // what cannot hold does not in shorter steps either
             let helps = made < PARTS_HOPED || miss_m < MISS_SHRINKS * *joints_missed_m;
             *joints_ask = times(turn_rad / TURN_MAX_RAD).max(if holds || !helps { 1 } else { 2 });
             missed_m = if holds { *joints_missed_m } else { miss_m };
-            if round == ROUNDS_MAX || !passed && joints_done {
-                break;
+            // the last look is followed by no solve that would stop what flies
+            let is_last = round == ROUNDS_MAX;
+            if joints_done || is_last {
+                self.rebound(on, all, !is_last, report)?;
             }
-            rebounds.stop(search);
-            if rebounds.wanted_parts().is_some() {
-                // the step is made again in shorter ones
-                return Ok(());
+            let look = Round { scene: on.scene, all, progress: &self.progress, h_s, judge: Judge::Solved };
+            // what is added is solved
+            let passed = !is_last && self.search.add_passed(&look);
+            // with other contacts joints start anew
+            last_miss_m = if passed { f64::INFINITY } else { miss_m };
+            if is_last || !passed && joints_done {
+                break;
             }
         }
         self.joints_missed_m = missed_m;
@@ -113,7 +112,7 @@ impl ClusterStepper {
         threads: &dyn ParallelFor,
         report: &mut ClusterReport,
     ) -> Result<(), StepError> {
-        let Self { solver, search, ties, progress, members, lent, .. } = self;
+        let Self { solver, search, ties, progress, members, lent, places, .. } = self;
         // what no row touches and knows how it would move does so, and makes no problem larger
         let mut count = 0..;
         progress.iter_mut().for_each(|state| state.place = (!state.unanswered.is_empty()).then_some(0));
@@ -121,60 +120,28 @@ impl ClusterStepper {
         sides.filter(|side| !side.terms().is_empty()).for_each(|side| progress[side.member].place = Some(0));
         let involved = progress.iter_mut().filter(|state| state.place.is_some());
         involved.for_each(|state| state.place = count.next());
-        let (mut list, mut lenders) = (recycled(std::mem::take(members)), recycled(std::mem::take(lent)));
-        let taking = || all.iter().zip(&*progress).filter(|(_, state)| state.place.is_some());
-        lenders.extend(taking().map(|(one, _)| one.member.lent()));
-        list.extend(taking().zip(&lenders).map(|((one, state), lender)| Member {
-            blocks: one.member.blocks(),
-            response: lender.as_ref().map(|lender| lender as &dyn Response),
-            free: &state.seen,
-            unanswered: &state.unanswered,
-            now: &state.before,
-            share: f64::from(state.part),
-        }));
-        move_sides(search, ties, |member| progress[member].place);
-        let has_factor = |member: &Member<'_>| member.response.is_some() || member.free.len() <= FACTORED_BLOCKS_MAX;
-        solver.set_form(if list.iter().all(has_factor) { StepForm::Direct } else { StepForm::Iterative });
-        let problem = Problem { h_s, members: &list, contacts: &search.contacts, rows: &ties.rows, threads };
-        let outcome = solver.solve(&problem).map(|solution| solution.report);
-        (*members, *lent) = (recycled(list), recycled(lenders));
-        let places = &mut self.places;
         places.clear();
         places.extend(progress.iter().enumerate().filter_map(|(member, state)| state.place.map(|_| member)));
-        move_sides(search, ties, |place| places.get(place).copied());
-        let took = outcome.map_err(|error| {
-            blame(&error, all, places);
-            refused(&error, h_s)
-        })?;
-        // a blow that would make energy is none
-        for (contact, rebounds) in search.contacts.iter_mut().zip(&solver.solution().rebounds) {
-            if !rebounds {
-                contact.restitution = 0.0;
-            }
-        }
+        let (contacts, rows) = (&mut search.contacts[..], &mut ties.rows[..]);
+        let (free, open): (Velocities, Velocities) = (|state| &state.seen, |state| &state.unanswered);
+        let posed = Posed { all, progress, places, contacts, rows, h_s, threads, free, open };
+        report.add(&posed.solve(solver, members, lent)?);
         for state in &mut *progress {
             let Progress { solved, seen, place, .. } = state;
             solved.clear();
             solved.extend_from_slice(place.map_or(&seen[..], |place| solver.solution().velocities(place)));
         }
-        report.factors += took.factors as u32;
-        report.products += took.products as u32;
-        report.solves += 1;
-        report.unfinished += u32::from(took.level == Level::Interior);
-        report.level = report.level.max(took.level);
-        report.miss_m_s = report.miss_m_s.max(took.miss_m_s);
         Ok(())
     }
 
     /// Finds what the impulses found hold, and how places move by them.
     fn note_motion(&mut self, all: &[Participant<'_>]) {
-        let Self { solver, search, ties, progress, .. } = self;
+        let Self { solver, search, ties, contact_rows, progress, .. } = self;
         let solution = solver.solution();
         progress.iter_mut().for_each(|state| state.bears = false);
         let mut hold = |both: &mut dyn Iterator<Item = usize>| both.for_each(|member| progress[member].bears = true);
         for (k, impulse) in solution.contacts_n_s.iter().enumerate() {
-            // a blow is over when the step begins: the flight after it is free
-            if *impulse != DVec3::ZERO && search.contacts[k].restitution == 0.0 {
+            if *impulse != DVec3::ZERO {
                 hold(&mut search.owners[k].both());
             }
         }
@@ -183,6 +150,9 @@ impl ClusterStepper {
                 hold(&mut owner.both());
             }
         }
+        for (contact, _) in contact_rows.pushes(ties).filter(|(_, row)| solution.rows_n_s[*row] != DVec3::ZERO) {
+            hold(&mut search.owners[contact].both());
+        }
         for (one, state) in all.iter().zip(progress) {
             state.go(one.member.role() == Role::Rigid);
         }
@@ -190,22 +160,86 @@ impl ClusterStepper {
 
     /// Gives every member the impulses found.
     fn give(&mut self, report: &mut ClusterReport) {
-        let Self { solver, search, progress, rebounds, .. } = self;
+        let Self { solver, search, progress, impacts, .. } = self;
         for state in &mut *progress {
             let left = state.place.map_or(&[][..], |place| solver.solution().unanswered(place));
             state.take(left);
         }
-        rebounds.note_late(search, &solver.solution().contacts_n_s, progress);
+        impacts.leave(progress);
         progress.iter_mut().filter(|state| state.bears).for_each(Progress::hold);
         report.contacts = search.contacts.len() as u32;
         report.depth_m = search.contacts.iter().map(|contact| -contact.gap_m).fold(report.depth_m, f64::max);
     }
 }
 
+/// Where a problem takes velocities or momentum of a participant from.
+pub(super) type Velocities = fn(&Progress) -> &[DVec3];
+
+/// A problem among the participants that have a place in it: some contacts and rows, bodies at some velocities.
+pub(super) struct Posed<'a, 'p> {
+    pub all: &'a [Participant<'p>],
+    pub progress: &'a [Progress],
+    /// The participant of each place.
+    pub places: &'a [usize],
+    pub contacts: &'a mut [Contact],
+    pub rows: &'a mut [JointRow],
+    pub h_s: f64,
+    pub threads: &'a dyn ParallelFor,
+    /// The velocities of a participant without the impulses sought, and the momentum that they leave open.
+    pub free: Velocities,
+    pub open: Velocities,
+}
+
+impl Posed<'_, '_> {
+    /// Solves it, with storage for its members.
+    pub fn solve(
+        self,
+        solver: &mut Solver,
+        members: &mut Vec<Member<'static>>,
+        lent: &mut Vec<Option<Lent<'static>>>,
+    ) -> Result<Report, StepError> {
+        let Self { all, progress, places, contacts, rows, h_s, threads, free, open } = self;
+        let (mut list, mut lenders) = (recycled(std::mem::take(members)), recycled(std::mem::take(lent)));
+        let taking = || places.iter().map(|at| (&all[*at], &progress[*at]));
+        lenders.extend(taking().map(|(one, _)| one.member.lent()));
+        list.extend(taking().zip(&lenders).map(|((one, state), lender)| Member {
+            blocks: one.member.blocks(),
+            response: lender.as_ref().map(|lender| lender as &dyn Response),
+            free: free(state),
+            unanswered: open(state),
+            now: &state.before,
+            share: f64::from(state.part),
+        }));
+        move_sides(contacts, rows, |member| progress[member].place);
+        let has_factor = |member: &Member<'_>| member.response.is_some() || member.free.len() <= FACTORED_BLOCKS_MAX;
+        solver.set_form(if list.iter().all(has_factor) { StepForm::Direct } else { StepForm::Iterative });
+        let problem = Problem { h_s, members: &list, contacts, rows, threads };
+        let outcome = solver.solve(&problem).map(|solution| solution.report);
+        (*members, *lent) = (recycled(list), recycled(lenders));
+        move_sides(contacts, rows, |place| places.get(place).copied());
+        outcome.map_err(|error| {
+            blame(&error, all, places);
+            refused(&error, h_s)
+        })
+    }
+}
+
+impl ClusterReport {
+    /// Counts a solve.
+    pub(super) fn add(&mut self, took: &Report) {
+        self.factors += took.factors as u32;
+        self.products += took.products as u32;
+        self.solves += 1;
+        self.unfinished += u32::from(took.level == Level::Interior);
+        self.level = self.level.max(took.level);
+        self.miss_m_s = self.miss_m_s.max(took.miss_m_s);
+    }
+}
+
 /// Counts the members of all sides anew.
-fn move_sides(search: &mut Search, ties: &mut Ties, to: impl Fn(usize) -> Option<usize>) {
-    let contacts = search.contacts.iter_mut().flat_map(|contact| &mut contact.sides);
-    let sides = contacts.chain(ties.rows.iter_mut().flat_map(|row| &mut row.sides));
+fn move_sides(contacts: &mut [Contact], rows: &mut [JointRow], to: impl Fn(usize) -> Option<usize>) {
+    let contacts = contacts.iter_mut().flat_map(|contact| &mut contact.sides);
+    let sides = contacts.chain(rows.iter_mut().flat_map(|row| &mut row.sides));
     for side in sides.filter(|side| !side.terms().is_empty()) {
         side.member = to(side.member).unwrap_or(side.member);
     }

@@ -7,7 +7,7 @@ use super::memory::Partner;
 use super::search::velocity;
 use super::yielding::SlidingRow;
 use super::{Participant, Progress};
-use crate::cluster::JointRow;
+use crate::cluster::{Hold, JointRow};
 use glam::DVec3;
 use metachron_core::{AgentId, Grip};
 use metachron_geometry::narrow_phase::TouchKey;
@@ -69,7 +69,7 @@ pub(super) struct Holders {
 /// The rows of a fine step.
 #[derive(Debug, Default)]
 pub(super) struct Ties {
-    /// Behind those with an owner are the spins of contacts.
+    /// Behind those with an owner are those that contacts bring.
     pub rows: Vec<JointRow>,
     /// One for each row but for those.
     pub owners: Vec<RowOwner>,
@@ -122,6 +122,19 @@ impl Ties {
             last = tie;
         }
     }
+}
+
+/// Whether a row passes on an impact: what gives no more than a force gives nothing in no time, and what it could push is not there yet.
+pub(super) fn is_rigid(row: &JointRow) -> bool {
+    let unbounded = match row.hold {
+        Hold::All { limit_n_s } | Hold::Across { limit_n_s, .. } => limit_n_s == f64::INFINITY,
+        Hold::Along { low_n_s, high_n_s, .. } => match (low_n_s == f64::NEG_INFINITY, high_n_s == f64::INFINITY) {
+            (true, true) => true,
+            (true, false) | (false, true) => row.warm_n_s != DVec3::ZERO,
+            (false, false) => false,
+        },
+    };
+    unbounded && row.limit_m_s == f64::INFINITY && row.compliance_per_kg.is_none() && row.pressed.is_none()
 }
 
 /// The name of a row in the memory of its pair.

@@ -15,6 +15,7 @@ mod links;
 mod locked;
 mod motors;
 mod organ;
+mod overlaps;
 mod own_model;
 mod own_skin;
 mod passing;

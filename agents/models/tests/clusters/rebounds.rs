@@ -94,8 +94,8 @@ fn a_ball_rebounds_off_a_box_that_lies_as_off_the_ground() {
                     break; // what flies for little more than a step
                 }
                 let (off, here) = (top_m / exact_m - 1.0, format!("e {restitution}, {rate_hz} Hz, bounce {bounce}"));
-                // never above: box and ball give way by a five-hundredth of the blow
-                assert!((-1e-2..1e-9).contains(&off), "{here}: {top_m} of {exact_m}");
+                // never above: box and ball give way by micrometres a second
+                assert!((-3e-3..1e-9).contains(&off), "{here}: {top_m} of {exact_m}");
             }
         }
     }
@@ -220,4 +220,147 @@ fn a_light_box_that_bounces_between_a_heavy_one_and_the_floor_stays_between_them
             assert!((found.highest_m - 0.26).abs() < 1e-4, "{here}: it lies at {} m", found.highest_m);
         }
     }
+}
+
+/// Numbers between −1 and 1: the fractions of a sine.
+fn drawn(number: usize, what: usize) -> f64 {
+    let x = libm::sin(12.9898 * (number + 1) as f64 + 78.233 * what as f64) * 43_758.545_3;
+    2.0 * (x - x.floor()) - 1.0
+}
+
+#[test]
+fn fifty_balls_without_loss_keep_their_energy_in_a_room() {
+    let wall = |axis: DVec3, sign: f64| Obstacle {
+        position: axis * (0.6 * sign),
+        restitution: 1.0,
+        ..Obstacle::new("wall", Solid::Box { half_extents_m: DVec3::splat(0.7) - axis * 0.6 })
+    };
+    let walls: Vec<_> = DVec3::AXES.into_iter().flat_map(|axis| [-1.0, 1.0].map(|sign| wall(axis, sign))).collect();
+    for rate_hz in [60.0, 240.0] {
+        let balls = (0..50).map(|k| {
+            let middle = DVec3::new((k % 4) as f64, (k / 4 % 4) as f64, (k / 16) as f64) * 0.22 - DVec3::splat(0.33);
+            let velocity = DVec3::new(drawn(k, 0), drawn(k, 1), drawn(k, 2)).normalize() * 5.0;
+            let spec = rigid(Solid::Ball { radius_m: 0.04 }, middle, 0.1);
+            let spec = RigidSpec { velocity, restitution: 1.0, friction: 0.0, gravity: DVec3::ZERO, ..spec };
+            let mut ball = placed(RigidBody::new(spec).unwrap(), false);
+            ball.rate_hz = rate_hz;
+            ball
+        });
+        let mut table = Table::among(balls.collect(), &walls);
+        let before_j = table.energy_j();
+        let found = table.play(1.0);
+        let kept = table.energy_j() / before_j;
+        // contacts give way by micrometres a second
+        assert!((0.999..1.0 + 1e-9).contains(&kept), "{rate_hz} Hz: {kept} of the energy is kept");
+        assert!(found.gain_j < 1e-9 * before_j, "{rate_hz} Hz: {found:?}");
+        let out = (0..50).filter(|k| table.middle(*k).0.abs().max_element() > 0.5).count();
+        assert_eq!(out, 0, "{rate_hz} Hz: balls that have left the room");
+    }
+}
+
+#[test]
+fn rough_boxes_that_collide_make_no_energy_and_keep_their_momentum() {
+    let (mut deepest_m, mut rebounds) = (0.0_f64, 0);
+    for seed in 0..24 {
+        let boxes = (0..8).map(|k| {
+            let corner = DVec3::new((k % 2) as f64, (k / 2 % 2) as f64, (k / 4) as f64) * 2.0 - DVec3::ONE;
+            let number = 8 * seed + k;
+            let off = DVec3::new(drawn(number, 0), drawn(number, 1), drawn(number, 2));
+            let spin = DVec3::new(drawn(number, 3), drawn(number, 4), drawn(number, 5)) * 8.0;
+            let spec =
+                rigid(Solid::Box { half_extents_m: DVec3::splat(0.05) }, corner * 0.2 + off * 0.05, 0.5 + k as f64);
+            let spec = RigidSpec { velocity: corner * -0.5, spin, gravity: DVec3::ZERO, ..spec };
+            let spec = RigidSpec { restitution: 0.5 + 0.5 * drawn(number, 6), friction: 0.6, ..spec };
+            placed(RigidBody::new(spec).unwrap(), false)
+        });
+        let mut table = Table::among(boxes.collect(), &[]);
+        let momentum = |table: &Table| table.bodies.iter().map(|body| body.agent.momentum().0).sum::<DVec3>();
+        let (before, mut least_j) = (momentum(&table), table.energy_j());
+        for _ in 0..120 {
+            let (report, _) = table.step();
+            deepest_m = deepest_m.max(report.depth_m);
+            rebounds += u32::from(report.solves > 0);
+            let now_j = table.energy_j();
+            // a push-out of what is in each other adds some
+            assert!(now_j < least_j + 1e-3 * least_j, "seed {seed}: {now_j} J after {least_j} J");
+            least_j = least_j.min(now_j);
+        }
+        let after = momentum(&table);
+        assert!(after.distance(before) < 1e-12 * 8.0 * 4.5, "seed {seed}: {after} kg m/s, not {before}");
+    }
+    assert!(rebounds > 30, "{rebounds} steps with rebounds");
+    // corners go by 11 mm a step
+    assert!(deepest_m < 3e-3, "{deepest_m} m deep");
+}
+
+#[test]
+fn a_tower_of_boxes_that_would_rebound_costs_what_one_costs_that_would_not() {
+    let cost = |restitution: f64| {
+        let boxes = (0..20).map(|at| {
+            let middle = DVec3::new(drawn(at, 0), drawn(at, 1), 0.0) * 0.025 + DVec3::Z * (0.02 + 0.04 * at as f64);
+            let spec = rigid(Solid::Box { half_extents_m: DVec3::new(0.04, 0.04, 0.02) }, middle, 0.2);
+            let mut body = placed(RigidBody::new(RigidSpec { friction: 0.8, restitution, ..spec }).unwrap(), false);
+            body.rate_hz = 500.0;
+            body
+        });
+        let mut table = Table::among(boxes.collect(), &[floor(0.0)]);
+        let (mut fine_steps, mut solves, mut factors) = (0, 0, 0);
+        for _ in 0..500 {
+            let (report, _) = table.step();
+            (fine_steps, solves, factors) =
+                (fine_steps + report.fine_steps, solves + report.solves, factors + report.factors);
+        }
+        let top_m = table.middle(19).0.z;
+        assert!((top_m - 0.78).abs() < 1e-3, "e {restitution}: its top is at {top_m} m");
+        (fine_steps, solves, factors)
+    };
+    assert_eq!(cost(0.2), cost(0.0));
+}
+
+#[test]
+fn a_ball_that_meets_two_others_at_once_in_a_step_passes_through_neither() {
+    // between a wall and a ball that comes towards it, a way of a step from both
+    let spec = |x: f64, speed: f64| RigidSpec {
+        velocity: DVec3::X * speed,
+        restitution: 1.0,
+        friction: 0.0,
+        gravity: DVec3::ZERO,
+        ..rigid(Solid::Ball { radius_m: 0.05 }, DVec3::X * x, 1.0)
+    };
+    let wall = Obstacle {
+        position: DVec3::X * -0.5,
+        restitution: 1.0,
+        ..Obstacle::new("wall", Solid::Box { half_extents_m: DVec3::splat(0.3) })
+    };
+    for gap_m in [0.001, 0.01, 0.03] {
+        let bodies = [spec(-0.15 + gap_m, -4.0), spec(-0.04 + 2.0 * gap_m, -6.0)];
+        let bodies = bodies.map(|spec| placed(RigidBody::new(spec).unwrap(), false));
+        let mut table = Table::among(bodies.into(), std::slice::from_ref(&wall));
+        for _ in 0..30 {
+            table.step();
+        }
+        // equal masses exchange their speeds: the first turns at the wall, hits the second, turns there and at the wall again
+        let speeds = [0, 1].map(|body| table.middle(body).1.x);
+        assert!((speeds[0] - 6.0).abs() < 1e-3 || (speeds[0] - 4.0).abs() < 1e-3, "{gap_m} m: {speeds:?}");
+        let squares = speeds[0] * speeds[0] + speeds[1] * speeds[1];
+        assert!((squares - 52.0).abs() < 1e-2 && speeds[1] > 0.0, "{gap_m} m: {speeds:?}");
+        assert!(table.middle(0).0.x < table.middle(1).0.x, "{gap_m} m: the order of the balls");
+    }
+}
+#[test]
+fn boxes_that_fall_on_each_other_and_rebound_a_little_cost_little_more_than_those_that_do_not() {
+    let cost = |restitution: f64| {
+        let boxes = (0..64).map(|k| {
+            let at = DVec3::new((k % 4) as f64, (k / 4 % 4) as f64, (k / 16) as f64) * 0.1;
+            let off = DVec3::new(drawn(k, 0), drawn(k, 1), 0.0) * 0.009;
+            let spec = rigid(Solid::Box { half_extents_m: DVec3::splat(0.04) }, at + off + DVec3::Z * 0.09, 0.05);
+            placed(RigidBody::new(RigidSpec { restitution, ..spec }).unwrap(), false)
+        });
+        let found = Table::among(boxes.collect(), &[floor(restitution)]).play(1.0);
+        assert!(found.landing_m.max(found.rest_m) < 3e-5 && found.cut == 0, "e {restitution}: {found:?}");
+        assert!((found.highest_m - 0.28).abs() < 1e-3, "e {restitution}: they lie as columns: {found:?}");
+        f64::from(found.factors)
+    };
+    let ratio = cost(0.1) / cost(0.0);
+    assert!(ratio < 1.5, "{ratio} times the factors");
 }

@@ -5,8 +5,9 @@
 
 use super::super::agent_clock::Timeline;
 use super::super::agent_runner::{AgentRunner, contained};
-use super::super::broad_phase::BroadPhaseState;
-use super::super::cluster::{Place, Placed, check_places};
+use super::super::broad_phase::{BroadPhaseState, NeighbourList};
+use super::super::cluster::{Place, Placed, Steppers, check_places};
+use super::super::loads::Loads;
 use super::super::mailbox::PendingCommands;
 use super::super::metrics::MetricsValues;
 use super::super::observation::Seen;
@@ -41,6 +42,21 @@ pub(super) struct ShownState {
     /// Commands that it has not obeyed yet.
     pub commands: Option<PendingCommands>,
     pub seen: Vec<Seen>,
+}
+
+/// The state that an agent kept to itself before another one was read into it.
+pub(super) struct OwnState {
+    parts: OwnParts,
+    /// The bytes of all else.
+    rest: Vec<u8>,
+}
+
+/// Parts that a state which is read makes anew: they are moved, and not written.
+struct OwnParts {
+    filled: Option<Arc<Snapshot>>,
+    loads: Option<Box<Loads>>,
+    neighbour_list: Option<Box<NeighbourList>>,
+    steppers: Option<Steppers>,
 }
 
 impl RunState {
@@ -164,22 +180,53 @@ impl AgentRunner {
         self.observer.archive(archive)
     }
 
-    /// The bytes by which [`Self::take_back`] makes it as it is now.
+    /// Takes out of it what a state is read into, by which [`Self::take_back`] makes it as it is now.
     ///
     /// # Errors
-    /// Those of [`Self::archive_own`].
-    pub(super) fn own_state(&mut self) -> Result<Vec<u8>, ArchiveError> {
-        let mut archive = Archive::writer();
-        self.archive_own(&mut archive)?;
-        Ok(archive.into_bytes())
+    /// Those of [`Self::archive_own`]; it is as it was then.
+    pub(super) fn take_own(&mut self) -> Result<OwnState, ArchiveError> {
+        let (parts, mut archive) = (self.take_parts(), Archive::writer());
+        match self.archive_own(&mut archive) {
+            Ok(()) => Ok(OwnState { parts, rest: archive.into_bytes() }),
+            Err(error) => {
+                self.put_parts(parts);
+                Err(error)
+            }
+        }
     }
 
-    /// Makes it as it was when it had these bytes.
+    /// Makes it as it was when that was taken.
     ///
     /// # Errors
     /// Where its model does not read what it has written itself.
-    pub(super) fn take_back(&mut self, own: &[u8]) -> Result<(), ArchiveError> {
-        self.archive_own(&mut Archive::reader(own))
+    pub(super) fn take_back(&mut self, own: OwnState) -> Result<(), ArchiveError> {
+        let read = self.archive_own(&mut Archive::reader(&own.rest));
+        self.put_parts(own.parts);
+        read
+    }
+
+    /// Puts back what was taken, where nothing was read since.
+    pub(super) fn keep_own(&mut self, own: OwnState) {
+        self.put_parts(own.parts);
+    }
+
+    fn take_parts(&mut self) -> OwnParts {
+        OwnParts {
+            filled: self.writer.filled_mut().take(),
+            loads: self.loads.take(),
+            neighbour_list: self.observer.neighbour_list_mut().take(),
+            steppers: self.cluster.as_mut().map(|seat| seat.take_steppers()),
+        }
+    }
+
+    fn put_parts(&mut self, parts: OwnParts) {
+        let OwnParts { filled, loads, neighbour_list, steppers } = parts;
+        *self.writer.filled_mut() = filled;
+        self.loads = loads;
+        *self.observer.neighbour_list_mut() = neighbour_list;
+        if let (Some(seat), Some(steppers)) = (&mut self.cluster, steppers) {
+            seat.put_steppers(steppers);
+        }
     }
 }
 

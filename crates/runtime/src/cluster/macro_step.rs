@@ -4,14 +4,16 @@
 //! fault it is are known by their models ([`super::super::model`]). Never here: what becomes of these ([`super::exclusion`]), who is a member.
 
 use super::super::agent_runner::{AgentRunner, StepOutcome, contained};
+use super::super::helpers::Helped;
 use super::super::loads::Acting;
-use super::{ClusterSeat, NO_SEAT, prepared};
+use super::{ClusterSeat, NO_SEAT, Wish, prepared};
 use metachron_contact::StepContext;
 use metachron_contact::asynchronous::{MacroStep, Pairs, Remotes, part};
 use metachron_contact::stepper::{
     ClusterMember, ClusterReport, ClusterScene, ClusterStepper, Participant, Plan, StepDoubling,
 };
-use metachron_core::{ParallelFor, SimSpan, SimTime, StepReport, recycled};
+use metachron_core::step_doubling::DoublingSchedule;
+use metachron_core::{AgentId, ParallelFor, SimSpan, SimTime, StepReport, recycled};
 use std::sync::Arc;
 
 /// The parts of a macro step that is being made.
@@ -63,37 +65,109 @@ impl Making<'_, '_> {
     }
 }
 
+/// All of a leader's seat that a macro step works with, taken out of it.
+struct Lent {
+    scene: Arc<ClusterScene>,
+    stepper: Box<ClusterStepper>,
+    doubling: Option<Box<StepDoubling>>,
+    remotes: Option<Box<Remotes>>,
+    helped: Helped,
+    /// As it was before the step.
+    schedule: DoublingSchedule,
+    wishes: Vec<Wish>,
+    participants: Vec<Participant<'static>>,
+    sides: Vec<Option<&'static mut Pairs>>,
+}
+
+/// The outcome of a macro step.
+struct Attempt {
+    made: Result<Made, String>,
+    /// After one that was made whether all may rest; an error is of who has moved with all others, and is parked where its state is written.
+    rests: Result<bool, String>,
+}
+
+impl ClusterSeat {
+    /// Lends what the macro step works with that `me` leads as its `steps`-th.
+    fn lend(&mut self, steps: u64, me: AgentId) -> Lent {
+        let schedule = self.schedule;
+        Lent {
+            scene: Arc::clone(&self.scene),
+            stepper: self.stepper.take().unwrap_or_default(),
+            doubling: self.repeats(steps, me),
+            remotes: self.remotes.take(),
+            helped: self.helped,
+            schedule,
+            wishes: std::mem::take(&mut self.wishes),
+            participants: std::mem::take(&mut self.participants),
+            sides: std::mem::take(&mut self.sides),
+        }
+    }
+
+    /// Takes it back after `attempt`. What a step that was not made has left in its stepper is of no use, and no step is compared by what one of its
+    /// members could not conclude: it is as if that had not been compared.
+    fn take_back(&mut self, lent: Lent, attempt: &Attempt) {
+        let is_made = attempt.made.is_ok();
+        self.stepper = is_made.then_some(lent.stepper);
+        self.doubling = lent.doubling.filter(|_| !is_made || attempt.rests.is_ok()).or_else(|| self.doubling.take());
+        if !is_made || attempt.rests.is_err() {
+            self.schedule = lent.schedule;
+        }
+        (self.remotes, self.helped) = (lent.remotes, lent.helped);
+        (self.wishes, self.participants, self.sides) = (lent.wishes, lent.participants, lent.sides);
+    }
+}
+
 impl AgentRunner {
     /// Steps all that it leads and that are at its time, with itself, as one problem.
     ///
     /// # Errors
     /// The reason why a member cannot go on: nobody has moved.
     pub(super) fn step_cluster(&mut self, plan: Plan, dt: SimSpan) -> Result<StepOutcome, String> {
-        let (id, time, steps) = (self.shared.id, self.pace.time(), self.metrics.turns());
-        let Some(seat) = &mut self.cluster else { return Err(NO_SEAT.to_owned()) };
-        let mut list = recycled(std::mem::take(&mut seat.participants));
-        let mut sides = recycled(std::mem::take(&mut seat.sides));
-        let (mut remotes, mut helped) = (seat.remotes.take(), seat.helped);
-        let mut stepper = seat.stepper.take().unwrap_or_default();
-        let schedule = seat.schedule;
-        let mut doubling = seat.repeats(steps, id);
-        let (scene, wishes) = (Arc::clone(&seat.scene), std::mem::take(&mut seat.wishes));
+        let (id, steps) = (self.shared.id, self.metrics.turns());
+        let Some(mut lent) = self.cluster.as_mut().map(|seat| seat.lend(steps, id)) else {
+            return Err(NO_SEAT.to_owned());
+        };
+        let attempt = self.try_macro_step(&mut lent, plan, dt);
+        if let Some(reason) = attempt.made.as_ref().err().or(attempt.rests.as_ref().err()) {
+            self.each_member(|actor| actor.model.note_unwound(reason));
+        }
+        if let (Ok(_), Ok(_), Some(doubling)) = (&attempt.made, &attempt.rests, &lent.doubling) {
+            self.note_errors(doubling, dt);
+        }
+        let report = attempt.made.as_ref().ok().map(|made| self.note_made(&lent.stepper, made, dt));
+        if let Some(seat) = &mut self.cluster {
+            seat.take_back(lent, &attempt);
+        }
+        let Attempt { made, rests } = attempt;
+        let at_rest = rests.unwrap_or(false);
+        match report {
+            Some(report) => Ok(StepOutcome { report: StepReport { at_rest, ..report }, dt }),
+            None => Err(made.err().unwrap_or_default()),
+        }
+    }
+
+    /// Makes a macro step with what its seat has lent.
+    fn try_macro_step(&mut self, lent: &mut Lent, plan: Plan, dt: SimSpan) -> Attempt {
+        let time = self.pace.time();
+        let Lent { scene, stepper, doubling, remotes, helped, wishes, participants, sides, .. } = lent;
+        let mut list = recycled(std::mem::take(participants));
+        let mut pairs = recycled(std::mem::take(sides));
         let (mut led, peers) = (std::mem::take(&mut self.led), Arc::clone(&self.peers));
         let all = std::iter::once(&mut *self).chain(led.members_at(time));
-        let parts = wishes.iter().map(|wish| plan.parts_in(wish.role, wish.step_s));
-        for (actor, parts) in all.zip(parts) {
-            if let Some((participant, pairs)) = actor.participant(time, dt, parts) {
+        for (actor, wish) in all.zip(&*wishes) {
+            let parts = plan.parts_in(wish.role, wish.step_s);
+            if let Some((participant, own)) = actor.participant(time, dt, parts) {
                 list.push(participant);
-                sides.push(pairs);
+                pairs.push(own);
             }
         }
-        let meets = sides.iter().any(Option::is_some);
+        let meets = pairs.iter().any(Option::is_some);
         let is_whole = list.len() == wishes.len();
         let mut making = Making {
-            scene: &scene,
+            scene,
             list: &mut list,
-            sides: &mut sides,
-            stepper: &mut stepper,
+            sides: &mut pairs,
+            stepper,
             doubling: doubling.as_deref_mut(),
             remotes: meets.then(|| &mut **remotes.get_or_insert_default()),
             step: MacroStep { dt_s: dt.as_secs_f64(), parts: plan.parts },
@@ -101,44 +175,22 @@ impl AgentRunner {
         };
         let make = || {
             let size = making.list.iter().map(Participant::size).sum();
-            peers.helpers.make(size, &mut helped, |threads| making.make(threads))
+            peers.helpers.make(size, helped, |threads| making.make(threads))
         };
         let made = if is_whole { contained(make) } else { Err(NO_SEAT.to_owned()) };
-        // what fails now has moved with all others, and is parked where its state is written
-        let concluded = contained(|| Ok(made.is_ok() && making.conclude(meets)));
-        let (list, sides) = (recycled(list), recycled(sides));
+        let rests = contained(|| Ok(made.is_ok() && making.conclude(meets)));
+        (*participants, *sides) = (recycled(list), recycled(pairs));
         self.led = led;
-        if let Some(seat) = &mut self.cluster {
-            (seat.participants, seat.sides, seat.wishes) = (list, sides, wishes);
-            (seat.remotes, seat.helped) = (remotes, helped);
-        }
-        if let Some(reason) = made.as_ref().err().or(concluded.as_ref().err()) {
-            self.each_member(|actor| actor.model.note_unwound(reason));
-        }
-        if made.is_err() || concluded.is_err() {
-            // it is as if this step had not been compared
-            let kept = doubling.take().filter(|_| made.is_err());
-            self.cluster.iter_mut().for_each(|seat| seat.schedule = schedule);
-            kept.into_iter().zip(&mut self.cluster).for_each(|(doubling, seat)| seat.doubling = Some(doubling));
-        }
-        if let Some(doubling) = doubling {
-            self.note_errors(doubling, dt);
-        }
-        let made = made?;
-        let report = self.note_made(stepper, plan, dt, &made);
-        Ok(StepOutcome { report: StepReport { at_rest: concluded.unwrap_or(false), ..report }, dt })
+        Attempt { made, rests }
     }
 
     /// Notes what a macro step was that has been made.
-    fn note_made(&mut self, stepper: Box<ClusterStepper>, plan: Plan, dt: SimSpan, made: &Made) -> StepReport {
+    fn note_made(&mut self, stepper: &ClusterStepper, made: &Made, dt: SimSpan) -> StepReport {
         let Made { report, extra } = made;
-        self.note_pairs(&stepper, dt);
-        self.note_events(&stepper, dt);
-        self.note_solves(report, plan, dt);
+        self.note_pairs(stepper, dt);
+        self.note_events(stepper, dt);
+        self.note_solves(report, dt);
         self.note_groups(self.pace.time() + dt);
-        if let Some(seat) = &mut self.cluster {
-            seat.stepper = Some(stepper);
-        }
         StepReport { work: report.work + extra, substeps: report.fine_steps, at_rest: false }
     }
 
@@ -146,7 +198,8 @@ impl AgentRunner {
     fn participant(&mut self, time: SimTime, dt: SimSpan, parts: u32) -> Option<(Participant<'_>, Option<&mut Pairs>)> {
         let id = self.shared.id;
         let Self { model, observer, loads, links, shared, cluster, .. } = self;
-        let ClusterSeat { memory, grips, asynchronous, .. } = &mut **cluster.as_mut()?;
+        let ClusterSeat { memory, grips, asynchronous, parts: own_parts, .. } = &mut **cluster.as_mut()?;
+        *own_parts = parts;
         let Acting { springs: hands, forces, motors, pose } = prepared(loads, time, dt);
         let (neighbours, pose) = (observer.neighbours(), *pose);
         let context = StepContext { me: id, time, neighbours, hands, forces, motors, pose, links };

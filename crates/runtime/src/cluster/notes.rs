@@ -1,10 +1,10 @@
-//! What a macro step leaves with the members of a cluster: how it was solved, its error, what pairs gave, who still belongs together.
+//! The notes that a macro step leaves with the members of a cluster: how it was solved, its error, what pairs gave, who still belongs together.
 //!
 //! In: a stepper after a macro step. Out: what each member's seat publishes. Never here: the step itself.
 
 use super::attachments::held_by_links;
 use super::{AgentRunner, ClusterSeat};
-use metachron_contact::stepper::{ClusterReport, ClusterStepper, PairTotal, Partner, Plan, StepDoubling};
+use metachron_contact::stepper::{ClusterReport, ClusterStepper, PairTotal, Partner, StepDoubling};
 use metachron_core::step_doubling::drift_m;
 use metachron_core::{AgentId, ClusterState, JointEffort, PairKind, PairState, SimSpan, SimTime};
 
@@ -29,7 +29,7 @@ impl ClusterSeat {
 
 impl AgentRunner {
     /// Notes how the step was made and solved.
-    pub(super) fn note_solves(&mut self, report: &ClusterReport, plan: Plan, dt: SimSpan) {
+    pub(super) fn note_solves(&mut self, report: &ClusterReport, dt: SimSpan) {
         let (leader, step_s) = (self.shared.id, dt.as_secs_f64());
         let Some(seat) = &mut self.cluster else { return };
         let ClusterReport { contacts, factors, products, unfinished, depth_m, .. } = *report;
@@ -42,16 +42,15 @@ impl AgentRunner {
         (solves.depth_m, solves.deepest_m) = (depth_m, solves.deepest_m.max(depth_m));
         let mut solves = Some(*solves);
         self.each_member(|actor| {
-            let parts = actor.wish().map_or(1, |wish| plan.parts_in(wish.role, wish.step_s));
             if let Some(seat) = &mut actor.cluster {
                 // those of the leader, which is the first
-                seat.state = Some(ClusterState { leader, parts, step_s, solves: solves.take() });
+                seat.state = Some(ClusterState { leader, parts: seat.parts, step_s, solves: solves.take() });
             }
         });
     }
 
     /// Hands every member how far a step of `dt` is from the same in halves.
-    pub(super) fn note_errors(&mut self, doubling: Box<StepDoubling>, dt: SimSpan) {
+    pub(super) fn note_errors(&mut self, doubling: &StepDoubling, dt: SimSpan) {
         let Some(seat) = &mut self.cluster else { return };
         let span_s = seat.schedule.finish_step(dt.as_secs_f64()).then_some(seat.schedule.span_s());
         if doubling.apart_m().is_empty() {
@@ -65,9 +64,6 @@ impl AgentRunner {
                 seat.drift_m = drift_m(*apart_m, 1, span_s);
             }
         });
-        if let Some(seat) = &mut self.cluster {
-            seat.doubling = Some(doubling);
-        }
     }
 
     /// Hands every pair what it gave each other, and every member its work.

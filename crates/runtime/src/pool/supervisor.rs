@@ -70,7 +70,9 @@ impl Supervisor {
     /// Starts a worker for each place.
     pub fn start(state: Arc<PoolState>, team: Team) -> io::Result<Self> {
         let ((sender, messages), places) = (channel(), team.places);
-        let mut supervisor = Self { state, workers: Vec::new(), team, started: 0, sender, messages };
+        // no worker has the number of one that is stuck
+        let started = team.stuck.iter().map(|worker| worker.number + 1).max().unwrap_or(0);
+        let mut supervisor = Self { state, workers: Vec::new(), team, started, sender, messages };
         for at in 0..places {
             match supervisor.start_worker(at) {
                 Ok(worker) => supervisor.workers.push(worker),
@@ -133,13 +135,17 @@ impl Supervisor {
         }
     }
 
-    /// A worker has ended. Before the end of the run that is a bug of metachron, and the other workers must continue.
+    /// A worker has ended. Before the end of the run that is a bug of metachron where no other works in its place, and the others must continue.
     fn on_ended(&mut self, number: u32) {
-        let Some(at) = self.workers.iter().position(|worker| worker.number == number) else { return };
-        if let Some(turn) = self.workers[at].watchdog.current() {
+        let all = self.workers.iter().chain(&self.team.stuck);
+        let turn = all.filter(|worker| worker.number == number).find_map(|worker| worker.watchdog.current());
+        if let Some(turn) = turn {
             self.park(turn.agent(), "the worker thread of the agent panicked, which is a bug in metachron");
         }
-        if self.state.sleep.stopping() { self.join(number) } else { self.replace(at) }
+        match self.workers.iter().position(|worker| worker.number == number) {
+            Some(at) if !self.state.sleep.stopping() => self.replace(at),
+            _ => self.join(number),
+        }
     }
 
     /// If the system gives no more threads, the other workers continue without this one.
@@ -168,7 +174,7 @@ impl Supervisor {
     }
 
     fn join(&mut self, number: u32) {
-        let worker = self.workers.iter_mut().find(|worker| worker.number == number);
+        let worker = self.workers.iter_mut().chain(&mut self.team.stuck).find(|worker| worker.number == number);
         // a panic outside a turn has been printed, and the other workers must still be joined
         drop(worker.and_then(|worker| worker.thread.take()).map(JoinHandle::join));
     }
@@ -181,7 +187,9 @@ impl Supervisor {
         loop {
             self.team.stuck.retain(|worker| !worker.has_ended());
             let mut missing = self.workers.iter().filter(|worker| worker.thread.is_some()).peekable();
-            if missing.peek().is_none() && (why == Halt::Cut || self.team.stuck.is_empty()) {
+            // one whose turn has ended late still has its agent until it ends itself
+            let is_left = |worker: &WorkerRecord| why == Halt::Cut && worker.watchdog.is_stalled();
+            if missing.peek().is_none() && self.team.stuck.iter().all(is_left) {
                 break;
             }
             let turns = missing.chain(&self.team.stuck).filter_map(|worker| worker.watchdog.current());
@@ -190,7 +198,7 @@ impl Supervisor {
                 Halt::Cut => watchdog.limit.interval(),
             };
             match (self.messages.recv_timeout(patience), why) {
-                (Ok(Message::Ended(number)), _) => self.join(number),
+                (Ok(Message::Ended(number)), _) => self.on_ended(number),
                 (Ok(Message::Stop(_)), _) => {}
                 (Err(_), Halt::End) => break,
                 (Err(_), Halt::Cut) => self.set_stuck_aside(),

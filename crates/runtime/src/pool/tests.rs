@@ -1,10 +1,13 @@
-//! What only a pool does; `live_tests.rs` holds what every executor does.
+//! Claims about pools alone; `live_tests.rs` holds what every executor does.
 
+use super::super::governor::{Demand, Governor, TurnMeasure};
+use super::super::sleep::SleepRegistry;
 use super::super::testing::{Dummy, Fault, Log, eventually, running, system};
 use super::super::{AgentHandle, AgentState, Command};
 use super::*;
 use metachron_core::{AgentId, SimTime};
 use std::collections::BTreeSet;
+use std::sync::atomic::{AtomicBool, Ordering::Relaxed};
 
 fn pool(spawns: Vec<AgentSpawn>, workers: usize, limit: Duration) -> Box<Pool> {
     running(Pool::with_workers(spawns, system(), workers, StallLimit::of(limit), Priority::Normal).unwrap())
@@ -116,4 +119,41 @@ fn an_empty_run_begins_and_ends() {
     let run = pool(Vec::new(), 4, LONG);
     assert!(run.agents().is_empty());
     assert!(run.shutdown().is_empty());
+}
+
+/// A governor that is still in a turn when the run is to be cut, and saves nothing.
+struct Lingers(Arc<SleepRegistry>, Arc<AtomicBool>);
+
+impl Governor for Lingers {
+    fn after_step(&mut self, _: &TurnMeasure) -> Demand {
+        while self.1.load(Relaxed) && !self.0.stopping() {
+            thread::yield_now();
+        }
+        if self.1.swap(false, Relaxed) {
+            // the other workers end meanwhile
+            thread::sleep(SHORT);
+        }
+        Demand::default()
+    }
+
+    fn archive(&mut self, _: &mut Archive<'_>) -> Result<(), ArchiveError> {
+        Ok(())
+    }
+}
+
+#[test]
+fn a_cut_waits_for_a_late_turn_that_has_ended_but_for_its_governor() {
+    let late = || Dummy { fault: Some((3, Fault::Slow)), ..Dummy::new(1.0) };
+    let mut run = pool(vec![Dummy::new(1.0).at(200.0)], 2, SHORT);
+    let lingers = Arc::new(AtomicBool::new(false));
+    let governor = Box::new(Lingers(Arc::clone(&run.all.sleep), Arc::clone(&lingers)));
+    let spawn = AgentSpawn { governor: Some(governor), ..late().at(200.0) };
+    let id = run.add(spawn).unwrap().id();
+    eventually("its step lasts too long", || stalled(&run.agents()[id.0 as usize]));
+    lingers.store(true, Relaxed);
+    eventually("its step ends", || !stalled(&run.agents()[id.0 as usize]));
+    run.save(&mut Archive::writer()).unwrap();
+    assert!(!lingers.load(Relaxed), "it was in its turn");
+    let before = run.agents()[id.0 as usize].steps();
+    eventually("it goes on", || run.agents()[id.0 as usize].steps() > before);
 }

@@ -1,6 +1,6 @@
 //! The thread of one agent: turn after turn, and sleep between them.
 //!
-//! In: an agent, or its place with its leader. Out: its turns; the agent again where the thread is asked to end. Never here: how threads begin and
+//! In: an agent that is given to it, or returns from its leader. Out: its turns; the agent again where the thread is asked to end. Never here: how threads begin and
 //! end.
 
 use super::super::agent_clock::{SharedTimeline, Timeline};
@@ -13,6 +13,7 @@ use super::super::turn_order::{Held, PartKind, TurnOrder, in_force};
 use super::super::turn_parts::Begun;
 use super::super::turns::Took;
 use super::super::watchdog::{Watchdog, WatchdogWord};
+use crossbeam::atomic::AtomicCell;
 use metachron_core::AgentId;
 use std::sync::Arc;
 use std::thread;
@@ -33,11 +34,16 @@ pub(super) struct AgentThread {
     pub watchdog: Watchdog,
     pub word: Arc<WatchdogWord>,
     pub turns: u32,
+    pub given: Given,
 }
+
+/// The agent that a thread is to take up.
+pub(super) type Given = Arc<AtomicCell<Option<Box<AgentRunner>>>>;
 
 impl AgentThread {
     /// The thread's main loop: turn after turn until the agent is asked to end, or is parked. While it is led, its leader has the actor.
-    pub fn run(mut self, mut here: Option<Box<AgentRunner>>, shared: &Shared) -> Option<Box<AgentRunner>> {
+    pub fn run(mut self, shared: &Shared) -> Option<Box<AgentRunner>> {
+        let mut here = None;
         while !(shared.sleep.stopping() && shared.sleep.end_if_stopping(|| self.word.leave())) {
             here = match here {
                 Some(actor) => match self.make_own_turns(actor) {
@@ -47,6 +53,8 @@ impl AgentThread {
                 None => self.wait_for(shared.handover()),
             };
         }
+        // it may have been given just before
+        here = here.or_else(|| self.given.take());
         here.iter_mut().for_each(|actor| self.settle(actor));
         here
     }
@@ -92,9 +100,9 @@ impl AgentThread {
         hand_over(actor, leader)
     }
 
-    /// Waits until the agent returns from its leader.
+    /// Waits until the agent is given to it, or returns from its leader.
     fn wait_for(&self, handover: Option<&Handover>) -> Option<Box<AgentRunner>> {
-        let returned = handover.and_then(Handover::take_returned);
+        let returned = self.given.take().or_else(|| handover.and_then(Handover::take_returned));
         if returned.is_none() {
             thread::park();
         }

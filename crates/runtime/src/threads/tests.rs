@@ -1,9 +1,11 @@
-//! What only threads do; `live_tests.rs` holds what every executor does.
+//! Claims about threads alone; `live_tests.rs` holds what every executor does.
 
 use super::super::SystemClock;
 use super::super::agent_runner::Next;
+use super::super::archive::refuse_absent;
 use super::super::clock::ManualClock;
-use super::super::testing::{Dummy, eventually, running};
+use super::super::testing::{Dummy, Log, eventually, running};
+use super::super::{AgentState, EventKind};
 use super::agent_thread::CATCH_UP_MAX;
 use super::*;
 
@@ -46,7 +48,8 @@ fn an_agent_that_is_behind_yields_its_core_after_a_while_and_goes_on() {
     clock.advance(Duration::from_millis(50));
     let (batch, awake, word) = (CpuBatch::default(), Duration::ZERO, Arc::default());
     let watchdog = Watchdog::new(&all.handles, StallLimit::default());
-    let mut thread = AgentThread { clock, timeline, batch, order: None, awake, watchdog, word, turns: 0 };
+    let mut thread =
+        AgentThread { clock, timeline, batch, order: None, awake, watchdog, word, turns: 0, given: Arc::default() };
     let mut steps_after = |awake: Duration| {
         thread.awake = awake;
         assert_eq!(thread.wait_or_turn(&mut actor), Next::Due);
@@ -69,4 +72,41 @@ fn agents_that_are_all_behind_take_turns() {
     eventually("they have gone on", || made().iter().sum::<u64>() >= 200 * each);
     let least = made().into_iter().min();
     assert!(least >= Some(each / 10), "{least:?} of {each} turns");
+}
+
+/// A system without threads to give.
+fn refuse(_: thread::Builder, _: Body) -> io::Result<JoinHandle<Option<Box<AgentRunner>>>> {
+    Err(io::Error::from(io::ErrorKind::WouldBlock))
+}
+
+#[test]
+fn no_agent_is_lost_where_the_system_gives_no_thread() {
+    let log = Log::default();
+    let mut spawns: Vec<_> = (0..3).map(|_| Dummy::new(1.0).at(200.0)).collect();
+    // one of them leads the other
+    spawns.extend((0..2).map(|_| Dummy::member(1.0, &log).at(200.0)));
+    let mut run = *running(Threads::start(spawns, Arc::new(SystemClock::new()), Priority::Normal).unwrap());
+    let steps = |run: &Threads| run.agents().iter().map(AgentHandle::steps).collect::<Vec<_>>();
+    eventually("all have begun", || steps(&run).iter().all(|made| *made > 0));
+    let mut heard: Vec<_> = run.agents().iter().map(AgentHandle::listen).collect();
+    let given = std::mem::replace(&mut run.spawner, refuse);
+    let mut archive = Archive::writer();
+    run.save(&mut archive).unwrap();
+    let bytes = archive.into_bytes();
+    for (agent, heard) in run.agents().iter().zip(&mut heard) {
+        let AgentState::Parked(reason) = agent.state() else { panic!("{:?}", agent.state()) };
+        assert!(reason.contains("refused a thread for agent:"), "{reason}");
+        let mut told = false;
+        agent.hear_events(heard, |event| told |= event.kind == EventKind::Parked);
+        assert!(told, "{}", agent.name());
+    }
+    // nor does one that joins leave anything behind
+    assert!(matches!(run.add(Dummy::new(1.0).at(200.0)), Err(RunError::NoThread { .. })));
+    assert_eq!(run.agents()[5].state(), AgentState::Gone);
+    // they come back with a state that is read
+    run.spawner = given;
+    run.archive(&mut Archive::reader(&bytes), &mut refuse_absent).unwrap();
+    let before = steps(&run);
+    eventually("they go on", || steps(&run).iter().zip(&before).take(5).all(|(now, then)| now > then));
+    assert!(run.agents().iter().take(5).all(|agent| agent.state() == AgentState::Running));
 }

@@ -5,6 +5,7 @@
 use super::super::agent_runner::AgentRunner;
 use super::super::spawn::RunError;
 use super::super::watchdog::{Seen, Watchdog, WatchdogWord};
+use super::agent_thread::Given;
 use metachron_core::AgentId;
 use std::collections::BTreeMap;
 use std::sync::mpsc::{RecvTimeoutError, Sender, channel};
@@ -15,6 +16,7 @@ use std::thread::{self, JoinHandle};
 pub(super) struct Ended {
     pub thread: JoinHandle<Option<Box<AgentRunner>>>,
     pub word: Arc<WatchdogWord>,
+    pub given: Given,
 }
 
 /// The turns in progress of the agents' threads, for the watching thread.

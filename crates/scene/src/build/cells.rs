@@ -23,7 +23,7 @@ const OUTSIDE: &str = "outside";
 /// Default colour of walls: a warm white.
 const WALL_COLOUR: [u8; 3] = [0xd8, 0xd2, 0xc4];
 /// Friction and restitution of walls.
-const WALL_SURFACE: (f64, f64) = (0.5, 0.2);
+const WALL_SURFACE: (f64, f64) = (0.5, 0.0);
 
 const THICKNESS: Allowed = allowed(1e-3..=100.0, "m");
 

@@ -197,7 +197,7 @@ fn pose(c: &mut Checker<'_, '_>, place: &Place, file: &RigidFile) -> (DVec3, DQu
 }
 
 fn surface(c: &mut Checker<'_, '_>, place: &Place, file: &RigidFile) -> (f64, f64) {
-    let restitution = c.optional(place, "restitution", file.restitution, &allowed(0.0..=1.0, "")).unwrap_or(0.2);
+    let restitution = c.optional(place, "restitution", file.restitution, &allowed(0.0..=1.0, "")).unwrap_or(0.0);
     (restitution, c.optional(place, "friction", file.friction, &FRICTION).unwrap_or(0.5))
 }
 

@@ -49,7 +49,7 @@ pub struct RigidFile {
     /// Moments and products of inertia about the centre of mass along the axes of the object, kg·m²: `[xx, yy, zz, xy, xz, yz]`, beside
     /// `mass_kg`. The products are those of the tensor, as in URDF and MJCF. Default: those of the shape, evenly filled.
     pub inertia_kg_m2: Option<[f64; 6]>,
-    /// Coefficient of restitution, 0 … 1; a pair takes the larger one. Default 0.2.
+    /// Coefficient of restitution, 0 … 1; a pair takes the larger one. Default 0.
     #[schemars(range(min = 0.0, max = 1.0))]
     pub restitution: Option<f64>,
     /// Coulomb friction coefficient, 0 … 10; a pair takes the geometric mean. Default 0.5.

@@ -1,8 +1,8 @@
 //! How often is a world lost, and an object parked, where it is saved and put back while objects join, leave and jump, and where eight threads call
 //! it at once?
 //!
-//! `cargo run --release -p metachron-world --example rewinds -- CHECKPOINTS RESTORES SECONDS`: so many on each executor, then so long with
-//! eight threads. It ends with an error where a world was lost, an object parked, or a thread did not return.
+//! `cargo run --release -p metachron-world --example rewinds -- CHECKPOINTS RESTORES SECONDS [EXECUTOR]`: so many on each executor, or on that
+//! one, then so long with eight threads. It ends with an error where a world was lost, an object parked, or a thread did not return.
 
 mod driver;
 
@@ -15,9 +15,16 @@ fn main() -> Result<(), String> {
     let [checkpoints, restores, seconds] = numbers[..] else {
         return Err("expected CHECKPOINTS RESTORES SECONDS, three whole numbers".to_owned());
     };
+    let only = std::env::args().nth(4);
+    let name = |executor: ExecutorKind| format!("{executor:?}").to_lowercase();
     println!("what    executor  checkpoints  restores  changes    calls  wall s  lost  parked");
     let mut faults = 0;
-    for executor in [ExecutorKind::Threads, ExecutorKind::Pool, ExecutorKind::Lockstep] {
+    let mut executors = vec![ExecutorKind::Threads, ExecutorKind::Pool, ExecutorKind::Lockstep];
+    executors.retain(|executor| only.as_ref().is_none_or(|only| *only == name(*executor)));
+    if executors.is_empty() {
+        return Err(format!("the executor is {}; expected threads, pool or lockstep", only.unwrap_or_default()));
+    }
+    for executor in executors {
         let began = Instant::now();
         if checkpoints > 0 {
             let amount = Amount { checkpoints, restores: restores.max(1), change_every: 16 };

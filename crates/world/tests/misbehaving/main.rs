@@ -1,6 +1,8 @@
 //! What a model of somebody's own does wrong, wherever it does: it is parked and an event says so, all others step on as they would have, and
 //! the world takes checkpoints, goes back, and lets objects join and leave.
 
+mod coupled;
+mod lockstep_stalls;
 mod rogue;
 mod stalls;
 

@@ -65,6 +65,8 @@ pub enum Kind {
     Sleeps,
     /// Its step does not end before it is told otherwise.
     Hangs,
+    /// Its step takes some time, and ends.
+    Slow,
 }
 
 impl Kind {
@@ -155,7 +157,17 @@ pub const HALF_M: f64 = 0.1;
 impl Rogue {
     pub fn new(switch: &Arc<Switch>, at: DVec3) -> Self {
         let solid = Solid::Box { half_extents_m: DVec3::splat(HALF_M) };
-        let body = RigidBody::new(RigidSpec::free(solid, at, 4.0)).unwrap();
+        Self::of(RigidSpec::free(solid, at, 4.0), switch)
+    }
+
+    /// One without weight.
+    pub fn floating(switch: &Arc<Switch>, at: DVec3) -> Self {
+        let solid = Solid::Box { half_extents_m: DVec3::splat(HALF_M) };
+        Self::of(RigidSpec { gravity: DVec3::ZERO, ..RigidSpec::free(solid, at, 4.0) }, switch)
+    }
+
+    fn of(spec: RigidSpec, switch: &Arc<Switch>) -> Self {
+        let body = RigidBody::new(spec).unwrap();
         Self { body, switch: Arc::clone(switch), wrong: Vec::new(), blocks: Vec::new() }
     }
 
@@ -261,6 +273,9 @@ impl ClusterMember for Rogue {
         if self.switch.is(Kind::Sleeps) {
             std::thread::sleep(Duration::from_millis(700));
             self.switch.set(Kind::None);
+        }
+        if self.switch.is(Kind::Slow) {
+            std::thread::sleep(Duration::from_millis(10));
         }
         while self.switch.is(Kind::Hangs) {
             std::thread::sleep(Duration::from_millis(1));

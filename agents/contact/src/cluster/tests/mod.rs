@@ -157,13 +157,12 @@ pub fn contact(sides: [Side; 2], normal: DVec3) -> Contact {
         tangents: [first, normal.cross(first)],
         gap_m: 0.0,
         friction: 0.5,
-        restitution: 0.0,
-        approach_m_s: 0.0,
-        gained_m_s: 0.0,
+        parting_m_s: 0.0,
         surface_m_s: DVec3::ZERO,
         owed_slip_m: DVec3::ZERO,
         warm_n_s: DVec3::ZERO,
         load_n_s: 0.0,
+        overlap_m: 0.0,
     }
 }
 

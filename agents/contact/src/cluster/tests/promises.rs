@@ -27,7 +27,7 @@ fn what_is_wrong_is_named() {
         (refusal(|c| c.h_s = f64::NAN), "step is NaN"),
         (refusal(|c| c.contacts[2].gap_m = f64::NAN), "contact 2: its gap"),
         (refusal(|c| c.contacts[1].friction = -0.1), "contact 1: its friction"),
-        (refusal(|c| c.contacts[1].restitution = 1.1), "contact 1: its restitution"),
+        (refusal(|c| c.contacts[1].parting_m_s = -0.1), "contact 1: the speed at which it parts"),
         (refusal(|c| c.contacts[1].surface_m_s.x = f64::NAN), "contact 1: its approach or"),
         (refusal(|c| c.rows = vec![JointRow::new(c.contacts[0].sides, Hold::along(DVec3::ONE))]), "row 0: its axis"),
         (refusal(|c| c.rows = vec![JointRow::new(c.contacts[0].sides, Hold::motor(DVec3::X, -1.0))]), "row 0: zero"),

@@ -82,12 +82,12 @@ pub(super) struct Skinned<'a> {
 /// A contact of the problem; from what is stepped elsewhere it comes out in that one's steps.
 pub(super) fn taken_up(round: &Round<'_, '_>, owner: &Owner, touch: &Touch, sides: &Skinned<'_>) -> Contact {
     let late_s = owner.other.map_or(0.0, |other| round.all[other].member.answers_after_s());
-    let found = contact(touch, sides.facing, sides.skins, round.progress);
+    let found = contact(touch, sides.facing, sides.skins);
     let let_go_m_s = remote::slower_push_out(touch, round.scene.depth_m(), round.h_s, late_s);
     Contact { surface_m_s: found.surface_m_s + let_go_m_s, ..found }
 }
 
-fn contact(touch: &Touch, facing: &Facing, skins: [&CollisionShape; 2], progress: &[Progress]) -> Contact {
+fn contact(touch: &Touch, facing: &Facing, skins: [&CollisionShape; 2]) -> Contact {
     let Facing { sides, led_m_s, .. } = *facing;
     let surface_m_s = led_m_s[1] - led_m_s[0];
     let tangent = touch.normal.any_orthonormal_vector();
@@ -97,12 +97,11 @@ fn contact(touch: &Touch, facing: &Facing, skins: [&CollisionShape; 2], progress
         tangents: [tangent, touch.normal.cross(tangent)],
         gap_m: touch.gap_m,
         friction: skins[0].friction_with(skins[1]),
-        restitution: skins[0].restitution_with(skins[1]),
-        approach_m_s: -facing.opening_m_s(touch.normal, |member| &progress[member].before),
-        gained_m_s: 0.0,
+        parting_m_s: 0.0,
         surface_m_s,
         owed_slip_m: DVec3::ZERO,
         warm_n_s: DVec3::ZERO,
         load_n_s: 0.0,
+        overlap_m: 0.0,
     }
 }

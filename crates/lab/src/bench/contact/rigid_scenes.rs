@@ -138,7 +138,7 @@ pub(super) fn overlap() -> anyhow::Result<Stage> {
             0 => (None, DVec3::Z, here),
             _ => (Some(AgentId(i as u32 - 1)), if i % 2 == 1 { DVec3::Y } else { DVec3::X }, here - middle(i - 1)?),
         };
-        joints.push(Joint { anchor_b_m, collide: true, ..Joint::new(AgentId(i as u32), other, hinge_about(axis)) });
+        joints.push(Joint { anchor_b_m, ..Joint::new(AgentId(i as u32), other, hinge_about(axis)) });
     }
     Ok(Stage::apart(bodies, 1.0 / 240.0).jointed(joints))
 }
