@@ -26,6 +26,8 @@ const MISS_YIELDS: f64 = 10.0;
 #[derive(Default)]
 pub(super) struct Impacts {
     solver: Solver,
+    /// The most steps of a solve.
+    factors_max: Option<u32>,
     /// The macro step and the fine step, seconds, and how deep contacts rest, metres.
     macro_s: f64,
     step_s: f64,
@@ -103,7 +105,7 @@ impl ClusterStepper {
 impl Impacts {
     /// Ends each solve after so many steps from now on.
     pub fn set_factors_max(&mut self, most: Option<u32>) {
-        self.solver.set_factors_max(most);
+        self.factors_max = most;
     }
 
     /// Begins a fine step. Its problem goes by the velocities at its end, and would stop too early sides that fly and meet in a later one: it
@@ -264,7 +266,8 @@ impl Impacts {
         let least_m_s = self.found.iter().map(lost_m_s).fold(f64::INFINITY, f64::min);
         let yield_m_s = (YIELD_SHARE * least_m_s).max(YIELD_MIN_M_S);
         let (depth_m, tolerance_m_s) = (self.depth_m, MISS_YIELDS * yield_m_s);
-        self.solver = Solver::new(Settings { depth_m, tolerance_m_s, ..Settings::default() });
+        self.solver =
+            Solver::new(Settings { depth_m, tolerance_m_s, factors_max: self.factors_max, ..Settings::default() });
         PUSH_OUT_SHARE * depth_m / yield_m_s
     }
 
