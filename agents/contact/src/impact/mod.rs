@@ -28,6 +28,8 @@ const MISS_YIELDS: f64 = 10.0;
 #[derive(Default)]
 pub(crate) struct Impacts {
     solver: Solver,
+    /// The most steps of a solve.
+    factors_max: Option<u32>,
     /// The macro step and the fine step, seconds, and how deep contacts rest, metres.
     macro_s: f64,
     step_s: f64,
@@ -82,6 +84,11 @@ pub(crate) struct SolvedStep<'a, 'p> {
 }
 
 impl Impacts {
+    /// Ends each solve after so many steps from now on.
+    pub fn set_factors_max(&mut self, most: Option<u32>) {
+        self.factors_max = most;
+    }
+
     /// Lets contacts that close fast rebound, after the solve of a fine step by which they close no more; `None` where none does.
     pub fn rebound(&mut self, step: SolvedStep<'_, '_>) -> Result<Option<Report>, StepError> {
         let SolvedStep { all, search, constraints, solution, members, progress, threads, depth_m, may_fly } = step;
@@ -274,7 +281,8 @@ impl Impacts {
         let least_m_s = self.found.iter().map(lost_m_s).fold(f64::INFINITY, f64::min);
         let yield_m_s = (YIELD_SHARE * least_m_s).max(YIELD_MIN_M_S);
         let (depth_m, tolerance_m_s) = (self.depth_m, MISS_YIELDS * yield_m_s);
-        self.solver = Solver::new(Settings { depth_m, tolerance_m_s, ..Settings::default() });
+        self.solver =
+            Solver::new(Settings { depth_m, tolerance_m_s, factors_max: self.factors_max, ..Settings::default() });
         PUSH_OUT_SHARE * depth_m / yield_m_s
     }
 
