@@ -7,7 +7,7 @@
 //! ```
 //! use glam::{DMat3, DVec3};
 //! use metachron_core::PlainLoop;
-//! use metachron_contact::cluster::{Block, Contact, Member, Problem, Side, Solver};
+//! use metachron_contact::solve::{Block, Contact, Member, Problem, Side, Solver};
 //!
 //! // a box of 2 kg, 0.2 m wide, on a floor under its corners, pushed aside; its spin is the second block
 //! let (h_s, mass_kg) = (0.01, 2.0);
@@ -39,12 +39,11 @@
 //! assert!((given.z - mass_kg * 9.81 * h_s).abs() < 0.001); // the floor carries the box …
 //! assert!((given.x + 0.3 * given.z).abs() < 1e-4); // … and slows it by Coulomb's law
 //! assert!(solution.report.miss_m_s < 1e-6);
-//! # Ok::<(), metachron_contact::cluster::ProblemError>(())
+//! # Ok::<(), metachron_contact::solve::ProblemError>(())
 //! ```
 
 pub mod agent;
 pub mod audit;
-pub mod cluster;
 pub mod constraint;
 pub mod detect;
 mod impact;
@@ -54,6 +53,7 @@ pub mod law;
 pub mod member;
 pub mod push_out;
 pub mod remote;
+pub mod solve;
 pub mod step;
 
 pub use agent::{Agent, AnchorForce, AnchorSpring, Carving, Neighbour, PoseGoal, SetMotion, SetMotor, StepContext};

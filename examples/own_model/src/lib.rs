@@ -6,7 +6,7 @@
 //! A step is linearly implicit: (m + h c + h² k) v' = m v + h (B − m g), where k = −dB/dz; contact adds its impulses on the right.
 
 use metachron::contact::StepContext;
-use metachron::contact::cluster::{Block, ProblemError, Side, SideTerm};
+use metachron::contact::solve::{Block, ProblemError, Side, SideTerm};
 use metachron::contact::member::{ClusterMember, Pose, Role};
 use metachron::core::{Archive, ArchiveError, Bounds, RigidState, StepError, StepReport, archive_values, check_span};
 use metachron::geometry::{CollisionShape, ContactSide, Place, PlacedShape, ShapeKind, ShapePose, SolidShape};

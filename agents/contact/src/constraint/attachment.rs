@@ -3,11 +3,11 @@
 //! In: what members say of such springs. Out: rows. Never here: springs that never yield, which are a part of their member's matrix.
 //! Theory: docs/theory/clusters.md, eq. 29; docs/theory/rod.md, eq. 21.
 
-use crate::cluster::{Hold, JointRow, Side, Spring};
 use crate::constraint::failure::SLIP_SHARE;
 use crate::constraint::{ConstraintRows, FineStep, Frame, Name, Pull, Slides, SlidingRow};
 use crate::member::memory::Partner;
 use crate::member::{ClusterMember, OwnSpring};
+use crate::solve::{Hold, JointRow, Side, Spring};
 use glam::DVec3;
 
 impl ConstraintRows {

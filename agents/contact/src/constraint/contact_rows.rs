@@ -4,11 +4,11 @@
 //! In: contacts of a fine step. Out: rows behind those of joints. Never here: where places are, the solve.
 //! Theory: docs/theory/clusters.md, section 2.
 
-use crate::cluster::{Contact, Hold, JointRow, Pressed, Side};
 use crate::constraint::ConstraintRows;
 use crate::detect::{Owner, Search};
 use crate::member::{ClusterMember, Participant};
 use crate::push_out::{PUSH_OUT_MAX_M_S, push_out_m_s};
+use crate::solve::{Contact, Hold, JointRow, Pressed, Side};
 use glam::DVec3;
 
 /// The rows of contacts of a fine step, in the order of those behind the rows of joints.

@@ -2,14 +2,14 @@
 //! and holds from then on where it has come to.
 //!
 //! In: rows with the impulses that they gave, what members say of their own attachments. Out: what tore or yielded, in the memory of the member that
-//! remembers it. Never here: what a row is made of, its bound ([`Hold::limited`](crate::cluster::Hold::limited)), how events are reported.
+//! remembers it. Never here: what a row is made of, its bound ([`Hold::limited`](crate::solve::Hold::limited)), how events are reported.
 //! Theory: docs/theory/clusters.md, eq. 28 and 29.
 
-use crate::cluster::JointRow;
 use crate::constraint::{ConstraintRows, FineStep, Frame, Name, Pull, RowOwner, Slides, SlidingRow};
 use crate::member::memory::{Partner, UnfinishedLoad};
 use crate::member::participant::{Progress, velocity};
 use crate::member::{ClusterMember, Participant, Slid};
+use crate::solve::JointRow;
 use glam::DVec3;
 
 /// A macro step of at least this share of the shortest time that a member's own steps fill in it is no cut one. By (23) it is half of that

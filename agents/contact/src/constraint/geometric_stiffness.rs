@@ -7,9 +7,9 @@
 //! than steps can follow, and would be thrown. Where h² of that stiffness is more than steps bear, so much inertia is added across the
 //! arm: it takes no energy, and a turn that steps can follow has none of it.
 
-use crate::cluster::{Hold, JointRow, Side};
 use crate::constraint::{ConstraintRows, End, FineStep, ForceAtArm, GeometricStiffness, Name, RowOwner};
 use crate::member::{ClusterMember, Participant};
+use crate::solve::{Hold, JointRow, Side};
 use glam::DVec3;
 
 /// Of h² times the stiffness of a force, the share that a body's inertia has to reach: ¼ is where steps begin to throw it.

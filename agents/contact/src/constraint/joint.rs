@@ -8,7 +8,6 @@
 //! step before, then those of the answer itself, until the joint holds. Positions are kept as by RATTLE (AND83): to second order, and
 //! what turns keeps its energy. Theory: docs/theory/clusters.md, eq. 21.
 
-use crate::cluster::{Hold, JointRow, Side, SideTerm};
 use crate::constraint::motor::Motored;
 use crate::constraint::{ConstraintRows, End, FineStep, Frame, Name, Pull, RowOwner, Slides, SlidingRow, YieldLimit};
 use crate::detect::ClusterScene;
@@ -17,6 +16,7 @@ use crate::member::memory::Partner;
 use crate::member::participant::{place_of, velocity};
 use crate::member::{ClusterMember, MaterialPoint, Participant, Pose};
 use crate::push_out::PUSH_OUT_MAX_M_S;
+use crate::solve::{Hold, JointRow, Side, SideTerm};
 use glam::{DQuat, DVec3};
 use metachron_core::{Anchor, shortest_turn};
 use metachron_geometry::narrow_phase::TouchKey;

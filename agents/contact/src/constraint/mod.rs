@@ -11,11 +11,11 @@ pub(crate) mod link;
 mod motor;
 pub(crate) mod spring;
 
-use crate::cluster::{Hold, JointRow, Side};
 use crate::law::Link;
 use crate::member::memory::Partner;
 use crate::member::participant::{Progress, velocity};
 use crate::member::{ClusterMember, MaterialPoint, Participant, Pose};
+use crate::solve::{Hold, JointRow, Side};
 pub use failure::{Torn, Yielded};
 use glam::DQuat;
 use glam::DVec3;

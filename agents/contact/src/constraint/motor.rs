@@ -3,9 +3,9 @@
 //! In: what a motor drives its joint to, where the joint is. Out: a row that gives at most what the motor may. Never here: joints' own
 //! rows (`joint.rs`). Theory: docs/theory/clusters.md, section 8.
 
-use crate::cluster::{Hold, JointRow, Side, Spring};
 use crate::constraint::{ConstraintRows, FineStep, RowOwner};
 use crate::joint::{Motor, MotorGoal};
+use crate::solve::{Hold, JointRow, Side, Spring};
 use glam::DVec3;
 use std::f64::consts::TAU;
 

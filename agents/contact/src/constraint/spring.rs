@@ -5,11 +5,11 @@
 
 use crate::AnchorSpring;
 use crate::agent::tool_extrapolation_s;
-use crate::cluster::{Hold, JointRow, Side, Spring};
 use crate::constraint::{ConstraintRows, End, FineStep, Holders, Name, Pull, Slides};
 use crate::member::memory::Partner;
 use crate::member::participant::place_of;
 use crate::member::{ClusterMember, MaterialPoint};
+use crate::solve::{Hold, JointRow, Side, Spring};
 use glam::{DQuat, DVec3};
 use metachron_core::{AgentId, Anchor, Body, shortest_turn};
 

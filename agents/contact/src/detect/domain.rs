@@ -57,9 +57,9 @@ fn rubs_as_usual(form: &CollisionShape) -> bool {
 mod tests {
     use super::*;
     use crate::StepContext;
-    use crate::cluster::Side;
     use crate::joint::{Joint, JointKind};
     use crate::member::{ClusterMember, ContactMemory};
+    use crate::solve::Side;
     use glam::{DQuat, DVec3};
     use metachron_core::{SimTime, StepError};
     use metachron_geometry::{ContactSide, Place, PlacedShape, Solid, SolidShape};

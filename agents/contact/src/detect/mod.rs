@@ -10,10 +10,10 @@ mod scene;
 mod sensor;
 mod thinning;
 
-use crate::cluster::Contact;
 use crate::detect::domain::Domain;
 use crate::member::memory::{Partner, Spin};
 use crate::member::{ClusterMember, Role};
+use crate::solve::Contact;
 use glam::DVec3;
 use metachron_geometry::narrow_phase::{NarrowPhaseScratch, TouchKey, self_touches, touches};
 use metachron_geometry::{CollisionShape, Place, Touch};

@@ -3,12 +3,12 @@
 //! In: members with the velocities they have and would have, touches. Out: contacts of the problem, and their owners. Never here: which touches there
 //! are.
 
-use crate::cluster::{Contact, Side};
 use crate::detect::ClusterScene;
 use crate::member::memory::{Partner, Spin};
 use crate::member::participant::{Progress, velocity};
 use crate::member::{ClusterMember, Participant};
 use crate::push_out::push_out_m_s;
+use crate::solve::{Contact, Side};
 use glam::DVec3;
 use metachron_geometry::narrow_phase::{StaticSolid, TouchKey};
 use metachron_geometry::{CollisionShape, ContactSide, Place, Touch};

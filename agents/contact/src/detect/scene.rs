@@ -2,8 +2,8 @@
 //!
 //! In: the obstacles and joints of a scene. Out: the same, ready for searches; shared by all clusters. Never here: what moves.
 
-use crate::cluster::DEPTH_DEFAULT_M;
 use crate::joint::{Joint, JointError};
+use crate::solve::DEPTH_DEFAULT_M;
 use metachron_core::AgentId;
 use metachron_geometry::Obstacle;
 use metachron_geometry::narrow_phase::{StaticSolid, StaticSolidError};

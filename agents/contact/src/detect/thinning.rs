@@ -3,10 +3,10 @@
 //! In: the contacts found of a pair, the cells that carry their places. Out: which of them are kept. Never here: how they were found.
 //! Theory: docs/theory/contact.md, section 3.
 
-use crate::cluster::Contact;
 use crate::detect::pair::{Judge, Owner, Pair, Round};
 use crate::member::ClusterMember;
 use crate::member::memory::Partner;
+use crate::solve::Contact;
 use glam::DVec3;
 use metachron_geometry::Touch;
 

@@ -5,7 +5,6 @@
 
 mod meeting;
 
-use crate::cluster::{Contact, JointRow, Report, Settings, Side, Solution, Solver};
 use crate::constraint::{ConstraintRows, contact_rows, is_rigid};
 use crate::detect::{Owner, Search};
 use crate::member::memory::Partner;
@@ -13,6 +12,7 @@ use crate::member::participant::{Progress, velocity};
 use crate::member::problem::{Posed, ProblemMembers, Velocities};
 use crate::member::{ClusterMember, Participant, Role};
 use crate::push_out::PUSH_OUT_SHARE;
+use crate::solve::{Contact, JointRow, Report, Settings, Side, Solution, Solver};
 use glam::DVec3;
 use meeting::{Closing, Meeting, Work};
 use metachron_core::ParallelFor;

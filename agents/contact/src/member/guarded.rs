@@ -4,8 +4,8 @@
 //! panic of the member. Whoever catches that finds by the marks whose code it was. Never here: what becomes of the agent, catching.
 
 use crate::StepContext;
-use crate::cluster::{Block, Response, Side};
 use crate::member::{ClusterMember, Drive, Locked, MaterialPoint, OwnAttachment, OwnSpring, Pose, Role, Slid};
+use crate::solve::{Block, Response, Side};
 use glam::DVec3;
 use metachron_core::{AgentId, Anchor, StepError};
 use metachron_geometry::narrow_phase::RestShape;

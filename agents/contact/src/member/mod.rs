@@ -8,7 +8,7 @@ pub(crate) mod participant;
 pub(crate) mod problem;
 
 use crate::StepContext;
-use crate::cluster::{Block, Response, Side};
+use crate::solve::{Block, Response, Side};
 use glam::{DMat3, DQuat, DVec3};
 pub use guarded::{BadAnswer, CallMark, GuardedMember};
 pub use memory::{ContactMemory, Partner};

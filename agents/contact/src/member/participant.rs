@@ -4,9 +4,9 @@
 //! velocities at which its place moves. Never here: contacts, the problem. Theory: docs/theory/clusters.md, section 9 (eq. 24 to 26).
 
 use crate::StepContext;
-use crate::cluster::Side;
 use crate::law::Law;
 use crate::member::{ClusterMember, ContactMemory, GuardedMember};
+use crate::solve::Side;
 use glam::DVec3;
 use metachron_core::{AgentId, Grip, StepError};
 

@@ -3,10 +3,10 @@
 //! In: contacts and rows whose sides are participants, the velocities that these have without them. Out: the answer, by the solver. Never here: which
 //! contacts and rows there are.
 
-use crate::cluster::{Contact, JointRow, Member, Problem, ProblemError, Report, Response, Solver, StepForm};
 use crate::member::guarded::Lent;
 use crate::member::participant::Progress;
 use crate::member::{ClusterMember, GuardedMember, Participant};
+use crate::solve::{Contact, JointRow, Member, Problem, ProblemError, Report, Response, Solver, StepForm};
 use glam::DVec3;
 use metachron_core::{ParallelFor, StepError, recycled};
 

@@ -3,11 +3,11 @@
 //! In: what partners published of their ends. Out: rows for the cluster's problem, and the waves that this end sends. Never here: the law
 //! of a line ([`crate::laws`]), the other end: it does the same for itself. Theory: docs/theory/coupling.md, eq. 10 to 11.
 
-use crate::cluster::{Hold, Side};
 use crate::member::{ClusterMember, Participant};
 use crate::remote::ledgers::state_of;
 use crate::remote::published_shape::PublishedShape;
 use crate::remote::transmission_line::{Line, LineLaw, LineStep};
+use crate::solve::{Hold, Side};
 use crate::step::{ClusterStepper, KnownImpulse, LineRow};
 use crate::{Law, Link, Neighbour};
 use glam::DVec3;

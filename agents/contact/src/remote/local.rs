@@ -4,10 +4,10 @@
 //! In: the last solve, partners' published states, what they give. Out: blocks, velocities, accelerations and W; A = W⁻¹ as a dense square. Never here:
 //! ledgers. Theory: docs/theory/coupling.md, section 3 (eq. 7m).
 
-use crate::cluster::Side;
 use crate::member::problem::respond;
 use crate::member::{ClusterMember, Participant, Role};
 use crate::remote::published_shape::{PublishedShape, anchor_of};
+use crate::solve::Side;
 use crate::step::ClusterStepper;
 use crate::{Law, Neighbour};
 use glam::DVec3;

@@ -5,10 +5,10 @@
 //! which pairs there are, the partner's own contacts: those are in its local model. Theory: docs/theory/coupling.md, section 3.
 
 use crate::Neighbour;
-use crate::cluster::{Block, Side, SideTerm};
 use crate::member::{ClusterMember, MaterialPoint, Role};
 use crate::remote::local::invert;
 use crate::remote::published_shape::PublishedShape;
+use crate::solve::{Block, Side, SideTerm};
 use glam::{DMat3, DVec3};
 use metachron_core::{AgentId, Anchor, Body, Impulse, Inertia, LocalBlock, LocalModel, SimTime, Site, StepError};
 use metachron_geometry::{CollisionShape, ContactSide, Place, PlacedShape, ShapeKind};

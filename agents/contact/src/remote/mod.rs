@@ -17,11 +17,11 @@ mod member;
 mod published_shape;
 mod transmission_line;
 
-use crate::cluster::Side;
 use crate::member::memory::Partner;
 use crate::member::{ClusterMember, ContactMemory, Participant};
 use crate::remote::ledgers::state_of;
 use crate::remote::local::Scratch;
+use crate::solve::Side;
 use crate::step::{ClusterStepper, KnownImpulse};
 use crate::{Law, Neighbour, StepContext};
 pub use ledgers::{GivenAt, Ledgers, TakenImpulse, acknowledged};

@@ -3,12 +3,12 @@
 //! In: impulses that partners gave before, forces of users, ends of transmission lines; the impulses of a solve. Out: velocities that known impulses make,
 //! rows of lines, sums of what remote members were given. Never here: ledgers, waves. Theory: docs/theory/coupling.md, eq. 3, 4c and 10.
 
-use crate::cluster::{Hold, JointRow, Side};
 use crate::constraint::{ConstraintRows, FineStep, RowOwner};
 use crate::member::memory::Partner;
 use crate::member::participant::Progress;
 use crate::member::problem::respond;
 use crate::member::{ClusterMember, Participant};
+use crate::solve::{Hold, JointRow, Side};
 use glam::DVec3;
 
 /// An impulse that a partner gave before the macro step: it acts evenly over it.

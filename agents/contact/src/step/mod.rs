@@ -24,7 +24,6 @@ mod report;
 mod rigid_pile;
 mod solve;
 
-use crate::cluster::{DEPTH_DEFAULT_M, Settings, Solver};
 use crate::constraint::contact_rows::ContactRows;
 use crate::constraint::failure::{Tearing, Torn, Yielded, Yielding};
 use crate::constraint::joint::Joints;
@@ -34,6 +33,7 @@ use crate::impact::Impacts;
 use crate::member::participant::Progress;
 use crate::member::problem::ProblemMembers;
 use crate::member::{ClusterMember, ContactMemory, Participant, Role};
+use crate::solve::{DEPTH_DEFAULT_M, Settings, Solver};
 pub use doubling::StepDoubling;
 pub use external::{ExternalImpulses, KnownImpulse, LineRow, RemoteImpulse};
 use glam::DVec3;

@@ -3,11 +3,11 @@
 //! In: members at the start of a fine step. Out: contacts and rows of its problem; after the solve, members at its end. Never here: the order of the
 //! phases. Theory: docs/theory/clusters.md, section 9 (eq. 24, 26, 27).
 
-use crate::cluster::multiply;
 use crate::constraint::FineStep;
 use crate::detect::{ClusterScene, Judge, Round};
 use crate::member::ClusterMember;
 use crate::member::participant::Participant;
+use crate::solve::multiply;
 use crate::step::ClusterStepper;
 use crate::step::report::ClusterReport;
 use crate::step::rigid_pile::Sums;

@@ -4,11 +4,11 @@
 //! In: what participants remember; a solution. Out: contacts that start from it; memories, totals of pairs. Never here: rows of joints as they
 //! are laid out, the solve. Theory of the stiffness: docs/theory/coupling.md, eq. 7s.
 
-use crate::cluster::Side;
 use crate::constraint::place_key;
 use crate::member::memory::{Partner, Remembered, Spin};
 use crate::member::participant::{place_of, velocity};
 use crate::member::{ClusterMember, Drive, Participant, Role};
+use crate::solve::Side;
 use crate::step::ClusterStepper;
 use crate::step::report::{PairTotal, total_of};
 use glam::DVec3;

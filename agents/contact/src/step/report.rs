@@ -2,8 +2,8 @@
 //!
 //! In: impulses of contacts and rows, reports of solves. Out: sums, by participants and partners. Never here: which rows there are, the solve.
 
-use crate::cluster::{Level, Report};
 use crate::member::memory::Partner;
+use crate::solve::{Level, Report};
 use glam::DVec3;
 
 /// What a macro step was.

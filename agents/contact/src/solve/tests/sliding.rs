@@ -1,7 +1,7 @@
 //! Friction that follows its pressure within a Newton step: what slides and leans on itself by that is found in a few.
 
 use super::{Body, Case, contact, rigid};
-use crate::cluster::{Report, Settings, Side, Solver};
+use crate::solve::{Report, Settings, Side, Solver};
 use glam::DVec3;
 
 const H_S: f64 = 0.01;

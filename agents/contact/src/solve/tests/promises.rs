@@ -1,7 +1,7 @@
 //! What the solver promises besides its answers: errors that name what is wrong, the same bits, no panic.
 
 use super::{Case, contact, is_open, rigid};
-use crate::cluster::{Block, Hold, JointRow, Level, ProblemError, SIDE_TERMS_MAX, Side, SideTerm, Solver};
+use crate::solve::{Block, Hold, JointRow, Level, ProblemError, SIDE_TERMS_MAX, Side, SideTerm, Solver};
 use glam::{DMat3, DVec3};
 use metachron_core::PlainLoop;
 
@@ -88,7 +88,7 @@ fn bodies_without_contacts_keep_their_velocities() {
 fn gap_depth_and_slip_owed_become_velocities() {
     let free = contact([Side::node(0, 0), Side::FIXED], DVec3::Z);
     let bias = |gap_m: f64, owed_slip_m: DVec3| {
-        let contact = crate::cluster::Contact { gap_m, owed_slip_m, tangents: [DVec3::X, DVec3::Y], ..free };
+        let contact = crate::solve::Contact { gap_m, owed_slip_m, tangents: [DVec3::X, DVec3::Y], ..free };
         contact.bias_m_s(0.01)
     };
     let close = |a: DVec3, b: DVec3| assert!(a.distance(b) < 1e-15, "{a} is not {b}");
@@ -113,7 +113,7 @@ fn a_slower_member_meets_as_stiff_as_its_own_step_makes_it() {
     // f = 2: its place moves by twice A⁻¹, so half the impulse stops it
     let case = Case { contacts: vec![contact([Side::node(0, 0), Side::FIXED], DVec3::Z)], ..case() };
     let impulse = |share: f64| {
-        let members = [crate::cluster::Member {
+        let members = [crate::solve::Member {
             blocks: &case.bodies[0].blocks,
             free: &case.bodies[0].free,
             unanswered: &[],
@@ -121,7 +121,7 @@ fn a_slower_member_meets_as_stiff_as_its_own_step_makes_it() {
             share,
             response: None,
         }];
-        let problem = crate::cluster::Problem {
+        let problem = crate::solve::Problem {
             h_s: 0.01,
             members: &members,
             contacts: &case.contacts,

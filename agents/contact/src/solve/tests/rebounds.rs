@@ -1,14 +1,14 @@
 //! Restitution and moving surfaces: impacts in closed form.
 
 use super::{Body, Case, contact, is_open, rigid, side_velocity};
-use crate::cluster::{Contact, Settings, Side, Solution, Solver};
+use crate::solve::{Contact, Settings, Side, Solution, Solver};
 use glam::DVec3;
 
 /// Contacts as hard as they become, so that a blow gives way by a ten-millionth of its speed.
 const HARD: Settings = Settings {
     tolerance_m_s: 1e-10,
     depth_m: 1e-12,
-    form: crate::cluster::StepForm::Direct,
+    form: crate::solve::StepForm::Direct,
     still_m_s: 1e-12,
     factors_max: None,
 };

@@ -1,7 +1,7 @@
 //! An independent solution: projected Gauss–Seidel over the dense matrix of all contacts, in as many sweeps as it takes.
 
 use super::{Body, Case, side_velocity};
-use crate::cluster::Side;
+use crate::solve::Side;
 use glam::DVec3;
 
 /// A dense square matrix by rows.

@@ -2,8 +2,8 @@
 
 use super::random::{COUNT, distance, miss, random_case, solved, velocities};
 use super::{Case, Seeded, contact, is_open, rigid};
-use crate::cluster::lorentz::{Lorentz, Scaling};
-use crate::cluster::{Hold, JointRow, Level, Settings, Side, Solution};
+use crate::solve::lorentz::{Lorentz, Scaling};
+use crate::solve::{Hold, JointRow, Level, Settings, Side, Solution};
 use glam::DVec3;
 
 const H_S: f64 = 0.01;

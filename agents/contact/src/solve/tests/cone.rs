@@ -1,10 +1,10 @@
 //! Projections against what defines them, and the guard of passivity.
 
 use super::{Seeded, contact, diagonal};
-use crate::cluster::cone::Law;
-use crate::cluster::iterate::Iterate;
-use crate::cluster::passivity::guard;
-use crate::cluster::{Contact, Member, Problem, Side};
+use crate::solve::cone::Law;
+use crate::solve::iterate::Iterate;
+use crate::solve::passivity::guard;
+use crate::solve::{Contact, Member, Problem, Side};
 use glam::{DMat3, DVec3};
 use metachron_core::PlainLoop;
 

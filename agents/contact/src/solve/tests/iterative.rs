@@ -3,7 +3,7 @@
 use super::random::{COUNT, Comparison, FINE, compare_with_slow, distance, miss, random_case, solved, velocities};
 use super::scenes::{Stack, momentum_gained, plate_on_soft_block};
 use super::{Body, Case, Seeded, is_open};
-use crate::cluster::{Block, Settings, Side, Solution, Solver, StepForm};
+use crate::solve::{Block, Settings, Side, Solution, Solver, StepForm};
 use glam::{DMat3, DVec3};
 
 fn iterative() -> Settings {

@@ -6,7 +6,7 @@
 //! ```
 //! use glam::{DMat3, DVec3};
 //! use metachron_core::PlainLoop;
-//! use metachron_contact::cluster::{Block, Contact, Member, Problem, Side, Solver};
+//! use metachron_contact::solve::{Block, Contact, Member, Problem, Side, Solver};
 //!
 //! // a box of 2 kg, 0.2 m wide, on a floor under its corners, pushed aside; its spin is the second block
 //! let (h_s, mass_kg) = (0.01, 2.0);
@@ -38,7 +38,7 @@
 //! assert!((given.z - mass_kg * 9.81 * h_s).abs() < 0.001); // the floor carries the box …
 //! assert!((given.x + 0.3 * given.z).abs() < 1e-4); // … and slows it by Coulomb's law
 //! assert!(solution.report.miss_m_s < 5e-6); // all laws hold
-//! # Ok::<(), metachron_contact::cluster::ProblemError>(())
+//! # Ok::<(), metachron_contact::solve::ProblemError>(())
 //! ```
 
 mod bound;

@@ -2,7 +2,7 @@
 
 use super::slow::gauss_seidel;
 use super::{Body, Case, JointRow, Lattice, Seeded, contact, is_open, rigid, side_velocity};
-use crate::cluster::{Contact, Hold, Settings, Side, SideTerm, Solution, Solver, StepForm};
+use crate::solve::{Contact, Hold, Settings, Side, SideTerm, Solution, Solver, StepForm};
 use glam::DVec3;
 
 pub const COUNT: u64 = 200;

@@ -1,7 +1,7 @@
 //! Joints as rows, each against its closed form: held points and turns, slides, motors, stops, ropes.
 
 use super::{Body, Case, is_open, rigid};
-use crate::cluster::{Hold, JointRow, Settings, Side, Solution, Solver, Spring, StepForm};
+use crate::solve::{Hold, JointRow, Settings, Side, Solution, Solver, Spring, StepForm};
 use glam::DVec3;
 
 const H: f64 = 0.01;

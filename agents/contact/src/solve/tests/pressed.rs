@@ -1,7 +1,7 @@
 //! Rows whose bound is what presses a contact: friction about its normal, in both forms, and in random piles.
 
 use super::{Body, Case, Seeded, contact, is_open, rigid};
-use crate::cluster::{Hold, JointRow, Pressed, Settings, Side, Solver, StepForm};
+use crate::solve::{Hold, JointRow, Pressed, Settings, Side, Solver, StepForm};
 use glam::DVec3;
 
 const H_S: f64 = 0.01;

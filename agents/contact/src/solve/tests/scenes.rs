@@ -1,7 +1,7 @@
 //! Scenes with an answer in closed form: rest, slopes, stacks, collisions.
 
 use super::{Body, Case, Lattice, contact, is_open, rigid};
-use crate::cluster::{Contact, Hold, JointRow, Settings, Side, Solution, Solver, Spring};
+use crate::solve::{Contact, Hold, JointRow, Settings, Side, Solution, Solver, Spring};
 use glam::DVec3;
 
 const G: f64 = 9.81;

@@ -3,7 +3,7 @@
 use super::random::{COUNT, FINE, distance, random_case, velocities};
 use super::slow::Dense;
 use super::{Body, Case, is_open};
-use crate::cluster::{Member, Problem, Response, Settings, Solution, Solver, StepForm};
+use crate::solve::{Member, Problem, Response, Settings, Solution, Solver, StepForm};
 use glam::DVec3;
 use metachron_core::PlainLoop;
 use std::sync::atomic::{AtomicUsize, Ordering};

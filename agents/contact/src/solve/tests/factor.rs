@@ -2,9 +2,9 @@
 
 use super::Seeded;
 use super::slow::Dense;
-use crate::cluster::Block;
-use crate::cluster::factor::{Cholesky, Pair};
-use crate::cluster::tiles::eliminate;
+use crate::solve::Block;
+use crate::solve::factor::{Cholesky, Pair};
+use crate::solve::tiles::eliminate;
 use fearless_simd::Level;
 use glam::{DMat3, DVec3};
 use metachron_core::{ParallelFor, PlainLoop};
