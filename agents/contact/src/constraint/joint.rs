@@ -33,6 +33,10 @@ const MOTOR: u32 = 16;
 pub(crate) struct Joints {
     /// Whether a motor keeps one of them moving.
     pub drives: bool,
+    /// How many times as many fine steps they ask for that do not hold, or in which bodies turn too far.
+    pub ask: u32,
+    /// What they missed in this macro step when they did not hold last, metres or radians.
+    pub missed_m: f64,
     held: Vec<Held>,
     parts: Vec<Part>,
 }

@@ -5,7 +5,7 @@
 //! ledgers. Theory: docs/theory/coupling.md, section 3 (eq. 7m).
 
 use crate::member::problem::respond;
-use crate::member::{ClusterMember, Participant, Role};
+use crate::member::{ClusterMember, GuardedMember, Participant, Role};
 use crate::remote::published_shape::{PublishedShape, anchor_of};
 use crate::solve::Side;
 use crate::step::ClusterStepper;
@@ -35,11 +35,13 @@ pub(crate) struct Scratch {
     pub(crate) shape: PublishedShape,
     pub(crate) narrow: NarrowPhaseScratch,
     pub(crate) touches: Vec<Touch>,
+    /// Of local models.
+    pub(crate) columns: [Vec<DVec3>; 2],
 }
 
 /// Blocks of a participant, with what its partners give them.
 #[derive(Debug, Clone, Copy)]
-pub struct LocalQuery<'a> {
+pub(super) struct LocalQuery<'a> {
     /// The participant.
     pub place: usize,
     /// Its blocks.
@@ -50,7 +52,7 @@ pub struct LocalQuery<'a> {
 
 impl ClusterStepper {
     /// The forces that would have held the blocks of a participant still in its last step, N or N·m; none where contacts or rows touched it.
-    pub fn weight(&self, all: &[Participant<'_>], place: usize, into: &mut Vec<DVec3>) {
+    pub(super) fn weight(&self, all: &[Participant<'_>], place: usize, into: &mut Vec<DVec3>) {
         into.clear();
         let state = &self.progress[place];
         if state.held {
@@ -70,7 +72,13 @@ impl ClusterStepper {
     }
 
     /// Fills blocks, compliance and step of a local model from the macro step that was made last.
-    pub fn local_model(&mut self, all: &[Participant<'_>], query: &LocalQuery<'_>, into: &mut LocalModel) {
+    pub(super) fn local_model(
+        &mut self,
+        all: &[Participant<'_>],
+        query: &LocalQuery<'_>,
+        storage: &mut [Vec<DVec3>; 2],
+        into: &mut LocalModel,
+    ) {
         let LocalQuery { place, blocks, .. } = *query;
         let member = &all[place].member;
         let (share, held) = (f64::from(self.progress[place].share), self.progress[place].held);
@@ -79,7 +87,7 @@ impl ClusterStepper {
         if in_problem.is_some_and(|place| self.solver.held_compliance(place, blocks, &mut into.compliance)) {
             into.compliance.iter_mut().for_each(|w| *w *= share.recip());
         } else {
-            self.own_compliance(all, query, into);
+            own_compliance(member, blocks, storage, into);
         }
         let state = &self.progress[place];
         let own_s = self.fine_s * share;
@@ -94,23 +102,21 @@ impl ClusterStepper {
             into.blocks.push(LocalBlock { slot: member.slot_of(block), velocity: state.v_before[block], acceleration });
         }
     }
+}
 
-    /// W of a participant that nothing touched.
-    fn own_compliance(&mut self, all: &[Participant<'_>], query: &LocalQuery<'_>, into: &mut LocalModel) {
-        let (member, blocks) = (&all[query.place].member, query.blocks);
-        let Self { local, .. } = self;
-        let [x, residual] = local;
-        into.compliance.clear();
-        into.compliance.resize(blocks.len() * blocks.len(), glam::DMat3::ZERO);
-        for (column, &pushed) in blocks.iter().enumerate() {
-            for axis in 0..3 {
-                x.clear();
-                x.resize(member.free().len(), DVec3::ZERO);
-                x[pushed] = DVec3::AXES[axis];
-                respond(member, x, residual);
-                for (row, &block) in blocks.iter().enumerate() {
-                    *into.compliance[row * blocks.len() + column].col_mut(axis) = x[block];
-                }
+/// W of a participant that nothing touched.
+fn own_compliance(member: &GuardedMember<'_>, blocks: &[usize], storage: &mut [Vec<DVec3>; 2], into: &mut LocalModel) {
+    let [x, residual] = storage;
+    into.compliance.clear();
+    into.compliance.resize(blocks.len() * blocks.len(), glam::DMat3::ZERO);
+    for (column, &pushed) in blocks.iter().enumerate() {
+        for axis in 0..3 {
+            x.clear();
+            x.resize(member.free().len(), DVec3::ZERO);
+            x[pushed] = DVec3::AXES[axis];
+            respond(member, x, residual);
+            for (row, &block) in blocks.iter().enumerate() {
+                *into.compliance[row * blocks.len() + column].col_mut(axis) = x[block];
             }
         }
     }

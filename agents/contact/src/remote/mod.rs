@@ -25,7 +25,7 @@ use crate::solve::Side;
 use crate::step::{ClusterStepper, KnownImpulse};
 use crate::{Law, Neighbour, StepContext};
 pub use ledgers::{GivenAt, Ledgers, TakenImpulse, acknowledged};
-pub use local::LocalQuery;
+use local::LocalQuery;
 pub use member::{RemoteMember, RemoteView};
 pub use published_shape::PublishedShape;
 
@@ -300,7 +300,7 @@ impl Pairs {
             model.partners.clear();
             return;
         }
-        let Scratch { blocks, goes_on, .. } = scratch;
+        let Scratch { blocks, goes_on, columns, .. } = scratch;
         goes_on.clear();
         goes_on.resize(blocks.len(), DVec3::ZERO);
         for partner in &mut model.partners {
@@ -329,7 +329,7 @@ impl Pairs {
             *all = lasts;
         }
         let query = LocalQuery { place, blocks, lasting: goes_on };
-        stepper.local_model(all, &query, model);
+        stepper.local_model(all, &query, columns, model);
     }
 
     /// Completes a state that its agent has written.

@@ -34,6 +34,7 @@ use crate::member::participant::Progress;
 use crate::member::problem::ProblemMembers;
 use crate::member::{ClusterMember, ContactMemory, Participant, Role};
 use crate::solve::{DEPTH_DEFAULT_M, Settings, Solver};
+use crate::step::report::Sums;
 pub use doubling::StepDoubling;
 pub use external::{ExternalImpulses, KnownImpulse, LineRow, RemoteImpulse};
 use glam::DVec3;
@@ -61,10 +62,7 @@ pub struct ClusterStepper {
     contact_rows: ContactRows,
     pub(crate) progress: Vec<Progress>,
     members: ProblemMembers,
-    totals: Vec<PairTotal>,
-    /// What contacts gave each participant in the macro step, N·s and N·m·s.
-    wrenches: Vec<Wrench>,
-    efforts: Vec<JointTotal>,
+    sums: Sums,
     tearing: Tearing,
     yielding: Yielding,
     /// What participants remembered when the macro step began.
@@ -74,16 +72,11 @@ pub struct ClusterStepper {
     impacts: Impacts,
     pile: RigidPile,
     external: ExternalImpulses,
-    /// Storage of local models, and of how the sides of contacts are moved.
-    pub(crate) local: [Vec<DVec3>; 2],
+    /// Storage of how the sides of contacts are moved.
     moved_m_s: Vec<DVec3>,
     /// The macro step that is made and its fine steps, seconds.
     pub(crate) macro_s: f64,
     pub(crate) fine_s: f64,
-    /// How many times as many fine steps joints ask for that do not hold, or in which bodies turn too far.
-    joints_ask: u32,
-    /// What joints missed in this macro step when they did not hold last, metres or radians.
-    joints_missed_m: f64,
 }
 
 impl Default for ClusterStepper {
@@ -97,9 +90,7 @@ impl Default for ClusterStepper {
             contact_rows: ContactRows::default(),
             progress: Vec::new(),
             members: ProblemMembers::default(),
-            totals: Vec::new(),
-            wrenches: Vec::new(),
-            efforts: Vec::new(),
+            sums: Sums::default(),
             tearing: Tearing::default(),
             yielding: Yielding::default(),
             kept: Vec::new(),
@@ -107,12 +98,9 @@ impl Default for ClusterStepper {
             impacts: Impacts::default(),
             pile: RigidPile::default(),
             external: ExternalImpulses::default(),
-            local: Default::default(),
             moved_m_s: Vec::new(),
             macro_s: 0.0,
             fine_s: 0.0,
-            joints_ask: 1,
-            joints_missed_m: f64::INFINITY,
         }
     }
 }
@@ -182,7 +170,7 @@ impl ClusterStepper {
         self.macro_s = dt.as_secs_f64();
         self.depth_m = scene.depth_m();
         self.solver.set_depth_m(self.depth_m);
-        self.joints_missed_m = f64::INFINITY;
+        self.joints.missed_m = f64::INFINITY;
         all.iter_mut().for_each(Participant::let_go);
         self.plan(all, self.macro_s, threads)?;
         self.keep(all);
@@ -219,10 +207,7 @@ impl ClusterStepper {
             (state.share, state.part) = (parts / own, 0);
             one.grips.clear();
         }
-        self.totals.clear();
-        self.wrenches.clear();
-        self.efforts.clear();
-        self.wrenches.resize(all.len(), Wrench::default());
+        self.sums.begin(all.len());
         self.tearing.begin();
         self.yielding.begin();
         self.external.begin();
@@ -254,25 +239,25 @@ impl ClusterStepper {
 
     /// What pairs and links gave in the last macro step, by participants and partners.
     pub fn totals(&self) -> &[PairTotal] {
-        &self.totals
+        &self.sums.totals
     }
 
     /// The same of one participant.
     #[must_use]
     pub fn totals_of(&self, member: usize) -> &[PairTotal] {
-        let start = self.totals.partition_point(|total| total.member < member);
-        &self.totals[start..self.totals.partition_point(|total| total.member <= member)]
+        let start = self.sums.totals.partition_point(|total| total.member < member);
+        &self.sums.totals[start..self.sums.totals.partition_point(|total| total.member <= member)]
     }
 
     /// What contacts gave a participant that moves as a whole in the last macro step, about its centre of mass, N·s and N·m·s; zero of others.
     #[must_use]
     pub fn wrench_of(&self, member: usize) -> Wrench {
-        self.wrenches.get(member).copied().unwrap_or_default()
+        self.sums.wrenches.get(member).copied().unwrap_or_default()
     }
 
     /// What hinges and slides gave in the last macro step along the ways that they leave free.
     pub fn efforts(&self) -> &[JointTotal] {
-        &self.efforts
+        &self.sums.efforts
     }
 
     /// What tore in the last macro step, by participants: no later step knows it.

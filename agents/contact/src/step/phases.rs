@@ -10,7 +10,6 @@ use crate::member::participant::Participant;
 use crate::solve::multiply;
 use crate::step::ClusterStepper;
 use crate::step::report::ClusterReport;
-use crate::step::rigid_pile::Sums;
 use crate::step::solve::joint_miss_m;
 use metachron_core::ParallelFor;
 use metachron_core::StepError;
@@ -83,9 +82,7 @@ impl ClusterStepper {
         h_s: f64,
         report: &mut ClusterReport,
     ) -> Result<(), StepError> {
-        self.pile
-            .step(all, &mut self.progress, h_s, Sums { totals: &mut self.totals, wrenches: &mut self.wrenches })?
-            .add_to(report);
+        self.pile.step(all, &mut self.progress, h_s, &mut self.sums)?.add_to(report);
         Ok(())
     }
 

@@ -83,14 +83,14 @@ impl ClusterStepper {
 
     /// Gives shorter steps to rigid members where joints ask for them; whether it does.
     pub(super) fn divide_joints(&mut self, all: &[Participant<'_>]) -> bool {
-        if self.joints_ask <= 1 {
+        if self.joints.ask <= 1 {
             return false;
         }
         let mut any = false;
         for (one, state) in all.iter().zip(&mut self.progress).filter(|(one, _)| one.member.role() == Role::Rigid) {
             let most = one.parts * DIVIDED_MAX;
             any |= state.parts < most;
-            state.parts = (state.parts * self.joints_ask).min(most);
+            state.parts = (state.parts * self.joints.ask).min(most);
         }
         any
     }

@@ -73,13 +73,13 @@ impl ClusterStepper {
             let impulse = impulse + push + impacts.contacts_n_s.get(k).copied().unwrap_or_default();
             external.note(all, owner.member, &contact.sides[1], -impulse);
             if impulse != DVec3::ZERO {
-                let total = total_of(&mut self.totals, owner.member, owner.partner);
+                let total = total_of(&mut self.sums.totals, owner.member, owner.partner);
                 total.add(impulse, -contact.gap_m);
                 let skin = all[owner.member].member.skin();
                 let point_m = skin.map_or(DVec3::NAN, |skin| skin.point(&owner.place, -contact.normal));
                 let given = std::iter::once((owner.member, impulse)).chain(owner.other.map(|at| (at, -impulse)));
                 for (member, impulse_n_s) in given {
-                    give(&mut self.wrenches[member], &all[member].member, impulse_n_s, point_m);
+                    give(&mut self.sums.wrenches[member], &all[member].member, impulse_n_s, point_m);
                 }
                 if impulse.length() > total.most_n_s {
                     (total.most_n_s, total.point_m, total.normal) = (impulse.length(), point_m, contact.normal);
@@ -87,14 +87,14 @@ impl ClusterStepper {
                 }
             } else if contact.gap_m < self.depth_m {
                 // no nearer than what bears something lies deep: the two touch, though nothing presses them together now
-                total_of(&mut self.totals, owner.member, owner.partner);
+                total_of(&mut self.sums.totals, owner.member, owner.partner);
             }
         }
     }
 
     /// Notes what rows of constraints hand to the next step, and what they gave.
     fn record_constraints(&mut self, all: &mut [Participant<'_>], h_s: f64) {
-        let Self { solver, constraints, joints, external, tearing, yielding, efforts, impacts, .. } = self;
+        let Self { solver, constraints, joints, external, tearing, yielding, sums, impacts, .. } = self;
         let solution = solver.solution();
         for (k, (owner, row)) in constraints.owners.iter().zip(&constraints.rows).enumerate() {
             let impulse = solution.rows_n_s[k];
@@ -103,13 +103,13 @@ impl ClusterStepper {
             external.note_line(owner, given);
             tearing.note(owner, given);
             if let Partner::Link(_) = owner.partner {
-                total_of(&mut self.totals, owner.member, owner.partner).add(given, 0.0);
+                total_of(&mut sums.totals, owner.member, owner.partner).add(given, 0.0);
             }
             let owed_slip_m = owner.owed_slip_m(row, impulse, &self.progress, h_s);
             let place = Remembered { owed_slip_m, ..Remembered::new(place_key(owner.key), impulse / h_s) };
             all[owner.member].memory.pair(owner.partner).next.push(place);
         }
-        joints.note_efforts(constraints, &solution.rows_n_s, efforts);
+        joints.note_efforts(constraints, &solution.rows_n_s, &mut sums.efforts);
         yielding.slip(all, constraints, &solution.rows_n_s, &self.progress);
     }
 
@@ -170,11 +170,11 @@ impl ClusterStepper {
         if !all.iter().any(Participant::is_led_by_user) {
             return;
         }
-        let mut totals = std::mem::take(&mut self.totals);
+        let mut totals = std::mem::take(&mut self.sums.totals);
         for total in &mut totals {
             total.stiffness_n_m = self.stiffness_of(all, total, h_s).unwrap_or(0.0);
         }
-        self.totals = totals;
+        self.sums.totals = totals;
     }
 
     /// The stiffness of a pair; `None` where nothing presses it, or where a user leads neither side.

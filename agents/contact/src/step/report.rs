@@ -2,9 +2,11 @@
 //!
 //! In: impulses of contacts and rows, reports of solves. Out: sums, by participants and partners. Never here: which rows there are, the solve.
 
+use crate::constraint::JointTotal;
 use crate::member::memory::Partner;
 use crate::solve::{Level, Report};
 use glam::DVec3;
+use metachron_core::Wrench;
 
 /// What a macro step was.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
@@ -102,5 +104,27 @@ impl ClusterReport {
         self.unfinished += u32::from(took.level == Level::Interior);
         self.level = self.level.max(took.level);
         self.miss_m_s = self.miss_m_s.max(took.miss_m_s);
+    }
+}
+
+/// What all fine steps of a macro step gave.
+#[derive(Debug, Default)]
+pub(super) struct Sums {
+    /// What pairs and links gave, by participants and partners.
+    pub totals: Vec<PairTotal>,
+    /// What contacts gave each participant, N·s and N·m·s.
+    pub wrenches: Vec<Wrench>,
+    /// What joints gave along the ways that they leave free.
+    pub efforts: Vec<JointTotal>,
+}
+
+impl Sums {
+    /// Begins a macro step of so many participants, for the first time or again.
+    pub fn begin(&mut self, participants: usize) {
+        let Self { totals, wrenches, efforts } = self;
+        totals.clear();
+        wrenches.clear();
+        efforts.clear();
+        wrenches.resize(participants, Wrench::default());
     }
 }

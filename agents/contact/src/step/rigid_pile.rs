@@ -10,9 +10,9 @@ use crate::detect::{ClusterScene, Search};
 use crate::member::memory::Partner;
 use crate::member::participant::{Progress, place_of};
 use crate::member::{ClusterMember, Locked, Participant};
-use crate::step::report::{ClusterReport, PairTotal, total_of};
+use crate::step::report::{ClusterReport, Sums, total_of};
 use glam::{DMat3, DQuat, DVec3};
-use metachron_core::{AgentId, Archive, ArchiveError, StepError, Wrench, archive_values};
+use metachron_core::{AgentId, Archive, ArchiveError, StepError, archive_values};
 use metachron_geometry::narrow_phase::StaticSolid;
 use metachron_geometry::{CollisionShape, ShapeKind, ShapePose, Solid, SolidShape};
 use rapier3d::dynamics::{
@@ -52,14 +52,6 @@ pub(super) struct RigidPile {
 pub(super) struct PileReport {
     pub contacts: usize,
     pub depth_m: f64,
-}
-
-/// Where the rigid pile adds what its contacts gave.
-pub(super) struct Sums<'a> {
-    /// Of pairs.
-    pub totals: &'a mut Vec<PairTotal>,
-    /// Of participants, by their places.
-    pub wrenches: &'a mut [Wrench],
 }
 
 /// The bodies of a rigid pile in rapier3d.
@@ -183,10 +175,10 @@ impl RigidPile {
         all: &[Participant<'_>],
         progress: &mut [Progress],
         h_s: f64,
-        into: Sums<'_>,
+        into: &mut Sums,
     ) -> Result<PileReport, StepError> {
         let Self { world: Some(world), domains } = self else { return Ok(PileReport::default()) };
-        let Sums { totals, wrenches } = into;
+        let Sums { totals, wrenches, .. } = into;
         world.take(all, domains, progress, h_s);
         // spans are whole nanoseconds
         let steps = (h_s / LONGEST_S - 1e-3).max(world.way(progress, h_s)).ceil().clamp(1.0, STEPS_MAX);
@@ -200,7 +192,7 @@ impl RigidPile {
         }
         if !world.is_sound() {
             self.world = None;
-            let what = "the pile has no finite answer".to_owned();
+            let what = "the rigid pile has no finite answer".to_owned();
             return Err(StepError::Diverged { model: "cluster", dt_s: h_s, what });
         }
         for known in world.bodies.iter().filter(|known| known.touched) {

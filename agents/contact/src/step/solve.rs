@@ -41,7 +41,7 @@ impl ClusterStepper {
         report: &mut ClusterReport,
     ) -> Result<(), StepError> {
         report.contacts = 0;
-        self.joints_ask = 1;
+        self.joints.ask = 1;
         let is_open = |state: &Progress| !state.unanswered.is_empty();
         if self.search.contacts.is_empty() && self.constraints.rows.is_empty() && !self.progress.iter().any(is_open) {
             // what touches nothing moves as it would
@@ -49,24 +49,12 @@ impl ClusterStepper {
             self.progress.iter_mut().for_each(Progress::go_on);
             return Ok(());
         }
-        let (mut last_miss_m, mut missed_m) = (f64::INFINITY, self.joints_missed_m);
+        let (mut last_miss_m, mut missed_m) = (f64::INFINITY, self.joints.missed_m);
         for round in 1..=ROUNDS_MAX {
             self.contact_rows.lay(&self.search, all, &mut self.constraints, h_s);
             self.solve_once(all, h_s, on.threads, report)?;
             self.note_motion(all);
-            let Self {
-                solver,
-                search,
-                constraints,
-                contact_rows,
-                joints,
-                joints_ask,
-                joints_missed_m,
-                macro_s,
-                progress,
-                depth_m,
-                ..
-            } = &mut *self;
+            let Self { solver, search, constraints, contact_rows, joints, macro_s, progress, depth_m, .. } = &mut *self;
             let solution = solver.solution();
             // the next solve starts from this one
             for (contact, impulse) in search.contacts.iter_mut().zip(&solution.contacts_n_s) {
@@ -84,9 +72,9 @@ impl ClusterStepper {
             let holds = miss_m < joint_miss_m(*depth_m);
             let made = (*macro_s / h_s).round();
             // what cannot hold does not in shorter steps either
-            let helps = made < PARTS_HOPED || miss_m < MISS_SHRINKS * *joints_missed_m;
-            *joints_ask = times(turn_rad / TURN_MAX_RAD).max(if holds || !helps { 1 } else { 2 });
-            missed_m = if holds { *joints_missed_m } else { miss_m };
+            let helps = made < PARTS_HOPED || miss_m < MISS_SHRINKS * joints.missed_m;
+            joints.ask = times(turn_rad / TURN_MAX_RAD).max(if holds || !helps { 1 } else { 2 });
+            missed_m = if holds { joints.missed_m } else { miss_m };
             // the last look is followed by no solve that would stop what flies
             let is_last = round == ROUNDS_MAX;
             if joints_done || is_last {
@@ -101,7 +89,7 @@ impl ClusterStepper {
                 break;
             }
         }
-        self.joints_missed_m = missed_m;
+        self.joints.missed_m = missed_m;
         self.give(report);
         Ok(())
     }
