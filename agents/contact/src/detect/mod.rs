@@ -201,6 +201,7 @@ impl Search {
             other: pair.other(),
             key: TouchKey::default(),
             spin,
+            push_n: 0.0,
             place: Place::Point(DVec3::NAN),
             restitution: skin.form.restitution_with(form),
         };

@@ -30,6 +30,8 @@ pub(crate) struct Owner {
     pub key: TouchKey,
     /// Its friction about the normal.
     pub spin: Spin,
+    /// What pushes its sides apart where their bodies began inside each other, N, ≥ 0.
+    pub push_n: f64,
     /// The point of the participant's skin.
     pub place: Place,
     /// Newton's coefficient of restitution of its pair, 0 to 1.

@@ -22,7 +22,7 @@ use metachron_core::{DisjointSets, StepError};
 const YIELD_SHARE: f64 = 3e-5;
 const YIELD_MIN_M_S: f64 = 2e-6;
 /// At how many times what contacts give way by the solve ends.
-const MISS_YIELDS: f64 = 10.0;
+const MISS_YIELDS: f64 = 0.1;
 
 /// The impacts of a fine step.
 #[derive(Default)]
