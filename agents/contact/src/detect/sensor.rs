@@ -1,7 +1,7 @@
 //! Which pairs of a cluster touch of which one side only senses.
 //!
 //! In: members with the velocities they would have. Out: pairs that touch where a fine step begins, or that meet on their way through it.
-//! Never here: forces, how often a pair has touched (`../memory.rs`).
+//! Never here: forces, how often a pair has touched (`member/memory.rs`).
 
 use crate::detect::pair::{Against, MET_M, Pair, Reaching, Round};
 use crate::detect::reach::FAR_M;

@@ -76,25 +76,25 @@ pub(crate) struct Progress {
     pub part: u32,
     /// Its velocities when its step began.
     pub v_start: Vec<DVec3>,
-    /// What its step would have changed them by without contact.
+    /// By how much its step would change them without contact.
     pub dv_free: Vec<DVec3>,
     /// The part of that which known impulses from outside make; empty for none.
     pub dv_known: Vec<DVec3>,
     /// Momentum that acts on it from outside over its step, where it leaves its answer to the cluster, N·s; empty for none.
     pub owed_n_s: Vec<DVec3>,
-    /// What the impulses since have changed them by.
+    /// By how much the impulses of contacts and rows have changed them since.
     pub dv_impulses: Vec<DVec3>,
-    /// v(p − 1): by which its place has moved so far.
+    /// v(p − 1): the velocities by which its place has moved up to this fine step.
     pub v_before: Vec<DVec3>,
-    /// v̄(p): its velocities with what it has been given so far.
+    /// v̄(p): its velocities with the impulses that it has been given so far.
     pub v_so_far: Vec<DVec3>,
-    /// û: the velocity at which its place moves in this fine step, without the impulses sought.
+    /// û: the velocities at which its place moves in this fine step without the impulses sought.
     pub v_predicted: Vec<DVec3>,
     /// The momentum that it does not answer yet (clusters.md, eq. 16a): what is solved for together with the impulses sought. Empty for none.
     pub unanswered: Vec<DVec3>,
-    /// û with the impulses that the last solve found, and the velocity at which its place moves by it: in the mean of the fine step, of a
-    /// body that flies.
+    /// û with the impulses that the last solve found.
     pub v_solved: Vec<DVec3>,
+    /// The velocities at which its place moves by that: in the mean of the fine step, of a body that flies.
     pub v_mean: Vec<DVec3>,
     /// Its place in the problem; `None` where no row touches it and it answers all momentum.
     pub place: Option<usize>,
