@@ -26,6 +26,8 @@ const MISS_YIELDS: f64 = 10.0;
 #[derive(Default)]
 pub(super) struct Impacts {
     solver: Solver,
+    /// The most steps of each solve ([`Settings::factors_max`]).
+    pub factors_max: Option<u32>,
     /// The macro step and the fine step, seconds, and how deep contacts rest, metres.
     macro_s: f64,
     step_s: f64,
@@ -258,8 +260,8 @@ impl Impacts {
         let lost_m_s = |impact: &Impact| impact.meeting.closing_m_s - impact.meeting.parting_m_s;
         let least_m_s = self.found.iter().map(lost_m_s).fold(f64::INFINITY, f64::min);
         let yield_m_s = (YIELD_SHARE * least_m_s).max(YIELD_MIN_M_S);
-        let (depth_m, tolerance_m_s) = (self.depth_m, MISS_YIELDS * yield_m_s);
-        self.solver = Solver::new(Settings { depth_m, tolerance_m_s, ..Settings::default() });
+        let (depth_m, tolerance_m_s, factors_max) = (self.depth_m, MISS_YIELDS * yield_m_s, self.factors_max);
+        self.solver = Solver::new(Settings { depth_m, tolerance_m_s, factors_max, ..Settings::default() });
         PUSH_OUT_SHARE * depth_m / yield_m_s
     }
 

@@ -72,7 +72,9 @@ pub use participant::Participant;
 pub use plan::Plan;
 use progress::Progress;
 pub use remote::{RemoteMember, RemoteView};
-pub use scene::{BadDepth, ClusterScene, DEPTH_RANGE_M, Passage};
+pub use scene::{
+    BadDepth, BadLeastSteps, ClusterScene, DEPTH_RANGE_M, LEAST_STEPS_DEFAULT, LEAST_STEPS_RANGE, Passage, SolveBudget,
+};
 use search::{Judge, Round, Search};
 use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
 use tearing::Tearing;
@@ -201,6 +203,7 @@ impl ClusterStepper {
     /// exact and no answer makes energy at any number.
     pub fn set_factors_max(&mut self, most: Option<u32>) {
         self.solver.set_factors_max(most);
+        self.impacts.factors_max = most;
     }
 
     /// The macro step that was made last, seconds.

@@ -3,6 +3,7 @@
 //! In: a stepper after a macro step. Out: what each member's seat publishes. Never here: the step itself.
 
 use super::attachments::held_by_links;
+use super::solve_budget::Solved;
 use super::{AgentRunner, ClusterSeat};
 use metachron_contact::stepper::{ClusterReport, ClusterStepper, PairTotal, Partner, StepDoubling};
 use metachron_core::step_doubling::drift_m;
@@ -33,6 +34,7 @@ impl AgentRunner {
         let (leader, step_s) = (self.shared.id, dt.as_secs_f64());
         let Some(seat) = &mut self.cluster else { return };
         let ClusterReport { contacts, factors, products, unfinished, depth_m, .. } = *report;
+        seat.solved = Some(Solved::from(report));
         let solves = &mut seat.solves;
         solves.contacts = contacts;
         solves.problems += u64::from(report.fine_steps);
