@@ -56,12 +56,6 @@ pub const LEAST_STEPS_RANGE: RangeInclusive<u32> = 1..=400;
 /// How many each is granted where nothing else is said: after so many from interior points contacts are some hundredths of a millimetre deeper.
 pub const LEAST_STEPS_DEFAULT: u32 = 5;
 
-impl Default for SolveBudget {
-    fn default() -> Self {
-        Self::Timed { least_steps: LEAST_STEPS_DEFAULT }
-    }
-}
-
 /// A least number of steps outside its range.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 #[error(

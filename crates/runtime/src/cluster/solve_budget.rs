@@ -17,7 +17,7 @@ const TURN_SHARE: f64 = 0.8;
 const TURNS_KEPT: u32 = 16;
 
 /// By how much of their mean the factors of turns must differ for what they say of the price to count as much as that mean.
-const TELLING_SPREAD: f64 = 0.25;
+const TELLING_SPREAD: f64 = 0.1;
 
 /// At least this share of a turn is the price of its factors: turns whose time hardly follows their factors do not make these free.
 const FACTORS_SHARE_MIN: f64 = 0.1;
@@ -36,6 +36,8 @@ pub(in super::super) enum SolveBound {
 pub(in super::super) struct Solved {
     pub solves: u32,
     pub factors: u32,
+    /// Products of conjugate gradients, of solves that make no factors.
+    pub products: u32,
     /// Contacts of its last fine step.
     pub contacts: u32,
 }
@@ -47,6 +49,8 @@ pub(in super::super) struct Solved {
 #[derive(Debug, Clone, Copy, PartialEq, Default, serde::Serialize, serde::Deserialize)]
 pub(in super::super) struct FactorPrice {
     turns: u32,
+    /// The last turn was solved by gradients alone, whose steps have no price.
+    by_gradients: bool,
     solves: f64,
     factors: f64,
     turn_s: f64,
@@ -57,7 +61,8 @@ pub(in super::super) struct FactorPrice {
 
 impl FactorPrice {
     /// Takes a turn of `turn_s` seconds; one without a factor says nothing of its price.
-    pub fn note(&mut self, Solved { solves, factors, .. }: Solved, turn_s: f64) {
+    pub fn note(&mut self, Solved { solves, factors, products, .. }: Solved, turn_s: f64) {
+        self.by_gradients = factors == 0 && (products > 0 || self.by_gradients);
         if factors == 0 || !turn_s.is_finite() {
             return;
         }
@@ -80,8 +85,11 @@ impl FactorPrice {
     }
 
     /// How many factors each solve of a turn of `turn_s` seconds may make: at least `least`, and that where no price is known yet; `None` where
-    /// there is time for as many as any solve makes.
+    /// there is time for as many as any solve makes, and for solves by gradients.
     pub fn factors_max(&self, turn_s: f64, least: u32) -> Option<u32> {
+        if self.by_gradients {
+            return None;
+        }
         let Some(factor_s) = self.factor_s() else { return Some(least) };
         let rest_s = self.turn_s - factor_s * self.factors;
         let each = (turn_s - rest_s) / (factor_s * self.solves);
@@ -93,7 +101,12 @@ impl FactorPrice {
 
 impl From<&ClusterReport> for Solved {
     fn from(report: &ClusterReport) -> Self {
-        Self { solves: report.solves, factors: report.factors, contacts: report.contacts.saturating_sub(report.heap_contacts) }
+        Self {
+            solves: report.solves,
+            factors: report.factors,
+            products: report.products,
+            contacts: report.contacts.saturating_sub(report.heap_contacts),
+        }
     }
 }
 
@@ -112,6 +125,11 @@ impl AgentRunner {
             SolveBudget::Timed { least_steps } if !timeline.is_free() => Some(least_steps),
             _ => None,
         }
+    }
+
+    /// What the solves of the turn in progress took; `None` where it has made no macro step.
+    pub fn solved(&self) -> Option<Solved> {
+        self.cluster.as_ref()?.solved
     }
 
     /// Learns from the turn that `took` so long what factors cost.
@@ -133,7 +151,7 @@ mod tests {
     fn after(factors: impl IntoIterator<Item = u32>) -> FactorPrice {
         let mut price = FactorPrice::default();
         for factors in factors {
-            price.note(Solved { solves: 1, factors, contacts: 8 }, 1e-3 + 20e-6 * f64::from(factors));
+            price.note(Solved { solves: 1, factors, products: 0, contacts: 8 }, 1e-3 + 20e-6 * f64::from(factors));
         }
         price
     }
@@ -153,7 +171,7 @@ mod tests {
         let mut price = after((0..64).map(|k| 4 + 13 * (k % 3)));
         for k in 0..64 {
             let factors = 4 + 13 * (k % 3);
-            price.note(Solved { solves: 1, factors, contacts: 80 }, 1e-3 + 200e-6 * f64::from(factors));
+            price.note(Solved { solves: 1, factors, products: 0, contacts: 80 }, 1e-3 + 200e-6 * f64::from(factors));
         }
         let found_s = price.factor_s().unwrap();
         assert!((found_s / 200e-6 - 1.0).abs() < 0.15, "{found_s}");
@@ -163,7 +181,7 @@ mod tests {
     fn a_number_that_is_used_up_settles_where_the_turn_is_full() {
         let (turn_s, mut price, mut most) = (3e-3, FactorPrice::default(), 5);
         for _ in 0..200 {
-            price.note(Solved { solves: 1, factors: most, contacts: 8 }, 1e-3 + 20e-6 * f64::from(most));
+            price.note(Solved { solves: 1, factors: most, products: 0, contacts: 8 }, 1e-3 + 20e-6 * f64::from(most));
             most = price.factors_max(turn_s, 5).unwrap();
         }
         assert!((95..=100).contains(&most), "{most}: 100 fill the turn, and never more");
@@ -173,24 +191,29 @@ mod tests {
     fn each_of_several_solves_gets_its_share_and_the_least_in_any_case() {
         let mut price = FactorPrice::default();
         assert_eq!(price.factors_max(1.0, 5), Some(5), "nothing is known");
-        price.note(Solved { solves: 4, factors: 40, contacts: 8 }, 0.4e-3);
+        price.note(Solved { solves: 4, factors: 40, products: 0, contacts: 8 }, 0.4e-3);
         assert_eq!(price.factors_max(0.801e-3, 5), Some(20));
         assert_eq!(price.factors_max(0.01e-3, 5), Some(5));
         assert_eq!(price.factors_max(-1.0, 7), Some(7), "late");
         assert_eq!(price.factors_max(0.1, 5), None, "there is time for all");
+        price.note(Solved { solves: 4, factors: 0, products: 90, contacts: 8 }, 5e-3);
+        price.note(Solved { solves: 0, factors: 0, products: 0, contacts: 0 }, 1e-4);
+        assert_eq!(price.factors_max(0.01e-3, 5), None, "by gradients");
+        price.note(Solved { solves: 4, factors: 40, products: 0, contacts: 8 }, 0.4e-3);
+        assert_eq!(price.factors_max(0.01e-3, 5), Some(5));
     }
 
     #[test]
     fn turns_whose_time_does_not_follow_their_factors_do_not_make_these_free() {
         let mut price = FactorPrice::default();
         for k in 0..64 {
-            price.note(Solved { solves: 1, factors: 5 + 40 * (k % 2), contacts: 8 }, 1e-3);
+            price.note(Solved { solves: 1, factors: 5 + 40 * (k % 2), products: 0, contacts: 8 }, 1e-3);
         }
         let (found_s, mean_s) = (price.factor_s().unwrap(), 1e-3 / 25.0);
         assert!(found_s >= 0.09 * mean_s, "{found_s}");
-        price.note(Solved { solves: 0, factors: 0, contacts: 0 }, 1e-4);
+        price.note(Solved { solves: 0, factors: 0, products: 0, contacts: 0 }, 1e-4);
         assert_eq!(price.factor_s(), Some(found_s), "no factor");
-        price.note(Solved { solves: 1, factors: 5, contacts: 8 }, f64::NAN);
+        price.note(Solved { solves: 1, factors: 5, products: 0, contacts: 8 }, f64::NAN);
         assert_eq!(price.factor_s(), Some(found_s));
     }
 }
