@@ -49,7 +49,7 @@ pub(in super::super) struct Solved {
 #[derive(Debug, Clone, Copy, PartialEq, Default, serde::Serialize, serde::Deserialize)]
 pub(in super::super) struct FactorPrice {
     turns: u32,
-    /// The last turn was solved by gradients alone, whose steps have no price.
+    /// Solves of the last turn went by gradients, whose steps have no price.
     by_gradients: bool,
     solves: f64,
     factors: f64,
@@ -62,8 +62,8 @@ pub(in super::super) struct FactorPrice {
 impl FactorPrice {
     /// Takes a turn of `turn_s` seconds; one without a factor says nothing of its price.
     pub fn note(&mut self, Solved { solves, factors, products, .. }: Solved, turn_s: f64) {
-        self.by_gradients = factors == 0 && (products > 0 || self.by_gradients);
-        if factors == 0 || !turn_s.is_finite() {
+        self.by_gradients = products > 0 || (factors == 0 && self.by_gradients);
+        if factors == 0 || self.by_gradients || !turn_s.is_finite() {
             return;
         }
         self.turns = (self.turns + 1).min(TURNS_KEPT);
@@ -199,6 +199,8 @@ mod tests {
         price.note(Solved { solves: 4, factors: 0, products: 90, contacts: 8 }, 5e-3);
         price.note(Solved { solves: 0, factors: 0, products: 0, contacts: 0 }, 1e-4);
         assert_eq!(price.factors_max(0.01e-3, 5), None, "by gradients");
+        price.note(Solved { solves: 2, factors: 3, products: 90, contacts: 8 }, 5e-3);
+        assert_eq!(price.factors_max(0.01e-3, 5), None, "one of two by gradients");
         price.note(Solved { solves: 4, factors: 40, products: 0, contacts: 8 }, 0.4e-3);
         assert_eq!(price.factors_max(0.01e-3, 5), Some(5));
     }
