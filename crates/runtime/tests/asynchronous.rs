@@ -7,7 +7,8 @@ use metachron_core::{AgentId, Anchor, Archive, Body, PairKind, SimSpan, Snapshot
 use metachron_geometry::{Obstacle, Solid};
 use metachron_models::rigid::{RigidBody, RigidSpec};
 use metachron_runtime::{
-    AgentSpawn, DrawPrice, FACTOR, Faults, Lockstep, Machine, Priority, Run, StepPrice, SystemClock, Threads, TimelineCommand,
+    AgentSpawn, DrawPrice, FACTOR, Faults, Lockstep, Machine, Priority, Run, StepPrice, SystemClock, Threads,
+    TimelineCommand,
 };
 use std::sync::Arc;
 use std::time::Duration;

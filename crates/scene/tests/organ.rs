@@ -3,8 +3,8 @@
 
 use metachron_core::SimSpan;
 use metachron_scene::{Source, load};
-use metachron_world::{SolveBudget, World};
 use metachron_world::kinds::ExecutorKind;
+use metachron_world::{SolveBudget, World};
 use std::path::Path;
 
 #[test]

@@ -132,8 +132,7 @@ impl Interior {
             let share = inside.follow(row);
             moved |= share != 1.0;
             *impulse *= share;
-            row.compliance = inside.compliance;
-            row.compliance = row.hardened(*impulse, yield_m_s);
+            row.compliance = inside.compliance.min(row.compliance_under(impulse.length(), yield_m_s));
         }
         if moved {
             iterate.remeasure();

@@ -270,6 +270,7 @@ impl Iterate {
 
     /// What momentum velocities leave unanswered, of impulses that have been changed without them.
     pub fn remeasure(&mut self) {
+        self.exact = false;
         self.scatter_given();
         let Self { system, state, step, scratch, .. } = self;
         system.members.multiply(&state.change, &mut step.left);

@@ -35,7 +35,7 @@ pub struct Settings {
 
 /// Below this miss the impulses of the last step nearly hold, m/s, and Newton's method may find the rest. Without a factor it comes nearer
 /// from further off, and its steps are cheaper than those from interior points.
-const NEAR_M_S: f64 = 0.03;
+const NEAR_M_S: f64 = 0.3;
 /// Below this miss, m/s, it is tried from interior points, and then at each tenth of the miss at which it failed.
 const POLISH_M_S: f64 = 1e-3;
 const POLISH_AGAIN: f64 = 0.1;

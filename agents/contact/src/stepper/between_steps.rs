@@ -23,6 +23,7 @@ impl ClusterStepper {
             contact.load_n_s = place.load_n * h_s;
             let lies_m = if contact.gap_m < -OVERLAP_SHARE * self.depth_m { -contact.gap_m } else { 0.0 };
             contact.overlap_m = place.overlap_m.min(lies_m);
+            owner.push_n = place.push_n;
             owner.spin = Spin { radius_m: owner.spin.radius_m, ..place.spin };
         }
     }
@@ -63,10 +64,11 @@ impl ClusterStepper {
                 if impacts.of(k).is_some() { (DVec3::ZERO, Spin::default()) } else { (impulse, owner.spin) };
             let load_n = contact.load_n_s / h_s;
             let (key, force_n, overlap_m) = (owner.key.anywhere(), lasting / h_s, contact.overlap_m);
-            let place = Remembered { key, force_n, load_n, overlap_m, owed_slip_m, spin };
-            all[owner.member].memory.pair(owner.partner).next.push(place);
             let push =
                 pushes.next_if(|(pushed, _)| *pushed == k).map_or(DVec3::ZERO, |(_, row)| solution.rows_n_s[row]);
+            let push_n = push.length() / h_s;
+            let place = Remembered { key, force_n, load_n, overlap_m, push_n, owed_slip_m, spin };
+            all[owner.member].memory.pair(owner.partner).next.push(place);
             let impulse = impulse + push + impacts.contacts_n_s.get(k).copied().unwrap_or_default();
             outside.note(all, owner.member, &contact.sides[1], -impulse);
             if impulse != DVec3::ZERO {

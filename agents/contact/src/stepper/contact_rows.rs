@@ -57,10 +57,14 @@ impl ContactRows {
             });
             self.spins.push(contact);
         }
-        for (contact, at) in search.contacts.iter().enumerate().filter(|(_, at)| at.overlap_m > 0.0) {
+        for (contact, (owner, at)) in search.owners.iter().zip(&search.contacts).enumerate() {
+            if at.overlap_m == 0.0 {
+                continue;
+            }
             ties.rows.push(JointRow {
                 target_m_s: at.normal * (at.surface_m_s.dot(at.normal) - push_out_m_s(at.gap_m, h_s)),
                 limit_m_s: PUSH_OUT_MAX_M_S,
+                warm_n_s: at.normal * (owner.push_n * h_s),
                 ..JointRow::new(at.sides, Hold::pushing(at.normal))
             });
             self.pushes.push(contact);

@@ -20,14 +20,14 @@ use metachron_core::{DisjointSets, StepError};
 const YIELD_SHARE: f64 = 3e-5;
 const YIELD_MIN_M_S: f64 = 2e-6;
 /// At how many times what contacts give way by the solve ends.
-const MISS_YIELDS: f64 = 10.0;
+const MISS_YIELDS: f64 = 0.1;
 
 /// The impacts of a fine step.
 #[derive(Default)]
 pub(super) struct Impacts {
     solver: Solver,
-    /// The most steps of each solve ([`Settings::factors_max`]).
-    pub factors_max: Option<u32>,
+    /// The most steps of a solve.
+    factors_max: Option<u32>,
     /// The macro step and the fine step, seconds, and how deep contacts rest, metres.
     macro_s: f64,
     step_s: f64,
@@ -103,6 +103,11 @@ impl ClusterStepper {
 }
 
 impl Impacts {
+    /// Ends each solve after so many steps from now on.
+    pub fn set_factors_max(&mut self, most: Option<u32>) {
+        self.factors_max = most;
+    }
+
     /// Begins a fine step. Its problem goes by the velocities at its end, and would stop too early sides that fly and meet in a later one: it
     /// has none of their contacts.
     pub fn begin(&mut self, [macro_s, step_s]: [f64; 2], search: &mut Search, ties: &Ties, progress: &[Progress]) {
@@ -260,8 +265,9 @@ impl Impacts {
         let lost_m_s = |impact: &Impact| impact.meeting.closing_m_s - impact.meeting.parting_m_s;
         let least_m_s = self.found.iter().map(lost_m_s).fold(f64::INFINITY, f64::min);
         let yield_m_s = (YIELD_SHARE * least_m_s).max(YIELD_MIN_M_S);
-        let (depth_m, tolerance_m_s, factors_max) = (self.depth_m, MISS_YIELDS * yield_m_s, self.factors_max);
-        self.solver = Solver::new(Settings { depth_m, tolerance_m_s, factors_max, ..Settings::default() });
+        let (depth_m, tolerance_m_s) = (self.depth_m, MISS_YIELDS * yield_m_s);
+        self.solver =
+            Solver::new(Settings { depth_m, tolerance_m_s, factors_max: self.factors_max, ..Settings::default() });
         PUSH_OUT_SHARE * depth_m / yield_m_s
     }
 

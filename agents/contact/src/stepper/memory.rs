@@ -48,6 +48,8 @@ pub(super) struct Remembered {
     pub load_n: f64,
     /// How deep it lies because its bodies began inside each other, metres, ≥ 0 (eq. 2a).
     pub overlap_m: f64,
+    /// What pushed it out of that in the last step, along its normal, N, ≥ 0.
+    pub push_n: f64,
     /// The slip owed, world axes, metres.
     pub owed_slip_m: DVec3,
     /// The same of its friction about the normal.
@@ -58,7 +60,7 @@ impl Remembered {
     /// A place that owes nothing.
     pub const fn new(key: TouchKey, force_n: DVec3) -> Self {
         let spin = Spin { radius_m: 0.0, torque_n_m: 0.0, owed_rad: 0.0 };
-        Self { key, force_n, load_n: 0.0, overlap_m: 0.0, owed_slip_m: DVec3::ZERO, spin }
+        Self { key, force_n, load_n: 0.0, overlap_m: 0.0, push_n: 0.0, owed_slip_m: DVec3::ZERO, spin }
     }
 }
 

@@ -203,7 +203,7 @@ impl ClusterStepper {
     /// exact and no answer makes energy at any number.
     pub fn set_factors_max(&mut self, most: Option<u32>) {
         self.solver.set_factors_max(most);
-        self.impacts.factors_max = most;
+        self.impacts.set_factors_max(most);
     }
 
     /// The macro step that was made last, seconds.

@@ -44,6 +44,8 @@ pub(super) struct Owner {
     pub key: TouchKey,
     /// Its friction about the normal.
     pub spin: Spin,
+    /// What pushes its sides apart where their bodies began inside each other, N, ≥ 0.
+    pub push_n: f64,
     /// The point of the participant's skin.
     pub place: Place,
     /// Newton's coefficient of restitution of its pair, 0 to 1.
@@ -296,6 +298,7 @@ impl Search {
             other: pair.other(),
             key: TouchKey::default(),
             spin,
+            push_n: 0.0,
             place: Place::Point(DVec3::NAN),
             restitution: skin.form.restitution_with(form),
         };

@@ -74,6 +74,9 @@ impl ClusterStepper {
             for (row, impulse) in ties.rows.iter_mut().zip(&solution.rows_n_s) {
                 row.warm_n_s = *impulse;
             }
+            for (contact, row) in contact_rows.pushes(ties) {
+                search.owners[contact].push_n = solution.rows_n_s[row].length() / h_s;
+            }
             for (contact, row) in contact_rows.spins(ties) {
                 let normal = search.contacts[contact].normal;
                 search.owners[contact].spin.torque_n_m = solution.rows_n_s[row].dot(normal) / h_s;

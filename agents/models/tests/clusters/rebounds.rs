@@ -357,7 +357,7 @@ fn boxes_that_fall_on_each_other_and_rebound_a_little_cost_little_more_than_thos
             placed(RigidBody::new(RigidSpec { restitution, ..spec }).unwrap(), false)
         });
         let found = Table::among(boxes.collect(), &[floor(restitution)]).play(1.0);
-        assert!(found.landing_m.max(found.rest_m) < 3e-5 && found.cut == 0, "e {restitution}: {found:?}");
+        assert!(found.landing_m.max(found.rest_m) < 3e-5 && found.unfinished == 0, "e {restitution}: {found:?}");
         assert!((found.highest_m - 0.28).abs() < 1e-3, "e {restitution}: they lie as columns: {found:?}");
         f64::from(found.factors)
     };

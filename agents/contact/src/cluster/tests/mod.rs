@@ -1,5 +1,6 @@
 //! Tests of the solver of a cluster: laws with closed forms, random problems against a slow method, the factor, promises.
 
+mod bounds;
 mod cone;
 mod factor;
 mod iterative;

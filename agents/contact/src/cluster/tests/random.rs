@@ -229,6 +229,6 @@ fn eight_hundred_more_problems_come_to_their_end() {
         most = most.max(report.factors);
     }
     println!("{factors} factors, {most} at most");
-    // 10 in the mean, 111 at most measured
+    // 10 in the mean, 68 at most measured
     assert!(factors < 12 * 800, "{factors}");
 }
