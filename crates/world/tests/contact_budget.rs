@@ -44,7 +44,7 @@ fn dear_factors_end_solves_and_cheap_ones_do_not() {
     let [dear, cheap] = [300.0, 0.01].map(|factor_us| played(&pile(BUDGET, factor_us), Pace::RealTime).solves);
     // before a factor has been made its price is not known
     assert!(dear.unfinished > 20 && cheap.unfinished <= 1, "{dear:?}, {cheap:?}");
-    assert!(dear.deepest_m < 1e-3 && dear.miss_m_s > cheap.miss_m_s, "{dear:?}, {cheap:?}");
+    assert!(dear.deepest_m < 1e-3, "{dear:?}");
 }
 
 #[test]
