@@ -13,7 +13,7 @@ use crate::world::World;
 use metachron::contact::joint::JointKind;
 use metachron::geometry::Solid;
 use metachron::scene::{Source, load};
-use metachron::world::{self, Part, Rigid, SceneBuilder, SceneText, Tube};
+use metachron::world::{self, Part, Rigid, SceneBuilder, SceneText, SolveBudget, Tube};
 use pyo3::conversion::FromPyObjectOwned;
 use pyo3::exceptions::{PyTypeError, PyValueError};
 use pyo3::prelude::*;
@@ -80,11 +80,18 @@ impl Moving {
 #[pymethods]
 impl Scene {
     #[new]
-    #[pyo3(signature = (*, gravity = None))]
-    fn new(gravity: Option<Vector>) -> Self {
-        let builder = world::Scene::builder();
+    #[pyo3(signature = (*, gravity = None, contact = "budget", contact_least_steps = 5))]
+    fn new(gravity: Option<Vector>, contact: &str, contact_least_steps: u32) -> PyResult<Self> {
+        let budget = match contact {
+            "budget" => SolveBudget::Timed { least_steps: contact_least_steps },
+            "exact" => SolveBudget::Exact,
+            other => {
+                return Err(PyValueError::new_err(format!("contact is {other:?}; expected \"budget\" or \"exact\"")));
+            }
+        };
+        let builder = world::Scene::builder().contact_budget(budget);
         let builder = gravity.into_iter().fold(builder, |builder, Vector(g)| builder.gravity(g.to_array()));
-        Self { inner: Inner::Built(builder), joints: Vec::new() }
+        Ok(Self { inner: Inner::Built(builder), joints: Vec::new() })
     }
 
     /// Reads a text that has a line break as the scene itself, any other as a path, or as the name of a built-in scene.

@@ -102,6 +102,14 @@ impl State {
         self.0.at_rest
     }
 
+    /// Of the leader of what touches or is joined, how its last step was solved: level, factors, by how much the answers
+    /// miss the laws, m/s, and the deepest overlap, m.
+    #[getter]
+    fn contact_solve(&self) -> Option<(&'static str, u32, f64, f64)> {
+        let solves = self.0.cluster?.solves?;
+        Some((solves.level.name(), solves.last_factors, solves.miss_m_s, solves.depth_m))
+    }
+
     /// Kinetic, elastic and that of gravity, J.
     #[getter]
     fn energy(&self) -> f64 {

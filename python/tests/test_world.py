@@ -386,3 +386,20 @@ def test_sensors_of_a_scene_in_code_sit_where_they_are_put() -> None:
         scene.sensor("wrong", mc.Ball(0.1))  # type: ignore[arg-type]
     with pytest.raises(ValueError, match='"leg"'):
         mc.Scene().sensor("s", mc.Imu("leg")).start()
+
+
+def test_a_scene_says_how_far_solves_of_contact_go() -> None:
+    def landed(scene: mc.Scene) -> tuple[str, int, float, float]:
+        world = scene.fixed("floor", mc.Plane()).add("box", mc.Box([0.05, 0.05, 0.05], at=[0.0, 0.0, 0.06])).start(pace="real-time")
+        world.advance(0.2)
+        solve = world.state("box").contact_solve
+        assert solve is not None
+        return solve
+
+    level, _, miss, depth = landed(mc.Scene(contact="exact"))
+    assert level != "interior" and miss < 1e-5 and 0.0 <= depth < 1e-4
+    assert landed(mc.Scene(contact_least_steps=1))[3] < 1e-3
+    with pytest.raises(ValueError, match="1 to 400"):
+        landed(mc.Scene(contact_least_steps=0))
+    with pytest.raises(ValueError, match="\"rough\""):
+        mc.Scene(contact="rough")  # type: ignore[arg-type]

@@ -356,6 +356,8 @@ fn clusters(scene: &Scene, outcome: &Outcome) -> Vec<ClusterRow> {
             factors: solves.factors as f64 / solves.problems.max(1) as f64,
             products: solves.products as f64 / solves.problems.max(1) as f64,
             unfinished: solves.unfinished,
+            level: solves.level.name(),
+            miss_m_s: solves.miss_m_s,
             depth_m: solves.depth_m,
             depth_max_m: solves.deepest_m,
             depth_wanted_m: scene.contact_depth_m,

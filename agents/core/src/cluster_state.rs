@@ -15,6 +15,33 @@ pub struct ClusterState {
     pub solves: Option<ClusterSolves>,
 }
 
+/// How far a solve of contacts went, the dearest last. All laws hold to the tolerance but at [`SolveLevel::Interior`].
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Default, serde::Serialize, serde::Deserialize)]
+pub enum SolveLevel {
+    /// The impulses of the step before still hold.
+    #[default]
+    Kept,
+    /// Newton's method found the rest from them.
+    Near,
+    /// Interior points led to where all laws hold.
+    Polished,
+    /// Interior points, as far as the budget went: inside all bounds, momentum exact, no energy made; the miss says how far off.
+    Interior,
+}
+
+impl SolveLevel {
+    /// Its name in reports.
+    #[must_use]
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Kept => "kept",
+            Self::Near => "near",
+            Self::Polished => "polished",
+            Self::Interior => "interior",
+        }
+    }
+}
+
 /// How a cluster was solved. Counts are those of all steps that its leader has led so far.
 #[derive(Debug, Clone, Copy, PartialEq, Default, serde::Serialize, serde::Deserialize)]
 pub struct ClusterSolves {
@@ -28,6 +55,12 @@ pub struct ClusterSolves {
     pub products: u64,
     /// Problems whose solve ended before all laws of contact held to the tolerance.
     pub unfinished: u64,
+    /// The dearest level of a solve of the last step.
+    pub level: SolveLevel,
+    /// Factors of the last step.
+    pub last_factors: u32,
+    /// What laws and momentum miss at most by an answer of the last step, m/s, ≥ 0; infinite where numbers overflowed.
+    pub miss_m_s: f64,
     /// The deepest overlap of the last step, metres, ≥ 0.
     pub depth_m: f64,
     /// The deepest overlap ever, metres, ≥ 0.

@@ -50,7 +50,7 @@ pub use body::{
     Anchor, Body, Bounds, CurveState, GRASP_BELOW, Grasp, GraspOrientation, Grip, RigidState, SoftNodes, SoftState,
     ToolState,
 };
-pub use cluster_state::{ClusterSolves, ClusterState};
+pub use cluster_state::{ClusterSolves, ClusterState, SolveLevel};
 pub use contact::{ContactPartner, ContactState, JointEffort, Wrench};
 pub use disjoint_sets::DisjointSets;
 pub use id::AgentId;

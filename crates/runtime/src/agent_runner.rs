@@ -171,6 +171,7 @@ impl AgentRunner {
             return next;
         };
         let now = timeline.sim_at(wall);
+        self.note_price(timeline, took);
         let work_s = self.share_work(work_s);
         self.metrics.time_turn(&self.shared.gauges, turn_s);
         // its own state comes last: where that is to be seen, those of all it leads are too

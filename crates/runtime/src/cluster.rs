@@ -13,6 +13,7 @@ mod membership;
 mod notes;
 mod places;
 mod seats;
+mod solve_budget;
 #[cfg(test)]
 mod tests;
 mod turn;
@@ -22,6 +23,8 @@ use attachments::{held_by_joints, held_by_links};
 pub(super) use membership::{Epoch, Membership};
 pub(super) use places::{Place, Placed, check_places, put_back, take_apart};
 pub(super) use seats::{Handover, Led, assign_leaders, close_remaining, hand_over, return_arrivals};
+pub(super) use solve_budget::SolveBound;
+use solve_budget::{FactorPrice, Solved};
 pub(super) use turn::Leap;
 
 use super::agent_runner::{AgentRunner, StepOutcome, contained};
@@ -81,6 +84,9 @@ pub(super) struct ClusterSeat {
     /// Its part in the last step, and how those were solved that it has led.
     state: Option<ClusterState>,
     solves: ClusterSolves,
+    /// What the solves of the turn in progress took, and what factors of those that it leads take.
+    solved: Option<Solved>,
+    price: FactorPrice,
     /// Its pairs whose other sides keep clocks of their own; `None` where its scene declares none.
     asynchronous: Option<Box<Pairs>>,
     /// The partners of such pairs as the members that it leads meet them.
@@ -129,6 +135,25 @@ pub(super) struct StepPlan {
     dt: SimSpan,
     /// Which steps the members of its cluster make in it; `None` of an agent that is no member of any.
     members: Option<Plan>,
+    /// The most steps of each of its solves.
+    factors_max: Option<u32>,
+}
+
+impl StepPlan {
+    /// Its length.
+    pub const fn dt(&self) -> SimSpan {
+        self.dt
+    }
+
+    /// The most steps of each of its solves; `None` for as many as the laws take.
+    pub const fn factors_max(&self) -> Option<u32> {
+        self.factors_max
+    }
+
+    /// The same with solves of at most so many steps.
+    pub const fn within(self, factors_max: Option<u32>) -> Self {
+        Self { factors_max, ..self }
+    }
 }
 
 /// A bug: only agents with a seat are stepped in clusters.
@@ -169,6 +194,8 @@ impl ClusterSeat {
             parts: 1,
             state: None,
             solves: ClusterSolves::default(),
+            solved: None,
+            price: FactorPrice::default(),
             participants: Vec::new(),
             wishes: Vec::new(),
             groups: DisjointSets::default(),
@@ -215,6 +242,7 @@ impl ClusterSeat {
         )?;
         archive_values!(archive, self.bonds, self.sleepers)?;
         archive_values!(archive, self.work, self.work_s, self.schedule, self.drift_m, self.state, self.solves)?;
+        archive_values!(archive, self.solved, self.price)?;
         archive.option(&mut self.stepper, Box::default, |stepper, archive| stepper.archive(archive))?;
         archive.option(&mut self.doubling, Box::default, |doubling, archive| doubling.archive(archive))?;
         archive.option(&mut self.asynchronous, Box::default, |pairs, archive| pairs.archive(archive))?;
@@ -284,13 +312,14 @@ fn prepared(loads: &mut Option<Box<Loads>>, time: SimTime, dt: SimSpan) -> &Acti
 }
 
 impl AgentRunner {
-    /// Steps it with all that it leads and that are at its time; an agent that is no member of clusters by itself.
+    /// Steps it with all that it leads and that are at its time, each solve by at most so many steps; an agent that is no member of clusters by
+    /// itself.
     ///
     /// # Errors
     /// The reason why one of them cannot go on.
-    pub fn step_alone(&mut self, span: Span) -> Result<StepOutcome, String> {
+    pub fn step_alone(&mut self, span: Span, factors_max: Option<u32>) -> Result<StepOutcome, String> {
         let plan = self.plan_step(span)?;
-        self.make_step(plan)
+        self.make_step(plan.within(factors_max))
     }
 
     /// Looks around before such a step: all that it depends on is known then, whatever others do meanwhile.
@@ -303,21 +332,22 @@ impl AgentRunner {
             let (Span::Wanted(dt) | Span::AtMost(dt)) = span;
             let step = PlannedStep { start: self.pace.scene_time(), dt };
             self.observe(step, &Membership::default());
-            return Ok(StepPlan { dt, members: None });
+            return Ok(StepPlan { dt, members: None, factors_max: None });
         }
         self.led.note_membership(self.shared.id, time);
         let (plan, dt) = self.plan(span)?;
         self.look(time, dt);
-        Ok(StepPlan { dt, members: Some(plan) })
+        Ok(StepPlan { dt, members: Some(plan), factors_max: None })
     }
 
     /// Makes the step that was planned: reads and writes nothing of others.
     ///
     /// # Errors
     /// The reason why one of them cannot go on.
-    pub fn make_step(&mut self, StepPlan { dt, members }: StepPlan) -> Result<StepOutcome, String> {
+    pub fn make_step(&mut self, step: StepPlan) -> Result<StepOutcome, String> {
+        let StepPlan { dt, members, factors_max } = step;
         if let Some(plan) = members {
-            return self.step_cluster(plan, dt);
+            return self.step_cluster(plan, factors_max, dt);
         }
         let (me, time, neighbours) = (self.shared.id, self.pace.time(), self.observer.neighbours());
         let Acting { springs: hands, forces, motors, pose } = prepared(&mut self.loads, time, dt);

@@ -8,7 +8,7 @@ use super::agent_clock::{Timeline, TimelineCommand};
 use super::agent_runner::{AgentRunner, Next, StepOutcome};
 use super::agents::Agents;
 use super::archive::{Absent, Cut};
-use super::cluster::{close_remaining, hand_over, put_back, take_apart};
+use super::cluster::{SolveBound, close_remaining, hand_over, put_back, take_apart};
 use super::handle::AgentHandle;
 use super::helpers::Helpers;
 use super::mailbox::SendError;
@@ -67,7 +67,7 @@ impl Follower {
     /// # Errors
     /// Why it cannot have been made here: the run is not the one that it is to follow.
     pub fn make(&mut self, part: TurnPart) -> Result<(), String> {
-        let TurnPart { kind, agent, wall } = part;
+        let TurnPart { kind, agent, wall, factors_max } = part;
         let unknown = || format!("there is no agent {} that could make a turn at {:.6} s", agent.0, wall.as_secs_f64());
         let handle = self.all.handles.of(agent).ok_or_else(unknown)?;
         let followed = self.followed.get_mut(agent.0 as usize).ok_or_else(unknown)?;
@@ -78,7 +78,7 @@ impl Follower {
         self.parts += 1;
         let turn = self.unwatched.begin(self.parts, agent, Instant::now());
         let done = match kind {
-            PartKind::Prepare => followed.prepare(&self.timeline, wall),
+            PartKind::Prepare => followed.prepare(&self.timeline, wall, SolveBound::Given(factors_max)),
             PartKind::Show => followed.show(&self.timeline, wall),
             PartKind::Wake => followed.wake(&self.timeline, wall),
             PartKind::Join => followed.join(),
@@ -143,10 +143,10 @@ impl Follower {
 }
 
 impl Followed {
-    fn prepare(&mut self, timeline: &Timeline, wall: Duration) -> Option<()> {
+    fn prepare(&mut self, timeline: &Timeline, wall: Duration, bound: SolveBound) -> Option<()> {
         let actor = self.actor.as_mut().filter(|actor| !actor.is_parked())?;
         self.turn = None;
-        match actor.prepare(timeline, wall) {
+        match actor.prepare(timeline, wall, bound) {
             Prepared::Parked => {}
             Prepared::Waits(_) => self.finish(timeline, wall, Duration::ZERO),
             Prepared::Steps(turn) => {

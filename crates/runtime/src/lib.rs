@@ -92,7 +92,7 @@ pub use follower::Follower;
 pub use governor::{Demand, Governor, TurnMeasure};
 pub use handle::{AgentHandle, state_hash};
 pub use lockstep::Lockstep;
-pub use machine::{DrawPrice, Machine, OTHER_STEP_US, ObjectPrice, PRESETS, StepPrice};
+pub use machine::{DrawPrice, FACTOR, Machine, OTHER_STEP_US, ObjectPrice, PRESETS, StepPrice};
 pub use mailbox::{Command, KEYS, Keyed, SendError};
 pub use metrics::{AgentState, AgentStats, STALLED_FOR_GOOD, Spread};
 pub use pool::Pool;

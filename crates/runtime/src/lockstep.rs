@@ -16,7 +16,7 @@ use super::cluster::{Place, Placed, close_remaining, hand_over, put_back, take_a
 use super::cpu::CpuBatch;
 use super::handle::AgentHandle;
 use super::helpers::Helpers;
-use super::machine::{Machine, duration};
+use super::machine::{FACTOR, Machine, duration};
 use super::mailbox::SendError;
 use super::metrics::AgentStats;
 use super::spawn::{AgentSpawn, AssembledRun, RunAgents, RunError, assemble};
@@ -182,6 +182,10 @@ impl Lockstep {
                 if actor.cluster.is_some() && steps > 0 {
                     self.jobs.extend(actor.member_costs().map(|cost| price(cost.model, cost.work)));
                     join(&mut self.jobs, self.machine.cores);
+                    // one thread factors for all members
+                    if let (Some(solved), Some(longest)) = (actor.solved(), self.jobs.iter_mut().max()) {
+                        *longest += price(FACTOR, f64::from(solved.contacts)) * solved.factors;
+                    }
                 } else {
                     self.jobs.push(price(actor.shared.model(), work) * steps);
                 }

@@ -11,7 +11,7 @@ use std::time::Duration;
 pub struct Machine {
     /// Cores shared by agents and the frame loop; at least 1 is assumed.
     pub cores: u32,
-    /// Price of a step of each model. A model that is not listed costs [`OTHER_STEP_US`] per step.
+    /// Price of a step of each model, and of a factor of the contacts of a cluster ([`FACTOR`]). What is not listed costs [`OTHER_STEP_US`].
     pub steps: Vec<StepPrice>,
     /// Price of a frame.
     pub draw: DrawPrice,
@@ -37,7 +37,7 @@ pub struct Machine {
 /// Price of a step of one model: base + unit · work.
 #[derive(Debug, Clone, PartialEq)]
 pub struct StepPrice {
-    /// The model's name, as its agents report it.
+    /// The model's name, as its agents report it; or [`FACTOR`].
     pub model: Cow<'static, str>,
     /// Microseconds per step, ≥ 0.
     pub base_us: f64,
@@ -73,6 +73,9 @@ pub struct ObjectPrice {
     pub pixel_ns: f64,
 }
 
+/// The name by which [`Machine::steps`] has the price of a factor of the coupled matrix of a cluster. Its work is the cluster's contacts.
+pub const FACTOR: &str = "factor";
+
 /// Price of a step of an unlisted model, microseconds.
 pub const OTHER_STEP_US: f64 = 10.0;
 
@@ -103,6 +106,7 @@ impl Machine {
                 price("rope", 5.0, 0.6),
                 price("tool", 0.0, 3.0),
                 price("synthetic", 0.0, 1.0),
+                price(FACTOR, 5.0, 3.0),
             ],
             draw: DrawPrice {
                 setup_ms: 1.4,

@@ -44,6 +44,9 @@ pub struct TurnPart {
     pub agent: AgentId,
     /// The reading of the run's clock that it uses. In a pool, readings of two workers may be in another order than their parts.
     pub wall: Duration,
+    /// The most steps of each solve of the step that it prepares, which what was measured has decided; `None` for as many as the laws take, and of
+    /// other parts.
+    pub factors_max: Option<u32>,
 }
 
 /// Where the parts of turns are written down.
@@ -121,8 +124,17 @@ impl TurnOrder {
 impl<'a> Held<'a> {
     /// Notes the part that is made now.
     pub(super) fn note(&mut self, kind: PartKind, agent: AgentId, wall: Duration) {
+        self.push(TurnPart { kind, agent, wall, factors_max: None });
+    }
+
+    /// Notes the first part of a turn, which has decided how far solves go.
+    pub(super) fn note_prepared(&mut self, agent: AgentId, wall: Duration, factors_max: Option<u32>) {
+        self.push(TurnPart { kind: PartKind::Prepare, agent, wall, factors_max });
+    }
+
+    fn push(&mut self, part: TurnPart) {
         if !self.order.closed.load(Acquire) {
-            self.parts.list.push(TurnPart { kind, agent, wall });
+            self.parts.list.push(part);
         }
     }
 

@@ -9,9 +9,9 @@
 
 use super::agent_clock::{LAG_CAP, Start, Timeline};
 use super::agent_runner::{AgentRunner, Effort, PendingTurn, StepOutcome, contained};
-use super::cluster::{Leap, Span, StepPlan};
+use super::cluster::{Leap, SolveBound, Span, StepPlan};
 use super::events::EventKind;
-use super::turn_order::{Held, PartKind};
+use super::turn_order::Held;
 use metachron_core::{Resolution, SimSpan};
 use std::time::Duration;
 
@@ -23,6 +23,13 @@ pub(super) enum Prepared {
     Waits(Effort),
     /// It is to make this step.
     Steps(PreparedTurn),
+}
+
+impl Prepared {
+    /// The most steps of each solve of the step that it is to make.
+    fn factors_max(&self) -> Option<u32> {
+        if let Self::Steps(turn) = self { turn.step.factors_max() } else { None }
+    }
 }
 
 /// A turn whose step is to be made.
@@ -52,7 +59,7 @@ impl AgentRunner {
     /// Steps at wall time `wall`, with all agents it leads, or waits for peers that are behind: the cost of that, or `None` if it failed
     /// and is parked now.
     pub fn begin(&mut self, timeline: &Timeline, wall: Duration) -> Option<Effort> {
-        match self.prepare(timeline, wall) {
+        match self.prepare(timeline, wall, SolveBound::Decided) {
             Prepared::Parked => None,
             Prepared::Waits(effort) => Some(effort),
             Prepared::Steps(turn) => {
@@ -65,8 +72,9 @@ impl AgentRunner {
     /// As [`Self::begin`], in the order that `held` notes, if there is one.
     pub fn begin_in<'a>(&mut self, timeline: &Timeline, wall: Duration, held: Option<Held<'a>>) -> Begun<'a> {
         let Some(mut held) = held else { return Begun { effort: self.begin(timeline, wall), held: None } };
-        held.note(PartKind::Prepare, self.id(), wall);
-        let (effort, held) = match self.prepare(timeline, wall) {
+        let prepared = self.prepare(timeline, wall, SolveBound::Decided);
+        held.note_prepared(self.id(), wall, prepared.factors_max());
+        let (effort, held) = match prepared {
             Prepared::Parked => (None, held),
             Prepared::Waits(effort) => (Some(effort), held),
             Prepared::Steps(turn) => {
@@ -78,10 +86,10 @@ impl AgentRunner {
     }
 
     /// The first part of a turn, at wall time `wall`.
-    pub fn prepare(&mut self, timeline: &Timeline, wall: Duration) -> Prepared {
+    pub fn prepare(&mut self, timeline: &Timeline, wall: Duration, bound: SolveBound) -> Prepared {
         self.shared.sleep.clear_wake(self.id());
         self.admit_arrivals();
-        contained(|| self.attempt(timeline, wall)).unwrap_or_else(|reason| {
+        contained(|| self.attempt(timeline, wall, bound)).unwrap_or_else(|reason| {
             self.fail(reason, timeline, wall);
             Prepared::Parked
         })
@@ -111,7 +119,7 @@ impl AgentRunner {
         self.disband(timeline, wall);
     }
 
-    fn attempt(&mut self, timeline: &Timeline, wall: Duration) -> Result<Prepared, String> {
+    fn attempt(&mut self, timeline: &Timeline, wall: Duration, bound: SolveBound) -> Result<Prepared, String> {
         self.take_commands()?;
         let now = timeline.sim_at(wall);
         let near = self.keeps_common_time(now, self.pace.is_late(timeline, wall));
@@ -140,7 +148,11 @@ impl AgentRunner {
                 Err(reason) => self.exclude(reason)?,
             }
         };
-        let led = self.led.members_at(time).count() as u32;
+        let factors_max = match bound {
+            SolveBound::Decided => self.factors_within(timeline, start.late, step.dt()),
+            SolveBound::Given(factors_max) => factors_max,
+        };
+        let (step, led) = (step.within(factors_max), self.led.members_at(time).count() as u32);
         Ok(Prepared::Steps(PreparedTurn { timeline: *timeline, wall, step, start, wanted, resolution, led, alone }))
     }
 
@@ -149,10 +161,10 @@ impl AgentRunner {
         turn: &PreparedTurn,
         made: Result<StepOutcome, String>,
     ) -> Result<(PendingTurn, Effort), String> {
-        let PreparedTurn { timeline, wall, start, wanted, resolution, led, alone, .. } = *turn;
+        let PreparedTurn { timeline, wall, step, start, wanted, resolution, led, alone } = *turn;
         let (StepOutcome { report, dt }, led) = match made {
             Ok(outcome) => (outcome, led),
-            Err(reason) => self.step_without_failed(reason, wanted)?,
+            Err(reason) => self.step_without_failed(reason, wanted, step.factors_max())?,
         };
         if start.dropped > SimSpan::ZERO {
             self.tell(EventKind::RateMissed);

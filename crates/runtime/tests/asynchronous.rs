@@ -7,7 +7,8 @@ use metachron_core::{AgentId, Anchor, Archive, Body, PairKind, SimSpan, Snapshot
 use metachron_geometry::{Obstacle, Solid};
 use metachron_models::rigid::{RigidBody, RigidSpec};
 use metachron_runtime::{
-    AgentSpawn, DrawPrice, Faults, Lockstep, Machine, Priority, Run, StepPrice, SystemClock, Threads, TimelineCommand,
+    AgentSpawn, DrawPrice, FACTOR, Faults, Lockstep, Machine, Priority, Run, StepPrice, SystemClock, Threads,
+    TimelineCommand,
 };
 use std::sync::Arc;
 use std::time::Duration;
@@ -15,7 +16,7 @@ use std::time::Duration;
 const GRAVITY: DVec3 = DVec3::new(0.0, 0.0, -9.81);
 
 fn machine() -> Machine {
-    let price = StepPrice { model: "rigid".into(), base_us: 1.0, unit_us: 0.0 };
+    let price = |what: &'static str, base_us| StepPrice { model: what.into(), base_us, unit_us: 0.0 };
     let draw = DrawPrice {
         setup_ms: 0.0,
         pixel_ns: 0.0,
@@ -23,7 +24,7 @@ fn machine() -> Machine {
         objects: Default::default(),
         strokes: Default::default(),
     };
-    Machine { cores: 4, steps: vec![price], draw, ..Machine::default() }
+    Machine { cores: 4, steps: vec![price("rigid", 1.0), price(FACTOR, 0.0)], draw, ..Machine::default() }
 }
 
 fn body(name: &str, solid: Solid, height_m: f64, mass_kg: f64, rate_hz: f64) -> AgentSpawn {

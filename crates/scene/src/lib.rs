@@ -38,9 +38,9 @@ use build::{Objects, SceneContext};
 use check::{Checker, Place, allowed};
 use diagnostic::Problem;
 use document::Document;
-use format::{ContactsFile, SceneFile, WorldFile};
+use format::{ContactsFile, SceneFile, SolvesFile, WorldFile};
 use glam::DVec3;
-use metachron_contact::detect::DEPTH_RANGE_M;
+use metachron_contact::detect::{DEPTH_RANGE_M, LEAST_STEPS_DEFAULT, LEAST_STEPS_RANGE, SolveBudget};
 use metachron_contact::solve::DEPTH_DEFAULT_M;
 use metachron_world::Scene;
 use metachron_world::kinds::ExecutorKind;
@@ -148,6 +148,7 @@ fn assemble(c: &mut Checker<'_, '_>, source: &Source, file: SceneFile, gravity: 
         let range = allowed(DEPTH_RANGE_M, "m");
         c.number(&Place::new("world", "of `[world]`"), "contact_depth_m", depth_m, &range)
     });
+    let contact_budget = contact_budget(c, file.world.as_ref());
     let environment = file.world.as_ref().and_then(|world| world.environment).unwrap_or_default();
     Scene {
         name: source.name().to_owned(),
@@ -170,6 +171,7 @@ fn assemble(c: &mut Checker<'_, '_>, source: &Source, file: SceneFile, gravity: 
         walls,
         contacts: contacts != Some(ContactsFile::Whether(false)),
         contact_depth_m,
+        contact_budget,
         joints: joints.into(),
         joint_names,
         sensors,
@@ -177,5 +179,17 @@ fn assemble(c: &mut Checker<'_, '_>, source: &Source, file: SceneFile, gravity: 
         probes,
         overlaps: Vec::new(),
         moved: Vec::new(),
+    }
+}
+
+/// How far the solves of contacts go.
+fn contact_budget(c: &mut Checker<'_, '_>, world: Option<&WorldFile>) -> SolveBudget {
+    let least = world.and_then(|world| world.contact_least_steps).map_or(LEAST_STEPS_DEFAULT, |steps| {
+        let range = allowed(f64::from(*LEAST_STEPS_RANGE.start())..=f64::from(*LEAST_STEPS_RANGE.end()), "");
+        c.number(&Place::new("world", "of `[world]`"), "contact_least_steps", f64::from(steps), &range) as u32
+    });
+    match world.and_then(|world| world.contact).unwrap_or_default() {
+        SolvesFile::Budget => SolveBudget::Timed { least_steps: least },
+        SolvesFile::Exact => SolveBudget::Exact,
     }
 }

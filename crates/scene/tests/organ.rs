@@ -3,8 +3,8 @@
 
 use metachron_core::SimSpan;
 use metachron_scene::{Source, load};
-use metachron_world::World;
 use metachron_world::kinds::ExecutorKind;
+use metachron_world::{SolveBudget, World};
 use std::path::Path;
 
 #[test]
@@ -12,7 +12,8 @@ fn the_finest_organ_is_solved_by_gradients_with_a_rigid_ball_on_it() {
     let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../scenes/organ.toml");
     let source = Source::memory("organ", &std::fs::read(file).unwrap()).unwrap();
     let finest = [("object.organ.eps_m".to_owned(), "0.014".to_owned())];
-    let scene = load(&source, &finest).unwrap();
+    let mut scene = load(&source, &finest).unwrap();
+    scene.contact_budget = SolveBudget::Exact;
     let world = World::start(&scene, ExecutorKind::Lockstep).unwrap();
     world.advance(SimSpan::from_millis(400));
     let state = |name: &str| world.latest(world.object(name).unwrap()).unwrap();

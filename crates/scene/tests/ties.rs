@@ -4,7 +4,7 @@ use metachron_core::{AgentId, AttachmentEventKind, AttachmentId, Body, SimSpan};
 use metachron_scene::{SceneError, Source, load};
 use metachron_world::couplings::CouplingKind;
 use metachron_world::kinds::ExecutorKind;
-use metachron_world::{Scene, Spec, World};
+use metachron_world::{Scene, SolveBudget, Spec, World};
 
 /// The leader of each agent before the first step.
 fn leaders(scene: &Scene) -> Vec<u32> {
@@ -244,4 +244,31 @@ fn the_world_says_how_deep_contacts_rest() {
     let SceneError { problems, .. } = load(&source, &[]).unwrap_err();
     let said = format!("{}; {}", problems[0].message, problems[0].expected);
     assert!(said.contains("`contact_depth_m` of `[world]` is 0.1") && said.contains("0.000001 to 0.001 m"), "{said}");
+}
+
+#[test]
+fn the_world_says_how_far_solves_go() {
+    let budget = |text: &str| balls(text).contact_budget;
+    assert_eq!(budget(""), SolveBudget::Timed { least_steps: 5 });
+    assert_eq!(
+        budget("world.contact = \"budget\"\nworld.contact_least_steps = 12"),
+        SolveBudget::Timed { least_steps: 12 }
+    );
+    assert_eq!(budget("world.contact = \"exact\""), SolveBudget::Exact);
+    for (line, expected) in [
+        ("world.contact_least_steps = 0", ["`contact_least_steps` of `[world]` is 0", "1 to 400"]),
+        ("world.contact_least_steps = 401", ["`contact_least_steps` of `[world]` is 401", "1 to 400"]),
+        ("world.contact = \"rough\"", ["rough", "exact"]),
+    ] {
+        let source = Source::memory("wrong", format!("format = 1\n{line}").as_bytes()).unwrap();
+        let SceneError { problems, .. } = load(&source, &[]).unwrap_err();
+        let said = format!("{}; {}", problems[0].message, problems[0].expected);
+        assert!(expected.iter().all(|part| said.contains(part)), "{said}");
+    }
+}
+
+#[test]
+fn a_machine_declares_what_a_factor_costs() {
+    let steps = balls("machine.step.factor = { base_us = 7, unit_us = 2 }").machine.steps;
+    assert_eq!(steps, [("factor".to_owned(), Some(7.0), Some(2.0))]);
 }

@@ -29,8 +29,8 @@ pub use commands::{Command, Group, MOUSE, SHORTCUTS, Shortcut, keys_text};
 pub use history::{FrameSummary, History};
 pub use native_window::{WindowEnd, WindowError, WindowOptions, run_window};
 pub use protocol::{
-    Action, AgentRow, AgentState, Bounds, CouplingRow, Filled, Forces, FrameTimes, HandStatus, Law, Look, Message,
-    Severity, Shares, Simulation, Skip, Status, Tuning, TurnRow, ViewRequest,
+    Action, AgentRow, AgentState, Bounds, ContactSolve, CouplingRow, Filled, Forces, FrameTimes, HandStatus, Law, Look,
+    Message, Severity, Shares, Simulation, Skip, Status, Tuning, TurnRow, ViewRequest,
 };
 
 use egui::{Frame, Margin, Panel, Rect, Sense, Ui};

@@ -2,7 +2,7 @@
 //!
 //! In: a [`Session`]. Out: a [`Status`]. Never here: how panels look.
 
-use crate::ui::{AgentRow, AgentState, CouplingRow, Filled, Law, Shares, Status, TurnRow};
+use crate::ui::{AgentRow, AgentState, ContactSolve, CouplingRow, Filled, Law, Shares, Status, TurnRow};
 use metachron_core::{SimTime, Snapshot};
 use metachron_lod::control;
 use metachron_lod::control::Policy;
@@ -188,6 +188,12 @@ fn fill_row(row: &mut AgentRow, stats: &AgentStats, newest: &Snapshot) {
     row.step_s = stats.work_s;
     row.dropped_s = stats.dropped.as_secs_f64();
     row.leader = newest.cluster.map(|cluster| cluster.leader);
+    row.contact = newest.cluster.and_then(|cluster| cluster.solves).map(|solves| ContactSolve {
+        level: solves.level,
+        factors: solves.last_factors,
+        miss_m_s: solves.miss_m_s,
+        depth_m: solves.depth_m,
+    });
     row.residual_m = stats.residual_m;
     row.force_n = newest.body.tool().map(|tool| tool.force_n);
     row.state = match &stats.state {

@@ -65,6 +65,7 @@ pub(super) fn surroundings(scene: &Scene) -> Result<Arc<ClusterScene>, WorldErro
     scene.obstacles.iter().try_for_each(check_surface)?;
     let among = ClusterScene::new(&scene.obstacles).map_err(|error| failed(error.to_string()))?;
     let among = among.resting_at(scene.contact_depth_m).map_err(|error| failed(error.to_string()))?;
+    let among = among.within(scene.contact_budget).map_err(|error| failed(error.to_string()))?;
     let passages = scene.held_through().map(|(body, solid)| Passage { body, solid: solid as u32 });
     let among = among.with_passages(passages);
     among.jointed(Arc::clone(&scene.joints)).map(Arc::new).map_err(|error| failed(error.to_string()))

@@ -15,6 +15,7 @@ use super::kinds::{
 use super::scene::{Appearance, Factors, Gains, Machine, Member, PaceWish, RENDER_SCALE, Scene, Spec, Target};
 use glam::{DQuat, DVec3};
 use metachron_contact::Agent;
+use metachron_contact::detect::{LEAST_STEPS_DEFAULT, SolveBudget};
 use metachron_contact::solve::DEPTH_DEFAULT_M;
 use metachron_core::{AgentId, N_MAX, Resolution, ResolutionRange, SimSpan};
 use metachron_geometry::{Cells, Obstacle, Solid};
@@ -99,6 +100,7 @@ pub enum SceneBuildError {
 pub struct SceneBuilder {
     gravity: DVec3,
     contact_depth_m: f64,
+    contact_budget: SolveBudget,
     fixed: Vec<Obstacle>,
     parts: Vec<(String, Part)>,
     joints: Vec<Joined>,
@@ -192,6 +194,7 @@ impl SceneBuilder {
         Self {
             gravity: GRAVITY_DEFAULT,
             contact_depth_m: DEPTH_DEFAULT_M,
+            contact_budget: SolveBudget::Timed { least_steps: LEAST_STEPS_DEFAULT },
             fixed: Vec::new(),
             parts: Vec::new(),
             joints: Vec::new(),
@@ -210,6 +213,13 @@ impl SceneBuilder {
     #[must_use]
     pub fn contact_depth_m(mut self, contact_depth_m: f64) -> Self {
         self.contact_depth_m = contact_depth_m;
+        self
+    }
+
+    /// How far the solves of contacts go in a run that goes by a clock; default: as far as there is time, five steps at least.
+    #[must_use]
+    pub fn contact_budget(mut self, contact_budget: SolveBudget) -> Self {
+        self.contact_budget = contact_budget;
         self
     }
 
@@ -276,7 +286,7 @@ impl SceneBuilder {
     /// [`SceneBuildError`].
     pub fn build(self) -> Result<Scene, SceneBuildError> {
         self.check_names()?;
-        let Self { gravity, contact_depth_m, fixed, parts, joints, sensors } = self;
+        let Self { gravity, contact_depth_m, contact_budget, fixed, parts, joints, sensors } = self;
         let obstacles: Arc<[Obstacle]> = fixed.into();
         let ids = (0..).map(AgentId);
         let agents: Result<Vec<_>, _> =
@@ -319,6 +329,7 @@ impl SceneBuilder {
             walls: 0..0,
             contacts: true,
             contact_depth_m,
+            contact_budget,
             joints: joints?,
             joint_names,
             sensors,

@@ -20,7 +20,7 @@ use std::time::Duration;
 /// The first bytes of every file.
 const MAGIC: [u8; 8] = *b"METACREC";
 /// The version of the format: it changes with what the bytes mean.
-const FORMAT: u32 = 5;
+const FORMAT: u32 = 6;
 /// Bytes of a chunk before its contents: length, its complement and checksum.
 const CHUNK_HEAD: usize = 4 + 4 + 8;
 /// So many entries are written at once: a process that is killed loses the newest ones, about a second of a frame loop.
@@ -98,16 +98,17 @@ struct PackedPart {
     agent: AgentId,
     /// Readings of two clocks of a pool may be in another order than what was made with them.
     after_ns: i64,
+    factors_max: Option<u32>,
 }
 
 impl PackedTurns {
     fn pack(parts: &[TurnPart]) -> Self {
         let from = parts.first().map_or(Duration::ZERO, |part| part.wall);
         let mut before = from;
-        let pack = |TurnPart { kind, agent, wall }: &TurnPart| {
+        let pack = |TurnPart { kind, agent, wall, factors_max }: &TurnPart| {
             let after_ns = nanos(*wall) - nanos(before);
             before = *wall;
-            PackedPart { kind: *kind, agent: *agent, after_ns }
+            PackedPart { kind: *kind, agent: *agent, after_ns, factors_max: *factors_max }
         };
         Self { from, parts: parts.iter().map(pack).collect() }
     }
@@ -115,9 +116,10 @@ impl PackedTurns {
     /// The parts, in their order.
     pub fn parts(&self) -> impl Iterator<Item = TurnPart> + '_ {
         let mut wall_ns = nanos(self.from);
-        self.parts.iter().map(move |PackedPart { kind, agent, after_ns }| {
+        self.parts.iter().map(move |PackedPart { kind, agent, after_ns, factors_max }| {
             wall_ns = wall_ns.saturating_add(*after_ns);
-            TurnPart { kind: *kind, agent: *agent, wall: Duration::from_nanos(wall_ns.max(0) as u64) }
+            let wall = Duration::from_nanos(wall_ns.max(0) as u64);
+            TurnPart { kind: *kind, agent: *agent, wall, factors_max: *factors_max }
         })
     }
 }

@@ -14,6 +14,7 @@ use super::sensors::Sensor;
 use glam::DVec3;
 #[cfg(doc)]
 use metachron_contact::detect::DEPTH_RANGE_M;
+use metachron_contact::detect::SolveBudget;
 use metachron_core::{AgentId, Resolution, ResolutionRange, SimSpan};
 use metachron_geometry::{Cells, Model, Motion, Obstacle, Placement, Texture};
 use metachron_models::rigid::Joint;
@@ -71,6 +72,8 @@ pub struct Scene {
     pub contacts: bool,
     /// How deep what lies on each other rests, metres ([`DEPTH_RANGE_M`]).
     pub contact_depth_m: f64,
+    /// How far the solves of contacts go.
+    pub contact_budget: SolveBudget,
     /// Joints between rigid agents.
     pub joints: Arc<[Joint]>,
     /// Their names, in their order; empty where a joint has none.
@@ -197,7 +200,7 @@ pub struct Machine {
     pub preset: String,
     /// Cores shared by agents and frames, 1 … 4096.
     pub cores: Option<u32>,
-    /// Costs of steps by model: (model, base in µs, µs per unit of work).
+    /// Costs of steps by model, and of factors of contacts by [`metachron_runtime::FACTOR`]: (name, base in µs, µs per unit of work).
     pub steps: Vec<(String, Option<f64>, Option<f64>)>,
     /// Milliseconds per frame.
     pub draw_setup_ms: Option<f64>,

@@ -10,7 +10,9 @@ use metachron_core::{Anchor, SimSpan, SimTime, Snapshot, StepError, StepReport};
 use metachron_geometry::Solid;
 use metachron_runtime::{Demand, Governor, TimelineCommand, TurnMeasure};
 use metachron_world::kinds::ExecutorKind;
-use metachron_world::{Command, Custom, EventFilter, Happening, Member, Pace, Recording, Rigid, Scene, Tube, World};
+use metachron_world::{
+    Command, Custom, EventFilter, Happening, Member, Pace, Recording, Rigid, Scene, SolveBudget, Tube, World,
+};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering::SeqCst};
 use std::thread;
@@ -244,5 +246,32 @@ fn a_recording_that_ends_with_its_world_has_the_steps_that_were_in_progress() {
         let recording = kept.read().unwrap();
         assert_eq!((steps, recording.hash()), (1, Some(world.hash())), "{executor:?}");
         assert_eq!(replayed(&scene, recording).hash(), world.hash(), "{executor:?}");
+    }
+}
+
+/// Boxes that fall on each other, one cluster from the start, with so many steps for each solve in any case.
+fn pile(least_steps: u32) -> Scene {
+    let empty = Scene::builder().fixed("floor", Solid::Plane).contact_budget(SolveBudget::Timed { least_steps });
+    let places = (0..27_u32).map(|k| [k % 3, k / 3 % 3, k / 9].map(f64::from));
+    let scene = places.fold(empty, |scene, [x, y, z]| {
+        let at = [0.101 * x + 0.02 * z, 0.101 * y, 0.05 + 0.103 * z];
+        scene.add(format!("{x} {y} {z}"), Rigid::cuboid([0.05; 3]).at(at).rate_hz(500.0))
+    });
+    scene.build().unwrap()
+}
+
+#[test]
+fn a_replay_takes_from_the_recording_how_far_solves_went() {
+    for executor in EXECUTORS {
+        let world = World::start(&pile(1), executor).unwrap();
+        let kept = recorded(&world);
+        world.advance(ms(500));
+        assert!(world.end_recording().unwrap());
+        let solves = world.agents()[0].latest().cluster.and_then(|cluster| cluster.solves).unwrap();
+        assert!(solves.unfinished > 0 && solves.contacts > 50, "the budget ends some: {solves:?}");
+        let recording = kept.read().unwrap();
+        let hash = recording.hash();
+        // by itself it would go on to the end
+        assert_eq!(Some(replayed(&pile(400), recording).hash()), hash, "{executor:?}");
     }
 }

@@ -80,8 +80,14 @@ class Object:
 class Scene:
     """A scene, complete or in the making."""
 
-    def __new__(cls, *, gravity: Numbers | None = None) -> Self:
-        """An empty scene; gravity in m/s2, by default 9.81 along -z."""
+    def __new__(
+        cls, *, gravity: Numbers | None = None, contact: Literal["budget", "exact"] = ..., contact_least_steps: int = ...
+    ) -> Self:
+        """An empty scene; gravity in m/s2, by default 9.81 along -z.
+
+        In real time, and in lockstep at the pace "real-time", solves of contact go as far as there is time, and `contact_least_steps` (1 to 400)
+        in any case, or to their end: `contact="exact"`. At the free pace they go to their end.
+        """
 
     @staticmethod
     def from_toml(text_or_path: str | PathLike[str]) -> Scene:
@@ -299,6 +305,11 @@ class State:
 
     @property
     def at_rest(self) -> bool: ...
+    @property
+    def contact_solve(self) -> tuple[Literal["kept", "near", "polished", "interior"], int, float, float] | None:
+        """Of the leader of what touches or is joined, how its last step was solved: level, factors, by how much the answers
+        miss the laws, m/s, and the deepest overlap, m."""
+
     @property
     def energy(self) -> float:
         """Kinetic, elastic and that of gravity, J."""

@@ -22,7 +22,9 @@ pub(crate) use pair::{Judge, Owner, Round};
 use pair::{Skinned, closes, taken_up};
 use reach::Boxes;
 use reach::{FAR_M, Meeting, Sought, Sweep, Sweeping};
-pub use scene::{BadDepth, ClusterScene, DEPTH_RANGE_M, Passage};
+pub use scene::{
+    BadDepth, BadLeastSteps, ClusterScene, DEPTH_RANGE_M, LEAST_STEPS_DEFAULT, LEAST_STEPS_RANGE, Passage, SolveBudget,
+};
 pub(crate) use sensor::Sensed;
 use thinning::Thinning;
 

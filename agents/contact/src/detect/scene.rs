@@ -1,4 +1,4 @@
-//! What never changes around all clusters of a scene: static solids, joints, how deep contacts rest.
+//! What never changes around all clusters of a scene: static solids, joints, how deep contacts rest, how far their solves go.
 //!
 //! In: the obstacles and joints of a scene. Out: the same, ready for searches; shared by all clusters. Never here: what moves.
 
@@ -14,6 +14,7 @@ use std::sync::Arc;
 #[derive(Debug)]
 pub struct ClusterScene {
     depth_m: f64,
+    budget: SolveBudget,
     statics: Vec<StaticSolid>,
     joints: Arc<[Joint]>,
     /// Numbers of joints, by their first bodies and then by themselves.
@@ -37,6 +38,36 @@ pub struct Passage {
 /// a solve; above it bodies are seen to lie in each other.
 pub const DEPTH_RANGE_M: RangeInclusive<f64> = 1e-6..=1e-3;
 
+/// How far the solves of a scene's contacts go.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum SolveBudget {
+    /// Until all laws hold, whatever that takes.
+    Exact,
+    /// As far as there is time in the macro step, in a run that goes by a clock.
+    Timed {
+        /// How many steps each solve may make in any case, within [`LEAST_STEPS_RANGE`]. After five an answer is safe.
+        least_steps: u32,
+    },
+}
+
+/// How many steps a solve may be granted in any case. No solve makes more than the most of them.
+pub const LEAST_STEPS_RANGE: RangeInclusive<u32> = 1..=400;
+
+/// How many each is granted where nothing else is said: after so many from interior points contacts are some hundredths of a millimetre deeper.
+pub const LEAST_STEPS_DEFAULT: u32 = 5;
+
+/// A least number of steps outside its range.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+#[error(
+    "a solve would be granted {least_steps} steps at least; it must be {} to {}",
+    LEAST_STEPS_RANGE.start(),
+    LEAST_STEPS_RANGE.end()
+)]
+pub struct BadLeastSteps {
+    /// The number given.
+    pub least_steps: u32,
+}
+
 /// A depth outside its range.
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
 #[error("contacts would rest {depth_m} m deep; it must be {} to {} m", DEPTH_RANGE_M.start(), DEPTH_RANGE_M.end())]
@@ -49,6 +80,7 @@ impl Default for ClusterScene {
     fn default() -> Self {
         Self {
             depth_m: DEPTH_DEFAULT_M,
+            budget: SolveBudget::Exact,
             statics: Vec::new(),
             joints: Arc::default(),
             by_body: Vec::new(),
@@ -98,6 +130,25 @@ impl ClusterScene {
     /// [`BadDepth`] outside [`DEPTH_RANGE_M`].
     pub fn resting_at(self, depth_m: f64) -> Result<Self, BadDepth> {
         if DEPTH_RANGE_M.contains(&depth_m) { Ok(Self { depth_m, ..self }) } else { Err(BadDepth { depth_m }) }
+    }
+
+    /// The same with solves that go as far as `budget` says; without it they are exact.
+    ///
+    /// # Errors
+    /// [`BadLeastSteps`] outside [`LEAST_STEPS_RANGE`].
+    pub fn within(self, budget: SolveBudget) -> Result<Self, BadLeastSteps> {
+        match budget {
+            SolveBudget::Timed { least_steps } if !LEAST_STEPS_RANGE.contains(&least_steps) => {
+                Err(BadLeastSteps { least_steps })
+            }
+            _ => Ok(Self { budget, ..self }),
+        }
+    }
+
+    /// How far solves go.
+    #[must_use]
+    pub const fn budget(&self) -> SolveBudget {
+        self.budget
     }
 
     /// How deep contacts rest, metres.

@@ -36,6 +36,12 @@ impl StepDoubling {
         self.stepper.archive(archive)
     }
 
+    /// Bounds its solves as those of the step that it repeats ([`ClusterStepper::set_factors_max`]): it costs no more, and what a bound leaves is
+    /// no error of the time step.
+    pub fn set_factors_max(&mut self, most: Option<u32>) {
+        self.stepper.set_factors_max(most);
+    }
+
     /// Begins a row: what steps so far were off by no longer counts.
     pub fn begin_row(&mut self) {
         self.row.clear();

@@ -79,6 +79,12 @@ impl Play {
         Ok(Self { scene: self.scene.jointed(joints.into()).context("the joints")?, ..self })
     }
 
+    /// The same with at most so many factors of each solve; `None` for as many as the laws of contact take.
+    pub(super) fn within(mut self, factors_max: Option<u32>) -> Self {
+        self.stepper.set_factors_max(factors_max);
+        self
+    }
+
     /// The time so far, seconds.
     pub(super) fn time_s(&self) -> f64 {
         self.time.as_secs_f64()

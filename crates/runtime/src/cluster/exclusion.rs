@@ -37,16 +37,22 @@ impl AgentRunner {
         Ok(())
     }
 
-    /// Makes a step of the `wanted` length after one that was not made for `reason`, without those who are to blame; how many step with it.
+    /// Makes a step of the `wanted` length after one that was not made for `reason`, without those who are to blame, each solve by at most so many
+    /// steps; how many step with it.
     ///
     /// # Errors
     /// Why it is to be parked itself.
-    pub fn step_without_failed(&mut self, reason: String, wanted: SimSpan) -> Result<(StepOutcome, u32), String> {
+    pub fn step_without_failed(
+        &mut self,
+        reason: String,
+        wanted: SimSpan,
+        factors_max: Option<u32>,
+    ) -> Result<(StepOutcome, u32), String> {
         let mut reason = reason;
         // each time fewer are left
         loop {
             self.exclude(reason)?;
-            match self.step_alone(Span::Wanted(wanted)) {
+            match self.step_alone(Span::Wanted(wanted), factors_max) {
                 Ok(outcome) => {
                     let time = self.pace.time();
                     return Ok((outcome, self.led.members_at(time).count() as u32));

@@ -118,15 +118,22 @@ impl ClusterSeat {
 }
 
 impl AgentRunner {
-    /// Steps all that it leads and that are at its time, with itself, as one problem.
+    /// Steps all that it leads and that are at its time, with itself, as one problem, each solve of it by at most so many steps.
     ///
     /// # Errors
     /// The reason why a member cannot go on: nobody has moved.
-    pub(super) fn step_cluster(&mut self, plan: Plan, dt: SimSpan) -> Result<StepOutcome, String> {
+    pub(super) fn step_cluster(
+        &mut self,
+        plan: Plan,
+        factors_max: Option<u32>,
+        dt: SimSpan,
+    ) -> Result<StepOutcome, String> {
         let (id, steps) = (self.shared.id, self.metrics.turns());
         let Some(mut lent) = self.cluster.as_mut().map(|seat| seat.lend(steps, id)) else {
             return Err(NO_SEAT.to_owned());
         };
+        lent.stepper.set_factors_max(factors_max);
+        lent.doubling.iter_mut().for_each(|doubling| doubling.set_factors_max(factors_max));
         let attempt = self.try_macro_step(&mut lent, plan, dt);
         if let Some(reason) = attempt.made.as_ref().err().or(attempt.rests.as_ref().err()) {
             self.each_member(|actor| actor.model.note_unwound(reason));

@@ -3,11 +3,13 @@
 //! In: a stepper after a macro step. Out: what each member's seat publishes. Never here: the step itself.
 
 use super::attachments::held_by_links;
+use super::solve_budget::Solved;
 use super::{AgentRunner, ClusterSeat};
 use metachron_contact::member::Partner;
+use metachron_contact::solve::Level;
 use metachron_contact::step::{ClusterReport, ClusterStepper, PairTotal, StepDoubling};
 use metachron_core::step_doubling::drift_m;
-use metachron_core::{AgentId, ClusterState, JointEffort, PairKind, PairState, SimSpan, SimTime};
+use metachron_core::{AgentId, ClusterState, JointEffort, PairKind, PairState, SimSpan, SimTime, SolveLevel};
 
 impl ClusterSeat {
     /// Notes what it and `with` gave each other in a step of `dt_s` seconds: by contact, or by one of the links between them.
@@ -28,18 +30,30 @@ impl ClusterSeat {
     }
 }
 
+/// The level of a solve as it is published.
+const fn level_of(level: Level) -> SolveLevel {
+    match level {
+        Level::Kept => SolveLevel::Kept,
+        Level::Near => SolveLevel::Near,
+        Level::Polished => SolveLevel::Polished,
+        Level::Interior => SolveLevel::Interior,
+    }
+}
+
 impl AgentRunner {
     /// Notes how the step was made and solved.
     pub(super) fn note_solves(&mut self, report: &ClusterReport, dt: SimSpan) {
         let (leader, step_s) = (self.shared.id, dt.as_secs_f64());
         let Some(seat) = &mut self.cluster else { return };
-        let ClusterReport { contacts, factors, products, unfinished, depth_m, .. } = *report;
+        let ClusterReport { contacts, factors, products, unfinished, level, miss_m_s, depth_m, .. } = *report;
+        seat.solved = Some(Solved::from(report));
         let solves = &mut seat.solves;
         solves.contacts = contacts;
         solves.problems += u64::from(report.fine_steps);
         solves.factors += u64::from(factors);
         solves.products += u64::from(products);
         solves.unfinished += u64::from(unfinished);
+        (solves.level, solves.last_factors, solves.miss_m_s) = (level_of(level), factors, miss_m_s);
         (solves.depth_m, solves.deepest_m) = (depth_m, solves.deepest_m.max(depth_m));
         let mut solves = Some(*solves);
         self.each_member(|actor| {

@@ -71,7 +71,7 @@ impl AgentRunner {
         let mut steps = 0;
         while self.pace.time() < time {
             let span = portion(time.since(self.pace.time()), self.pace.dt(), timeline.is_free());
-            let StepOutcome { dt, .. } = self.step_alone(Span::AtMost(span))?;
+            let StepOutcome { dt, .. } = self.step_alone(Span::AtMost(span), self.least_factors(timeline))?;
             self.write_snapshot(self.pace.time() + dt, false)?;
             self.pace.advance_by(dt);
             let work_s = self.shared.gauges.work_s.get();

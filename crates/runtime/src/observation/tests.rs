@@ -109,7 +109,7 @@ fn laws_and_attachments_are_known_on_both_sides() {
     let mut run = assemble(spawns, Helpers::none()).unwrap();
     let mut seen = |id: usize| {
         let actor = run.actors[id].as_mut().unwrap();
-        actor.step_alone(Span::AtMost(SimSpan::from_nanos(4_000_000))).unwrap();
+        actor.step_alone(Span::AtMost(SimSpan::from_nanos(4_000_000)), None).unwrap();
         let met = actor.observer.neighbours().iter().map(|n| (n.id.0, n.law, n.form.is_some()));
         (met.collect::<Vec<_>>(), actor.links.clone())
     };

@@ -9,7 +9,9 @@ use crate::format::{
 };
 use glam::DVec3;
 use metachron_core::{SimSpan, gains};
-use metachron_world::{Camera, Factors, Gains, Machine, NamedCamera, ObjectCost, Probe, RENDER_SCALE, Target, View};
+use metachron_world::{
+    Camera, FACTOR, Factors, Gains, Machine, NamedCamera, ObjectCost, Probe, RENDER_SCALE, Target, View,
+};
 
 /// Default share of the lag that is reserved for choosing levels: the most that (GB99) needed.
 const OPTIMISER_SHARE: f64 = 0.05;
@@ -280,12 +282,14 @@ fn object_cost(c: &mut Checker<'_, '_>, place: &Place, file: Option<ShadingCostF
 fn step_prices(c: &mut Checker<'_, '_>, place: &Place, file: &MachineFile) -> Vec<(String, Option<f64>, Option<f64>)> {
     let mut steps = Vec::with_capacity(file.step.len());
     for (model, price) in &file.step {
-        let known = model_named(model);
+        let known = if model == FACTOR { Some(FACTOR) } else { model_named(model) };
         if known.is_none() {
             let span = c.document().locate(&format!("machine.step.{model}"));
             let list = MODELS.map(|m| format!("`{m}`")).join(", ");
-            let problem = Problem::new(span, format!("`{model}` in `[machine.step]` is not a model"));
-            c.push(problem.expecting(format!("expected one of {list}")).helped(did_you_mean(model, MODELS)));
+            let problem = Problem::new(span, format!("`{model}` in `[machine.step]` is no model, nor `{FACTOR}`"));
+            c.push(
+                problem.expecting(format!("expected one of {list}, `{FACTOR}`")).helped(did_you_mean(model, MODELS)),
+            );
         }
         let place = place.table(model);
         let mut cost = |key: &str, v: Option<f64>| v.map(|v| c.number(&place, key, v, &allowed(0.0..=1e9, "µs")));

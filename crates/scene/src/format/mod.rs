@@ -26,7 +26,7 @@ pub use joint::{JointFile, JointKind, MotorFile};
 pub use rigid::{Axis, PartFile, PoseKeyFile, RigidFile, Shape};
 pub use scene::{
     CameraFile, CameraFiles, CameraKeyFile, ContactPath, ContactsFile, LoadFile, MachineFile, ModelCostFile, ProbeFile,
-    SceneFile, ShadingCostFile, TargetFile, WorldFile,
+    SceneFile, ShadingCostFile, SolvesFile, TargetFile, WorldFile,
 };
 pub use scenery::{GeneratorKind, GroupFile, MeshFile, MotionFile, TreeFile, TreeLod};
 pub use sensor::{SensorFile, SensorFileKind};

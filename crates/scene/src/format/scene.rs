@@ -87,8 +87,26 @@ pub struct WorldFile {
     /// for bodies below a centimetre, at some more factors a step. What weighs too little to be pressed so deep lies less deep.
     #[schemars(range(min = 1e-6, max = 1e-3))]
     pub contact_depth_m: Option<f64>,
+    /// How far the solves of contacts go. Default `budget`; at the free pace they are exact in any case.
+    pub contact: Option<SolvesFile>,
+    /// How many steps a solve makes in any case where it goes by `budget` and has not come to its end before, 1 … 400. Default 5, after which an
+    /// answer is safe; with more contacts are less deep while bodies land, and turns may take longer than there is time.
+    #[schemars(range(min = 1, max = 400))]
+    pub contact_least_steps: Option<u32>,
     /// Faults injected into the clock and messages of every object.
     pub faults: Option<FaultsFile>,
+}
+
+/// How far the solves of contacts go.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum SolvesFile {
+    /// As far as there is time in a step of all that touch: then contacts are some hundredths of a millimetre deeper. Momentum is exact and no
+    /// energy made at any number of steps.
+    #[default]
+    Budget,
+    /// Until all laws of contact hold, whatever that takes.
+    Exact,
 }
 
 /// Whether objects collide.
@@ -258,7 +276,7 @@ pub struct MachineFile {
     /// Cores that agents and frames share, 1 … 4096.
     #[schemars(range(min = 1, max = 4096))]
     pub cores: Option<u32>,
-    /// Costs of a step of each model, by the model's name.
+    /// Costs of a step of each model, by the model's name, and of a factor of contacts that are solved as one problem, by `factor`.
     #[serde(default)]
     pub step: BTreeMap<String, ModelCostFile>,
     /// Milliseconds per frame before anything is drawn, 0 … 1e4.
@@ -350,7 +368,7 @@ pub struct ModelCostFile {
     /// Microseconds per step, 0 … 1e9.
     pub base_us: Option<f64>,
     /// Microseconds per unit of work (tube: one segment in one solved system, with one or more systems per substep; synthetic: a declared
-    /// microsecond; others: a step), 0 … 1e9.
+    /// microsecond; factor: a contact; others: a step), 0 … 1e9.
     pub unit_us: Option<f64>,
 }
 

@@ -56,6 +56,8 @@ const NAMES: &[&str] = &[
     "/clusters/0/factors",
     "/clusters/0/products",
     "/clusters/0/unfinished",
+    "/clusters/0/level",
+    "/clusters/0/miss_m_s",
     "/clusters/0/depth_m",
     "/clusters/0/depth_wanted_m",
     "/couplings/0/a",

@@ -4,7 +4,7 @@
 //! Never here: egui, a window, the runtime. The viewer knows the rest of metachron through these types only.
 
 use glam::DVec3;
-use metachron_core::{AgentId, Resolution, SimTime};
+use metachron_core::{AgentId, Resolution, SimTime, SolveLevel};
 use metachron_lod::cost::benefit::Sliders;
 use metachron_render::{Camera, Hit, Picture, Ray, Size, Style, ToolForce};
 use metachron_session::RewindStatus;
@@ -383,8 +383,23 @@ pub struct AgentRow {
     pub led_by: Option<String>,
     /// The leader of its cluster, itself included; `None` of an agent that is alone.
     pub leader: Option<AgentId>,
+    /// How the contacts of the cluster that it leads were solved last.
+    pub contact: Option<ContactSolve>,
     /// Present activity.
     pub state: AgentState,
+}
+
+/// How the contacts of a cluster were solved in its last step.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ContactSolve {
+    /// The dearest level of a solve.
+    pub level: SolveLevel,
+    /// Factors of all solves.
+    pub factors: u32,
+    /// What laws of contact and momentum miss at most, m/s.
+    pub miss_m_s: f64,
+    /// The deepest overlap, metres.
+    pub depth_m: f64,
 }
 
 /// A turn of an agent: a step, or a wait for others.
@@ -438,6 +453,7 @@ impl AgentRow {
             residual_m: 0.0,
             force_n: None,
             filled: None,
+            contact: None,
             led_by: None,
             leader: None,
             state: AgentState::Running,

@@ -5,7 +5,7 @@
 use super::DrawingOptions;
 use super::history::{FrameSummary, History};
 use super::plots;
-use super::protocol::{Action, AgentRow, AgentState, Filled, Law, Status, Tuning};
+use super::protocol::{Action, AgentRow, AgentState, ContactSolve, Filled, Law, Status, Tuning};
 use super::text;
 use super::theme::{Palette, palette};
 use egui::{Align, ComboBox, Layout, ProgressBar, RichText, Slider, SliderClamping, Ui};
@@ -283,6 +283,15 @@ fn selected(ui: &mut Ui, row: Option<&AgentRow>, out: &mut Vec<Action>) {
         if wanted_pa != pressure_pa {
             out.push(Action::Pressure { agent: row.id, pressure_pa: wanted_pa });
         }
+    }
+    if let Some(ContactSolve { miss_m_s, depth_m, .. }) = row.contact {
+        let text = format!("{} deep, {}/s off", text::metres(depth_m), text::metres(miss_m_s));
+        value(
+            ui,
+            "Contacts",
+            &text,
+            "The deepest overlap of its cluster, and what laws of contact miss in its last step",
+        );
     }
     if let Some(force_n) = row.force_n {
         value(ui, "Force", &format!("{} N", text::figures(force_n)), "Reaction force of the grasped object");

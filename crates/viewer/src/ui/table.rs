@@ -6,13 +6,13 @@ use super::protocol::{AgentRow, AgentState, Status};
 use super::text;
 use super::theme::{Palette, palette};
 use egui::{Align2, Color32, FontId, Rect, Role, Sense, Ui, WidgetInfo, pos2, vec2};
-use metachron_core::{AgentId, Resolution};
+use metachron_core::{AgentId, Resolution, SolveLevel};
 
 const ROW: f32 = 22.0;
 /// The least width of the table, points.
 const WIDTH_MIN: f32 = 1000.0;
 /// Names of the columns, their relative widths, and whether they hold numbers.
-const COLUMNS: [(&str, f32, bool); 11] = [
+const COLUMNS: [(&str, f32, bool); 12] = [
     ("Agent", 1.5, false),
     ("Model", 0.9, false),
     ("Rate / requested", 1.3, true),
@@ -23,6 +23,7 @@ const COLUMNS: [(&str, f32, bool); 11] = [
     ("Age", 0.85, true),
     ("Step cost", 0.9, true),
     ("CPU", 0.7, true),
+    ("Contact", 1.0, true),
     ("State", 1.3, false),
 ];
 /// A state older than this many of its own periods is stale.
@@ -145,6 +146,7 @@ fn cells(row: &AgentRow) -> [String; COLUMNS.len()] {
         text::seconds(row.age_s),
         text::seconds(row.step_s),
         format!("{:.1} %", 100.0 * row.cpu_share),
+        row.contact.map_or_else(dash, |solve| format!("{}, {}", solve.level.name(), solve.factors)),
         state_text(row),
     ]
 }
@@ -164,7 +166,7 @@ fn state_text(row: &AgentRow) -> String {
 }
 
 fn accessible_text(row: &AgentRow, texts: &[String; COLUMNS.len()]) -> String {
-    format!("{}, {}, {}, dt {}, {}", row.name, row.model, texts[2], texts[3], texts[10])
+    format!("{}, {}, {}, dt {}, {}", row.name, row.model, texts[2], texts[3], texts[COLUMNS.len() - 1])
 }
 
 fn state_color(state: &AgentState, palette: &Palette) -> Color32 {
@@ -185,9 +187,10 @@ fn cell_color(row: &AgentRow, index: usize, palette: &Palette) -> Color32 {
         1 => palette.weak,
         2 if behind => palette.warn,
         7 if stale => palette.warn,
-        10 if matches!(row.state, AgentState::Parked(_)) => palette.bad,
-        10 if row.state == AgentState::Stalled => palette.warn,
-        10 => palette.weak,
+        10 if row.contact.is_some_and(|solve| solve.level == SolveLevel::Interior) => palette.warn,
+        11 if matches!(row.state, AgentState::Parked(_)) => palette.bad,
+        11 if row.state == AgentState::Stalled => palette.warn,
+        11 => palette.weak,
         _ => palette.text.gamma_multiply(0.9),
     }
 }
