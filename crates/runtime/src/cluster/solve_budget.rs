@@ -3,16 +3,8 @@
 //! In: how long its turns took, and how many solves and factors they made. Out: the most factors of each solve of the next one.
 //! Never here: a clock, what a turn takes ([`super::super::turns::Took`] is measured on threads and in pools and declared in lockstep), the solve.
 
-use super::super::agent_clock::Timeline;
-use super::super::agent_runner::AgentRunner;
-use super::super::turns::Took;
-use metachron_contact::detect::{LEAST_STEPS_RANGE, SolveBudget};
+use metachron_contact::detect::LEAST_STEPS_RANGE;
 use metachron_contact::step::ClusterReport;
-use metachron_core::SimSpan;
-use std::time::Duration;
-
-/// The share of a macro step that its turn may take: the rest is for what turns take longer now and then.
-const TURN_SHARE: f64 = 0.8;
 
 /// A turn counts as much as the mean of so many before it.
 const TURNS_KEPT: u32 = 16;
@@ -107,39 +99,6 @@ impl From<&ClusterReport> for Solved {
             factors: report.factors,
             products: report.products,
             contacts: report.contacts.saturating_sub(report.pile_contacts),
-        }
-    }
-}
-
-impl AgentRunner {
-    /// The most steps of each solve in a macro step of `dt` that begins `late`; `None` for as many as the laws take.
-    pub fn factors_within(&self, timeline: &Timeline, late: Duration, dt: SimSpan) -> Option<u32> {
-        let least = self.least_factors(timeline)?;
-        let turn_s = TURN_SHARE * timeline.wall_span(dt).as_secs_f64() - late.as_secs_f64();
-        self.cluster.as_ref()?.price.factors_max(turn_s, least)
-    }
-
-    /// The steps that each solve may make in any case: all that one may that is behind its leader. `None` where nothing bounds them: at the free
-    /// pace there is time for all.
-    pub fn least_factors(&self, timeline: &Timeline) -> Option<u32> {
-        match self.cluster.as_ref()?.scene.budget() {
-            SolveBudget::Timed { least_steps } if !timeline.is_free() => Some(least_steps),
-            _ => None,
-        }
-    }
-
-    /// What the solves of the turn in progress took; `None` where it has made no macro step.
-    pub fn solved(&self) -> Option<Solved> {
-        self.cluster.as_ref()?.solved
-    }
-
-    /// Learns from the turn that `took` so long what factors cost.
-    pub fn note_price(&mut self, timeline: &Timeline, took: Took) {
-        let Some(seat) = &mut self.cluster else { return };
-        if let Some(solved) = seat.solved.take()
-            && !timeline.is_free()
-        {
-            seat.price.note(solved, took.ended.saturating_sub(took.begun).as_secs_f64());
         }
     }
 }

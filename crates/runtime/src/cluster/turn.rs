@@ -15,8 +15,12 @@ use super::super::agent_runner::{AgentRunner, PendingTurn, StepOutcome, containe
 use super::super::metrics::Entry;
 use super::super::turns::Took;
 use super::Span;
+use metachron_contact::detect::SolveBudget;
 use metachron_core::{DT_MAX_S, SimSpan, SimTime};
 use std::time::Duration;
+
+/// The share of a macro step that its turn may take: the rest is for what turns take longer now and then.
+const TURN_SHARE: f64 = 0.8;
 
 /// How the time of a leader went on without a step when its turn began.
 #[derive(Debug, Clone, Copy)]
@@ -169,6 +173,39 @@ fn portion(left: SimSpan, dt: SimSpan, none_longer: bool) -> SimSpan {
     }
     let longest = SimSpan::from_secs_f64(DT_MAX_S).unwrap_or(dt);
     if left <= dt + half_more { left.min(longest) } else { dt }
+}
+
+impl AgentRunner {
+    /// The most steps of each solve in a macro step of `dt` that begins `late`; `None` for as many as the laws take.
+    pub fn factors_within(&self, timeline: &Timeline, late: Duration, dt: SimSpan) -> Option<u32> {
+        let least = self.least_factors(timeline)?;
+        let turn_s = TURN_SHARE * timeline.wall_span(dt).as_secs_f64() - late.as_secs_f64();
+        self.cluster.as_ref()?.price.factors_max(turn_s, least)
+    }
+
+    /// The steps that each solve may make in any case: all that one may that is behind its leader. `None` where nothing bounds them: at the free
+    /// pace there is time for all.
+    pub fn least_factors(&self, timeline: &Timeline) -> Option<u32> {
+        match self.cluster.as_ref()?.scene.budget() {
+            SolveBudget::Timed { least_steps } if !timeline.is_free() => Some(least_steps),
+            _ => None,
+        }
+    }
+
+    /// What the solves of the turn in progress took; `None` where it has made no macro step.
+    pub fn solved(&self) -> Option<Solved> {
+        self.cluster.as_ref()?.solved
+    }
+
+    /// Learns from the turn that `took` so long what factors cost.
+    pub fn note_price(&mut self, timeline: &Timeline, took: Took) {
+        let Some(seat) = &mut self.cluster else { return };
+        if let Some(solved) = seat.solved.take()
+            && !timeline.is_free()
+        {
+            seat.price.note(solved, took.ended.saturating_sub(took.begun).as_secs_f64());
+        }
+    }
 }
 
 #[cfg(test)]
