@@ -31,7 +31,7 @@ pub(in super::super) enum SolveBound {
     Given(Option<u32>),
 }
 
-/// What the solves of a macro step took.
+/// The solves of a macro step.
 #[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
 pub(in super::super) struct Solved {
     pub solves: u32,
@@ -127,7 +127,7 @@ impl AgentRunner {
         }
     }
 
-    /// What the solves of the turn in progress took; `None` where it has made no macro step.
+    /// The solves of the turn in progress; `None` where it has made no macro step.
     pub fn solved(&self) -> Option<Solved> {
         self.cluster.as_ref()?.solved
     }
