@@ -6,7 +6,7 @@
 //! from the impulses found. A factor: the cold solve less the one at rest, over its factors, with all else that a Newton step takes.
 
 use glam::{DMat3, DVec3};
-use metachron_contact::cluster::{Block, Contact, Member, Problem, Side, SideTerm, Solver};
+use metachron_contact::solve::{Block, Contact, Member, Problem, Side, SideTerm, Solver};
 use metachron_core::PlainLoop;
 use std::time::{Duration, Instant};
 
@@ -63,7 +63,7 @@ fn measure(mut scene: Scene) {
     );
 }
 
-fn solve<T>(scene: &Scene, solver: &mut Solver, of: impl FnOnce(&metachron_contact::cluster::Solution) -> T) -> T {
+fn solve<T>(scene: &Scene, solver: &mut Solver, of: impl FnOnce(&metachron_contact::solve::Solution) -> T) -> T {
     let members: Vec<_> = scene
         .bodies
         .iter()

@@ -4,7 +4,7 @@
 //! Never here: clocks, threads, files, the GPU. What every agent promises is tested by the suite `metachron_models::conformance`.
 
 use crate::joint::Motor;
-use crate::stepper::ClusterMember;
+use crate::member::ClusterMember;
 use crate::{Inputs, Law, Link};
 use glam::{DQuat, DVec3};
 use metachron_core::{
@@ -150,7 +150,7 @@ pub struct Neighbour {
     pub form: Option<Arc<CollisionShape>>,
     /// How the two act on each other in contact.
     pub law: Law,
-    /// Whether, of an asynchronous pair, the agent that looks computes it ([`crate::asynchronous::computes`]).
+    /// Whether, of an asynchronous pair, the agent that looks computes it ([`crate::remote::computes`]).
     pub computed_here: bool,
     /// Its usual step length, seconds; zero where that does not matter.
     pub step_s: f64,

@@ -1,6 +1,6 @@
 //! Joints between rigid bodies: the data a scene gives, and their checks.
 //!
-//! In: two bodies, two anchors and a kind. Out: a checked [`Joint`]. Never here: how a joint is solved (`stepper/`).
+//! In: two bodies, two anchors and a kind. Out: a checked [`Joint`]. Never here: how a joint is solved (`constraint/`).
 
 use glam::{DQuat, DVec3};
 use metachron_core::AgentId;
@@ -257,8 +257,8 @@ impl Joint {
             JointKind::Prismatic { axis, range_m, .. } => {
                 let axis = a.1 * axis.normalize();
                 let along = between.dot(axis);
-                let outside = range_m.map_or(0.0, |[low, high]| along - along.clamp(low, high));
-                (between - axis * (along - outside)).length()
+                let external = range_m.map_or(0.0, |[low, high]| along - along.clamp(low, high));
+                (between - axis * (along - external)).length()
             }
             JointKind::Spring { .. } => 0.0,
             JointKind::Rope { length_m } => (between.length() - length_m).max(0.0),

@@ -22,7 +22,9 @@
 //! ```
 
 use glam::DVec3;
-use metachron_contact::stepper::{ClusterScene, ClusterStepper, ContactMemory, Participant};
+use metachron_contact::detect::ClusterScene;
+use metachron_contact::member::{ContactMemory, Participant};
+use metachron_contact::step::ClusterStepper;
 use metachron_contact::{Agent, AnchorSpring, Neighbour, StepContext};
 use metachron_core::{
     AgentId, Archive, ArchiveError, Body, DT_MAX_S, Grip, HASH_START, PlainLoop, Resolution, SimSpan, SimTime,

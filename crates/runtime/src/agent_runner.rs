@@ -21,7 +21,7 @@ use super::model::Model;
 use super::observation::{Observer, Peers};
 use super::slot::SlotWriter;
 use super::turns::Took;
-use metachron_contact::stepper::BadAnswer;
+use metachron_contact::member::BadAnswer;
 use metachron_contact::{Carving, Link};
 use metachron_core::{AgentId, Resolution, ResolutionRange, SimSpan, SimTime, Snapshot, StepReport};
 use std::panic::{AssertUnwindSafe, catch_unwind};

@@ -2,7 +2,7 @@
 //!
 //! In: the members at the leader's time, what each of them sees. Out: their new states, who each is bonded with, who has lost touch.
 //! Never here: how members come and go ([`seats`]), what else belongs to a turn ([`turn`]), the problem itself
-//! ([`metachron_contact::stepper`]).
+//! ([`metachron_contact::step`]).
 
 mod attachments;
 mod common_time;
@@ -33,10 +33,10 @@ use super::handle::Shared;
 use super::helpers::Helped;
 use super::loads::{Acting, Loads};
 use super::observation::{Observer, newest};
-use metachron_contact::asynchronous::{Pairs, Remotes};
-use metachron_contact::stepper::{
-    ClusterMember, ClusterScene, ClusterStepper, ContactMemory, Participant, Plan, Role, StepDoubling,
-};
+use metachron_contact::detect::ClusterScene;
+use metachron_contact::member::{ClusterMember, ContactMemory, Participant, Role};
+use metachron_contact::remote::{Pairs, Remotes};
+use metachron_contact::step::{ClusterStepper, Plan, StepDoubling};
 use metachron_contact::{Link, Neighbour, StepContext};
 use metachron_core::step_doubling::DoublingSchedule;
 use metachron_core::{

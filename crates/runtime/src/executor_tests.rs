@@ -11,7 +11,7 @@ use super::{
 };
 use glam::{DQuat, DVec3};
 use metachron_contact::Agent;
-use metachron_contact::stepper::ClusterScene;
+use metachron_contact::detect::ClusterScene;
 use metachron_core::{AgentId, SimTime};
 use metachron_geometry::{Obstacle, Solid};
 use metachron_models::rigid::{RigidBody, RigidSpec};

@@ -136,7 +136,9 @@ impl ParallelFor for Turn {
 mod tests {
     use super::*;
     use glam::DVec3;
-    use metachron_contact::stepper::{ClusterScene, ClusterStepper, ContactMemory, Participant};
+    use metachron_contact::detect::ClusterScene;
+    use metachron_contact::member::{ContactMemory, Participant};
+    use metachron_contact::step::ClusterStepper;
     use metachron_contact::{Agent, StepContext};
     use metachron_core::{AgentId, HASH_START, SimSpan, SimTime, Snapshot};
     use metachron_models::rod::{Material, Section, Tube, TubeSpec};

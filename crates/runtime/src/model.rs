@@ -5,7 +5,7 @@
 
 use super::agent_runner::contained;
 use super::handle::Shared;
-use metachron_contact::stepper::{CallMark, GuardedMember};
+use metachron_contact::member::{CallMark, GuardedMember};
 use metachron_contact::{Agent, Inputs, StepContext};
 use metachron_core::SimSpan;
 use metachron_core::{Archive, ArchiveError, Snapshot, StepError, StepReport};

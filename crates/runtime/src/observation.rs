@@ -11,7 +11,7 @@ use super::cluster::Membership;
 use super::handle::{AgentHandle, Shared};
 use super::helpers::Helpers;
 use super::slot::SlotWriter;
-use metachron_contact::asynchronous::{PairClock, computes};
+use metachron_contact::remote::{PairClock, computes};
 use metachron_contact::{Input, Law, Neighbour, acknowledged};
 use metachron_core::{AgentId, Archive, ArchiveError, Snapshot, archive_values};
 use metachron_geometry::{CollisionShape, ShapeKind};

@@ -6,9 +6,9 @@ use super::spawn::AgentSpawn;
 use super::watchdog::StallLimit;
 use super::{AgentHandle, Clock, Priority, Run, SystemClock, Threads, TimelineCommand};
 use glam::{DQuat, DVec3};
-use metachron_contact::asynchronous::{GivenAt, Ledgers};
-use metachron_contact::cluster::Side;
-use metachron_contact::stepper::{ClusterMember, Role};
+use metachron_contact::member::{ClusterMember, Role};
+use metachron_contact::remote::{GivenAt, Ledgers};
+use metachron_contact::solve::Side;
 use metachron_contact::{Agent, Input, Inputs, StepContext};
 use metachron_core::{
     AgentId, Body, Bounds, N_MAX, Resolution, ResolutionRange, RigidState, SimSpan, SimTime, Snapshot, StepError,

@@ -1,7 +1,7 @@
 //! Asynchronous pairs in runs: each side in a cluster of its own, the same bits on every run, faults on them alone.
 
 use glam::DVec3;
-use metachron_contact::stepper::ClusterScene;
+use metachron_contact::detect::ClusterScene;
 use metachron_contact::{Law, Link};
 use metachron_core::{AgentId, Anchor, Archive, Body, PairKind, SimSpan, Snapshot};
 use metachron_geometry::{Obstacle, Solid};

@@ -1,7 +1,7 @@
 //! Bodies with clocks of their own that fly towards each other: however far ahead each looks, they meet. Reference: momentum and restitution.
 
 use glam::DVec3;
-use metachron_contact::stepper::ClusterScene;
+use metachron_contact::detect::ClusterScene;
 use metachron_core::{Body, RigidState, Snapshot};
 use metachron_geometry::Solid;
 use metachron_models::rigid::{RigidBody, RigidSpec};

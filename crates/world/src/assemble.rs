@@ -7,7 +7,7 @@ use super::kinds::{ExecutorKind, PriorityKind};
 use super::ties::{Ties, faults};
 use super::{Member, Scene, Spec};
 use metachron_contact::Agent;
-use metachron_contact::stepper::{ClusterScene, Passage};
+use metachron_contact::detect::{ClusterScene, Passage};
 use metachron_geometry::Obstacle;
 use metachron_models::rigid::{KinematicBody, RigidBody};
 use metachron_models::rod::Tube;

@@ -15,8 +15,8 @@ use super::kinds::{
 use super::scene::{Appearance, Factors, Gains, Machine, Member, PaceWish, RENDER_SCALE, Scene, Spec, Target};
 use glam::{DQuat, DVec3};
 use metachron_contact::Agent;
-use metachron_contact::cluster::DEPTH_DEFAULT_M;
-use metachron_contact::stepper::{LEAST_STEPS_DEFAULT, SolveBudget};
+use metachron_contact::detect::{LEAST_STEPS_DEFAULT, SolveBudget};
+use metachron_contact::solve::DEPTH_DEFAULT_M;
 use metachron_core::{AgentId, N_MAX, Resolution, ResolutionRange, SimSpan};
 use metachron_geometry::{Cells, Obstacle, Solid};
 use metachron_models::rigid::{Joint, JointError, JointKind, RigidSpec};

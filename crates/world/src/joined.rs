@@ -9,7 +9,7 @@ use super::error::WorldError;
 use super::kinds::ExecutorKind;
 use super::scene::{Member, Spec};
 use glam::DVec3;
-use metachron_contact::stepper::ClusterScene;
+use metachron_contact::detect::ClusterScene;
 use metachron_core::{AgentId, Archive, ArchiveError};
 use metachron_models::synthetic::SyntheticSpec;
 use metachron_runtime::{AgentSpawn, AgentState, Agents};

@@ -63,7 +63,7 @@ pub use error::WorldError;
 pub use events::{Contact, Event, EventFilter, Events, Happening};
 pub use frames::{Frame, Frames};
 pub use initial_overlap::Moved;
-pub use metachron_contact::stepper::SolveBudget;
+pub use metachron_contact::detect::SolveBudget;
 pub use metachron_runtime::{Command, FACTOR};
 pub use object::{Object, Touched};
 pub use overlap::Overlap;

@@ -8,7 +8,7 @@ use super::events::touched;
 use super::object::{Object, Touched};
 use super::world::World;
 use glam::{DQuat, DVec3};
-use metachron_contact::stepper::Matter;
+use metachron_contact::remote::PublishedShape;
 use metachron_core::{ContactPartner, ContactState, SimTime};
 use metachron_geometry::narrow_phase::{NarrowPhaseScratch, touches};
 use metachron_geometry::{
@@ -151,12 +151,12 @@ impl World {
         let mut near = Vec::new();
         for (number, solid) in (0..).zip(self.surroundings().statics()) {
             if solid.bounds().meets(*within) {
-                near.push(Near { what: Touched::Fixed(number), matter: Matter::default() });
+                near.push(Near { what: Touched::Fixed(number), matter: PublishedShape::default() });
             }
         }
         for agent in self.agents().iter() {
             let Some(form) = agent.form() else { continue };
-            let mut matter = Matter::default();
+            let mut matter = PublishedShape::default();
             let known = matter.bring(&agent.latest().body, 0.0);
             if known && matter.placed(&form).is_some_and(|placed| placed.bounds().meets(*within)) {
                 near.push(Near { what: Touched::Object(self.tag().object(agent.id())), matter });
@@ -184,7 +184,7 @@ pub struct Cast<'a> {
 /// Something near a query.
 struct Near {
     what: Touched,
-    matter: Matter,
+    matter: PublishedShape,
 }
 
 /// The solid of a query.

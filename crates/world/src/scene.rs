@@ -13,8 +13,8 @@ use super::overlap::Overlap;
 use super::sensors::Sensor;
 use glam::DVec3;
 #[cfg(doc)]
-use metachron_contact::stepper::DEPTH_RANGE_M;
-use metachron_contact::stepper::SolveBudget;
+use metachron_contact::detect::DEPTH_RANGE_M;
+use metachron_contact::detect::SolveBudget;
 use metachron_core::{AgentId, Resolution, ResolutionRange, SimSpan};
 use metachron_geometry::{Cells, Model, Motion, Obstacle, Placement, Texture};
 use metachron_models::rigid::Joint;

@@ -7,7 +7,7 @@ use super::object::Object;
 use super::world::World;
 use glam::{DQuat, DVec3};
 use metachron_contact::joint::{Joint, JointKind, Motor};
-use metachron_contact::stepper::Pose;
+use metachron_contact::member::Pose;
 use metachron_core::{AgentId, Anchor, Body, ContactPartner, RigidState, SimTime, Snapshot};
 use metachron_geometry::ShapeKind;
 use metachron_runtime::Command;

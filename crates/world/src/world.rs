@@ -18,7 +18,7 @@ use super::object::{Object, WorldTag};
 use super::recording::{Entry, RecordError};
 use super::sensors::Instruments;
 use glam::DVec3;
-use metachron_contact::stepper::ClusterScene;
+use metachron_contact::detect::ClusterScene;
 use metachron_core::{AgentId, SimTime, Snapshot};
 use metachron_runtime::{
     AgentHandle, AgentState, AgentStats, Agents, Lockstep, Pool, Run, STALLED_FOR_GOOD, SystemClock, Threads, Timeline,

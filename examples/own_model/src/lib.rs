@@ -6,8 +6,8 @@
 //! A step is linearly implicit: (m + h c + h² k) v' = m v + h (B − m g), where k = −dB/dz; contact adds its impulses on the right.
 
 use metachron::contact::StepContext;
-use metachron::contact::cluster::{Block, ProblemError, Side, SideTerm};
-use metachron::contact::stepper::{ClusterMember, Pose, Role};
+use metachron::contact::member::{ClusterMember, Pose, Role};
+use metachron::contact::solve::{Block, ProblemError, Side, SideTerm};
 use metachron::core::{Archive, ArchiveError, Bounds, RigidState, StepError, StepReport, archive_values, check_span};
 use metachron::geometry::{CollisionShape, ContactSide, Place, PlacedShape, ShapeKind, ShapePose, SolidShape};
 use metachron::glam::DMat3;

@@ -5,7 +5,9 @@
 use super::{Make, Suite};
 use crate::rigid::{RigidBody, RigidSpec};
 use glam::DVec3;
-use metachron_contact::stepper::{ClusterScene, ClusterStepper, ContactMemory, Participant, Plan};
+use metachron_contact::detect::ClusterScene;
+use metachron_contact::member::{ContactMemory, Participant};
+use metachron_contact::step::{ClusterStepper, Plan};
 use metachron_contact::{Agent, StepContext};
 use metachron_core::{AgentId, Grip, PlainLoop, SimSpan, SimTime, Snapshot};
 use metachron_geometry::Solid;

@@ -3,8 +3,8 @@
 use super::{Breach, Load, Promise, Suite, check};
 use crate::rigid::{KinematicBody, Led, RigidSpec};
 use glam::{DQuat, DVec3};
-use metachron_contact::cluster::Side;
-use metachron_contact::stepper::{ClusterMember, Role};
+use metachron_contact::member::{ClusterMember, Role};
+use metachron_contact::solve::Side;
 use metachron_contact::{Agent, AnchorSpring, Input, Inputs, SetMotion, StepContext};
 use metachron_core::{Anchor, Body, CurveState, Resolution, SimSpan, Snapshot, StepError, StepReport, check_span};
 use metachron_geometry::{CollisionShape, ContactSide, Place, PlacedShape, Solid};

@@ -7,7 +7,7 @@ use super::member::Unknowns;
 use super::motion::{Flight, Motion};
 use super::{RigidError, RigidSpec};
 use glam::{DQuat, DVec3};
-use metachron_contact::stepper::ClusterMember;
+use metachron_contact::member::ClusterMember;
 use metachron_contact::{Agent, Input, Inputs, SetMotion, StepContext};
 use metachron_core::{
     Archive, ArchiveError, Body, Bounds, RigidState, SimSpan, Snapshot, StepError, StepReport, archive_values,

@@ -10,8 +10,8 @@ use super::mass_properties::MassDistribution;
 use super::{RigidError, RigidSpec};
 use crate::trajectory::{Pose as Pace, Script};
 use glam::{DQuat, DVec3};
-use metachron_contact::cluster::Side;
-use metachron_contact::stepper::{ClusterMember, MaterialPoint, Pose, Role};
+use metachron_contact::member::{ClusterMember, MaterialPoint, Pose, Role};
+use metachron_contact::solve::Side;
 use metachron_contact::{Agent, Input, Inputs, PoseGoal, SetMotion, StepContext};
 use metachron_core::{
     Anchor, Archive, ArchiveError, Body, Bounds, Inertia, RigidState, SimSpan, SimTime, Snapshot, StepError,

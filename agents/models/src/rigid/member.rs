@@ -7,8 +7,8 @@ use super::RigidBody;
 use super::body::{CALM_M_S, REST_S};
 use super::motion::{Flight, Motion};
 use glam::{DMat3, DQuat, DVec3};
-use metachron_contact::cluster::{Block, Side};
-use metachron_contact::stepper::{ClusterMember, Locked, MaterialPoint, Pose, Role};
+use metachron_contact::member::{ClusterMember, Locked, MaterialPoint, Pose, Role};
+use metachron_contact::solve::{Block, Side};
 use metachron_core::{Anchor, Archive, ArchiveError, Inertia, StepError, inverse_of_free};
 use metachron_geometry::{ContactSide, Place, PlacedShape, ShapePose};
 

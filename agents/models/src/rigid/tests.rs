@@ -2,7 +2,7 @@
 
 use super::{Restraint, RigidBody, RigidError, RigidSpec};
 use glam::{DQuat, DVec3};
-use metachron_contact::stepper::ClusterMember;
+use metachron_contact::member::ClusterMember;
 use metachron_contact::{Agent, StepContext};
 use metachron_core::{AgentId, Body, Inertia, RigidState, SimSpan, SimTime, Snapshot, StepError, StepReport};
 use metachron_geometry::Solid;

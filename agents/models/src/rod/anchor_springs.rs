@@ -8,7 +8,7 @@ use super::spec::Attachment;
 use super::sym3::Sym3;
 use glam::DVec3;
 use metachron_contact::AnchorSpring;
-use metachron_contact::stepper::Slid;
+use metachron_contact::member::Slid;
 use metachron_core::{AgentId, Anchor};
 
 /// The spring of an attachment at one node.

@@ -10,7 +10,7 @@
 use super::block::{Column, Matrix, Number, Symmetric, positive};
 use super::sym3::Sym3;
 use glam::{DMat3, DVec3};
-use metachron_contact::cluster::Response;
+use metachron_contact::solve::Response;
 use wide::f64x2;
 
 /// One block row of the system's lower half.

@@ -15,7 +15,7 @@ use super::system::System;
 use crate::limits::{QUIET_ACCELERATION_M_S2, QUIET_S, QUIET_SPEED_M_S};
 use crate::set_motion::{WholeMotion, check_nodes};
 use glam::DVec3;
-use metachron_contact::stepper::ClusterMember;
+use metachron_contact::member::ClusterMember;
 use metachron_contact::{Agent, AnchorSpring, Carving, Input, Inputs, SetMotion, StepContext};
 use metachron_core::{
     Archive, ArchiveError, Body, Bounds, Grip, Removed, Resolution, SimSpan, Snapshot, StepError, StepReport,

@@ -5,7 +5,7 @@
 
 use super::system::{NOT_POSITIVE, UNENDED};
 use glam::{DMat3, DVec3};
-use metachron_contact::cluster::{Block, multiply};
+use metachron_contact::solve::{Block, multiply};
 
 /// What is left may change no vertex by itself by more than this, m/s: a hundredth of what contacts are solved to.
 const LEFT_M_S: f64 = 5e-8;

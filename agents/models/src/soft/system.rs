@@ -5,7 +5,7 @@
 
 use super::gradients::Gradients;
 use glam::{DMat3, DVec3};
-use metachron_contact::cluster::{Block, Response, SparseFactor};
+use metachron_contact::solve::{Block, Response, SparseFactor};
 use metachron_core::PlainLoop;
 
 /// Products that conjugate gradients take at least, and for each root of how far stiffness outweighs inertia, in solids of some hundred to

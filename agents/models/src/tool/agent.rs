@@ -14,7 +14,7 @@ use super::pivot::Pivot;
 use super::{ToolError, ToolSpec};
 use crate::trajectory::{PointMotion, Pose, Script};
 use glam::{DQuat, DVec3};
-use metachron_contact::stepper::ClusterMember;
+use metachron_contact::member::ClusterMember;
 use metachron_contact::{Agent, AnchorSpring, Input, Inputs, StepContext};
 use metachron_core::{
     AgentId, Anchor, Archive, ArchiveError, Body, Bounds, GRASP_BELOW, SimSpan, Snapshot, StepError, StepReport,

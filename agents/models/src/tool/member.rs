@@ -10,8 +10,9 @@ use super::gripper::Jaws;
 use super::spec::REACH_MAX_M;
 use crate::trajectory::PointMotion;
 use glam::{DMat3, DQuat, DVec3};
-use metachron_contact::cluster::{Block, Side};
-use metachron_contact::stepper::{self, ClusterMember, MaterialPoint, Pose, Role};
+use metachron_contact::member;
+use metachron_contact::member::{ClusterMember, MaterialPoint, Pose, Role};
+use metachron_contact::solve::{Block, Side};
 use metachron_contact::{AnchorSpring, StepContext};
 use metachron_core::{AgentId, Anchor, Archive, ArchiveError, SimSpan, SimTime, StepError, ToolState, archive_values};
 use metachron_geometry::{ContactSide, Place, PlacedShape, ShapePose};
@@ -213,8 +214,8 @@ impl ClusterMember for Tool {
         Some(Pose { centre_m, origin_m: centre_m, rotation, turns, led_rad_s })
     }
 
-    fn drive(&self) -> Option<stepper::Drive> {
-        Some(stepper::Drive {
+    fn drive(&self) -> Option<member::Drive> {
+        Some(member::Drive {
             point: MaterialPoint::new(self.tool.tip, Side::node(0, 0)),
             target_m: self.commanded.position,
             target_m_s: self.unknowns.led_m_s,

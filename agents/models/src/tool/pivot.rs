@@ -7,7 +7,7 @@
 use super::{Keyframe, ToolError, ToolSpec};
 use crate::trajectory::PointMotion;
 use glam::{DMat3, DQuat, DVec3};
-use metachron_contact::cluster::{Side, SideTerm};
+use metachron_contact::solve::{Side, SideTerm};
 use metachron_core::ToolState;
 use metachron_geometry::ToolShape;
 use std::ops::RangeInclusive;

@@ -1,8 +1,10 @@
 //! Agents with clocks of their own, each a cluster by itself, that see each other's published states.
 
 use glam::DVec3;
-use metachron_contact::asynchronous::{MacroStep, PairClock, Pairs, Remotes, computes, part};
-use metachron_contact::stepper::{ClusterScene, ClusterStepper, ContactMemory, Participant};
+use metachron_contact::detect::ClusterScene;
+use metachron_contact::member::{ContactMemory, Participant};
+use metachron_contact::remote::{MacroStep, PairClock, Pairs, Remotes, computes, part};
+use metachron_contact::step::ClusterStepper;
 use metachron_contact::{Agent, AnchorSpring, Law, Link, Neighbour, StepContext};
 use metachron_core::{AgentId, Body, Grip, Ledger, PlainLoop, RigidState, SimSpan, SimTime, Snapshot};
 use metachron_geometry::Obstacle;

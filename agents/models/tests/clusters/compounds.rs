@@ -3,7 +3,7 @@
 use crate::bodies::rigid;
 use crate::table::{GRAVITY, Table, placed, plane};
 use glam::{DQuat, DVec3};
-use metachron_contact::stepper::Partner;
+use metachron_contact::member::Partner;
 use metachron_geometry::{CompoundPart, Solid};
 use metachron_models::rigid::{RigidBody, RigidSpec};
 
@@ -95,7 +95,7 @@ fn a_heap_of_tables_stands_as_one_does() {
     while heap.time.as_secs_f64() < 0.5 {
         last = heap.step().0;
     }
-    assert!(last.heap_contacts > 1000, "rapier3d has it: {last:?}");
+    assert!(last.pile_contacts > 1000, "rapier3d has it: {last:?}");
     let com = spec(0).com_local();
     for k in 0..81 {
         let (place, velocity) = heap.middle(k);

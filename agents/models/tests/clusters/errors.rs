@@ -4,7 +4,7 @@ use crate::bodies::{block, cloth, cube, rigid, rope, slab, tube};
 use crate::table::{GRAVITY, Placed, Table, placed, plane, spring};
 use glam::{DQuat, DVec3};
 use metachron_contact::AnchorSpring;
-use metachron_contact::stepper::StepDoubling;
+use metachron_contact::step::StepDoubling;
 use metachron_core::step_doubling::{DRIFT_S, drift_m, farthest};
 use metachron_core::{Anchor, SimSpan, Snapshot};
 use metachron_geometry::Solid;

@@ -4,7 +4,7 @@ use crate::bodies::{block, cube, rigid, solid};
 use crate::table::{GRAVITY, Table, placed, plane};
 use glam::{DQuat, DVec3};
 use metachron_contact::AnchorSpring;
-use metachron_contact::stepper::Partner;
+use metachron_contact::member::Partner;
 use metachron_core::Anchor;
 use metachron_geometry::Solid;
 use metachron_models::rigid::{RigidBody, RigidSpec};
@@ -108,8 +108,8 @@ fn what_lies_beside_a_heap_is_solved_as_if_it_lay_alone_and_the_heap_too() {
     while heap.time.as_secs_f64() < 0.5 {
         (with, without) = (heap.step().0, alone.step().0);
     }
-    assert!(with.heap_contacts > 1000, "{with:?}");
-    assert_eq!((with.contacts - with.heap_contacts, with.factors), (without.contacts, without.factors));
+    assert!(with.pile_contacts > 1000, "{with:?}");
+    assert_eq!((with.contacts - with.pile_contacts, with.factors), (without.contacts, without.factors));
     let (here, there) = (heap.middle(last).0, alone.middle(0).0);
     assert!((here - there).length() < 1e-12, "{here}, alone {there}");
     for k in 0..wide * wide * high {
@@ -144,8 +144,8 @@ fn what_flies_into_a_heap_keeps_the_momentum_of_all() {
     let (mut was_heap, mut met) = (false, false);
     while all.time.as_secs_f64() < 0.12 {
         let (report, _) = all.step();
-        was_heap |= report.heap_contacts > 0;
-        met |= was_heap && report.heap_contacts == 0;
+        was_heap |= report.pile_contacts > 0;
+        met |= was_heap && report.pile_contacts == 0;
     }
     assert!(was_heap && met, "rapier3d has it until it is struck: {was_heap}, {met}");
     assert!(all.energy_j() < before_j + 1e-6, "{before_j} J, then {} J", all.energy_j());

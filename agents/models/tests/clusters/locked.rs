@@ -24,7 +24,7 @@ fn boxes_of_a_heap_that_cannot_turn_or_leave_their_plane_do_not() {
     while heap.time.as_secs_f64() < 0.2 {
         last = heap.step().0;
     }
-    assert!(last.heap_contacts > 1000, "rapier3d has it: {last:?}");
+    assert!(last.pile_contacts > 1000, "rapier3d has it: {last:?}");
     for k in 0..300 {
         let (place, velocity) = heap.middle(k);
         let y = 0.0605 * (k / 10 % 10) as f64;

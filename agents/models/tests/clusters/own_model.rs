@@ -4,7 +4,7 @@ use crate::bodies::{rigid, tube};
 use crate::plate::Plate;
 use crate::table::{GRAVITY, Table, placed};
 use glam::DVec3;
-use metachron_contact::stepper::Partner;
+use metachron_contact::member::Partner;
 use metachron_core::AgentId;
 use metachron_geometry::Solid;
 use metachron_models::rigid::RigidBody;

@@ -1,8 +1,8 @@
 //! A model of a user's own, by the contracts of agents and members alone: what it takes to be touched.
 
 use glam::{DMat3, DQuat, DVec3};
-use metachron_contact::cluster::{Block, Side};
-use metachron_contact::stepper::{ClusterMember, Role};
+use metachron_contact::member::{ClusterMember, Role};
+use metachron_contact::solve::{Block, Side};
 use metachron_contact::{Agent, StepContext};
 use metachron_core::{Body, Bounds, RigidState, SimSpan, Snapshot, StepError, StepReport};
 use metachron_geometry::{CollisionShape, ContactSide, Place, PlacedShape, ShapeKind, ShapePose, Solid, SolidShape};

@@ -3,7 +3,7 @@
 use crate::bodies::{block, rigid};
 use crate::table::{GRAVITY, Table, placed, plane};
 use glam::{DQuat, DVec3};
-use metachron_contact::stepper::Partner;
+use metachron_contact::member::Partner;
 use metachron_core::{AgentId, Body};
 use metachron_geometry::{Obstacle, Solid};
 use metachron_models::rigid::{RigidBody, RigidSpec};

@@ -1,11 +1,11 @@
 //! A table on which bodies are put and stepped as one cluster, and what is measured of them.
 
 use glam::{DQuat, DVec3};
+use metachron_contact::constraint::{Torn, Yielded};
+use metachron_contact::detect::ClusterScene;
 use metachron_contact::joint::Joint;
-use metachron_contact::stepper::{
-    ClusterReport, ClusterScene, ClusterStepper, ContactMemory, PairTotal, Participant, Partner, Plan, StepDoubling,
-    Torn, Yielded,
-};
+use metachron_contact::member::{ContactMemory, Participant, Partner};
+use metachron_contact::step::{ClusterReport, ClusterStepper, PairTotal, Plan, StepDoubling};
 use metachron_contact::{Agent, AnchorSpring, Law, Link, Neighbour, StepContext};
 use metachron_core::{AgentId, Anchor, Grip, PlainLoop, SensorTouch, SimSpan, SimTime, Snapshot};
 use metachron_geometry::{Obstacle, Solid};

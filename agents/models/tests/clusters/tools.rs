@@ -3,8 +3,8 @@
 use crate::bodies::{block, cube, rigid, sheet};
 use crate::table::{GRAVITY, Table, placed, spring};
 use glam::{DQuat, DVec3};
-use metachron_contact::cluster::Side;
-use metachron_contact::stepper::{ClusterMember, MaterialPoint, Partner, Role};
+use metachron_contact::member::{ClusterMember, MaterialPoint, Partner, Role};
+use metachron_contact::solve::Side;
 use metachron_contact::{Agent, AnchorSpring, StepContext};
 use metachron_core::{AgentId, Anchor, Body, SimSpan, Snapshot, StepError, StepReport, ToolState};
 use metachron_geometry::{

@@ -5,7 +5,8 @@ use crate::hung::{self, ALL, CENTRE, G, Held, Limits, MASS_KG, WEIGHT_N, ball, b
 use crate::table::{Table, spring};
 use glam::DVec3;
 use metachron_contact::joint::{Joint, JointKind};
-use metachron_contact::stepper::{Partner, StepDoubling};
+use metachron_contact::member::Partner;
+use metachron_contact::step::StepDoubling;
 use metachron_contact::{AnchorSpring, Link};
 use metachron_core::{AgentId, Anchor, Resolution, Snapshot};
 use metachron_models::rigid::RigidSpec;

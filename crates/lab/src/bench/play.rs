@@ -5,8 +5,10 @@
 use super::machine::own_cpu;
 use anyhow::Context;
 use glam::DVec3;
+use metachron_contact::detect::ClusterScene;
 use metachron_contact::joint::Joint;
-use metachron_contact::stepper::{ClusterReport, ClusterScene, ClusterStepper, ContactMemory, Participant, Plan};
+use metachron_contact::member::{ContactMemory, Participant};
+use metachron_contact::step::{ClusterReport, ClusterStepper, Plan};
 use metachron_contact::{Agent, StepContext};
 use metachron_core::{AgentId, Body, Grip, PlainLoop, SimSpan, SimTime, Snapshot};
 use metachron_geometry::Obstacle;

@@ -4,8 +4,8 @@
 
 use super::super::chart::GRAVITY;
 use glam::{DQuat, DVec3};
-use metachron_contact::cluster::Side;
-use metachron_contact::stepper::{ClusterMember, MaterialPoint, Role};
+use metachron_contact::member::{ClusterMember, MaterialPoint, Role};
+use metachron_contact::solve::Side;
 use metachron_contact::{Agent, StepContext};
 use metachron_core::{Anchor, SimSpan, Snapshot, StepError, StepReport};
 use metachron_geometry::{CollisionShape, ContactSide, Place, PlacedShape, ShapeError, ShapeKind, ShapePose};

@@ -4,9 +4,9 @@
 //! Never here: measurements.
 
 use glam::DVec3;
-use metachron_contact::stepper::{
-    ClusterReport, ClusterScene, ClusterStepper, ContactMemory, Participant, Partner, Plan,
-};
+use metachron_contact::detect::ClusterScene;
+use metachron_contact::member::{ContactMemory, Participant, Partner};
+use metachron_contact::step::{ClusterReport, ClusterStepper, Plan};
 use metachron_contact::{Agent, AnchorSpring, Neighbour, StepContext};
 use metachron_core::{AgentId, Grip, PlainLoop, SimSpan, SimTime, Snapshot, StepError, recycled};
 use metachron_geometry::Obstacle;

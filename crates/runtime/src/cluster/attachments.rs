@@ -1,11 +1,13 @@
 //! Joints and links as what keeps agents in one cluster, until they tear.
 //!
 //! In: an agent's joints and links, its memory of what has torn, what yielded and tore in a step. Out: agents that belong together, entries in the states
-//! of those that tell of it. Never here: forces, when something yields or tears ([`metachron_contact::stepper`]).
+//! of those that tell of it. Never here: forces, when something yields or tears ([`metachron_contact::step`]).
 
 use super::super::events::{AgentEvent, EventKind};
 use super::AgentRunner;
-use metachron_contact::stepper::{ClusterStepper, ContactMemory, Partner, Torn, Yielded};
+use metachron_contact::constraint::{Torn, Yielded};
+use metachron_contact::member::{ContactMemory, Partner};
+use metachron_contact::step::ClusterStepper;
 use metachron_contact::{Law, Link};
 use metachron_core::{AgentId, AttachmentEvent, AttachmentEventKind, AttachmentId, SimSpan};
 

@@ -6,7 +6,8 @@
 use super::ClusterSeat;
 use crate::events::{AgentEvent, ContactEvent, EventKind};
 use crate::streams::EventStreams;
-use metachron_contact::stepper::{PairTotal, Partner};
+use metachron_contact::member::Partner;
+use metachron_contact::step::PairTotal;
 use metachron_core::{ContactPartner, ContactState, SimSpan, SimTime};
 
 /// By which factor a contact presses more where it is told of again.

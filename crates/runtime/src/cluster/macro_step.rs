@@ -8,10 +8,10 @@ use super::super::helpers::Helped;
 use super::super::loads::Acting;
 use super::{ClusterSeat, NO_SEAT, Wish, prepared};
 use metachron_contact::StepContext;
-use metachron_contact::asynchronous::{MacroStep, Pairs, Remotes, part};
-use metachron_contact::stepper::{
-    ClusterMember, ClusterReport, ClusterScene, ClusterStepper, Participant, Plan, StepDoubling,
-};
+use metachron_contact::detect::ClusterScene;
+use metachron_contact::member::{ClusterMember, Participant};
+use metachron_contact::remote::{MacroStep, Pairs, Remotes, part};
+use metachron_contact::step::{ClusterReport, ClusterStepper, Plan, StepDoubling};
 use metachron_core::step_doubling::DoublingSchedule;
 use metachron_core::{AgentId, ParallelFor, SimSpan, SimTime, StepReport, recycled};
 use std::sync::Arc;

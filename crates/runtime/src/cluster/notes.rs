@@ -5,8 +5,9 @@
 use super::attachments::held_by_links;
 use super::solve_budget::Solved;
 use super::{AgentRunner, ClusterSeat};
-use metachron_contact::cluster::Level;
-use metachron_contact::stepper::{ClusterReport, ClusterStepper, PairTotal, Partner, StepDoubling};
+use metachron_contact::member::Partner;
+use metachron_contact::solve::Level;
+use metachron_contact::step::{ClusterReport, ClusterStepper, PairTotal, StepDoubling};
 use metachron_core::step_doubling::drift_m;
 use metachron_core::{AgentId, ClusterState, JointEffort, PairKind, PairState, SimSpan, SimTime, SolveLevel};
 

@@ -6,7 +6,8 @@
 use super::super::agent_clock::Timeline;
 use super::super::agent_runner::AgentRunner;
 use super::super::turns::Took;
-use metachron_contact::stepper::{ClusterReport, LEAST_STEPS_RANGE, SolveBudget};
+use metachron_contact::detect::{LEAST_STEPS_RANGE, SolveBudget};
+use metachron_contact::step::ClusterReport;
 use metachron_core::SimSpan;
 use std::time::Duration;
 
@@ -105,7 +106,7 @@ impl From<&ClusterReport> for Solved {
             solves: report.solves,
             factors: report.factors,
             products: report.products,
-            contacts: report.contacts.saturating_sub(report.heap_contacts),
+            contacts: report.contacts.saturating_sub(report.pile_contacts),
         }
     }
 }

@@ -3,8 +3,8 @@
 use super::super::lockstep::Lockstep;
 use super::super::testing::{Dummy, Fault, Log, RecordedStep, Swing, eventually, holders, on_every_executor, system};
 use super::super::{AgentHandle, AgentSpawn, AgentState, AgentStats, Command, Machine, Run, WatchedPoint, state_hash};
+use metachron_contact::detect::ClusterScene;
 use metachron_contact::joint::{Joint, JointKind};
-use metachron_contact::stepper::ClusterScene;
 use metachron_core::{AgentId, Resolution, SimSpan, SimTime};
 use std::cell::{Cell, RefCell};
 use std::sync::{Arc, PoisonError};

@@ -1,8 +1,8 @@
 //! A model that behaves like a rigid body until it is told to misbehave, and how.
 
 use glam::{DMat3, DVec3};
-use metachron_contact::cluster::{Block, Side, SideTerm};
-use metachron_contact::stepper::{ClusterMember, Locked, MaterialPoint, Pose, Role};
+use metachron_contact::member::{ClusterMember, Locked, MaterialPoint, Pose, Role};
+use metachron_contact::solve::{Block, Side, SideTerm};
 use metachron_contact::{Agent, Inputs, SetMotion, StepContext};
 use metachron_core::{AgentId, Anchor, Archive, ArchiveError, Body, Bounds, SimSpan, Snapshot, StepError, StepReport};
 use metachron_geometry::{CollisionShape, ContactSide, Place, PlacedShape, ShapePose, Solid};

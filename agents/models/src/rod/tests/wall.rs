@@ -240,8 +240,8 @@ fn a_wall_that_gives_makes_no_energy() {
 
 #[test]
 fn a_load_at_one_place_dents_as_much_of_the_tube_as_its_wall_can_reach() {
-    use metachron_contact::cluster::Response;
-    use metachron_contact::stepper::ClusterMember;
+    use metachron_contact::member::ClusterMember;
+    use metachron_contact::solve::Response;
     let wall_m: f64 = 5e-4;
     let spec = giving(wall_m, 400);
     let mut tube = Tube::new(TubeSpec { damping_per_s: 0.0, ..spec }).unwrap();

@@ -11,7 +11,7 @@ use super::super::step::{Divergence, Setting, Stepper};
 use super::{Tube, nearest_resolution};
 use crate::set_motion::WholeMotion;
 use glam::DVec3;
-use metachron_contact::stepper::ClusterMember;
+use metachron_contact::member::ClusterMember;
 use metachron_contact::{Agent, Input, Inputs, SetMotion, StepContext};
 use metachron_core::{
     Archive, ArchiveError, Body, Grip, Resolution, SimSpan, SimTime, Snapshot, StepError, StepReport, check_span,

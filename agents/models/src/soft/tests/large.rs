@@ -2,7 +2,7 @@
 
 use super::super::system::Purpose;
 use super::*;
-use metachron_contact::cluster::{Response, SparseFactor};
+use metachron_contact::solve::{Response, SparseFactor};
 use metachron_core::PlainLoop;
 
 fn cube(cells: u32) -> SoftShape {

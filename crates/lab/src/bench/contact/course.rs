@@ -5,7 +5,7 @@
 use super::super::machine::own_cpu;
 use super::super::play::Play;
 use glam::DVec3;
-use metachron_contact::stepper::ClusterReport;
+use metachron_contact::step::ClusterReport;
 use rapier3d::pipeline::PhysicsWorld;
 
 /// The part of a run in which bodies are held to lie still, seconds before its end.

@@ -6,9 +6,11 @@
 
 use super::penalty::{Overlaps, Penalty};
 use glam::DVec3;
-use metachron_contact::asynchronous::{MacroStep, PairClock, Pairs, Remotes, computes, part};
 use metachron_contact::audit::Member;
-use metachron_contact::stepper::{ClusterScene, ClusterStepper, ContactMemory, Participant};
+use metachron_contact::detect::ClusterScene;
+use metachron_contact::member::{ContactMemory, Participant};
+use metachron_contact::remote::{MacroStep, PairClock, Pairs, Remotes, computes, part};
+use metachron_contact::step::ClusterStepper;
 use metachron_contact::{Agent, AnchorSpring, Law, Link, Neighbour, StepContext};
 use metachron_core::{AgentId, Body, Grip, PlainLoop, SimSpan, Snapshot, StepError};
 use metachron_geometry::CollisionShape;
@@ -255,7 +257,7 @@ impl Cluster {
             // velocities and skin are those of its last step
             let penalty = Penalty { stiffness_n_m, damping_n_s_m, extrapolate, dt_s };
             for other in context.neighbours {
-                overlaps.push_off(&list[0], other, &penalty, &mut stepper.outside().known);
+                overlaps.push_off(&list[0], other, &penalty, &mut stepper.external().known);
             }
         }
         stepper.step(scene, &mut list, dt, &PlainLoop)?;

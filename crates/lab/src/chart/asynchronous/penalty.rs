@@ -5,7 +5,9 @@
 
 use glam::DVec3;
 use metachron_contact::Neighbour;
-use metachron_contact::stepper::{ClusterMember, KnownImpulse, Matter, Participant};
+use metachron_contact::member::{ClusterMember, Participant};
+use metachron_contact::remote::PublishedShape;
+use metachron_contact::step::KnownImpulse;
 use metachron_geometry::narrow_phase::{NarrowPhaseScratch, touches};
 use metachron_geometry::{ContactSide, Touch};
 
@@ -39,7 +41,7 @@ pub(in super::super) fn push_off_n(approach: Approach, stiffness_n_m: f64, dampi
 /// Overlaps of two skins.
 #[derive(Default)]
 pub(in super::super) struct Overlaps {
-    matter: Matter,
+    matter: PublishedShape,
     narrow: NarrowPhaseScratch,
     touches: Vec<Touch>,
 }

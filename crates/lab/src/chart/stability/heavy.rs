@@ -9,7 +9,7 @@ use super::super::lockstep_run::LockstepRun;
 use super::super::table::Table;
 use super::common::{GRAVITY, plain_body};
 use glam::{DQuat, DVec3};
-use metachron_contact::stepper::ClusterScene;
+use metachron_contact::detect::ClusterScene;
 use metachron_core::{AgentId, Body, RigidState, Snapshot};
 use metachron_geometry::{Obstacle, Solid};
 use metachron_models::rigid::RigidBody;

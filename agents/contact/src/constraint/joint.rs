@@ -1,0 +1,461 @@
+//! Joints of rigid bodies as rows of the cluster's problem.
+//!
+//! In: the joints of a scene, poses of participants. Out: rows whose targets bring both bodies to where the joint holds them at the
+//! end of the step, by the poses that they will then have. Never here: springs (`spring.rs`), contacts.
+//!
+//! A row knows velocities: held at zero, they let whatever turns drift off by ω² h² of its arm in each step, and lose what taking
+//! that back takes. So a target contains how far the joint would be off after the step, for velocities near the answer: those of the
+//! step before, then those of the answer itself, until the joint holds. Positions are kept as by RATTLE (AND83): to second order, and
+//! what turns keeps its energy. Theory: docs/theory/clusters.md, eq. 21.
+
+use crate::constraint::motor::Motored;
+use crate::constraint::{ConstraintRows, End, FineStep, Frame, Name, Pull, RowOwner, Slides, SlidingRow, YieldLimit};
+use crate::detect::ClusterScene;
+use crate::joint::{Joint, JointKind};
+use crate::member::memory::Partner;
+use crate::member::participant::{place_of, velocity};
+use crate::member::{ClusterMember, MaterialPoint, Participant, Pose};
+use crate::push_out::PUSH_OUT_MAX_M_S;
+use crate::solve::{Hold, JointRow, Side, SideTerm};
+use glam::{DQuat, DVec3};
+use metachron_core::{Anchor, shortest_turn};
+use metachron_geometry::narrow_phase::TouchKey;
+use std::f64::consts::{PI, TAU};
+
+/// A row that gave this share of the most that it may is not asked whether it holds.
+const YIELDS_SHARE: f64 = 0.999;
+
+/// The key of a motor's row: above those of what holds its joint.
+const MOTOR: u32 = 16;
+
+/// The joints of a fine step.
+#[derive(Debug, Default)]
+pub(crate) struct Joints {
+    /// Whether a motor keeps one of them moving.
+    pub drives: bool,
+    /// How many times as many fine steps they ask for that do not hold, or in which bodies turn too far.
+    pub ask: u32,
+    /// What they missed in this macro step when they did not hold last, metres or radians.
+    pub missed_m: f64,
+    held: Vec<Held>,
+    parts: Vec<Part>,
+}
+
+/// What a joint gave in a macro step along the way that it leaves free.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct JointTotal {
+    /// The participant that is its first body.
+    pub member: usize,
+    /// Its number in the scene.
+    pub joint: u32,
+    /// Of the first body on the second, N·m·s of a hinge, N·s of a slide.
+    pub impulse: f64,
+}
+
+/// A joint between participants; no second one is the world.
+#[derive(Debug, Clone, Copy)]
+struct Held {
+    /// Its number in the scene.
+    number: u32,
+    joint: Joint,
+    /// The direction that it leaves free, world axes, of length 1.
+    axis: DVec3,
+    /// Its rows in the problem, from the first to past the last.
+    rows: [usize; 2],
+    members: (usize, Option<usize>),
+    /// How far it is off when the step begins, and the rotations of both.
+    now: Off,
+    rotations: [DQuat; 2],
+}
+
+/// What joints do with some velocities by the end of a fine step.
+#[derive(Debug, Clone, Copy, Default)]
+pub(crate) struct Aimed {
+    /// By how much one misses what it is to hold, metres or radians.
+    pub miss_m: f64,
+    /// By how much a body in a joint turns.
+    pub turn_rad: f64,
+}
+
+/// What a row of a joint is about.
+#[derive(Debug, Clone, Copy)]
+struct Part {
+    /// The joint, by its place here, and the row among those of the problem.
+    held: usize,
+    row: usize,
+    way: Way,
+}
+
+/// The way in which a row holds.
+#[derive(Debug, Clone, Copy, PartialEq)]
+enum Way {
+    /// A point of a against one of b.
+    Point,
+    /// The attitude of a against that of b.
+    Turn,
+    /// Travel above a least one, and below a most.
+    Above(f64),
+    Below(f64),
+}
+
+/// By how much a joint is off, a against b.
+#[derive(Debug, Clone, Copy, Default)]
+struct Off {
+    /// Of the points, metres, world axes.
+    point: DVec3,
+    /// Of the attitudes, radians, world axes.
+    turn: DVec3,
+    /// How far b has moved from a in the way that is free: an angle, a length.
+    travel: f64,
+}
+
+/// What a joint holds together, its points or its turns, and the name of what does.
+#[derive(Clone, Copy)]
+struct Together {
+    sides: [Side; 2],
+    name: Name,
+}
+
+/// What a joint is made of.
+struct Parts {
+    points: Together,
+    turns: Together,
+    /// The direction that it leaves free, world axes, of length 1.
+    axis: DVec3,
+    /// Its name for what neither tears nor yields it.
+    lasting: Name,
+}
+
+/// A row of a joint as it is laid out.
+struct LaidRow {
+    /// The joint, by its place here.
+    held: usize,
+    way: Way,
+    hold: Hold,
+    of: Together,
+    owner: RowOwner,
+}
+
+/// A joint and the participants that it holds.
+struct Jointed<'a> {
+    number: u32,
+    joint: &'a Joint,
+    a: usize,
+    /// `None` is the world.
+    b: Option<usize>,
+}
+
+impl Joints {
+    /// Lays out all joints between participants.
+    pub fn gather(&mut self, scene: &ClusterScene, step: &FineStep<'_, '_>, constraints: &mut ConstraintRows) {
+        let FineStep { all, progress, .. } = *step;
+        self.held.clear();
+        self.parts.clear();
+        self.drives = false;
+        for (a, one) in all.iter().enumerate() {
+            for (number, joint) in scene.joints_of(one.id) {
+                if one.memory.has_torn(Partner::Joint(number)) {
+                    continue;
+                }
+                let b = joint.b.map(|id| place_of(all, id));
+                // a body that is not here cannot be held: clusters contain both
+                let Some(b) = b.map_or(Some(None), |b| b.map(Some)) else { continue };
+                let joint = one.memory.slipped(Partner::Joint(number)).joint(joint);
+                let set = one.context.motors.iter().find(|set| set.joint == number);
+                let joint = set.map_or(joint, |set| joint.with_motor(set.motor));
+                self.hold(step, &Jointed { number, joint: &joint, a, b }, constraints);
+            }
+        }
+        self.aim(all, constraints, |member| &progress[member].v_before[..], step.h_s);
+    }
+
+    /// Lays out one joint.
+    fn hold(&mut self, step: &FineStep<'_, '_>, jointed: &Jointed<'_>, constraints: &mut ConstraintRows) {
+        let Jointed { number, joint, a: first, b: second } = *jointed;
+        let all = step.all;
+        let at = |member: usize| all[member].member.pose(&[], 0.0);
+        let (Some(a), Some(b)) = (at(first), second.map_or(Some(Pose::WORLD), at)) else { return };
+        let anchors = [a.place(joint.anchor_a_m), b.place(joint.anchor_b_m)];
+        // on a slide b's anchor meets the matter of a beside it, wherever that is
+        let on_a = if matches!(joint.kind, JointKind::Prismatic { .. }) { anchors[1] } else { anchors[0] };
+        let (Some(point_a), Some(point_b)) =
+            (material(all, Some(first), &a, on_a), material(all, second, &b, anchors[1]))
+        else {
+            return;
+        };
+        let ends = [End { member: Some(first), point: point_a }, End { member: second, point: point_b }];
+        let yields = YieldLimit { above_n: joint.yields_above_n, frame: Frame::of(&b) };
+        let lasting = Name::lasting(first, Partner::Joint(number), None);
+        let name = Name { tears_above_n: joint.tears_above_n, yields, ..lasting };
+        if let JointKind::Spring { stiffness_n_m, damping_n_s_m, rest_m } = joint.kind {
+            constraints.spring(step, &ends, &Pull { stiffness_n_m, damping_n_s_m, rest_m }, name);
+            return;
+        }
+        let points = Together { sides: [ends[0].side(), ends[1].side()], name };
+        // what holds a turn gives no force
+        let turns = [a.turns.of_member(first), second.map_or(Side::FIXED, |at| b.turns.of_member(at))];
+        let turns = Together { sides: turns, name: lasting };
+        // as in the last step
+        constraints.geometric_stiffness.note(
+            step,
+            &ends,
+            all[name.member].memory.recall(name.partner, TouchKey::default()).force_n,
+            name,
+        );
+        let now = joint.off(&a, &b);
+        let (axis, rows) = (joint.axis(&a, anchors[1] - anchors[0]), [constraints.rows.len(); 2]);
+        let (members, rotations) = ((first, second), [a.rotation, b.rotation]);
+        self.held.push(Held { number, joint: *joint, axis, rows, members, now, rotations });
+        self.lay_all(step, constraints, &Parts { points, turns, axis, lasting });
+        self.held.iter_mut().next_back().into_iter().for_each(|held| held.rows[1] = constraints.rows.len());
+    }
+
+    /// Lays out the rows of the joint that was noted last.
+    fn lay_all(&mut self, step: &FineStep<'_, '_>, constraints: &mut ConstraintRows, parts: &Parts) {
+        let Parts { points, turns, axis, lasting } = *parts;
+        let held = self.held.len() - 1;
+        let Held { joint, members: (_, second), now, .. } = self.held[held];
+        let (mut key, mut driven) = (0, None);
+        let mut push = |way: Way, of: Together, hold: Hold| {
+            self.lay(step, constraints, &LaidRow { held, way, hold, of, owner: of.name.row(key, second) });
+            key += 1;
+        };
+        match joint.kind {
+            JointKind::Fixed => {
+                push(Way::Point, points, Hold::ALL);
+                push(Way::Turn, turns, Hold::ALL);
+            }
+            JointKind::Revolute { range_rad, motor, .. } => {
+                driven = motor.map(|motor| (motor, turns));
+                push(Way::Point, points, Hold::ALL);
+                push(Way::Turn, turns, Hold::across(axis));
+                if let Some([low, high]) = range_rad {
+                    push(Way::Above(low), turns, Hold::pushing(-axis));
+                    push(Way::Below(high), turns, Hold::pushing(axis));
+                }
+            }
+            JointKind::Spherical => push(Way::Point, points, Hold::ALL),
+            JointKind::Prismatic { range_m, motor, .. } => {
+                driven = motor.map(|motor| (motor, points));
+                push(Way::Point, points, Hold::across(axis));
+                push(Way::Turn, turns, Hold::ALL);
+                if let Some([low, high]) = range_m {
+                    push(Way::Above(low), points, Hold::pushing(-axis));
+                    push(Way::Below(high), points, Hold::pushing(axis));
+                }
+            }
+            JointKind::Rope { length_m } => push(Way::Below(length_m), points, Hold::pushing(axis)),
+            JointKind::Spring { .. } => {}
+        }
+        if let Some((motor, Together { sides, .. })) = driven {
+            let turns = matches!(joint.kind, JointKind::Revolute { .. });
+            self.drives |= motor.moves();
+            let before = |member: usize| &step.progress[member].v_before[..];
+            let [of_a, of_b] = sides.map(|side| velocity(&side, before).dot(axis));
+            let inverse_mass = sides.iter().map(|side| own_inverse_mass(step.all, side, axis)).sum();
+            let speed = of_b - of_a;
+            let motored = Motored { sides, axis, travel: now.travel, speed, inverse_mass, turns };
+            let row = motor.row(&motored, step.h_s);
+            constraints.motor(step, row, lasting.row(MOTOR, second));
+        }
+    }
+
+    /// Lays out one row of a joint.
+    fn lay(&mut self, step: &FineStep<'_, '_>, constraints: &mut ConstraintRows, laid: &LaidRow) {
+        let LaidRow { held, way, hold, of: Together { sides, name }, owner } = *laid;
+        let row = constraints.rows.len();
+        let YieldLimit { above_n, frame } = name.yields;
+        if !constraints.push(step, JointRow::new(sides, hold.limited(above_n * step.h_s)), owner) {
+            return;
+        }
+        self.parts.push(Part { held, row, way });
+        let slides = match (self.held[held].joint.kind, hold) {
+            (JointKind::Rope { .. }, Hold::Along { axis, .. }) => Slides::Length { axis: -axis },
+            _ => Slides::Point(frame),
+        };
+        let (per_m_s, free_m) = (step.h_s, step.joint_miss_m);
+        constraints.slides(SlidingRow { row, slides, per_m_s, free_m, yields_above_n: above_n, own: None });
+    }
+
+    /// Adds to `totals` what motors and stops gave b against a along the ways that their joints leave free.
+    pub fn note_efforts(&self, constraints: &ConstraintRows, rows_n_s: &[DVec3], totals: &mut Vec<JointTotal>) {
+        for held in self.held.iter().filter(|held| held.joint.takes_motor()) {
+            let rows = held.rows[0]..held.rows[1];
+            let along = rows.filter(|row| matches!(constraints.rows[*row].hold, Hold::Along { .. }));
+            let given = along.map(|row| -rows_n_s[row].dot(held.axis)).fold(0.0, |sum, given| sum + given);
+            let (member, joint) = (held.members.0, held.number);
+            match totals.iter_mut().find(|total| total.joint == joint) {
+                Some(total) => total.impulse += given,
+                None => totals.push(JointTotal { member, joint, impulse: given }),
+            }
+        }
+    }
+
+    /// Sets the targets of all rows so that joints hold at the end of the step, to the first order about `velocities` of members.
+    /// Returns what they would do with these velocities themselves.
+    pub fn aim<'v>(
+        &self,
+        all: &[Participant<'_>],
+        constraints: &mut ConstraintRows,
+        velocities: impl Fn(usize) -> &'v [DVec3],
+        h_s: f64,
+    ) -> Aimed {
+        let mut aimed = Aimed::default();
+        let mut then = None;
+        for part in &self.parts {
+            let held = &self.held[part.held];
+            let off = match then {
+                Some((at, off)) if at == part.held => off,
+                _ => {
+                    let (off, turn_rad) = held.after(all, &velocities, h_s);
+                    aimed.turn_rad = aimed.turn_rad.max(turn_rad);
+                    off
+                }
+            };
+            then = Some((part.held, off));
+            let row = &mut constraints.rows[part.row];
+            let wanted = part.way.wanted(part.way.off(&held.now, row), row, h_s);
+            let miss = part.way.off(&off, row) - wanted;
+            let [a, b] = row.sides.map(|side| velocity(&side, &velocities));
+            row.target_m_s = a - b - miss / h_s;
+            // one that gives all that it may holds nowhere
+            if !row.gives_all(row.warm_n_s, YIELDS_SHARE) {
+                aimed.miss_m = aimed.miss_m.max(part.way.missed(miss, row));
+            }
+        }
+        aimed
+    }
+}
+
+impl Held {
+    /// How far it is off once its bodies have moved on for `h_s` seconds, and by how much one of them has turned then.
+    fn after<'v>(&self, all: &[Participant<'_>], velocities: &impl Fn(usize) -> &'v [DVec3], h_s: f64) -> (Off, f64) {
+        let at = |member: usize| all[member].member.pose(velocities(member), h_s);
+        let (a, b) = self.members;
+        let (Some(a), Some(b)) = (at(a), b.map_or(Some(Pose::WORLD), at)) else { return (self.now, 0.0) };
+        let turned = [&a, &b].into_iter().zip(self.rotations).map(|(then, now)| then.rotation.angle_between(now));
+        let turn_rad = turned.fold(0.0, f64::max);
+        let mut off = self.joint.off(&a, &b);
+        if matches!(self.joint.kind, JointKind::Revolute { .. }) {
+            // angles are known but for whole turns
+            off.travel += ((self.now.travel - off.travel) / TAU).round() * TAU;
+        }
+        (off, turn_rad)
+    }
+}
+
+impl Way {
+    /// How far a row is off, along directions in which it holds or not.
+    fn off(self, off: &Off, row: &JointRow) -> DVec3 {
+        let along = |gap: f64| match row.hold {
+            Hold::Along { axis, .. } => axis * gap,
+            _ => DVec3::ZERO,
+        };
+        match self {
+            Self::Point => off.point,
+            Self::Turn => off.turn,
+            Self::Above(low) => along(off.travel - low),
+            Self::Below(high) => along(high - off.travel),
+        }
+    }
+
+    /// How far it may be off at the end of the step where it is `off` at its start: nothing, unless that is more than can be taken back
+    /// as fast as contacts take an overlap back.
+    fn wanted(self, off: DVec3, row: &JointRow, h_s: f64) -> DVec3 {
+        let open = match row.hold {
+            Hold::Along { axis, .. } => off.dot(axis) > 0.0,
+            _ => false,
+        };
+        if open { DVec3::ZERO } else { off - off.clamp_length_max(PUSH_OUT_MAX_M_S * h_s) }
+    }
+
+    /// The part of a miss that counts: in directions in which the row holds, and of a stop what lies beyond it.
+    fn missed(self, miss: DVec3, row: &JointRow) -> f64 {
+        match row.hold {
+            Hold::All { .. } => miss.length(),
+            Hold::Across { axis, .. } => (miss - axis * miss.dot(axis)).length(),
+            Hold::Along { axis, .. } => (-miss.dot(axis)).max(0.0),
+        }
+    }
+}
+
+impl Joint {
+    /// How far b has moved from a in the way that the joint leaves free, from its zero: rad within −π … π, metres; of springs and ropes the
+    /// distance of the anchors.
+    #[must_use]
+    pub fn travel(&self, a: &Pose, b: &Pose) -> f64 {
+        self.off(a, b).travel
+    }
+
+    /// How far the joint is off where its bodies are in these poses.
+    fn off(&self, a: &Pose, b: &Pose) -> Off {
+        let apart = a.place(self.anchor_a_m) - b.place(self.anchor_b_m);
+        let at_zero = (a.rotation * self.rest.normalize()).normalize();
+        match self.kind {
+            JointKind::Fixed => Off { point: apart, turn: shortest_turn(b.rotation, at_zero), travel: 0.0 },
+            JointKind::Revolute { axis, .. } => {
+                let axis = axis.normalize_or_zero();
+                let back = self.rest.normalize().conjugate();
+                let turned = a.rotation.conjugate() * b.rotation * back;
+                let about = axis * turned.xyz().dot(axis);
+                let about = DQuat::from_xyzw(about.x, about.y, about.z, turned.w).normalize();
+                let angle = about.to_scaled_axis().dot(axis);
+                let travel = if angle > PI {
+                    angle - TAU
+                } else if angle < -PI {
+                    angle + TAU
+                } else {
+                    angle
+                };
+                Off { point: apart, turn: tilt(b.rotation * back * axis, a.rotation * axis), travel }
+            }
+            JointKind::Spherical => Off { point: apart, ..Off::default() },
+            JointKind::Prismatic { .. } => {
+                let axis = self.axis(a, DVec3::ZERO);
+                let travel = -apart.dot(axis);
+                Off { point: apart + axis * travel, turn: shortest_turn(b.rotation, at_zero), travel }
+            }
+            JointKind::Spring { .. } | JointKind::Rope { .. } => Off { travel: apart.length(), ..Off::default() },
+        }
+    }
+
+    /// The direction that it leaves free, or along which it pulls where b's anchor lies `away` from a's: world axes, of length 1.
+    fn axis(&self, a: &Pose, away: DVec3) -> DVec3 {
+        match self.kind {
+            JointKind::Revolute { axis, .. } | JointKind::Prismatic { axis, .. } => {
+                (a.rotation * axis).try_normalize().unwrap_or(DVec3::X)
+            }
+            _ => away.try_normalize().unwrap_or(DVec3::X),
+        }
+    }
+}
+
+impl Pose {
+    /// The place of a point of the shape's axes.
+    #[must_use]
+    pub fn place(&self, local_m: DVec3) -> DVec3 {
+        self.origin_m + self.rotation * local_m
+    }
+}
+
+/// The matter of a participant, or of the world, at `place`.
+fn material(all: &[Participant<'_>], member: Option<usize>, pose: &Pose, place: DVec3) -> Option<MaterialPoint> {
+    let Some(member) = member else { return Some(MaterialPoint::led(place, DVec3::ZERO)) };
+    all[member].member.anchor(Anchor::Local(pose.rotation.conjugate() * (place - pose.centre_m)))
+}
+
+/// The inverse mass of a side along an axis where nothing but its member's own blocks resists, 1/kg, or 1/(kg m²) of a turn.
+fn own_inverse_mass(all: &[Participant<'_>], side: &Side, axis: DVec3) -> f64 {
+    let of = |term: &SideTerm| {
+        let mut blocks = all[side.member].member.blocks().iter();
+        let block = blocks.find(|block| block.row == term.block && block.column == term.block)?;
+        let given = term.map.transpose() * axis;
+        Some(given.dot(block.value.inverse() * given))
+    };
+    side.terms().iter().filter_map(of).sum()
+}
+
+/// The turn that leads from one direction to another, as a rotation vector.
+fn tilt(from: DVec3, to: DVec3) -> DVec3 {
+    DQuat::from_rotation_arc(from.normalize_or(DVec3::X), to.normalize_or(DVec3::X)).to_scaled_axis()
+}

@@ -1,0 +1,302 @@
+//! Rows of the cluster's problem that hold two points or two spins together: springs, links, drives, joints.
+//!
+//! In: rows with what they belong to. Out: the same in a list, and the forces that they gave. Never here: contacts, what a row is made of.
+
+mod attachment;
+pub(crate) mod contact_rows;
+pub(crate) mod failure;
+pub(crate) mod geometric_stiffness;
+pub(crate) mod joint;
+pub(crate) mod link;
+mod motor;
+pub(crate) mod spring;
+
+use crate::law::Link;
+use crate::member::memory::Partner;
+use crate::member::participant::{Progress, velocity};
+use crate::member::{ClusterMember, MaterialPoint, Participant, Pose};
+use crate::solve::{Hold, JointRow, Side};
+pub use failure::{Torn, Yielded};
+use glam::DQuat;
+use glam::DVec3;
+pub use joint::JointTotal;
+use metachron_core::Anchor;
+use metachron_core::{AgentId, Grip};
+use metachron_geometry::narrow_phase::TouchKey;
+
+/// A fine step as rows are laid out for it.
+#[derive(Clone, Copy)]
+pub(crate) struct FineStep<'a, 'b> {
+    pub all: &'a [Participant<'b>],
+    pub progress: &'a [Progress],
+    /// How long it is, seconds.
+    pub h_s: f64,
+    /// How long after the start of the macro step it begins, seconds.
+    pub after_s: f64,
+    /// By how much a joint that holds may be off, metres.
+    pub joint_miss_m: f64,
+}
+
+/// Where a row belongs.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct RowOwner {
+    /// The participant that remembers it: side 0, the lower number of two.
+    pub member: usize,
+    /// The participant on side 1, where there is one.
+    pub other: Option<usize>,
+    pub partner: Partner,
+    /// The name of the row within its tie.
+    pub key: u32,
+    /// Who pulls at whom, where it is a force by which somebody holds a body.
+    pub hold: Option<Holders>,
+    /// The force above which its tie tears, N: infinite of one that never does, and of rows that hold turns.
+    pub tears_above_n: f64,
+    /// Whether it takes back what it has crept: of one that knows its velocity, and no place.
+    pub owes: bool,
+}
+
+impl RowOwner {
+    /// The way that its row owes after a step that gave `impulse_n_s` (eq. 13).
+    pub fn owed_slip_m(&self, row: &JointRow, impulse_n_s: DVec3, progress: &[Progress], h_s: f64) -> DVec3 {
+        if !self.owes {
+            return DVec3::ZERO;
+        }
+        let [a, b] = row.sides.map(|side| velocity(&side, |member| &progress[member].v_solved[..]));
+        row.owed_slip_after(impulse_n_s, a - b, row.hold.most_n_s(impulse_n_s), h_s)
+    }
+
+    /// Its participants.
+    pub fn both(&self) -> impl Iterator<Item = usize> + use<> {
+        std::iter::once(self.member).chain(self.other)
+    }
+}
+
+/// The two ends of a force, as each is told to the other: `None` is the user.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Holders {
+    pub side_0: AgentId,
+    pub side_1: Option<AgentId>,
+}
+
+/// The rows of a fine step.
+#[derive(Debug, Default)]
+pub(crate) struct ConstraintRows {
+    /// Behind those with an owner are those that contacts bring.
+    pub rows: Vec<JointRow>,
+    /// One for each row but for those.
+    pub owners: Vec<RowOwner>,
+    /// Those that may slip.
+    pub sliding: Vec<SlidingRow>,
+    /// The forces at arms that come with them.
+    pub geometric_stiffness: GeometricStiffness,
+}
+
+impl ConstraintRows {
+    pub fn clear(&mut self) {
+        self.geometric_stiffness.clear();
+        self.rows.clear();
+        self.owners.clear();
+        self.sliding.clear();
+    }
+
+    /// Adds a row, which starts from what it gave in the last step; whether it did. Left out is one of which neither side moves.
+    pub fn push(&mut self, step: &FineStep<'_, '_>, row: JointRow, owner: RowOwner) -> bool {
+        let sound = row.target_m_s.is_finite() && row.compliance_per_kg.is_none_or(|r| r > 0.0 && r.is_finite());
+        if !sound || row.sides.iter().all(|side| side.terms().is_empty()) {
+            return false;
+        }
+        let remembered = step.all[owner.member].memory.recall(owner.partner, place_key(owner.key));
+        let warm_n_s = remembered.force_n * step.h_s;
+        let owed_slip_m = if owner.owes { remembered.owed_slip_m } else { DVec3::ZERO };
+        self.rows.push(JointRow { warm_n_s, owed_slip_m, ..row });
+        self.owners.push(owner);
+        true
+    }
+
+    /// The forces by which `member` is held, of rows that gave `impulses` within a fine step of `h_s` seconds, added to `grips`.
+    pub fn grips(&self, member: usize, impulses: &[DVec3], h_s: f64, grips: &mut Vec<Grip>) {
+        let mut last = None;
+        for (owner, impulse) in self.owners.iter().zip(impulses) {
+            let Some(hold) = owner.hold else { continue };
+            let (by, force_n) = if owner.member == member {
+                (hold.side_1, *impulse / h_s)
+            } else if owner.other == Some(member) {
+                (Some(hold.side_0), -*impulse / h_s)
+            } else {
+                continue;
+            };
+            // the rows of one spring are one force
+            let tie = Some((owner.member, owner.partner));
+            match grips.last_mut().filter(|_| last == tie) {
+                Some(grip) => grip.force_n += force_n,
+                None => grips.push(Grip { by, force_n }),
+            }
+            last = tie;
+        }
+    }
+}
+
+/// Whether a row passes on an impact: what gives no more than a force gives nothing in no time, and what it could push is not there yet.
+pub(crate) fn is_rigid(row: &JointRow) -> bool {
+    let unbounded = match row.hold {
+        Hold::All { limit_n_s } | Hold::Across { limit_n_s, .. } => limit_n_s == f64::INFINITY,
+        Hold::Along { low_n_s, high_n_s, .. } => match (low_n_s == f64::NEG_INFINITY, high_n_s == f64::INFINITY) {
+            (true, true) => true,
+            (true, false) | (false, true) => row.warm_n_s != DVec3::ZERO,
+            (false, false) => false,
+        },
+    };
+    unbounded && row.limit_m_s == f64::INFINITY && row.compliance_per_kg.is_none() && row.pressed.is_none()
+}
+
+/// The name of a row in the memory of its pair.
+pub(crate) fn place_key(row: u32) -> TouchKey {
+    TouchKey { place: row, ..TouchKey::default() }
+}
+
+/// One end of a spring.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct End {
+    /// The participant; `None` where the end is led from outside.
+    pub member: Option<usize>,
+    pub point: MaterialPoint,
+}
+
+/// What is between two ends.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Pull {
+    pub stiffness_n_m: f64,
+    pub damping_n_s_m: f64,
+    pub rest_m: f64,
+}
+
+/// A name for a spring between others, so that its rows are told apart and remembered.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Name {
+    /// The participant that remembers it.
+    pub member: usize,
+    pub partner: Partner,
+    pub hold: Option<Holders>,
+    /// The force above which it tears, N; infinite where it never does.
+    pub tears_above_n: f64,
+    pub yields: YieldLimit,
+}
+
+impl Name {
+    /// What neither tears nor yields.
+    pub fn lasting(member: usize, partner: Partner, hold: Option<Holders>) -> Self {
+        Self { member, partner, hold, tears_above_n: f64::INFINITY, yields: YieldLimit::NONE }
+    }
+
+    pub fn row(self, key: u32, other: Option<usize>) -> RowOwner {
+        let Self { member, partner, hold, tears_above_n, .. } = self;
+        RowOwner { member, other, partner, key, hold, tears_above_n, owes: false }
+    }
+}
+
+impl End {
+    pub fn side(&self) -> Side {
+        self.member.map_or(Side::FIXED, |member| self.point.side.of_member(member))
+    }
+}
+
+impl Pull {
+    /// By how much its spring slips for each unit of velocity by which it gives way: what its damper bears it need not.
+    pub(crate) fn slips_per_m_s(&self, h_s: f64) -> Option<f64> {
+        (self.stiffness_n_m > 0.0).then(|| h_s + self.damping_n_s_m / self.stiffness_n_m)
+    }
+}
+
+/// In which way a row slips.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) enum Slides {
+    /// The point at an end moves.
+    Point(Frame),
+    /// A length grows by what side 0 moves along the axis from side 1 to it.
+    Length {
+        /// World axes, of length 1.
+        axis: DVec3,
+    },
+}
+
+/// What an attachment gives at most, and where it keeps its slip.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct YieldLimit {
+    /// The most force, N; infinite where it never yields.
+    pub above_n: f64,
+    pub frame: Frame,
+}
+
+impl YieldLimit {
+    /// Of what never yields.
+    pub const NONE: Self = Self { above_n: f64::INFINITY, frame: Frame::WORLD };
+}
+
+/// The axes in which a moved point is kept.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Frame {
+    /// From the world's axes.
+    pub to_own: DQuat,
+    /// −1 where the near end's point moves instead, by the opposite.
+    pub sign: f64,
+}
+
+impl Frame {
+    /// The world's axes at the far end.
+    pub const WORLD: Self = Self { to_own: DQuat::IDENTITY, sign: 1.0 };
+
+    /// The axes of a far end in this pose.
+    pub fn of(far: &Pose) -> Self {
+        Self { to_own: far.rotation.conjugate(), sign: 1.0 }
+    }
+
+    /// The axes that a link keeps its slip in, of its ends' participants.
+    pub fn of_link(all: &[Participant<'_>], ends: [usize; 2], link: &Link) -> Self {
+        let axes = |member: usize, sign: f64| {
+            let pose = all[member].member.pose(&[], 0.0);
+            pose.map_or(Self::WORLD, |pose| Self { sign, ..Self::of(&pose) })
+        };
+        match (link.here, link.there) {
+            (_, Anchor::Local(_)) => axes(ends[1], 1.0),
+            (Anchor::Local(_), _) => axes(ends[0], -1.0),
+            _ => Self::WORLD,
+        }
+    }
+}
+
+/// A row that may slip.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct SlidingRow {
+    /// Its place among the rows of the fine step.
+    pub row: usize,
+    pub slides: Slides,
+    /// By how much it slips for each unit of velocity by which it gives way, seconds.
+    pub per_m_s: f64,
+    /// What it may be off without having slipped, metres.
+    pub free_m: f64,
+    /// The force of its attachment at which it yields, N.
+    pub yields_above_n: f64,
+    /// Its place among the springs of its member that yield, where it is one of them.
+    pub own: Option<usize>,
+}
+
+/// The forces of a fine step at arms.
+#[derive(Debug, Default)]
+pub(crate) struct GeometricStiffness {
+    pulls: Vec<ForceAtArm>,
+    /// Of each participant, how much inertia its pulls ask for, in shares of what it has.
+    asked: Vec<f64>,
+}
+
+/// A force at an arm of a body.
+#[derive(Debug, Clone, Copy)]
+struct ForceAtArm {
+    owner: RowOwner,
+    /// The body, and its spin.
+    member: usize,
+    turns: Side,
+    /// Along the arm, of length 1.
+    axis: DVec3,
+    /// The inertia that it asks for across the arm, kg m².
+    inertia_kg_m2: f64,
+}

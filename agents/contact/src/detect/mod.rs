@@ -1,0 +1,329 @@
+//! Where members of a cluster may touch each other, themselves and the static solids around them within a fine step.
+//!
+//! In: members with the velocities they have and would have. Out: contacts of the problem, each with its name. Never here: impulses.
+//! Theory: docs/theory/clusters.md, section 9.
+
+pub(crate) mod domain;
+mod pair;
+mod reach;
+mod scene;
+mod sensor;
+mod thinning;
+
+use crate::detect::domain::Domain;
+use crate::member::memory::{Partner, Spin};
+use crate::member::{ClusterMember, Role};
+use crate::solve::Contact;
+use glam::DVec3;
+use metachron_geometry::narrow_phase::{NarrowPhaseScratch, TouchKey, self_touches, touches};
+use metachron_geometry::{CollisionShape, Place, Touch};
+use pair::{Against, LOOK_M, Pair, Reaching};
+pub(crate) use pair::{Judge, Owner, Round};
+use pair::{Skinned, closes, taken_up};
+use reach::Boxes;
+use reach::{FAR_M, Meeting, Sought, Sweep, Sweeping};
+pub use scene::{
+    BadDepth, BadLeastSteps, ClusterScene, DEPTH_RANGE_M, LEAST_STEPS_DEFAULT, LEAST_STEPS_RANGE, Passage, SolveBudget,
+};
+pub(crate) use sensor::Sensed;
+use thinning::Thinning;
+
+/// How many steps ahead bodies look for each other.
+const NEAR_STEPS: f64 = 2.0;
+
+/// Places found of a pair.
+struct Found<'a> {
+    owner: Owner,
+    skins: [&'a CollisionShape; 2],
+    /// When, in a fine step: later than its start for a pair that meets on its way.
+    at: Meeting,
+    /// No place was left out that is nearer than this, metres.
+    clear_m: f64,
+}
+
+/// Reusable storage, and what was found.
+#[derive(Default)]
+pub(crate) struct Search {
+    pub contacts: Vec<Contact>,
+    /// One for each contact.
+    pub owners: Vec<Owner>,
+    /// Pairs of participants that are near each other, the lower first.
+    pub near: Vec<[usize; 2]>,
+    /// Pairs that touch and of which one side only senses, by rising names.
+    pub sensed: Vec<Sensed>,
+    point: sensor::Point,
+    /// Members that rapier3d steps have no contacts but with the others; empty where there are none.
+    domains: Vec<Domain>,
+    /// What was looked at in this fine step, by rising names once it is sorted.
+    looks: Vec<Look>,
+    /// How many contacts were found before the solve.
+    known: usize,
+    /// Whether a contact of before the solve has another place since.
+    moved: bool,
+    /// Pairs near each other by the velocities of a solution.
+    again: Vec<[usize; 2]>,
+    boxes: Boxes,
+    sweep: Sweep,
+    thinning: Thinning,
+    touches: Vec<Touch>,
+    scratch: NarrowPhaseScratch,
+    sorted: Vec<Named>,
+}
+
+/// A contact with its owner.
+struct Named {
+    owner: Owner,
+    contact: Contact,
+}
+
+/// A member and its partner that were looked at.
+#[derive(Debug, Clone, Copy)]
+struct Look {
+    member: usize,
+    partner: Partner,
+    /// No place of the two that was left out is nearer than this, metres.
+    clear_m: f64,
+}
+
+impl Search {
+    /// Finds all places of a fine step, but for those of a rigid pile among itself and with static solids; `domains` is empty where there is none.
+    pub fn find(&mut self, round: &Round<'_, '_>, domains: &[Domain]) {
+        self.find_near(round);
+        self.domains.clear();
+        self.domains.extend_from_slice(domains);
+        let near = std::mem::take(&mut self.near);
+        self.find_all(round, &near);
+        self.near = near;
+        self.sort();
+    }
+
+    /// Finds pairs that are near each other, and no places.
+    fn find_near(&mut self, round: &Round<'_, '_>) {
+        let Round { all, progress, h_s, .. } = *round;
+        self.contacts.clear();
+        self.owners.clear();
+        self.near.clear();
+        self.looks.clear();
+        self.thinning.begin();
+        self.boxes.place(all, |member| {
+            let (body, state) = (&all[member].member, &progress[member]);
+            body.speed_bound(&state.v_before).max(body.speed_bound(&state.v_predicted))
+        });
+        self.boxes.near(NEAR_STEPS, h_s, &mut self.near);
+        let apart =
+            |[a, b]: [usize; 2]| all[a].member.is_remote() && all[b].member.is_remote() || !all[a].meets(&all[b]);
+        self.near.retain(|pair| !apart(*pair));
+    }
+
+    /// Adds the places that bodies would have passed with the velocities `solved`: what is struck moves as nobody foresaw. Returns
+    /// whether there are any; contacts are then in a new order.
+    pub fn add_passed(&mut self, round: &Round<'_, '_>) -> bool {
+        let Round { all, h_s, .. } = *round;
+        if (0..all.len()).all(|member| self.is_pile(member)) {
+            return false;
+        }
+        self.boxes.place(all, |member| all[member].member.speed_bound(round.moved(member)));
+        let mut pairs = std::mem::take(&mut self.again);
+        pairs.clear();
+        self.boxes.meeting(h_s, &mut pairs);
+        (self.known, self.moved) = (self.contacts.len(), false);
+        self.find_all(round, &pairs);
+        self.again = pairs;
+        let more = self.moved || self.contacts.len() > self.known;
+        self.sort();
+        more
+    }
+
+    /// Places of some pairs of members, and of all members with static solids and with themselves.
+    fn find_all(&mut self, round: &Round<'_, '_>, pairs: &[[usize; 2]]) {
+        let Round { scene, all, .. } = *round;
+        for &[a, b] in pairs {
+            if !(self.is_pile(a) && self.is_pile(b))
+                && all[a].may_touch(&all[b])
+                && [a, b].iter().any(|at| all[*at].member.role() != Role::Kinematic)
+                && !scene.lets_through([all[a].id, all[b].id])
+            {
+                self.find_of(round, Pair { member: a, against: Against::Member(b) });
+            }
+        }
+        for (member, one) in all.iter().enumerate() {
+            if self.is_pile(member) {
+                continue;
+            }
+            if one.member.rest_shape().is_some() {
+                self.find_of(round, Pair { member, against: Against::Own });
+            }
+            if one.member.is_led() {
+                continue; // what leads it is stronger than what never moves
+            }
+            let Some(form) = one.member.skin().map(|skin| skin.form) else { continue };
+            let met = |number: u32| !scene.has_passage(Passage { body: one.id, solid: number });
+            let all = (0..).zip(scene.statics());
+            for (number, solid) in all.filter(|(number, solid)| met(*number) && form.meets(&solid.form)) {
+                self.find_of(round, Pair { member, against: Against::Static { number, solid } });
+            }
+        }
+    }
+
+    fn is_pile(&self, member: usize) -> bool {
+        self.domains.get(member) == Some(&Domain::RigidPile)
+    }
+
+    /// Places of a pair.
+    fn find_of(&mut self, round: &Round<'_, '_>, pair: Pair<'_>) {
+        let Round { all, h_s, .. } = *round;
+        let Pair { member, against } = pair;
+        let (Some(skin), Some(reach)) = (all[member].member.skin(), self.boxes.of(member)) else { return };
+        let (partner, form, bounds, their_m_s) = match against {
+            Against::Own => (Partner::Own, skin.form, reach.skin, reach.speed_m_s),
+            Against::Static { number, solid } => (Partner::Static(number), &solid.form, solid.bounds(), 0.0),
+            Against::Member(other) => {
+                let (Some(skin), Some(there)) = (all[other].member.skin(), self.boxes.of(other)) else { return };
+                (Partner::Agent(all[other].id), skin.form, there.skin, there.speed_m_s)
+            }
+        };
+        if skin.form.senses(form) {
+            return;
+        }
+        let way_m = (reach.speed_m_s + their_m_s) * h_s;
+        if !round.predicts() && !self.may_have_passed(member, partner, way_m) {
+            return;
+        }
+        let reach_m = LOOK_M + way_m;
+        self.touches.clear();
+        let meets = reach.skin.grown(reach_m).meets(bounds);
+        // a body that goes far meets others that are not near yet
+        let swept_m = (reach_m > FAR_M).then_some(LOOK_M);
+        let at = if meets { self.touch(round, pair, Reaching { reach_m, swept_m }) } else { Meeting::default() };
+        let clear_m = if at.after_s > 0.0 { 0.0 } else { reach_m };
+        let spin = Spin { radius_m: skin.form.spin_radius_with_m(form), ..Spin::default() };
+        let owner = Owner {
+            member,
+            partner,
+            other: pair.other(),
+            key: TouchKey::default(),
+            spin,
+            push_n: 0.0,
+            place: Place::Point(DVec3::NAN),
+            restitution: skin.form.restitution_with(form),
+        };
+        self.take(round, pair, Found { owner, skins: [skin.form, form], at, clear_m });
+    }
+
+    /// Finds the places of a pair that may come within reach, and when: at their first meeting, of a pair that is apart now and goes far.
+    fn touch(&mut self, round: &Round<'_, '_>, pair: Pair<'_>, reaching: Reaching) -> Meeting {
+        let Reaching { reach_m, swept_m } = reaching;
+        let Self { touches: into, scratch, sweep, .. } = self;
+        let body = &round.all[pair.member].member;
+        let (now, end) = (Meeting::default(), Meeting { after_s: round.h_s, ..Meeting::default() });
+        let Some(skin) = body.skin() else { return now };
+        if let Some(reach_m) = swept_m {
+            match sweep.meet(round, Sought { pair, reach_m }, scratch, into) {
+                Sweeping::Meets(meeting) if meeting.after_s > 0.0 => return meeting,
+                Sweeping::Passes => return end,
+                Sweeping::Meets(_) | Sweeping::Unknown => {}
+            }
+        }
+        match pair.against {
+            Against::Own => {
+                body.rest_shape().into_iter().for_each(|rest| self_touches(&skin, rest, reach_m, scratch, into));
+            }
+            Against::Static { solid, .. } => solid.touches(&skin, reach_m, scratch, into),
+            Against::Member(other) => {
+                let there = round.all[other].member.skin();
+                there.into_iter().for_each(|there| touches(&skin, &there, reach_m, scratch, into));
+            }
+        }
+        now
+    }
+
+    /// Whether a solution may have closed a place of the two that was left out: they come closer by at most `way_m`.
+    fn may_have_passed(&self, member: usize, partner: Partner, way_m: f64) -> bool {
+        let found = self.looks.binary_search_by_key(&(member, partner), |look| (look.member, look.partner));
+        found.map_or(true, |at| way_m > self.looks[at].clear_m)
+    }
+
+    /// Takes up those of the touches found that may close.
+    fn take(&mut self, round: &Round<'_, '_>, pair: Pair<'_>, found: Found<'_>) {
+        let Self { contacts, owners, touches, looks, known, moved, thinning, .. } = self;
+        thinning.begin_pair();
+        let from = contacts.len();
+        let Found { owner, skins, at: Meeting { after_s, ways }, mut clear_m } = found;
+        let swept = after_s > 0.0;
+        for touch in touches.iter() {
+            let (owner, facing) =
+                (Owner { key: touch.key, place: touch.on_a, ..owner }, pair.facing(round, touch, ways));
+            if facing.sides.iter().all(|side| side.terms().is_empty()) {
+                continue;
+            }
+            let opening_m_s = facing.opening_m_s(touch.normal, |member| round.moved(member));
+            let gap_m = touch.gap_m + facing.recess_m - opening_m_s * after_s;
+            let touch = Touch { gap_m, ..*touch };
+            let ends_m = gap_m + opening_m_s * round.h_s;
+            let taken = match round.judge {
+                Judge::Predicted if swept => ends_m < LOOK_M,
+                Judge::Predicted => closes(&touch, &facing, round.progress, round.h_s),
+                Judge::Solved => match owners[..*known].binary_search_by_key(&owner.name(), Owner::name) {
+                    Err(_) => ends_m < 0.0,
+                    // on its way it meets another place than the one it was kept from
+                    Ok(at) if swept && ends_m < -LOOK_M => {
+                        let Contact { warm_n_s, load_n_s, overlap_m, owed_slip_m, .. } = contacts[at];
+                        let found = taken_up(round, &owner, &touch, &Skinned { facing: &facing, skins });
+                        contacts[at] = Contact { warm_n_s, load_n_s, overlap_m, owed_slip_m, ..found };
+                        *moved = true;
+                        false
+                    }
+                    Ok(_) => false,
+                },
+            };
+            if taken && thinning.note(round, pair, &owner, &touch) {
+                owners.push(owner);
+                contacts.push(taken_up(round, &owner, &touch, &Skinned { facing: &facing, skins }));
+            } else if !taken {
+                clear_m = clear_m.min(gap_m);
+            }
+        }
+        thinning.thin(from, contacts, owners);
+        if round.predicts() {
+            looks.push(Look { member: owner.member, partner: owner.partner, clear_m });
+        }
+    }
+
+    /// Keeps the contacts for which `keep` is true; the pairs of others are looked at again after the solve.
+    pub fn retain(&mut self, keep: impl Fn(&Contact, &Owner) -> bool) {
+        let Self { contacts, owners, looks, .. } = self;
+        let mut kept = 0;
+        for at in 0..contacts.len() {
+            if !keep(&contacts[at], &owners[at]) {
+                let pair = (owners[at].member, owners[at].partner);
+                if let Ok(look) = looks.binary_search_by_key(&pair, |look| (look.member, look.partner)) {
+                    looks[look].clear_m = 0.0;
+                }
+            } else {
+                contacts.swap(kept, at);
+                owners.swap(kept, at);
+                kept += 1;
+            }
+        }
+        contacts.truncate(kept);
+        owners.truncate(kept);
+    }
+
+    /// Contacts in the order of their names: sums are then the same whatever found them first.
+    fn sort(&mut self) {
+        let Self { looks, owners, contacts, sorted, thinning, .. } = self;
+        thinning.sort();
+        looks.sort_unstable_by_key(|look| (look.member, look.partner));
+        if owners.is_sorted_by_key(Owner::name) {
+            return;
+        }
+        sorted.clear();
+        sorted.extend(owners.drain(..).zip(contacts.drain(..)).map(|(owner, contact)| Named { owner, contact }));
+        // names are unique
+        sorted.sort_unstable_by_key(|named| named.owner.name());
+        for Named { owner, contact } in sorted.drain(..) {
+            owners.push(owner);
+            contacts.push(contact);
+        }
+    }
+}

@@ -1,0 +1,377 @@
+//! What a body offers the cluster that it is stepped in.
+//!
+//! In: steps, velocities. Out: a matrix, velocities without contact, a skin, how points of it move. Never here: contacts, other bodies.
+
+pub(crate) mod guarded;
+pub(crate) mod memory;
+pub(crate) mod participant;
+pub(crate) mod problem;
+
+use crate::StepContext;
+use crate::solve::{Block, Response, Side};
+use glam::{DMat3, DQuat, DVec3};
+pub use guarded::{BadAnswer, CallMark, GuardedMember};
+pub use memory::{ContactMemory, Partner};
+use metachron_core::{AgentId, Anchor, StepError};
+use metachron_geometry::narrow_phase::RestShape;
+use metachron_geometry::{ContactSide, Place, PlacedShape, ShapePose};
+pub use participant::Participant;
+
+/// A body that a cluster steps together with all that it touches. Its unknowns are blocks of three velocities: nodes (m/s), spins (rad/s).
+///
+/// A step is `begin`, then `move_to` within it where others make shorter steps, then `end`. A refused `begin` leaves the state as it was,
+/// and so does a `begin` with no `end`. `keep` and `go_back` frame several steps that may have to be made again.
+pub trait ClusterMember: Send {
+    /// How it takes part.
+    fn role(&self) -> Role;
+
+    /// Reads its surroundings at the start of a macro step of `dt_s` seconds: what leads it, what it may grasp.
+    fn look(&mut self, context: &StepContext<'_>, dt_s: f64) {
+        let _ = (context, dt_s);
+    }
+
+    /// Prepares a step of `h_s` seconds from its present state: its matrix A and the velocities at the step's end without contact.
+    ///
+    /// # Errors
+    /// [`StepError::Diverged`] where the matrix has no factor.
+    fn begin(&mut self, h_s: f64) -> Result<(), StepError>;
+
+    /// The lower half of A = M + h C + h² K of the step begun: symmetric and positive definite, kg or kg·m². Blocks that never move
+    /// stand for themselves, and no side refers to them. None of a body that is led.
+    fn blocks(&self) -> &[Block] {
+        &[]
+    }
+
+    /// The axes of the world along and about which nothing moves it, of a rigid body that has such: its matrix is as good as unbounded there.
+    fn locked(&self) -> Option<Locked> {
+        None
+    }
+
+    /// The factor of that matrix, where `begin` has made one. Of up to 200 blocks without one the problem makes it; beyond, conjugate
+    /// gradients solve the whole cluster.
+    fn response(&self) -> Option<&dyn Response> {
+        None
+    }
+
+    /// The velocity of each block at the end of the step begun, if nothing touched the body. Where [`Self::unanswered`] says what it lacks it is
+    /// near that: places are foreseen by it, and into how many parts the step is divided is seen by the solution.
+    fn free(&self) -> &[DVec3] {
+        &[]
+    }
+
+    /// A (v − v̂): the momentum that free velocities v̂ do not answer, where the body leaves it to the cluster to find v, N·s on each block.
+    /// Empty for none.
+    fn unanswered(&self) -> &[DVec3] {
+        &[]
+    }
+
+    /// The velocity of each block now.
+    fn velocities(&self) -> &[DVec3] {
+        &[]
+    }
+
+    /// Receives before the end of its step what its last velocities leave unanswered of all that it was given, N·s on each block (eq. 17).
+    fn leave(&mut self, unanswered: &[DVec3]) {
+        let _ = unanswered;
+    }
+
+    /// Its skin where it is now; `None` where nothing can touch it.
+    fn skin(&self) -> Option<PlacedShape<'_>>;
+
+    /// Its skin once it has gone on from where it is for `t_s` seconds with the velocities `v`; `nodes` is storage for it. `None` for a body
+    /// that does not say: what such a body meets is found by what is near it at the start of a step, however far it goes.
+    fn skin_after<'a>(&'a self, v: &[DVec3], t_s: f64, nodes: &'a mut Vec<DVec3>) -> Option<PlacedShape<'a>> {
+        let _ = nodes;
+        let skin = self.skin()?;
+        let ShapePose::Solid { .. } = skin.view else { return None };
+        let Pose { centre_m, rotation, .. } = self.pose(v, t_s)?;
+        Some(PlacedShape { view: ShapePose::Solid { position: centre_m, rotation }, ..skin })
+    }
+
+    /// Its skin at rest, for a body that touches itself; `None` for one that passes through itself.
+    fn rest_shape(&self) -> Option<RestShape<'_>> {
+        None
+    }
+
+    /// How the point `place` of its skin moves with its blocks, for one side of a contact. The side's member is left to the caller.
+    fn side(&self, place: &Place, contact: ContactSide) -> Side;
+
+    /// The cell that carries the point `place` of its skin, by its number: all points of one move with the same few blocks. `None` where each
+    /// moves by itself.
+    fn cell_of(&self, place: &Place) -> Option<u32> {
+        let _ = place;
+        None
+    }
+
+    /// By how much its skin at `place` lies inside the shape that [`Self::skin`] gives, metres: of a section that is not round, whose shape
+    /// is the round one about it.
+    fn recess_m(&self, place: &Place, contact: ContactSide) -> f64 {
+        let _ = (place, contact);
+        0.0
+    }
+
+    /// The velocity of the point `place` of its skin in the step begun beyond that of its blocks, m/s: of a body that is led, all of it.
+    fn led_m_s(&self, place: &Place) -> DVec3 {
+        let _ = place;
+        DVec3::ZERO
+    }
+
+    /// The material point `anchor`; `None` for one that the body does not have.
+    fn anchor(&self, anchor: Anchor) -> Option<MaterialPoint> {
+        let _ = anchor;
+        None
+    }
+
+    /// How the matter at the material point `anchor` turns with the body's blocks; `None` where no block is a spin there.
+    fn turn(&self, anchor: Anchor) -> Option<Side> {
+        let _ = anchor;
+        None
+    }
+
+    /// The block as its published state counts it ([`metachron_core::LocalBlock::slot`]).
+    fn slot_of(&self, block: usize) -> u32 {
+        block as u32
+    }
+
+    /// How long what is given to it takes to show, seconds: of one that is stepped elsewhere a step of its own, and nothing of all others.
+    fn answers_after_s(&self) -> f64 {
+        0.0
+    }
+
+    /// Whether it stands for a partner of an asynchronous pair that is stepped elsewhere.
+    fn is_remote(&self) -> bool {
+        false
+    }
+
+    /// Where it is once it has moved for `t_s` seconds with the velocities `v`, of which there need be none where `t_s` is zero; `None` for a
+    /// body that does not move as a whole.
+    fn pose(&self, v: &[DVec3], t_s: f64) -> Option<Pose> {
+        let _ = (v, t_s);
+        None
+    }
+
+    /// The spring by which it follows what leads it; `None` for a body that nothing drives.
+    fn drive(&self) -> Option<Drive> {
+        None
+    }
+
+    /// Whether the springs of users lead it by its [`Self::drive`] instead of pulling at it.
+    fn is_led(&self) -> bool {
+        self.role() == Role::Kinematic
+    }
+
+    /// Whether it passes through `other` where the two meet, as jaws do through what they hold.
+    fn spares(&self, other: AgentId) -> bool {
+        let _ = other;
+        false
+    }
+
+    /// The speed of its fastest point where its blocks have the velocities `v`, m/s.
+    fn speed_bound(&self, v: &[DVec3]) -> f64 {
+        v.iter().map(|v| v.length_squared()).fold(0.0, f64::max).sqrt()
+    }
+
+    /// By how much the velocities `v` would turn or stretch it in a step of `h_s` seconds, as a share of what its linear forces can take:
+    /// above 1 the step should be divided. Zero for a body whose forces are exact.
+    fn strain(&self, v: &[DVec3], h_s: f64) -> f64 {
+        let _ = (v, h_s);
+        0.0
+    }
+
+    /// Moves it by A⁻¹ of these, N·s² and N·m·s²: impulses times the seconds for which they should have moved it longer; its velocities
+    /// stay. A body whose flight is not its centre's alone stays where it is.
+    fn carry(&mut self, impulses_n_s2: &[DVec3]) {
+        let _ = impulses_n_s2;
+    }
+
+    /// Keeps the present state, at the end of a step.
+    fn keep(&mut self);
+
+    /// Goes back to the state kept last.
+    fn go_back(&mut self);
+
+    /// Places the skin where it is `t_s` seconds into the step begun, having moved with the velocities `v` from its start.
+    fn move_to(&mut self, v: &[DVec3], t_s: f64);
+
+    /// Ends the step begun, of `h_s` seconds, with these velocities. `touched` is false where nothing acted on the body but impacts at the
+    /// start, which account for what `v` is beyond its free velocities: its motion after them is then its own.
+    ///
+    /// # Errors
+    /// [`StepError::Diverged`] where the state would not be finite; it is then what it was before.
+    fn end(&mut self, v: &[DVec3], h_s: f64, touched: bool) -> Result<(), StepError>;
+
+    /// Its own attachments to the world that may tear, with what they gave over the step that ended last. Springs to other members, and
+    /// those that yield, are rows of the problem.
+    fn attachments(&self) -> &[OwnAttachment] {
+        &[]
+    }
+
+    /// The spring of that place among those of its own attachments that yield: a row of the cluster's problem; `None` past the last one.
+    fn own_spring(&self, place: usize) -> Option<OwnSpring> {
+        let _ = place;
+        None
+    }
+
+    /// Lets that spring slip.
+    fn slip(&mut self, place: usize, by: Slid) {
+        let _ = (place, by);
+    }
+
+    /// Lets go of its own attachment `number`, for good; nothing where it has done so before.
+    fn let_go(&mut self, number: u32) {
+        let _ = number;
+    }
+
+    /// Whether it has been still long enough to rest, as far as it can tell by itself; never of a body that does not rest.
+    fn is_calm(&self) -> bool {
+        false
+    }
+
+    /// Stops it: it rests until something wakes it.
+    fn rest(&mut self) {}
+
+    /// The cost of the step begun, in the unit of [`metachron_core::StepReport::work`].
+    fn work(&self) -> f64 {
+        1.0
+    }
+}
+
+/// How a member takes part in its cluster.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Role {
+    /// Moves as it is led; whatever it touches gives way. It has no blocks.
+    Kinematic,
+    /// Moves as a whole: its steps cost next to nothing, so it takes the shortest of its cluster.
+    Rigid,
+    /// Bends: it keeps steps of its own length.
+    Deformable,
+}
+
+/// A rigid body that does not move along or about some axes of the world.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Locked {
+    /// Whether it is kept from moving along x, y, z.
+    pub locked_translation: [bool; 3],
+    /// Whether it is kept from turning about x, y, z.
+    pub locked_rotation: [bool; 3],
+    /// Its mass, kg.
+    pub mass_kg: f64,
+    /// Its inertia without locks, world axes, kg·m².
+    pub inertia: DMat3,
+}
+
+/// A point of a body's matter.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct MaterialPoint {
+    /// Its position, metres.
+    pub position: DVec3,
+    /// How it moves with the body's blocks.
+    pub side: Side,
+    /// Its velocity beyond that, m/s: of a body that is led.
+    pub led_m_s: DVec3,
+}
+
+/// A body that moves as a whole.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Pose {
+    /// Its centre of mass, metres: the origin of [`Anchor::Local`].
+    pub centre_m: DVec3,
+    /// The origin of its shape's axes, metres.
+    pub origin_m: DVec3,
+    /// From its shape's axes to the world's.
+    pub rotation: DQuat,
+    /// How its spin follows from its blocks.
+    pub turns: Side,
+    /// Its spin beyond that, rad/s: of a body that is led.
+    pub led_rad_s: DVec3,
+}
+
+/// What an attachment that is a body's own gave over a step, and can bear.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct OwnAttachment {
+    /// Its number among those of the body.
+    pub number: u32,
+    /// The force on the body, world axes, N: the sum over all of the attachment, and the mean over the step.
+    pub force_n: DVec3,
+    /// The force above which it tears, N, > 0.
+    pub tears_above_n: f64,
+}
+
+/// A spring between a point of a body and a place of the world, of an attachment that is the body's own and yields.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct OwnSpring {
+    /// The number of the attachment among those of the body; it may have other springs.
+    pub attachment: u32,
+    /// The point that is held.
+    pub point: MaterialPoint,
+    /// Where it is held, slips included, metres.
+    pub place_m: DVec3,
+    /// The distance within which it gives nothing, slips included, metres, ≥ 0.
+    pub slack_m: f64,
+    /// Stiffness, N/m, ≥ 0.
+    pub stiffness_n_m: f64,
+    /// Damping, N s/m, ≥ 0.
+    pub damping_n_s_m: f64,
+    /// The most that this spring gives, N, > 0.
+    pub yields_above_n: f64,
+    /// The force of the whole attachment above which it tears, N; infinite where it never does.
+    pub tears_above_n: f64,
+}
+
+/// How far an attachment has slipped.
+#[derive(Debug, Clone, Copy, PartialEq, Default, serde::Serialize, serde::Deserialize)]
+pub struct Slid {
+    /// How far the point that it holds at its far end has moved, in that end's axes, metres.
+    pub moved_m: DVec3,
+    /// How much longer its length at rest, or its greatest length, is, metres.
+    pub longer_m: f64,
+}
+
+impl std::ops::AddAssign for Slid {
+    fn add_assign(&mut self, by: Self) {
+        self.moved_m += by.moved_m;
+        self.longer_m += by.longer_m;
+    }
+}
+
+/// A spring between a point of a body and a place that is led, which gives no more than it can.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Drive {
+    /// The point that is driven.
+    pub point: MaterialPoint,
+    /// Where it is led to when the step begins, metres.
+    pub target_m: DVec3,
+    /// How that moves within the step, m/s.
+    pub target_m_s: DVec3,
+    /// Stiffness, N/m, ≥ 0.
+    pub stiffness_n_m: f64,
+    /// Damping, N s/m, ≥ 0; one of both above zero.
+    pub damping_n_s_m: f64,
+    /// The most force that it gives, N, ≥ 0.
+    pub limit_n: f64,
+}
+
+impl MaterialPoint {
+    /// A point that moves with its body's blocks alone.
+    #[must_use]
+    pub fn new(position: DVec3, side: Side) -> Self {
+        Self { position, side, led_m_s: DVec3::ZERO }
+    }
+
+    /// A point that no impulse moves.
+    #[must_use]
+    pub fn led(position: DVec3, led_m_s: DVec3) -> Self {
+        Self { position, side: Side::FIXED, led_m_s }
+    }
+}
+
+impl Pose {
+    /// What stands still, at the origin of the world.
+    pub const WORLD: Self = Self {
+        centre_m: DVec3::ZERO,
+        origin_m: DVec3::ZERO,
+        rotation: DQuat::IDENTITY,
+        turns: Side::FIXED,
+        led_rad_s: DVec3::ZERO,
+    };
+}

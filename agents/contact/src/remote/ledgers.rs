@@ -1,0 +1,213 @@
+//! Impulses between two clocks: what an agent has given its partners, and what it has taken of what they gave.
+//!
+//! In: impulses of the pairs that the agent computes, snapshots of partners. Out: what is new, each impulse once, and the part of a
+//! snapshot by which partners read. Never here: how an impulse was found, how a body answers. Theory: docs/theory/coupling.md, section 2.
+
+use crate::{Neighbour, StepContext};
+use glam::DVec3;
+use metachron_core::{AgentId, Impulse, Ledger, SimTime, Site, Snapshot};
+use metachron_core::{PairKind, PairState};
+
+/// The ledgers of one agent.
+#[derive(Debug, Clone, Default, serde::Serialize, serde::Deserialize)]
+pub struct Ledgers {
+    /// By rising numbers of the receivers.
+    given: Vec<Ledger>,
+    /// By rising numbers of the givers.
+    taken: Vec<Taken>,
+}
+
+/// What was taken from one partner.
+#[derive(Debug, Clone, serde::Serialize, serde::Deserialize)]
+struct Taken {
+    copy: Ledger,
+    /// The giver's own time in the last reading.
+    read: SimTime,
+    forces: Vec<SiteForce>,
+    /// The copy that it is to have once the step in progress is made.
+    #[serde(skip)]
+    reading: Reading,
+}
+
+/// A ledger that a step in progress acts by.
+#[derive(Debug, Clone)]
+struct Reading {
+    /// Storage where nothing was read.
+    ledger: Ledger,
+    is_new: bool,
+}
+
+impl Default for Reading {
+    fn default() -> Self {
+        Self { ledger: Ledger::new(AgentId(0)), is_new: false }
+    }
+}
+
+/// What a partner gave a site a second in the last step, N and N·m.
+#[derive(Debug, Clone, Copy, serde::Serialize, serde::Deserialize)]
+struct SiteForce {
+    site: Site,
+    force: Impulse,
+}
+
+/// An impulse that a partner gave.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct TakenImpulse {
+    /// Where it acts.
+    pub site: Site,
+    /// N·s and N·m·s.
+    pub impulse: Impulse,
+    /// The same times the seconds since it acted, dJ t − dS, N·s² and N·m·s².
+    pub carried: Impulse,
+}
+
+impl Ledgers {
+    /// Begins a step: pages that partners have taken are torn out.
+    pub fn open(&mut self, context: &StepContext<'_>) {
+        for ledger in &mut self.given {
+            let other = context.neighbours.iter().find(|other| other.id == ledger.with);
+            ledger.turn(other.and_then(|other| acknowledged(other, context.me)), context.time);
+        }
+    }
+
+    /// Takes all that is new, each impulse once (eq. 2): it will act evenly over the step of `dt_s` seconds that begins (eq. 4c). A step that
+    /// is not made has taken nothing: until [`Self::settle`] the same is new again.
+    pub fn take(&mut self, context: &StepContext<'_>, dt_s: f64, mut apply: impl FnMut(TakenImpulse)) {
+        for taken in &mut self.taken {
+            taken.forces.clear();
+            taken.reading.is_new = false;
+        }
+        for neighbour in context.neighbours {
+            let Some(ledger) = neighbour.snapshot.given.iter().find(|ledger| ledger.with == context.me) else {
+                continue;
+            };
+            if !ledger.is_finite() {
+                continue;
+            }
+            let taken = self.taken_mut(neighbour.id);
+            taken.read = taken.read.max(neighbour.snapshot.time);
+            // what is not newer than the copy is not read
+            if taken.copy.revision >= ledger.revision {
+                continue;
+            }
+            let Taken { copy, forces, reading, .. } = taken;
+            ledger.beyond(Some(copy), context.time, |site, impulse, carried| {
+                forces.push(SiteForce { site, force: impulse * dt_s.recip() });
+                apply(TakenImpulse { site, impulse, carried });
+            });
+            reading.is_new = true;
+            reading.ledger.copy_from(ledger);
+            (reading.ledger.with, reading.ledger.ahead) = (neighbour.id, None);
+            reading.ledger.coming.clear();
+        }
+    }
+
+    /// The step that took what was new is made.
+    pub fn settle(&mut self) {
+        for Taken { copy, reading, .. } in &mut self.taken {
+            if std::mem::take(&mut reading.is_new) {
+                std::mem::swap(copy, &mut reading.ledger);
+            }
+        }
+    }
+
+    /// Books an impulse that acts `after_s` seconds after `time` (eq. 1).
+    pub fn give(&mut self, to: AgentId, at: GivenAt, impulse: Impulse) {
+        let place = self.given.binary_search_by_key(&to, |ledger| ledger.with).unwrap_or_else(|place| {
+            self.given.insert(place, Ledger::new(to));
+            place
+        });
+        self.given[place].give(at.site, at.time, at.after_s, impulse);
+    }
+
+    /// What `other` has been given and had not taken in the snapshot that is seen, J − J_ack, and that times the seconds since it acted:
+    /// (J − J_ack) t − (S − S_ack) at the time `at`.
+    pub fn in_flight(&self, me: AgentId, other: &Neighbour, at: SimTime, visit: impl FnMut(Site, Impulse, Impulse)) {
+        if let Ok(place) = self.given.binary_search_by_key(&other.id, |ledger| ledger.with) {
+            self.given[place].beyond(acknowledged(other, me), at, visit);
+        }
+    }
+
+    /// How much linear impulse is on its way to `other`, N·s.
+    #[must_use]
+    pub fn in_flight_n_s(&self, me: AgentId, other: &Neighbour) -> f64 {
+        let mut sum = DVec3::ZERO;
+        self.in_flight(me, other, SimTime::ZERO, |_, impulse, _| sum += impulse.linear);
+        sum.length()
+    }
+
+    /// What `from` gave a second in the last step, N and N·m.
+    pub fn forces(&self, from: AgentId, mut visit: impl FnMut(Site, Impulse)) {
+        if let Ok(place) = self.taken.binary_search_by_key(&from, |taken| taken.copy.with) {
+            self.taken[place].forces.iter().for_each(|at| visit(at.site, at.force));
+        }
+    }
+
+    /// Whether anything was taken in the last step.
+    #[must_use]
+    pub fn has_taken(&self) -> bool {
+        self.taken.iter().any(|taken| !taken.forces.is_empty())
+    }
+
+    /// The own time of `from` in the last reading; `None` where nothing of it was ever read.
+    #[must_use]
+    pub fn read_of(&self, from: AgentId) -> Option<SimTime> {
+        let place = self.taken.binary_search_by_key(&from, |taken| taken.copy.with).ok()?;
+        Some(self.taken[place].read)
+    }
+
+    /// Writes what partners read.
+    pub fn write(&self, into: &mut Snapshot) {
+        copy(self.given.iter(), &mut into.given);
+        copy(self.taken.iter().map(|taken| &taken.copy), &mut into.taken);
+    }
+
+    fn taken_mut(&mut self, from: AgentId) -> &mut Taken {
+        let place = self.taken.binary_search_by_key(&from, |taken| taken.copy.with).unwrap_or_else(|place| {
+            let (copy, forces, reading) = (Ledger::new(from), Vec::new(), Reading::default());
+            let taken = Taken { copy, read: SimTime::ZERO, forces, reading };
+            self.taken.insert(place, taken);
+            place
+        });
+        &mut self.taken[place]
+    }
+}
+
+/// Where and when an impulse is given.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct GivenAt {
+    /// Where on the receiver.
+    pub site: Site,
+    /// The start of the giver's step.
+    pub time: SimTime,
+    /// Seconds after that.
+    pub after_s: f64,
+}
+
+/// The copy that `other` keeps of what `me` has given it.
+#[must_use]
+pub fn acknowledged(other: &Neighbour, me: AgentId) -> Option<&Ledger> {
+    other.snapshot.taken.iter().find(|ledger| ledger.with == me)
+}
+
+/// Copies ledgers into storage that is there already.
+fn copy<'a>(from: impl Iterator<Item = &'a Ledger>, into: &mut Vec<Ledger>) {
+    let mut count = 0;
+    for ledger in from {
+        match into.get_mut(count) {
+            Some(place) => place.copy_from(ledger),
+            None => into.push(ledger.clone()),
+        }
+        count += 1;
+    }
+    into.truncate(count);
+}
+
+/// The state of a pair, made where it is new.
+pub(crate) fn state_of(states: &mut Vec<PairState>, with: AgentId, kind: PairKind) -> &mut PairState {
+    let place = states.binary_search_by_key(&with, |state| state.with).unwrap_or_else(|place| {
+        states.insert(place, PairState::new(with, kind));
+        place
+    });
+    &mut states[place]
+}

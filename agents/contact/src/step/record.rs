@@ -1,0 +1,228 @@
+//! What a fine step starts from of the one before, and leaves to the next and to reports: impulses, slip owed, what sensors saw, the stiffness of
+//! contacts.
+//!
+//! In: what participants remember; a solution. Out: contacts that start from it; memories, totals of pairs. Never here: rows of joints as they
+//! are laid out, the solve. Theory of the stiffness: docs/theory/coupling.md, eq. 7s.
+
+use crate::constraint::place_key;
+use crate::member::memory::{Partner, Remembered, Spin};
+use crate::member::participant::{place_of, velocity};
+use crate::member::{ClusterMember, Drive, Participant, Role};
+use crate::solve::Side;
+use crate::step::ClusterStepper;
+use crate::step::report::{PairTotal, total_of};
+use glam::DVec3;
+use metachron_core::{SimSpan, Wrench};
+
+/// Bodies that meet deeper inside each other than this many times the depth of contacts began so: a load in motion goes less deep.
+const OVERLAP_SHARE: f64 = 2.0;
+
+impl ClusterStepper {
+    /// Starts every contact from what the last step gave.
+    pub(super) fn warm_start(&mut self, all: &[Participant<'_>], h_s: f64) {
+        for (owner, contact) in self.search.owners.iter_mut().zip(&mut self.search.contacts) {
+            let place = all[owner.member].memory.recall(owner.partner, owner.key);
+            (contact.warm_n_s, contact.owed_slip_m) = (place.force_n * h_s, place.owed_slip_m);
+            contact.load_n_s = place.load_n * h_s;
+            let lies_m = if contact.gap_m < -OVERLAP_SHARE * self.depth_m { -contact.gap_m } else { 0.0 };
+            contact.overlap_m = place.overlap_m.min(lies_m);
+            owner.push_n = place.push_n;
+            owner.spin = Spin { radius_m: owner.spin.radius_m, ..place.spin };
+        }
+    }
+
+    /// Notes what the next step starts from.
+    pub(super) fn record(&mut self, all: &mut [Participant<'_>], h_s: f64, last: bool, dt: SimSpan) {
+        self.record_spins(all, h_s);
+        self.record_contacts(all, h_s);
+        self.record_constraints(all, h_s);
+        let Self { solver, search, constraints, external, .. } = self;
+        for &[a, b] in &search.near {
+            let (now, other) = (all[a].context.time + dt, all[b].id);
+            all[a].memory.meet(other, now);
+        }
+        let mut sensed = search.sensed.as_slice();
+        for (member, one) in all.iter_mut().enumerate() {
+            let (mine, others) = sensed.split_at(sensed.partition_point(|pair| pair.member <= member));
+            sensed = others;
+            let begins = SimSpan::from_secs_f64(external.after_s).unwrap_or(SimSpan::ZERO);
+            one.memory.sense(mine.iter().map(|pair| pair.partner), one.context.time + begins);
+            one.memory.turn(one.context.time + dt);
+            if last {
+                constraints.grips(member, &solver.solution().rows_n_s, h_s, one.grips);
+            }
+        }
+    }
+
+    /// Notes what contacts hand to the next step, and adds up what they gave, push-outs and impacts included.
+    fn record_contacts(&mut self, all: &mut [Participant<'_>], h_s: f64) {
+        let Self { solver, search, constraints, contact_rows, external, impacts, .. } = self;
+        let solution = solver.solution();
+        let mut pushes = contact_rows.pushes(constraints).peekable();
+        for (k, (owner, contact)) in search.owners.iter().zip(&search.contacts).enumerate() {
+            let impulse = solution.contacts_n_s[k];
+            let owed_slip_m = contact.owed_slip_after(impulse, solution.contacts_m_s[k], h_s);
+            // sides that rebound hold each other no more
+            let (lasting, spin) =
+                if impacts.of(k).is_some() { (DVec3::ZERO, Spin::default()) } else { (impulse, owner.spin) };
+            let load_n = contact.load_n_s / h_s;
+            let (key, force_n, overlap_m) = (owner.key.anywhere(), lasting / h_s, contact.overlap_m);
+            let push =
+                pushes.next_if(|(pushed, _)| *pushed == k).map_or(DVec3::ZERO, |(_, row)| solution.rows_n_s[row]);
+            let push_n = push.length() / h_s;
+            let place = Remembered { key, force_n, load_n, overlap_m, push_n, owed_slip_m, spin };
+            all[owner.member].memory.pair(owner.partner).next.push(place);
+            let impulse = impulse + push + impacts.contacts_n_s.get(k).copied().unwrap_or_default();
+            external.note(all, owner.member, &contact.sides[1], -impulse);
+            if impulse != DVec3::ZERO {
+                let total = total_of(&mut self.sums.totals, owner.member, owner.partner);
+                total.add(impulse, -contact.gap_m);
+                let skin = all[owner.member].member.skin();
+                let point_m = skin.map_or(DVec3::NAN, |skin| skin.point(&owner.place, -contact.normal));
+                let given = std::iter::once((owner.member, impulse)).chain(owner.other.map(|at| (at, -impulse)));
+                for (member, impulse_n_s) in given {
+                    give(&mut self.sums.wrenches[member], &all[member].member, impulse_n_s, point_m);
+                }
+                if impulse.length() > total.most_n_s {
+                    (total.most_n_s, total.point_m, total.normal) = (impulse.length(), point_m, contact.normal);
+                    total.inverse_mass_per_kg = solver.inverse_masses(k, self.progress[owner.member].place);
+                }
+            } else if contact.gap_m < self.depth_m {
+                // no nearer than what bears something lies deep: the two touch, though nothing presses them together now
+                total_of(&mut self.sums.totals, owner.member, owner.partner);
+            }
+        }
+    }
+
+    /// Notes what rows of constraints hand to the next step, and what they gave.
+    fn record_constraints(&mut self, all: &mut [Participant<'_>], h_s: f64) {
+        let Self { solver, constraints, joints, external, tearing, yielding, sums, impacts, .. } = self;
+        let solution = solver.solution();
+        for (k, (owner, row)) in constraints.owners.iter().zip(&constraints.rows).enumerate() {
+            let impulse = solution.rows_n_s[k];
+            let given = impulse + impacts.rows_n_s.get(k).copied().unwrap_or_default();
+            external.note(all, owner.member, &row.sides[1], -given);
+            external.note_line(owner, given);
+            tearing.note(owner, given);
+            if let Partner::Link(_) = owner.partner {
+                total_of(&mut sums.totals, owner.member, owner.partner).add(given, 0.0);
+            }
+            let owed_slip_m = owner.owed_slip_m(row, impulse, &self.progress, h_s);
+            let place = Remembered { owed_slip_m, ..Remembered::new(place_key(owner.key), impulse / h_s) };
+            all[owner.member].memory.pair(owner.partner).next.push(place);
+        }
+        joints.note_efforts(constraints, &solution.rows_n_s, &mut sums.efforts);
+        yielding.slip(all, constraints, &solution.rows_n_s, &self.progress);
+    }
+
+    /// Notes what the spins of contacts were given.
+    fn record_spins(&mut self, all: &[Participant<'_>], h_s: f64) {
+        let Self { solver, search, constraints, contact_rows, external, progress, .. } = self;
+        let solution = solver.solution();
+        for (contact, row) in contact_rows.spins(constraints) {
+            let (impulse, row) = (solution.rows_n_s[row], &constraints.rows[row]);
+            let owner = &mut search.owners[contact];
+            let (normal, pressed) = (search.contacts[contact].normal, row.pressed.map_or(0.0, |by| by.reach_m));
+            let most = pressed * solution.contacts_n_s[contact].dot(normal);
+            let [a, b] = row.sides.map(|side| velocity(&side, |member| &progress[member].v_solved[..]));
+            owner.spin.owed_rad = row.owed_slip_after(impulse, a - b, most, h_s).dot(normal);
+            owner.spin.torque_n_m = impulse.dot(normal) / h_s;
+            external.note(all, owner.member, &row.sides[1], -impulse);
+        }
+    }
+}
+
+/// Adds an impulse at a point to what contacts gave a body, if that moves as a whole.
+fn give(wrench: &mut Wrench, member: &dyn ClusterMember, impulse_n_s: DVec3, point_m: DVec3) {
+    if let Some(pose) = member.pose(&[], 0.0) {
+        wrench.add(impulse_n_s, point_m - pose.centre_m);
+    }
+}
+
+/// The steps in which a pair is resisted.
+#[derive(Clone, Copy)]
+struct Steps {
+    /// The step of the problem, seconds.
+    problem_s: f64,
+    /// The step of the side that makes longer ones, seconds.
+    longer_s: f64,
+}
+
+impl Participant<'_> {
+    /// Whether a user leads it in this step.
+    fn is_led_by_user(&self) -> bool {
+        let is_held = || self.context.hands.iter().any(|spring| spring.by.is_none());
+        self.member.is_led() && (self.context.pose.is_some() || is_held())
+    }
+
+    /// A stiffness within a step along `normal`, with the drive's spring alone where mass and damping of a driven tip resist too: a hand that
+    /// goes on evenly is followed without them.
+    fn drive_settled(&self, within_n_m: f64, normal: DVec3, steps: Steps) -> f64 {
+        let Some((drive, tip)) = self.member.drive().zip(self.member.blocks().first()) else { return within_n_m };
+        let (Drive { stiffness_n_m, damping_n_s_m, .. }, Steps { problem_s, longer_s }) = (drive, steps);
+        let given_kg = normal.dot(tip.value * normal) + problem_s * (damping_n_s_m + problem_s * stiffness_n_m);
+        let give_m_per_n = (within_n_m.recip() - problem_s * longer_s / given_kg).max(0.0);
+        (give_m_per_n + stiffness_n_m.recip()).recip()
+    }
+}
+
+impl ClusterStepper {
+    /// Notes the stiffness of all pairs with a side that a user leads now, one solve for each.
+    pub(super) fn note_stiffness(&mut self, all: &[Participant<'_>], h_s: f64) {
+        if !all.iter().any(Participant::is_led_by_user) {
+            return;
+        }
+        let mut totals = std::mem::take(&mut self.sums.totals);
+        for total in &mut totals {
+            total.stiffness_n_m = self.stiffness_of(all, total, h_s).unwrap_or(0.0);
+        }
+        self.sums.totals = totals;
+    }
+
+    /// The stiffness of a pair; `None` where nothing presses it, or where a user leads neither side.
+    fn stiffness_of(&mut self, all: &[Participant<'_>], total: &PairTotal, problem_s: f64) -> Option<f64> {
+        if self.search.contacts.is_empty() {
+            return None;
+        }
+        let other = match total.partner {
+            Partner::Agent(id) => place_of(all, id),
+            Partner::Static(_) => None,
+            _ => return None,
+        };
+        let both = || std::iter::once(total.member).chain(other);
+        let led = both().find(|&member| all[member].is_led_by_user())?;
+        // side 0 is pressed against side 1
+        let towards = if led == total.member { -total.normal } else { total.normal };
+        self.move_sides(all, led, towards);
+        let Self { solver, search, moved_m_s, progress, .. } = self;
+        let given = solver.resistance(moved_m_s)?;
+        let of_pair =
+            search.owners.iter().zip(given).filter(|(owner, _)| owner.pair() == (total.member, total.partner));
+        let impulse_n_s = of_pair.map(|(_, given)| given.dot(total.normal)).sum::<f64>();
+        let longer_s = both().map(|member| problem_s * f64::from(progress[member].share)).fold(problem_s, f64::max);
+        let within_n_m = impulse_n_s / (problem_s * longer_s);
+        let stiffness_n_m = all[led].drive_settled(within_n_m, total.normal, Steps { problem_s, longer_s });
+        (stiffness_n_m > 0.0 && stiffness_n_m.is_finite()).then_some(stiffness_n_m)
+    }
+
+    /// Sets by which velocities side 0 of each contact moves against side 1 where the member `led` moves by `towards`, m/s, world axes.
+    fn move_sides(&mut self, all: &[Participant<'_>], led: usize, towards: DVec3) {
+        let role = all[led].member.role();
+        let moved = |side: &Side| match role {
+            Role::Kinematic => towards,
+            Role::Rigid | Role::Deformable => side.velocity(&[towards, DVec3::ZERO]),
+        };
+        let Self { search, moved_m_s, .. } = self;
+        moved_m_s.clear();
+        moved_m_s.extend(search.contacts.iter().zip(&search.owners).map(|(contact, owner)| {
+            let [here, there] = &contact.sides;
+            if owner.member == led {
+                moved(here)
+            } else if owner.other == Some(led) {
+                -moved(there)
+            } else {
+                DVec3::ZERO
+            }
+        }));
+    }
+}

@@ -1,0 +1,130 @@
+//! The account of a macro step: of all of it, of each pair, of each participant.
+//!
+//! In: impulses of contacts and rows, reports of solves. Out: sums, by participants and partners. Never here: which rows there are, the solve.
+
+use crate::constraint::JointTotal;
+use crate::member::memory::Partner;
+use crate::solve::{Level, Report};
+use glam::DVec3;
+use metachron_core::Wrench;
+
+/// What a macro step was.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct ClusterReport {
+    /// Fine steps that it was made in.
+    pub fine_steps: u32,
+    /// Contacts of the last fine step, those that bear nothing included.
+    pub contacts: u32,
+    /// Those of them that are a rigid pile's, which rapier3d has; all others are the problem's.
+    pub pile_contacts: u32,
+    /// Factors of the coupled matrix in all fine steps.
+    pub factors: u32,
+    /// Products of conjugate gradients in all fine steps: of the iterative form, which makes no factors.
+    pub products: u32,
+    /// Solves in all fine steps.
+    pub solves: u32,
+    /// Those of them that ended within interior points, before all laws held.
+    pub unfinished: u32,
+    /// The dearest level of a solve.
+    pub level: Level,
+    /// What laws and momentum miss at most by the answer of any solve, m/s (clusters.md, eq. 9).
+    pub miss_m_s: f64,
+    /// The deepest overlap seen, metres.
+    pub depth_m: f64,
+    /// Work of all members, in the unit of [`metachron_core::StepReport::work`].
+    pub work: f64,
+}
+
+/// What a pair of bodies, or a link, gave in a macro step.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct PairTotal {
+    /// The participant of lower number, by its place in the list.
+    pub member: usize,
+    /// What it touched, or by which of its links it is held.
+    pub partner: Partner,
+    /// The impulse on the participant, world axes, N·s.
+    pub impulse_n_s: DVec3,
+    /// Places that bore something, or rows of the link, counted in every fine step; zero for a pair that only touches.
+    pub contacts: u32,
+    /// The deepest overlap, metres, ≥ 0.
+    pub depth_m: f64,
+    /// The most that one contact gave, N·s; zero for links and in rigid piles.
+    pub most_n_s: f64,
+    /// Where that contact is, metres; not a number for links and in rigid piles.
+    pub point_m: DVec3,
+    /// Its normal, towards the participant, of length 1; zero for links and in rigid piles.
+    pub normal: DVec3,
+    /// How easily the participant and its partner give way at that contact along its normal, 1/kg, ≥ 0 (coupling.md, eq. 7h).
+    pub inverse_mass_per_kg: [f64; 2],
+    /// How much more the pair bears along that normal for each metre that a side which a user leads is led on towards the other, N/m, ≥ 0
+    /// (coupling.md, eq. 7s). 0 where a user leads neither, in rigid piles, and where neither gives way.
+    pub stiffness_n_m: f64,
+}
+
+impl PairTotal {
+    /// Adds the impulse of a contact or of a link's row.
+    pub(super) fn add(&mut self, impulse_n_s: DVec3, depth_m: f64) {
+        self.impulse_n_s += impulse_n_s;
+        self.depth_m = self.depth_m.max(depth_m);
+        self.contacts += 1;
+    }
+}
+
+/// The total of a pair, made where it is new.
+pub(super) fn total_of(totals: &mut Vec<PairTotal>, member: usize, partner: Partner) -> &mut PairTotal {
+    let order = |total: &PairTotal| (total.member, total.partner);
+    let at = totals.binary_search_by_key(&(member, partner), order).unwrap_or_else(|at| {
+        let (impulse_n_s, contacts, depth_m) = (DVec3::ZERO, 0, 0.0);
+        totals.insert(
+            at,
+            PairTotal {
+                member,
+                partner,
+                impulse_n_s,
+                contacts,
+                depth_m,
+                most_n_s: 0.0,
+                point_m: DVec3::NAN,
+                normal: DVec3::ZERO,
+                inverse_mass_per_kg: [0.0; 2],
+                stiffness_n_m: 0.0,
+            },
+        );
+        at
+    });
+    &mut totals[at]
+}
+
+impl ClusterReport {
+    /// Counts a solve.
+    pub(super) fn add(&mut self, took: &Report) {
+        self.factors += took.factors as u32;
+        self.products += took.products as u32;
+        self.solves += 1;
+        self.unfinished += u32::from(took.level == Level::Interior);
+        self.level = self.level.max(took.level);
+        self.miss_m_s = self.miss_m_s.max(took.miss_m_s);
+    }
+}
+
+/// What all fine steps of a macro step gave.
+#[derive(Debug, Default)]
+pub(super) struct Sums {
+    /// What pairs and links gave, by participants and partners.
+    pub totals: Vec<PairTotal>,
+    /// What contacts gave each participant, N·s and N·m·s.
+    pub wrenches: Vec<Wrench>,
+    /// What joints gave along the ways that they leave free.
+    pub efforts: Vec<JointTotal>,
+}
+
+impl Sums {
+    /// Begins a macro step of so many participants, for the first time or again.
+    pub fn begin(&mut self, participants: usize) {
+        let Self { totals, wrenches, efforts } = self;
+        totals.clear();
+        wrenches.clear();
+        efforts.clear();
+        wrenches.resize(participants, Wrench::default());
+    }
+}
