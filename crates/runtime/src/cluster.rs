@@ -84,7 +84,7 @@ pub(super) struct ClusterSeat {
     /// Its part in the last step, and how those were solved that it has led.
     state: Option<ClusterState>,
     solves: ClusterSolves,
-    /// What the solves of the turn in progress took, and what factors of those that it leads take.
+    /// The solves of the turn in progress, and the price of factors in the turns that it leads.
     solved: Option<Solved>,
     price: FactorPrice,
     /// Its pairs whose other sides keep clocks of their own; `None` where its scene declares none.

@@ -24,8 +24,10 @@ impl ClusterStepper {
             let place = all[owner.member].memory.recall(owner.partner, owner.key);
             (contact.warm_n_s, contact.owed_slip_m) = (place.force_n * h_s, place.owed_slip_m);
             contact.load_n_s = place.load_n * h_s;
-            let lies_m = if contact.gap_m < -OVERLAP_SHARE * self.depth_m { -contact.gap_m } else { 0.0 };
-            contact.overlap_m = place.overlap_m.min(lies_m);
+            // a body that is stepped elsewhere is found deep because it comes on in steps of its own, and is let go by these
+            let comes_on = owner.other.is_some_and(|other| all[other].member.answers_after_s() > h_s);
+            let lies = contact.gap_m < -OVERLAP_SHARE * self.depth_m && !comes_on;
+            contact.overlap_m = if lies { place.overlap_m.min(-contact.gap_m) } else { 0.0 };
             owner.push_n = place.push_n;
             owner.spin = Spin { radius_m: owner.spin.radius_m, ..place.spin };
         }

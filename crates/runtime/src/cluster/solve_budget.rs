@@ -24,7 +24,7 @@ pub(in super::super) enum SolveBound {
     Given(Option<u32>),
 }
 
-/// What the solves of a macro step took.
+/// The solves of a macro step.
 #[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
 pub(in super::super) struct Solved {
     pub solves: u32,
