@@ -15,6 +15,7 @@ use super::super::agent_runner::{AgentRunner, PendingTurn, StepOutcome, containe
 use super::super::metrics::Entry;
 use super::super::turns::Took;
 use super::Span;
+use super::solve_budget::Solved;
 use metachron_contact::detect::SolveBudget;
 use metachron_core::{DT_MAX_S, SimSpan, SimTime};
 use std::time::Duration;
