@@ -67,18 +67,24 @@ fn a_ball_by_ledger_rests_on_a_plate_with_its_weight_in_a_cluster_of_its_own() {
             *pairs.iter().find(|pair| pair.with == AgentId(1 - computing as u32)).unwrap()
         };
         let before = pair(&states(&run));
-        run.wait_until(Duration::from_secs(3));
+        let mut depths_m = [f64::INFINITY, f64::NEG_INFINITY];
+        for frame in 61..=180 {
+            run.wait_until(Duration::from_secs_f64(f64::from(frame) / 60.0));
+            let depth_m = 0.04 - height_m(&states(&run)[1]);
+            depths_m = [depths_m[0].min(depth_m), depths_m[1].max(depth_m)];
+        }
         let all = states(&run);
         let leaders: Vec<_> = all.iter().map(|state| state.cluster.unwrap().leader).collect();
         assert_eq!(leaders, [AgentId(0), AgentId(1)], "{rates:?}");
         let after = pair(&all);
         assert_eq!(after.kind, PairKind::Ledger);
         assert!(all[1 - computing].pairs.iter().all(|pair| pair.with != AgentId(computing as u32)), "{rates:?}");
-        // both rest 20 µm deep, and at 1000 : 60 Hz the ball stirs by a tenth of a millimetre
-        let depth_m = 0.04 - height_m(&all[1]);
+        // both rest 20 µm deep; at 1000 : 60 Hz the ball is never at rest, and goes as deep as it falls in a step of its own
+        let stirs_m = if rates[0] == 1000.0 { 9.81 / 3600.0 } else { 1.1e-4 };
         let weight = (after.impulse_n_s - before.impulse_n_s) / (2.0 * 0.2 * 9.81);
-        println!("{rates:?}: {depth_m} m, {weight}");
-        assert!((depth_m - 4e-5).abs() < 1.5e-4 && (weight - 1.0).abs() < 0.01, "{rates:?}: {depth_m} m, {weight}");
+        println!("{rates:?}: {depths_m:?} m, {weight}");
+        assert!(depths_m[0] > 4e-5 - 2e-4 && depths_m[1] < 4e-5 + stirs_m, "{rates:?}: {depths_m:?} m");
+        assert!((weight - 1.0).abs() < 0.01, "{rates:?}: {weight}");
     }
 }
 
@@ -167,7 +173,7 @@ fn a_cut_on_threads_loses_no_momentum_that_is_in_flight_between_two_clocks() {
     let start = || Threads::start(two_balls(), Arc::new(SystemClock::new()), Priority::Normal).unwrap();
     let mut in_flight = 0;
     // they meet after 20 ms
-    for cut_ms in (16..40).step_by(2) {
+    for cut_ms in 14..44 {
         let mut run = start();
         run.drive(TimelineCommand::Leap(SimSpan::from_millis(cut_ms)));
         let end = run.timeline().until().unwrap();
