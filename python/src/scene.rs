@@ -80,7 +80,7 @@ impl Moving {
 #[pymethods]
 impl Scene {
     #[new]
-    #[pyo3(signature = (*, gravity = None, contact = "budget", contact_least_steps = 5))]
+    #[pyo3(signature = (*, gravity = None, contact = "exact", contact_least_steps = 5))]
     fn new(gravity: Option<Vector>, contact: &str, contact_least_steps: u32) -> PyResult<Self> {
         let budget = match contact {
             "budget" => SolveBudget::Timed { least_steps: contact_least_steps },

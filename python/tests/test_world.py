@@ -398,8 +398,8 @@ def test_a_scene_says_how_far_solves_of_contact_go() -> None:
 
     level, _, miss, depth = landed(mc.Scene(contact="exact"))
     assert level != "interior" and miss < 1e-5 and 0.0 <= depth < 1e-4
-    assert landed(mc.Scene(contact_least_steps=1))[3] < 1e-3
+    assert landed(mc.Scene(contact="budget", contact_least_steps=1))[3] < 1e-3
     with pytest.raises(ValueError, match="1 to 400"):
-        landed(mc.Scene(contact_least_steps=0))
+        landed(mc.Scene(contact="budget", contact_least_steps=0))
     with pytest.raises(ValueError, match="\"rough\""):
         mc.Scene(contact="rough")  # type: ignore[arg-type]

@@ -67,7 +67,7 @@ fn the_error_that_unequal_steps_make_is_reported_for_every_scene() {
     let rows = error["table"].as_array().unwrap();
     assert_eq!(rows.len(), 12, "four scenes, 1:1, 1:10 and 10:1");
     for row in rows.iter().filter(|r| r["scene"] == "oblique-blow") {
-        // a blow acts where and when the sides meet; it gives way by a little that depends on the step (clusters.md, sections 2 and 9)
-        assert!(number(row, "max_mm") < 1e-2 && number(row, "momentum_error") < 1e-9, "{row}");
+        // an impact acts when the sides meet, along the normal that they had when the step began: an error of first order (clusters.md, section 9)
+        assert!(number(row, "max_mm") < 0.5 && number(row, "momentum_error") < 1e-9, "{row}");
     }
 }

@@ -249,7 +249,8 @@ fn the_world_says_how_deep_contacts_rest() {
 #[test]
 fn the_world_says_how_far_solves_go() {
     let budget = |text: &str| balls(text).contact_budget;
-    assert_eq!(budget(""), SolveBudget::Timed { least_steps: 5 });
+    assert_eq!(budget(""), SolveBudget::Exact);
+    assert_eq!(budget("world.contact = \"budget\""), SolveBudget::Timed { least_steps: 5 });
     assert_eq!(
         budget("world.contact = \"budget\"\nworld.contact_least_steps = 12"),
         SolveBudget::Timed { least_steps: 12 }

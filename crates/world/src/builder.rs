@@ -15,7 +15,7 @@ use super::kinds::{
 use super::scene::{Appearance, Factors, Gains, Machine, Member, PaceWish, RENDER_SCALE, Scene, Spec, Target};
 use glam::{DQuat, DVec3};
 use metachron_contact::Agent;
-use metachron_contact::detect::{LEAST_STEPS_DEFAULT, SolveBudget};
+use metachron_contact::detect::SolveBudget;
 use metachron_contact::solve::DEPTH_DEFAULT_M;
 use metachron_core::{AgentId, N_MAX, Resolution, ResolutionRange, SimSpan};
 use metachron_geometry::{Cells, Obstacle, Solid};
@@ -194,7 +194,7 @@ impl SceneBuilder {
         Self {
             gravity: GRAVITY_DEFAULT,
             contact_depth_m: DEPTH_DEFAULT_M,
-            contact_budget: SolveBudget::Timed { least_steps: LEAST_STEPS_DEFAULT },
+            contact_budget: SolveBudget::Exact,
             fixed: Vec::new(),
             parts: Vec::new(),
             joints: Vec::new(),
@@ -216,7 +216,7 @@ impl SceneBuilder {
         self
     }
 
-    /// How far the solves of contacts go in a run that goes by a clock; default: as far as there is time, five steps at least.
+    /// How far the solves of contacts go in a run that goes by a clock; default: to the end.
     #[must_use]
     pub fn contact_budget(mut self, contact_budget: SolveBudget) -> Self {
         self.contact_budget = contact_budget;

@@ -85,8 +85,8 @@ class Scene:
     ) -> Self:
         """An empty scene; gravity in m/s2, by default 9.81 along -z.
 
-        In real time, and in lockstep at the pace "real-time", solves of contact go as far as there is time, and `contact_least_steps` (1 to 400)
-        in any case, or to their end: `contact="exact"`. At the free pace they go to their end.
+        Solves of contact go to their end. With `contact="budget"` they go as far as there is time in real time, and in lockstep at the pace
+        "real-time", and `contact_least_steps` (1 to 400) in any case.
         """
 
     @staticmethod

@@ -87,7 +87,7 @@ pub struct WorldFile {
     /// for bodies below a centimetre, at some more factors a step. What weighs too little to be pressed so deep lies less deep.
     #[schemars(range(min = 1e-6, max = 1e-3))]
     pub contact_depth_m: Option<f64>,
-    /// How far the solves of contacts go. Default `budget`; at the free pace they are exact in any case.
+    /// How far the solves of contacts go. Default `exact`; at the free pace they are so in any case.
     pub contact: Option<SolvesFile>,
     /// How many steps a solve makes in any case where it goes by `budget` and has not come to its end before, 1 … 400. Default 5, after which an
     /// answer is safe; with more contacts are less deep while bodies land, and turns may take longer than there is time.
@@ -103,9 +103,9 @@ pub struct WorldFile {
 pub enum SolvesFile {
     /// As far as there is time in a step of all that touch: then contacts are some hundredths of a millimetre deeper. Momentum is exact and no
     /// energy made at any number of steps.
-    #[default]
     Budget,
     /// Until all laws of contact hold, whatever that takes.
+    #[default]
     Exact,
 }
 
