@@ -106,7 +106,7 @@ impl Machine {
                 price("rope", 5.0, 0.6),
                 price("tool", 0.0, 3.0),
                 price("synthetic", 0.0, 1.0),
-                price(FACTOR, 5.0, 3.0),
+                price(FACTOR, 0.0, 0.0),
             ],
             draw: DrawPrice {
                 setup_ms: 1.4,
