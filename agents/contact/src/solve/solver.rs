@@ -65,7 +65,8 @@ pub enum Level {
     Near,
     /// Interior points led to where all laws hold.
     Polished,
-    /// Interior points, as far as the budget went: inside all bounds, with momentum and passivity as everywhere; the miss says how far off.
+    /// Interior points, ended before all laws held, by the budget or after as many steps as any solve makes: inside all bounds, with momentum and
+    /// passivity as everywhere; the miss says how far off.
     Interior,
 }
 
