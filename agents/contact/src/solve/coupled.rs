@@ -146,7 +146,7 @@ impl Coupled {
 
     /// Factors ⊕ A/f + Jᵀ G J where it has changed; `false` where rounding leaves it without a factor.
     pub fn factor(&mut self, contacts: Stiffness<'_>) -> bool {
-        let Stiffness { rows, gains, threads } = contacts;
+        let Stiffness { rows, gains, threads, .. } = contacts;
         let Self { factor, meetings, of_fronts, fronts, starts, gains: known, active, pushed, .. } = self;
         let terms = rows.all_terms();
         for (row, (known, gain)) in known.iter_mut().zip(gains).enumerate().filter(|(_, (known, gain))| known != gain) {

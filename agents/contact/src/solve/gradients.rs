@@ -1,4 +1,5 @@
-//! The iterative form of a Newton step: preconditioned conjugate gradients (HS52) on ⊕ A/f, or on ⊕ A/f + Jᵀ G J.
+//! The iterative form of a Newton step: preconditioned conjugate gradients (HS52) on ⊕ A/f, or on ⊕ A/f + Jᵀ G J; minimal residuals
+//! where slopes of laws are not symmetric.
 //!
 //! In: an operator, a right side, a start and a goal. Out: a solution and exactly what it leaves. Never here: when the goal is met
 //! well enough for a law of contact. Theory: `docs/theory/clusters.md`, section 6.
@@ -7,7 +8,9 @@ use super::coupled::{Coupled, PlacedRows};
 use super::factor::Pair;
 use super::members::{Members, Size};
 use super::problem::Block;
+use super::residuals::{Direction, Residuals};
 use super::rows::Rows;
+use super::skew::Skew;
 use glam::{DMat3, DVec3};
 use metachron_core::{Archive, ArchiveError, ParallelFor};
 
@@ -17,6 +20,8 @@ const ROUNDS: usize = 3;
 const PRODUCTS_BASE: usize = 50;
 const PRODUCTS_PER_BLOCK: usize = 12;
 const PRODUCTS_MAX: usize = 3000;
+/// The most directions of a round where slopes of laws are not symmetric, each of which is stored.
+const DIRECTIONS_MAX: usize = 60;
 /// The share of a goal at which a round ends: the rest is for rounding, and for what laws then change.
 const SHARE_OF_GOAL: f64 = 0.5;
 
@@ -45,11 +50,13 @@ pub(super) struct Operator<'a> {
     pub still_m_s: f64,
 }
 
-/// Jᵀ G J.
+/// Jᵀ (G + S) J.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Stiffness<'a> {
     pub rows: &'a Rows,
     pub gains: &'a [DMat3],
+    /// S, the part of each row that no factor holds; empty where there is none.
+    pub skews: &'a [Skew],
     /// Who factors it.
     pub threads: &'a dyn ParallelFor,
 }
@@ -68,26 +75,44 @@ pub(super) struct Gradients {
     nearby: Vec<DVec3>,
     direction: Vec<DVec3>,
     image: Vec<DVec3>,
+    residuals: Residuals,
     /// Products since the members were taken up.
     pub products: usize,
 }
 
+impl Stiffness<'_> {
+    /// Whether there is a part that is not symmetric.
+    pub fn is_skew(&self) -> bool {
+        self.skews.iter().any(|skew| *skew != Skew::NONE)
+    }
+
+    /// out ← out + Jᵀ S J x.
+    pub fn add_skew(&self, x: &[DVec3], out: &mut [DVec3]) {
+        for (row, skew) in self.skews.iter().enumerate().filter(|(_, skew)| **skew != Skew::NONE) {
+            self.rows.add_impulse(row, skew.impulse(self.rows.velocity(row, x)), out);
+        }
+    }
+}
+
 impl Operator<'_> {
     /// Whether what is left is at this share of what may be.
-    fn is_done(&self, task: &Task<'_>, share: f64) -> bool {
+    pub fn is_done(&self, task: &Task<'_>, share: f64) -> bool {
         let Size { squared, fastest_m_s } = self.members.measure(task.left);
         squared <= (share * task.goal).powi(2) || fastest_m_s <= share * self.still_m_s
     }
 
     fn multiply(&self, x: &[DVec3], out: &mut [DVec3]) {
         self.members.multiply(x, out);
-        let Some(Stiffness { rows, gains, .. }) = self.contacts else { return };
+        self.add_contacts(x, out);
+    }
+
+    fn add_contacts(&self, x: &[DVec3], out: &mut [DVec3]) {
+        let Some(contacts) = self.contacts else { return };
+        let Stiffness { rows, gains, .. } = contacts;
         for (row, gain) in gains.iter().enumerate().filter(|(_, gain)| **gain != DMat3::ZERO) {
-            let impulse = *gain * rows.velocity(row, x);
-            for term in rows.terms(row) {
-                out[term.block] += term.map.mul_transpose_vec3(impulse);
-            }
+            rows.add_impulse(row, *gain * rows.velocity(row, x), out);
         }
+        contacts.add_skew(x, out);
     }
 }
 
@@ -154,7 +179,11 @@ impl Gradients {
             if operator.is_done(task, 1.0) {
                 return;
             }
-            self.descend(operator, task);
+            if operator.contacts.is_some_and(|contacts| contacts.is_skew()) {
+                self.descend_skew(operator, task);
+            } else {
+                self.descend(operator, task);
+            }
         }
         self.measure(operator, task);
     }
@@ -169,27 +198,43 @@ impl Gradients {
         }
     }
 
-    /// Solves what is near for `left`, into the image.
-    fn solve_near(&mut self, left: &[DVec3]) {
-        let Self { near, met, nearby, image, .. } = self;
-        nearby.iter_mut().zip(&*met).for_each(|(x, &block)| *x = left[block]);
-        near.solve(nearby);
-        nearby.iter().zip(&*met).for_each(|(x, &block)| image[block] = *x);
+    /// Solves for what is left with the preconditioner.
+    fn solve_near(&mut self, operator: &Operator<'_>, left: &[DVec3], into: &mut [DVec3]) {
+        let Self { near, met, nearby, .. } = self;
+        let by_themselves = into.iter_mut().zip(&operator.members.mobilities).zip(left);
+        by_themselves.for_each(|((z, mobility), left)| *z = *mobility * *left);
+        if operator.contacts.is_some() {
+            nearby.iter_mut().zip(&*met).for_each(|(x, &block)| *x = left[block]);
+            near.solve(nearby);
+            nearby.iter().zip(&*met).for_each(|(x, &block)| into[block] = *x);
+        }
+    }
+
+    /// One round of minimal residuals.
+    fn descend_skew(&mut self, operator: &Operator<'_>, task: &mut Task<'_>) {
+        let mut residuals = std::mem::take(&mut self.residuals);
+        let is_done = |task: &Task<'_>| operator.is_done(task, SHARE_OF_GOAL);
+        residuals.descend(operator.members, task, DIRECTIONS_MAX, is_done, |left, Direction { x, image }| {
+            self.products += 1;
+            self.solve_near(operator, left, x);
+            operator.members.multiply(x, image);
+            let is_positive = dot(x, image) > 0.0;
+            operator.add_contacts(x, image);
+            is_positive
+        });
+        self.residuals = residuals;
     }
 
     /// One round of conjugate gradients.
     fn descend(&mut self, operator: &Operator<'_>, task: &mut Task<'_>) {
-        let members = operator.members;
-        let most = (PRODUCTS_BASE + PRODUCTS_PER_BLOCK * members.size()).min(PRODUCTS_MAX);
+        let most = (PRODUCTS_BASE + PRODUCTS_PER_BLOCK * operator.members.size()).min(PRODUCTS_MAX);
         let mut power = f64::INFINITY;
         self.direction.fill(DVec3::ZERO);
         for _ in 0..most {
             // `image` serves as storage for what the preconditioner makes of the residual
-            let by_themselves = self.image.iter_mut().zip(&members.mobilities).zip(&*task.left);
-            by_themselves.for_each(|((z, mobility), left)| *z = *mobility * *left);
-            if operator.contacts.is_some() {
-                self.solve_near(task.left);
-            }
+            let mut image = std::mem::take(&mut self.image);
+            self.solve_near(operator, task.left, &mut image);
+            self.image = image;
             let before = std::mem::replace(&mut power, dot(task.left, &self.image));
             if power <= 0.0 || power.is_nan() {
                 return;

@@ -26,7 +26,7 @@ impl Solver {
         into.clear();
         into.resize(blocks.len() * blocks.len(), DMat3::ZERO);
         let super::iterate::Iterate { rows, system, gains, .. } = &mut self.iterate;
-        let contacts = Stiffness { rows, gains, threads: &PlainLoop };
+        let contacts = Stiffness { rows, gains, skews: &[], threads: &PlainLoop };
         if !system.factor(contacts) {
             return false;
         }

@@ -21,7 +21,7 @@ const SPREAD: f64 = 3.0;
 const GOLDEN: f64 = 0.618_033_988_749_894_9;
 /// The least share of the gap that a step aims at.
 const CENTRING_MIN: f64 = 1e-6;
-/// The share of its right side that a step by gradients may leave, and ten times that of the slopes of shifts.
+/// The share of its right side that a step may leave: by gradients, and of what follows slopes that no factor holds.
 const LEAVE: f64 = 1e-3;
 
 /// Storage of the way.
@@ -65,7 +65,7 @@ impl Interior {
     /// One step, from which the iterate is taken up; `false` where there is none.
     pub fn step(&mut self, iterate: &mut Iterate, aim: &Aim<'_>) -> bool {
         // where the slopes of shifts lead to an edge, shifts that are held for a step lead elsewhere
-        self.follows = iterate.follows_pressure() && self.stuck.is_multiple_of(2);
+        self.follows = self.stuck.is_multiple_of(2);
         let gap = self.measure(iterate);
         self.rows.iter_mut().for_each(Inside::aim_at_the_edge);
         self.pull(iterate);

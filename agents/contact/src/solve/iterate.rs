@@ -9,13 +9,10 @@ use super::cone::Projection;
 use super::gradients::{Stiffness, Task};
 use super::problem::Member;
 use super::rows::{Point, Rows};
-use super::skew::{Followed, Residuals, Skew, Sliding, follow_pressure, follow_slip};
+use super::skew::{Followed, Skew, follow_pressure, follow_slip};
 use super::system::{StepForm, System};
 use glam::{DMat3, DVec3};
 use metachron_core::ParallelFor;
-
-/// The share of what an inexact step may leave that friction may be off by from what its pressure allows.
-const FOLLOW_SHARE: f64 = 0.1;
 
 /// Impulses λ of all rows, the change of velocity of all blocks, and the velocity u of all rows.
 #[derive(Debug, Clone, Default)]
@@ -39,7 +36,6 @@ pub(super) struct Iterate {
     pub gains: Vec<DMat3>,
     /// What friction that follows pressure adds to G of each row.
     pub skews: Vec<Skew>,
-    residuals: Residuals,
     /// What free velocities leave unanswered, N·s; empty where they answer all.
     pub unanswered: Vec<DVec3>,
     /// λ + c of each row: the impulse it would have if no velocity changed.
@@ -243,7 +239,7 @@ impl Iterate {
         let factor = (DVec3::ONE - slopes + slopes * yielding).recip();
         let missing = image.axes.mul_transpose_vec3(image.value - self.state.lambda[row]);
         let pulled = image.axes * (missing * factor);
-        let followed = if self.follows_pressure() { follow_pressure(of, image, pulled) } else { None };
+        let followed = follow_pressure(of, image, pulled);
         self.gains[row] = image.along_axes(slopes * factor / of.scale);
         self.pull(row, pulled, followed);
     }
@@ -261,11 +257,6 @@ impl Iterate {
         let Followed { skew, more } = followed.unwrap_or(Followed { skew: Skew::NONE, more: DVec3::ZERO });
         self.skews[row] = skew;
         self.pull[row] = self.state.lambda[row] + pulled + more;
-    }
-
-    /// Whether steps know how friction follows its pressure and shifts their slip: where a factor is at hand.
-    pub fn follows_pressure(&self) -> bool {
-        self.system.form == StepForm::Direct
     }
 
     /// What momentum velocities leave unanswered, of impulses that have been changed without them.
@@ -312,7 +303,7 @@ impl Iterate {
     /// Factors ⊕A/f + JᵀGJ of the gains as they are, or what serves gradients for it; `false` where rounding leaves none.
     pub fn factor(&mut self, threads: &dyn ParallelFor) -> bool {
         self.steps += 1;
-        self.system.factor(Stiffness { rows: &self.rows, gains: &self.gains, threads })
+        self.system.factor(Stiffness { rows: &self.rows, gains: &self.gains, skews: &self.skews, threads })
     }
 
     /// The step of eq. 8 from gains and pulls by the last factor; `goal` says how much of a right side of a size may be left, in √J. `false`
@@ -322,20 +313,17 @@ impl Iterate {
         let Self { rows, system, state, step, scratch, .. } = self;
         let goal = goal(system.members.measure(scratch).root());
         step.change.fill(DVec3::ZERO);
-        let contacts = Stiffness { rows, gains: &self.gains, threads };
+        let contacts = Stiffness { rows, gains: &self.gains, skews: &self.skews, threads };
         system.solve(contacts, &mut Task { right: scratch, x: &mut step.change, left: &mut step.left, goal });
-        let sliding = Sliding { rows, skews: &self.skews, goal: FOLLOW_SHARE * goal };
-        self.residuals.correct(&sliding, &mut step.change, |x| system.solve_again(x));
         // what was left before is part of the right side, and goes
         step.left.iter_mut().zip(&state.left).for_each(|(left, before)| *left -= *before);
         rows.velocities(&step.change, &mut step.velocity);
         for row in 0..rows.len() {
-            step.lambda[row] = self.pull[row] - self.gains[row] * step.velocity[row] - state.lambda[row];
+            let velocity = step.velocity[row];
+            let given = self.gains[row] * velocity + self.skews[row].impulse(velocity);
+            step.lambda[row] = self.pull[row] - given - state.lambda[row];
         }
-        for (row, impulse) in self.residuals.impulses(&self.skews) {
-            step.lambda[row] -= impulse;
-        }
-        let finite = step.change.iter().all(|v| v.is_finite());
+        let finite = step.change.iter().chain(&step.lambda).all(|v| v.is_finite());
         if !finite {
             // no share of it, not even none, is of use to a later look
             step.resize(self.rows.len(), self.scratch.len());

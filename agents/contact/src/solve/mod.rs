@@ -59,6 +59,7 @@ mod newton;
 mod order;
 mod passivity;
 mod problem;
+mod residuals;
 mod resistance;
 mod rows;
 mod scale;

@@ -33,7 +33,7 @@ impl Solver {
         let [right, x, left] = &mut self.held;
         rows.scatter(&self.resisted, right);
         let goal = LEFT_SHARE * system.members.measure(right).root();
-        let contacts = Stiffness { rows, gains, threads: &PlainLoop };
+        let contacts = Stiffness { rows, gains, skews: &[], threads: &PlainLoop };
         if !system.factor(contacts) {
             return None;
         }

@@ -268,9 +268,14 @@ impl Rows {
     pub fn scatter(&self, impulses: &[DVec3], out: &mut [DVec3]) {
         out.fill(DVec3::ZERO);
         for (row, impulse) in impulses.iter().enumerate().filter(|(_, impulse)| **impulse != DVec3::ZERO) {
-            for term in self.terms(row) {
-                out[term.block] += term.map.mul_transpose_vec3(*impulse);
-            }
+            self.add_impulse(row, *impulse, out);
+        }
+    }
+
+    /// out ← out + Jᵀ λ of one row.
+    pub fn add_impulse(&self, row: usize, impulse: DVec3, out: &mut [DVec3]) {
+        for term in self.terms(row) {
+            out[term.block] += term.map.mul_transpose_vec3(impulse);
         }
     }
 }

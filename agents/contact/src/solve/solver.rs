@@ -33,15 +33,13 @@ pub struct Settings {
     pub factors_max: Option<u32>,
 }
 
-/// Below this miss the impulses of the last step nearly hold, m/s, and Newton's method may find the rest. Without a factor it comes nearer
-/// from further off, and its steps are cheaper than those from interior points.
+/// Below this miss the impulses of the last step nearly hold, m/s, and Newton's method may find the rest.
 const NEAR_M_S: f64 = 0.3;
 /// Below this miss, m/s, it is tried from interior points, and then at each tenth of the miss at which it failed.
 const POLISH_M_S: f64 = 1e-3;
 const POLISH_AGAIN: f64 = 0.1;
-/// How long it goes on. By gradients, which do not know how friction follows its pressure, it comes nearer by a quarter a step.
+/// How long it goes on.
 const PATIENCE: Patience = Patience { steps: usize::MAX, stale: 4, left: 0.5 };
-const PATIENCE_BY_GRADIENTS: Patience = Patience { steps: usize::MAX, stale: 6, left: 0.9 };
 /// The most steps of a solve without a budget: of 1000 problems at random none took 150.
 const STEPS_MAX: usize = 400;
 
@@ -272,12 +270,12 @@ impl Solver {
     fn improve(&mut self, aim: &Aim<'_>) -> Level {
         let Self { iterate, interior, kept, settings, .. } = self;
         let last = iterate.steps + settings.factors_max.map_or(STEPS_MAX, |most| most as usize);
-        let direct = settings.form == StepForm::Direct;
-        let mut patience = if direct { PATIENCE } else { PATIENCE_BY_GRADIENTS };
+        let mut patience = PATIENCE;
         if settings.factors_max.is_some() {
             patience.stale = 1;
         }
-        let mut try_below_m_s = if direct { NEAR_M_S } else { f64::INFINITY };
+        // a miss of velocities that do not answer the impulses yet does not tell how near they are
+        let mut try_below_m_s = if iterate.exact { NEAR_M_S } else { f64::INFINITY };
         let mut entered = false;
         loop {
             let (miss_m_s, before) = (newton::miss_m_s(iterate), iterate.steps);

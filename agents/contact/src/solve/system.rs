@@ -8,6 +8,7 @@ use super::error::ProblemError;
 use super::gradients::{Gradients, Operator, Stiffness, Task};
 use super::members::Members;
 use super::problem::{Member, Problem};
+use super::residuals::{Direction, Residuals};
 use super::rows::Rows;
 use super::scale::Scales;
 use glam::DVec3;
@@ -25,6 +26,11 @@ pub enum StepForm {
     Iterative,
 }
 
+/// The most that a factor is used again in a step.
+const FOLLOWED_MAX: usize = 30;
+/// The share of a goal at which that ends: friction that does not follow its pressure costs another factor.
+const FOLLOWED_SHARE: f64 = 0.1;
+
 /// ⊕ A/f and ⊕ A/f + Jᵀ G J, and how equations with them are solved.
 #[derive(Debug, Clone, Default)]
 pub(super) struct System {
@@ -35,6 +41,7 @@ pub(super) struct System {
     pub members: Members,
     direct: Direct,
     gradients: Gradients,
+    residuals: Residuals,
     scales: Scales,
     right: Vec<DVec3>,
     /// Whether the structure of a Newton step is that of the rows.
@@ -130,13 +137,14 @@ impl System {
         }
     }
 
-    /// Solves with ⊕ A/f + Jᵀ G J as it was factored.
+    /// Solves with ⊕ A/f + Jᵀ (G + S) J as it was factored.
     pub fn solve(&mut self, contacts: Stiffness<'_>, task: &mut Task<'_>) {
         match self.form {
             StepForm::Direct => {
                 task.x.copy_from_slice(task.right);
                 self.direct.solve(task.x);
                 task.left.fill(DVec3::ZERO);
+                self.follow(contacts, task);
             }
             StepForm::Iterative => {
                 // a goal says how exact a step is worth to be
@@ -147,9 +155,23 @@ impl System {
         }
     }
 
-    /// x ← (⊕ A/f + Jᵀ G J)⁻¹ x of the last step, where it was by a factor.
-    pub fn solve_again(&mut self, x: &mut [DVec3]) {
-        self.direct.solve(x);
+    /// Lets what a factor has solved follow the part that is not in it.
+    fn follow(&mut self, contacts: Stiffness<'_>, task: &mut Task<'_>) {
+        let Self { members, direct, residuals, .. } = self;
+        contacts.add_skew(task.x, task.left);
+        task.left.iter_mut().for_each(|left| *left = -*left);
+        let operator = Operator { members, contacts: Some(contacts), still_m_s: 0.0 };
+        if !contacts.is_skew() || operator.is_done(task, FOLLOWED_SHARE) {
+            return;
+        }
+        let is_done = |task: &Task<'_>| operator.is_done(task, FOLLOWED_SHARE);
+        residuals.descend(members, task, FOLLOWED_MAX, is_done, |left, Direction { x, image }| {
+            x.copy_from_slice(left);
+            direct.solve(x);
+            image.copy_from_slice(left);
+            contacts.add_skew(x, image);
+            true
+        });
     }
 
     /// Factors of the coupled matrix for the members taken up last.
