@@ -9,8 +9,9 @@
 //! Exact for rigid bodies whose acceleration is constant in between. Tubes count as published, with the work of what is on its way.
 
 use glam::{DMat3, DQuat, DVec3};
-use metachron_core::{AgentId, Body, CurveState, Inertia, RigidState, SimTime, Snapshot, inverse_of_free};
-use metachron_core::{Impulse, Ledger, Site};
+use metachron_core::{
+    AgentId, Body, CurveState, Impulse, Inertia, Ledger, RigidState, SimTime, Site, Snapshot, inverse_of_free,
+};
 
 /// An agent as the audit sees it.
 #[derive(Debug, Clone, Copy)]

@@ -50,6 +50,7 @@ mod impact;
 pub mod inputs;
 pub mod joint;
 pub mod law;
+mod lists;
 pub mod member;
 pub mod push_out;
 pub mod remote;

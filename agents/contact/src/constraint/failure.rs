@@ -6,6 +6,7 @@
 //! Theory: docs/theory/clusters.md, eq. 28 and 29.
 
 use crate::constraint::{ConstraintRows, FineStep, Frame, Name, Pull, RowOwner, Slides, SlidingRow};
+use crate::lists::entry;
 use crate::member::memory::{Partner, UnfinishedLoad};
 use crate::member::participant::{Progress, velocity};
 use crate::member::{ClusterMember, Participant, Slid};
@@ -77,10 +78,9 @@ impl Tearing {
         if load.tears_above_n == f64::INFINITY {
             return;
         }
-        match self.loads.binary_search_by_key(&(load.member, load.partner), |load| (load.member, load.partner)) {
-            Ok(at) => self.loads[at].impulse_n_s += load.impulse_n_s,
-            Err(at) => self.loads.insert(at, load),
-        }
+        let order = |load: &Load| (load.member, load.partner);
+        let none = || Load { impulse_n_s: DVec3::ZERO, ..load };
+        entry(&mut self.loads, &order(&load), order, none).impulse_n_s += load.impulse_n_s;
     }
 
     /// Ends a macro step of `macro_s` seconds: what gave too much has torn (eq. 28), and both its members remember that. What was given in
@@ -201,7 +201,8 @@ impl Yielding {
             }
             let slid = sliding.slides.slid(against * (slid_m - sliding.free_m));
             let one = &mut all[owner.member];
-            let (slip, first) = one.memory.slip(owner.partner);
+            let first = !one.memory.has_slipped(owner.partner);
+            let slip = one.memory.slip(owner.partner);
             match sliding.own {
                 Some(place) => one.member.slip(place, slid),
                 None => slip.slid += slid,

@@ -8,6 +8,7 @@
 //! arm: it takes no energy, and a turn that steps can follow has none of it.
 
 use crate::constraint::{ConstraintRows, End, FineStep, ForceAtArm, GeometricStiffness, Name, RowOwner};
+use crate::lists::reset;
 use crate::member::{ClusterMember, Participant};
 use crate::solve::{Hold, JointRow, Side};
 use glam::DVec3;
@@ -44,8 +45,7 @@ impl ConstraintRows {
     pub fn add_inertia(&mut self, step: &FineStep<'_, '_>) {
         let FineStep { all, progress, .. } = *step;
         let GeometricStiffness { pulls, mut asked } = std::mem::take(&mut self.geometric_stiffness);
-        asked.clear();
-        asked.resize(all.len(), 0.0);
+        reset(&mut asked, all.len(), 0.0);
         for pull in &pulls {
             asked[pull.member] += pull.share(all);
         }

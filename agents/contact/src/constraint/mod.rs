@@ -17,11 +17,9 @@ use crate::member::participant::{Progress, velocity};
 use crate::member::{ClusterMember, MaterialPoint, Participant, Pose};
 use crate::solve::{Hold, JointRow, Side};
 pub use failure::{Torn, Yielded};
-use glam::DQuat;
-use glam::DVec3;
+use glam::{DQuat, DVec3};
 pub use joint::JointTotal;
-use metachron_core::Anchor;
-use metachron_core::{AgentId, Grip};
+use metachron_core::{AgentId, Anchor, Grip};
 use metachron_geometry::narrow_phase::TouchKey;
 
 /// A fine step as rows are laid out for it.

@@ -4,6 +4,7 @@
 //! Theory: docs/theory/clusters.md, section 9.
 
 use crate::detect::ClusterScene;
+use crate::lists::reset;
 use crate::member::participant::place_of;
 use crate::member::{ClusterMember, Participant, Role};
 use metachron_core::AgentId;
@@ -21,8 +22,7 @@ pub(crate) enum Domain {
 /// Finds the domain of each member of a cluster with a rigid pile: rapier3d steps rigid bodies with the usual rules for pairs and without friction
 /// about normals, of which none passes through another or through a static solid but by its groups.
 pub(crate) fn assign(scene: &ClusterScene, all: &[Participant<'_>], domains: &mut Vec<Domain>) {
-    domains.clear();
-    domains.resize(all.len(), Domain::Problem);
+    reset(domains, all.len(), Domain::Problem);
     if !scene.statics().iter().all(|solid| rubs_as_usual(&solid.form)) {
         return;
     }

@@ -11,17 +11,16 @@ mod sensor;
 mod thinning;
 
 use crate::detect::domain::Domain;
+use crate::lists::refill;
 use crate::member::memory::{Partner, Spin};
 use crate::member::{ClusterMember, Role};
 use crate::solve::Contact;
 use glam::DVec3;
 use metachron_geometry::narrow_phase::{NarrowPhaseScratch, TouchKey, self_touches, touches};
 use metachron_geometry::{CollisionShape, Place, Touch};
-use pair::{Against, LOOK_M, Pair, Reaching};
+use pair::{Against, LOOK_M, Pair, Reaching, Skinned, closes, taken_up};
 pub(crate) use pair::{Judge, Owner, Round};
-use pair::{Skinned, closes, taken_up};
-use reach::Boxes;
-use reach::{FAR_M, Meeting, Sought, Sweep, Sweeping};
+use reach::{Boxes, FAR_M, Meeting, Sought, Sweep, Sweeping};
 pub use scene::{
     BadDepth, BadLeastSteps, ClusterScene, DEPTH_RANGE_M, LEAST_STEPS_DEFAULT, LEAST_STEPS_RANGE, Passage, SolveBudget,
 };
@@ -89,8 +88,7 @@ impl Search {
     /// Finds all places of a fine step, but for those of a rigid pile among itself and with static solids; `domains` is empty where there is none.
     pub fn find(&mut self, round: &Round<'_, '_>, domains: &[Domain]) {
         self.find_near(round);
-        self.domains.clear();
-        self.domains.extend_from_slice(domains);
+        domains.clone_into(&mut self.domains);
         let near = std::mem::take(&mut self.near);
         self.find_all(round, &near);
         self.near = near;
@@ -317,8 +315,7 @@ impl Search {
         if owners.is_sorted_by_key(Owner::name) {
             return;
         }
-        sorted.clear();
-        sorted.extend(owners.drain(..).zip(contacts.drain(..)).map(|(owner, contact)| Named { owner, contact }));
+        refill(sorted, owners.drain(..).zip(contacts.drain(..)).map(|(owner, contact)| Named { owner, contact }));
         // names are unique
         sorted.sort_unstable_by_key(|named| named.owner.name());
         for Named { owner, contact } in sorted.drain(..) {

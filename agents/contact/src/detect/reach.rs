@@ -4,6 +4,7 @@
 //! places of skins that are near from the start.
 
 use crate::detect::pair::{Against, Pair, Round};
+use crate::lists::refill;
 use crate::member::{ClusterMember, Participant};
 use glam::DVec3;
 use metachron_geometry::narrow_phase::{NarrowPhaseScratch, SweptReach, SweptShape, first_touch};
@@ -42,8 +43,7 @@ impl Boxes {
             Some(Reach { skin, speed_m_s: speed_m_s(member), alone_s: one.alone_s })
         };
         self.reaches.extend(all.iter().enumerate().map(reach));
-        self.along_x.clear();
-        self.along_x.extend((0..all.len()).filter(|&member| self.reaches[member].is_some()));
+        refill(&mut self.along_x, (0..all.len()).filter(|&member| self.reaches[member].is_some()));
         let low_x = |member: usize| self.reaches[member].map_or(0.0, |reach| reach.skin.low.x);
         self.along_x.sort_unstable_by(|&a, &b| low_x(a).total_cmp(&low_x(b)).then(a.cmp(&b)));
     }

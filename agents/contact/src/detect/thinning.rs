@@ -4,6 +4,7 @@
 //! Theory: docs/theory/contact.md, section 3.
 
 use crate::detect::pair::{Judge, Owner, Pair, Round};
+use crate::lists::{refill, reset};
 use crate::member::ClusterMember;
 use crate::member::memory::Partner;
 use crate::solve::Contact;
@@ -95,14 +96,12 @@ impl Thinning {
     /// Keeps of each patch's contacts, of those from number `from` on, as many as it can tell apart; in their order.
     pub fn thin(&mut self, from: usize, contacts: &mut Vec<Contact>, owners: &mut Vec<Owner>) {
         let Self { patches, loads_n, order, loaded, deepest, is_kept, full } = self;
-        order.clear();
-        order.extend((0..patches.len()).filter(|at| patches[*at].is_some()));
+        refill(order, (0..patches.len()).filter(|at| patches[*at].is_some()));
         if order.len() <= KEPT_MOST {
             return;
         }
         order.sort_unstable_by_key(|at| (patches[*at], *at));
-        is_kept.clear();
-        is_kept.resize(patches.len(), true);
+        reset(is_kept, patches.len(), true);
         for group in order.chunk_by(|a, b| patches[*a] == patches[*b]).filter(|group| group.len() > KEPT_MOST) {
             group.iter().for_each(|at| is_kept[*at] = false);
             let Some(patch) = patches[group[0]] else { continue };
@@ -123,8 +122,7 @@ fn retain_from<T>(from: usize, list: &mut Vec<T>, is_kept: &[bool]) {
 
 /// Marks those of a patch's contacts that bore most in the last step: which of them bear is then settled as steps go on.
 fn keep_loaded(group: &[usize], loads_n: &[f64], loaded: &mut Vec<usize>, is_kept: &mut [bool]) {
-    loaded.clear();
-    loaded.extend(group.iter().copied().filter(|at| loads_n[*at] > 0.0));
+    refill(loaded, group.iter().copied().filter(|at| loads_n[*at] > 0.0));
     loaded.sort_unstable_by(|a, b| loads_n[*b].total_cmp(&loads_n[*a]).then(a.cmp(b)));
     loaded.iter().take(NODES).for_each(|at| is_kept[*at] = true);
 }

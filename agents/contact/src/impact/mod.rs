@@ -7,6 +7,7 @@ mod meeting;
 
 use crate::constraint::{ConstraintRows, contact_rows, is_rigid};
 use crate::detect::{Owner, Search};
+use crate::lists::{refill, reset};
 use crate::member::memory::Partner;
 use crate::member::participant::{Progress, velocity};
 use crate::member::problem::{Posed, ProblemMembers, Velocities};
@@ -15,8 +16,7 @@ use crate::push_out::PUSH_OUT_SHARE;
 use crate::solve::{Contact, JointRow, Report, Settings, Side, Solution, Solver};
 use glam::DVec3;
 use meeting::{Closing, Meeting, Work};
-use metachron_core::ParallelFor;
-use metachron_core::{DisjointSets, StepError};
+use metachron_core::{DisjointSets, ParallelFor, StepError};
 
 /// By which share of the speed that an impact loses its contact gives way (eq. 5), and the least by which it does, m/s.
 const YIELD_SHARE: f64 = 3e-5;
@@ -128,8 +128,7 @@ impl Impacts {
     ) {
         (self.macro_s, self.step_s) = (macro_s, step_s);
         self.clear();
-        self.supported.clear();
-        self.supported.resize(progress.len(), false);
+        reset(&mut self.supported, progress.len(), false);
         if search.owners.iter().all(|owner| owner.restitution == 0.0) {
             return;
         }
@@ -192,8 +191,7 @@ impl Impacts {
     /// Finds which of the bodies that may fly do so.
     fn note_flights(&mut self, may_fly: impl Iterator<Item = bool>, search: &Search, constraints: &ConstraintRows) {
         let mut flights = std::mem::take(&mut self.flights);
-        flights.clear();
-        flights.extend(may_fly.map(|is_free| Flight { is_free, ..Flight::default() }));
+        refill(&mut flights, may_fly.map(|is_free| Flight { is_free, ..Flight::default() }));
         for (at, (contact, owner)) in search.contacts.iter().zip(&search.owners).enumerate() {
             // sides that come back in the step fly on in the next
             let meeting = self.of(at).filter(|meeting| meeting.parts_at_end_m_s() > 0.0);
@@ -264,8 +262,7 @@ impl Impacts {
             }
         }
         self.touching = touching;
-        self.works.clear();
-        self.works.resize(progress.len(), None);
+        reset(&mut self.works, progress.len(), None);
         for body in self.found.iter().filter_map(|impact| movers(&search.contacts[impact.at].sides).next()) {
             self.works[self.touching.lowest(body)] = Some(Work::default());
         }

@@ -5,10 +5,10 @@
 
 use crate::joint::{Joint, JointKind};
 use crate::law::Link;
+use crate::lists::entry;
 use crate::member::Slid;
 use glam::DVec3;
-use metachron_core::Anchor;
-use metachron_core::{AgentId, ContactPartner, SensorTouch, SimSpan, SimTime};
+use metachron_core::{AgentId, Anchor, ContactPartner, SensorTouch, SimSpan, SimTime};
 use metachron_geometry::narrow_phase::{TouchKey, TouchKind};
 
 /// A pair that bears less than this share of the most that its places have borne is relieved.
@@ -209,15 +209,8 @@ impl Slip {
 impl ContactMemory {
     /// The pair with `partner`, made where it is new.
     pub(crate) fn pair(&mut self, partner: Partner) -> &mut PairMemory {
-        let at = match self.pairs.binary_search_by_key(&partner, |pair| pair.partner) {
-            Ok(at) => at,
-            Err(at) => {
-                let pair = PairMemory { partner, near_until: SimTime::ZERO, places: Vec::new(), next: Vec::new() };
-                self.pairs.insert(at, pair);
-                at
-            }
-        };
-        &mut self.pairs[at]
+        let new = || PairMemory { partner, near_until: SimTime::ZERO, places: Vec::new(), next: Vec::new() };
+        entry(&mut self.pairs, &partner, |pair| pair.partner, new)
     }
 
     /// What the place `key` of the pair with `partner` remembers, wherever on a skin or a mesh it is now. A new one may lie as deep as it does where
@@ -330,15 +323,14 @@ impl ContactMemory {
         at.map_or(Slip::none(partner), |at| self.slips[at])
     }
 
-    /// The same, to let it slip on; and whether it has never slipped before.
-    pub(crate) fn slip(&mut self, partner: Partner) -> (&mut Slip, bool) {
-        match self.slips.binary_search_by_key(&partner, |slip| slip.partner) {
-            Ok(at) => (&mut self.slips[at], false),
-            Err(at) => {
-                self.slips.insert(at, Slip::none(partner));
-                (&mut self.slips[at], true)
-            }
-        }
+    /// Whether an attachment of the body has ever slipped.
+    pub(crate) fn has_slipped(&self, partner: Partner) -> bool {
+        self.slips.iter().any(|slip| slip.partner == partner)
+    }
+
+    /// The same, to let it slip on.
+    pub(crate) fn slip(&mut self, partner: Partner) -> &mut Slip {
+        entry(&mut self.slips, &partner, |slip| slip.partner, || Slip::none(partner))
     }
 
     /// Forgets places that are named by edges and triangles of skins, where one has lost some and others have their numbers now.

@@ -5,6 +5,7 @@
 
 use crate::StepContext;
 use crate::law::Law;
+use crate::lists::{refill, reset};
 use crate::member::{ClusterMember, ContactMemory, GuardedMember};
 use crate::solve::Side;
 use glam::DVec3;
@@ -123,16 +124,12 @@ impl Progress {
     /// Begins the step that a member has begun.
     pub fn start(&mut self, member: &dyn ClusterMember) {
         let (now, free) = (member.velocities(), member.free());
-        self.v_start.clear();
-        self.v_start.extend_from_slice(now);
-        self.dv_free.clear();
-        self.dv_free.extend(free.iter().zip(now).map(|(free, now)| *free - *now));
-        self.dv_impulses.clear();
-        self.dv_impulses.resize(now.len(), DVec3::ZERO);
+        now.clone_into(&mut self.v_start);
+        refill(&mut self.dv_free, free.iter().zip(now).map(|(free, now)| *free - *now));
+        reset(&mut self.dv_impulses, now.len(), DVec3::ZERO);
         self.v_before.clone_from(&self.v_start);
         self.owed_n_s.clear();
-        self.unanswered.clear();
-        self.unanswered.resize(member.unanswered().len(), DVec3::ZERO);
+        reset(&mut self.unanswered, member.unanswered().len(), DVec3::ZERO);
         (self.touched, self.held) = (false, false);
     }
 
@@ -143,8 +140,7 @@ impl Progress {
 
     /// Adds what known impulses change its velocities by within its step; none where there are none.
     pub fn push(&mut self, change: &[DVec3]) {
-        self.dv_known.clear();
-        self.dv_known.extend_from_slice(change);
+        change.clone_into(&mut self.dv_known);
         self.dv_free.iter_mut().zip(change).for_each(|(dv_free, change)| *dv_free += *change);
         self.touched |= !change.is_empty();
     }
@@ -179,8 +175,8 @@ impl Progress {
         unanswered.iter_mut().zip(member.unanswered()).for_each(|(r, more)| *r += *more * each);
         unanswered.iter_mut().zip(&*owed_n_s).for_each(|(r, more)| *r += *more * each);
         let (p, s) = (f64::from(*part), f64::from(*part) / f64::from(*share));
-        v_so_far.clear();
-        v_so_far.extend(
+        refill(
+            v_so_far,
             v_start
                 .iter()
                 .zip(&*dv_free)
@@ -225,8 +221,7 @@ impl Progress {
     /// Lets it be where the solution of the step leaves it, whose impacts come at the end of its `h_s` seconds.
     pub fn wait(&mut self, h_s: f64) {
         let Self { v_solved, dv_impacts, dx_impacts, v_mean, .. } = self;
-        dx_impacts.clear();
-        dx_impacts.extend(dv_impacts.iter().map(|dv_impacts| *dv_impacts * -h_s));
+        refill(dx_impacts, dv_impacts.iter().map(|dv_impacts| *dv_impacts * -h_s));
         v_mean.clone_from(v_solved);
         self.bears = true;
     }

@@ -98,8 +98,7 @@ pub(crate) fn respond(member: &GuardedMember<'_>, impulses: &mut [DVec3], residu
         return lent.respond(impulses);
     }
     // block Gauss–Seidel: exact after one sweep where no blocks are coupled, as of rigid bodies
-    residual.clear();
-    residual.extend_from_slice(impulses);
+    impulses.clone_into(residual);
     impulses.fill(DVec3::ZERO);
     let blocks = member.blocks();
     for _ in 0..SWEEPS_MAX {

@@ -3,6 +3,7 @@
 //! In: what partners published of their ends. Out: rows for the cluster's problem, and the waves that this end sends. Never here: the law
 //! of a line ([`crate::laws`]), the other end: it does the same for itself. Theory: docs/theory/coupling.md, eq. 10 to 11.
 
+use crate::lists::entry;
 use crate::member::{ClusterMember, Participant};
 use crate::remote::ledgers::state_of;
 use crate::remote::published_shape::PublishedShape;
@@ -210,11 +211,8 @@ impl Lines {
 
     /// The line to `with`; a new one where there is none.
     fn line(&mut self, with: AgentId, stiffness_n_m: f64) -> &mut LineAt {
-        let place = self.all.binary_search_by_key(&with, |line| line.with).unwrap_or_else(|place| {
-            self.all.insert(place, LineAt { with, line: Line::new(stiffness_n_m), row: None, pushed_n: 0.0 });
-            place
-        });
-        &mut self.all[place]
+        let new = || LineAt { with, line: Line::new(stiffness_n_m), row: None, pushed_n: 0.0 };
+        entry(&mut self.all, &with, |line| line.with, new)
     }
 }
 

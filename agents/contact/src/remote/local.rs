@@ -4,6 +4,7 @@
 //! In: the last solve, partners' published states, what they give. Out: blocks, velocities, accelerations and W; A = W⁻¹ as a dense square. Never here:
 //! ledgers. Theory: docs/theory/coupling.md, section 3 (eq. 7m).
 
+use crate::lists::reset;
 use crate::member::problem::respond;
 use crate::member::{ClusterMember, GuardedMember, Participant, Role};
 use crate::remote::published_shape::{PublishedShape, anchor_of};
@@ -12,10 +13,8 @@ use crate::step::ClusterStepper;
 use crate::{Law, Neighbour};
 use glam::DVec3;
 use metachron_core::{Impulse, LocalBlock, LocalModel, Site};
-use metachron_geometry::Touch;
-use metachron_geometry::narrow_phase::NarrowPhaseScratch;
-use metachron_geometry::narrow_phase::touches;
-use metachron_geometry::{CollisionShape, ContactSide, ShapeKind};
+use metachron_geometry::narrow_phase::{NarrowPhaseScratch, touches};
+use metachron_geometry::{CollisionShape, ContactSide, ShapeKind, Touch};
 
 /// The most places of a pair whose blocks are published: W is dense.
 const PLACES_MAX: usize = 12;
@@ -107,12 +106,10 @@ impl ClusterStepper {
 /// W of a participant that nothing touched.
 fn own_compliance(member: &GuardedMember<'_>, blocks: &[usize], storage: &mut [Vec<DVec3>; 2], into: &mut LocalModel) {
     let [x, residual] = storage;
-    into.compliance.clear();
-    into.compliance.resize(blocks.len() * blocks.len(), glam::DMat3::ZERO);
+    reset(&mut into.compliance, blocks.len() * blocks.len(), glam::DMat3::ZERO);
     for (column, &pushed) in blocks.iter().enumerate() {
         for axis in 0..3 {
-            x.clear();
-            x.resize(member.free().len(), DVec3::ZERO);
+            reset(x, member.free().len(), DVec3::ZERO);
             x[pushed] = DVec3::AXES[axis];
             respond(member, x, residual);
             for (row, &block) in blocks.iter().enumerate() {
@@ -180,8 +177,7 @@ pub(crate) fn invert(model: &LocalModel, out: &mut Vec<f64>) -> bool {
         return false;
     }
     // the lower half of the symmetric part, twice: the second becomes the inverse
-    out.clear();
-    out.resize(2 * size * size, 0.0);
+    reset(out, 2 * size * size, 0.0);
     let entry = |i: usize, j: usize| model.compliance[(i / 3) * blocks + j / 3].col(j % 3)[i % 3];
     // blocks of points and of spins have units of their own
     for i in 0..size {

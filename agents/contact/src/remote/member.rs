@@ -5,6 +5,7 @@
 //! which pairs there are, the partner's own contacts: those are in its local model. Theory: docs/theory/coupling.md, section 3.
 
 use crate::Neighbour;
+use crate::lists::{refill, reset};
 use crate::member::{ClusterMember, MaterialPoint, Role};
 use crate::remote::local::invert;
 use crate::remote::published_shape::PublishedShape;
@@ -90,8 +91,7 @@ impl RemoteMember {
             self.set_matrix();
         }
         for list in [&mut self.deviation, &mut self.carried] {
-            list.clear();
-            list.resize(self.model.blocks.len(), DVec3::ZERO);
+            reset(list, self.model.blocks.len(), DVec3::ZERO);
         }
         self.gain_m_s2.clear();
         self.gain_m_s2.extend(self.model.blocks.iter().map(|block| block.acceleration));
@@ -110,8 +110,7 @@ impl RemoteMember {
         let begun = (since_s / model.step_s).clamp(0.0, 1.0);
         let acts = if model.held { before * begun + (1.0 - before) } else { 1.0 };
         let Self { shape, deviation, carried, flight, .. } = self;
-        flight.clear();
-        flight.resize(deviation.len(), InFlight::default());
+        reset(flight, deviation.len(), InFlight::default());
         given(&mut |site, impulse, way| {
             let mut add = |value: Impulse, to: fn(&mut InFlight) -> &mut DVec3| {
                 shape.visit_blocks(site, value, |slot, part| {
@@ -239,8 +238,7 @@ impl ClusterMember for RemoteMember {
     }
 
     fn begin(&mut self, h_s: f64) -> Result<(), StepError> {
-        self.free.clear();
-        self.free.extend(self.now.iter().zip(&self.gain_m_s2).map(|(now, gain)| *now + *gain * h_s));
+        refill(&mut self.free, self.now.iter().zip(&self.gain_m_s2).map(|(now, gain)| *now + *gain * h_s));
         Ok(())
     }
 

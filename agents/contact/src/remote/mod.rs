@@ -17,6 +17,7 @@ mod member;
 mod published_shape;
 mod transmission_line;
 
+use crate::lists::{entry, reset};
 use crate::member::memory::Partner;
 use crate::member::{ClusterMember, ContactMemory, Participant};
 use crate::remote::ledgers::state_of;
@@ -31,10 +32,9 @@ pub use published_shape::PublishedShape;
 
 use glam::DVec3;
 use lines::Lines;
-use metachron_core::archive_values;
 use metachron_core::{
     AgentId, Archive, ArchiveError, Body, Grip, Impulse, LocalModel, LocalPartner, PairKind, PairState, SimTime, Site,
-    Snapshot,
+    Snapshot, archive_values,
 };
 
 use std::sync::Arc;
@@ -102,31 +102,34 @@ fn by_ledger(context: &StepContext<'_>, other: &Neighbour) -> bool {
     (other.law == Law::Ledger && other.form.is_some()) || linked()
 }
 
+impl Remote {
+    /// One that is not met yet.
+    fn new(seen: Neighbour) -> Self {
+        let (member, memory) = (RemoteMember::default(), ContactMemory::default());
+        Self { seen, member, memory, grips: Vec::new(), met: false }
+    }
+}
+
 impl Remotes {
     /// Writes or reads what the next macro step needs of them: what partners gave is remembered, what they are is seen anew.
     ///
     /// # Errors
     /// [`ArchiveError::Malformed`].
     pub fn archive(&mut self, archive: &mut Archive<'_>) -> Result<(), ArchiveError> {
-        let unseen = || Remote {
-            seen: Neighbour::observed(AgentId(0), Arc::default()),
-            member: RemoteMember::default(),
-            memory: ContactMemory::default(),
-            grips: Vec::new(),
-            met: false,
-        };
-        archive.list(&mut self.all, unseen, |remote, archive| {
-            let mut id = remote.seen.id;
-            archive_values!(archive, id, remote.memory, remote.grips)?;
-            if archive.is_reading() {
-                *remote = Remote {
-                    seen: Neighbour::observed(id, Arc::default()),
-                    member: RemoteMember::default(),
-                    ..std::mem::replace(remote, unseen())
-                };
-            }
-            Ok(())
-        })
+        let unseen = |id| Remote::new(Neighbour::observed(id, Arc::default()));
+        archive.list(
+            &mut self.all,
+            || unseen(AgentId(0)),
+            |remote, archive| {
+                let mut id = remote.seen.id;
+                archive_values!(archive, id, remote.memory, remote.grips)?;
+                if archive.is_reading() {
+                    let read = std::mem::replace(remote, unseen(id));
+                    (remote.memory, remote.grips) = (read.memory, read.grips);
+                }
+                Ok(())
+            },
+        )
     }
 
     /// Before a macro step: takes what partners of `locals` gave them, and adds the partners that they meet as remote members.
@@ -167,18 +170,13 @@ impl Remotes {
 
     /// Sees a partner, for one of those that meet it.
     fn see(&mut self, other: &Neighbour, context: &StepContext<'_>, ledgers: &Ledgers) {
-        let place = self.all.binary_search_by_key(&other.id, |remote| remote.seen.id).unwrap_or_else(|place| {
-            let (member, memory) = (RemoteMember::default(), ContactMemory::default());
-            self.all.insert(place, Remote { seen: other.clone(), member, memory, grips: Vec::new(), met: false });
-            place
-        });
-        let remote = &mut self.all[place];
+        let remote = entry(&mut self.all, &other.id, |remote| remote.seen.id, || Remote::new(other.clone()));
         if !remote.met {
             remote.seen.clone_from(other);
             remote.met = remote.member.see(other);
         }
         if remote.met {
-            let Remote { seen, member, .. } = remote;
+            let Remote { seen, member, .. } = &mut *remote;
             let view = RemoteView { id: context.me, neighbour: seen, time: context.time };
             member.add_partner(&view, |visit| ledgers.in_flight(context.me, seen, context.time, visit));
         }
@@ -220,8 +218,7 @@ impl Pairs {
         let known = &mut stepper.external().known;
         let Self { weight, scratch: Scratch { carried, goes_on: sums, .. }, .. } = self;
         for list in [&mut *carried, &mut *sums] {
-            list.clear();
-            list.resize(weight.len(), DVec3::ZERO);
+            reset(list, weight.len(), DVec3::ZERO);
         }
         self.ledgers.take(&one.context, dt_s, |taken| {
             let add = |list: &mut [DVec3], side: &Side, impulse: DVec3| {
@@ -301,11 +298,9 @@ impl Pairs {
             return;
         }
         let Scratch { blocks, goes_on, columns, .. } = scratch;
-        goes_on.clear();
-        goes_on.resize(blocks.len(), DVec3::ZERO);
+        reset(goes_on, blocks.len(), DVec3::ZERO);
         for partner in &mut model.partners {
-            partner.forces.clear();
-            partner.forces.resize(blocks.len(), DVec3::ZERO);
+            reset(&mut partner.forces, blocks.len(), DVec3::ZERO);
             let add = |site: Site, force: Impulse, list: &mut [DVec3]| {
                 local::visit_sides(&one.member, site, force, |side, force| {
                     for term in side.terms() {

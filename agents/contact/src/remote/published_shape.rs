@@ -3,8 +3,7 @@
 //! In: published bodies, velocities. Out: placed skins, points, which slots an impulse at a site acts on. Never here: how it answers impulses.
 
 use glam::{DQuat, DVec3};
-use metachron_core::Anchor;
-use metachron_core::{Body, Impulse, LocalBlock, Site};
+use metachron_core::{Anchor, Body, Impulse, LocalBlock, Site};
 use metachron_geometry::{CollisionShape, Place, PlacedShape, ShapeKind, ShapePose};
 
 /// The matter of another agent, where it is as far as it is known.

@@ -8,8 +8,7 @@
 //! lost readings lose nothing, double readings repeat nothing, and averages over a step only dissipate.
 
 use glam::DVec3;
-use metachron_core::Wave;
-use metachron_core::{SimSpan, SimTime};
+use metachron_core::{SimSpan, SimTime, Wave};
 use std::collections::VecDeque;
 
 /// One end of a link, as a row of a problem sees it during a step.

@@ -3,7 +3,7 @@
 //! In: the law of a row, impulses and velocities in its frame. Out: points of the cone, gains, steps. Never here: other rows, matrices.
 //! Theory: `docs/theory/clusters.md`, eq. C1–C5.
 
-use super::cone::Law;
+use super::cone::{Law, outer};
 use super::lorentz::{Lorentz, Scaling};
 use super::rows::{Point, Row};
 use glam::{DMat3, DVec3};
@@ -72,7 +72,6 @@ impl Chart {
     /// (R + d P d)⁻¹ of eq. C2 without any difference of large numbers: P is large along the edge on which points lie, and small across.
     fn gain(&self, scaling: &Scaling, compliance: f64) -> DMat3 {
         let Scaling { t, w, .. } = *scaling;
-        let outer = |a: DVec3, b: DVec3| DMat3::from_cols(a * b.x, a * b.y, a * b.z);
         let (slope, along) = (w.tail.length(), w.tail.normalize_or_zero());
         let steep = t * (1.0 + 2.0 * slope * slope);
         let across = (DMat3::from_diagonal(self.tail) - outer(along, along)) * (compliance + t).recip();

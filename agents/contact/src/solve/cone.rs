@@ -71,13 +71,13 @@ impl Projection {
     /// The slope's matrix with other numbers along the same directions.
     pub fn along_axes(&self, numbers: DVec3) -> DMat3 {
         let DMat3 { x_axis: x, y_axis: y, z_axis: z } = self.axes;
-        outer(x) * numbers.x + outer(y) * numbers.y + outer(z) * numbers.z
+        outer(x, x) * numbers.x + outer(y, y) * numbers.y + outer(z, z) * numbers.z
     }
 }
 
-/// v vᵀ.
-fn outer(v: DVec3) -> DMat3 {
-    DMat3::from_cols(v * v.x, v * v.y, v * v.z)
+/// a bᵀ.
+pub(super) fn outer(a: DVec3, b: DVec3) -> DMat3 {
+    DMat3::from_cols(a * b.x, a * b.y, a * b.z)
 }
 
 /// Coulomb's law at the pressure of `z` itself.

@@ -1,20 +1,30 @@
-//! The members' matrix with what contacts add to it, ⊕ A/f + Jᵀ G J, and its factor.
+//! A part of the members' matrix with what contacts add to it, ⊕ A/f + Jᵀ G J, and its factor.
 //!
-//! In: blocks of members, rows, a gain of each row. Out: solutions. Never here: which blocks are part of it (the whole matrix, or those
-//! near its diagonal). Theory: `docs/theory/clusters.md`, eq. 8.
+//! In: members, which of their blocks are whole in it, rows, a gain of each row. Out: solutions. Never here: which parts are wanted, laws of
+//! contact. Theory: `docs/theory/clusters.md`, eq. 8.
 
 use super::factor::{Cholesky, Pair, Place};
 use super::gradients::Stiffness;
+use super::members::Members;
 use super::problem::Block;
-use super::rows::{Rows, Term};
-use glam::DMat3;
-use glam::DVec3;
+use super::rows::Rows;
+use crate::lists::{refill, reset};
+use glam::{DMat3, DVec3};
 use metachron_core::{Archive, ArchiveError};
+
+/// The place of a block that is not in it.
+const NOWHERE: usize = usize::MAX;
 
 /// A matrix, where rows add to it, and its factor.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Coupled {
     factor: Cholesky,
+    /// The blocks that it is of, and what each of all blocks is called in it.
+    met: Vec<usize>,
+    places: Vec<usize>,
+    /// Of the members' matrix the part that is in it, and what that couples.
+    own: Vec<Block>,
+    pairs: Vec<Pair>,
     /// Where two terms of a row meet, by front, those with one place next to each other; those of front k start at `of_fronts[k]`.
     meetings: Vec<Meeting>,
     of_fronts: Vec<usize>,
@@ -33,13 +43,7 @@ pub(super) struct Coupled {
     pushed: Vec<DMat3>,
     /// The blocks that rows add to.
     changes: Vec<bool>,
-}
-
-/// Rows, and what their matrix calls the blocks that they are about.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct PlacedRows<'a> {
-    pub rows: &'a Rows,
-    pub places: &'a [usize],
+    x: Vec<DVec3>,
 }
 
 /// Two terms of one row, counted over all rows, and where their product goes.
@@ -60,59 +64,84 @@ impl Coupled {
         self.factor.archive(archive)
     }
 
-    /// Takes up a matrix of `size` blocks without contacts, with room for these couplings and those of the rows.
-    pub fn take(&mut self, size: usize, blocks: &[Block], pairs: &mut Vec<Pair>, rows: PlacedRows<'_>) {
+    /// Takes up the members, without contacts, and where rows couple them: whole blocks with all that they are coupled with, of others those on
+    /// the diagonal that rows touch.
+    pub fn couple(&mut self, members: &Members, rows: &Rows, is_whole: impl Fn(usize) -> bool) {
+        let Self { met, places, own, pairs, x, .. } = self;
+        refill(places, (0..members.size()).map(|block| if is_whole(block) { 0 } else { NOWHERE }));
+        rows.all_terms().iter().for_each(|term| places[term.block] = 0);
+        met.clear();
+        for (block, place) in places.iter_mut().enumerate().filter(|(_, place)| **place == 0) {
+            *place = met.len();
+            met.push(block);
+        }
+        let near = members.blocks.iter().filter_map(|block| {
+            let [row, column] = [block.row, block.column].map(|block| places[block]);
+            let is_near = row != NOWHERE && (block.row == block.column || is_whole(block.row));
+            is_near.then_some(Block { row, column, ..*block })
+        });
+        refill(own, near);
+        refill(pairs, own.iter().map(Pair::of));
+        reset(x, met.len(), DVec3::ZERO);
+        self.take(rows);
+        self.meet(rows);
+    }
+
+    /// Makes room for the matrix with these rows.
+    fn take(&mut self, rows: &Rows) {
         for row in (0..self.active.len()).filter(|&row| self.active[row]) {
             self.fronts[self.starts[row]..self.starts[row + 1]].iter().for_each(|&front| self.factor.spoil(front));
         }
         self.gains.fill(DMat3::ZERO);
         self.active.fill(false);
-        if !(self.knows(rows) && self.factor.fits(size, pairs)) {
-            pairs.extend(rows.couplings());
-            self.changes.clear();
-            self.changes.resize(size, false);
-            rows.rows.all_terms().iter().for_each(|term| self.changes[rows.places[term.block]] = true);
-            if self.factor.shape(size, pairs, &self.changes) {
+        let size = self.met.len();
+        if !(self.knows(rows) && self.factor.fits(size, &self.pairs)) {
+            let Self { factor, places, pairs, changes, .. } = self;
+            for terms in (0..rows.len()).map(|row| rows.terms(row)) {
+                for (left, term) in terms.iter().enumerate() {
+                    let row = places[term.block];
+                    pairs.extend(terms[..=left].iter().map(|other| Pair { row, column: places[other.block] }));
+                }
+            }
+            reset(changes, size, false);
+            rows.all_terms().iter().for_each(|term| changes[places[term.block]] = true);
+            if factor.shape(size, pairs, changes) {
                 self.forget();
             }
         }
-        self.factor.set(blocks);
+        self.factor.set(&self.own);
     }
 
     /// Finds where the rows add to the matrix.
-    pub fn meet(&mut self, placed: PlacedRows<'_>) {
-        if self.knows(placed) {
+    fn meet(&mut self, rows: &Rows) {
+        if self.knows(rows) {
             return;
         }
-        let PlacedRows { rows, places } = placed;
         self.forget();
-        self.gains.resize(rows.len(), DMat3::ZERO);
-        self.active.resize(rows.len(), false);
-        self.pushed.resize(rows.all_terms().len(), DMat3::ZERO);
+        let Self { factor, places, gains, active, pushed, starts, fronts, blocks, unsorted, .. } = self;
         let terms = rows.all_terms();
+        gains.resize(rows.len(), DMat3::ZERO);
+        active.resize(rows.len(), false);
+        pushed.resize(terms.len(), DMat3::ZERO);
         for row in 0..rows.len() {
-            self.starts.push(self.fronts.len());
-            self.blocks.extend(rows.terms(row).iter().map(|term| places[term.block]));
+            starts.push(fronts.len());
             for left in rows.range(row) {
                 for right in rows.range(row).start..=left {
-                    let pair = [left, right].map(|term| places[terms[term].block]);
-                    let place = self.factor.place(Pair { row: pair[0], column: pair[1] });
-                    self.fronts.extend(place.map(|place| place.front));
-                    self.unsorted.extend(place.map(|place| Meeting { row, left, right, place }));
+                    let [row_at, column] = [left, right].map(|term| places[terms[term].block]);
+                    let place = factor.place(Pair { row: row_at, column });
+                    fronts.extend(place.map(|place| place.front));
+                    unsorted.extend(place.map(|place| Meeting { row, left, right, place }));
                 }
             }
-            // an end of each row's blocks, so that lists of blocks are equal where all rows' are
-            self.blocks.push(usize::MAX);
         }
-        self.starts.push(self.fronts.len());
+        starts.push(fronts.len());
+        blocks.extend(names(rows, places));
         self.sort();
     }
 
     /// Whether the meetings are those of rows on these blocks.
-    fn knows(&self, PlacedRows { rows, places }: PlacedRows<'_>) -> bool {
-        let blocks = (0..rows.len())
-            .flat_map(|row| rows.terms(row).iter().map(|term| places[term.block]).chain(std::iter::once(usize::MAX)));
-        !self.starts.is_empty() && self.blocks.iter().copied().eq(blocks)
+    fn knows(&self, rows: &Rows) -> bool {
+        !self.starts.is_empty() && self.blocks.iter().copied().eq(names(rows, &self.places))
     }
 
     fn forget(&mut self) {
@@ -144,10 +173,13 @@ impl Coupled {
         meetings.extend(order.iter().map(|&k| unsorted[k]));
     }
 
-    /// Factors ⊕ A/f + Jᵀ G J where it has changed; `false` where rounding leaves it without a factor.
-    pub fn factor(&mut self, contacts: Stiffness<'_>) -> bool {
+    /// Factors it where it has changed.
+    ///
+    /// # Errors
+    /// A block at which it is not positive definite, or rounding leaves it without a factor.
+    pub fn factor(&mut self, contacts: Stiffness<'_>) -> Result<(), usize> {
         let Stiffness { rows, gains, threads, .. } = contacts;
-        let Self { factor, meetings, of_fronts, fronts, starts, gains: known, active, pushed, .. } = self;
+        let Self { factor, met, meetings, of_fronts, fronts, starts, gains: known, active, pushed, .. } = self;
         let terms = rows.all_terms();
         for (row, (known, gain)) in known.iter_mut().zip(gains).enumerate().filter(|(_, (known, gain))| known != gain) {
             fronts[starts[row]..starts[row + 1]].iter().for_each(|&front| factor.spoil(front));
@@ -171,23 +203,20 @@ impl Coupled {
             }
             sum.iter().for_each(|(place, sum)| entries.add(*place, sum));
         });
-        done.is_ok()
+        done.map_err(|block| met[block])
     }
 
-    /// x ← (⊕ A/f + Jᵀ G J)⁻¹ x of the last factor.
-    pub fn solve(&mut self, x: &mut [DVec3]) {
-        self.factor.solve(x);
+    /// Solves by the last factor, for the blocks that are in it; the others stay.
+    pub fn solve(&mut self, right: &[DVec3], into: &mut [DVec3]) {
+        let Self { factor, met, x, .. } = self;
+        x.iter_mut().zip(&*met).for_each(|(x, &block)| *x = right[block]);
+        factor.solve(x);
+        x.iter().zip(met).for_each(|(x, block)| into[*block] = *x);
     }
 }
 
-impl<'a> PlacedRows<'a> {
-    /// Where terms of one row meet.
-    fn couplings(self) -> impl Iterator<Item = Pair> + 'a {
-        let Self { rows, places } = self;
-        let pair = |term: &Term, other: &Term| Pair { row: places[term.block], column: places[other.block] };
-        (0..rows.len()).flat_map(move |row| {
-            let terms = rows.terms(row).iter().enumerate();
-            terms.flat_map(move |(left, term)| rows.terms(row)[..=left].iter().map(move |other| pair(term, other)))
-        })
-    }
+/// What the blocks of rows are called, with an end of each row, so that lists are equal where all rows' are.
+fn names<'a>(rows: &'a Rows, places: &'a [usize]) -> impl Iterator<Item = usize> + 'a {
+    let of_row = |row| rows.terms(row).iter().map(|term| places[term.block]).chain(std::iter::once(usize::MAX));
+    (0..rows.len()).flat_map(of_row)
 }

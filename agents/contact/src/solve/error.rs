@@ -2,19 +2,20 @@
 //!
 //! In: nothing. Out: one enum of errors. Never here: the checks themselves (`validate.rs`).
 
-use std::error::Error;
-use std::fmt;
+use super::SIDE_TERMS_MAX;
 
 /// Why a problem was refused. The solver keeps its state; the next problem may be solved with it.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum ProblemError {
     /// The step was zero, negative or not finite.
+    #[error("the step is {h_s} s; it must be finite and above zero")]
     Step {
         /// The step given, seconds.
         h_s: f64,
     },
     /// A member has a block outside its matrix, a share that is not above zero, or a number that is not finite.
+    #[error("member {member}: {reason}")]
     Member {
         /// Its place in the problem.
         member: usize,
@@ -22,6 +23,7 @@ pub enum ProblemError {
         reason: &'static str,
     },
     /// The matrix of a member has no Cholesky factor.
+    #[error("member {member}: its matrix is not positive definite at block {block}")]
     NotPositiveDefinite {
         /// Its place in the problem.
         member: usize,
@@ -29,11 +31,13 @@ pub enum ProblemError {
         block: usize,
     },
     /// A side has more blocks than it can hold.
+    #[error("a side of {terms} blocks; {SIDE_TERMS_MAX} is the most")]
     LongSide {
         /// How many were given.
         terms: usize,
     },
     /// A contact's data are not those of a contact.
+    #[error("contact {contact}: {reason}")]
     Contact {
         /// Its place in the problem.
         contact: usize,
@@ -41,6 +45,7 @@ pub enum ProblemError {
         reason: &'static str,
     },
     /// The data of a joint's row are not those of one.
+    #[error("row {row}: {reason}")]
     Row {
         /// Its place in the problem.
         row: usize,
@@ -48,20 +53,3 @@ pub enum ProblemError {
         reason: &'static str,
     },
 }
-
-impl fmt::Display for ProblemError {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::Step { h_s } => write!(f, "the step is {h_s} s; it must be finite and above zero"),
-            Self::Member { member, reason } => write!(f, "member {member}: {reason}"),
-            Self::NotPositiveDefinite { member, block } => {
-                write!(f, "member {member}: its matrix is not positive definite at block {block}")
-            }
-            Self::LongSide { terms } => write!(f, "a side of {terms} blocks; {} is the most", super::SIDE_TERMS_MAX),
-            Self::Contact { contact, reason } => write!(f, "contact {contact}: {reason}"),
-            Self::Row { row, reason } => write!(f, "row {row}: {reason}"),
-        }
-    }
-}
-
-impl Error for ProblemError {}

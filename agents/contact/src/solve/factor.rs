@@ -10,6 +10,7 @@ use super::fronts::{Front, Fronts};
 use super::order::minimum_degree;
 use super::problem::Block;
 use super::tiles::{TILE, TILE_SIZE, filled, solve_down, solve_up, triangle};
+use crate::lists::refill;
 use fearless_simd::{Level, dispatch};
 use glam::{DMat3, DVec3};
 use metachron_core::{Archive, ArchiveError, ParallelFor, archive_values};
@@ -20,6 +21,12 @@ use pass::{Part, Pass};
 pub(super) struct Pair {
     pub row: usize,
     pub column: usize,
+}
+
+impl Pair {
+    pub fn of(block: &Block) -> Self {
+        Self { row: block.row, column: block.column }
+    }
 }
 
 /// Where a block is stored, and whether as its transpose.
@@ -239,15 +246,12 @@ impl Cholesky {
 
     /// Where these blocks are stored, found anew where they are not those of the last matrix.
     fn find_places(&mut self, blocks: &[Block]) {
-        let pairs = || blocks.iter().map(|block| Pair { row: block.row, column: block.column });
-        if self.roomy && self.known.iter().copied().eq(pairs()) {
+        if self.roomy && self.known.iter().copied().eq(blocks.iter().map(Pair::of)) {
             return;
         }
-        self.known.clear();
-        self.known.extend(pairs());
+        refill(&mut self.known, blocks.iter().map(Pair::of));
         let mut places = std::mem::take(&mut self.places);
-        places.clear();
-        places.extend(self.known.iter().map(|&pair| self.place(pair)));
+        refill(&mut places, self.known.iter().map(|&pair| self.place(pair)));
         self.roomy = places.iter().all(Option::is_some);
         self.places = places;
     }

@@ -4,13 +4,12 @@
 //! In: an operator, a right side, a start and a goal. Out: a solution and exactly what it leaves. Never here: when the goal is met
 //! well enough for a law of contact. Theory: `docs/theory/clusters.md`, section 6.
 
-use super::coupled::{Coupled, PlacedRows};
-use super::factor::Pair;
+use super::coupled::Coupled;
 use super::members::{Members, Size};
-use super::problem::Block;
-use super::residuals::{Direction, Residuals};
+use super::residuals::{Direction, Residuals, dot};
 use super::rows::Rows;
 use super::skew::Skew;
+use crate::lists::reset;
 use glam::{DMat3, DVec3};
 use metachron_core::{Archive, ArchiveError, ParallelFor};
 
@@ -24,9 +23,6 @@ const PRODUCTS_MAX: usize = 3000;
 const DIRECTIONS_MAX: usize = 60;
 /// The share of a goal at which a round ends: the rest is for rounding, and for what laws then change.
 const SHARE_OF_GOAL: f64 = 0.5;
-
-/// The place of a block that is not near.
-const NOWHERE: usize = usize::MAX;
 
 /// One system of linear equations.
 #[derive(Debug)]
@@ -67,12 +63,6 @@ pub(super) struct Gradients {
     /// Of ⊕ A/f what is near, with Jᵀ G J whole: all of members that lend a factor and of rigid ones, of others the blocks on the diagonal
     /// that rows touch. What is not in it is a block by itself.
     near: Coupled,
-    /// The blocks in `near`, and what each of all blocks is called there.
-    met: Vec<usize>,
-    places: Vec<usize>,
-    blocks: Vec<Block>,
-    pairs: Vec<Pair>,
-    nearby: Vec<DVec3>,
     direction: Vec<DVec3>,
     image: Vec<DVec3>,
     residuals: Residuals,
@@ -127,44 +117,21 @@ impl Gradients {
     /// # Errors
     /// A block that is not.
     pub fn take_members(&mut self, members: &Members) -> Result<(), usize> {
-        self.products = 0;
         for list in [&mut self.direction, &mut self.image] {
-            list.clear();
-            list.resize(members.size(), DVec3::ZERO);
+            reset(list, members.size(), DVec3::ZERO);
         }
         members.mobilities.iter().position(|mobility| !is_positive(mobility)).map_or(Ok(()), Err)
     }
 
     /// Takes up which blocks the rows move.
     pub fn couple(&mut self, members: &Members, rows: &Rows) {
-        let Self { near, met, places, blocks, pairs, nearby, .. } = self;
         let is_whole = |block: usize| members.rigid[members.owners[block]] || members.lends[members.owners[block]];
-        places.clear();
-        places.extend((0..members.size()).map(|block| if is_whole(block) { 0 } else { NOWHERE }));
-        rows.all_terms().iter().for_each(|term| places[term.block] = 0);
-        met.clear();
-        for (block, place) in places.iter_mut().enumerate().filter(|(_, place)| **place == 0) {
-            *place = met.len();
-            met.push(block);
-        }
-        blocks.clear();
-        blocks.extend(members.blocks.iter().filter_map(|block| {
-            let [row, column] = [block.row, block.column].map(|block| places[block]);
-            let is_near = row != NOWHERE && (block.row == block.column || is_whole(block.row));
-            is_near.then_some(Block { row, column, ..*block })
-        }));
-        pairs.clear();
-        pairs.extend(blocks.iter().map(|block| Pair { row: block.row, column: block.column }));
-        nearby.clear();
-        nearby.resize(met.len(), DVec3::ZERO);
-        let rows = PlacedRows { rows, places };
-        near.take(met.len(), blocks, pairs, rows);
-        near.meet(rows);
+        self.near.couple(members, rows, is_whole);
     }
 
     /// Makes the preconditioner that of ⊕ A/f + Jᵀ G J; `false` where rounding leaves it without an inverse.
     pub fn precondition(&mut self, contacts: Stiffness<'_>) -> bool {
-        self.near.factor(contacts)
+        self.near.factor(contacts).is_ok()
     }
 
     /// Solves until what is left is at its goal, or as far as products reach.
@@ -200,13 +167,10 @@ impl Gradients {
 
     /// Solves for what is left with the preconditioner.
     fn solve_near(&mut self, operator: &Operator<'_>, left: &[DVec3], into: &mut [DVec3]) {
-        let Self { near, met, nearby, .. } = self;
         let by_themselves = into.iter_mut().zip(&operator.members.mobilities).zip(left);
         by_themselves.for_each(|((z, mobility), left)| *z = *mobility * *left);
         if operator.contacts.is_some() {
-            nearby.iter_mut().zip(&*met).for_each(|(x, &block)| *x = left[block]);
-            near.solve(nearby);
-            nearby.iter().zip(&*met).for_each(|(x, &block)| into[block] = *x);
+            self.near.solve(left, into);
         }
     }
 
@@ -262,8 +226,4 @@ impl Gradients {
 fn is_positive(matrix: &DMat3) -> bool {
     let [x, y] = [matrix.x_axis, matrix.y_axis];
     matrix.is_finite() && x.x > 0.0 && x.x * y.y > x.y * y.x && matrix.determinant() > 0.0
-}
-
-fn dot(a: &[DVec3], b: &[DVec3]) -> f64 {
-    a.iter().zip(b).map(|(a, b)| a.dot(*b)).sum()
 }

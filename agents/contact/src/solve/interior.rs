@@ -7,6 +7,7 @@ use super::bound::{Bound, Inside};
 use super::iterate::{Iterate, Kept};
 use super::lorentz::Lorentz;
 use super::newton::Aim;
+use crate::lists::refill;
 
 /// How far inside its cone a start lies, in means of what laws and momentum miss, and the least of it, m/s.
 const INSIDE: f64 = 3.0;
@@ -50,8 +51,7 @@ impl Interior {
     pub fn begin(&mut self, iterate: &mut Iterate) {
         (self.stuck, self.least_m_s) = (0, f64::INFINITY);
         iterate.keep(&mut self.best);
-        self.rows.clear();
-        self.rows.extend(iterate.rows.rows.iter().map(Inside::of));
+        refill(&mut self.rows, iterate.rows.rows.iter().map(Inside::of));
         self.enter(iterate);
     }
 

@@ -11,6 +11,7 @@ use super::problem::Member;
 use super::rows::{Point, Rows};
 use super::skew::{Followed, Skew, follow_pressure, follow_slip};
 use super::system::{StepForm, System};
+use crate::lists::{refill, reset};
 use glam::{DMat3, DVec3};
 use metachron_core::ParallelFor;
 
@@ -67,23 +68,22 @@ pub(super) enum Refined {
 
 impl State {
     fn resize(&mut self, rows: usize, blocks: usize) {
-        let lists = [
-            (&mut self.lambda, rows),
-            (&mut self.velocity, rows),
-            (&mut self.change, blocks),
-            (&mut self.left, blocks),
-        ];
-        for (list, size) in lists {
-            list.clear();
-            list.resize(size, DVec3::ZERO);
+        for (list, size) in self.lists_mut().into_iter().zip([rows, rows, blocks, blocks]) {
+            reset(list, size, DVec3::ZERO);
         }
     }
 
     fn copy(&mut self, other: &Self) {
-        let Self { lambda, change, velocity, left } = self;
-        let lists =
-            [(lambda, &other.lambda), (change, &other.change), (velocity, &other.velocity), (left, &other.left)];
-        lists.into_iter().for_each(|(list, from)| list.clone_from(from));
+        self.lists_mut().into_iter().zip(other.lists()).for_each(|(list, from)| list.clone_from(from));
+    }
+
+    /// Of rows, then of blocks.
+    fn lists(&self) -> [&Vec<DVec3>; 4] {
+        [&self.lambda, &self.velocity, &self.change, &self.left]
+    }
+
+    fn lists_mut(&mut self) -> [&mut Vec<DVec3>; 4] {
+        [&mut self.lambda, &mut self.velocity, &mut self.change, &mut self.left]
     }
 
     /// A row's impulse and velocity.
@@ -98,14 +98,10 @@ impl Iterate {
         let rows = self.rows.len();
         self.state.resize(rows, blocks);
         self.step.resize(rows, blocks);
-        self.gains.clear();
-        self.gains.resize(rows, DMat3::ZERO);
-        self.skews.clear();
-        self.skews.resize(rows, Skew::NONE);
-        self.pull.clear();
-        self.pull.resize(rows, DVec3::ZERO);
-        self.scratch.clear();
-        self.scratch.resize(blocks, DVec3::ZERO);
+        reset(&mut self.gains, rows, DMat3::ZERO);
+        reset(&mut self.skews, rows, Skew::NONE);
+        reset(&mut self.pull, rows, DVec3::ZERO);
+        reset(&mut self.scratch, blocks, DVec3::ZERO);
         self.steps = 0;
     }
 
@@ -212,8 +208,7 @@ impl Iterate {
     /// Stores what [`Self::go_back`] goes back to.
     pub fn keep(&self, kept: &mut Kept) {
         kept.state.copy(&self.state);
-        kept.compliances.clear();
-        kept.compliances.extend(self.rows.rows.iter().map(|row| row.compliance));
+        refill(&mut kept.compliances, self.rows.rows.iter().map(|row| row.compliance));
     }
 
     /// Goes back to where it was.
@@ -358,14 +353,7 @@ impl Iterate {
     /// Goes a share of the step.
     pub fn advance(&mut self, share: f64) {
         self.exact = false;
-        let Self { state, step, .. } = self;
-        let lists = [
-            (&mut state.lambda, &step.lambda),
-            (&mut state.change, &step.change),
-            (&mut state.velocity, &step.velocity),
-            (&mut state.left, &step.left),
-        ];
-        for (list, by) in lists {
+        for (list, by) in self.state.lists_mut().into_iter().zip(self.step.lists()) {
             list.iter_mut().zip(by).for_each(|(value, by)| *value += *by * share);
         }
     }

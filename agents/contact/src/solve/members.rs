@@ -3,6 +3,7 @@
 //! In: members. Out: products and sizes. Never here: contacts, solutions. Theory: `docs/theory/clusters.md`, eq. 1 and 15.
 
 use super::problem::{Block, Problem};
+use crate::lists::reset;
 use glam::{DMat3, DVec3};
 
 /// A member of no more blocks than a rigid body's.
@@ -57,8 +58,7 @@ impl Members {
                 value: block.value * (1.0 / member.share),
             }));
         }
-        self.mobilities.clear();
-        self.mobilities.resize(self.owners.len(), DMat3::ZERO);
+        reset(&mut self.mobilities, self.owners.len(), DMat3::ZERO);
         for block in self.blocks.iter().filter(|block| block.row == block.column) {
             self.mobilities[block.row] += block.value;
         }

@@ -44,7 +44,6 @@
 mod bound;
 mod cone;
 mod coupled;
-mod direct;
 mod error;
 mod factor;
 mod fronts;
@@ -60,7 +59,6 @@ mod order;
 mod passivity;
 mod problem;
 mod residuals;
-mod resistance;
 mod rows;
 mod scale;
 mod side;

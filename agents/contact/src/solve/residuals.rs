@@ -5,6 +5,7 @@
 
 use super::gradients::Task;
 use super::members::Members;
+use crate::lists::{refill, reset};
 use glam::DVec3;
 
 /// A change of the solution, and the part of the right side that it answers.
@@ -65,8 +66,7 @@ impl Residuals {
 impl Direction {
     fn resize(&mut self, size: usize) {
         for list in [&mut self.x, &mut self.image] {
-            list.clear();
-            list.resize(size, DVec3::ZERO);
+            reset(list, size, DVec3::ZERO);
         }
     }
 
@@ -82,14 +82,13 @@ impl Direction {
 
 /// diag(A/f)⁻¹ of impulses (eq. 15).
 fn weigh(members: &Members, impulses: &[DVec3], into: &mut Vec<DVec3>) {
-    into.clear();
-    into.extend(members.mobilities.iter().zip(impulses).map(|(mobility, impulse)| *mobility * *impulse));
+    refill(into, members.mobilities.iter().zip(impulses).map(|(mobility, impulse)| *mobility * *impulse));
 }
 
 fn add(to: &mut [DVec3], list: &[DVec3], share: f64) {
     to.iter_mut().zip(list).for_each(|(value, by)| *value += *by * share);
 }
 
-fn dot(a: &[DVec3], b: &[DVec3]) -> f64 {
+pub(super) fn dot(a: &[DVec3], b: &[DVec3]) -> f64 {
     a.iter().zip(b).map(|(a, b)| a.dot(*b)).sum()
 }

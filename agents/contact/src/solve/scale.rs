@@ -8,6 +8,7 @@ use super::members::Members;
 use super::problem::Member;
 use super::rows::{Rows, Term};
 use super::system::System;
+use crate::lists::reset;
 use glam::{DMat3, DVec3};
 use std::ops::Range;
 
@@ -50,8 +51,7 @@ struct Sample {
 impl Scales {
     /// The estimate of the members' diagonals, put right by some exact ones.
     pub fn set(&mut self, system: &mut System, members: &[Member<'_>], rows: &mut Rows) {
-        self.samples.clear();
-        self.samples.resize(system.members.rigid.len(), Sample::default());
+        reset(&mut self.samples, system.members.rigid.len(), Sample::default());
         if system.members.blocks.iter().any(|block| block.row != block.column) {
             self.choose(&system.members, rows);
             let at_once = if system.members.size() > APART_MAX { SAMPLES } else { 1 };
@@ -100,8 +100,7 @@ impl Scales {
     fn sample(&mut self, system: &mut System, members: &[Member<'_>], rows: &Rows, which: Range<usize>) {
         let Self { samples, right, x, left } = self;
         for list in [&mut *right, &mut *x, &mut *left] {
-            list.clear();
-            list.resize(system.members.size(), DVec3::ZERO);
+            reset(list, system.members.size(), DVec3::ZERO);
         }
         for (member, at) in samples.iter_mut().enumerate() {
             for (direction, term) in at.terms(&which, member, &system.members, rows) {

@@ -4,6 +4,7 @@
 //! keys, steps of members. Theory: `docs/theory/clusters.md`, sections 3 to 5.
 
 use super::error::ProblemError;
+use super::held::Held;
 use super::interior::Interior;
 use super::iterate::{Iterate, Kept, State};
 use super::newton::{self, Aim, Patience};
@@ -135,9 +136,7 @@ pub struct Solver {
     interior: Interior,
     kept: Kept,
     pub(super) solution: Solution,
-    /// Storage of [`Self::held_compliance`] and [`Self::resistance`], and what the latter found.
-    pub(super) held: [Vec<DVec3>; 3],
-    pub(super) resisted: Vec<DVec3>,
+    pub(super) held: Held,
 }
 
 impl Solver {
@@ -249,7 +248,7 @@ impl Solver {
         };
         let mut report = self.find(&aim);
         let ray = passivity::guard(&mut self.iterate, problem.members, &self.solution.velocities);
-        (report.factors, report.products) = (self.iterate.system.factors(), self.iterate.system.products());
+        (report.factors, report.products) = (self.iterate.system.factors, self.iterate.system.products());
         (report.work_j, report.ray) = (ray.work_j, ray.share);
         if ray.share < 1.0 {
             report.miss_m_s = newton::miss_m_s(&mut self.iterate);

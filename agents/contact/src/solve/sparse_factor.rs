@@ -4,6 +4,7 @@
 
 use super::factor::{Cholesky, Pair};
 use super::problem::{Block, Response};
+use crate::lists::refill;
 use glam::DVec3;
 use metachron_core::ParallelFor;
 use std::sync::{Mutex, PoisonError};
@@ -23,8 +24,7 @@ pub struct SparseFactor {
 impl SparseFactor {
     /// Takes up the structure of a matrix of `size` blocks, without its numbers.
     pub fn shape(&mut self, size: usize, blocks: &[Block]) {
-        self.pairs.clear();
-        self.pairs.extend(blocks.iter().map(|block| Pair { row: block.row, column: block.column }));
+        refill(&mut self.pairs, blocks.iter().map(Pair::of));
         let factor = self.factor.get_mut().unwrap_or_else(PoisonError::into_inner);
         factor.shape(size, &self.pairs, &[]);
         self.cost = factor.cost();
@@ -33,7 +33,7 @@ impl SparseFactor {
     /// What a factor of such a matrix would cost, about in multiplications, without room for its numbers.
     #[must_use]
     pub fn cost_of(size: usize, blocks: &[Block]) -> f64 {
-        let pairs: Vec<Pair> = blocks.iter().map(|block| Pair { row: block.row, column: block.column }).collect();
+        let pairs: Vec<Pair> = blocks.iter().map(Pair::of).collect();
         Cholesky::cost_of(size, &pairs)
     }
 

@@ -3,7 +3,7 @@
 //! In: members, rows, and a gain of each row. Out: solutions, with what they leave. Never here: laws of contact, steps of the
 //! iteration. Theory: `docs/theory/clusters.md`, eq. 8 and section 6.
 
-use super::direct::Direct;
+use super::coupled::Coupled;
 use super::error::ProblemError;
 use super::gradients::{Gradients, Operator, Stiffness, Task};
 use super::members::Members;
@@ -39,19 +39,24 @@ pub(super) struct System {
     /// The velocity by which what is left unanswered may change a block by itself, m/s (eq. 17).
     pub still_m_s: f64,
     pub members: Members,
-    direct: Direct,
+    /// The matrix of members that lend no factor, and that of all members with contacts, in the direct form.
+    own: Coupled,
+    coupled: Coupled,
+    /// Factors of the latter for the members taken up last.
+    pub factors: usize,
     gradients: Gradients,
     residuals: Residuals,
     scales: Scales,
     right: Vec<DVec3>,
     /// Whether the structure of a Newton step is that of the rows.
-    coupled: bool,
+    is_coupled: bool,
 }
 
 impl System {
     /// Writes or reads what the next problem needs.
     pub fn archive(&mut self, archive: &mut Archive<'_>) -> Result<(), ArchiveError> {
-        self.direct.archive(archive)?;
+        self.own.archive(archive)?;
+        self.coupled.archive(archive)?;
         self.gradients.archive(archive)
     }
 
@@ -61,10 +66,15 @@ impl System {
     /// [`ProblemError::NotPositiveDefinite`].
     pub fn take_members(&mut self, problem: &Problem<'_>, offsets: &[usize]) -> Result<(), ProblemError> {
         self.members.take(problem, offsets);
-        self.coupled = false;
+        (self.is_coupled, self.factors, self.gradients.products) = (false, 0, 0);
+        let Self { members, own, gradients, .. } = self;
         let taken = match self.form {
-            StepForm::Direct => self.direct.take_members(&self.members, problem.threads),
-            StepForm::Iterative => self.gradients.take_members(&self.members),
+            StepForm::Direct => {
+                let none = Rows::default();
+                own.couple(members, &none, |block| !members.lends[members.owners[block]]);
+                own.factor(Stiffness { rows: &none, gains: &[], skews: &[], threads: problem.threads })
+            }
+            StepForm::Iterative => gradients.take_members(members),
         };
         taken.map_err(|block| {
             let member = self.members.owners[block];
@@ -76,8 +86,7 @@ impl System {
     pub fn respond(&mut self, members: &[Member<'_>], task: &mut Task<'_>) {
         match self.form {
             StepForm::Direct => {
-                task.x.copy_from_slice(task.right);
-                self.direct.respond(task.x);
+                self.own.solve(task.right, task.x);
                 task.left.fill(DVec3::ZERO);
             }
             StepForm::Iterative => self.descend(members, task),
@@ -111,8 +120,7 @@ impl System {
 
     /// Solves with ⊕ A/f by conjugate gradients, for members that lend no factor; the others are left at rest.
     fn descend(&mut self, members: &[Member<'_>], task: &mut Task<'_>) {
-        self.right.clear();
-        self.right.extend_from_slice(task.right);
+        task.right.clone_into(&mut self.right);
         for (range, _) in lending(members) {
             self.right[range.clone()].fill(DVec3::ZERO);
             task.x[range].fill(DVec3::ZERO);
@@ -124,16 +132,22 @@ impl System {
 
     /// Factors ⊕ A/f + Jᵀ G J, or what of it is near; `false` where rounding leaves it without a factor.
     pub fn factor(&mut self, contacts: Stiffness<'_>) -> bool {
-        if !self.coupled {
-            match self.form {
-                StepForm::Direct => self.direct.couple(&self.members, contacts.rows),
-                StepForm::Iterative => self.gradients.couple(&self.members, contacts.rows),
-            }
-            self.coupled = true;
-        }
+        let Self { members, coupled, gradients, .. } = self;
+        let is_first = !std::mem::replace(&mut self.is_coupled, true);
         match self.form {
-            StepForm::Direct => self.direct.factor(contacts),
-            StepForm::Iterative => self.gradients.precondition(contacts),
+            StepForm::Direct => {
+                self.factors += 1;
+                if is_first {
+                    coupled.couple(members, contacts.rows, |_| true);
+                }
+                coupled.factor(contacts).is_ok()
+            }
+            StepForm::Iterative => {
+                if is_first {
+                    gradients.couple(members, contacts.rows);
+                }
+                gradients.precondition(contacts)
+            }
         }
     }
 
@@ -141,8 +155,7 @@ impl System {
     pub fn solve(&mut self, contacts: Stiffness<'_>, task: &mut Task<'_>) {
         match self.form {
             StepForm::Direct => {
-                task.x.copy_from_slice(task.right);
-                self.direct.solve(task.x);
+                self.coupled.solve(task.right, task.x);
                 task.left.fill(DVec3::ZERO);
                 self.follow(contacts, task);
             }
@@ -157,7 +170,7 @@ impl System {
 
     /// Lets what a factor has solved follow the part that is not in it.
     fn follow(&mut self, contacts: Stiffness<'_>, task: &mut Task<'_>) {
-        let Self { members, direct, residuals, .. } = self;
+        let Self { members, coupled, residuals, .. } = self;
         contacts.add_skew(task.x, task.left);
         task.left.iter_mut().for_each(|left| *left = -*left);
         let operator = Operator { members, contacts: Some(contacts), still_m_s: 0.0 };
@@ -166,22 +179,16 @@ impl System {
         }
         let is_done = |task: &Task<'_>| operator.is_done(task, FOLLOWED_SHARE);
         residuals.descend(members, task, FOLLOWED_MAX, is_done, |left, Direction { x, image }| {
-            x.copy_from_slice(left);
-            direct.solve(x);
+            coupled.solve(left, x);
             image.copy_from_slice(left);
             contacts.add_skew(x, image);
             true
         });
     }
 
-    /// Factors of the coupled matrix for the members taken up last.
-    pub fn factors(&self) -> usize {
-        if self.form == StepForm::Direct { self.direct.factors } else { 0 }
-    }
-
     /// Products of conjugate gradients for the members taken up last.
     pub fn products(&self) -> usize {
-        if self.form == StepForm::Iterative { self.gradients.products } else { 0 }
+        self.gradients.products
     }
 
     /// How easily each side of a row gives way along the first axis of its frame, 1/kg: that of the member `first`, and all others.

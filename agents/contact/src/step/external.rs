@@ -4,6 +4,7 @@
 //! rows of lines, sums of what remote members were given. Never here: ledgers, waves. Theory: docs/theory/coupling.md, eq. 3, 4c and 10.
 
 use crate::constraint::{ConstraintRows, FineStep, RowOwner};
+use crate::lists::reset;
 use crate::member::memory::Partner;
 use crate::member::participant::Progress;
 use crate::member::problem::respond;
@@ -79,8 +80,7 @@ impl ExternalImpulses {
     /// Begins a macro step, for the first time or again.
     pub(super) fn begin(&mut self) {
         self.given.clear();
-        self.line_impulses.clear();
-        self.line_impulses.resize(self.lines.len(), DVec3::ZERO);
+        reset(&mut self.line_impulses, self.lines.len(), DVec3::ZERO);
     }
 
     /// Lets what acts on the participant at `place` act in its own step of `own_s` seconds within a macro step of `macro_s`: the known

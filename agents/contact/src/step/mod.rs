@@ -33,7 +33,7 @@ use crate::impact::Impacts;
 use crate::member::participant::Progress;
 use crate::member::problem::ProblemMembers;
 use crate::member::{ClusterMember, ContactMemory, Participant, Role};
-use crate::solve::{DEPTH_DEFAULT_M, Settings, Solver};
+use crate::solve::Solver;
 use crate::step::report::Sums;
 pub use doubling::StepDoubling;
 pub use external::{ExternalImpulses, KnownImpulse, LineRow, RemoteImpulse};
@@ -52,6 +52,7 @@ struct On<'a> {
 }
 
 /// Steps clusters one after the other, and keeps structure and storage between them.
+#[derive(Default)]
 pub struct ClusterStepper {
     /// How deep contacts rest in the scene of the macro step that is made, metres.
     depth_m: f64,
@@ -77,32 +78,6 @@ pub struct ClusterStepper {
     /// The macro step that is made and its fine steps, seconds.
     pub(crate) macro_s: f64,
     pub(crate) fine_s: f64,
-}
-
-impl Default for ClusterStepper {
-    fn default() -> Self {
-        Self {
-            depth_m: DEPTH_DEFAULT_M,
-            solver: Solver::new(Settings::default()),
-            search: Search::default(),
-            constraints: ConstraintRows::default(),
-            joints: Joints::default(),
-            contact_rows: ContactRows::default(),
-            progress: Vec::new(),
-            members: ProblemMembers::default(),
-            sums: Sums::default(),
-            tearing: Tearing::default(),
-            yielding: Yielding::default(),
-            kept: Vec::new(),
-            is_kept: false,
-            impacts: Impacts::default(),
-            pile: RigidPile::default(),
-            external: ExternalImpulses::default(),
-            moved_m_s: Vec::new(),
-            macro_s: 0.0,
-            fine_s: 0.0,
-        }
-    }
 }
 
 impl ClusterStepper {

@@ -11,9 +11,8 @@ use crate::solve::multiply;
 use crate::step::ClusterStepper;
 use crate::step::report::ClusterReport;
 use crate::step::solve::joint_miss_m;
-use metachron_core::ParallelFor;
-use metachron_core::StepError;
 use metachron_core::parallel::for_each;
+use metachron_core::{ParallelFor, StepError};
 
 impl ClusterStepper {
     /// Begins the steps of members that are at the end of one, and finds what all others see of each other (eq. 24).

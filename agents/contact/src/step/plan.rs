@@ -5,9 +5,8 @@
 
 use crate::member::{ClusterMember, ContactMemory, Participant, Role};
 use crate::step::ClusterStepper;
-use metachron_core::ParallelFor;
-use metachron_core::StepError;
 use metachron_core::parallel::for_each;
+use metachron_core::{ParallelFor, StepError};
 use std::f64::consts::SQRT_2;
 use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
 

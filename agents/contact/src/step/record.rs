@@ -5,6 +5,7 @@
 //! are laid out, the solve. Theory of the stiffness: docs/theory/coupling.md, eq. 7s.
 
 use crate::constraint::place_key;
+use crate::lists::refill;
 use crate::member::memory::{Partner, Remembered, Spin};
 use crate::member::participant::{place_of, velocity};
 use crate::member::{ClusterMember, Drive, Participant, Role};
@@ -215,16 +216,18 @@ impl ClusterStepper {
             Role::Rigid | Role::Deformable => side.velocity(&[towards, DVec3::ZERO]),
         };
         let Self { search, moved_m_s, .. } = self;
-        moved_m_s.clear();
-        moved_m_s.extend(search.contacts.iter().zip(&search.owners).map(|(contact, owner)| {
-            let [here, there] = &contact.sides;
-            if owner.member == led {
-                moved(here)
-            } else if owner.other == Some(led) {
-                -moved(there)
-            } else {
-                DVec3::ZERO
-            }
-        }));
+        refill(
+            moved_m_s,
+            search.contacts.iter().zip(&search.owners).map(|(contact, owner)| {
+                let [here, there] = &contact.sides;
+                if owner.member == led {
+                    moved(here)
+                } else if owner.other == Some(led) {
+                    -moved(there)
+                } else {
+                    DVec3::ZERO
+                }
+            }),
+        );
     }
 }

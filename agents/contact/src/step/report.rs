@@ -3,6 +3,7 @@
 //! In: impulses of contacts and rows, reports of solves. Out: sums, by participants and partners. Never here: which rows there are, the solve.
 
 use crate::constraint::JointTotal;
+use crate::lists::entry;
 use crate::member::memory::Partner;
 use crate::solve::{Level, Report};
 use glam::DVec3;
@@ -73,26 +74,18 @@ impl PairTotal {
 /// The total of a pair, made where it is new.
 pub(super) fn total_of(totals: &mut Vec<PairTotal>, member: usize, partner: Partner) -> &mut PairTotal {
     let order = |total: &PairTotal| (total.member, total.partner);
-    let at = totals.binary_search_by_key(&(member, partner), order).unwrap_or_else(|at| {
-        let (impulse_n_s, contacts, depth_m) = (DVec3::ZERO, 0, 0.0);
-        totals.insert(
-            at,
-            PairTotal {
-                member,
-                partner,
-                impulse_n_s,
-                contacts,
-                depth_m,
-                most_n_s: 0.0,
-                point_m: DVec3::NAN,
-                normal: DVec3::ZERO,
-                inverse_mass_per_kg: [0.0; 2],
-                stiffness_n_m: 0.0,
-            },
-        );
-        at
-    });
-    &mut totals[at]
+    entry(totals, &(member, partner), order, || PairTotal {
+        member,
+        partner,
+        impulse_n_s: DVec3::ZERO,
+        contacts: 0,
+        depth_m: 0.0,
+        most_n_s: 0.0,
+        point_m: DVec3::NAN,
+        normal: DVec3::ZERO,
+        inverse_mass_per_kg: [0.0; 2],
+        stiffness_n_m: 0.0,
+    })
 }
 
 impl ClusterReport {

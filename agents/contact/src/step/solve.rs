@@ -6,6 +6,7 @@
 use crate::constraint::joint::Aimed;
 use crate::detect::{Judge, Round};
 use crate::impact::SolvedStep;
+use crate::lists::refill;
 use crate::member::participant::Progress;
 use crate::member::problem::{Posed, Velocities};
 use crate::member::{ClusterMember, Participant, Role};
@@ -113,16 +114,17 @@ impl ClusterStepper {
         sides.filter(|side| !side.terms().is_empty()).for_each(|side| progress[side.member].place = Some(0));
         let involved = progress.iter_mut().filter(|state| state.place.is_some());
         involved.for_each(|state| state.place = count.next());
-        members.places.clear();
-        members.places.extend(progress.iter().enumerate().filter_map(|(member, state)| state.place.map(|_| member)));
+        refill(
+            &mut members.places,
+            progress.iter().enumerate().filter_map(|(member, state)| state.place.map(|_| member)),
+        );
         let (contacts, rows) = (&mut search.contacts[..], &mut constraints.rows[..]);
         let (free, open): (Velocities, Velocities) = (|state| &state.v_predicted, |state| &state.unanswered);
         let posed = Posed { all, progress, contacts, rows, h_s, threads, free, open };
         report.add(&posed.solve(solver, members)?);
         for state in &mut *progress {
             let Progress { v_solved, v_predicted, place, .. } = state;
-            v_solved.clear();
-            v_solved.extend_from_slice(place.map_or(&v_predicted[..], |place| solver.solution().velocities(place)));
+            (place.map_or(&v_predicted[..], |place| solver.solution().velocities(place))).clone_into(v_solved);
         }
         Ok(())
     }
