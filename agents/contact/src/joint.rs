@@ -122,14 +122,8 @@ impl Motor {
     /// # Errors
     /// [`JointError::BadNumber`] with the first that is not.
     pub fn check(&self) -> Result<(), JointError> {
-        if self.max_effort.is_nan() || self.max_effort <= 0.0 {
-            let (what, value, wanted) = ("motor's greatest effort", self.max_effort, "above zero");
-            return Err(JointError::BadNumber { what, value, wanted });
-        }
-        let goal = |what, value: f64| {
-            let wanted = "at most 1e9 in magnitude";
-            if value.abs() <= NUMBER_MAX { Ok(()) } else { Err(JointError::BadNumber { what, value, wanted }) }
-        };
+        number_if(self.max_effort > 0.0, "motor's greatest effort", self.max_effort, "above zero")?;
+        let goal = |what, value: f64| number_if(value.abs() <= NUMBER_MAX, what, value, "at most 1e9 in magnitude");
         match self.goal {
             MotorGoal::Velocity(velocity) => goal("motor's velocity", velocity),
             MotorGoal::Spring { position, velocity, stiffness, damping } => {
@@ -215,16 +209,10 @@ impl Joint {
         if !(self.rest.is_finite() && self.rest.length_squared() > 0.0) {
             return Err(JointError::BadVector { what: "rest rotation" });
         }
-        if self.tears_above_n.is_nan() || self.tears_above_n <= 0.0 {
-            let (what, value, wanted) = ("tearing force", self.tears_above_n, "above zero");
-            return Err(JointError::BadNumber { what, value, wanted });
-        }
-        if !(self.yields_above_n > 0.0
-            && (self.yields_above_n < self.tears_above_n || self.yields_above_n == f64::INFINITY))
-        {
-            let (what, value, wanted) = ("yield force", self.yields_above_n, "above zero and below the tearing force");
-            return Err(JointError::BadNumber { what, value, wanted });
-        }
+        let [tears_n, yields_n] = [self.tears_above_n, self.yields_above_n];
+        number_if(tears_n > 0.0, "tearing force", tears_n, "above zero")?;
+        let yields_first = yields_n > 0.0 && (yields_n < tears_n || yields_n == f64::INFINITY);
+        number_if(yields_first, "yield force", yields_n, "above zero and below the tearing force")?;
         match self.kind {
             JointKind::Fixed | JointKind::Spherical => Ok(()),
             JointKind::Revolute { axis, range_rad, motor } => {
@@ -278,16 +266,18 @@ const REACH_MAX_M: f64 = 1e6;
 /// The largest number accepted in a joint.
 const NUMBER_MAX: f64 = 1e9;
 
+fn number_if(is_good: bool, what: &'static str, value: f64, wanted: &'static str) -> Result<(), JointError> {
+    if is_good { Ok(()) } else { Err(JointError::BadNumber { what, value, wanted }) }
+}
+
 fn number(what: &'static str, value: f64, least: f64) -> Result<(), JointError> {
     let wanted = if least > 0.0 { "above zero and at most 1e9" } else { "between 0 and 1e9" };
-    if (least..=NUMBER_MAX).contains(&value) { Ok(()) } else { Err(JointError::BadNumber { what, value, wanted }) }
+    number_if((least..=NUMBER_MAX).contains(&value), what, value, wanted)
 }
 
 fn range(what: &'static str, [low, high]: [f64; 2], most: f64, wanted: &'static str) -> Result<(), JointError> {
     for value in [low, high] {
-        if value.is_nan() || value.abs() > most {
-            return Err(JointError::BadNumber { what, value, wanted });
-        }
+        number_if(value.abs() <= most, what, value, wanted)?;
     }
     if low <= high { Ok(()) } else { Err(JointError::EmptyRange { low, high }) }
 }

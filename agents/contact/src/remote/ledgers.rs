@@ -3,10 +3,10 @@
 //! In: impulses of the pairs that the agent computes, snapshots of partners. Out: what is new, each impulse once, and the part of a
 //! snapshot by which partners read. Never here: how an impulse was found, how a body answers. Theory: docs/theory/coupling.md, section 2.
 
+use crate::lists::entry;
 use crate::{Neighbour, StepContext};
 use glam::DVec3;
-use metachron_core::{AgentId, Impulse, Ledger, SimTime, Site, Snapshot};
-use metachron_core::{PairKind, PairState};
+use metachron_core::{AgentId, Impulse, Ledger, PairKind, PairState, SimTime, Site, Snapshot};
 
 /// The ledgers of one agent.
 #[derive(Debug, Clone, Default, serde::Serialize, serde::Deserialize)]
@@ -24,23 +24,16 @@ struct Taken {
     /// The giver's own time in the last reading.
     read: SimTime,
     forces: Vec<SiteForce>,
-    /// The copy that it is to have once the step in progress is made.
+    /// The copy that it is to have once the step in progress is made, where that has read something; else storage.
+    #[serde(skip, default = "unread")]
+    next: Ledger,
     #[serde(skip)]
-    reading: Reading,
-}
-
-/// A ledger that a step in progress acts by.
-#[derive(Debug, Clone)]
-struct Reading {
-    /// Storage where nothing was read.
-    ledger: Ledger,
     is_new: bool,
 }
 
-impl Default for Reading {
-    fn default() -> Self {
-        Self { ledger: Ledger::new(AgentId(0)), is_new: false }
-    }
+/// A ledger in which nothing was read.
+const fn unread() -> Ledger {
+    Ledger::new(AgentId(0))
 }
 
 /// What a partner gave a site a second in the last step, N and N·m.
@@ -75,7 +68,7 @@ impl Ledgers {
     pub fn take(&mut self, context: &StepContext<'_>, dt_s: f64, mut apply: impl FnMut(TakenImpulse)) {
         for taken in &mut self.taken {
             taken.forces.clear();
-            taken.reading.is_new = false;
+            taken.is_new = false;
         }
         for neighbour in context.neighbours {
             let Some(ledger) = neighbour.snapshot.given.iter().find(|ledger| ledger.with == context.me) else {
@@ -90,34 +83,31 @@ impl Ledgers {
             if taken.copy.revision >= ledger.revision {
                 continue;
             }
-            let Taken { copy, forces, reading, .. } = taken;
+            let Taken { copy, forces, next, is_new, .. } = taken;
             ledger.beyond(Some(copy), context.time, |site, impulse, carried| {
                 forces.push(SiteForce { site, force: impulse * dt_s.recip() });
                 apply(TakenImpulse { site, impulse, carried });
             });
-            reading.is_new = true;
-            reading.ledger.copy_from(ledger);
-            (reading.ledger.with, reading.ledger.ahead) = (neighbour.id, None);
-            reading.ledger.coming.clear();
+            *is_new = true;
+            next.copy_from(ledger);
+            (next.with, next.ahead) = (neighbour.id, None);
+            next.coming.clear();
         }
     }
 
     /// The step that took what was new is made.
     pub fn settle(&mut self) {
-        for Taken { copy, reading, .. } in &mut self.taken {
-            if std::mem::take(&mut reading.is_new) {
-                std::mem::swap(copy, &mut reading.ledger);
+        for taken in &mut self.taken {
+            if std::mem::take(&mut taken.is_new) {
+                std::mem::swap(&mut taken.copy, &mut taken.next);
             }
         }
     }
 
     /// Books an impulse that acts `after_s` seconds after `time` (eq. 1).
     pub fn give(&mut self, to: AgentId, at: GivenAt, impulse: Impulse) {
-        let place = self.given.binary_search_by_key(&to, |ledger| ledger.with).unwrap_or_else(|place| {
-            self.given.insert(place, Ledger::new(to));
-            place
-        });
-        self.given[place].give(at.site, at.time, at.after_s, impulse);
+        let ledger = entry(&mut self.given, &to, |ledger| ledger.with, || Ledger::new(to));
+        ledger.give(at.site, at.time, at.after_s, impulse);
     }
 
     /// What `other` has been given and had not taken in the snapshot that is seen, J − J_ack, and that times the seconds since it acted:
@@ -163,13 +153,18 @@ impl Ledgers {
     }
 
     fn taken_mut(&mut self, from: AgentId) -> &mut Taken {
-        let place = self.taken.binary_search_by_key(&from, |taken| taken.copy.with).unwrap_or_else(|place| {
-            let (copy, forces, reading) = (Ledger::new(from), Vec::new(), Reading::default());
-            let taken = Taken { copy, read: SimTime::ZERO, forces, reading };
-            self.taken.insert(place, taken);
-            place
-        });
-        &mut self.taken[place]
+        entry(
+            &mut self.taken,
+            &from,
+            |taken| taken.copy.with,
+            || Taken {
+                copy: Ledger::new(from),
+                read: SimTime::ZERO,
+                forces: Vec::new(),
+                next: unread(),
+                is_new: false,
+            },
+        )
     }
 }
 
@@ -205,9 +200,5 @@ fn copy<'a>(from: impl Iterator<Item = &'a Ledger>, into: &mut Vec<Ledger>) {
 
 /// The state of a pair, made where it is new.
 pub(crate) fn state_of(states: &mut Vec<PairState>, with: AgentId, kind: PairKind) -> &mut PairState {
-    let place = states.binary_search_by_key(&with, |state| state.with).unwrap_or_else(|place| {
-        states.insert(place, PairState::new(with, kind));
-        place
-    });
-    &mut states[place]
+    entry(states, &with, |state| state.with, || PairState::new(with, kind))
 }
