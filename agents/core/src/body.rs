@@ -204,7 +204,10 @@ impl Body {
                 let arm = body.rotation * local;
                 Some((body.position + arm, body.velocity + body.spin.cross(arm)))
             }
-            (Self::Tool(tool), Anchor::Local(local)) => Some((tool.tip + tool.rotation * local, tool.velocity)),
+            (Self::Tool(tool), Anchor::Local(local)) => {
+                let arm = tool.rotation * local;
+                Some((tool.tip + arm, tool.velocity + tool.spin.cross(arm)))
+            }
             (Self::Soft(soft), Anchor::Vertex(vertex)) => {
                 Some((*soft.positions.get(vertex as usize)?, *soft.velocities.get(vertex as usize)?))
             }

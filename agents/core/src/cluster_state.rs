@@ -18,14 +18,15 @@ pub struct ClusterState {
 /// How far a solve of contacts went, the dearest last. All laws hold to the tolerance but at [`SolveLevel::Interior`].
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Default, serde::Serialize, serde::Deserialize)]
 pub enum SolveLevel {
-    /// The impulses of the step before still hold.
+    /// The impulses of the last step still hold.
     #[default]
     Kept,
     /// Newton's method found the rest from them.
     Near,
     /// Interior points led to where all laws hold.
     Polished,
-    /// Interior points, as far as the budget went: inside all bounds, momentum exact, no energy made; the miss says how far off.
+    /// Interior points, ended before all laws held, by the budget or after as many steps as any solve makes: inside all bounds, with momentum and
+    /// passivity as everywhere; the miss says how far off.
     Interior,
 }
 

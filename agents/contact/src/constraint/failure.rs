@@ -5,10 +5,10 @@
 //! remembers it. Never here: what a row is made of, its bound ([`Hold::limited`](crate::solve::Hold::limited)), how events are reported.
 //! Theory: docs/theory/clusters.md, eq. 28 and 29.
 
-use crate::constraint::{ConstraintRows, FineStep, Frame, Name, Pull, RowOwner, Slides, SlidingRow};
+use crate::constraint::{ConstraintRows, FineStep, Frame, Pull, RowOwner, Slides, SlidingRow};
 use crate::lists::entry;
 use crate::member::memory::{Partner, UnfinishedLoad};
-use crate::member::participant::{Progress, velocity};
+use crate::member::participant::{Progress, relative};
 use crate::member::{ClusterMember, Participant, Slid};
 use crate::solve::JointRow;
 use glam::DVec3;
@@ -19,68 +19,63 @@ const WHOLE: f64 = 0.5;
 /// A row whose force is this share of the most that it gives has yielded, but for the accuracy of a solve.
 const ALL_SHARE: f64 = 1.0 - 1e-6;
 /// A spring slips by what it would give this share of the most for, or more: less is the accuracy of a solve.
-pub(crate) const SLIP_SHARE: f64 = 1e-6;
+const SLIP_SHARE: f64 = 1e-6;
 
-/// An attachment that tore at the end of a macro step.
+/// An attachment that tore at the end of a macro step, or began to yield in it.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Torn {
-    /// The participant that remembered it, by its place in the list: of a joint the first body, of a link the lower number, else whose own
+pub struct FailedAttachment {
+    /// The participant that remembers it, by its place in the list: of a joint the first body, of a link the lower number, else whose own
     /// it is.
     pub member: usize,
     /// The participant at its other end; `None` is the world.
     pub other: Option<usize>,
     /// A link, a joint, or an attachment that is the participant's own.
     pub partner: Partner,
-    /// The force that it gave: the mean over the macro step, and over those cut short before it, N.
+    /// Of one that tore the force that it gave: the mean over the macro step, and over those cut short before it; else that at which it yields, N.
     pub force_n: f64,
 }
 
-/// What can tear, in one macro step.
+/// What can tear or yield, in one macro step.
 #[derive(Debug, Default)]
-pub(crate) struct Tearing {
+pub(crate) struct Failures {
     /// By participants and partners.
     loads: Vec<Load>,
-    torn: Vec<Torn>,
+    pub torn: Vec<FailedAttachment>,
+    /// Those that had never yielded before.
+    pub yielded: Vec<FailedAttachment>,
 }
 
 /// What an attachment that may tear has given since the macro step began.
 #[derive(Debug, Clone, Copy)]
 struct Load {
-    member: usize,
-    other: Option<usize>,
-    partner: Partner,
-    tears_above_n: f64,
+    owner: RowOwner,
     impulse_n_s: DVec3,
 }
 
-impl Tearing {
+impl Failures {
     /// Begins a macro step, for the first time or again.
     pub fn begin(&mut self) {
         self.loads.clear();
         self.torn.clear();
+        self.yielded.clear();
     }
 
     /// Adds what a row gave.
     pub fn note(&mut self, owner: &RowOwner, impulse_n_s: DVec3) {
-        let RowOwner { member, other, partner, tears_above_n, .. } = *owner;
-        self.add(Load { member, other, partner, tears_above_n, impulse_n_s });
+        if owner.tears_above_n < f64::INFINITY {
+            let order = |owner: &RowOwner| (owner.member, owner.partner);
+            let none = || Load { owner: *owner, impulse_n_s: DVec3::ZERO };
+            let load = entry(&mut self.loads, &order(owner), |load| order(&load.owner), none);
+            load.impulse_n_s += impulse_n_s;
+        }
     }
 
     /// Adds what the own attachments of a member gave over its step of `h_s` seconds, which has ended.
     pub fn note_own(&mut self, member: usize, body: &dyn ClusterMember, h_s: f64) {
         for own in body.attachments() {
-            let (partner, impulse_n_s) = (Partner::Attachment(own.number), own.force_n * h_s);
-            self.add(Load { member, other: None, partner, tears_above_n: own.tears_above_n, impulse_n_s });
+            let owner = RowOwner::new(member, None, Partner::Attachment(own.number));
+            self.note(&RowOwner { tears_above_n: own.tears_above_n, ..owner }, own.force_n * h_s);
         }
-    }
-
-    fn add(&mut self, load: Load) {
-        if load.tears_above_n == f64::INFINITY {
-            return;
-        }
-        let order = |load: &Load| (load.member, load.partner);
-        let none = || Load { impulse_n_s: DVec3::ZERO, ..load };
-        entry(&mut self.loads, &order(&load), order, none).impulse_n_s += load.impulse_n_s;
     }
 
     /// Ends a macro step of `macro_s` seconds: what gave too much has torn (eq. 28), and both its members remember that. What was given in
@@ -90,21 +85,55 @@ impl Tearing {
             return;
         }
         let whole_s = WHOLE * filled_s(all);
-        for Load { member, other, partner, tears_above_n, impulse_n_s } in self.loads.iter().copied() {
+        for Load { owner, impulse_n_s } in &self.loads {
+            let (RowOwner { member, other, partner, .. }, impulse_n_s) = (*owner, *impulse_n_s);
             let load = UnfinishedLoad { partner, impulse_n_s, span_s: macro_s };
             let Some(UnfinishedLoad { impulse_n_s, span_s, .. }) = all[member].memory.bear(load, whole_s) else {
                 continue;
             };
             let force_n = impulse_n_s.length() / span_s;
-            if force_n > tears_above_n {
-                std::iter::once(member).chain(other).for_each(|one| all[one].memory.tear(partner));
-                self.torn.push(Torn { member, other, partner, force_n });
+            if force_n > owner.tears_above_n {
+                owner.both().for_each(|one| all[one].memory.tear(partner));
+                self.torn.push(FailedAttachment { member, other, partner, force_n });
             }
         }
     }
 
-    pub fn torn(&self) -> &[Torn] {
-        &self.torn
+    /// Lets the rows of a fine step that gave all that they may slip to where they then are (eq. 29).
+    pub fn slip(
+        &mut self,
+        all: &mut [Participant<'_>],
+        constraints: &ConstraintRows,
+        impulses_n_s: &[DVec3],
+        progress: &[Progress],
+    ) {
+        for sliding in &constraints.sliding {
+            let (row, impulse_n_s, owner) =
+                (&constraints.rows[sliding.row], impulses_n_s[sliding.row], &constraints.owners[sliding.row]);
+            if !row.gives_all(impulse_n_s, ALL_SHARE) {
+                continue;
+            }
+            let moves_m_s = relative(&row.sides, |member| &progress[member].v_solved);
+            let given = impulse_n_s * row.compliance_per_kg.unwrap_or(0.0);
+            // it gives way against its force, and never along it
+            let against = -impulse_n_s.normalize_or_zero();
+            let slid_m = row.hold.held_part(moves_m_s - row.target_m_s + given).dot(against) * sliding.per_m_s;
+            if slid_m <= sliding.free_m {
+                continue;
+            }
+            let slid = sliding.slides.slid(against * (slid_m - sliding.free_m));
+            let one = &mut all[owner.member];
+            let first = !one.memory.has_slipped(owner.partner);
+            let slip = one.memory.slip(owner.partner);
+            match owner.own {
+                Some(place) => one.member.slip(place, slid),
+                None => slip.slid += slid,
+            }
+            if first {
+                let RowOwner { member, other, partner, yields_above_n: force_n, .. } = *owner;
+                self.yielded.push(FailedAttachment { member, other, partner, force_n });
+            }
+        }
     }
 }
 
@@ -125,26 +154,6 @@ impl Participant<'_> {
     }
 }
 
-/// An attachment that began to yield in a macro step.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Yielded {
-    /// The participant that remembers it, by its place in the list: of a joint the first body, of a link the lower number, else whose own
-    /// it is.
-    pub member: usize,
-    /// The participant at its other end; `None` is the world.
-    pub other: Option<usize>,
-    /// A link, a joint, or an attachment that is the participant's own.
-    pub partner: Partner,
-    /// The force at which it yields, N.
-    pub force_n: f64,
-}
-
-/// What yields, in one macro step.
-#[derive(Debug, Default)]
-pub(crate) struct Yielding {
-    begun: Vec<Yielded>,
-}
-
 impl Slides {
     /// What has slipped where its row has moved by so much, world axes, metres.
     fn slid(self, by_m: DVec3) -> Slid {
@@ -156,66 +165,20 @@ impl Slides {
 }
 
 impl ConstraintRows {
-    /// Notes that the row laid out last slips where it gives all that it may; nothing where it never does.
-    pub(crate) fn slides(&mut self, row: SlidingRow) {
-        if row.yields_above_n < f64::INFINITY {
-            self.sliding.push(row);
+    /// Notes how the row laid out last slips where it gives all that it may; nothing where it never does.
+    pub(crate) fn slides(&mut self, slides: Slides, per_m_s: f64, free_m: f64) {
+        if self.owners.last().is_some_and(|owner| owner.yields_above_n < f64::INFINITY) {
+            self.sliding.push(SlidingRow { row: self.owners.len() - 1, slides, per_m_s, free_m });
         }
     }
 
     /// The same of the row of a spring.
-    pub(crate) fn spring_slides(&mut self, step: &FineStep<'_, '_>, pull: &Pull, name: Name, slides: Slides) {
-        let (Some(row), Some(per_m_s)) = (self.rows.len().checked_sub(1), pull.slips_per_m_s(step.h_s)) else { return };
-        let free_m = SLIP_SHARE * name.yields.above_n / pull.stiffness_n_m;
-        self.slides(SlidingRow { row, slides, per_m_s, free_m, yields_above_n: name.yields.above_n, own: None });
-    }
-}
-
-impl Yielding {
-    /// Begins a macro step, for the first time or again.
-    pub fn begin(&mut self) {
-        self.begun.clear();
-    }
-
-    /// Lets the rows of a fine step that gave all that they may slip to where they then are (eq. 29).
-    pub fn slip(
-        &mut self,
-        all: &mut [Participant<'_>],
-        constraints: &ConstraintRows,
-        impulses_n_s: &[DVec3],
-        progress: &[Progress],
-    ) {
-        for sliding in &constraints.sliding {
-            let (row, impulse_n_s, owner) =
-                (&constraints.rows[sliding.row], impulses_n_s[sliding.row], &constraints.owners[sliding.row]);
-            if !row.gives_all(impulse_n_s, ALL_SHARE) {
-                continue;
-            }
-            let [a, b] = row.sides.map(|side| velocity(&side, |member| &progress[member].v_solved[..]));
-            let given = impulse_n_s * row.compliance_per_kg.unwrap_or(0.0);
-            // it gives way against its force, and never along it
-            let against = -impulse_n_s.normalize_or_zero();
-            let slid_m = row.hold.held_part(a - b - row.target_m_s + given).dot(against) * sliding.per_m_s;
-            if slid_m <= sliding.free_m {
-                continue;
-            }
-            let slid = sliding.slides.slid(against * (slid_m - sliding.free_m));
-            let one = &mut all[owner.member];
-            let first = !one.memory.has_slipped(owner.partner);
-            let slip = one.memory.slip(owner.partner);
-            match sliding.own {
-                Some(place) => one.member.slip(place, slid),
-                None => slip.slid += slid,
-            }
-            if first {
-                let force_n = sliding.yields_above_n;
-                self.begun.push(Yielded { member: owner.member, other: owner.other, partner: owner.partner, force_n });
-            }
-        }
-    }
-
-    pub fn begun(&self) -> &[Yielded] {
-        &self.begun
+    pub(crate) fn spring_slides(&mut self, step: &FineStep<'_, '_>, pull: &Pull, slides: Slides) {
+        let Pull { stiffness_n_m, damping_n_s_m, .. } = *pull;
+        let Some(owner) = self.owners.last().filter(|_| stiffness_n_m > 0.0) else { return };
+        // what its damper bears need not be slipped
+        let per_m_s = step.h_s + damping_n_s_m / stiffness_n_m;
+        self.slides(slides, per_m_s, SLIP_SHARE * owner.yields_above_n / stiffness_n_m);
     }
 }
 

@@ -7,7 +7,7 @@
 //! than steps can follow, and would be thrown. Where h² of that stiffness is more than steps bear, so much inertia is added across the
 //! arm: it takes no energy, and a turn that steps can follow has none of it.
 
-use crate::constraint::{ConstraintRows, End, FineStep, ForceAtArm, GeometricStiffness, Name, RowOwner};
+use crate::constraint::{ConstraintRows, End, FineStep, ForceAtArm, GeometricStiffness, RowOwner};
 use crate::lists::reset;
 use crate::member::{ClusterMember, Participant};
 use crate::solve::{Hold, JointRow, Side};
@@ -24,7 +24,7 @@ impl GeometricStiffness {
     }
 
     /// Notes a force on the first end of a tie, of which the other has the opposite.
-    pub fn note(&mut self, step: &FineStep<'_, '_>, ends: &[End; 2], force_n: DVec3, name: Name) {
+    pub fn note(&mut self, step: &FineStep<'_, '_>, ends: &[End; 2], force_n: DVec3, owner: RowOwner) {
         let FineStep { all, h_s, .. } = *step;
         for (at, (end, force_n)) in ends.iter().zip([force_n, -force_n]).enumerate() {
             let Some(member) = end.member else { continue };
@@ -33,7 +33,7 @@ impl GeometricStiffness {
             let Some(axis) = arm.try_normalize() else { continue };
             // the largest of its stiffnesses: a force that is not along its arm has three
             let stiffness = 0.5 * (force_n.dot(arm) + force_n.length() * arm.length());
-            let owner = RowOwner { hold: None, ..name.row(ADDED + at as u32, Some(member)) };
+            let owner = RowOwner { hold: None, key: ADDED + at as u32, other: Some(member), ..owner };
             let inertia_kg_m2 = INERTIA_SHARE * h_s * h_s * stiffness;
             self.pulls.push(ForceAtArm { owner, member, turns: pose.turns.of_member(member), axis, inertia_kg_m2 });
         }

@@ -8,15 +8,14 @@
 //! step before, then those of the answer itself, until the joint holds. Positions are kept as by RATTLE (AND83): to second order, and
 //! what turns keeps its energy. Theory: docs/theory/clusters.md, eq. 21.
 
-use crate::constraint::motor::Motored;
-use crate::constraint::{ConstraintRows, End, FineStep, Frame, Name, Pull, RowOwner, Slides, SlidingRow, YieldLimit};
+use crate::constraint::{ConstraintRows, End, FineStep, Frame, Pull, RowOwner, Slides};
 use crate::detect::ClusterScene;
-use crate::joint::{Joint, JointKind};
+use crate::joint::{Joint, JointKind, Motor, MotorGoal};
 use crate::member::memory::Partner;
-use crate::member::participant::{place_of, velocity};
+use crate::member::participant::{place_of, relative, velocity};
 use crate::member::{ClusterMember, MaterialPoint, Participant, Pose};
 use crate::push_out::PUSH_OUT_MAX_M_S;
-use crate::solve::{Hold, JointRow, Side, SideTerm};
+use crate::solve::{Hold, JointRow, Side, SideTerm, Spring};
 use glam::{DQuat, DVec3};
 use metachron_core::{Anchor, shortest_turn};
 use metachron_geometry::narrow_phase::TouchKey;
@@ -52,17 +51,26 @@ pub struct JointTotal {
     pub impulse: f64,
 }
 
-/// A joint between participants; no second one is the world.
+/// A joint between participants.
 #[derive(Debug, Clone, Copy)]
-struct Held {
+struct Jointed {
     /// Its number in the scene.
     number: u32,
+    /// As it holds now.
     joint: Joint,
+    a: usize,
+    /// `None` is the world.
+    b: Option<usize>,
+}
+
+/// A joint as it was laid out.
+#[derive(Debug, Clone, Copy)]
+struct Held {
+    of: Jointed,
     /// The direction that it leaves free, world axes, of length 1.
     axis: DVec3,
     /// Its rows in the problem, from the first to past the last.
     rows: [usize; 2],
-    members: (usize, Option<usize>),
     /// How far it is off when the step begins, and the rotations of both.
     now: Off,
     rotations: [DQuat; 2],
@@ -109,40 +117,11 @@ struct Off {
     travel: f64,
 }
 
-/// What a joint holds together, its points or its turns, and the name of what does.
+/// What a joint holds together, its points or its turns, and whose the first row of these is.
 #[derive(Clone, Copy)]
 struct Together {
     sides: [Side; 2],
-    name: Name,
-}
-
-/// What a joint is made of.
-struct Parts {
-    points: Together,
-    turns: Together,
-    /// The direction that it leaves free, world axes, of length 1.
-    axis: DVec3,
-    /// Its name for what neither tears nor yields it.
-    lasting: Name,
-}
-
-/// A row of a joint as it is laid out.
-struct LaidRow {
-    /// The joint, by its place here.
-    held: usize,
-    way: Way,
-    hold: Hold,
-    of: Together,
     owner: RowOwner,
-}
-
-/// A joint and the participants that it holds.
-struct Jointed<'a> {
-    number: u32,
-    joint: &'a Joint,
-    a: usize,
-    /// `None` is the world.
-    b: Option<usize>,
 }
 
 impl Joints {
@@ -163,15 +142,15 @@ impl Joints {
                 let joint = one.memory.slipped(Partner::Joint(number)).joint(joint);
                 let set = one.context.motors.iter().find(|set| set.joint == number);
                 let joint = set.map_or(joint, |set| joint.with_motor(set.motor));
-                self.hold(step, &Jointed { number, joint: &joint, a, b }, constraints);
+                self.hold(step, Jointed { number, joint, a, b }, constraints);
             }
         }
         self.aim(all, constraints, |member| &progress[member].v_before[..], step.h_s);
     }
 
     /// Lays out one joint.
-    fn hold(&mut self, step: &FineStep<'_, '_>, jointed: &Jointed<'_>, constraints: &mut ConstraintRows) {
-        let Jointed { number, joint, a: first, b: second } = *jointed;
+    fn hold(&mut self, step: &FineStep<'_, '_>, of: Jointed, constraints: &mut ConstraintRows) {
+        let Jointed { number, joint, a: first, b: second } = of;
         let all = step.all;
         let at = |member: usize| all[member].member.pose(&[], 0.0);
         let (Some(a), Some(b)) = (at(first), second.map_or(Some(Pose::WORLD), at)) else { return };
@@ -184,41 +163,43 @@ impl Joints {
             return;
         };
         let ends = [End { member: Some(first), point: point_a }, End { member: second, point: point_b }];
-        let yields = YieldLimit { above_n: joint.yields_above_n, frame: Frame::of(&b) };
-        let lasting = Name::lasting(first, Partner::Joint(number), None);
-        let name = Name { tears_above_n: joint.tears_above_n, yields, ..lasting };
+        let lasting = RowOwner::new(first, second, Partner::Joint(number));
+        let Joint { tears_above_n, yields_above_n, .. } = joint;
+        let owner = RowOwner { tears_above_n, yields_above_n, frame: Frame::of(&b), ..lasting };
         if let JointKind::Spring { stiffness_n_m, damping_n_s_m, rest_m } = joint.kind {
-            constraints.spring(step, &ends, &Pull { stiffness_n_m, damping_n_s_m, rest_m }, name);
+            constraints.spring(step, &ends, &Pull { stiffness_n_m, damping_n_s_m, rest_m }, owner);
             return;
         }
-        let points = Together { sides: [ends[0].side(), ends[1].side()], name };
+        let points = Together { sides: [ends[0].side(), ends[1].side()], owner };
         // what holds a turn gives no force
         let turns = [a.turns.of_member(first), second.map_or(Side::FIXED, |at| b.turns.of_member(at))];
-        let turns = Together { sides: turns, name: lasting };
-        // as in the last step
-        constraints.geometric_stiffness.note(
-            step,
-            &ends,
-            all[name.member].memory.recall(name.partner, TouchKey::default()).force_n,
-            name,
-        );
-        let now = joint.off(&a, &b);
-        let (axis, rows) = (joint.axis(&a, anchors[1] - anchors[0]), [constraints.rows.len(); 2]);
-        let (members, rotations) = ((first, second), [a.rotation, b.rotation]);
-        self.held.push(Held { number, joint: *joint, axis, rows, members, now, rotations });
-        self.lay_all(step, constraints, &Parts { points, turns, axis, lasting });
-        self.held.iter_mut().next_back().into_iter().for_each(|held| held.rows[1] = constraints.rows.len());
+        let turns = Together { sides: turns, owner: lasting };
+        let as_before_n = all[first].memory.recall(owner.partner, TouchKey::default()).force_n;
+        constraints.geometric_stiffness.note(step, &ends, as_before_n, owner);
+        let (axis, now) = (joint.axis(&a, anchors[1] - anchors[0]), joint.off(&a, &b));
+        let (rows, rotations) = ([constraints.rows.len(); 2], [a.rotation, b.rotation]);
+        self.held.push(Held { of, axis, rows, now, rotations });
+        self.lay(step, constraints, points, turns);
+        self.held.last_mut().into_iter().for_each(|held| held.rows[1] = constraints.rows.len());
     }
 
     /// Lays out the rows of the joint that was noted last.
-    fn lay_all(&mut self, step: &FineStep<'_, '_>, constraints: &mut ConstraintRows, parts: &Parts) {
-        let Parts { points, turns, axis, lasting } = *parts;
-        let held = self.held.len() - 1;
-        let Held { joint, members: (_, second), now, .. } = self.held[held];
+    fn lay(&mut self, step: &FineStep<'_, '_>, constraints: &mut ConstraintRows, points: Together, turns: Together) {
+        let at = self.held.len() - 1;
+        let Held { of: Jointed { joint, .. }, axis, .. } = self.held[at];
         let (mut key, mut driven) = (0, None);
         let mut push = |way: Way, of: Together, hold: Hold| {
-            self.lay(step, constraints, &LaidRow { held, way, hold, of, owner: of.name.row(key, second) });
+            let (row, owner) = (constraints.rows.len(), RowOwner { key, ..of.owner });
             key += 1;
+            let hold = hold.limited(owner.yields_above_n * step.h_s);
+            if constraints.push(step, JointRow::new(of.sides, hold), owner) {
+                self.parts.push(Part { held: at, row, way });
+                let slides = match (joint.kind, hold) {
+                    (JointKind::Rope { .. }, Hold::Along { axis, .. }) => Slides::Length { axis: -axis },
+                    _ => Slides::Point(owner.frame),
+                };
+                constraints.slides(slides, step.h_s, step.joint_miss_m);
+            }
         };
         match joint.kind {
             JointKind::Fixed => {
@@ -226,7 +207,7 @@ impl Joints {
                 push(Way::Turn, turns, Hold::ALL);
             }
             JointKind::Revolute { range_rad, motor, .. } => {
-                driven = motor.map(|motor| (motor, turns));
+                driven = motor.zip(Some(turns));
                 push(Way::Point, points, Hold::ALL);
                 push(Way::Turn, turns, Hold::across(axis));
                 if let Some([low, high]) = range_rad {
@@ -236,7 +217,7 @@ impl Joints {
             }
             JointKind::Spherical => push(Way::Point, points, Hold::ALL),
             JointKind::Prismatic { range_m, motor, .. } => {
-                driven = motor.map(|motor| (motor, points));
+                driven = motor.zip(Some(points));
                 push(Way::Point, points, Hold::across(axis));
                 push(Way::Turn, turns, Hold::ALL);
                 if let Some([low, high]) = range_m {
@@ -248,42 +229,47 @@ impl Joints {
             JointKind::Spring { .. } => {}
         }
         if let Some((motor, Together { sides, .. })) = driven {
-            let turns = matches!(joint.kind, JointKind::Revolute { .. });
-            self.drives |= motor.moves();
-            let before = |member: usize| &step.progress[member].v_before[..];
-            let [of_a, of_b] = sides.map(|side| velocity(&side, before).dot(axis));
-            let inverse_mass = sides.iter().map(|side| own_inverse_mass(step.all, side, axis)).sum();
-            let speed = of_b - of_a;
-            let motored = Motored { sides, axis, travel: now.travel, speed, inverse_mass, turns };
-            let row = motor.row(&motored, step.h_s);
-            constraints.motor(step, row, lasting.row(MOTOR, second));
+            // what it gives is not what holds its joint together
+            self.drive(step, constraints, &motor, Together { sides, owner: turns.owner });
         }
     }
 
-    /// Lays out one row of a joint.
-    fn lay(&mut self, step: &FineStep<'_, '_>, constraints: &mut ConstraintRows, laid: &LaidRow) {
-        let LaidRow { held, way, hold, of: Together { sides, name }, owner } = *laid;
-        let row = constraints.rows.len();
-        let YieldLimit { above_n, frame } = name.yields;
-        if !constraints.push(step, JointRow::new(sides, hold.limited(above_n * step.h_s)), owner) {
-            return;
-        }
-        self.parts.push(Part { held, row, way });
-        let slides = match (self.held[held].joint.kind, hold) {
-            (JointKind::Rope { .. }, Hold::Along { axis, .. }) => Slides::Length { axis: -axis },
-            _ => Slides::Point(frame),
+    /// Lays out the row of a motor of the joint that was noted last, between spins of a hinge, points of a slide. What moves b forward pushes a back.
+    fn drive(&mut self, step: &FineStep<'_, '_>, constraints: &mut ConstraintRows, motor: &Motor, of: Together) {
+        let Some(Held { of: Jointed { joint, .. }, axis, now, .. }) = self.held.last().copied() else { return };
+        self.drives |= motor.moves();
+        let h_s = step.h_s;
+        let row = JointRow::new(of.sides, Hold::motor(axis, motor.max_effort * h_s));
+        let row = match motor.goal {
+            MotorGoal::Velocity(velocity) => JointRow { target_m_s: axis * -velocity, ..row },
+            MotorGoal::Spring { position, velocity: wanted, stiffness, damping } => {
+                let off = now.travel - position;
+                // angles are known but for whole turns
+                let is_hinge = matches!(joint.kind, JointKind::Revolute { .. });
+                let off = if is_hinge { off - (off / TAU).round() * TAU } else { off };
+                let law = Spring { stiffness_n_m: stiffness, damping_n_s_m: damping, stretch_m: axis * -off };
+                let row = row.with_spring(law, h_s);
+                let compliance = row.compliance_per_kg.unwrap_or(0.0);
+                // what a step resolves, it need not damp (eq. 22a)
+                let stiff = h_s * h_s * stiffness;
+                let before = |member: usize| &step.progress[member].v_before[..];
+                let [of_a, of_b] = of.sides.map(|side| velocity(&side, before).dot(axis));
+                let inverse_mass: f64 = of.sides.iter().map(|side| own_inverse_mass(step.all, side, axis)).sum();
+                let kept = (of_b - of_a) * stiff / (1.0 + stiff * inverse_mass);
+                let target_m_s = row.target_m_s - axis * ((wanted * h_s * damping + kept) * compliance);
+                JointRow { target_m_s, ..row }
+            }
         };
-        let (per_m_s, free_m) = (step.h_s, step.joint_miss_m);
-        constraints.slides(SlidingRow { row, slides, per_m_s, free_m, yields_above_n: above_n, own: None });
+        constraints.push(step, row, RowOwner { key: MOTOR, owes: row.compliance_per_kg.is_none(), ..of.owner });
     }
 
     /// Adds to `totals` what motors and stops gave b against a along the ways that their joints leave free.
     pub fn note_efforts(&self, constraints: &ConstraintRows, rows_n_s: &[DVec3], totals: &mut Vec<JointTotal>) {
-        for held in self.held.iter().filter(|held| held.joint.takes_motor()) {
+        for held in self.held.iter().filter(|held| held.of.joint.takes_motor()) {
             let rows = held.rows[0]..held.rows[1];
             let along = rows.filter(|row| matches!(constraints.rows[*row].hold, Hold::Along { .. }));
             let given = along.map(|row| -rows_n_s[row].dot(held.axis)).fold(0.0, |sum, given| sum + given);
-            let (member, joint) = (held.members.0, held.number);
+            let Jointed { a: member, number: joint, .. } = held.of;
             match totals.iter_mut().find(|total| total.joint == joint) {
                 Some(total) => total.impulse += given,
                 None => totals.push(JointTotal { member, joint, impulse: given }),
@@ -316,8 +302,7 @@ impl Joints {
             let row = &mut constraints.rows[part.row];
             let wanted = part.way.wanted(part.way.off(&held.now, row), row, h_s);
             let miss = part.way.off(&off, row) - wanted;
-            let [a, b] = row.sides.map(|side| velocity(&side, &velocities));
-            row.target_m_s = a - b - miss / h_s;
+            row.target_m_s = relative(&row.sides, &velocities) - miss / h_s;
             // one that gives all that it may holds nowhere
             if !row.gives_all(row.warm_n_s, YIELDS_SHARE) {
                 aimed.miss_m = aimed.miss_m.max(part.way.missed(miss, row));
@@ -327,16 +312,23 @@ impl Joints {
     }
 }
 
+impl Motor {
+    /// Whether it keeps its joint moving.
+    fn moves(&self) -> bool {
+        matches!(self.goal, MotorGoal::Velocity(velocity) | MotorGoal::Spring { velocity, .. } if velocity != 0.0)
+    }
+}
+
 impl Held {
     /// How far it is off once its bodies have moved on for `h_s` seconds, and by how much one of them has turned then.
     fn after<'v>(&self, all: &[Participant<'_>], velocities: &impl Fn(usize) -> &'v [DVec3], h_s: f64) -> (Off, f64) {
         let at = |member: usize| all[member].member.pose(velocities(member), h_s);
-        let (a, b) = self.members;
+        let Jointed { joint, a, b, .. } = self.of;
         let (Some(a), Some(b)) = (at(a), b.map_or(Some(Pose::WORLD), at)) else { return (self.now, 0.0) };
         let turned = [&a, &b].into_iter().zip(self.rotations).map(|(then, now)| then.rotation.angle_between(now));
         let turn_rad = turned.fold(0.0, f64::max);
-        let mut off = self.joint.off(&a, &b);
-        if matches!(self.joint.kind, JointKind::Revolute { .. }) {
+        let mut off = joint.off(&a, &b);
+        if matches!(joint.kind, JointKind::Revolute { .. }) {
             // angles are known but for whole turns
             off.travel += ((self.now.travel - off.travel) / TAU).round() * TAU;
         }

@@ -2,21 +2,18 @@
 //!
 //! In: rows with what they belong to. Out: the same in a list, and the forces that they gave. Never here: contacts, what a row is made of.
 
-mod attachment;
 pub(crate) mod contact_rows;
 pub(crate) mod failure;
 pub(crate) mod geometric_stiffness;
 pub(crate) mod joint;
-pub(crate) mod link;
-mod motor;
 pub(crate) mod spring;
 
 use crate::law::Link;
 use crate::member::memory::Partner;
-use crate::member::participant::{Progress, velocity};
+use crate::member::participant::{Progress, relative};
 use crate::member::{ClusterMember, MaterialPoint, Participant, Pose};
 use crate::solve::{Hold, JointRow, Side};
-pub use failure::{Torn, Yielded};
+pub use failure::FailedAttachment;
 use glam::{DQuat, DVec3};
 pub use joint::JointTotal;
 use metachron_core::{AgentId, Anchor, Grip};
@@ -47,20 +44,32 @@ pub(crate) struct RowOwner {
     pub key: u32,
     /// Who pulls at whom, where it is a force by which somebody holds a body.
     pub hold: Option<Holders>,
-    /// The force above which its tie tears, N: infinite of one that never does, and of rows that hold turns.
+    /// The force above which its tie tears, N, and the most that it gives: infinite of one that never tears or yields, and of rows that hold turns.
     pub tears_above_n: f64,
+    pub yields_above_n: f64,
+    /// The axes in which it keeps its slip.
+    pub frame: Frame,
+    /// Its place among the springs of its member that yield, where it is one of them.
+    pub own: Option<usize>,
     /// Whether it takes back what it has crept: of one that knows its velocity, and no place.
     pub owes: bool,
 }
 
 impl RowOwner {
+    /// Of the first row of a tie that holds nobody, neither tears nor yields and owes nothing.
+    pub fn new(member: usize, other: Option<usize>, partner: Partner) -> Self {
+        let (tears_above_n, yields_above_n) = (f64::INFINITY, f64::INFINITY);
+        let (hold, frame, own, owes) = (None, Frame::WORLD, None, false);
+        Self { member, other, partner, key: 0, hold, tears_above_n, yields_above_n, frame, own, owes }
+    }
+
     /// The way that its row owes after a step that gave `impulse_n_s` (eq. 13).
     pub fn owed_slip_m(&self, row: &JointRow, impulse_n_s: DVec3, progress: &[Progress], h_s: f64) -> DVec3 {
         if !self.owes {
             return DVec3::ZERO;
         }
-        let [a, b] = row.sides.map(|side| velocity(&side, |member| &progress[member].v_solved[..]));
-        row.owed_slip_after(impulse_n_s, a - b, row.hold.most_n_s(impulse_n_s), h_s)
+        let slip_m_s = relative(&row.sides, |member| &progress[member].v_solved);
+        row.owed_slip_after(impulse_n_s, slip_m_s, row.hold.most_n_s(impulse_n_s), h_s)
     }
 
     /// Its participants.
@@ -168,40 +177,9 @@ pub(crate) struct Pull {
     pub rest_m: f64,
 }
 
-/// A name for a spring between others, so that its rows are told apart and remembered.
-#[derive(Debug, Clone, Copy)]
-pub(crate) struct Name {
-    /// The participant that remembers it.
-    pub member: usize,
-    pub partner: Partner,
-    pub hold: Option<Holders>,
-    /// The force above which it tears, N; infinite where it never does.
-    pub tears_above_n: f64,
-    pub yields: YieldLimit,
-}
-
-impl Name {
-    /// What neither tears nor yields.
-    pub fn lasting(member: usize, partner: Partner, hold: Option<Holders>) -> Self {
-        Self { member, partner, hold, tears_above_n: f64::INFINITY, yields: YieldLimit::NONE }
-    }
-
-    pub fn row(self, key: u32, other: Option<usize>) -> RowOwner {
-        let Self { member, partner, hold, tears_above_n, .. } = self;
-        RowOwner { member, other, partner, key, hold, tears_above_n, owes: false }
-    }
-}
-
 impl End {
     pub fn side(&self) -> Side {
         self.member.map_or(Side::FIXED, |member| self.point.side.of_member(member))
-    }
-}
-
-impl Pull {
-    /// By how much its spring slips for each unit of velocity by which it gives way: what its damper bears it need not.
-    pub(crate) fn slips_per_m_s(&self, h_s: f64) -> Option<f64> {
-        (self.stiffness_n_m > 0.0).then(|| h_s + self.damping_n_s_m / self.stiffness_n_m)
     }
 }
 
@@ -215,19 +193,6 @@ pub(crate) enum Slides {
         /// World axes, of length 1.
         axis: DVec3,
     },
-}
-
-/// What an attachment gives at most, and where it keeps its slip.
-#[derive(Debug, Clone, Copy)]
-pub(crate) struct YieldLimit {
-    /// The most force, N; infinite where it never yields.
-    pub above_n: f64,
-    pub frame: Frame,
-}
-
-impl YieldLimit {
-    /// Of what never yields.
-    pub const NONE: Self = Self { above_n: f64::INFINITY, frame: Frame::WORLD };
 }
 
 /// The axes in which a moved point is kept.
@@ -272,10 +237,6 @@ pub(crate) struct SlidingRow {
     pub per_m_s: f64,
     /// What it may be off without having slipped, metres.
     pub free_m: f64,
-    /// The force of its attachment at which it yields, N.
-    pub yields_above_n: f64,
-    /// Its place among the springs of its member that yield, where it is one of them.
-    pub own: Option<usize>,
 }
 
 /// The forces of a fine step at arms.

@@ -18,7 +18,7 @@ use crate::solve::Contact;
 use glam::DVec3;
 use metachron_geometry::narrow_phase::{NarrowPhaseScratch, TouchKey, self_touches, touches};
 use metachron_geometry::{CollisionShape, Place, Touch};
-use pair::{Against, LOOK_M, Pair, Reaching, Skinned, closes, taken_up};
+use pair::{Against, LOOK_M, Pair, Reaching, closes, taken_up};
 pub(crate) use pair::{Judge, Owner, Round};
 use reach::{Boxes, FAR_M, Meeting, Sought, Sweep, Sweeping};
 pub use scene::{
@@ -204,6 +204,7 @@ impl Search {
             push_n: 0.0,
             place: Place::Point(DVec3::NAN),
             restitution: skin.form.restitution_with(form),
+            late_s: pair.other().map_or(0.0, |other| all[other].member.answers_after_s()),
         };
         self.take(round, pair, Found { owner, skins: [skin.form, form], at, clear_m });
     }
@@ -250,7 +251,7 @@ impl Search {
         let swept = after_s > 0.0;
         for touch in touches.iter() {
             let (owner, facing) =
-                (Owner { key: touch.key, place: touch.on_a, ..owner }, pair.facing(round, touch, ways));
+                (Owner { key: touch.key, place: touch.on_a, ..owner }, pair.facing(round, touch, ways, skins));
             if facing.sides.iter().all(|side| side.terms().is_empty()) {
                 continue;
             }
@@ -266,7 +267,7 @@ impl Search {
                     // on its way it meets another place than the one it was kept from
                     Ok(at) if swept && ends_m < -LOOK_M => {
                         let Contact { warm_n_s, load_n_s, overlap_m, owed_slip_m, .. } = contacts[at];
-                        let found = taken_up(round, &owner, &touch, &Skinned { facing: &facing, skins });
+                        let found = taken_up(round, &owner, &touch, &facing);
                         contacts[at] = Contact { warm_n_s, load_n_s, overlap_m, owed_slip_m, ..found };
                         *moved = true;
                         false
@@ -276,7 +277,7 @@ impl Search {
             };
             if taken && thinning.note(round, pair, &owner, &touch) {
                 owners.push(owner);
-                contacts.push(taken_up(round, &owner, &touch, &Skinned { facing: &facing, skins }));
+                contacts.push(taken_up(round, &owner, &touch, &facing));
             } else if !taken {
                 clear_m = clear_m.min(gap_m);
             }

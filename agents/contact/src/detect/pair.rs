@@ -36,6 +36,8 @@ pub(crate) struct Owner {
     pub place: Place,
     /// Newton's coefficient of restitution of its pair, 0 to 1.
     pub restitution: f64,
+    /// How long side 1 takes to answer, seconds: longer than a step where its body is stepped elsewhere.
+    pub late_s: f64,
 }
 
 impl Owner {
@@ -124,7 +126,8 @@ impl Pair<'_> {
 }
 
 /// The two sides of a touch.
-pub(crate) struct Facing {
+pub(crate) struct Facing<'a> {
+    pub skins: [&'a CollisionShape; 2],
     pub sides: [Side; 2],
     /// How far the skins lie inside the shapes that touch, metres.
     pub recess_m: f64,
@@ -134,7 +137,13 @@ pub(crate) struct Facing {
 
 impl Pair<'_> {
     /// The sides of a touch between bodies that have gone as far as `ways`.
-    pub(crate) fn facing(&self, round: &Round<'_, '_>, touch: &Touch, ways: [DVec3; 2]) -> Facing {
+    pub(crate) fn facing<'a>(
+        &self,
+        round: &Round<'_, '_>,
+        touch: &Touch,
+        ways: [DVec3; 2],
+        skins: [&'a CollisionShape; 2],
+    ) -> Facing<'a> {
         let all = round.all;
         let back = |place: &Place, way: DVec3| match *place {
             Place::Point(point) => Place::Point(point - way),
@@ -148,6 +157,7 @@ impl Pair<'_> {
         let other = self.other();
         let recess_m = |member: usize, place: &Place, contact: ContactSide| all[member].member.recess_m(place, contact);
         Facing {
+            skins,
             recess_m: recess_m(self.member, &on_a, first) + other.map_or(0.0, |other| recess_m(other, &on_b, second)),
             sides: [side(self.member, &on_a, first), other.map_or(Side::FIXED, |other| side(other, &on_b, second))],
             led_m_s: [
@@ -158,7 +168,7 @@ impl Pair<'_> {
     }
 }
 
-impl Facing {
+impl Facing<'_> {
     /// How fast a gap opens with the velocities `of` each member, m/s.
     pub(crate) fn opening_m_s<'a>(&self, normal: DVec3, of: impl Fn(usize) -> &'a [DVec3]) -> f64 {
         let [a, b] = [0, 1].map(|at| {
@@ -171,7 +181,7 @@ impl Facing {
 
 /// Whether a gap may close within the step, by the motion of both or of either alone, as it is or as it would be without contact: what
 /// lies on something that the ground stops would else not be seen.
-pub(crate) fn closes(touch: &Touch, facing: &Facing, progress: &[Progress], h_s: f64) -> bool {
+pub(crate) fn closes(touch: &Touch, facing: &Facing<'_>, progress: &[Progress], h_s: f64) -> bool {
     let led = facing.led_m_s.map(|led| led.dot(touch.normal));
     [(|p: &Progress| &p.v_before[..]) as fn(&Progress) -> &[DVec3], |p: &Progress| &p.v_predicted[..]].into_iter().any(
         |of| {
@@ -183,18 +193,24 @@ pub(crate) fn closes(touch: &Touch, facing: &Facing, progress: &[Progress], h_s:
     )
 }
 
-/// The two sides of a touch, with their skins.
-pub(crate) struct Skinned<'a> {
-    pub facing: &'a Facing,
-    pub skins: [&'a CollisionShape; 2],
-}
-
 /// A contact of the problem; from what is stepped elsewhere it comes out in that one's steps.
-pub(crate) fn taken_up(round: &Round<'_, '_>, owner: &Owner, touch: &Touch, sides: &Skinned<'_>) -> Contact {
-    let late_s = owner.other.map_or(0.0, |other| round.all[other].member.answers_after_s());
-    let found = contact(touch, sides.facing, sides.skins);
-    let let_go_m_s = slower_push_out(touch, round.scene.depth_m(), round.h_s, late_s);
-    Contact { surface_m_s: found.surface_m_s + let_go_m_s, ..found }
+pub(crate) fn taken_up(round: &Round<'_, '_>, owner: &Owner, touch: &Touch, facing: &Facing<'_>) -> Contact {
+    let Facing { skins: [mine, theirs], sides, led_m_s, .. } = *facing;
+    let let_go_m_s = slower_push_out(touch, round.scene.depth_m(), round.h_s, owner.late_s);
+    let tangent = touch.normal.any_orthonormal_vector();
+    Contact {
+        sides,
+        normal: touch.normal,
+        tangents: [tangent, touch.normal.cross(tangent)],
+        gap_m: touch.gap_m,
+        friction: mine.friction_with(theirs),
+        parting_m_s: 0.0,
+        surface_m_s: led_m_s[1] - led_m_s[0] + let_go_m_s,
+        owed_slip_m: DVec3::ZERO,
+        warm_n_s: DVec3::ZERO,
+        load_n_s: 0.0,
+        overlap_m: 0.0,
+    }
 }
 
 /// The velocity that a contact's sides are let go on with where one of them takes `late_s` seconds to answer: what is deeper than contacts
@@ -205,23 +221,4 @@ fn slower_push_out(touch: &Touch, rests_m: f64, h_s: f64, late_s: f64) -> DVec3 
     }
     let slow = push_out_m_s(-rests_m, h_s) + push_out_m_s(touch.gap_m + rests_m, late_s);
     touch.normal * (push_out_m_s(touch.gap_m, h_s) - slow).min(0.0)
-}
-
-fn contact(touch: &Touch, facing: &Facing, skins: [&CollisionShape; 2]) -> Contact {
-    let Facing { sides, led_m_s, .. } = *facing;
-    let surface_m_s = led_m_s[1] - led_m_s[0];
-    let tangent = touch.normal.any_orthonormal_vector();
-    Contact {
-        sides,
-        normal: touch.normal,
-        tangents: [tangent, touch.normal.cross(tangent)],
-        gap_m: touch.gap_m,
-        friction: skins[0].friction_with(skins[1]),
-        parting_m_s: 0.0,
-        surface_m_s,
-        owed_slip_m: DVec3::ZERO,
-        warm_n_s: DVec3::ZERO,
-        load_n_s: 0.0,
-        overlap_m: 0.0,
-    }
 }

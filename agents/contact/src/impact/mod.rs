@@ -9,7 +9,7 @@ use crate::constraint::{ConstraintRows, contact_rows, is_rigid};
 use crate::detect::{Owner, Search};
 use crate::lists::{refill, reset};
 use crate::member::memory::Partner;
-use crate::member::participant::{Progress, velocity};
+use crate::member::participant::{Progress, relative, velocity};
 use crate::member::problem::{Posed, ProblemMembers, Velocities};
 use crate::member::{ClusterMember, Participant, Role};
 use crate::push_out::PUSH_OUT_SHARE;
@@ -29,7 +29,7 @@ const MISS_YIELDS: f64 = 0.1;
 pub(crate) struct Impacts {
     solver: Solver,
     /// The most steps of a solve.
-    factors_max: Option<u32>,
+    pub factors_max: Option<u32>,
     /// The macro step and the fine step, seconds, and how deep contacts rest, metres.
     macro_s: f64,
     step_s: f64,
@@ -84,11 +84,6 @@ pub(crate) struct SolvedStep<'a, 'p> {
 }
 
 impl Impacts {
-    /// Ends each solve after so many steps from now on.
-    pub fn set_factors_max(&mut self, most: Option<u32>) {
-        self.factors_max = most;
-    }
-
     /// Lets contacts that close fast rebound, after the solve of a fine step by which they close no more; `None` where none does.
     pub fn rebound(&mut self, step: SolvedStep<'_, '_>) -> Result<Option<Report>, StepError> {
         let SolvedStep { all, search, constraints, solution, members, progress, threads, depth_m, may_fly } = step;
@@ -383,9 +378,4 @@ impl Impacts {
 fn movers(sides: &[Side; 2]) -> impl Iterator<Item = usize> + use<> {
     let of = |side: &Side| (!side.terms().is_empty()).then_some(side.member);
     of(&sides[0]).into_iter().chain(of(&sides[1]))
-}
-
-/// The velocity of side 0 against side 1 with the velocities `of` members, m/s.
-fn relative<'a>(sides: &[Side; 2], of: impl Fn(usize) -> &'a [DVec3]) -> DVec3 {
-    velocity(&sides[0], &of) - velocity(&sides[1], &of)
 }

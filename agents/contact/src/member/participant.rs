@@ -245,6 +245,11 @@ impl Progress {
     }
 }
 
+/// The velocity of side 0 against side 1 with the velocities `of` members, m/s.
+pub(crate) fn relative<'a>(sides: &[Side; 2], of: impl Fn(usize) -> &'a [DVec3]) -> DVec3 {
+    velocity(&sides[0], &of) - velocity(&sides[1], &of)
+}
+
 /// The velocity of a side with the velocities `of` its member, m/s; zero for one that does not move.
 pub(crate) fn velocity<'a>(side: &Side, of: impl Fn(usize) -> &'a [DVec3]) -> DVec3 {
     if side.terms().is_empty() { DVec3::ZERO } else { side.velocity(of(side.member)) }

@@ -58,7 +58,7 @@ impl Posed<'_, '_> {
         }));
         move_sides(contacts, rows, |member| progress[member].place);
         let has_factor = |member: &Member<'_>| member.response.is_some() || member.free.len() <= FACTORED_BLOCKS_MAX;
-        solver.set_form(if list.iter().all(has_factor) { StepForm::Direct } else { StepForm::Iterative });
+        solver.settings.form = if list.iter().all(has_factor) { StepForm::Direct } else { StepForm::Iterative };
         let problem = Problem { h_s, members: &list, contacts, rows, threads };
         let outcome = solver.solve(&problem).map(|solution| solution.report);
         (*members, *lent) = (recycled(list), recycled(lenders));

@@ -77,12 +77,11 @@ impl Lines {
         let context = one.context;
         for other in context.neighbours {
             if let (Law::Tlm { stiffness_n_m, damping_n_s_m }, Some(_)) = (other.law, &other.form) {
-                let end = ContactEnd { place, one, other, stiffness_n_m, damping_n_s_m, dt_s };
-                self.contact(&end, stepper);
+                self.contact(&LineEnd { place, one, other, stiffness_n_m, damping_n_s_m, dt_s }, stepper);
             }
-            let tied = |link: &&Link| link.other == other.id && matches!(link.law, Law::Tlm { .. });
-            if let Some(link) = context.links.iter().find(tied) {
-                self.link(&LinkEnd { place, one, other, link, dt_s }, stepper);
+            let line = context.links.iter().find(|link| link.other == other.id && matches!(link.law, Law::Tlm { .. }));
+            if let Some((link, Law::Tlm { stiffness_n_m, damping_n_s_m })) = line.map(|link| (link, link.law)) {
+                self.link(&LineEnd { place, one, other, stiffness_n_m, damping_n_s_m, dt_s }, link, stepper);
             }
         }
     }
@@ -93,9 +92,8 @@ impl Lines {
     }
 
     /// A link: a line from point to point.
-    fn link(&mut self, end: &LinkEnd<'_, '_>, stepper: &mut ClusterStepper) {
-        let LinkEnd { place, one, other, link, dt_s } = *end;
-        let Law::Tlm { stiffness_n_m, damping_n_s_m } = link.law else { return };
+    fn link(&mut self, end: &LineEnd<'_, '_>, link: &Link, stepper: &mut ClusterStepper) {
+        let LineEnd { place, one, other, stiffness_n_m, damping_n_s_m, dt_s } = *end;
         let at = one.context.time;
         let Some((far_m, far_m_s)) = other.snapshot.body.point(link.there) else { return };
         let Some(here) = one.member.anchor(link.here) else { return };
@@ -106,20 +104,13 @@ impl Lines {
         }
         let arriving = line.listen(one, other, dt_s);
         let law = line.line.law(&LineStep { at, dt_s, far_m_s, way, arriving, rest_m: link.rest_m, damping_n_s_m });
-        let hold = law.along.map_or(Hold::ALL, Hold::along);
-        let row = LineRow {
-            member: place,
-            side: here.side,
-            hold,
-            resistance_n_s_m: law.resistance_n_s_m,
-            target_m_s: law.drive_n / law.resistance_n_s_m - here.led_m_s,
-        };
+        let row = law.row(place, here.side, here.led_m_s, law.along.map_or(Hold::ALL, Hold::along));
         line.add(stepper, row, LineNow { number: 0, law, contacts: 1, depth_m: 0.0 });
     }
 
     /// Contact: one line along the mean normal that only pushes, with friction by the push of the last step.
-    fn contact(&mut self, end: &ContactEnd<'_, '_>, stepper: &mut ClusterStepper) {
-        let ContactEnd { place, one, other, stiffness_n_m, damping_n_s_m, dt_s } = *end;
+    fn contact(&mut self, end: &LineEnd<'_, '_>, stepper: &mut ClusterStepper) {
+        let LineEnd { place, one, other, stiffness_n_m, damping_n_s_m, dt_s } = *end;
         let pressed = self.pressed(one, other);
         let line = self.line(other.id, stiffness_n_m);
         let arriving = line.listen(one, other, dt_s);
@@ -141,13 +132,7 @@ impl Lines {
         let friction = forms.map_or(0.0, |(mine, theirs)| mine.friction_with(theirs));
         let rub = slip * (-friction * line.pushed_n / slip.length().max(STICK_M_S));
         stepper.external().known.push(KnownImpulse { member: place, side, impulse: rub * dt_s });
-        let row = LineRow {
-            member: place,
-            side,
-            hold: Hold::pushing(normal),
-            resistance_n_s_m: law.resistance_n_s_m,
-            target_m_s: law.drive_n / law.resistance_n_s_m - led_m_s,
-        };
+        let row = law.row(place, side, led_m_s, Hold::pushing(normal));
         line.add(stepper, row, LineNow { number: 0, law, contacts: places, depth_m });
     }
 
@@ -216,25 +201,23 @@ impl Lines {
     }
 }
 
-/// The end of a link at a participant.
+/// The end of a line at a participant, in a macro step.
 #[derive(Clone, Copy)]
-struct LinkEnd<'a, 'b> {
-    place: usize,
-    one: &'a Participant<'b>,
-    other: &'a Neighbour,
-    link: &'a Link,
-    dt_s: f64,
-}
-
-/// The end of a contact at a participant.
-#[derive(Clone, Copy)]
-struct ContactEnd<'a, 'b> {
+struct LineEnd<'a, 'b> {
     place: usize,
     one: &'a Participant<'b>,
     other: &'a Neighbour,
     stiffness_n_m: f64,
     damping_n_s_m: f64,
     dt_s: f64,
+}
+
+impl LineLaw {
+    /// Its row at a point of a member that is led at `led_m_s` beside its blocks.
+    fn row(&self, member: usize, side: Side, led_m_s: DVec3, hold: Hold) -> LineRow {
+        let resistance_n_s_m = self.resistance_n_s_m;
+        LineRow { member, side, hold, resistance_n_s_m, target_m_s: self.drive_n / resistance_n_s_m - led_m_s }
+    }
 }
 
 impl LineAt {

@@ -73,7 +73,7 @@ pub use error::ProblemError;
 pub use joint::{Hold, JointRow, Pressed, Spring};
 pub use problem::{Block, Contact, Member, Problem, Response, multiply};
 pub use side::{SIDE_TERMS_MAX, Side, SideTerm};
-pub use solver::{DEPTH_DEFAULT_M, Level, Report, Settings, Solution, Solver};
+pub use solver::{DEPTH_DEFAULT_M, Report, Settings, Solution, Solver};
 pub use sparse_factor::SparseFactor;
 pub use system::StepForm;
 

@@ -14,7 +14,7 @@ use super::system::StepForm;
 use super::validate::validate;
 use crate::push_out::PUSH_OUT_SHARE;
 use glam::DVec3;
-use metachron_core::{Archive, ArchiveError};
+use metachron_core::{Archive, ArchiveError, SolveLevel};
 use std::ops::Range;
 
 /// What a solve aims at.
@@ -54,26 +54,11 @@ impl Default for Settings {
     }
 }
 
-/// How far a solve went, the dearest last. All laws hold to the tolerance but at [`Level::Interior`].
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Default)]
-pub enum Level {
-    /// The impulses of the last step still hold.
-    #[default]
-    Kept,
-    /// Newton's method found the rest from them.
-    Near,
-    /// Interior points led to where all laws hold.
-    Polished,
-    /// Interior points, ended before all laws held, by the budget or after as many steps as any solve makes: inside all bounds, with momentum and
-    /// passivity as everywhere; the miss says how far off.
-    Interior,
-}
-
 /// What a solve took, and how good its answer is.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Report {
     /// How far it went.
-    pub level: Level,
+    pub level: SolveLevel,
     /// Factors of the coupled matrix; none in the iterative form.
     pub factors: usize,
     /// Products of conjugate gradients with a matrix of the members' size, all for scales, steps and responses; none in the direct form.
@@ -129,7 +114,7 @@ impl Solution {
 /// Solves problems one after the other, and keeps structure and storage between them.
 #[derive(Debug, Clone, Default)]
 pub struct Solver {
-    settings: Settings,
+    pub(crate) settings: Settings,
     pub(super) iterate: Iterate,
     warm: Vec<DVec3>,
     compliances: Vec<f64>,
@@ -143,21 +128,6 @@ impl Solver {
     /// Writes or reads what the next solve needs of those before: orders of elimination. Impulses are remembered by who gave them.
     pub(crate) fn archive(&mut self, archive: &mut Archive<'_>) -> Result<(), ArchiveError> {
         self.iterate.system.archive(archive)
-    }
-
-    /// Solves the equations of steps by this form from now on.
-    pub fn set_form(&mut self, form: StepForm) {
-        self.settings.form = form;
-    }
-
-    /// Ends each solve after so many steps from now on.
-    pub fn set_factors_max(&mut self, most: Option<u32>) {
-        self.settings.factors_max = most;
-    }
-
-    /// Lets contacts rest `depth_m` metres deep from now on, > 0.
-    pub fn set_depth_m(&mut self, depth_m: f64) {
-        self.settings.depth_m = depth_m;
     }
 
     /// A solver with its settings.
@@ -266,7 +236,7 @@ impl Solver {
     }
 
     /// One loop, each level of which is the start of the next.
-    fn improve(&mut self, aim: &Aim<'_>) -> Level {
+    fn improve(&mut self, aim: &Aim<'_>) -> SolveLevel {
         let Self { iterate, interior, kept, settings, .. } = self;
         let last = iterate.steps + settings.factors_max.map_or(STEPS_MAX, |most| most as usize);
         let mut patience = PATIENCE;
@@ -283,8 +253,8 @@ impl Solver {
                 // what Newton's method has not finished is of no use: half of a budget is kept for what is
                 patience.steps = (last - before) / if entered { 1 } else { 2 };
                 if newton::solve(iterate, aim, patience) {
-                    let near = if iterate.steps == before { Level::Kept } else { Level::Near };
-                    return if entered { Level::Polished } else { near };
+                    let near = if iterate.steps == before { SolveLevel::Kept } else { SolveLevel::Near };
+                    return if entered { SolveLevel::Polished } else { near };
                 }
                 iterate.go_back(kept);
                 try_below_m_s = POLISH_AGAIN * miss_m_s;
@@ -295,7 +265,7 @@ impl Solver {
             }
             if iterate.steps >= last || !interior.step(iterate, aim) {
                 interior.finish(iterate);
-                return Level::Interior;
+                return SolveLevel::Interior;
             }
         }
     }

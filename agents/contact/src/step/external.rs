@@ -176,9 +176,7 @@ impl ConstraintRows {
                 compliance_per_kg: Some((step.h_s * line.resistance_n_s_m).recip()),
                 ..JointRow::new(sides, line.hold)
             };
-            let (member, partner, tears_above_n) = (line.member, Partner::Line(number), f64::INFINITY);
-            let owner = RowOwner { member, other: None, partner, key: 0, hold: None, tears_above_n, owes: false };
-            self.push(step, row, owner);
+            self.push(step, row, RowOwner::new(line.member, None, Partner::Line(number)));
         }
     }
 }

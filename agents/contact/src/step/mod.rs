@@ -25,9 +25,9 @@ mod rigid_pile;
 mod solve;
 
 use crate::constraint::contact_rows::ContactRows;
-use crate::constraint::failure::{Tearing, Torn, Yielded, Yielding};
+use crate::constraint::failure::Failures;
 use crate::constraint::joint::Joints;
-use crate::constraint::{ConstraintRows, JointTotal};
+use crate::constraint::{ConstraintRows, FailedAttachment, JointTotal};
 use crate::detect::{ClusterScene, Search};
 use crate::impact::Impacts;
 use crate::member::participant::Progress;
@@ -64,8 +64,7 @@ pub struct ClusterStepper {
     pub(crate) progress: Vec<Progress>,
     members: ProblemMembers,
     sums: Sums,
-    tearing: Tearing,
-    yielding: Yielding,
+    failures: Failures,
     /// What participants remembered when the macro step began.
     kept: Vec<ContactMemory>,
     /// Whether that is of this macro step, and members have kept their states.
@@ -93,8 +92,8 @@ impl ClusterStepper {
     /// The most steps of each solve from now on, each a factor or what serves gradients for one; `None` for as many as the laws take. Momentum is
     /// exact and no answer makes energy at any number.
     pub fn set_factors_max(&mut self, most: Option<u32>) {
-        self.solver.set_factors_max(most);
-        self.impacts.set_factors_max(most);
+        self.solver.settings.factors_max = most;
+        self.impacts.factors_max = most;
     }
 
     /// The macro step that was made last, seconds.
@@ -144,7 +143,7 @@ impl ClusterStepper {
         let mut report = ClusterReport::default();
         self.macro_s = dt.as_secs_f64();
         self.depth_m = scene.depth_m();
-        self.solver.set_depth_m(self.depth_m);
+        self.solver.settings.depth_m = self.depth_m;
         self.joints.missed_m = f64::INFINITY;
         all.iter_mut().for_each(Participant::let_go);
         self.plan(all, self.macro_s, threads)?;
@@ -160,7 +159,7 @@ impl ClusterStepper {
                 }
             }
         }
-        self.tearing.end(all, self.macro_s);
+        self.failures.end(all, self.macro_s);
         report.work = self.progress.iter().map(|state| state.work).sum();
         Ok(report)
     }
@@ -183,8 +182,7 @@ impl ClusterStepper {
             one.grips.clear();
         }
         self.sums.begin(all.len());
-        self.tearing.begin();
-        self.yielding.begin();
+        self.failures.begin();
         self.external.begin();
         report.fine_steps = parts;
         (report.depth_m, report.pile_contacts) = (0.0, 0);
@@ -236,13 +234,13 @@ impl ClusterStepper {
     }
 
     /// What tore in the last macro step, by participants: no later step knows it.
-    pub fn torn(&self) -> &[Torn] {
-        self.tearing.torn()
+    pub fn torn(&self) -> &[FailedAttachment] {
+        &self.failures.torn
     }
 
     /// What began to yield in the last macro step: no later step reports it again.
-    pub fn yielded(&self) -> &[Yielded] {
-        self.yielding.begun()
+    pub fn yielded(&self) -> &[FailedAttachment] {
+        &self.failures.yielded
     }
 
     /// Whether every attachment held in the last macro step as it had held before.

@@ -108,10 +108,10 @@ impl ClusterStepper {
             }
         });
         self.first_failure()?;
-        let Self { progress, tearing, .. } = self;
+        let Self { progress, failures, .. } = self;
         for (place, (one, state)) in all.iter().zip(progress).enumerate() {
             if state.part == 0 {
-                tearing.note_own(place, &one.member, h_s * f64::from(state.share));
+                failures.note_own(place, &one.member, h_s * f64::from(state.share));
             }
         }
         Ok(())

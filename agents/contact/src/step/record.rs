@@ -7,7 +7,7 @@
 use crate::constraint::place_key;
 use crate::lists::refill;
 use crate::member::memory::{Partner, Remembered, Spin};
-use crate::member::participant::{place_of, velocity};
+use crate::member::participant::{place_of, relative};
 use crate::member::{ClusterMember, Drive, Participant, Role};
 use crate::solve::Side;
 use crate::step::ClusterStepper;
@@ -26,8 +26,7 @@ impl ClusterStepper {
             (contact.warm_n_s, contact.owed_slip_m) = (place.force_n * h_s, place.owed_slip_m);
             contact.load_n_s = place.load_n * h_s;
             // a body that is stepped elsewhere is found deep because it comes on in steps of its own, and is let go by these
-            let comes_on = owner.other.is_some_and(|other| all[other].member.answers_after_s() > h_s);
-            let lies = contact.gap_m < -OVERLAP_SHARE * self.depth_m && !comes_on;
+            let lies = contact.gap_m < -OVERLAP_SHARE * self.depth_m && owner.late_s <= h_s;
             contact.overlap_m = if lies { place.overlap_m.min(-contact.gap_m) } else { 0.0 };
             owner.push_n = place.push_n;
             owner.spin = Spin { radius_m: owner.spin.radius_m, ..place.spin };
@@ -99,14 +98,14 @@ impl ClusterStepper {
 
     /// Notes what rows of constraints hand to the next step, and what they gave.
     fn record_constraints(&mut self, all: &mut [Participant<'_>], h_s: f64) {
-        let Self { solver, constraints, joints, external, tearing, yielding, sums, impacts, .. } = self;
+        let Self { solver, constraints, joints, external, failures, sums, impacts, .. } = self;
         let solution = solver.solution();
         for (k, (owner, row)) in constraints.owners.iter().zip(&constraints.rows).enumerate() {
             let impulse = solution.rows_n_s[k];
             let given = impulse + impacts.rows_n_s.get(k).copied().unwrap_or_default();
             external.note(all, owner.member, &row.sides[1], -given);
             external.note_line(owner, given);
-            tearing.note(owner, given);
+            failures.note(owner, given);
             if let Partner::Link(_) = owner.partner {
                 total_of(&mut sums.totals, owner.member, owner.partner).add(given, 0.0);
             }
@@ -115,7 +114,7 @@ impl ClusterStepper {
             all[owner.member].memory.pair(owner.partner).next.push(place);
         }
         joints.note_efforts(constraints, &solution.rows_n_s, &mut sums.efforts);
-        yielding.slip(all, constraints, &solution.rows_n_s, &self.progress);
+        failures.slip(all, constraints, &solution.rows_n_s, &self.progress);
     }
 
     /// Notes what the spins of contacts were given.
@@ -127,8 +126,8 @@ impl ClusterStepper {
             let owner = &mut search.owners[contact];
             let (normal, pressed) = (search.contacts[contact].normal, row.pressed.map_or(0.0, |by| by.reach_m));
             let most = pressed * solution.contacts_n_s[contact].dot(normal);
-            let [a, b] = row.sides.map(|side| velocity(&side, |member| &progress[member].v_solved[..]));
-            owner.spin.owed_rad = row.owed_slip_after(impulse, a - b, most, h_s).dot(normal);
+            let slip = relative(&row.sides, |member| &progress[member].v_solved);
+            owner.spin.owed_rad = row.owed_slip_after(impulse, slip, most, h_s).dot(normal);
             owner.spin.torque_n_m = impulse.dot(normal) / h_s;
             external.note(all, owner.member, &row.sides[1], -impulse);
         }

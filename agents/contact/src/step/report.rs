@@ -5,9 +5,9 @@
 use crate::constraint::JointTotal;
 use crate::lists::entry;
 use crate::member::memory::Partner;
-use crate::solve::{Level, Report};
+use crate::solve::Report;
 use glam::DVec3;
-use metachron_core::Wrench;
+use metachron_core::{SolveLevel, Wrench};
 
 /// What a macro step was.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
@@ -27,7 +27,7 @@ pub struct ClusterReport {
     /// Those of them that ended within interior points, before all laws held.
     pub unfinished: u32,
     /// The dearest level of a solve.
-    pub level: Level,
+    pub level: SolveLevel,
     /// What laws and momentum miss at most by the answer of any solve, m/s (clusters.md, eq. 9).
     pub miss_m_s: f64,
     /// The deepest overlap seen, metres.
@@ -94,7 +94,7 @@ impl ClusterReport {
         self.factors += took.factors as u32;
         self.products += took.products as u32;
         self.solves += 1;
-        self.unfinished += u32::from(took.level == Level::Interior);
+        self.unfinished += u32::from(took.level == SolveLevel::Interior);
         self.level = self.level.max(took.level);
         self.miss_m_s = self.miss_m_s.max(took.miss_m_s);
     }

@@ -1,7 +1,7 @@
 //! A table on which bodies are put and stepped as one cluster, and what is measured of them.
 
 use glam::{DQuat, DVec3};
-use metachron_contact::constraint::{Torn, Yielded};
+use metachron_contact::constraint::FailedAttachment;
 use metachron_contact::detect::ClusterScene;
 use metachron_contact::joint::Joint;
 use metachron_contact::member::{ContactMemory, Participant, Partner};
@@ -139,12 +139,12 @@ impl Table {
     }
 
     /// What tore in the last macro step.
-    pub fn torn(&self) -> &[Torn] {
+    pub fn torn(&self) -> &[FailedAttachment] {
         self.stepper.torn()
     }
 
     /// What began to yield in the last macro step.
-    pub fn yielded(&self) -> &[Yielded] {
+    pub fn yielded(&self) -> &[FailedAttachment] {
         self.stepper.yielded()
     }
 

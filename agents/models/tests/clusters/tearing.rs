@@ -4,7 +4,7 @@ use crate::bodies::tube;
 use crate::hung::{self, ALL, CENTRE, G, Held, Limits, WEIGHT_N, ball, balls};
 use crate::table::{GRAVITY, Table, spring};
 use glam::DVec3;
-use metachron_contact::constraint::Torn;
+use metachron_contact::constraint::FailedAttachment;
 use metachron_contact::joint::{Joint, JointKind};
 use metachron_contact::member::Partner;
 use metachron_contact::step::StepDoubling;
@@ -121,7 +121,7 @@ fn the_same_run_tears_in_the_same_step_with_the_same_bits_repeated_in_halves_or_
     let play = |doubling: bool| {
         let mut table = parting();
         table.doubling = doubling.then(StepDoubling::default);
-        let mut seen: Vec<(usize, Torn)> = vec![];
+        let mut seen: Vec<(usize, FailedAttachment)> = vec![];
         for step in 0..60 {
             table.step();
             seen.extend(table.torn().iter().map(|torn| (step, *torn)));

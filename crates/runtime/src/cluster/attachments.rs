@@ -5,7 +5,7 @@
 
 use super::super::events::{AgentEvent, EventKind};
 use super::AgentRunner;
-use metachron_contact::constraint::{Torn, Yielded};
+use metachron_contact::constraint::FailedAttachment;
 use metachron_contact::member::{ContactMemory, Partner};
 use metachron_contact::step::ClusterStepper;
 use metachron_contact::{Law, Link};
@@ -34,30 +34,6 @@ pub(super) fn held_by_links<'a>(links: &'a [Link], memory: &'a ContactMemory) ->
     links.iter().filter(holding).map(|link| link.other)
 }
 
-/// Something that happened to an attachment in a step, of a participant by its place.
-#[derive(Debug, Clone, Copy)]
-struct Happened {
-    member: usize,
-    other: Option<usize>,
-    partner: Partner,
-    kind: AttachmentEventKind,
-    force_n: f64,
-}
-
-impl From<&Torn> for Happened {
-    fn from(torn: &Torn) -> Self {
-        let Torn { member, other, partner, force_n } = *torn;
-        Self { member, other, partner, kind: AttachmentEventKind::Tore, force_n }
-    }
-}
-
-impl From<&Yielded> for Happened {
-    fn from(yielded: &Yielded) -> Self {
-        let Yielded { member, other, partner, force_n } = *yielded;
-        Self { member, other, partner, kind: AttachmentEventKind::Yielded, force_n }
-    }
-}
-
 impl AgentRunner {
     /// Hands what yielded and tore in the last step, of `dt`, to the members that tell of it.
     pub(super) fn note_events(&mut self, stepper: &ClusterStepper, dt: SimSpan) {
@@ -69,8 +45,10 @@ impl AgentRunner {
         let mut places = 0..;
         self.each_member(|actor| {
             let (Some(place), Some(seat)) = (places.next(), &mut actor.cluster) else { return };
-            let all = stepper.yielded().iter().map(Happened::from).chain(stepper.torn().iter().map(Happened::from));
-            for Happened { other, partner, kind, force_n, .. } in all.filter(|one| one.member == place) {
+            let yielded = stepper.yielded().iter().map(|one| (one, AttachmentEventKind::Yielded));
+            let all = yielded.chain(stepper.torn().iter().map(|one| (one, AttachmentEventKind::Tore)));
+            for (failed, kind) in all.filter(|(one, _)| one.member == place) {
+                let FailedAttachment { other, partner, force_n, .. } = *failed;
                 let attachment = match partner {
                     Partner::Link(number) => AttachmentId::Coupling(number),
                     Partner::Joint(number) => AttachmentId::Joint(number),

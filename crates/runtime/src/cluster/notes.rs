@@ -6,10 +6,9 @@ use super::attachments::held_by_links;
 use super::solve_budget::Solved;
 use super::{AgentRunner, ClusterSeat};
 use metachron_contact::member::Partner;
-use metachron_contact::solve::Level;
 use metachron_contact::step::{ClusterReport, ClusterStepper, PairTotal, StepDoubling};
 use metachron_core::step_doubling::drift_m;
-use metachron_core::{AgentId, ClusterState, JointEffort, PairKind, PairState, SimSpan, SimTime, SolveLevel};
+use metachron_core::{AgentId, ClusterState, JointEffort, PairKind, PairState, SimSpan, SimTime};
 
 impl ClusterSeat {
     /// Notes what it and `with` gave each other in a step of `dt_s` seconds: by contact, or by one of the links between them.
@@ -30,16 +29,6 @@ impl ClusterSeat {
     }
 }
 
-/// The level of a solve as it is published.
-const fn level_of(level: Level) -> SolveLevel {
-    match level {
-        Level::Kept => SolveLevel::Kept,
-        Level::Near => SolveLevel::Near,
-        Level::Polished => SolveLevel::Polished,
-        Level::Interior => SolveLevel::Interior,
-    }
-}
-
 impl AgentRunner {
     /// Notes how the step was made and solved.
     pub(super) fn note_solves(&mut self, report: &ClusterReport, dt: SimSpan) {
@@ -53,7 +42,7 @@ impl AgentRunner {
         solves.factors += u64::from(factors);
         solves.products += u64::from(products);
         solves.unfinished += u64::from(unfinished);
-        (solves.level, solves.last_factors, solves.miss_m_s) = (level_of(level), factors, miss_m_s);
+        (solves.level, solves.last_factors, solves.miss_m_s) = (level, factors, miss_m_s);
         (solves.depth_m, solves.deepest_m) = (depth_m, solves.deepest_m.max(depth_m));
         let mut solves = Some(*solves);
         self.each_member(|actor| {

@@ -3,8 +3,9 @@
 use super::random::{COUNT, distance, miss, random_case, solved, velocities};
 use super::{Case, Seeded, contact, is_open, rigid};
 use crate::solve::lorentz::{Lorentz, Scaling};
-use crate::solve::{Hold, JointRow, Level, Settings, Side, Solution};
+use crate::solve::{Hold, JointRow, Settings, Side, Solution};
 use glam::DVec3;
+use metachron_core::SolveLevel;
 
 const H_S: f64 = 0.01;
 const G: f64 = 9.81;
@@ -71,7 +72,7 @@ fn a_solve_that_ends_early_is_safe_and_more_factors_come_nearer() {
             assert!(report.factors <= most as usize && report.work_j < 1e-11, "{seed}: {report:?}");
             // that all impulses lie in their cones
             miss(&case, &solution);
-            finished[k] += usize::from(report.level != Level::Interior);
+            finished[k] += usize::from(report.level != SolveLevel::Interior);
             off[k] += distance(&exact, &velocities(&case, &solution)).max(1e-6).ln();
         }
     }

@@ -14,9 +14,9 @@ mod scenes;
 mod sliding;
 mod slow;
 
-use super::{Block, Contact, JointRow, Level, Member, Problem, Report, Side, SideTerm};
+use super::{Block, Contact, JointRow, Member, Problem, Report, Side, SideTerm};
 use glam::{DMat3, DVec3};
-use metachron_core::PlainLoop;
+use metachron_core::{PlainLoop, SolveLevel};
 
 /// Numbers of a fixed seed: xorshift.
 pub struct Seeded(u64);
@@ -145,7 +145,7 @@ impl Lattice {
 
 /// Whether a solve ended before all laws held.
 pub fn is_open(report: &Report) -> bool {
-    report.level == Level::Interior || report.miss_m_s > 1e-5
+    report.level == SolveLevel::Interior || report.miss_m_s > 1e-5
 }
 
 /// A contact of two sides along a normal, with tangents of its own.

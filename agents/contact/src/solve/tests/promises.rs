@@ -1,9 +1,9 @@
 //! What the solver promises besides its answers: errors that name what is wrong, the same bits, no panic.
 
 use super::{Case, contact, is_open, rigid};
-use crate::solve::{Block, Hold, JointRow, Level, ProblemError, SIDE_TERMS_MAX, Side, SideTerm, Solver};
+use crate::solve::{Block, Hold, JointRow, ProblemError, SIDE_TERMS_MAX, Side, SideTerm, Solver};
 use glam::{DMat3, DVec3};
-use metachron_core::PlainLoop;
+use metachron_core::{PlainLoop, SolveLevel};
 
 /// A box that falls on the floor on three points.
 fn case() -> Case {
@@ -81,7 +81,7 @@ fn bodies_without_contacts_keep_their_velocities() {
     let case = Case { contacts: Vec::new(), ..case() };
     let solution = case.with(|problem| Solver::default().solve(problem).unwrap().clone());
     assert_eq!(solution.velocities(0), case.bodies[0].free);
-    assert_eq!(solution.report.level, Level::Kept);
+    assert_eq!(solution.report.level, SolveLevel::Kept);
 }
 
 #[test]
