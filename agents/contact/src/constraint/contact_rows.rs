@@ -11,63 +11,34 @@ use crate::push_out::{PUSH_OUT_MAX_M_S, push_out_m_s};
 use crate::solve::{Contact, Hold, JointRow, Pressed, Side};
 use glam::DVec3;
 
-/// The rows of contacts of a fine step, in the order of those behind the rows of joints.
-#[derive(Debug, Default)]
-pub(crate) struct ContactRows {
-    /// The contacts of the rows of spins.
-    spins: Vec<usize>,
-    /// The contacts of the rows that push out, behind them.
-    pushes: Vec<usize>,
-}
-
 /// How one side of a contact turns: its spin, and that beyond its blocks, rad/s.
 struct Turns {
     side: Side,
     led_rad_s: DVec3,
 }
 
-impl ContactRows {
-    /// Lets go of the rows of the last solve: nothing is solved.
-    pub fn clear(&mut self) {
-        self.spins.clear();
-        self.pushes.clear();
-    }
-
-    /// Lays out the rows anew for the contacts as they are.
-    pub fn lay(&mut self, search: &Search, all: &[Participant<'_>], constraints: &mut ConstraintRows, h_s: f64) {
-        constraints.rows.truncate(constraints.owners.len());
-        self.clear();
-        for (contact, (owner, at)) in search.owners.iter().zip(&search.contacts).enumerate() {
-            let Some(row) = spin_row(all, owner, at, contact) else { continue };
-            constraints.rows.push(JointRow {
+impl ConstraintRows {
+    /// Lays out the rows of contacts anew, behind all others: those of spins, then those that push out.
+    pub fn lay_contacts(&mut self, search: &mut Search, all: &[Participant<'_>], h_s: f64) {
+        self.rows.truncate(self.owners.len());
+        for (contact, (owner, at)) in search.owners.iter_mut().zip(&search.contacts).enumerate() {
+            let row = spin_row(all, owner, at, contact);
+            owner.spin_row = row.is_some().then_some(self.rows.len());
+            self.rows.extend(row.map(|row| JointRow {
                 owed_slip_m: at.normal * owner.spin.owed_rad,
                 warm_n_s: at.normal * (owner.spin.torque_n_m * h_s),
                 ..row
-            });
-            self.spins.push(contact);
+            }));
         }
-        for (contact, (owner, at)) in search.owners.iter().zip(&search.contacts).enumerate() {
-            if at.overlap_m == 0.0 {
-                continue;
-            }
-            constraints.rows.push(JointRow {
+        for (owner, at) in search.owners.iter_mut().zip(&search.contacts) {
+            owner.push_row = (at.overlap_m != 0.0).then_some(self.rows.len());
+            self.rows.extend(owner.push_row.map(|_| JointRow {
                 target_m_s: at.normal * (at.surface_m_s.dot(at.normal) - push_out_m_s(at.gap_m, h_s)),
                 limit_m_s: PUSH_OUT_MAX_M_S,
                 warm_n_s: at.normal * (owner.push_n * h_s),
                 ..JointRow::new(at.sides, Hold::pushing(at.normal))
-            });
-            self.pushes.push(contact);
+            }));
         }
-    }
-
-    /// The contacts of the rows of spins, with the place of each row among all of the problem.
-    pub fn spins(&self, constraints: &ConstraintRows) -> impl Iterator<Item = (usize, usize)> + use<'_> {
-        self.spins.iter().copied().zip(constraints.owners.len()..)
-    }
-
-    /// The same of the rows that push out.
-    pub fn pushes(&self, constraints: &ConstraintRows) -> impl Iterator<Item = (usize, usize)> + use<'_> {
-        self.pushes.iter().copied().zip(constraints.owners.len() + self.spins.len()..)
     }
 }
 

@@ -28,10 +28,12 @@ pub(crate) struct Owner {
     pub other: Option<usize>,
     /// The name of the place within its pair.
     pub key: TouchKey,
-    /// Its friction about the normal.
+    /// Its friction about the normal, and its row in the problem.
     pub spin: Spin,
-    /// What pushes its sides apart where their bodies began inside each other, N, ≥ 0.
+    pub spin_row: Option<usize>,
+    /// What pushes its sides apart where their bodies began inside each other, N, ≥ 0, and its row in the problem.
     pub push_n: f64,
+    pub push_row: Option<usize>,
     /// The point of the participant's skin.
     pub place: Place,
     /// Newton's coefficient of restitution of its pair, 0 to 1.

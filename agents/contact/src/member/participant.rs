@@ -133,6 +133,13 @@ impl Progress {
         (self.touched, self.held) = (false, false);
     }
 
+    /// Lets it make so many times as many steps, up to the most; whether it makes more.
+    pub fn divide(&mut self, times: u32, most: u32) -> bool {
+        let before = self.parts;
+        self.parts = (before * times).min(most);
+        before < most
+    }
+
     /// Notes that a contact or row of the problem acts on it.
     pub fn hold(&mut self) {
         (self.touched, self.held) = (true, true);

@@ -8,7 +8,7 @@ use crate::Neighbour;
 use crate::lists::{refill, reset};
 use crate::member::{ClusterMember, MaterialPoint, Role};
 use crate::remote::local::invert;
-use crate::remote::published_shape::PublishedShape;
+use crate::remote::published_shape::{Motion, PublishedShape};
 use crate::solve::{Block, Side, SideTerm};
 use glam::{DMat3, DVec3};
 use metachron_core::{AgentId, Anchor, Body, Impulse, Inertia, LocalBlock, LocalModel, SimTime, Site, StepError};
@@ -23,7 +23,7 @@ const FORETOLD_STEPS: f64 = 2.0;
 pub struct RemoteMember {
     form: Option<Arc<CollisionShape>>,
     /// How it moves as it is led, which no impulse changes; `None` of what impulses move.
-    led: Option<LedMotion>,
+    led: Option<Motion>,
     /// The participants that compute their pairs with it.
     partners: Vec<AgentId>,
     shape: PublishedShape,
@@ -42,13 +42,6 @@ pub struct RemoteMember {
     seen: Option<SimTime>,
     kept: (PublishedShape, Vec<DVec3>),
     matrix: Vec<f64>,
-}
-
-/// The motion of a body that moves as it is led.
-#[derive(Debug, Clone, Copy)]
-struct LedMotion {
-    velocity_m_s: DVec3,
-    spin_rad_s: DVec3,
 }
 
 /// What is on its way to a block: an impulse, and that times the seconds since it acted.
@@ -75,12 +68,8 @@ impl RemoteMember {
         self.partners.clear();
         let snapshot = &neighbour.snapshot;
         let known = self.shape.take(&snapshot.body);
-        self.led = match (&snapshot.inertia, &snapshot.body) {
-            (Inertia::Immovable, Body::Rigid(state)) => {
-                Some(LedMotion { velocity_m_s: state.velocity, spin_rad_s: state.spin })
-            }
-            _ => None,
-        };
+        let is_led = matches!((&snapshot.inertia, &snapshot.body), (Inertia::Immovable, Body::Rigid(_)));
+        self.led = Motion::of(&snapshot.body).filter(|_| is_led);
         if self.seen != Some(snapshot.time) || self.blocks.is_empty() {
             self.seen = Some(snapshot.time);
             if snapshot.local_model.blocks.is_empty() {
@@ -141,9 +130,8 @@ impl RemoteMember {
         let step_s = self.model.step_s;
         let since_s = time.secs_after(neighbour.snapshot.time).clamp(-FORETOLD_STEPS * step_s, FORETOLD_STEPS * step_s);
         self.now.clear();
-        self.go_on(since_s);
-        let Self { model, shape, now, deviation, carried, .. } = self;
-        shape.drift.iter().zip(&mut shape.points).for_each(|(v, x)| *x += *v * since_s);
+        let Self { model, shape, led, now, deviation, carried, .. } = self;
+        shape.go_on(*led, since_s);
         for (at, block) in model.blocks.iter().enumerate() {
             let row = &model.compliance[at * size..(at + 1) * size];
             let of = |list: &[DVec3]| row.iter().zip(list).map(|(w, impulse)| *w * *impulse).sum::<DVec3>();
@@ -154,17 +142,9 @@ impl RemoteMember {
         }
     }
 
-    /// Moves what is led for `for_s` seconds.
-    fn go_on(&mut self, for_s: f64) {
-        let Some(LedMotion { velocity_m_s, spin_rad_s }) = self.led else { return };
-        for (slot, velocity) in [(0, velocity_m_s), (1, spin_rad_s)] {
-            self.shape.shift(&LocalBlock { slot, velocity, acceleration: DVec3::ZERO }, DVec3::ZERO, for_s);
-        }
-    }
-
     /// The velocity of a point of space as if it were the matter of a body that is led, m/s; zero of all others.
     fn led_at(&self, point: DVec3) -> DVec3 {
-        self.led.map_or(DVec3::ZERO, |led| led.velocity_m_s + led.spin_rad_s.cross(point - self.shape.centre))
+        self.led.map_or(DVec3::ZERO, |led| led.at(point - self.shape.centre))
     }
 
     /// A = W⁻¹ of the local model; none where W is not positive definite.
@@ -352,9 +332,8 @@ impl ClusterMember for RemoteMember {
     }
 
     fn end(&mut self, v: &[DVec3], h_s: f64, _touched: bool) -> Result<(), StepError> {
-        self.go_on(h_s);
-        let Self { shape, model, now, .. } = self;
-        shape.drift.iter().zip(&mut shape.points).for_each(|(v, x)| *x += *v * h_s);
+        let Self { shape, model, led, now, .. } = self;
+        shape.go_on(*led, h_s);
         for (block, v) in model.blocks.iter_mut().zip(v) {
             let at = LocalBlock { velocity: *v, ..*block };
             shape.shift(&at, DVec3::ZERO, h_s);

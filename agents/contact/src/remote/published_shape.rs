@@ -6,6 +6,30 @@ use glam::{DQuat, DVec3};
 use metachron_core::{Anchor, Body, Impulse, LocalBlock, Site};
 use metachron_geometry::{CollisionShape, Place, PlacedShape, ShapeKind, ShapePose};
 
+/// How a body moves as a whole.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Motion {
+    pub velocity_m_s: DVec3,
+    pub spin_rad_s: DVec3,
+}
+
+impl Motion {
+    /// As a published body does; `None` of one that bends.
+    pub fn of(body: &Body) -> Option<Self> {
+        let (velocity_m_s, spin_rad_s) = match body {
+            Body::Rigid(rigid) => (rigid.velocity, rigid.spin),
+            Body::Tool(tool) => (tool.velocity, tool.spin),
+            _ => return None,
+        };
+        Some(Self { velocity_m_s, spin_rad_s })
+    }
+
+    /// The velocity of a point at an arm from its centre, m/s.
+    pub fn at(&self, arm_m: DVec3) -> DVec3 {
+        self.velocity_m_s + self.spin_rad_s.cross(arm_m)
+    }
+}
+
 /// The matter of another agent, where it is as far as it is known.
 #[derive(Debug, Clone, Default)]
 pub struct PublishedShape {
@@ -24,28 +48,27 @@ impl PublishedShape {
     /// Takes in a published body, `since_s` seconds later as its velocities lead it; whether it has matter.
     pub fn bring(&mut self, body: &Body, since_s: f64) -> bool {
         let known = self.take(body);
-        self.drift.iter().zip(&mut self.points).for_each(|(v, x)| *x += *v * since_s);
-        let whole = match body {
-            Body::Rigid(rigid) => [rigid.velocity, rigid.spin],
-            Body::Tool(tool) => [tool.velocity, tool.spin],
-            _ => return known,
-        };
-        for (slot, velocity) in (0..).zip(whole) {
-            self.shift(&LocalBlock { slot, velocity, acceleration: DVec3::ZERO }, DVec3::ZERO, since_s);
-        }
+        self.go_on(Motion::of(body), since_s);
         known
+    }
+
+    /// Moves its points by their drift, and all of it as it moves as a whole, for some seconds.
+    pub(crate) fn go_on(&mut self, whole: Option<Motion>, for_s: f64) {
+        self.drift.iter().zip(&mut self.points).for_each(|(v, x)| *x += *v * for_s);
+        let Some(Motion { velocity_m_s, spin_rad_s }) = whole else { return };
+        for (slot, velocity) in [(0, velocity_m_s), (1, spin_rad_s)] {
+            self.shift(&LocalBlock { slot, velocity, acceleration: DVec3::ZERO }, DVec3::ZERO, for_s);
+        }
     }
 
     /// The velocity of a point of its skin, as published, m/s.
     #[must_use]
     pub fn velocity(&self, body: &Body, place: &Place) -> DVec3 {
         let of = |point: u32| self.drift.get(point as usize).copied().unwrap_or(DVec3::ZERO);
-        match (*place, body) {
-            (Place::Point(point), Body::Rigid(rigid)) => rigid.velocity + rigid.spin.cross(point - self.centre),
-            (Place::Point(point), Body::Tool(tool)) => tool.velocity + tool.spin.cross(point - self.centre),
-            (Place::Point(_), _) => DVec3::ZERO,
-            (Place::Chain { segment, share, .. }, _) => of(segment).lerp(of(segment + 1), share),
-            (Place::Surface { vertices, shares }, _) => {
+        match *place {
+            Place::Point(point) => Motion::of(body).map_or(DVec3::ZERO, |whole| whole.at(point - self.centre)),
+            Place::Chain { segment, share, .. } => of(segment).lerp(of(segment + 1), share),
+            Place::Surface { vertices, shares } => {
                 vertices.into_iter().zip(shares).map(|(vertex, share)| of(vertex) * share).sum()
             }
         }

@@ -71,7 +71,7 @@ impl StepDoubling {
             all.iter().zip(finer).for_each(|(one, places)| probe(&one.member, places));
         }
         all.iter_mut().for_each(|one| one.parts /= 2);
-        stepper.go_back_all(all);
+        stepper.guard(all, ClusterStepper::go_back);
         let report = outcome?;
         *made = true;
         Ok(report.work)

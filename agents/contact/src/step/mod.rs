@@ -24,7 +24,6 @@ mod report;
 mod rigid_pile;
 mod solve;
 
-use crate::constraint::contact_rows::ContactRows;
 use crate::constraint::failure::Failures;
 use crate::constraint::joint::Joints;
 use crate::constraint::{ConstraintRows, FailedAttachment, JointTotal};
@@ -42,7 +41,6 @@ use metachron_core::{Archive, ArchiveError, ParallelFor, SimSpan, StepError, Wre
 pub use plan::Plan;
 pub use report::{ClusterReport, PairTotal};
 use rigid_pile::RigidPile;
-use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
 
 /// The surroundings of a macro step, and the threads that make it.
 #[derive(Clone, Copy)]
@@ -60,7 +58,6 @@ pub struct ClusterStepper {
     search: Search,
     constraints: ConstraintRows,
     joints: Joints,
-    contact_rows: ContactRows,
     pub(crate) progress: Vec<Progress>,
     members: ProblemMembers,
     sums: Sums,
@@ -128,11 +125,7 @@ impl ClusterStepper {
     ) -> Result<ClusterReport, StepError> {
         check_span(dt)?;
         self.is_kept = false;
-        let made = catch_unwind(AssertUnwindSafe(|| self.make(On { scene, threads }, all, dt)));
-        made.unwrap_or_else(|panic| {
-            self.put_back(all);
-            resume_unwind(panic)
-        })
+        self.guard(all, |stepper, all| stepper.make(On { scene, threads }, all, dt))
     }
 
     /// The same; after a panic members are where it came.

@@ -87,9 +87,7 @@ impl ClusterStepper {
         }
         let mut any = false;
         for (one, state) in all.iter().zip(&mut self.progress).filter(|(one, _)| one.member.role() == Role::Rigid) {
-            let most = one.parts * DIVIDED_MAX;
-            any |= state.parts < most;
-            state.parts = (state.parts * self.joints.ask).min(most);
+            any |= state.divide(self.joints.ask, one.parts * DIVIDED_MAX);
         }
         any
     }
@@ -102,11 +100,7 @@ impl ClusterStepper {
             // what is too much already grows through the rest of its step
             let more = if so_far > 1.0 { times(so_far * f64::from(state.share) / f64::from(state.part)) } else { 1 };
             // what its free motion asked for counts
-            let most = one.parts * DIVIDED_MAX;
-            if more > 1 && state.parts < most {
-                state.parts = (state.parts * more).min(most);
-                any = true;
-            }
+            any |= more > 1 && state.divide(more, one.parts * DIVIDED_MAX);
         }
         any
     }
@@ -132,13 +126,16 @@ impl ClusterStepper {
         self.is_kept = true;
     }
 
-    /// As [`Self::go_back`], for all where one of them unwinds, too.
-    pub(super) fn go_back_all(&mut self, all: &mut [Participant<'_>]) {
-        let gone_back = catch_unwind(AssertUnwindSafe(|| self.go_back(all)));
-        gone_back.unwrap_or_else(|panic| {
+    /// Does what code of members may unwind from: all others are then put back.
+    pub(super) fn guard<'p, T>(
+        &mut self,
+        all: &mut [Participant<'p>],
+        run: impl FnOnce(&mut Self, &mut [Participant<'p>]) -> T,
+    ) -> T {
+        catch_unwind(AssertUnwindSafe(|| run(self, all))).unwrap_or_else(|panic| {
             self.put_back(all);
             resume_unwind(panic)
-        });
+        })
     }
 
     /// Puts all back to the start of the macro step but those whose code has unwound, from wherever in it that came. Until all are kept none has

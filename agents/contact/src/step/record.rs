@@ -58,9 +58,8 @@ impl ClusterStepper {
 
     /// Notes what contacts hand to the next step, and adds up what they gave, push-outs and impacts included.
     fn record_contacts(&mut self, all: &mut [Participant<'_>], h_s: f64) {
-        let Self { solver, search, constraints, contact_rows, external, impacts, .. } = self;
+        let Self { solver, search, external, impacts, .. } = self;
         let solution = solver.solution();
-        let mut pushes = contact_rows.pushes(constraints).peekable();
         for (k, (owner, contact)) in search.owners.iter().zip(&search.contacts).enumerate() {
             let impulse = solution.contacts_n_s[k];
             let owed_slip_m = contact.owed_slip_after(impulse, solution.contacts_m_s[k], h_s);
@@ -69,8 +68,7 @@ impl ClusterStepper {
                 if impacts.of(k).is_some() { (DVec3::ZERO, Spin::default()) } else { (impulse, owner.spin) };
             let load_n = contact.load_n_s / h_s;
             let (key, force_n, overlap_m) = (owner.key.anywhere(), lasting / h_s, contact.overlap_m);
-            let push =
-                pushes.next_if(|(pushed, _)| *pushed == k).map_or(DVec3::ZERO, |(_, row)| solution.rows_n_s[row]);
+            let push = owner.push_row.map_or(DVec3::ZERO, |row| solution.rows_n_s[row]);
             let push_n = push.length() / h_s;
             let place = Remembered { key, force_n, load_n, overlap_m, push_n, owed_slip_m, spin };
             all[owner.member].memory.pair(owner.partner).next.push(place);
@@ -119,13 +117,13 @@ impl ClusterStepper {
 
     /// Notes what the spins of contacts were given.
     fn record_spins(&mut self, all: &[Participant<'_>], h_s: f64) {
-        let Self { solver, search, constraints, contact_rows, external, progress, .. } = self;
+        let Self { solver, search, constraints, external, progress, .. } = self;
         let solution = solver.solution();
-        for (contact, row) in contact_rows.spins(constraints) {
+        for (k, (owner, contact)) in search.owners.iter_mut().zip(&search.contacts).enumerate() {
+            let Some(row) = owner.spin_row else { continue };
             let (impulse, row) = (solution.rows_n_s[row], &constraints.rows[row]);
-            let owner = &mut search.owners[contact];
-            let (normal, pressed) = (search.contacts[contact].normal, row.pressed.map_or(0.0, |by| by.reach_m));
-            let most = pressed * solution.contacts_n_s[contact].dot(normal);
+            let (normal, pressed) = (contact.normal, row.pressed.map_or(0.0, |by| by.reach_m));
+            let most = pressed * solution.contacts_n_s[k].dot(normal);
             let slip = relative(&row.sides, |member| &progress[member].v_solved);
             owner.spin.owed_rad = row.owed_slip_after(impulse, slip, most, h_s).dot(normal);
             owner.spin.torque_n_m = impulse.dot(normal) / h_s;

@@ -46,16 +46,15 @@ impl ClusterStepper {
         let is_open = |state: &Progress| !state.unanswered.is_empty();
         if self.search.contacts.is_empty() && self.constraints.rows.is_empty() && !self.progress.iter().any(is_open) {
             // what touches nothing moves as it would
-            self.contact_rows.clear();
             self.progress.iter_mut().for_each(Progress::go_on);
             return Ok(());
         }
         let (mut last_miss_m, mut missed_m) = (f64::INFINITY, self.joints.missed_m);
         for round in 1..=ROUNDS_MAX {
-            self.contact_rows.lay(&self.search, all, &mut self.constraints, h_s);
+            self.constraints.lay_contacts(&mut self.search, all, h_s);
             self.solve_once(all, h_s, on.threads, report)?;
             self.note_motion(all);
-            let Self { solver, search, constraints, contact_rows, joints, macro_s, progress, depth_m, .. } = &mut *self;
+            let Self { solver, search, constraints, joints, macro_s, progress, depth_m, .. } = &mut *self;
             let solution = solver.solution();
             // the next solve starts from this one
             for (contact, impulse) in search.contacts.iter_mut().zip(&solution.contacts_n_s) {
@@ -64,12 +63,10 @@ impl ClusterStepper {
             for (row, impulse) in constraints.rows.iter_mut().zip(&solution.rows_n_s) {
                 row.warm_n_s = *impulse;
             }
-            for (contact, row) in contact_rows.pushes(constraints) {
-                search.owners[contact].push_n = solution.rows_n_s[row].length() / h_s;
-            }
-            for (contact, row) in contact_rows.spins(constraints) {
-                let normal = search.contacts[contact].normal;
-                search.owners[contact].spin.torque_n_m = solution.rows_n_s[row].dot(normal) / h_s;
+            for (owner, contact) in search.owners.iter_mut().zip(&search.contacts) {
+                owner.push_n = owner.push_row.map_or(owner.push_n, |row| solution.rows_n_s[row].length() / h_s);
+                let torque_n_m = |row: usize| solution.rows_n_s[row].dot(contact.normal) / h_s;
+                owner.spin.torque_n_m = owner.spin_row.map_or(owner.spin.torque_n_m, torque_n_m);
             }
             let Aimed { miss_m, turn_rad } = joints.aim(all, constraints, |member| &progress[member].v_solved[..], h_s);
             let joints_done = miss_m < joint_miss_m(*depth_m) || miss_m > last_miss_m;
@@ -156,22 +153,19 @@ impl ClusterStepper {
 
     /// Finds what the impulses found hold, and how places move by them.
     fn note_motion(&mut self, all: &[Participant<'_>]) {
-        let Self { solver, search, constraints, contact_rows, progress, .. } = self;
+        let Self { solver, search, constraints, progress, .. } = self;
         let solution = solver.solution();
         progress.iter_mut().for_each(|state| state.bears = false);
         let mut hold = |both: &mut dyn Iterator<Item = usize>| both.for_each(|member| progress[member].bears = true);
-        for (k, impulse) in solution.contacts_n_s.iter().enumerate() {
-            if *impulse != DVec3::ZERO {
-                hold(&mut search.owners[k].both());
+        for (owner, impulse) in search.owners.iter().zip(&solution.contacts_n_s) {
+            if *impulse != DVec3::ZERO || owner.push_row.is_some_and(|row| solution.rows_n_s[row] != DVec3::ZERO) {
+                hold(&mut owner.both());
             }
         }
         for (owner, impulse) in constraints.owners.iter().zip(&solution.rows_n_s) {
             if *impulse != DVec3::ZERO {
                 hold(&mut owner.both());
             }
-        }
-        for (contact, _) in contact_rows.pushes(constraints).filter(|(_, row)| solution.rows_n_s[*row] != DVec3::ZERO) {
-            hold(&mut search.owners[contact].both());
         }
         for (one, state) in all.iter().zip(progress) {
             state.go(one.member.role() == Role::Rigid);
