@@ -1,15 +1,14 @@
 //! The iterative form of a Newton step: preconditioned conjugate gradients (HS52) on ⊕ A/f, or on ⊕ A/f + Jᵀ G J; minimal residuals
-//! where slopes of laws are not symmetric.
+//! where slopes of laws are not symmetric, in either form: generalised conjugate residuals (EES83), each direction stored with its image.
 //!
 //! In: an operator, a right side, a start and a goal. Out: a solution and exactly what it leaves. Never here: when the goal is met
-//! well enough for a law of contact. Theory: `docs/theory/clusters.md`, section 6.
+//! well enough for a law of contact. Theory: `docs/theory/clusters.md`, section 6 and eq. 8b and 15.
 
 use super::coupled::Coupled;
 use super::members::{Members, Size};
-use super::residuals::{Direction, Residuals, dot};
 use super::rows::Rows;
 use super::skew::Skew;
-use crate::lists::reset;
+use crate::lists::{refill, reset};
 use glam::{DMat3, DVec3};
 use metachron_core::{Archive, ArchiveError, ParallelFor};
 
@@ -177,8 +176,8 @@ impl Gradients {
     /// One round of minimal residuals.
     fn descend_skew(&mut self, operator: &Operator<'_>, task: &mut Task<'_>) {
         let mut residuals = std::mem::take(&mut self.residuals);
-        let is_done = |task: &Task<'_>| operator.is_done(task, SHARE_OF_GOAL);
-        residuals.descend(operator.members, task, DIRECTIONS_MAX, is_done, |left, Direction { x, image }| {
+        let end = End { directions: DIRECTIONS_MAX, share: SHARE_OF_GOAL };
+        residuals.descend(operator, task, end, |left, Direction { x, image }| {
             self.products += 1;
             self.solve_near(operator, left, x);
             operator.members.multiply(x, image);
@@ -226,4 +225,95 @@ impl Gradients {
 fn is_positive(matrix: &DMat3) -> bool {
     let [x, y] = [matrix.x_axis, matrix.y_axis];
     matrix.is_finite() && x.x > 0.0 && x.x * y.y > x.y * y.x && matrix.determinant() > 0.0
+}
+
+/// A change of the solution, and the part of the right side that it answers.
+#[derive(Debug, Clone, Default)]
+pub(super) struct Direction {
+    pub x: Vec<DVec3>,
+    pub image: Vec<DVec3>,
+}
+
+/// When a round ends: after so many directions, or at this share of its goal.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct End {
+    pub directions: usize,
+    pub share: f64,
+}
+
+/// Storage of the directions.
+#[derive(Debug, Clone, Default)]
+pub(super) struct Residuals {
+    directions: Vec<Direction>,
+    /// A velocity of each block, by which impulses are weighed.
+    weighed: Vec<DVec3>,
+}
+
+impl Residuals {
+    /// Makes what a task leaves smaller, direction by direction. `aim` makes one of what is left, or tells that there is none.
+    pub fn descend(
+        &mut self,
+        operator: &Operator<'_>,
+        task: &mut Task<'_>,
+        end: End,
+        mut aim: impl FnMut(&[DVec3], &mut Direction) -> bool,
+    ) {
+        let Self { directions, weighed } = self;
+        let members = operator.members;
+        for count in 0..end.directions {
+            if directions.len() == count {
+                directions.push(Direction::default());
+            }
+            let (known, unknown) = directions.split_at_mut(count);
+            let next = &mut unknown[0];
+            next.resize(task.left.len());
+            let aimed = aim(task.left, next);
+            weigh(members, &next.image, weighed);
+            for other in &*known {
+                next.add(other, -dot(weighed, &other.image));
+            }
+            weigh(members, &next.image, weighed);
+            let size = dot(weighed, &next.image).sqrt();
+            let share = dot(weighed, task.left) / (size * size);
+            if !(aimed && share.is_finite()) {
+                return;
+            }
+            add(task.x, &next.x, share);
+            add(task.left, &next.image, -share);
+            next.scale(size.recip());
+            if operator.is_done(task, end.share) {
+                return;
+            }
+        }
+    }
+}
+
+impl Direction {
+    fn resize(&mut self, size: usize) {
+        for list in [&mut self.x, &mut self.image] {
+            reset(list, size, DVec3::ZERO);
+        }
+    }
+
+    fn add(&mut self, other: &Self, share: f64) {
+        add(&mut self.x, &other.x, share);
+        add(&mut self.image, &other.image, share);
+    }
+
+    fn scale(&mut self, by: f64) {
+        self.x.iter_mut().chain(&mut self.image).for_each(|value| *value *= by);
+    }
+}
+
+/// diag(A/f)⁻¹ of impulses (eq. 15).
+fn weigh(members: &Members, impulses: &[DVec3], into: &mut Vec<DVec3>) {
+    refill(into, members.mobilities.iter().zip(impulses).map(|(mobility, impulse)| *mobility * *impulse));
+}
+
+fn add(to: &mut [DVec3], list: &[DVec3], share: f64) {
+    to.iter_mut().zip(list).for_each(|(value, by)| *value += *by * share);
+}
+
+fn dot(a: &[DVec3], b: &[DVec3]) -> f64 {
+    a.iter().zip(b).map(|(a, b)| a.dot(*b)).sum()
 }

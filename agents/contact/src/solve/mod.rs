@@ -58,7 +58,6 @@ mod newton;
 mod order;
 mod passivity;
 mod problem;
-mod residuals;
 mod rows;
 mod scale;
 mod side;

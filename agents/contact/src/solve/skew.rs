@@ -1,6 +1,6 @@
 //! The part of a law's slope that is not symmetric: friction that follows its pressure, and a shift that follows its slip.
 //!
-//! In: a row and where it is. Out: a matrix of rank one. Never here: equations, and how they are solved (`residuals.rs`).
+//! In: a row and where it is. Out: a matrix of rank one. Never here: equations, and how they are solved (`gradients.rs`).
 //! Theory: `docs/theory/clusters.md`, eq. 8b and C3.
 
 use super::cone::{Law, Projection};

@@ -5,10 +5,9 @@
 
 use super::coupled::Coupled;
 use super::error::ProblemError;
-use super::gradients::{Gradients, Operator, Stiffness, Task};
+use super::gradients::{Direction, End, Gradients, Operator, Residuals, Stiffness, Task};
 use super::members::Members;
 use super::problem::{Member, Problem};
-use super::residuals::{Direction, Residuals};
 use super::rows::Rows;
 use super::scale::Scales;
 use glam::DVec3;
@@ -26,10 +25,9 @@ pub enum StepForm {
     Iterative,
 }
 
-/// The most that a factor is used again in a step.
-const FOLLOWED_MAX: usize = 30;
-/// The share of a goal at which that ends: friction that does not follow its pressure costs another factor.
-const FOLLOWED_SHARE: f64 = 0.1;
+/// The most that a factor is used again in a step, and the share of a goal at which that ends: friction that does not follow its pressure
+/// costs another factor.
+const FOLLOWED: End = End { directions: 30, share: 0.1 };
 
 /// ⊕ A/f and ⊕ A/f + Jᵀ G J, and how equations with them are solved.
 #[derive(Debug, Clone, Default)]
@@ -174,11 +172,10 @@ impl System {
         contacts.add_skew(task.x, task.left);
         task.left.iter_mut().for_each(|left| *left = -*left);
         let operator = Operator { members, contacts: Some(contacts), still_m_s: 0.0 };
-        if !contacts.is_skew() || operator.is_done(task, FOLLOWED_SHARE) {
+        if !contacts.is_skew() || operator.is_done(task, FOLLOWED.share) {
             return;
         }
-        let is_done = |task: &Task<'_>| operator.is_done(task, FOLLOWED_SHARE);
-        residuals.descend(members, task, FOLLOWED_MAX, is_done, |left, Direction { x, image }| {
+        residuals.descend(&operator, task, FOLLOWED, |left, Direction { x, image }| {
             coupled.solve(left, x);
             image.copy_from_slice(left);
             contacts.add_skew(x, image);

@@ -435,16 +435,11 @@ fn insert(physics: &mut PhysicsWorld, one: &Participant<'_>, body: &Placed<'_>, 
     Known { id: one.id, member: 0, handle, mass_kg, inertia, radius_m: body.shape.radius_m, touched: false }
 }
 
+/// A bit for each axis: of translations, then of rotations.
 fn axes_of(locked: Locked) -> LockedAxes {
-    let all = [
-        (LockedAxes::TRANSLATION_LOCKED_X, locked.locked_translation[0]),
-        (LockedAxes::TRANSLATION_LOCKED_Y, locked.locked_translation[1]),
-        (LockedAxes::TRANSLATION_LOCKED_Z, locked.locked_translation[2]),
-        (LockedAxes::ROTATION_LOCKED_X, locked.locked_rotation[0]),
-        (LockedAxes::ROTATION_LOCKED_Y, locked.locked_rotation[1]),
-        (LockedAxes::ROTATION_LOCKED_Z, locked.locked_rotation[2]),
-    ];
-    all.into_iter().filter(|(_, is_locked)| *is_locked).fold(LockedAxes::empty(), |axes, (axis, _)| axes | axis)
+    let all = locked.locked_translation.into_iter().chain(locked.locked_rotation);
+    let bits = (0..).zip(all).map(|(axis, is_locked)| u8::from(is_locked) << axis);
+    LockedAxes::from_bits_truncate(bits.fold(0, |axes, axis| axes | axis))
 }
 
 /// A static solid; its form is always one.
