@@ -29,34 +29,24 @@ pub enum Input {
 }
 
 impl Input {
-    const ALL: [Self; 10] = [
-        Self::Spring,
-        Self::Force,
-        Self::Torque,
-        Self::Pose,
-        Self::Place,
-        Self::Velocity,
-        Self::State,
-        Self::Pressure,
-        Self::Carving,
-        Self::Resolution,
+    /// All, in their order, as messages name them.
+    const NAMES: [(Self, &'static str); 10] = [
+        (Self::Spring, "springs"),
+        (Self::Force, "forces"),
+        (Self::Torque, "torques"),
+        (Self::Pose, "poses"),
+        (Self::Place, "other places"),
+        (Self::Velocity, "other velocities"),
+        (Self::State, "other states"),
+        (Self::Pressure, "pressures"),
+        (Self::Carving, "carving"),
+        (Self::Resolution, "other resolutions"),
     ];
 
     /// As messages name it.
     #[must_use]
     pub const fn name(self) -> &'static str {
-        match self {
-            Self::Spring => "springs",
-            Self::Force => "forces",
-            Self::Torque => "torques",
-            Self::Pose => "poses",
-            Self::Place => "other places",
-            Self::Velocity => "other velocities",
-            Self::State => "other states",
-            Self::Pressure => "pressures",
-            Self::Carving => "carving",
-            Self::Resolution => "other resolutions",
-        }
+        Self::NAMES[self as usize].1
     }
 }
 
@@ -95,13 +85,14 @@ impl Inputs {
     /// The first of `needed` that is not among them.
     #[must_use]
     pub fn lacks(self, needed: Self) -> Option<Input> {
-        Input::ALL.into_iter().find(|input| needed.has(*input) && !self.has(*input))
+        let mut all = Input::NAMES.into_iter().map(|(input, _)| input);
+        all.find(|input| needed.has(*input) && !self.has(*input))
     }
 }
 
 impl std::fmt::Display for Inputs {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        let names: Vec<_> = Input::ALL.into_iter().filter(|input| self.has(*input)).map(Input::name).collect();
+        let names: Vec<_> = Input::NAMES.iter().filter(|(input, _)| self.has(*input)).map(|(_, name)| *name).collect();
         match &names[..] {
             [] => f.write_str("nothing of the kind"),
             [one] => f.write_str(one),
@@ -116,9 +107,10 @@ mod tests {
 
     #[test]
     fn a_set_has_what_was_put_into_it_and_names_it() {
-        for input in Input::ALL {
+        let all = Input::NAMES.map(|(input, _)| input);
+        for input in all {
             let one = Inputs::of(&[input]);
-            assert!(Input::ALL.into_iter().all(|other| one.has(other) == (other == input)));
+            assert!(all.into_iter().all(|other| one.has(other) == (other == input)));
             assert_eq!((one.to_string(), one.with(input, false)), (input.name().to_owned(), Inputs::NONE));
         }
         let some = Inputs::of(&[Input::Carving, Input::Force, Input::Spring]);

@@ -49,7 +49,6 @@ pub mod detect;
 mod impact;
 pub mod inputs;
 pub mod joint;
-pub mod law;
 mod lists;
 pub mod member;
 pub mod push_out;
@@ -57,8 +56,9 @@ pub mod remote;
 pub mod solve;
 pub mod step;
 
-pub use agent::{Agent, AnchorForce, AnchorSpring, Carving, Neighbour, PoseGoal, SetMotion, SetMotor, StepContext};
+pub use agent::{
+    Agent, AnchorForce, AnchorSpring, Carving, Law, Link, Neighbour, PoseGoal, SetMotion, SetMotor, StepContext,
+};
 pub use inputs::{Input, Inputs};
-pub use law::{Law, Link};
 pub use push_out::PUSH_OUT_SHARE;
 pub use remote::acknowledged;

@@ -6,16 +6,9 @@
 
 use crate::constraint::ConstraintRows;
 use crate::detect::{Owner, Search};
-use crate::member::{ClusterMember, Participant};
+use crate::member::{ClusterMember, Participant, Pose};
 use crate::push_out::{PUSH_OUT_MAX_M_S, push_out_m_s};
-use crate::solve::{Contact, Hold, JointRow, Pressed, Side};
-use glam::DVec3;
-
-/// How one side of a contact turns: its spin, and that beyond its blocks, rad/s.
-struct Turns {
-    side: Side,
-    led_rad_s: DVec3,
-}
+use crate::solve::{Contact, Hold, JointRow, Pressed};
 
 impl ConstraintRows {
     /// Lays out the rows of contacts anew, behind all others: those of spins, then those that push out.
@@ -49,19 +42,19 @@ pub(crate) fn spin_row(all: &[Participant<'_>], owner: &Owner, at: &Contact, con
         return None;
     }
     let (here, there) = (turns(all, Some(owner.member))?, turns(all, owner.other)?);
-    if [&here, &there].iter().all(|turns| turns.side.terms().is_empty()) {
+    if [&here, &there].iter().all(|pose| pose.turns.terms().is_empty()) {
         return None;
     }
     Some(JointRow {
         target_m_s: there.led_rad_s - here.led_rad_s,
         pressed: Some(Pressed { contact, reach_m }),
-        ..JointRow::new([here.side, there.side], Hold::motor(at.normal, f64::INFINITY))
+        ..JointRow::new([here.turns, there.turns], Hold::motor(at.normal, f64::INFINITY))
     })
 }
 
-/// How a member turns, or what never moves; `None` of a body that does not turn as a whole.
-fn turns(all: &[Participant<'_>], member: Option<usize>) -> Option<Turns> {
-    let Some(member) = member else { return Some(Turns { side: Side::FIXED, led_rad_s: DVec3::ZERO }) };
+/// How a member moves as a whole, or what never does; `None` of a body that does not.
+fn turns(all: &[Participant<'_>], member: Option<usize>) -> Option<Pose> {
+    let Some(member) = member else { return Some(Pose::WORLD) };
     let pose = all[member].member.pose(&[], 0.0)?;
-    Some(Turns { side: pose.turns.of_member(member), led_rad_s: pose.led_rad_s })
+    Some(Pose { turns: pose.turns.of_member(member), ..pose })
 }

@@ -8,7 +8,7 @@ pub(crate) mod geometric_stiffness;
 pub(crate) mod joint;
 pub(crate) mod spring;
 
-use crate::law::Link;
+use crate::agent::Link;
 use crate::member::memory::Partner;
 use crate::member::participant::{Progress, relative};
 use crate::member::{ClusterMember, MaterialPoint, Participant, Pose};

@@ -6,9 +6,8 @@
 //! Theory: docs/theory/clusters.md, eq. 14 and 29; docs/theory/rod.md, eq. 21.
 
 use crate::AnchorSpring;
-use crate::agent::tool_extrapolation_s;
+use crate::agent::{Law, Link, tool_extrapolation_s};
 use crate::constraint::{ConstraintRows, End, FineStep, Frame, Holders, Pull, RowOwner, Slides};
-use crate::law::{Law, Link};
 use crate::member::memory::Partner;
 use crate::member::participant::place_of;
 use crate::member::{ClusterMember, MaterialPoint, OwnSpring, Participant};

@@ -107,7 +107,7 @@ impl Search {
             let (body, state) = (&all[member].member, &progress[member]);
             body.speed_bound(&state.v_before).max(body.speed_bound(&state.v_predicted))
         });
-        self.boxes.near(NEAR_STEPS, h_s, &mut self.near);
+        self.boxes.pairs(|reach| NEAR_STEPS * h_s.max(reach.alone_s), &mut self.near);
         let apart =
             |[a, b]: [usize; 2]| all[a].member.is_remote() && all[b].member.is_remote() || !all[a].meets(&all[b]);
         self.near.retain(|pair| !apart(*pair));
@@ -123,7 +123,7 @@ impl Search {
         self.boxes.place(all, |member| all[member].member.speed_bound(round.moved(member)));
         let mut pairs = std::mem::take(&mut self.again);
         pairs.clear();
-        self.boxes.meeting(h_s, &mut pairs);
+        self.boxes.pairs(|_| h_s, &mut pairs);
         (self.known, self.moved) = (self.contacts.len(), false);
         self.find_all(round, &pairs);
         self.again = pairs;

@@ -23,7 +23,7 @@ pub(super) struct Reach {
     /// The fastest speed of any point of it, m/s.
     pub speed_m_s: f64,
     /// How long a step it makes alone, seconds.
-    alone_s: f64,
+    pub alone_s: f64,
 }
 
 /// The boxes of all members that have a skin.
@@ -37,12 +37,11 @@ pub(super) struct Boxes {
 impl Boxes {
     /// Places the boxes of `all` anew; `speed_m_s` says how fast each member may move.
     pub fn place(&mut self, all: &[Participant<'_>], speed_m_s: impl Fn(usize) -> f64) {
-        self.reaches.clear();
         let reach = |(member, one): (usize, &Participant<'_>)| {
             let skin = one.member.skin()?.bounds();
             Some(Reach { skin, speed_m_s: speed_m_s(member), alone_s: one.alone_s })
         };
-        self.reaches.extend(all.iter().enumerate().map(reach));
+        refill(&mut self.reaches, all.iter().enumerate().map(reach));
         refill(&mut self.along_x, (0..all.len()).filter(|&member| self.reaches[member].is_some()));
         let low_x = |member: usize| self.reaches[member].map_or(0.0, |reach| reach.skin.low.x);
         self.along_x.sort_unstable_by(|&a, &b| low_x(a).total_cmp(&low_x(b)).then(a.cmp(&b)));
@@ -53,17 +52,8 @@ impl Boxes {
         self.reaches[member]
     }
 
-    /// Adds the pairs whose boxes may meet within a step of `step_s` seconds, the lower member first, sorted.
-    pub fn meeting(&self, step_s: f64, into: &mut Vec<[usize; 2]>) {
-        self.pairs(|_| step_s, into);
-    }
-
-    /// Adds the pairs whose boxes may meet within `steps` steps of one of `step_s` seconds, or of those that either makes alone.
-    pub fn near(&self, steps: f64, step_s: f64, into: &mut Vec<[usize; 2]>) {
-        self.pairs(|reach| steps * step_s.max(reach.alone_s), into);
-    }
-
-    fn pairs(&self, after_s: impl Fn(&Reach) -> f64, into: &mut Vec<[usize; 2]>) {
+    /// Adds the pairs whose boxes may meet within the longer of the times that `after_s` says of the two, seconds, the lower member first, sorted.
+    pub fn pairs(&self, after_s: impl Fn(&Reach) -> f64, into: &mut Vec<[usize; 2]>) {
         let reach = |&member: &usize| self.reaches[member].map(|reach| (member, reach));
         let most = |of: &dyn Fn(&Reach) -> f64| self.reaches.iter().flatten().map(of).fold(0.0, f64::max);
         let (fastest, longest_s) = (most(&|reach| reach.speed_m_s), most(&|reach| after_s(reach)));

@@ -77,8 +77,6 @@ pub(crate) struct SolvedStep<'a, 'p> {
     pub members: &'a mut ProblemMembers,
     pub progress: &'a mut [Progress],
     pub threads: &'a dyn ParallelFor,
-    /// How deep contacts rest, metres.
-    pub depth_m: f64,
     /// Whether bodies may be where a flight brings them: another solve would stop those that pass into others.
     pub may_fly: bool,
 }
@@ -86,13 +84,12 @@ pub(crate) struct SolvedStep<'a, 'p> {
 impl Impacts {
     /// Lets contacts that close fast rebound, after the solve of a fine step by which they close no more; `None` where none does.
     pub fn rebound(&mut self, step: SolvedStep<'_, '_>) -> Result<Option<Report>, StepError> {
-        let SolvedStep { all, search, constraints, solution, members, progress, threads, depth_m, may_fly } = step;
+        let SolvedStep { all, search, constraints, solution, members, progress, threads, may_fly } = step;
         self.clear();
         for state in &mut *progress {
             state.dv_impacts.clear();
             state.dx_impacts.clear();
         }
-        self.depth_m = depth_m;
         self.find(search, progress);
         if self.found.is_empty() {
             return Ok(None);
@@ -112,16 +109,16 @@ impl Impacts {
         Ok(Some(took))
     }
 
-    /// Begins a fine step. Its problem goes by the velocities at its end, and would stop too early sides that fly and meet in a later one: it
+    /// Begins a fine step, of a macro step and with contacts that rest as deep as given. Its problem goes by the velocities at its end, and would stop too early sides that fly and meet in a later one: it
     /// has none of their contacts.
     pub fn begin(
         &mut self,
-        [macro_s, step_s]: [f64; 2],
+        [macro_s, step_s, depth_m]: [f64; 3],
         search: &mut Search,
         constraints: &ConstraintRows,
         progress: &[Progress],
     ) {
-        (self.macro_s, self.step_s) = (macro_s, step_s);
+        (self.macro_s, self.step_s, self.depth_m) = (macro_s, step_s, depth_m);
         self.clear();
         reset(&mut self.supported, progress.len(), false);
         if search.owners.iter().all(|owner| owner.restitution == 0.0) {

@@ -62,6 +62,14 @@ impl CallMark {
     }
 }
 
+/// Runs a call of a model, marked where somebody watches it.
+fn marked<T>(mark: Option<&CallMark>, call: impl FnOnce() -> T) -> T {
+    match mark {
+        Some(mark) => mark.during(call),
+        None => call(),
+    }
+}
+
 /// The factor that a member lends: its calls are marked, too.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Lent<'a> {
@@ -71,10 +79,7 @@ pub(crate) struct Lent<'a> {
 
 impl Response for Lent<'_> {
     fn respond(&self, impulses: &mut [DVec3]) {
-        match self.mark {
-            Some(mark) => mark.during(|| self.by.respond(impulses)),
-            None => self.by.respond(impulses),
-        }
+        marked(self.mark, || self.by.respond(impulses));
     }
 }
 
@@ -142,11 +147,7 @@ impl<'a> GuardedMember<'a> {
 
     /// Lets it change its state.
     fn tell<T>(&mut self, call: impl FnOnce(&mut dyn ClusterMember) -> T) -> T {
-        let Self { inner, mark, .. } = self;
-        match mark {
-            Some(mark) => mark.during(|| call(&mut **inner)),
-            None => call(&mut **inner),
-        }
+        marked(self.mark, || call(&mut *self.inner))
     }
 
     /// Lets it begin or end a step, and checks how it then is.
@@ -209,16 +210,13 @@ fn lengths_fault(member: &dyn ClusterMember) -> Option<String> {
     if !is_finite(member.velocities()) || !is_finite(member.free()) {
         return Some("a velocity that is not finite".to_owned());
     }
-    let skin = member.skin()?;
-    match skin.view {
-        ShapePose::Chain { positions, radii_m } => {
-            let is_sound = is_finite(positions) && radii_m.iter().all(|r| r.is_finite());
-            (!is_sound).then(|| "a skin that is not finite".to_owned())
-        }
-        ShapePose::Surface(positions) => (!is_finite(positions)).then(|| "a skin that is not finite".to_owned()),
+    let is_sound = match member.skin()?.view {
+        ShapePose::Chain { positions, radii_m } => is_finite(positions) && radii_m.iter().all(|r| r.is_finite()),
+        ShapePose::Surface(positions) => is_finite(positions),
         // seen wherever it is asked for
-        ShapePose::Solid { .. } | ShapePose::Tool { .. } => None,
-    }
+        ShapePose::Solid { .. } | ShapePose::Tool { .. } => true,
+    };
+    (!is_sound).then(|| "a skin that is not finite".to_owned())
 }
 
 fn number_fault(what: &'static str) -> impl FnOnce(&f64) -> Option<String> {

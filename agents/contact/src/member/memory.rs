@@ -3,8 +3,8 @@
 //! In: contacts with their impulses. Out: the same for the next step. Never here: contacts that are new.
 //! A pair is remembered by its lower number, so that nothing has to be moved when clusters join or part.
 
+use crate::agent::Link;
 use crate::joint::{Joint, JointKind};
-use crate::law::Link;
 use crate::lists::entry;
 use crate::member::Slid;
 use glam::DVec3;
@@ -75,14 +75,6 @@ pub(crate) struct Remembered {
     pub owed_slip_m: DVec3,
     /// The same of its friction about the normal.
     pub spin: Spin,
-}
-
-impl Remembered {
-    /// A place that owes nothing.
-    pub const fn new(key: TouchKey, force_n: DVec3) -> Self {
-        let spin = Spin { radius_m: 0.0, torque_n_m: 0.0, owed_rad: 0.0 };
-        Self { key, force_n, load_n: 0.0, overlap_m: 0.0, push_n: 0.0, owed_slip_m: DVec3::ZERO, spin }
-    }
 }
 
 /// One pair, with its places by rising keys.
@@ -417,7 +409,11 @@ mod tests {
         let partner = Partner::Static(0);
         let kinds = [TouchKind::Vertex, TouchKind::Edge, TouchKind::Triangle];
         let keys = kinds.map(|kind| TouchKey::new(kind, [3, 0]));
-        memory.pair(partner).next.extend(keys.map(|key| Remembered::new(key, DVec3::Z)));
+        memory.pair(partner).next.extend(keys.map(|key| Remembered {
+            key,
+            force_n: DVec3::Z,
+            ..Remembered::default()
+        }));
         memory.turn(SimTime::ZERO);
         memory.forget_features();
         assert_eq!(keys.map(|key| memory.recall(partner, key).force_n.z), [1.0, 0.0, 0.0]);

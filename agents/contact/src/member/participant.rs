@@ -4,7 +4,7 @@
 //! velocities at which its place moves. Never here: contacts, the problem. Theory: docs/theory/clusters.md, section 9 (eq. 24 to 26).
 
 use crate::StepContext;
-use crate::law::Law;
+use crate::agent::Law;
 use crate::lists::{refill, reset};
 use crate::member::{ClusterMember, ContactMemory, GuardedMember};
 use crate::solve::Side;
@@ -161,38 +161,17 @@ impl Progress {
 
     /// Finds v̄(p), û and what they leave unanswered, of the fine step that begins (eq. 24).
     pub fn look(&mut self, member: &dyn ClusterMember) {
-        let Self {
-            share,
-            part,
-            v_start,
-            dv_free,
-            dv_impulses,
-            v_before,
-            v_so_far,
-            v_predicted,
-            unanswered,
-            owed_n_s,
-            dv_impacts,
-            dx_impacts,
-            ..
-        } = self;
-        dv_impacts.clear();
-        dx_impacts.clear();
-        let each = f64::from(*share).recip();
-        unanswered.iter_mut().zip(member.unanswered()).for_each(|(r, more)| *r += *more * each);
-        unanswered.iter_mut().zip(&*owed_n_s).for_each(|(r, more)| *r += *more * each);
-        let (p, s) = (f64::from(*part), f64::from(*part) / f64::from(*share));
-        refill(
-            v_so_far,
-            v_start
-                .iter()
-                .zip(&*dv_free)
-                .zip(&*dv_impulses)
-                .map(|((v, dv_free), dv_impulses)| *v + *dv_free * s + *dv_impulses),
-        );
-        v_predicted.clear();
-        v_predicted
-            .extend(v_so_far.iter().zip(&*v_before).map(|(v_so_far, v_before)| *v_so_far * p - *v_before * (p - 1.0)));
+        self.dv_impacts.clear();
+        self.dx_impacts.clear();
+        let (p, shares) = (f64::from(self.part), f64::from(self.share));
+        let (each, s) = (shares.recip(), p / shares);
+        self.unanswered.iter_mut().zip(member.unanswered()).for_each(|(r, more)| *r += *more * each);
+        self.unanswered.iter_mut().zip(&self.owed_n_s).for_each(|(r, more)| *r += *more * each);
+        let changes = self.dv_free.iter().zip(&self.dv_impulses);
+        let so_far = |(v, (free, impulses)): (&DVec3, (&DVec3, &DVec3))| *v + *free * s + *impulses;
+        refill(&mut self.v_so_far, self.v_start.iter().zip(changes).map(so_far));
+        let moves = |(so_far, before): (&DVec3, &DVec3)| *so_far * p - *before * (p - 1.0);
+        refill(&mut self.v_predicted, self.v_so_far.iter().zip(&self.v_before).map(moves));
     }
 
     /// Finds at which velocity its place moves by the last solve: where it `flies` if nothing holds it, in the mean of the fine step.
@@ -205,9 +184,8 @@ impl Progress {
 
     /// Takes a share of the velocities that impacts lead to from those solved.
     pub fn strike(&mut self, struck: &[DVec3], share: f64) {
-        self.dv_impacts.clear();
-        self.dv_impacts
-            .extend(struck.iter().zip(&self.v_solved).map(|(struck, v_solved)| (*struck - *v_solved) * share));
+        let changes = struck.iter().zip(&self.v_solved).map(|(struck, v_solved)| (*struck - *v_solved) * share);
+        refill(&mut self.dv_impacts, changes);
     }
 
     /// Lets it be where its flight has brought it, in a step of `h_s` seconds with all impulses `after_s` seconds from its start (eq. 27).

@@ -1,7 +1,7 @@
 //! The ends of transmission lines at one agent: links and contacts by wave variables.
 //!
 //! In: what partners published of their ends. Out: rows for the cluster's problem, and the waves that this end sends. Never here: the law
-//! of a line ([`crate::laws`]), the other end: it does the same for itself. Theory: docs/theory/coupling.md, eq. 10 to 11.
+//! of a line (`transmission_line.rs`), the other end: it does the same for itself. Theory: docs/theory/coupling.md, eq. 10 to 11.
 
 use crate::lists::entry;
 use crate::member::{ClusterMember, Participant};

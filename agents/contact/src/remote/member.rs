@@ -82,8 +82,7 @@ impl RemoteMember {
         for list in [&mut self.deviation, &mut self.carried] {
             reset(list, self.model.blocks.len(), DVec3::ZERO);
         }
-        self.gain_m_s2.clear();
-        self.gain_m_s2.extend(self.model.blocks.iter().map(|block| block.acceleration));
+        refill(&mut self.gain_m_s2, self.model.blocks.iter().map(|block| block.acceleration));
         known && (self.led.is_some() || !self.blocks.is_empty())
     }
 

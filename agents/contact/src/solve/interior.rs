@@ -113,7 +113,7 @@ impl Interior {
         let spread = SPREAD * (2.0 * (f64::from(self.stuck) * GOLDEN + 0.5).fract() - 1.0);
         let by_m_s = (INSIDE * spread.exp2() * iterate.mean_miss_m_s()).max(INSIDE_MIN_M_S);
         for (k, inside) in self.rows.iter_mut().enumerate() {
-            if k == iterate.rows.contacts() {
+            if k == iterate.rows.contacts {
                 iterate.press();
             }
             let at = iterate.state.point(k);

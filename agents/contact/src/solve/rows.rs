@@ -64,7 +64,8 @@ pub(super) struct Point {
 #[derive(Debug, Clone, Default)]
 pub(super) struct Rows {
     pub rows: Vec<Row>,
-    contacts: usize,
+    /// How many of them are contacts.
+    pub contacts: usize,
     terms: Vec<Term>,
     /// Rows that are bounded by what presses a contact.
     pressed: Vec<PressedRow>,
@@ -229,11 +230,6 @@ impl Rows {
             }
             law => law,
         };
-    }
-
-    /// How many of them are contacts.
-    pub fn contacts(&self) -> usize {
-        self.contacts
     }
 
     pub fn len(&self) -> usize {

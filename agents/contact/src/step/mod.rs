@@ -186,7 +186,8 @@ impl ClusterStepper {
             self.detect(scene, all, h_s);
             self.assemble(scene, all, h_s, f64::from(fine) * h_s);
             self.warm_start(all, h_s);
-            self.impacts.begin([self.macro_s, h_s], &mut self.search, &self.constraints, &self.progress);
+            let given = [self.macro_s, h_s, self.depth_m];
+            self.impacts.begin(given, &mut self.search, &self.constraints, &self.progress);
             self.solve(on, all, h_s, report)?;
             if self.divide_joints(all) || self.divide(all, h_s) {
                 return Ok(false);

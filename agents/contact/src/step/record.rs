@@ -108,7 +108,8 @@ impl ClusterStepper {
                 total_of(&mut sums.totals, owner.member, owner.partner).add(given, 0.0);
             }
             let owed_slip_m = owner.owed_slip_m(row, impulse, &self.progress, h_s);
-            let place = Remembered { owed_slip_m, ..Remembered::new(place_key(owner.key), impulse / h_s) };
+            let (key, force_n) = (place_key(owner.key), impulse / h_s);
+            let place = Remembered { key, force_n, owed_slip_m, ..Remembered::default() };
             all[owner.member].memory.pair(owner.partner).next.push(place);
         }
         joints.note_efforts(constraints, &solution.rows_n_s, &mut sums.efforts);

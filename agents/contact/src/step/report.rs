@@ -3,7 +3,7 @@
 //! In: impulses of contacts and rows, reports of solves. Out: sums, by participants and partners. Never here: which rows there are, the solve.
 
 use crate::constraint::JointTotal;
-use crate::lists::entry;
+use crate::lists::{entry, reset};
 use crate::member::memory::Partner;
 use crate::solve::Report;
 use glam::DVec3;
@@ -116,8 +116,7 @@ impl Sums {
     pub fn begin(&mut self, participants: usize) {
         let Self { totals, wrenches, efforts } = self;
         totals.clear();
-        wrenches.clear();
         efforts.clear();
-        wrenches.resize(participants, Wrench::default());
+        reset(wrenches, participants, Wrench::default());
     }
 }

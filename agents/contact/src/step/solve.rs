@@ -134,19 +134,10 @@ impl ClusterStepper {
         may_fly: bool,
         report: &mut ClusterReport,
     ) -> Result<(), StepError> {
-        let Self { impacts, search, constraints, solver, progress, members, depth_m, .. } = self;
-        let (solution, depth_m, threads) = (solver.solution(), *depth_m, on.threads);
-        let took = impacts.rebound(SolvedStep {
-            all,
-            search,
-            constraints,
-            solution,
-            members,
-            progress,
-            threads,
-            depth_m,
-            may_fly,
-        })?;
+        let Self { impacts, search, constraints, solver, progress, members, .. } = self;
+        let (solution, threads) = (solver.solution(), on.threads);
+        let step = SolvedStep { all, search, constraints, solution, members, progress, threads, may_fly };
+        let took = impacts.rebound(step)?;
         took.iter().for_each(|took| report.add(took));
         Ok(())
     }
