@@ -4,9 +4,9 @@
 //! near its diagonal). Theory: `docs/theory/clusters.md`, eq. 8.
 
 use super::factor::{Cholesky, Pair, Place};
-use super::gradients::Stiffness;
 use super::problem::Block;
 use super::rows::{Rows, Term};
+use super::skew::Stiffness;
 use glam::DMat3;
 use glam::DVec3;
 use metachron_core::{Archive, ArchiveError};

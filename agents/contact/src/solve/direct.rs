@@ -5,10 +5,10 @@
 
 use super::coupled::{Coupled, PlacedRows};
 use super::factor::{Cholesky, Pair};
-use super::gradients::Stiffness;
 use super::members::Members;
 use super::problem::Block;
 use super::rows::Rows;
+use super::skew::Stiffness;
 use glam::DVec3;
 use metachron_core::{Archive, ArchiveError, ParallelFor};
 

@@ -8,11 +8,11 @@ use super::coupled::{Coupled, PlacedRows};
 use super::factor::Pair;
 use super::members::{Members, Size};
 use super::problem::Block;
-use super::residuals::{Direction, Residuals};
+use super::residuals::{Direction, Residuals, Task};
 use super::rows::Rows;
-use super::skew::Skew;
+use super::skew::Stiffness;
 use glam::{DMat3, DVec3};
-use metachron_core::{Archive, ArchiveError, ParallelFor};
+use metachron_core::{Archive, ArchiveError};
 
 /// Starts from the true residual: what is summed up along the way differs from it by rounding.
 const ROUNDS: usize = 3;
@@ -28,19 +28,6 @@ const SHARE_OF_GOAL: f64 = 0.5;
 /// The place of a block that is not near.
 const NOWHERE: usize = usize::MAX;
 
-/// One system of linear equations.
-#[derive(Debug)]
-pub(super) struct Task<'a> {
-    /// The right side.
-    pub right: &'a [DVec3],
-    /// Where to start, then the solution; a factor needs no start.
-    pub x: &'a mut [DVec3],
-    /// Right side less product, exactly; zero by a factor.
-    pub left: &'a mut [DVec3],
-    /// The size that `left` may have (eq. 15), √J; where it is larger, the operator's `still_m_s` ends the solve.
-    pub goal: f64,
-}
-
 /// What is multiplied by: ⊕ A/f, with Jᵀ G J where there are contacts in it.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Operator<'a> {
@@ -48,17 +35,6 @@ pub(super) struct Operator<'a> {
     pub contacts: Option<Stiffness<'a>>,
     /// What changes no block by more than this by itself may be left, m/s.
     pub still_m_s: f64,
-}
-
-/// Jᵀ (G + S) J.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct Stiffness<'a> {
-    pub rows: &'a Rows,
-    pub gains: &'a [DMat3],
-    /// S, the part of each row that no factor holds; empty where there is none.
-    pub skews: &'a [Skew],
-    /// Who factors it.
-    pub threads: &'a dyn ParallelFor,
 }
 
 /// The preconditioner and the storage of conjugate gradients.
@@ -78,20 +54,6 @@ pub(super) struct Gradients {
     residuals: Residuals,
     /// Products since the members were taken up.
     pub products: usize,
-}
-
-impl Stiffness<'_> {
-    /// Whether there is a part that is not symmetric.
-    pub fn is_skew(&self) -> bool {
-        self.skews.iter().any(|skew| *skew != Skew::NONE)
-    }
-
-    /// out ← out + Jᵀ S J x.
-    pub fn add_skew(&self, x: &[DVec3], out: &mut [DVec3]) {
-        for (row, skew) in self.skews.iter().enumerate().filter(|(_, skew)| **skew != Skew::NONE) {
-            self.rows.add_impulse(row, skew.impulse(self.rows.velocity(row, x)), out);
-        }
-    }
 }
 
 impl Operator<'_> {

@@ -3,8 +3,9 @@
 //! In: the last problem of a solver. Out: velocities of blocks per impulse on them. Never here: the solve, who asks.
 //! Theory: `docs/theory/coupling.md`, eq. 7m.
 
-use super::gradients::{Stiffness, Task};
 use super::newton::linearise;
+use super::residuals::Task;
+use super::skew::Stiffness;
 use super::solver::Solver;
 use glam::{DMat3, DVec3};
 use metachron_core::PlainLoop;

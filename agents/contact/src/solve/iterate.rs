@@ -6,10 +6,10 @@
 //! Theory: `docs/theory/clusters.md`, eq. 8 and 15–17.
 
 use super::cone::Projection;
-use super::gradients::{Stiffness, Task};
 use super::problem::Member;
+use super::residuals::Task;
 use super::rows::{Point, Rows};
-use super::skew::{Followed, Skew, follow_pressure, follow_slip};
+use super::skew::{Followed, Skew, Stiffness, follow_pressure, follow_slip};
 use super::system::{StepForm, System};
 use glam::{DMat3, DVec3};
 use metachron_core::ParallelFor;

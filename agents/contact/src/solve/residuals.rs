@@ -3,9 +3,21 @@
 //! In: what is left of a right side, and who makes a direction of it. Out: a solution and what it leaves, smaller by every direction. Never
 //! here: the matrix, how directions are made. Theory: `docs/theory/clusters.md`, eq. 8b and 15.
 
-use super::gradients::Task;
 use super::members::Members;
 use glam::DVec3;
+
+/// One system of linear equations.
+#[derive(Debug)]
+pub(super) struct Task<'a> {
+    /// The right side.
+    pub right: &'a [DVec3],
+    /// Where to start, then the solution; a factor needs no start.
+    pub x: &'a mut [DVec3],
+    /// Right side less product, exactly; zero by a factor.
+    pub left: &'a mut [DVec3],
+    /// The size that `left` may have (eq. 15), √J; where it is larger, the operator's `still_m_s` ends the solve.
+    pub goal: f64,
+}
 
 /// A change of the solution, and the part of the right side that it answers.
 #[derive(Debug, Clone, Default)]

@@ -3,9 +3,10 @@
 //! In: the last problem of a solver, a velocity of the sides of each contact that is not that of any block. Out: impulses. Never here: the
 //! solve, who moves. Theory: `docs/theory/coupling.md`, eq. 7s.
 
-use super::gradients::{Stiffness, Task};
 use super::iterate::Iterate;
 use super::newton::linearise;
+use super::residuals::Task;
+use super::skew::Stiffness;
 use super::solver::Solver;
 use glam::DVec3;
 use metachron_core::PlainLoop;

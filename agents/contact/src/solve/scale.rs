@@ -3,9 +3,9 @@
 //! In: members and rows. Out: a scale of each row, in the row. Never here: how equations are solved.
 //! Theory: `docs/theory/clusters.md`, eq. 6.
 
-use super::gradients::Task;
 use super::members::Members;
 use super::problem::Member;
+use super::residuals::Task;
 use super::rows::{Rows, Term};
 use super::system::System;
 use glam::{DMat3, DVec3};

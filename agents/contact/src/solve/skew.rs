@@ -1,11 +1,12 @@
 //! The part of a law's slope that is not symmetric: friction that follows its pressure, and a shift that follows its slip.
 //!
-//! In: a row and where it is. Out: a matrix of rank one. Never here: equations, and how they are solved (`residuals.rs`).
+//! In: rows and where they are. Out: a matrix of rank one for each. Never here: equations, and how they are solved (`residuals.rs`).
 //! Theory: `docs/theory/clusters.md`, eq. 8b and C3.
 
 use super::cone::{Law, Projection};
-use super::rows::{Point, Row};
+use super::rows::{Point, Row, Rows};
 use glam::{DMat3, DVec3};
+use metachron_core::ParallelFor;
 
 /// By how much the impulse of a row changes beyond its symmetric gain: by `gives` for each unit of the velocity along `sees`.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -14,6 +15,17 @@ pub(super) struct Skew {
     pub gives: DVec3,
     /// In the row's frame, 1/kg times the reciprocal unit of `gives`.
     pub sees: DVec3,
+}
+
+/// Jᵀ (G + S) J.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Stiffness<'a> {
+    pub rows: &'a Rows,
+    pub gains: &'a [DMat3],
+    /// S, the part of each row that no factor holds; empty where there is none.
+    pub skews: &'a [Skew],
+    /// Who factors it.
+    pub threads: &'a dyn ParallelFor,
 }
 
 /// What the exact slope of a row adds to its symmetric gain.
@@ -28,6 +40,20 @@ impl Skew {
     /// The impulse that a row gives less where its velocity changes by this.
     pub fn impulse(&self, velocity: DVec3) -> DVec3 {
         self.gives * self.sees.dot(velocity)
+    }
+}
+
+impl Stiffness<'_> {
+    /// Whether there is a part that is not symmetric.
+    pub fn is_skew(&self) -> bool {
+        self.skews.iter().any(|skew| *skew != Skew::NONE)
+    }
+
+    /// out ← out + Jᵀ S J x.
+    pub fn add_skew(&self, x: &[DVec3], out: &mut [DVec3]) {
+        for (row, skew) in self.skews.iter().enumerate().filter(|(_, skew)| **skew != Skew::NONE) {
+            self.rows.add_impulse(row, skew.impulse(self.rows.velocity(row, x)), out);
+        }
     }
 }
 

@@ -5,12 +5,13 @@
 
 use super::direct::Direct;
 use super::error::ProblemError;
-use super::gradients::{Gradients, Operator, Stiffness, Task};
+use super::gradients::{Gradients, Operator};
 use super::members::Members;
 use super::problem::{Member, Problem};
-use super::residuals::{Direction, Residuals};
+use super::residuals::{Direction, Residuals, Task};
 use super::rows::Rows;
 use super::scale::Scales;
+use super::skew::Stiffness;
 use glam::DVec3;
 use metachron_core::{Archive, ArchiveError};
 use std::ops::Range;
