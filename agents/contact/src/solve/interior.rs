@@ -9,7 +9,8 @@ use super::lorentz::Lorentz;
 use super::newton::Aim;
 use crate::lists::refill;
 
-/// How far inside its cone a start lies, in means of what laws and momentum miss, and the least of it, m/s.
+/// How far inside their cones impulses and dual points start, in means of what laws and momentum miss, √J, so that λ·y is the same for all
+/// rows and none moves another by more than its own share; and the least of it, m/s.
 const INSIDE: f64 = 3.0;
 const INSIDE_MIN_M_S: f64 = 1e-5;
 /// The most of the way to the nearest edge that a step goes.
@@ -29,10 +30,10 @@ const LEAVE: f64 = 1e-3;
 #[derive(Debug, Clone, Default)]
 pub(super) struct Interior {
     rows: Vec<Inside>,
-    /// How often it was stuck, the best place of these, and what that misses in the mean, m/s.
+    /// How often it was stuck, the best place of these, and what that misses, √J.
     stuck: u32,
     best: Kept,
-    least_m_s: f64,
+    least: f64,
     /// Whether steps know how shifts follow slips.
     follows: bool,
 }
@@ -49,7 +50,7 @@ struct Gap {
 impl Interior {
     /// Begins from where an iterate is.
     pub fn begin(&mut self, iterate: &mut Iterate) {
-        (self.stuck, self.least_m_s) = (0, f64::INFINITY);
+        (self.stuck, self.least) = (0, f64::INFINITY);
         iterate.keep(&mut self.best);
         refill(&mut self.rows, iterate.rows.rows.iter().map(Inside::of));
         self.enter(iterate);
@@ -57,7 +58,7 @@ impl Interior {
 
     /// Goes back to the best place at which it was stuck where that is better.
     pub fn finish(&mut self, iterate: &mut Iterate) {
-        if self.stuck > 0 && self.least_m_s < iterate.mean_miss_m_s() {
+        if self.stuck > 0 && self.least < iterate.missed() {
             iterate.go_back(&self.best);
         }
     }
@@ -97,10 +98,10 @@ impl Interior {
     /// Begins again from the best place at which it was stuck, at another distance from the edges.
     fn leave(&mut self, iterate: &mut Iterate) {
         self.stuck += 1;
-        let here_m_s = iterate.mean_miss_m_s();
-        if here_m_s < self.least_m_s {
+        let here = iterate.missed();
+        if here < self.least {
             iterate.keep(&mut self.best);
-            self.least_m_s = here_m_s;
+            self.least = here;
         } else {
             iterate.go_back(&self.best);
         }
@@ -111,13 +112,14 @@ impl Interior {
     fn enter(&mut self, iterate: &mut Iterate) {
         iterate.press();
         let spread = SPREAD * (2.0 * (f64::from(self.stuck) * GOLDEN + 0.5).fract() - 1.0);
-        let by_m_s = (INSIDE * spread.exp2() * iterate.mean_miss_m_s()).max(INSIDE_MIN_M_S);
+        let by = INSIDE * spread.exp2() * iterate.missed() / (iterate.rows.len() as f64).sqrt();
         for (k, inside) in self.rows.iter_mut().enumerate() {
             if k == iterate.rows.contacts {
                 iterate.press();
             }
             let at = iterate.state.point(k);
-            inside.enter(&iterate.rows.rows[k], at, by_m_s);
+            let row = &iterate.rows.rows[k];
+            inside.enter(row, at, (by * row.scale.sqrt()).max(INSIDE_MIN_M_S));
             iterate.state.lambda[k] = inside.impulse;
         }
         iterate.remeasure();

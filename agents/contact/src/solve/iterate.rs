@@ -273,18 +273,6 @@ impl Iterate {
         (of_rows.sum::<f64>() + self.system.members.measure(&self.state.left).squared).sqrt()
     }
 
-    /// The root of the mean square of what laws and momentum miss, m/s.
-    pub fn mean_miss_m_s(&self) -> f64 {
-        let of_rows = self.rows.rows.iter().enumerate().map(|(k, row)| {
-            let at = self.state.point(k);
-            ((row.natural_map(at).value - at.impulse) * row.scale).length_squared()
-        });
-        let of_blocks = self.system.members.mobilities.iter().zip(&self.state.left);
-        let blocks = of_blocks.map(|(mobility, left)| (*mobility * *left).length_squared());
-        let (rows, blocks) = (of_rows.sum::<f64>(), blocks.sum::<f64>());
-        (rows / self.rows.len().max(1) as f64 + blocks / self.state.left.len().max(1) as f64).sqrt()
-    }
-
     /// Jᵀ (λ + c) + r − ⊕A/f Δv into `scratch`.
     fn pull_on_members(&mut self) {
         let Self { rows, system, state, step, unanswered, scratch, .. } = self;
