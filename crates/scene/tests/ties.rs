@@ -62,9 +62,9 @@ fn without_contacts_only_the_pairs_that_a_coupling_names_collide() {
         let speed = |body: &Body| if let Body::Rigid(state) = body { state.velocity.x } else { f64::NAN };
         world.agents().iter().map(|agent| speed(&agent.latest().body)).collect::<Vec<_>>()
     };
-    // laws of contact hold to 5 µm/s
-    let near = |found: Vec<f64>, wanted: [f64; 3]| found.iter().zip(wanted).all(|(a, b)| (a - b).abs() < 5e-6);
-    assert!(near(speeds(""), [1.0, 0.0, 0.0]), "it passes through both");
+    // the contact of an impact without loss gives way by 2 µm/s
+    let near = |found: Vec<f64>, wanted: [f64; 3]| found.iter().zip(wanted).all(|(a, b)| (a - b).abs() < 2e-6);
+    assert_eq!(speeds(""), [1.0, 0.0, 0.0], "it passes through both");
     assert!(
         near(speeds("coupling = [{ a = \"0\", b = \"1\" }]"), [0.0, 0.0, 1.0]),
         "it passes the second and meets the third"
