@@ -4,7 +4,7 @@ use metachron_core::{AgentId, AttachmentEventKind, AttachmentId, Body, SimSpan};
 use metachron_scene::{SceneError, Source, load};
 use metachron_world::couplings::CouplingKind;
 use metachron_world::kinds::ExecutorKind;
-use metachron_world::{Scene, SolveBudget, Spec, World};
+use metachron_world::{Scene, Spec, World};
 
 /// The leader of each agent before the first step.
 fn leaders(scene: &Scene) -> Vec<u32> {
@@ -62,9 +62,9 @@ fn without_contacts_only_the_pairs_that_a_coupling_names_collide() {
         let speed = |body: &Body| if let Body::Rigid(state) = body { state.velocity.x } else { f64::NAN };
         world.agents().iter().map(|agent| speed(&agent.latest().body)).collect::<Vec<_>>()
     };
-    // laws of contact hold to 5 µm/s
-    let near = |found: Vec<f64>, wanted: [f64; 3]| found.iter().zip(wanted).all(|(a, b)| (a - b).abs() < 5e-6);
-    assert!(near(speeds(""), [1.0, 0.0, 0.0]), "it passes through both");
+    // the contact of an impact without loss gives way by 2 µm/s
+    let near = |found: Vec<f64>, wanted: [f64; 3]| found.iter().zip(wanted).all(|(a, b)| (a - b).abs() < 2e-6);
+    assert_eq!(speeds(""), [1.0, 0.0, 0.0], "it passes through both");
     assert!(
         near(speeds("coupling = [{ a = \"0\", b = \"1\" }]"), [0.0, 0.0, 1.0]),
         "it passes the second and meets the third"
@@ -245,32 +245,4 @@ fn the_world_says_how_deep_contacts_rest() {
     let SceneError { problems, .. } = load(&source, &[]).unwrap_err();
     let said = format!("{}; {}", problems[0].message, problems[0].expected);
     assert!(said.contains("`contact_depth_m` of `[world]` is 0.1") && said.contains("0.000001 to 0.001 m"), "{said}");
-}
-
-#[test]
-fn the_world_says_how_far_solves_go() {
-    let budget = |text: &str| balls(text).contact_budget;
-    assert_eq!(budget(""), SolveBudget::Exact);
-    assert_eq!(budget("world.contact = \"budget\""), SolveBudget::Timed { least_steps: 5 });
-    assert_eq!(
-        budget("world.contact = \"budget\"\nworld.contact_least_steps = 12"),
-        SolveBudget::Timed { least_steps: 12 }
-    );
-    assert_eq!(budget("world.contact = \"exact\""), SolveBudget::Exact);
-    for (line, expected) in [
-        ("world.contact_least_steps = 0", ["`contact_least_steps` of `[world]` is 0", "1 to 400"]),
-        ("world.contact_least_steps = 401", ["`contact_least_steps` of `[world]` is 401", "1 to 400"]),
-        ("world.contact = \"rough\"", ["rough", "exact"]),
-    ] {
-        let source = Source::memory("wrong", format!("format = 1\n{line}").as_bytes()).unwrap();
-        let SceneError { problems, .. } = load(&source, &[]).unwrap_err();
-        let said = format!("{}; {}", problems[0].message, problems[0].expected);
-        assert!(expected.iter().all(|part| said.contains(part)), "{said}");
-    }
-}
-
-#[test]
-fn a_machine_declares_what_a_factor_costs() {
-    let steps = balls("machine.step.factor = { base_us = 7, unit_us = 2 }").machine.steps;
-    assert_eq!(steps, [("factor".to_owned(), Some(7.0), Some(2.0))]);
 }
