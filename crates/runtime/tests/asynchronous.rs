@@ -79,8 +79,8 @@ fn a_ball_by_ledger_rests_on_a_plate_with_its_weight_in_a_cluster_of_its_own() {
         let after = pair(&all);
         assert_eq!(after.kind, PairKind::Ledger);
         assert!(all[1 - computing].pairs.iter().all(|pair| pair.with != AgentId(computing as u32)), "{rates:?}");
-        // both rest 20 µm deep; at 1000 : 60 Hz the ball is never at rest, and goes as deep as it falls in a step of its own
-        let stirs_m = if rates[0] == 1000.0 { 9.81 / 3600.0 } else { 1.1e-4 };
+        // both rest 20 µm deep; at 1000 : 60 Hz the ball is never at rest, and goes a little deeper than it falls in a step of its own
+        let stirs_m = if rates[0] == 1000.0 { 1.2 * 9.81 / 3600.0 } else { 1.1e-4 };
         let weight = (after.impulse_n_s - before.impulse_n_s) / (2.0 * 0.2 * 9.81);
         println!("{rates:?}: {depths_m:?} m, {weight}");
         assert!(depths_m[0] > 4e-5 - 2e-4 && depths_m[1] < 4e-5 + stirs_m, "{rates:?}: {depths_m:?} m");
