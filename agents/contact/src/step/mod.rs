@@ -115,7 +115,7 @@ impl ClusterStepper {
     /// as they were.
     ///
     /// # Panics
-    /// Where a member does, or answers what no step goes on with ([`GuardedMember`]): all others are as they were.
+    /// Where a member does, or answers what no step goes on with ([`GuardedMember`](crate::member::GuardedMember)): all others are as they were.
     pub fn step(
         &mut self,
         scene: &ClusterScene,
