@@ -62,7 +62,7 @@ pub(super) struct PlacedSkin {
 }
 
 /// The form of a skin, as long as somebody else has it.
-struct KnownForm {
+pub(super) struct KnownForm {
     vertices: Weak<[u32]>,
     edges: Weak<[[u32; 2]]>,
     triangles: Weak<[[u32; 3]]>,
@@ -84,7 +84,7 @@ impl SkinCache {
         let is_known = |skin: &PlacedSkin| skin.form.is_that_of(form) && skin.address == address;
         let at = self.skins.iter().position(is_known).or_else(|| self.replaceable(form));
         let at = at.unwrap_or_else(|| {
-            self.skins.retain(|skin| skin.form.fans.strong_count() > 0);
+            self.skins.retain(|skin| skin.form.is_had());
             let known = self.skins.iter().find(|skin| skin.form.is_that_of(form)).map(|skin| Arc::clone(&skin.tree));
             self.skins.push(PlacedSkin::new(form, known.unwrap_or_else(|| Arc::new(SkinTree::of(form, positions)))));
             self.skins.len() - 1
@@ -109,7 +109,7 @@ impl SkinCache {
 }
 
 impl KnownForm {
-    fn new(form: &SurfaceShape) -> Self {
+    pub fn new(form: &SurfaceShape) -> Self {
         Self {
             vertices: Arc::downgrade(&form.vertices),
             edges: Arc::downgrade(&form.edges),
@@ -118,7 +118,12 @@ impl KnownForm {
         }
     }
 
-    fn is_that_of(&self, form: &SurfaceShape) -> bool {
+    /// Whether somebody else has it.
+    pub fn is_had(&self) -> bool {
+        self.fans.strong_count() > 0
+    }
+
+    pub fn is_that_of(&self, form: &SurfaceShape) -> bool {
         addr_eq(self.fans.as_ptr(), Arc::as_ptr(&form.fans))
             && addr_eq(self.triangles.as_ptr(), Arc::as_ptr(&form.triangles))
             && addr_eq(self.edges.as_ptr(), Arc::as_ptr(&form.edges))

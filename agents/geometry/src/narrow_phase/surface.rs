@@ -7,6 +7,7 @@
 //! no wall. On what is round each node over a triangle and each edge that it crosses is a place. A place of the other side is reported in
 //! the surface itself, so that both sides are pushed at one point.
 
+mod self_pairs;
 mod surface_box;
 mod surface_convex;
 mod surface_surface;
@@ -19,15 +20,19 @@ use crate::signed_distance::Ball;
 use crate::{Aabb, Place, SurfaceShape, Touch};
 use crate::{near_segments, near_triangle};
 use glam::DVec3;
+use self_pairs::SelfPairs;
 use surface_surface::SkinPair;
 
 /// Two soft skins that have passed each other by more than this share of an edge are ignored: they came from elsewhere.
 const DEEP_SHARE: f64 = 0.5;
 
-/// Scratch storage for searches: the patches of either surface that are near the other.
+/// What searches keep.
 #[derive(Default)]
 pub(super) struct SurfaceScratch {
+    /// The patches of either surface that are near the other.
     patches: [Vec<u32>; 2],
+    /// One for each skin that was searched against itself.
+    own: Vec<SelfPairs>,
 }
 
 /// A point of a surface: three vertices with shares.
@@ -235,11 +240,18 @@ impl SurfaceScratch {
 
     /// Every place within `reach_m` of a surface with itself; `rest` holds its vertices at rest.
     pub(super) fn self_touches(&mut self, surface: &Surface<'_>, rest: &[DVec3], reach_m: f64, into: &mut Vec<Touch>) {
-        let [patches, _] = &mut self.patches;
+        let Self { patches: [patches, _], own } = self;
         patches.clear();
         patches.extend(surface.skin.patches(|_| true));
         let query = SurfaceQuery { surface, reach_m, region: surface.bounds, patches };
-        SkinPair::with_itself(&query, rest).self_touches(into);
+        let pair = SkinPair::with_itself(&query, rest);
+        let at = own.iter().position(|pairs| pairs.is_of(surface.form)).unwrap_or_else(|| {
+            own.retain(SelfPairs::is_wanted);
+            own.push(SelfPairs::new(surface.form));
+            own.len() - 1
+        });
+        own[at].bring_to(surface, rest, &pair);
+        pair.self_touches(&own[at], into);
     }
 }
 

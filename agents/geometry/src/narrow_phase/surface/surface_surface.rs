@@ -5,7 +5,8 @@
 
 use super::super::touch_key::{TouchKey, TouchKind};
 use super::super::voronoi_regions::{Feature, LEAN, LEAN_SHARE};
-use super::{BarycentricPoint, DEEP_SHARE, SkinPoint, SurfaceQuery, Triangle, shares, vertex_key};
+use super::self_pairs::SelfPairs;
+use super::{BarycentricPoint, DEEP_SHARE, Edge, SkinPoint, SurfaceQuery, Triangle, shares, vertex_key};
 use crate::capsule_chain::CROSSING_M;
 use crate::{Aabb, SurfaceShape, Touch};
 use crate::{near_segments, near_triangle};
@@ -74,11 +75,14 @@ impl OwnSkin<'_> {
     /// Whether two edges without a common vertex never touch.
     fn is_crossed(&self, first: [u32; 2], second: [u32; 2]) -> bool {
         let at = |vertex: u32| self.rest[vertex as usize];
-        let (first, second) = (first.map(at), second.map(at));
-        let (s, t) = near_segments(first, second);
-        let apart_m = first[0].lerp(first[1], s).distance(second[0].lerp(second[1], t));
-        apart_m < self.apart_m
+        is_near(first.map(at), second.map(at), self.apart_m)
     }
+}
+
+/// Whether two segments are nearer to each other than `within_m`.
+fn is_near(first: [DVec3; 2], second: [DVec3; 2], within_m: f64) -> bool {
+    let (s, t) = near_segments(first, second);
+    first[0].lerp(first[1], s).distance(second[0].lerp(second[1], t)) < within_m
 }
 
 impl<'a> SkinPair<'a> {
@@ -106,10 +110,36 @@ impl<'a> SkinPair<'a> {
     }
 
     /// Every place of a skin with itself within reach.
-    pub fn self_touches(&self, into: &mut Vec<Touch>) {
-        self.vertices_here(into);
-        self.edges(into);
+    pub fn self_touches(&self, pairs: &SelfPairs, into: &mut Vec<Touch>) {
+        let surface = self.here.surface;
+        into.extend(pairs.vertices.iter().filter_map(|vertex| self.vertex_here(*vertex, surface.at(*vertex))));
+        let edges = pairs.edges.iter().map(|pair| pair.map(|number| surface.edge(number)));
+        into.extend(edges.filter_map(|[edge, other]| self.edge_touch(&edge, &other)));
         into.retain(|touch| touch.gap_m <= self.here.reach_m);
+    }
+
+    /// The vertices of a skin from which other features of it are not farther than `within_m`, and the pairs of its edges that are not; none
+    /// that are one at rest.
+    pub fn find_pairs(&self, within_m: f64, pairs: &mut SelfPairs) {
+        let Self { here, own, .. } = *self;
+        let Some(own) = own else { return };
+        let near = here.vertices().filter(|(vertex, at)| {
+            here.nearest(*at, within_m, None, |triangle| !own.is_one(*vertex, triangle)).is_some()
+        });
+        pairs.vertices.extend(near.map(|(vertex, _)| vertex));
+        for edge in here.edges() {
+            here.surface.each_edge(Aabb::of(&edge.ends).grown(within_m), |other| {
+                // most that are near have a vertex in common
+                let is_joined = || edge.vertices.iter().any(|vertex| other.vertices.contains(vertex));
+                if edge.number < other.number
+                    && !is_joined()
+                    && is_near(edge.ends, other.ends, within_m)
+                    && !own.is_crossed(edge.vertices, other.vertices)
+                {
+                    pairs.edges.push([edge.number, other.number]);
+                }
+            });
+        }
     }
 
     /// Every place within reach.
@@ -121,12 +151,13 @@ impl<'a> SkinPair<'a> {
     }
 
     fn vertices_here(&self, into: &mut Vec<Touch>) {
-        let Self { here, there, thick_m, .. } = *self;
-        for (vertex, at) in here.vertices() {
-            let Some(SkinContact { spot, normal, distance_m }) = self.vertex(here, there, vertex, at) else { continue };
-            let (on_a, on_b) = (BarycentricPoint::vertex(vertex).place(), spot.place());
-            into.push(Touch { key: vertex_key(vertex), normal, gap_m: distance_m - thick_m, on_a, on_b });
-        }
+        into.extend(self.here.vertices().filter_map(|(vertex, at)| self.vertex_here(vertex, at)));
+    }
+
+    fn vertex_here(&self, vertex: u32, at: DVec3) -> Option<Touch> {
+        let SkinContact { spot, normal, distance_m } = self.vertex(self.here, self.there, vertex, at)?;
+        let (on_a, on_b) = (BarycentricPoint::vertex(vertex).place(), spot.place());
+        Some(Touch { key: vertex_key(vertex), normal, gap_m: distance_m - self.thick_m, on_a, on_b })
     }
 
     fn vertices_there(&self, into: &mut Vec<Touch>) {
@@ -140,33 +171,28 @@ impl<'a> SkinPair<'a> {
     }
 
     fn edges(&self, into: &mut Vec<Touch>) {
-        let Self { here, there, thick_m, .. } = *self;
-        let inner = LEAN_SHARE..=1.0 - LEAN_SHARE;
-        for edge in here.edges() {
-            let around = Aabb { low: edge.ends[0].min(edge.ends[1]), high: edge.ends[0].max(edge.ends[1]) };
-            there.surface.each_edge(around.grown(self.within_m()), |other| {
-                // of two edges of one skin the lower number comes first; most that are near have a vertex in common
-                let is_joined = || edge.vertices.iter().any(|vertex| other.vertices.contains(vertex));
-                if self.own.is_some() && (edge.number >= other.number || is_joined()) {
-                    return;
-                }
-                let (s, t) = near_segments(edge.ends, other.ends);
-                let own = |own: OwnSkin<'_>| own.is_crossed(edge.vertices, other.vertices);
-                if !(inner.contains(&s) && inner.contains(&t)) || self.own.is_some_and(own) {
-                    return;
-                }
-                let (a, b) = (edge.at(s), other.at(t));
-                if let Some((normal, distance_m)) = self.crossing([a, b], [edge.feature(), other.feature()]) {
-                    let key = TouchKey::new(TouchKind::Edge, [edge.number, other.number]);
-                    let (on_a, on_b) = (a.spot.place(), b.spot.place());
-                    into.push(Touch { key, normal, gap_m: distance_m - thick_m, on_a, on_b });
-                }
-            });
+        let within_m = self.within_m();
+        for edge in self.here.edges() {
+            let around = Aabb::of(&edge.ends).grown(within_m);
+            self.there.surface.each_edge(around, |other| into.extend(self.edge_touch(&edge, &other)));
         }
     }
 
+    /// Where two edges cross.
+    fn edge_touch(&self, edge: &Edge, other: &Edge) -> Option<Touch> {
+        let inner = LEAN_SHARE..=1.0 - LEAN_SHARE;
+        let (s, t) = near_segments(edge.ends, other.ends);
+        if !(inner.contains(&s) && inner.contains(&t)) {
+            return None;
+        }
+        let (a, b) = (edge.at(s), other.at(t));
+        let (normal, distance_m) = self.crossing([a, b], [edge.feature(), other.feature()])?;
+        let key = TouchKey::new(TouchKind::Edge, [edge.number, other.number]);
+        Some(Touch { key, normal, gap_m: distance_m - self.thick_m, on_a: a.spot.place(), on_b: b.spot.place() })
+    }
+
     /// Search radius: nothing farther from a place is tested, metres.
-    fn within_m(&self) -> f64 {
+    pub fn within_m(&self) -> f64 {
         let closed = self.here.surface.form.closed || self.there.surface.form.closed;
         self.here.reach_m.max(if closed { self.deep_m } else { 0.0 }) + self.thick_m
     }

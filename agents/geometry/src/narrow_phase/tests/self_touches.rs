@@ -318,6 +318,27 @@ fn the_legs_of_a_soft_arch_touch_where_they_meet_and_a_crushed_block_does_not() 
 }
 
 #[test]
+fn a_skin_that_moves_touches_itself_where_a_first_search_finds_it() {
+    let (form, rest, flat) = sheet([12, 6], 5e-4, |point| point);
+    let (mut kept, mut found, mut most) = (NarrowPhaseScratch::default(), vec![], 0);
+    for step in 0..400 {
+        // it closes, is thrown away as a whole, and shakes in between
+        let at = f64::from(step);
+        let apart_m = 0.001 + 0.011 * libm::cos(at / 60.0).powi(2);
+        let shake = |k: usize| DVec3::new(0.0, 0.0, 4e-5 * libm::sin(1.3 * at + 7.0 * k as f64));
+        let thrown = DVec3::new(0.01, -0.02, 0.05) * at;
+        let places: Vec<_> =
+            flat.iter().enumerate().map(|(k, p)| folded(*p, 0.055, apart_m) + shake(k) + thrown).collect();
+        let placed = PlacedShape { form: &form, view: ShapePose::Surface(&places) };
+        let reach_m = 1e-3 * (1.0 + libm::sin(0.2 * at));
+        self_touches(&placed, RestShape::Surface(&rest), reach_m, &mut kept, &mut found);
+        assert_eq!(found, own(&placed, RestShape::Surface(&rest), reach_m), "step {step}");
+        most = most.max(found.len());
+    }
+    assert!(most > 20, "{most}");
+}
+
+#[test]
 fn nothing_is_allocated_by_a_skin_against_itself_once_everything_is_known() {
     let (form, rest, places) = sheet([20, 8], 1e-3, |point| folded(point, 0.098, 2.2e-3));
     let placed = PlacedShape { form: &form, view: ShapePose::Surface(&places) };
