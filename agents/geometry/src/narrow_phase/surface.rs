@@ -13,6 +13,7 @@ mod surface_convex;
 mod surface_surface;
 
 use super::primitives::{Piece, Strand, StrandPoint, Surface};
+use super::skin_tree::KnownForm;
 use super::touch_key::{TouchKey, TouchKind};
 use super::voronoi_regions::{Feature, LEAN, LEAN_SHARE};
 use crate::capsule_chain::CROSSING_M;
@@ -26,13 +27,22 @@ use surface_surface::SkinPair;
 /// Two soft skins that have passed each other by more than this share of an edge are ignored: they came from elsewhere.
 const DEEP_SHARE: f64 = 0.5;
 
+/// By how much more than is asked for the features of a skin are found that may touch it, as a share of the length of an edge.
+const ROOM_SHARE: f64 = 0.25;
+
 /// What searches keep.
 #[derive(Default)]
 pub(super) struct SurfaceScratch {
     /// The patches of either surface that are near the other.
     patches: [Vec<u32>; 2],
-    /// One for each skin that was searched against itself.
-    own: Vec<SelfPairs>,
+    /// Of each skin that was searched against itself.
+    own: Vec<KnownPairs>,
+}
+
+/// What of a skin may touch it, as long as somebody else has the skin.
+struct KnownPairs {
+    form: KnownForm,
+    pairs: SelfPairs,
 }
 
 /// A point of a surface: three vertices with shares.
@@ -245,13 +255,19 @@ impl SurfaceScratch {
         patches.extend(surface.skin.patches(|_| true));
         let query = SurfaceQuery { surface, reach_m, region: surface.bounds, patches };
         let pair = SkinPair::with_itself(&query, rest);
-        let at = own.iter().position(|pairs| pairs.is_of(surface.form)).unwrap_or_else(|| {
-            own.retain(SelfPairs::is_wanted);
-            own.push(SelfPairs::new(surface.form));
+        let at = own.iter().position(|known| known.form.is_that_of(surface.form)).unwrap_or_else(|| {
+            own.retain(|known| known.form.is_had());
+            own.push(KnownPairs { form: KnownForm::new(surface.form), pairs: SelfPairs::default() });
             own.len() - 1
         });
-        own[at].bring_to(surface, rest, &pair);
-        pair.self_touches(&own[at], into);
+        let pairs = &mut own[at].pairs;
+        let asked_m = pair.within_m();
+        if !pairs.has_all(rest, surface.positions, asked_m) {
+            let within_m = asked_m + ROOM_SHARE * surface.form.edge_m;
+            pairs.clear(rest, surface.positions, within_m);
+            pair.find_pairs(within_m, pairs);
+        }
+        pair.self_touches(pairs, into);
     }
 }
 
