@@ -35,17 +35,17 @@ pub struct FailedAttachment {
     pub force_n: f64,
 }
 
-/// What can tear or yield, in one macro step.
+/// The attachments that can tear or yield, in one macro step.
 #[derive(Debug, Default)]
 pub(crate) struct Failures {
     /// By participants and partners.
     loads: Vec<Load>,
     pub torn: Vec<FailedAttachment>,
-    /// Those that had never yielded before.
+    /// Attachments that had never yielded before.
     pub yielded: Vec<FailedAttachment>,
 }
 
-/// What an attachment that may tear has given since the macro step began.
+/// The impulse of an attachment that may tear, since the macro step began.
 #[derive(Debug, Clone, Copy)]
 struct Load {
     owner: RowOwner,

@@ -56,7 +56,7 @@ pub(crate) struct RowOwner {
 }
 
 impl RowOwner {
-    /// Of the first row of a tie that holds nobody, neither tears nor yields and owes nothing.
+    /// Of the first row of a tie that holds no member, neither tears nor yields and owes nothing.
     pub fn new(member: usize, other: Option<usize>, partner: Partner) -> Self {
         let (tears_above_n, yields_above_n) = (f64::INFINITY, f64::INFINITY);
         let (hold, frame, own, owes) = (None, Frame::WORLD, None, false);

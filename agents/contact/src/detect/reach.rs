@@ -97,7 +97,7 @@ pub(super) struct Sought<'a> {
     pub reach_m: f64,
 }
 
-/// What a sweep found.
+/// The result of a sweep.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) enum Sweeping {
     /// The two come within reach.

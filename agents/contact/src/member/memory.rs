@@ -161,7 +161,7 @@ impl Clone for ContactMemory {
 }
 
 impl Slip {
-    /// One that has not slipped.
+    /// An attachment to `partner` that has not slipped.
     pub(crate) const fn none(partner: Partner) -> Self {
         Self { partner, slid: Slid { moved_m: DVec3::ZERO, longer_m: 0.0 } }
     }

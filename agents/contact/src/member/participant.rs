@@ -21,7 +21,7 @@ pub struct Participant<'a> {
     pub context: StepContext<'a>,
     /// The laws of its pairs other than [`Law::Cluster`], by rising numbers: a pair with one is not the cluster's.
     pub laws: &'a [(AgentId, Law)],
-    /// What it remembers of others.
+    /// Its memory of others.
     pub memory: &'a mut ContactMemory,
     /// Its own steps within the macro step: a power of two, at most 16; a rigid body makes the most of its cluster.
     pub parts: u32,

@@ -38,7 +38,7 @@ pub(super) struct Interior {
     follows: bool,
 }
 
-/// What all cones miss in the mean.
+/// The mean miss of all cones.
 #[derive(Debug, Clone, Copy, Default)]
 struct Gap {
     /// λ·y, J.

@@ -85,7 +85,7 @@ pub(super) fn solve(iterate: &mut Iterate, aim: &Aim<'_>, patience: Patience) ->
     false
 }
 
-/// What laws and momentum miss at most, m/s (eq. 9); infinite where it is no number.
+/// The most that laws and momentum miss, m/s (eq. 9); infinite where it is no number.
 pub(super) fn miss_m_s(iterate: &mut Iterate) -> f64 {
     iterate.press();
     let of_momentum = iterate.system.members.measure(&iterate.state.left).fastest_m_s;

@@ -16,7 +16,7 @@ pub(super) struct Skew {
     pub sees: DVec3,
 }
 
-/// What the exact slope of a row adds to its symmetric gain.
+/// The part of a row's exact slope beyond its symmetric gain.
 pub(super) struct Followed {
     pub skew: Skew,
     pub more: DVec3,

@@ -14,7 +14,7 @@ const SLACK: f64 = 1e-6;
 /// Whether a problem can be solved.
 ///
 /// # Errors
-/// What is wrong first, with its place.
+/// The first fault of a problem, with its place.
 pub(super) fn validate(problem: &Problem<'_>) -> Result<(), ProblemError> {
     let h_s = problem.h_s;
     if !(h_s.is_finite() && h_s > 0.0) {

@@ -107,8 +107,8 @@ impl ClusterStepper {
     /// Advances `all`, by rising numbers and at one common time, by `dt`.
     ///
     /// A member whose motion would strain it too far makes 2, 4 … 64 times as many steps: its free motion before the solve, and what the
-    /// solve makes of it after, from the start of the macro step; so do all rigid members where joints turn far or do not hold. What members do by themselves they do on `threads`, if there are enough of
-    /// them; the bits are the same on however many.
+    /// solve makes of it after, from the start of the macro step; so do all rigid members where joints turn far or do not hold. Members' own
+    /// work is done on `threads`, if there are enough of them; the bits are the same on however many.
     ///
     /// # Errors
     /// [`StepError::BadSpan`] for a span that no body steps by. [`StepError::Diverged`] where the state of a member stops being finite: all are
@@ -204,7 +204,7 @@ impl ClusterStepper {
         Ok(true)
     }
 
-    /// What pairs and links gave in the last macro step, by participants and partners.
+    /// The impulses of pairs and links in the last macro step, by participants and partners.
     pub fn totals(&self) -> &[PairTotal] {
         &self.sums.totals
     }
@@ -227,12 +227,12 @@ impl ClusterStepper {
         &self.sums.efforts
     }
 
-    /// What tore in the last macro step, by participants: no later step knows it.
+    /// Attachments that tore in the last macro step, by participants: no later step knows them.
     pub fn torn(&self) -> &[FailedAttachment] {
         &self.failures.torn
     }
 
-    /// What began to yield in the last macro step: no later step reports it again.
+    /// Attachments that began to yield in the last macro step: no later step reports them again.
     pub fn yielded(&self) -> &[FailedAttachment] {
         &self.failures.yielded
     }

@@ -9,7 +9,7 @@ use crate::solve::Report;
 use glam::DVec3;
 use metachron_core::{SolveLevel, Wrench};
 
-/// What a macro step was.
+/// Counts and figures of a macro step.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct ClusterReport {
     /// Fine steps that it was made in.
@@ -36,7 +36,7 @@ pub struct ClusterReport {
     pub work: f64,
 }
 
-/// What a pair of bodies, or a link, gave in a macro step.
+/// The impulses of a pair of bodies, or of a link, in a macro step.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct PairTotal {
     /// The participant of lower number, by its place in the list.
@@ -100,7 +100,7 @@ impl ClusterReport {
     }
 }
 
-/// What all fine steps of a macro step gave.
+/// The sums over all fine steps of a macro step.
 #[derive(Debug, Default)]
 pub(super) struct Sums {
     /// What pairs and links gave, by participants and partners.

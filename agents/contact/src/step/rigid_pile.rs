@@ -47,7 +47,7 @@ pub(super) struct RigidPile {
     domains: Vec<Domain>,
 }
 
-/// What a step of a rigid pile was.
+/// Counts and figures of a step of a rigid pile.
 #[derive(Debug, Clone, Copy, Default)]
 pub(super) struct PileReport {
     pub contacts: usize,

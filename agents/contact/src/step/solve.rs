@@ -32,7 +32,7 @@ pub(super) fn joint_miss_m(depth_m: f64) -> f64 {
 }
 
 impl ClusterStepper {
-    /// Solves the problem of a fine step, and again while bodies would pass through each other where nobody looked; gives every member
+    /// Solves the problem of a fine step, and again while bodies would pass through each other where no contact was sought; gives every member
     /// its impulses (eq. 25).
     pub(super) fn solve(
         &mut self,

@@ -30,7 +30,7 @@ const DEEP_SHARE: f64 = 0.5;
 /// By how much more than is asked for the features of a skin are found that may touch it, as a share of the length of an edge.
 const ROOM_SHARE: f64 = 0.25;
 
-/// What searches keep.
+/// Storage that searches keep.
 #[derive(Default)]
 pub(super) struct SurfaceScratch {
     /// The patches of either surface that are near the other.
@@ -39,7 +39,7 @@ pub(super) struct SurfaceScratch {
     own: Vec<KnownPairs>,
 }
 
-/// What of a skin may touch it, as long as somebody else has the skin.
+/// The features of a skin that may touch it, as long as the skin is in use.
 struct KnownPairs {
     form: KnownForm,
     pairs: SelfPairs,
