@@ -1,6 +1,7 @@
 //! Mass properties that a rigid object is given.
 
 use glam::{DMat3, DVec3};
+use metachron_geometry::Solid;
 use metachron_models::rigid::GivenInertia;
 use metachron_scene::{Source, load};
 use metachron_world::Spec;
@@ -51,4 +52,29 @@ fn the_density_of_a_compound_is_one_with_a_mass_too_and_is_reported_once() {
             assert!(problems.len() == 1 && said.starts_with("`density_kg_m3` of `a` is "), "{density}: {problems:?}");
         }
     }
+}
+
+/// The corners of the hull of a generated ball of half a decimetre, or what is wrong with it.
+fn corners(shape: &str, keys: &str) -> Result<usize, String> {
+    let text = format!(
+        "format = 1\n[[object]]\nname = \"a\"\nmodel = \"rigid\"\nshape = \"{shape}\"\ngenerate = \"sphere\"\ntriangles = 8000\nscale = 0.05\n{keys}"
+    );
+    let source = Source::memory("hull", text.as_bytes()).unwrap();
+    let scene = load(&source, &[]).map_err(|error| error.problems[0].message.clone())?;
+    let Spec::Rigid(body) = &scene.agents[0].spec else { panic!("it is not rigid") };
+    let Solid::Hull { points_m } = &body.solid else { return Ok(0) };
+    Ok(points_m.len())
+}
+
+#[test]
+fn a_hull_has_the_corners_that_its_tolerance_tells_apart() {
+    let all = corners("hull", "hull_within_m = 0.0").unwrap();
+    // a cap of 0.1 mm on such a ball has a radius of 3.2 mm, and covers a thousandth of it
+    let usual = corners("hull", "").unwrap();
+    let few = corners("hull", "hull_within_m = 1e-3").unwrap();
+    assert!(all > 3000 && (200..2000).contains(&usual) && few < 200, "{all}, {usual}, {few} corners");
+    let said = corners("hull", "hull_within_m = -1.0").unwrap_err();
+    assert!(said.starts_with("`hull_within_m` of `a` is -1"), "{said}");
+    let said = corners("mesh", "hull_within_m = 1e-3").unwrap_err();
+    assert!(said.starts_with("`hull_within_m` of `a` does not belong to a mesh"), "{said}");
 }

@@ -10,7 +10,9 @@ use crate::check::{Allowed, Checker, Place, allowed};
 use crate::format::{Axis, GeneratorKind, PartFile, Point, RigidFile, Shape};
 use crate::source::Source;
 use glam::{DQuat, DVec3, EulerRot};
-use metachron_geometry::{COMPOUND_PARTS_MAX, CompoundPart, ContactTraits, Obstacle, Solid, generate_surface};
+use metachron_geometry::{
+    Aabb, COMPOUND_PARTS_MAX, CompoundPart, ContactTraits, Obstacle, Solid, generate_surface, hull_corners,
+};
 use metachron_models::rigid::{Keyframe, Led, Restraint, RigidSpec};
 use std::sync::Arc;
 
@@ -19,6 +21,11 @@ const DENSITY_DEFAULT_KG_M3: f64 = 1000.0;
 
 /// Triangles of generated surfaces.
 const TRIANGLES: Allowed = allowed(4.0..=1e5, "");
+
+/// How far points of a file may lie above the hull that touches; where nothing is given so far, and at most this share of its diagonal.
+const HULL_WITHIN: Allowed = allowed(0.0..=0.1, "m");
+const HULL_WITHIN_M: f64 = 1e-4;
+const HULL_SHARE: f64 = 1e-3;
 
 const DENSITY: Allowed = allowed(1e-3..=1e6, "kg/m³");
 
@@ -212,6 +219,7 @@ struct ShapeKeys<'a> {
     seed: Option<u32>,
     triangles: Option<u32>,
     scale: Option<f64>,
+    hull_within_m: Option<f64>,
     has_parts: bool,
 }
 
@@ -228,6 +236,7 @@ macro_rules! shape_keys {
             seed: $file.seed,
             triangles: $file.triangles,
             scale: $file.scale,
+            hull_within_m: $file.hull_within_m,
             has_parts: $has_parts,
         }
     };
@@ -242,7 +251,8 @@ impl ShapeKeys<'_> {
             Shape::Capsule | Shape::Cylinder => &["radius_m", "half_height_m"],
             Shape::Plane => &[],
             Shape::Compound => &["part"],
-            Shape::Hull | Shape::Mesh => &["file", "generate", "seed", "triangles", "scale"],
+            Shape::Hull => &["file", "generate", "seed", "triangles", "scale", "hull_within_m"],
+            Shape::Mesh => &["file", "generate", "seed", "triangles", "scale"],
         }
     }
 
@@ -258,6 +268,7 @@ impl ShapeKeys<'_> {
             ("seed", self.seed.is_some()),
             ("triangles", self.triangles.is_some()),
             ("scale", self.scale.is_some()),
+            ("hull_within_m", self.hull_within_m.is_some()),
             ("part", self.has_parts),
         ];
         let name = format!("{:?}", self.shape).to_lowercase();
@@ -271,7 +282,7 @@ impl ShapeKeys<'_> {
                 c.wrong(place, key, format_args!("does not belong to a {name}"), expected.clone());
             }
             // a surface has one of `file` and `generate`, which is checked where it is read
-            if takes && !is_given && !matches!(key, "file" | "generate" | "seed" | "triangles" | "scale") {
+            if takes && !is_given && matches!(key, "radius_m" | "half_extents_m" | "half_height_m" | "part") {
                 c.wrong(place, key, "is missing", format!("{expected}: expected `{key}` in this table"));
                 complete = false;
             }
@@ -300,6 +311,10 @@ impl ShapeKeys<'_> {
             Shape::Plane => Solid::Plane,
             Shape::Hull => {
                 let (points_m, _) = self.surface(c, place, source)?;
+                let Aabb { low, high } = Aabb::of(&points_m);
+                let told_apart_m = HULL_WITHIN_M.min(HULL_SHARE * low.distance(high));
+                let given_m = c.optional(place, "hull_within_m", self.hull_within_m, &HULL_WITHIN);
+                let points_m = hull_corners(&points_m, given_m.unwrap_or(told_apart_m)).into();
                 sound(c, place, Solid::Hull { points_m })?
             }
             Shape::Mesh => {

@@ -29,6 +29,10 @@ pub struct RigidFile {
     pub triangles: Option<u32>,
     /// Factor that converts the surface's coordinates to metres, 1e-6 … 1e6. Default 1.
     pub scale: Option<f64>,
+    /// How far points of the file may lie above the hull that touches, metres, 0 … 0.1: more corners cost more. Default 1e-4, or a
+    /// thousandth of the hull's diagonal where that is less.
+    #[schemars(range(min = 0.0, max = 0.1))]
+    pub hull_within_m: Option<f64>,
     /// The solids of a `compound`, 1 … 16: each has a shape with its keys, and may have `position_m`, `rotation_deg` and `density_kg_m3`.
     #[schemars(length(min = 1, max = 16))]
     pub part: Option<Vec<PartFile>>,
@@ -112,6 +116,10 @@ pub struct PartFile {
     pub triangles: Option<u32>,
     /// Factor that converts the surface's coordinates to metres, 1e-6 … 1e6. Default 1.
     pub scale: Option<f64>,
+    /// How far points of the file may lie above the hull that touches, metres, 0 … 0.1: more corners cost more. Default 1e-4, or a
+    /// thousandth of the hull's diagonal where that is less.
+    #[schemars(range(min = 0.0, max = 0.1))]
+    pub hull_within_m: Option<f64>,
     /// Position of the origin of its axes in those of the object, metres. Default: their origin.
     pub position_m: Option<Point>,
     /// Rotation by angles about the object's x, then y, then z axis, degrees. Default none.
