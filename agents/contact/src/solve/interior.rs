@@ -7,6 +7,7 @@ use super::bound::{Bound, Inside};
 use super::iterate::{Iterate, Kept};
 use super::lorentz::Lorentz;
 use super::newton::Aim;
+use super::system::StepForm;
 use crate::lists::refill;
 
 /// How far inside their cones impulses and dual points start, in means of what laws and momentum miss, √J, so that λ·y is the same for all
@@ -23,8 +24,10 @@ const SPREAD: f64 = 3.0;
 const GOLDEN: f64 = 0.618_033_988_749_894_9;
 /// The least share of the gap that a step aims at.
 const CENTRING_MIN: f64 = 1e-6;
-/// The share of its right side that a step may leave: by gradients, and of what follows slopes that no factor holds.
+/// The share of its right side that a step may leave: by gradients, whose rest is momentum; and of what follows slopes that no factor holds, which
+/// are others after the step.
 const LEAVE: f64 = 1e-3;
+const LEAVE_SLOPES: f64 = 0.1;
 
 /// Storage of the way.
 #[derive(Debug, Clone, Default)]
@@ -70,7 +73,8 @@ impl Interior {
         let gap = self.measure(iterate);
         self.rows.iter_mut().for_each(Inside::aim_at_the_edge);
         self.pull(iterate);
-        let leave = |size: f64| LEAVE * size;
+        let share = if iterate.system.form == StepForm::Direct { LEAVE_SLOPES } else { LEAVE };
+        let leave = |size: f64| share * size;
         if !iterate.factor(aim.threads) || !iterate.solve(aim.threads, leave) {
             return false;
         }

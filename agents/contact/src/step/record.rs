@@ -5,6 +5,7 @@
 //! are laid out, the solve. Theory of the stiffness: docs/theory/coupling.md, eq. 7s.
 
 use crate::constraint::place_key;
+use crate::detect::{Owner, Search};
 use crate::lists::refill;
 use crate::member::memory::{Partner, Remembered, Spin};
 use crate::member::participant::{place_of, relative};
@@ -21,8 +22,12 @@ const OVERLAP_SHARE: f64 = 2.0;
 impl ClusterStepper {
     /// Starts every contact from what the last step gave.
     pub(super) fn warm_start(&mut self, all: &[Participant<'_>], h_s: f64) {
-        for (owner, contact) in self.search.owners.iter_mut().zip(&mut self.search.contacts) {
-            let place = all[owner.member].memory.recall(owner.partner, owner.key);
+        let Search { owners, contacts, .. } = &mut self.search;
+        for (at, contact) in contacts.iter_mut().enumerate() {
+            let owner = &owners[at];
+            let is_there = |key| owners.binary_search_by_key(&(owner.member, owner.partner, key), Owner::name).is_ok();
+            let place = all[owner.member].memory.recall(owner.partner, owner.key, is_there);
+            let owner = &mut owners[at];
             (contact.warm_n_s, contact.owed_slip_m) = (place.force_n * h_s, place.owed_slip_m);
             contact.load_n_s = place.load_n * h_s;
             // a body that is stepped elsewhere is found deep because it comes on in steps of its own, and is let go by these
@@ -67,7 +72,7 @@ impl ClusterStepper {
             let (lasting, spin) =
                 if impacts.of(k).is_some() { (DVec3::ZERO, Spin::default()) } else { (impulse, owner.spin) };
             let load_n = contact.load_n_s / h_s;
-            let (key, force_n, overlap_m) = (owner.key.anywhere(), lasting / h_s, contact.overlap_m);
+            let (key, force_n, overlap_m) = (owner.key, lasting / h_s, contact.overlap_m);
             let push = owner.push_row.map_or(DVec3::ZERO, |row| solution.rows_n_s[row]);
             let push_n = push.length() / h_s;
             let place = Remembered { key, force_n, load_n, overlap_m, push_n, owed_slip_m, spin };
