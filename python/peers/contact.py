@@ -1,17 +1,20 @@
 #!/usr/bin/env python3
-"""Runs MuJoCo on the rigid scenes of `metachron bench contact`, and writes what its steps take and how bodies lie.
+"""Runs MuJoCo or PyBullet on the rigid scenes of `metachron bench contact`, and writes what steps take and how bodies lie.
 
-In: nothing but MuJoCo (`pip install mujoco`). Out: JSON for `metachron bench contact --peers FILE`.
-Never here: our own engine.
+In: nothing but MuJoCo (`pip install mujoco`) or, with --engine pybullet, that (`pip install pybullet`). Out: JSON for
+`metachron bench contact --peers FILE` and for `metachron chart contact`. Never here: our own engine.
 
 The scenes have the sizes, places, masses, frictions and steps of those of the benchmark. MuJoCo has no coefficient
-of restitution: its run of a scene stands beside ours of e = 0 and of e > 0. Solver and integrator are its own
-defaults (Newton, pyramidal cones, Euler). The boxes of `pile` are scattered as far as those of the scene file, by other numbers.
+of restitution: a peer's run of a scene stands beside ours of e = 0 and of e > 0. Solvers and integrators are the engines' own
+defaults (MuJoCo: Newton, pyramidal cones, Euler; PyBullet: 50 sequential impulses), and PyBullet reads the scenes as MuJoCo's
+files, but those of joints and of more than 500 bodies. The boxes of `pile` are scattered as far as those of the scene file, by other numbers.
 """
 
 import argparse
 import math
+import re
 import sys
+import tempfile
 import time
 
 import report
@@ -45,7 +48,7 @@ def listed(numbers):
 def box(middle, half, mass, friction, rotation=(0.0, 0.0, 0.0)):
     """A free box."""
     return (
-        f'<body pos="{listed(middle)}" quat="{listed(turn(rotation))}"><freejoint/>'
+        f'<body pos="{listed(middle)}" quat="{listed(turn(rotation))}"><joint type="free"/>'
         f'<geom type="box" size="{listed(half)}" mass="{mass!r}" friction="{friction} 0 0"/></body>'
     )
 
@@ -58,7 +61,7 @@ def world(step, bodies, floor=None, walls=()):
     ]
     return (
         f'<mujoco><option timestep="{step!r}" gravity="0 0 -{GRAVITY}"/><size memory="512M"/>'
-        f'<worldbody>{"".join(fixed)}{"".join(bodies)}</worldbody></mujoco>'
+        + "\n".join(("<worldbody>", *fixed, *bodies, "</worldbody></mujoco>"))
     )
 
 
@@ -144,38 +147,107 @@ SCENES = [
     ("chain", 2.0, lambda: chain(100.0)),
 ]
 
+# Scenes that PyBullet does not read: of joints, or of more than 500 bodies.
+UNREAD = ("pendulum", "chain", "pile", "bricks")
+
 
 def share(sorted_list, of):
     return sorted_list[round(of * (len(sorted_list) - 1))]
 
 
-def run(mujoco, test, seconds, text):
+class Mujoco:
+    """A scene in MuJoCo."""
+
+    def __init__(self, text):
+        self.module = report.load("mujoco")
+        self.name = f"MuJoCo {report.version('mujoco')}"
+        self.model = self.module.MjModel.from_xml_string(text)
+        self.model.opt.enableflags |= self.module.mjtEnableBit.mjENBL_ENERGY
+        self.data = self.module.MjData(self.model)
+        self.step_s = self.model.opt.timestep
+        self.module.mj_forward(self.model, self.data)
+
+    def step(self):
+        self.module.mj_step(self.model, self.data)
+
+    def places(self):
+        return [tuple(place) for place in self.data.xipos[1:]]
+
+    def energy_j(self):
+        return float(sum(self.data.energy))
+
+    def depth_m(self):
+        return float(-self.data.contact.dist.min()) if self.data.ncon else 0.0
+
+
+class Pybullet:
+    """A scene in PyBullet, without joints, of at most 500 bodies."""
+
+    def __init__(self, text):
+        self.module = report.load("pybullet")
+        self.name = f"PyBullet {report.version('pybullet')}"
+        self.step_s = float(re.search('timestep="([^"]+)"', text)[1])
+        self.module.connect(self.module.DIRECT)
+        self.module.resetSimulation()
+        self.module.setGravity(0.0, 0.0, -GRAVITY)
+        self.module.setTimeStep(self.step_s)
+        with tempfile.NamedTemporaryFile("w", suffix=".xml") as file:
+            file.write(text)
+            file.flush()
+            loaded = self.module.loadMJCF(file.name)
+        free = [body for body in loaded if self.module.getDynamicsInfo(body, -1)[0] > 0.0]
+        self.bodies = []
+        # it reads no masses
+        for body, mass in zip(free, map(float, re.findall(' mass="([^"]+)"', text)), strict=True):
+            self.module.changeDynamics(body, -1, mass=mass, linearDamping=0.0, angularDamping=0.0)
+            self.bodies.append((body, mass, self.module.getDynamicsInfo(body, -1)[2]))
+
+    def step(self):
+        self.module.stepSimulation()
+
+    def places(self):
+        return [self.module.getBasePositionAndOrientation(body)[0] for body, _, _ in self.bodies]
+
+    def energy_j(self):
+        total = 0.0
+        for body, mass, inertia in self.bodies:
+            place, rotation = self.module.getBasePositionAndOrientation(body)
+            velocity, spin = self.module.getBaseVelocity(body)
+            back = self.module.invertTransform((0.0, 0.0, 0.0), rotation)[1]
+            own = self.module.multiplyTransforms((0.0, 0.0, 0.0), back, spin, (0.0, 0.0, 0.0, 1.0))[0]
+            moving = mass * sum(v * v for v in velocity) + sum(i * w * w for i, w in zip(inertia, own))
+            total += 0.5 * moving + mass * GRAVITY * place[2]
+        return total
+
+    def depth_m(self):
+        return max((-point[8] for point in self.module.getContactPoints()), default=0.0)
+
+
+ENGINES = {"mujoco": Mujoco, "pybullet": Pybullet}
+
+
+def run(test, seconds, scene):
     """One row; `None` for what takes too long."""
-    model = mujoco.MjModel.from_xml_string(text)
-    model.opt.enableflags |= mujoco.mjtEnableBit.mjENBL_ENERGY
-    data = mujoco.MjData(model)
-    mujoco.mj_forward(model, data)
-    start, least_j = data.xipos[1:].copy(), sum(data.energy)
-    settled, made_j, landing_m, rest_m, spent_ms = None, 0.0, 0.0, 0.0, []
+    start = scene.places()
+    settled, landing_m, rest_m, made_j, least_j, spent_ms = None, 0.0, 0.0, 0.0, scene.energy_j(), []
     begun = time.monotonic()
-    for step in range(round(seconds / model.opt.timestep)):
-        if settled is None and step * model.opt.timestep > seconds - REST_S:
-            settled = data.xipos[1:].copy()
+    for step in range(round(seconds / scene.step_s)):
+        if settled is None and step * scene.step_s > seconds - REST_S:
+            settled = scene.places()
         from_s = time.process_time()
-        mujoco.mj_step(model, data)
+        scene.step()
         spent_ms.append((time.process_time() - from_s) * 1e3)
-        depth_m = float(-data.contact.dist.min()) if data.ncon else 0.0
         if settled is None:
-            landing_m = max(landing_m, depth_m)
+            landing_m = max(landing_m, scene.depth_m())
         else:
-            rest_m = max(rest_m, depth_m)
-        energy_j = float(sum(data.energy))
+            rest_m = max(rest_m, scene.depth_m())
+        energy_j = scene.energy_j()
         made_j, least_j = max(made_j, energy_j - least_j), min(least_j, energy_j)
         if time.monotonic() - begun > PATIENCE_S:
             return None
-    end = data.xipos[1:]
-    went = ((end - (start if settled is None else settled)) ** 2).sum(axis=1) ** 0.5
-    highest = start[:, 2].argmax()
+    end = scene.places()
+    went = [math.dist(a, b) for a, b in zip(start if settled is None else settled, end)]
+    highest = max(range(len(start)), key=lambda at: start[at][2])
     ordered = sorted(spent_ms)
     return {
         "test": test,
@@ -187,9 +259,9 @@ def run(mujoco, test, seconds, text):
         "cpu_s": round(sum(spent_ms) * 1e-3, 5),
         "landing_m": round(landing_m, 8),
         "rest_m": round(rest_m, 8),
-        "drift_mean_m": round(float(went.mean()), 8),
-        "drift_most_m": round(float(went.max()), 8),
-        "sank_m": round(float(start[highest, 2] - end[highest, 2]), 6),
+        "drift_mean_m": round(sum(went) / len(went), 8),
+        "drift_most_m": round(max(went), 8),
+        "sank_m": round(start[highest][2] - end[highest][2], 6),
         "made_j": round(made_j, 6),
     }
 
@@ -198,19 +270,23 @@ def main():
     parser = argparse.ArgumentParser(description=__doc__.split("\n", 1)[0])
     parser.add_argument("out", nargs="?", help="where the JSON goes; standard output where not given")
     parser.add_argument("--only", action="append", default=[], help="only tests whose names begin with this")
+    parser.add_argument("--engine", choices=ENGINES, default="mujoco", help="which engine runs")
     arguments = parser.parse_args()
-    mujoco = report.load_mujoco()
-    rows = []
-    for test, seconds, scene in SCENES:
-        if arguments.only and not any(test.startswith(name) for name in arguments.only):
+    rows, name = [], ""
+    for test, seconds, text in SCENES:
+        if arguments.only and not any(test.startswith(only) for only in arguments.only):
             continue
-        row = run(mujoco, test, seconds, scene())
+        if arguments.engine == "pybullet" and test.startswith(UNREAD):
+            continue
+        scene = ENGINES[arguments.engine](text())
+        name = scene.name
+        row = run(test, seconds, scene)
         if row is None:
             print(f"{test}: takes longer than {PATIENCE_S:.0f} s, left out", file=sys.stderr)
             continue
         rows.append(row)
         print(f"{test}: {row['ms_p50']} ms a step, {row['cpu_s']} s in all", file=sys.stderr)
-    report.write(f"MuJoCo {mujoco.__version__}", rows, arguments.out)
+    report.write(name, rows, arguments.out)
 
 
 if __name__ == "__main__":

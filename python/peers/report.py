@@ -3,6 +3,8 @@
 In: the engine's name, rows. Out: JSON. Never here: a scene, an engine's steps.
 """
 
+import importlib
+import importlib.metadata
 import json
 import platform
 import sys
@@ -20,13 +22,17 @@ def processor():
     return platform.processor() or platform.machine()
 
 
-def load_mujoco():
-    """MuJoCo's module; without it the script ends with the way to it."""
+def load(name):
+    """An engine's Python module; without it the script ends with the way to it."""
     try:
-        import mujoco
+        return importlib.import_module(name)
     except ImportError:
-        sys.exit("this needs MuJoCo's Python module, which is not installed: pip install mujoco")
-    return mujoco
+        sys.exit(f"this needs the Python module {name}, which is not installed: pip install {name}")
+
+
+def version(name):
+    """The version of an engine's package."""
+    return importlib.metadata.version(name)
 
 
 def write(engine, rows, path):

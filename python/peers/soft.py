@@ -94,7 +94,7 @@ def main():
     parser = argparse.ArgumentParser(description=__doc__.split("\n", 1)[0])
     parser.add_argument("out", nargs="?", help="where the JSON goes; standard output where not given")
     arguments = parser.parse_args()
-    mujoco = report.load_mujoco()
+    mujoco = report.load("mujoco")
     rows = []
     for nodes_along in EDGES:
         row, took_s = run(mujoco, nodes_along)
@@ -102,7 +102,7 @@ def main():
         print(f"{row['nodes']} nodes: {row['ms_a_step']} ms a step, sag {row['sag_m'] * 1e3:.3f} mm", file=sys.stderr)
         if took_s > PATIENCE_S:
             break
-    report.write(f"MuJoCo {mujoco.__version__}, flex, {integrator(mujoco)}", rows, arguments.out)
+    report.write(f"MuJoCo {report.version("mujoco")}, flex, {integrator(mujoco)}", rows, arguments.out)
 
 
 if __name__ == "__main__":

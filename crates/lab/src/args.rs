@@ -12,6 +12,7 @@ Examples:
   metachron bench agents --executor pool --agents 1000
   metachron bench pile --quick
   metachron bench soft --peers docs/bench/soft-peers.json
+  metachron bench scenes --against ../before/target/release/metachron
   metachron bench agents --json -q | jq '.rows[] | [.agents, .cpu_us_per_step]'
 
 Compare CPU times: wall times include the load of other programs.";
@@ -163,7 +164,10 @@ pub struct BenchArgs {
     /// For soft and contact: show another engine's rows beside ours, from the file that python/peers/soft.py or contact.py writes
     #[arg(long, value_name = "FILE", value_hint = ValueHint::FilePath)]
     pub peers: Option<PathBuf>,
-    /// How long each case runs; for pile: simulated seconds
+    /// For scenes: show another build beside this one, from its program
+    #[arg(long, value_name = "PROGRAM", value_hint = ValueHint::ExecutablePath)]
+    pub against: Option<PathBuf>,
+    /// How long each case runs; for pile and scenes: simulated seconds
     #[arg(long, value_name = "S", value_parser = seconds)]
     pub seconds: Option<f64>,
     /// Print the rows as JSON on standard output and nothing else there
@@ -181,6 +185,8 @@ pub enum BenchSubject {
     Agents,
     /// Cost of a tube's step by number of segments, with and without self-contact search
     Rod,
+    /// Built-in scenes in lockstep: CPU time, beside that of another build
+    Scenes,
     /// Time to select a level of detail for every object, by policy and number of objects
     Select,
     /// A thousand boxes as agents that step in clusters while they touch, compared with one rapier3d world of the same boxes
@@ -198,6 +204,8 @@ pub enum BenchSubject {
 pub enum Subject {
     /// Error and cost of each method against independent solutions, compared with other engines
     Accuracy,
+    /// Error of contacts over their cost, by levels of the solve, beside rapier3d, MuJoCo and PyBullet
+    Contact,
     /// Growth of cost with segments, contacts and agents, and its distance from the machine's limit
     Scaling,
     /// Where integrators and couplings diverge, and where they are bounded but wrong

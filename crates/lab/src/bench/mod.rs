@@ -5,7 +5,7 @@
 pub(super) mod agents;
 mod bare;
 pub(super) mod cast;
-mod contact;
+pub(super) mod contact;
 mod machine;
 mod peers;
 mod pile;
@@ -13,6 +13,7 @@ mod plain_world;
 mod play;
 mod render;
 mod rod;
+mod scenes;
 mod select;
 mod shaken_floor;
 mod shown;
@@ -30,6 +31,7 @@ pub fn command(args: &BenchArgs) -> anyhow::Result<Exit> {
     match args.subject {
         BenchSubject::Agents => subject::run::<shown::Agents>(args),
         BenchSubject::Rod => subject::run::<rod::Rod>(args),
+        BenchSubject::Scenes => subject::run::<scenes::Scenes>(args),
         BenchSubject::Select => subject::run::<select::Select>(args),
         BenchSubject::Pile => subject::run::<pile::Pile>(args),
         BenchSubject::Contact => subject::run::<contact::Contact>(args),

@@ -65,7 +65,7 @@ pub struct Finding {
 
 impl Finding {
     /// Holds where `measured` is at most `limit`; does not hold for NaN.
-    pub(super) fn at_most(claim: impl Into<String>, measured: f64, limit: f64) -> Self {
+    pub fn at_most(claim: impl Into<String>, measured: f64, limit: f64) -> Self {
         Self { claim: claim.into(), measured, limit, holds: Some(measured <= limit) }
     }
 
@@ -77,7 +77,7 @@ impl Finding {
 }
 
 /// The greatest of some numbers; NaN where one of them is, or where there are none.
-pub(super) fn worst(numbers: impl IntoIterator<Item = f64>) -> f64 {
+pub fn worst(numbers: impl IntoIterator<Item = f64>) -> f64 {
     let greater = |a: f64, b: f64| if a.is_nan() || b.is_nan() { f64::NAN } else { a.max(b) };
     numbers.into_iter().reduce(greater).unwrap_or(f64::NAN)
 }

@@ -25,7 +25,6 @@ pub(crate) use stability::common::GRAVITY;
 use super::args::{ChartArgs, Subject};
 use accuracy::diagram::Diagram;
 use anyhow::Context;
-use experiment::Finding;
 use metachron_console::exit::Exit;
 use metachron_console::output::{BadInput, data, message};
 use metachron_console::progress::Bar;
@@ -40,7 +39,7 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicU32, Ordering};
 use table::{Cell, Table};
 
-pub(super) use experiment::Experiment;
+pub(super) use experiment::{Experiment, Finding, worst};
 pub(super) use policies::selection::Selection;
 
 /// Settings that the experiments of a command share.
@@ -111,6 +110,8 @@ const SCALING: &[Entry] = &[
 
 const COUPLING: &[Entry] = &[entry::<coupling::error::CouplingError>()];
 
+const CONTACT: &[Entry] = &[entry::<super::bench::contact::Levels>()];
+
 const POLICIES: &[Entry] = &[
     entry::<policies::auditorium::Auditorium>(),
     entry::<policies::grove::Grove>(),
@@ -156,6 +157,7 @@ const POLICIES_LIVE: &[Entry] = &[
 pub fn command(args: &ChartArgs) -> anyhow::Result<Exit> {
     let (subject, all) = match (args.subject, args.live) {
         (Subject::Accuracy, false) => ("accuracy", ACCURACY),
+        (Subject::Contact, false) => ("contact", CONTACT),
         (Subject::Scaling, false) => ("scaling", SCALING),
         (Subject::Stability, false) => ("stability", STABILITY),
         (Subject::Coupling, false) => ("coupling", COUPLING),

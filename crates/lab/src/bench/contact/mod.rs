@@ -4,6 +4,7 @@
 //! factors without a bound and within one, depth at landing and at rest, drift, energy made. Never here: how a step is made, how peers are run.
 
 mod course;
+mod levels;
 mod peer;
 mod rigid_scenes;
 mod soft_scenes;
@@ -17,6 +18,7 @@ use super::peers::Peers;
 use super::subject::{Progress, Subject};
 use anyhow::Context;
 use course::Course;
+pub(crate) use levels::Levels;
 use metachron_console::output::{BadInput, message};
 use peer::PeerRun;
 use serde::Serialize;

@@ -1,0 +1,292 @@
+//! `chart contact`: the error of contacts over their cost, by levels of the solve, beside rapier3d, MuJoCo and PyBullet.
+//!
+//! In: scenes of `bench contact`, the most factors of a solve, files of peers. Out: rows of CPU time, depth, drift and energy made, in one chart.
+//! Never here: how a scene is stepped and measured.
+
+use super::super::super::chart::figure::{Axis, Colour, Figure, Layer, Mark, Panel, span};
+use super::super::super::chart::table::Table;
+use super::super::super::chart::{Experiment, Finding, worst};
+use super::super::peers::Peers;
+use super::course::Course;
+use super::peer::PeerRun;
+use super::stage::Stage;
+use super::{Case as BenchCase, cases};
+use serde::{Deserialize, Serialize};
+
+/// The experiment.
+pub(crate) struct Levels;
+
+/// The most factors of a solve; `None` for as many as the laws take.
+const FACTORS: [Option<u32>; 7] = [Some(1), Some(2), Some(3), Some(5), Some(8), Some(12), None];
+/// Iterations of rapier3d's solver.
+const ITERATIONS: [usize; 4] = [1, 4, 16, 64];
+/// What others take for the same scenes, on one processor and by their own settings.
+const PEERS: [&str; 2] = [include_str!("mujoco.json"), include_str!("pybullet.json")];
+
+const OURS: &str = "metachron";
+const RAPIER: &str = "rapier3d";
+/// Less is not told apart in the chart, in the unit of the measure.
+const LEAST: f64 = 1e-5;
+
+/// What a scene is about.
+#[derive(Debug, Clone, Copy, PartialEq)]
+enum Measure {
+    /// Depth at rest, mm.
+    Depth,
+    /// How far a body went in the last half second at most, mm.
+    Drift,
+    /// Energy made, J.
+    Energy,
+}
+
+/// A scene of `bench contact`, and what counts in it.
+struct Shown {
+    test: &'static str,
+    title: &'static str,
+    measure: Measure,
+}
+
+const fn shown(test: &'static str, title: &'static str, measure: Measure) -> Shown {
+    Shown { test, title, measure }
+}
+
+/// In quick charts the first two.
+const SHOWN: [Shown; 6] = [
+    shown("tower, off by 12 mm, e 0", "a tower of 20 boxes: drift at rest, mm", Measure::Drift),
+    shown("pendulum", "a double pendulum, 20 s: energy made, J", Measure::Energy),
+    shown("ropes", "40 ropes: depth at rest, mm", Measure::Depth),
+    shown("mess_small", "a jam of 216 boxes: depth at rest, mm", Measure::Depth),
+    shown("bin, seed 2", "12 unlike bodies in a bin: depth at rest, mm", Measure::Depth),
+    shown("pile, one problem, e 0", "a pile of 1000 boxes: drift at rest, mm", Measure::Drift),
+];
+
+/// A scene stepped by an engine at one of its levels.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct Case {
+    test: String,
+    engine: String,
+    level: String,
+}
+
+/// The same with its measurements.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub(crate) struct Row {
+    test: String,
+    engine: String,
+    /// Our factors or rapier3d's iterations, "exact", or "as it is".
+    level: String,
+    /// CPU milliseconds a simulated second.
+    cpu_ms_per_s: f64,
+    /// Median and 99th percentile of a step, CPU milliseconds.
+    ms_p50: f64,
+    ms_p99: f64,
+    /// The deepest overlap before and within the last half second, mm.
+    landing_mm: f64,
+    rest_mm: f64,
+    /// How far a body went in the last half second at most, mm.
+    drift_mm: f64,
+    /// The most energy above its least so far, and how much was lost, J; NaN of a peer's loss.
+    made_j: f64,
+    lost_j: f64,
+}
+
+impl Row {
+    fn of(case: &Case, course: &Course, seconds: f64) -> Self {
+        Self {
+            cpu_ms_per_s: course.cpu_s() * 1e3 / seconds,
+            ms_p50: course.ms_at(0.5),
+            ms_p99: course.ms_at(0.99),
+            landing_mm: course.landing_m * 1e3,
+            rest_mm: course.rest_m * 1e3,
+            drift_mm: course.drift_most_m * 1e3,
+            made_j: course.made_j,
+            lost_j: course.lost_j,
+            ..Self::unknown(case)
+        }
+    }
+
+    fn of_peer(case: &Case, run: &PeerRun, seconds: f64) -> Self {
+        Self {
+            cpu_ms_per_s: run.cpu_s * 1e3 / seconds,
+            ms_p50: run.ms_p50,
+            ms_p99: run.ms_p99,
+            landing_mm: run.landing_m * 1e3,
+            rest_mm: run.rest_m * 1e3,
+            drift_mm: run.drift_most_m * 1e3,
+            made_j: run.made_j,
+            ..Self::unknown(case)
+        }
+    }
+
+    fn unknown(case: &Case) -> Self {
+        let Case { test, engine, level } = case.clone();
+        let [cpu_ms_per_s, ms_p50, ms_p99, landing_mm, rest_mm, drift_mm, made_j, lost_j] = [f64::NAN; 8];
+        Self { test, engine, level, cpu_ms_per_s, ms_p50, ms_p99, landing_mm, rest_mm, drift_mm, made_j, lost_j }
+    }
+
+    fn error(&self, measure: Measure) -> f64 {
+        match measure {
+            Measure::Depth => self.rest_mm,
+            Measure::Drift => self.drift_mm,
+            Measure::Energy => self.made_j,
+        }
+    }
+}
+
+/// The scene of `bench contact` of this name.
+fn scene(test: &str) -> Option<BenchCase> {
+    cases(false).into_iter().find(|case| case.name() == test)
+}
+
+fn peers() -> impl Iterator<Item = Peers<PeerRun>> {
+    PEERS.iter().filter_map(|text| serde_json::from_str(text).ok())
+}
+
+fn measured(case: &Case) -> Option<Row> {
+    let BenchCase { seconds, stage, .. } = scene(&case.test)?;
+    if let Some(peer) = peers().find(|peer| peer.engine == case.engine) {
+        return Some(Row::of_peer(case, peer.of(&case.test)?, seconds));
+    }
+    let stage: Stage = stage().ok()?;
+    let course = if case.engine == RAPIER {
+        let mut world = stage.plain_world()?;
+        world.integration_parameters.num_solver_iterations = case.level.parse().ok()?;
+        Course::of_plain_world(&mut world, seconds)
+    } else {
+        Course::of_cluster(&mut stage.play().ok()?.within(case.level.parse().ok()), seconds).ok()?
+    };
+    Some(Row::of(case, &course, seconds))
+}
+
+impl Experiment for Levels {
+    type Case = Case;
+    type Row = Row;
+    const NAME: &'static str = "levels";
+    const TITLE: &'static str = "Error of contacts over their cost, by levels of the solve";
+    const ALONE: bool = true;
+
+    fn cases(quick: bool) -> Vec<Case> {
+        let mut all = Vec::new();
+        for Shown { test, .. } in &SHOWN[..if quick { 2 } else { SHOWN.len() }] {
+            let mut add = |engine: &str, level: String| {
+                all.push(Case { test: (*test).to_owned(), engine: engine.to_owned(), level });
+            };
+            for most in FACTORS {
+                add(OURS, most.map_or_else(|| "exact".to_owned(), |most| most.to_string()));
+            }
+            if scene(test).and_then(|case| (case.stage)().ok()).is_some_and(|stage| stage.plain_world().is_some()) {
+                ITERATIONS.iter().for_each(|count| add(RAPIER, count.to_string()));
+            }
+            peers().filter(|peer| peer.of(test).is_some()).for_each(|peer| add(&peer.engine, "as it is".to_owned()));
+        }
+        all
+    }
+
+    fn measure(case: &Case) -> Row {
+        measured(case).unwrap_or_else(|| Row::unknown(case))
+    }
+
+    fn case_of(row: &Row) -> Case {
+        Case { test: row.test.clone(), engine: row.engine.clone(), level: row.level.clone() }
+    }
+
+    fn figure(rows: &[Row]) -> Figure {
+        let mut engines: Vec<&str> = Vec::new();
+        for row in rows {
+            if !engines.contains(&row.engine.as_str()) {
+                engines.push(&row.engine);
+            }
+        }
+        let panel = |Shown { test, title, measure }: &Shown| {
+            let here: Vec<_> = rows.iter().filter(|row| row.test == *test).collect();
+            let error = |row: &Row| row.error(*measure).max(LEAST);
+            let (least, most) = span(here.iter().map(|row| error(row)), true);
+            let (low, high) = span(here.iter().map(|row| row.cpu_ms_per_s), true);
+            let points = |engine: &str| {
+                let own = here.iter().filter(|row| row.engine == engine);
+                own.map(|row| (row.cpu_ms_per_s, error(row))).filter(|(x, y)| x.is_finite() && y.is_finite()).collect()
+            };
+            let layers = engines.iter().zip(Colour::LINES).map(|(engine, colour)| Layer {
+                label: (*engine).to_owned(),
+                colour,
+                mark: Mark::Line(points(engine)),
+            });
+            Panel {
+                title: (*title).to_owned(),
+                x: Axis::log("CPU time a simulated second, ms", low, high),
+                y: Axis::log("", least, most),
+                layers: layers
+                    .filter(|layer| !matches!(&layer.mark, Mark::Line(points) if points.is_empty()))
+                    .collect(),
+            }
+        };
+        let measured = |shown: &&Shown| rows.iter().any(|row| row.test == shown.test);
+        let panels: Vec<_> = SHOWN.iter().filter(measured).map(panel).collect();
+        Figure { title: Self::TITLE.to_owned(), columns: panels.len().clamp(1, 3), panels }
+    }
+
+    fn table(rows: &[Row]) -> Table {
+        let mut table = Table::new(&[
+            "test",
+            "engine",
+            "level",
+            "ms_per_s",
+            "p50_ms",
+            "p99_ms",
+            "landing_mm",
+            "rest_mm",
+            "drift_mm",
+            "made_j",
+        ]);
+        table.rows.extend(rows.iter().map(|row| {
+            vec![
+                row.test.clone().into(),
+                row.engine.clone().into(),
+                row.level.clone().into(),
+                (row.cpu_ms_per_s, 1).into(),
+                (row.ms_p50, 3).into(),
+                (row.ms_p99, 3).into(),
+                (row.landing_mm, 3).into(),
+                (row.rest_mm, 3).into(),
+                (row.drift_mm, 4).into(),
+                (row.made_j, 5).into(),
+            ]
+        }));
+        table
+    }
+
+    fn findings(rows: &[Row]) -> Vec<Finding> {
+        let ours = |test: &'static str| rows.iter().filter(move |row| row.test == test && row.engine == OURS);
+        let tower = SHOWN[0].test;
+        let from_five = ours(tower).filter(|row| row.level.parse().is_ok_and(|most: u32| most >= 5));
+        let drift_mm = worst(from_five.map(|row| row.drift_mm));
+        let made = worst(ours(tower).map(|row| row.made_j));
+        vec![
+            Finding::at_most(
+                "from five factors a solve on the tower stands: mm of drift in half a second",
+                drift_mm,
+                0.01,
+            ),
+            Finding::at_most(
+                "energy that the tower makes at any level, J; a box falls its height with 0.08 J",
+                made,
+                2e-3,
+            ),
+        ]
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_scene_of_the_chart_is_one_of_the_benchmark_and_every_peers_file_is_read() {
+        assert!(SHOWN.iter().all(|shown| scene(shown.test).is_some()));
+        assert_eq!(peers().count(), PEERS.len());
+        let cases = Levels::cases(true);
+        for engine in peers().map(|peer| peer.engine).chain([OURS.to_owned(), RAPIER.to_owned()]) {
+            assert!(cases.iter().any(|case| case.engine == engine), "{engine}");
+        }
+    }
+}

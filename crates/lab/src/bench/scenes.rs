@@ -1,0 +1,171 @@
+//! `bench scenes`: what the built-in scenes take of a processor in lockstep, beside another build of this program.
+//!
+//! In: programs, each of which plays a scene by itself. Out: rows of CPU time a scene. Never here: how a scene is played.
+
+use super::super::args::BenchArgs;
+use super::super::chart::figure::{Axis, Colour, Figure, Layer, Mark, Panel, span};
+use super::super::chart::table::Table;
+use super::machine::processor;
+use super::subject::{Progress, Subject};
+use anyhow::Context;
+use metachron_console::output::BadInput;
+use serde::{Deserialize, Serialize};
+use std::path::Path;
+use std::process::{Command, Stdio};
+
+/// The subject.
+pub(super) struct Scenes;
+
+/// The built-in scenes in which something is stepped, the dear ones last.
+const PLAYED: [&str; 11] =
+    ["tube", "yard", "crossing", "gripper", "stack", "chain", "mesentery", "cavity", "pile", "organ", "overload"];
+/// How many of them are played with `--quick`.
+const QUICK: usize = 8;
+/// How often each is played by each program, the two by turns; the dear ones once.
+const ROUNDS: usize = 5;
+
+/// Simulated seconds.
+const SECONDS: f64 = 2.0;
+
+/// A scene, played by one build or two.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub(super) struct Row {
+    pub scene: String,
+    /// The median of CPU time of all threads, loading included, seconds.
+    pub cpu_s: f64,
+    /// The same of the other build, and the ratio to it; NaN without one.
+    pub other_cpu_s: f64,
+    pub over_other: f64,
+    /// Whether both ended in the same state.
+    pub same_state: Option<bool>,
+    pub machine: String,
+}
+
+/// The part of a run's report that is needed.
+#[derive(Debug, Clone, Deserialize)]
+struct Report {
+    cpu_s: f64,
+    state_hash: String,
+}
+
+/// Has a program play a scene.
+fn play(program: &Path, scene: &str, seconds: f64) -> anyhow::Result<Report> {
+    let shown = program.display();
+    let mut command = Command::new(program);
+    command.args(["run", scene, "--headless", "--executor", "lockstep", "--quiet", "--report", "-", "--seconds"]);
+    let done = command.arg(seconds.to_string()).stdin(Stdio::null()).output();
+    let done = done.map_err(|error| BadInput(format!("{shown} cannot be started: {error}")))?;
+    if !done.status.success() {
+        let said = String::from_utf8_lossy(&done.stderr);
+        return Err(BadInput(format!("{shown} does not play {scene} ({}): {}", done.status, said.trim())).into());
+    }
+    let report = serde_json::from_slice(&done.stdout);
+    Ok(report.map_err(|error| BadInput(format!("{shown} wrote no report of {scene}: {error}")))?)
+}
+
+/// Plays a scene by turns with each program; reports of each.
+fn by_turns(programs: &[&Path], scene: &str, rounds: usize, seconds: f64) -> anyhow::Result<Vec<Vec<Report>>> {
+    let mut reports = vec![Vec::new(); programs.len()];
+    for _ in 0..rounds {
+        for (program, reports) in programs.iter().zip(&mut reports) {
+            reports.push(play(program, scene, seconds)?);
+        }
+    }
+    Ok(reports)
+}
+
+fn median_s(reports: &[Report]) -> f64 {
+    let mut times: Vec<_> = reports.iter().map(|report| report.cpu_s).collect();
+    times.sort_by(f64::total_cmp);
+    times.get(times.len() / 2).copied().unwrap_or(f64::NAN)
+}
+
+fn row(scene: &str, reports: &[Vec<Report>]) -> Row {
+    let [cpu_s, other_cpu_s] = [0, 1].map(|at| reports.get(at).map_or(f64::NAN, |reports| median_s(reports)));
+    let states: Vec<_> = reports.iter().filter_map(|reports| Some(&reports.first()?.state_hash)).collect();
+    let same_state = if let [own, other] = states[..] { Some(own == other) } else { None };
+    let over_other = cpu_s / other_cpu_s;
+    Row { scene: scene.to_owned(), cpu_s, other_cpu_s, over_other, same_state, machine: processor() }
+}
+
+impl Subject for Scenes {
+    type Row = Row;
+    const NAME: &'static str = "scenes";
+
+    fn measure(args: &BenchArgs, progress: &Progress) -> anyhow::Result<Vec<Row>> {
+        let own = std::env::current_exe().context("this program's own file")?;
+        let programs: Vec<_> = std::iter::once(own.as_path()).chain(args.against.as_deref()).collect();
+        let scenes = if args.quick { &PLAYED[..QUICK] } else { &PLAYED[..] };
+        let mut rows = Vec::new();
+        for (at, scene) in scenes.iter().enumerate() {
+            if !progress.continues(at as f64 / scenes.len() as f64, (*scene).to_owned()) {
+                break;
+            }
+            let rounds = if at < QUICK { ROUNDS } else { 1 };
+            rows.push(row(scene, &by_turns(&programs, scene, rounds, args.seconds.unwrap_or(SECONDS))?));
+        }
+        Ok(rows)
+    }
+
+    fn table(rows: &[Row]) -> Table {
+        let mut table = Table::new(&["scene", "cpu_s", "other_cpu_s", "over_other", "same_state"]);
+        table.rows.extend(rows.iter().map(|row| {
+            vec![
+                row.scene.clone().into(),
+                (row.cpu_s, 2).into(),
+                (row.other_cpu_s, 2).into(),
+                (row.over_other, 2).into(),
+                row.same_state.map_or("–", |same| if same { "yes" } else { "no" }).into(),
+            ]
+        }));
+        table
+    }
+
+    fn figure(rows: &[Row]) -> Figure {
+        let times = || rows.iter().flat_map(|row| [row.cpu_s, row.other_cpu_s]).filter(|time| time.is_finite());
+        let (least, most) = span(times(), true);
+        let bars = |of: fn(&Row) -> f64, from: f64| {
+            let bar = |(at, row): (usize, &Row)| [at as f64 + from, at as f64 + from + 0.4, least, of(row)];
+            Mark::Cells(rows.iter().enumerate().map(bar).filter(|cell| cell[3].is_finite()).collect())
+        };
+        let layer = |(label, mark): (&str, Mark), colour| Layer { label: label.to_owned(), colour, mark };
+        let names: Vec<_> = rows.iter().map(|row| row.scene.as_str()).collect();
+        let layers = [("this build", bars(|row| row.cpu_s, 0.1)), ("the other", bars(|row| row.other_cpu_s, 0.5))];
+        let panel = Panel {
+            title: names.join(", "),
+            x: Axis::linear("", 0.0, rows.len().max(1) as f64),
+            y: Axis::log("CPU time, s", least, most),
+            layers: layers.into_iter().zip(Colour::LINES).map(|(layer_of, colour)| layer(layer_of, colour)).collect(),
+        };
+        Figure { title: "Built-in scenes in lockstep".to_owned(), panels: vec![panel], columns: 1 }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn reports(times: &[f64], state: &str) -> Vec<Report> {
+        times.iter().map(|cpu_s| Report { cpu_s: *cpu_s, state_hash: state.to_owned() }).collect()
+    }
+
+    #[test]
+    fn a_row_holds_medians_their_ratio_and_whether_states_agree() {
+        let Row { cpu_s, other_cpu_s, over_other, same_state, .. } =
+            row("tube", &[reports(&[0.5, 9.0, 0.4], "a"), reports(&[0.25, 0.2, 0.3], "b")]);
+        assert_eq!((cpu_s, other_cpu_s, over_other, same_state), (0.5, 0.25, 2.0, Some(false)));
+        let alone = row("tube", &[reports(&[0.5], "a")]);
+        assert!(alone.over_other.is_nan() && alone.same_state.is_none());
+    }
+
+    #[test]
+    fn what_is_no_program_or_writes_no_report_is_named() {
+        let error = play(Path::new("/nowhere/metachron"), "tube", 0.1).unwrap_err().to_string();
+        assert!(error.starts_with("/nowhere/metachron cannot be started"), "{error}");
+        #[cfg(unix)]
+        {
+            let error = play(Path::new("/bin/echo"), "tube", 0.1).unwrap_err().to_string();
+            assert!(error.starts_with("/bin/echo wrote no report of tube"), "{error}");
+        }
+    }
+}
