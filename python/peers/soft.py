@@ -102,7 +102,7 @@ def main():
         print(f"{row['nodes']} nodes: {row['ms_a_step']} ms a step, sag {row['sag_m'] * 1e3:.3f} mm", file=sys.stderr)
         if took_s > PATIENCE_S:
             break
-    report.write(f"MuJoCo {report.version("mujoco")}, flex, {integrator(mujoco)}", rows, arguments.out)
+    report.write(f"MuJoCo {report.version('mujoco')}, flex, {integrator(mujoco)}", rows, arguments.out)
 
 
 if __name__ == "__main__":

@@ -185,7 +185,7 @@ pub enum BenchSubject {
     Agents,
     /// Cost of a tube's step by number of segments, with and without self-contact search
     Rod,
-    /// Built-in scenes in lockstep: CPU time, beside that of another build
+    /// Built-in scenes in lockstep: CPU time of their agents' turns, beside that of another build
     Scenes,
     /// Time to select a level of detail for every object, by policy and number of objects
     Select,

@@ -174,7 +174,7 @@ impl Joints {
         // what holds a turn gives no force
         let turns = [a.turns.of_member(first), second.map_or(Side::FIXED, |at| b.turns.of_member(at))];
         let turns = Together { sides: turns, owner: lasting };
-        let as_before_n = all[first].memory.recall(owner.partner, TouchKey::default(), |_| false).force_n;
+        let as_before_n = all[first].memory.recall(owner.partner, TouchKey::default()).force_n;
         constraints.geometric_stiffness.note(step, &ends, as_before_n, owner);
         let (axis, now) = (joint.axis(&a, anchors[1] - anchors[0]), joint.off(&a, &b));
         let (rows, rotations) = ([constraints.rows.len(); 2], [a.rotation, b.rotation]);

@@ -112,7 +112,7 @@ impl ConstraintRows {
         if !sound || row.sides.iter().all(|side| side.terms().is_empty()) {
             return false;
         }
-        let remembered = step.all[owner.member].memory.recall(owner.partner, place_key(owner.key), |_| false);
+        let remembered = step.all[owner.member].memory.recall(owner.partner, place_key(owner.key));
         let warm_n_s = remembered.force_n * step.h_s;
         let owed_slip_m = if owner.owes { remembered.owed_slip_m } else { DVec3::ZERO };
         self.rows.push(JointRow { warm_n_s, owed_slip_m, ..row });

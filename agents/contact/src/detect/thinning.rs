@@ -86,9 +86,8 @@ impl Thinning {
         if matches!(round.judge, Judge::Solved) && patch.is_some_and(|patch| self.full.binary_search(&patch).is_ok()) {
             return false;
         }
-        let load_n = patch.map_or(0.0, |_| {
-            round.all[owner.member].memory.recall(owner.partner, owner.key, |_| false).force_n.length()
-        });
+        let load_n =
+            patch.map_or(0.0, |_| round.all[owner.member].memory.recall(owner.partner, owner.key).force_n.length());
         self.loads_n.push(load_n);
         self.patches.push(patch);
         true

@@ -77,7 +77,7 @@ pub(crate) struct Remembered {
     pub spin: Spin,
 }
 
-/// One pair, with its places by rising keys.
+/// One pair, with its places by rising names, those of one name by their triangles.
 #[derive(Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 pub(crate) struct PairMemory {
     pub partner: Partner,
@@ -198,8 +198,8 @@ impl Slip {
     }
 }
 
-/// By which places are sorted: those of one name, wherever they are, follow each other.
-fn order(key: TouchKey) -> [TouchKey; 2] {
+/// The sort key of a place: first its name without the triangle, then its whole name.
+fn sort_key(key: TouchKey) -> [TouchKey; 2] {
     [key.anywhere(), key]
 }
 
@@ -210,20 +210,28 @@ impl ContactMemory {
         entry(&mut self.pairs, &partner, |pair| pair.partner, new)
     }
 
-    /// What the place `key` of the pair with `partner` remembers: where it is new, what one of the same name on another triangle of a skin or a mesh
-    /// does that is not there any more, as `is_there` says. A new one may lie as deep as it does where its pair is new too, or began inside each
-    /// other.
-    pub(crate) fn recall(&self, partner: Partner, key: TouchKey, is_there: impl Fn(TouchKey) -> bool) -> Remembered {
+    /// What the place `key` of the pair with `partner` remembers, or a place of the same name on another triangle.
+    pub(crate) fn recall(&self, partner: Partner, key: TouchKey) -> Remembered {
+        self.recall_left(partner, key, |_| true)
+    }
+
+    /// The same; a place that is new takes over what a place of the same name remembers only where `is_left` says that nothing touches there any
+    /// more. A new one may lie as deep as it does where its pair is new too, or began inside each other.
+    pub(crate) fn recall_left(
+        &self,
+        partner: Partner,
+        key: TouchKey,
+        is_left: impl Fn(TouchKey) -> bool,
+    ) -> Remembered {
         let pair = self.pairs.binary_search_by_key(&partner, |pair| pair.partner).ok().map(|at| &self.pairs[at]);
         let places = pair.map_or(&[][..], |pair| &pair.places);
-        if let Ok(at) = places.binary_search_by_key(&order(key), |place| order(place.key)) {
+        if let Ok(at) = places.binary_search_by_key(&sort_key(key), |place| sort_key(place.key)) {
             return places[at];
         }
         let name = key.anywhere();
-        let alike = &places[places.partition_point(|place| place.key.anywhere() < name)..];
-        let mut alike = alike.iter().take_while(|place| place.key.anywhere() == name);
-        let slid = alike.find(|place| !is_there(place.key)).map(|place| Remembered { key, ..*place });
-        slid.unwrap_or_else(|| {
+        let same_name = &places[places.partition_point(|place| place.key.anywhere() < name)..];
+        let mut same_name = same_name.iter().take_while(|place| place.key.anywhere() == name);
+        same_name.find(|place| is_left(place.key)).copied().unwrap_or_else(|| {
             let overlaps = places.is_empty() || places.iter().any(|place| place.overlap_m > 0.0);
             Remembered { key, overlap_m: if overlaps { f64::INFINITY } else { 0.0 }, ..Remembered::default() }
         })
@@ -234,7 +242,7 @@ impl ContactMemory {
         for pair in &mut self.pairs {
             std::mem::swap(&mut pair.places, &mut pair.next);
             pair.next.clear();
-            pair.places.sort_unstable_by_key(|place| order(place.key));
+            pair.places.sort_unstable_by_key(|place| sort_key(place.key));
             pair.note_loads();
         }
         self.pairs.retain(|pair| !pair.places.is_empty() || pair.near_until > now);
@@ -343,8 +351,6 @@ impl ContactMemory {
 mod tests {
     use super::*;
 
-    const NONE_THERE: fn(TouchKey) -> bool = |_| false;
-
     #[test]
     fn a_place_is_recalled_after_one_turn_and_forgotten_after_two() {
         let mut memory = ContactMemory::default();
@@ -359,19 +365,11 @@ mod tests {
         };
         memory.pair(partner).next.push(place);
         memory.turn(now);
-        assert_eq!(memory.recall(partner, key(70_000), NONE_THERE), place);
-        assert_eq!(
-            memory.recall(partner, key(70_000 - 32_768), NONE_THERE).force_n,
-            DVec3::ZERO,
-            "another place of the same pair"
-        );
-        assert_eq!(
-            memory.recall(Partner::Static(3 + 32_768), key(70_000), NONE_THERE).force_n,
-            DVec3::ZERO,
-            "another pair"
-        );
+        assert_eq!(memory.recall(partner, key(70_000)), place);
+        assert_eq!(memory.recall(partner, key(70_000 - 32_768)).force_n, DVec3::ZERO, "another place of the same pair");
+        assert_eq!(memory.recall(Partner::Static(3 + 32_768), key(70_000)).force_n, DVec3::ZERO, "another pair");
         memory.turn(now);
-        assert_eq!(memory.recall(partner, key(70_000), NONE_THERE).force_n, DVec3::ZERO);
+        assert_eq!(memory.recall(partner, key(70_000)).force_n, DVec3::ZERO);
         assert!(memory.pairs.is_empty());
     }
 
@@ -384,7 +382,7 @@ mod tests {
         let place = Remembered { key: on_triangle(7), force_n: DVec3::Z, ..Remembered::default() };
         memory.pair(partner).next.push(place);
         memory.turn(SimTime::ZERO);
-        assert_eq!([7, 8].map(|number| memory.recall(partner, on_triangle(number), NONE_THERE).force_n), [DVec3::Z; 2]);
+        assert_eq!([7, 8].map(|number| memory.recall(partner, on_triangle(number)).force_n), [DVec3::Z; 2]);
     }
 
     #[test]
@@ -396,11 +394,12 @@ mod tests {
         let place = |(key, force_n)| Remembered { key, force_n: DVec3::Z * force_n, ..Remembered::default() };
         memory.pair(partner).next.extend(places.map(place));
         memory.turn(SimTime::ZERO);
-        let force_n = |key, there: &[TouchKey]| memory.recall(partner, key, |other| there.contains(&other)).force_n.z;
+        let force_n =
+            |key, there: &[TouchKey]| memory.recall_left(partner, key, |other| !there.contains(&other)).force_n.z;
         for (key, borne_n) in places {
             assert_eq!(force_n(key, &places.map(|(key, _)| key)), borne_n);
         }
-        // what the ninth bore has gone on to the fourth, but not what is still where it was
+        // a contact that is new on triangle 4 takes over what was borne on triangle 9 once nothing touches there
         assert_eq!(force_n(on(4, 0), &[on(4, 0), on(7, 0)]), 5.0);
         assert_eq!(force_n(on(4, 0), &[on(4, 0), on(7, 0), on(9, 0)]), 0.0);
     }
@@ -412,11 +411,11 @@ mod tests {
         let key = |vertex: u32| TouchKey { features: [vertex, 0], ..TouchKey::default() };
         let mut load_n = |forces_n: [f64; 2]| {
             for (vertex, force_n) in (0..).zip(forces_n) {
-                let before = memory.recall(partner, key(vertex), NONE_THERE);
+                let before = memory.recall(partner, key(vertex));
                 memory.pair(partner).next.push(Remembered { force_n: DVec3::Z * force_n, ..before });
             }
             memory.turn(SimTime::ZERO);
-            [0, 1].map(|vertex| memory.recall(partner, key(vertex), NONE_THERE).load_n)
+            [0, 1].map(|vertex| memory.recall(partner, key(vertex)).load_n)
         };
         assert_eq!(load_n([4.0, 1.0]), [4.0, 1.0]);
         // load moves from one place to the other: both are as hard as what they have borne
@@ -435,7 +434,7 @@ mod tests {
         memory.tear(joint);
         let copy = memory.clone();
         assert!(copy.has_torn(joint) && !copy.has_torn(other) && copy.pairs.is_empty());
-        assert_eq!((copy.recall(joint, TouchKey::default(), NONE_THERE).force_n, copy.torn.len()), (DVec3::ZERO, 1));
+        assert_eq!((copy.recall(joint, TouchKey::default()).force_n, copy.torn.len()), (DVec3::ZERO, 1));
     }
 
     #[test]
@@ -451,7 +450,7 @@ mod tests {
         }));
         memory.turn(SimTime::ZERO);
         memory.forget_features();
-        assert_eq!(keys.map(|key| memory.recall(partner, key, NONE_THERE).force_n.z), [1.0, 0.0, 0.0]);
+        assert_eq!(keys.map(|key| memory.recall(partner, key).force_n.z), [1.0, 0.0, 0.0]);
     }
 
     #[test]

@@ -24,9 +24,9 @@ const SPREAD: f64 = 3.0;
 const GOLDEN: f64 = 0.618_033_988_749_894_9;
 /// The least share of the gap that a step aims at.
 const CENTRING_MIN: f64 = 1e-6;
-/// The share of its right side that a step may leave: by gradients, whose rest is momentum; and of what follows slopes that no factor holds, which
-/// are others after the step.
+/// The share of its right side that a step by gradients may leave: the problem goes on with it as momentum that no velocity answers.
 const LEAVE: f64 = 1e-3;
+/// The same of a step by a factor, which lacks the slopes of friction alone: they change with the step, and exactness would be wasted.
 const LEAVE_SLOPES: f64 = 0.1;
 
 /// Storage of the way.
@@ -73,8 +73,8 @@ impl Interior {
         let gap = self.measure(iterate);
         self.rows.iter_mut().for_each(Inside::aim_at_the_edge);
         self.pull(iterate);
-        let share = if iterate.system.form == StepForm::Direct { LEAVE_SLOPES } else { LEAVE };
-        let leave = |size: f64| share * size;
+        let most_left = if iterate.system.form == StepForm::Direct { LEAVE_SLOPES } else { LEAVE };
+        let leave = |size: f64| most_left * size;
         if !iterate.factor(aim.threads) || !iterate.solve(aim.threads, leave) {
             return false;
         }

@@ -29,6 +29,7 @@ use crate::constraint::joint::Joints;
 use crate::constraint::{ConstraintRows, FailedAttachment, JointTotal};
 use crate::detect::{ClusterScene, Search};
 use crate::impact::Impacts;
+use crate::member::memory::Partner;
 use crate::member::participant::Progress;
 use crate::member::problem::ProblemMembers;
 use crate::member::{ClusterMember, ContactMemory, Participant, Role};
@@ -38,6 +39,7 @@ pub use doubling::StepDoubling;
 pub use external::{ExternalImpulses, KnownImpulse, LineRow, RemoteImpulse};
 use glam::DVec3;
 use metachron_core::{Archive, ArchiveError, ParallelFor, SimSpan, StepError, Wrench, check_span};
+use metachron_geometry::narrow_phase::TouchKey;
 pub use plan::Plan;
 pub use report::{ClusterReport, PairTotal};
 use rigid_pile::RigidPile;
@@ -69,7 +71,8 @@ pub struct ClusterStepper {
     impacts: Impacts,
     pile: RigidPile,
     external: ExternalImpulses,
-    /// Storage of how the sides of contacts are moved.
+    /// Storage of the places that contacts have taken over in this fine step, and of how their sides are moved.
+    taken_over: Vec<(usize, Partner, TouchKey)>,
     moved_m_s: Vec<DVec3>,
     /// The macro step that is made and its fine steps, seconds.
     pub(crate) macro_s: f64,

@@ -22,11 +22,18 @@ const OVERLAP_SHARE: f64 = 2.0;
 impl ClusterStepper {
     /// Starts every contact from what the last step gave.
     pub(super) fn warm_start(&mut self, all: &[Participant<'_>], h_s: f64) {
-        let Search { owners, contacts, .. } = &mut self.search;
+        let Self { search: Search { owners, contacts, .. }, taken_over, .. } = self;
+        taken_over.clear();
         for (at, contact) in contacts.iter_mut().enumerate() {
-            let owner = &owners[at];
-            let is_there = |key| owners.binary_search_by_key(&(owner.member, owner.partner, key), Owner::name).is_ok();
-            let place = all[owner.member].memory.recall(owner.partner, owner.key, is_there);
+            let Owner { member, partner, key, .. } = owners[at];
+            let is_left = |key| {
+                let name = (member, partner, key);
+                owners.binary_search_by_key(&name, Owner::name).is_err() && !taken_over.contains(&name)
+            };
+            let place = all[member].memory.recall_left(partner, key, is_left);
+            if place.key != key {
+                taken_over.push((member, partner, place.key));
+            }
             let owner = &mut owners[at];
             (contact.warm_n_s, contact.owed_slip_m) = (place.force_n * h_s, place.owed_slip_m);
             contact.load_n_s = place.load_n * h_s;

@@ -1,4 +1,4 @@
-//! `bench scenes`: what the built-in scenes take of a processor in lockstep, beside another build of this program.
+//! `bench scenes`: CPU time of the built-in scenes in lockstep, beside another build of this program.
 //!
 //! In: programs, each of which plays a scene by itself. Out: rows of CPU time a scene. Never here: how a scene is played.
 
@@ -8,7 +8,7 @@ use super::super::chart::table::Table;
 use super::machine::processor;
 use super::subject::{Progress, Subject};
 use anyhow::Context;
-use metachron_console::output::BadInput;
+use metachron_console::output::{BadInput, message};
 use serde::{Deserialize, Serialize};
 use std::path::Path;
 use std::process::{Command, Stdio};
@@ -16,12 +16,25 @@ use std::process::{Command, Stdio};
 /// The subject.
 pub(super) struct Scenes;
 
-/// The built-in scenes in which something is stepped, the dear ones last.
-const PLAYED: [&str; 11] =
-    ["tube", "yard", "crossing", "gripper", "stack", "chain", "mesentery", "cavity", "pile", "organ", "overload"];
-/// How many of them are played with `--quick`.
-const QUICK: usize = 8;
-/// How often each is played by each program, the two by turns; the dear ones once.
+/// The built-in scenes in which something is stepped, the expensive ones last.
+const PLAYED: [&str; 13] = [
+    "tube",
+    "pendulum",
+    "yard",
+    "crossing",
+    "gripper",
+    "catenary",
+    "stack",
+    "chain",
+    "mesentery",
+    "cavity",
+    "pile",
+    "organ",
+    "overload",
+];
+/// From here on they are played once, and with `--quick` not at all.
+const EXPENSIVE_FROM: usize = 10;
+/// How often each of the others is played by each program, the two alternately.
 const ROUNDS: usize = 5;
 
 /// Simulated seconds.
@@ -31,12 +44,12 @@ const SECONDS: f64 = 2.0;
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub(super) struct Row {
     pub scene: String,
-    /// The median of CPU time of all threads, loading included, seconds.
+    /// The median of the CPU time of the agents' turns, seconds.
     pub cpu_s: f64,
     /// The same of the other build, and the ratio to it; NaN without one.
     pub other_cpu_s: f64,
     pub over_other: f64,
-    /// Whether both ended in the same state.
+    /// Whether all runs of both ended in the same state.
     pub same_state: Option<bool>,
     pub machine: String,
 }
@@ -63,12 +76,16 @@ fn play(program: &Path, scene: &str, seconds: f64) -> anyhow::Result<Report> {
     Ok(report.map_err(|error| BadInput(format!("{shown} wrote no report of {scene}: {error}")))?)
 }
 
-/// Plays a scene by turns with each program; reports of each.
-fn by_turns(programs: &[&Path], scene: &str, rounds: usize, seconds: f64) -> anyhow::Result<Vec<Vec<Report>>> {
+/// Plays a scene with each program alternately; reports of each, of another build none where it does not play the scene.
+fn alternately(programs: &[&Path], scene: &str, rounds: usize, seconds: f64) -> anyhow::Result<Vec<Vec<Report>>> {
     let mut reports = vec![Vec::new(); programs.len()];
     for _ in 0..rounds {
-        for (program, reports) in programs.iter().zip(&mut reports) {
-            reports.push(play(program, scene, seconds)?);
+        for (at, program) in programs.iter().enumerate() {
+            match play(program, scene, seconds) {
+                Ok(report) => reports[at].push(report),
+                Err(error) if at > 0 && reports[at].is_empty() => message(&format!("{error:#}")),
+                Err(error) => return Err(error),
+            }
         }
     }
     Ok(reports)
@@ -82,8 +99,9 @@ fn median_s(reports: &[Report]) -> f64 {
 
 fn row(scene: &str, reports: &[Vec<Report>]) -> Row {
     let [cpu_s, other_cpu_s] = [0, 1].map(|at| reports.get(at).map_or(f64::NAN, |reports| median_s(reports)));
-    let states: Vec<_> = reports.iter().filter_map(|reports| Some(&reports.first()?.state_hash)).collect();
-    let same_state = if let [own, other] = states[..] { Some(own == other) } else { None };
+    let mut states: Vec<_> = reports.iter().flatten().map(|report| &report.state_hash).collect();
+    states.dedup();
+    let same_state = reports.get(1).filter(|reports| !reports.is_empty()).map(|_| states.len() == 1);
     let over_other = cpu_s / other_cpu_s;
     Row { scene: scene.to_owned(), cpu_s, other_cpu_s, over_other, same_state, machine: processor() }
 }
@@ -95,14 +113,20 @@ impl Subject for Scenes {
     fn measure(args: &BenchArgs, progress: &Progress) -> anyhow::Result<Vec<Row>> {
         let own = std::env::current_exe().context("this program's own file")?;
         let programs: Vec<_> = std::iter::once(own.as_path()).chain(args.against.as_deref()).collect();
-        let scenes = if args.quick { &PLAYED[..QUICK] } else { &PLAYED[..] };
+        let scenes = if args.quick { &PLAYED[..EXPENSIVE_FROM] } else { &PLAYED[..] };
         let mut rows = Vec::new();
         for (at, scene) in scenes.iter().enumerate() {
-            if !progress.continues(at as f64 / scenes.len() as f64, (*scene).to_owned()) {
+            let done = at as f64 / scenes.len() as f64;
+            if !progress.continues(done, (*scene).to_owned()) {
                 break;
             }
-            let rounds = if at < QUICK { ROUNDS } else { 1 };
-            rows.push(row(scene, &by_turns(&programs, scene, rounds, args.seconds.unwrap_or(SECONDS))?));
+            let rounds = if at < EXPENSIVE_FROM { ROUNDS } else { 1 };
+            match alternately(&programs, scene, rounds, args.seconds.unwrap_or(SECONDS)) {
+                Ok(reports) => rows.push(row(scene, &reports)),
+                // Ctrl-C ends what plays, too
+                Err(_) if !progress.continues(done, String::new()) => break,
+                Err(error) => return Err(error),
+            }
         }
         Ok(rows)
     }
@@ -130,12 +154,12 @@ impl Subject for Scenes {
         };
         let layer = |(label, mark): (&str, Mark), colour| Layer { label: label.to_owned(), colour, mark };
         let names: Vec<_> = rows.iter().map(|row| row.scene.as_str()).collect();
-        let layers = [("this build", bars(|row| row.cpu_s, 0.1)), ("the other", bars(|row| row.other_cpu_s, 0.5))];
+        let layers = [("this build", bars(|row| row.cpu_s, 0.1)), ("other build", bars(|row| row.other_cpu_s, 0.5))];
         let panel = Panel {
             title: names.join(", "),
             x: Axis::linear("", 0.0, rows.len().max(1) as f64),
             y: Axis::log("CPU time, s", least, most),
-            layers: layers.into_iter().zip(Colour::LINES).map(|(layer_of, colour)| layer(layer_of, colour)).collect(),
+            layers: layers.into_iter().zip(Colour::LINES).map(|(bars, colour)| layer(bars, colour)).collect(),
         };
         Figure { title: "Built-in scenes in lockstep".to_owned(), panels: vec![panel], columns: 1 }
     }

@@ -110,7 +110,7 @@ const SCALING: &[Entry] = &[
 
 const COUPLING: &[Entry] = &[entry::<coupling::error::CouplingError>()];
 
-const CONTACT: &[Entry] = &[entry::<super::bench::contact::Levels>()];
+const CONTACT: &[Entry] = &[entry::<super::bench::contact::SolveLevels>()];
 
 const POLICIES: &[Entry] = &[
     entry::<policies::auditorium::Auditorium>(),

@@ -22,8 +22,9 @@ const DENSITY_DEFAULT_KG_M3: f64 = 1000.0;
 /// Triangles of generated surfaces.
 const TRIANGLES: Allowed = allowed(4.0..=1e5, "");
 
-/// How far points of a file may lie above the hull that touches; where nothing is given so far, and at most this share of its diagonal.
+/// How far points may lie above a face of their hull.
 const HULL_WITHIN: Allowed = allowed(0.0..=0.1, "m");
+/// The same where the scene does not say, metres, and at most this share of the diagonal of the box around them.
 const HULL_WITHIN_M: f64 = 1e-4;
 const HULL_SHARE: f64 = 1e-3;
 
@@ -311,10 +312,10 @@ impl ShapeKeys<'_> {
             Shape::Plane => Solid::Plane,
             Shape::Hull => {
                 let (points_m, _) = self.surface(c, place, source)?;
-                let Aabb { low, high } = Aabb::of(&points_m);
-                let told_apart_m = HULL_WITHIN_M.min(HULL_SHARE * low.distance(high));
                 let given_m = c.optional(place, "hull_within_m", self.hull_within_m, &HULL_WITHIN);
-                let points_m = hull_corners(&points_m, given_m.unwrap_or(told_apart_m)).into();
+                let Aabb { low, high } = Aabb::of(&points_m);
+                let tolerance_m = given_m.unwrap_or(HULL_WITHIN_M.min(HULL_SHARE * low.distance(high)));
+                let points_m = if tolerance_m > 0.0 { hull_corners(&points_m, tolerance_m).into() } else { points_m };
                 sound(c, place, Solid::Hull { points_m })?
             }
             Shape::Mesh => {
@@ -444,8 +445,8 @@ fn weighted_m3(solid: &Solid) -> f64 {
     }
 }
 
-/// The volume a solid encloses; zero of one whose surface is none. Hulls and meshes have that of their shapes in single precision, so that the
-/// masses of scenes stay what they were to the bit.
+/// The volume a solid encloses; zero of one whose surface is none. Hulls, as simplified, and meshes have that of their shapes in single
+/// precision.
 fn volume_m3(solid: &Solid) -> f64 {
     match solid {
         Solid::Hull { .. } | Solid::Mesh { .. } => {

@@ -29,8 +29,8 @@ pub struct RigidFile {
     pub triangles: Option<u32>,
     /// Factor that converts the surface's coordinates to metres, 1e-6 … 1e6. Default 1.
     pub scale: Option<f64>,
-    /// How far points of the file may lie above the hull that touches, metres, 0 … 0.1: more corners cost more. Default 1e-4, or a
-    /// thousandth of the hull's diagonal where that is less.
+    /// How far points of a surface may lie above a face of its hull, metres, 0 … 0.1: the hull is simplified so far, and 0 keeps all points.
+    /// Default 1e-4, or a thousandth of the diagonal of the box around the points where that is less.
     #[schemars(range(min = 0.0, max = 0.1))]
     pub hull_within_m: Option<f64>,
     /// The solids of a `compound`, 1 … 16: each has a shape with its keys, and may have `position_m`, `rotation_deg` and `density_kg_m3`.
@@ -116,8 +116,8 @@ pub struct PartFile {
     pub triangles: Option<u32>,
     /// Factor that converts the surface's coordinates to metres, 1e-6 … 1e6. Default 1.
     pub scale: Option<f64>,
-    /// How far points of the file may lie above the hull that touches, metres, 0 … 0.1: more corners cost more. Default 1e-4, or a
-    /// thousandth of the hull's diagonal where that is less.
+    /// How far points of a surface may lie above a face of its hull, metres, 0 … 0.1: the hull is simplified so far, and 0 keeps all points.
+    /// Default 1e-4, or a thousandth of the diagonal of the box around the points where that is less.
     #[schemars(range(min = 0.0, max = 0.1))]
     pub hull_within_m: Option<f64>,
     /// Position of the origin of its axes in those of the object, metres. Default: their origin.

@@ -18,7 +18,7 @@ use super::peers::Peers;
 use super::subject::{Progress, Subject};
 use anyhow::Context;
 use course::Course;
-pub(crate) use levels::Levels;
+pub(crate) use levels::SolveLevels;
 use metachron_console::output::{BadInput, message};
 use peer::PeerRun;
 use serde::Serialize;
