@@ -7,7 +7,6 @@ use super::bound::{Bound, Inside};
 use super::iterate::{Iterate, Kept};
 use super::lorentz::Lorentz;
 use super::newton::Aim;
-use super::system::StepForm;
 use crate::lists::refill;
 
 /// How far inside their cones impulses and dual points start, in means of what laws and momentum miss, √J, so that λ·y is the same for all
@@ -24,10 +23,8 @@ const SPREAD: f64 = 3.0;
 const GOLDEN: f64 = 0.618_033_988_749_894_9;
 /// The least share of the gap that a step aims at.
 const CENTRING_MIN: f64 = 1e-6;
-/// The share of its right side that a step by gradients may leave: the problem goes on with it as momentum that no velocity answers.
+/// The share of its right side that a step may leave: by gradients, and of what follows slopes that no factor holds.
 const LEAVE: f64 = 1e-3;
-/// The same of a step by a factor, which lacks the slopes of friction alone: they change with the step, and exactness would be wasted.
-const LEAVE_SLOPES: f64 = 0.1;
 
 /// Storage of the way.
 #[derive(Debug, Clone, Default)]
@@ -73,8 +70,7 @@ impl Interior {
         let gap = self.measure(iterate);
         self.rows.iter_mut().for_each(Inside::aim_at_the_edge);
         self.pull(iterate);
-        let most_left = if iterate.system.form == StepForm::Direct { LEAVE_SLOPES } else { LEAVE };
-        let leave = |size: f64| most_left * size;
+        let leave = |size: f64| LEAVE * size;
         if !iterate.factor(aim.threads) || !iterate.solve(aim.threads, leave) {
             return false;
         }
