@@ -152,7 +152,7 @@ impl Row {
         match measure {
             Measure::Depth => self.rest_mm,
             Measure::Drift => self.drift_mm,
-            Measure::Sinking => self.sank_mm,
+            Measure::Sinking => self.sank_mm.abs(),
             Measure::Energy => self.made_j,
         }
     }
