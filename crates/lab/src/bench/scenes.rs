@@ -76,16 +76,13 @@ fn play(program: &Path, scene: &str, seconds: f64) -> anyhow::Result<Report> {
     Ok(report.map_err(|error| BadInput(format!("{shown} wrote no report of {scene}: {error}")))?)
 }
 
-/// Plays a scene with each program alternately; reports of each, of another build none where it does not play the scene.
+/// Plays a scene with each program alternately, each first in turn; reports of each.
 fn alternately(programs: &[&Path], scene: &str, rounds: usize, seconds: f64) -> anyhow::Result<Vec<Vec<Report>>> {
     let mut reports = vec![Vec::new(); programs.len()];
-    for _ in 0..rounds {
-        for (at, program) in programs.iter().enumerate() {
-            match play(program, scene, seconds) {
-                Ok(report) => reports[at].push(report),
-                Err(error) if at > 0 && reports[at].is_empty() => message(&format!("{error:#}")),
-                Err(error) => return Err(error),
-            }
+    for round in 0..rounds {
+        for at in 0..programs.len() {
+            let at = (at + round) % programs.len();
+            reports[at].push(play(programs[at], scene, seconds)?);
         }
     }
     Ok(reports)
@@ -101,7 +98,7 @@ fn row(scene: &str, reports: &[Vec<Report>]) -> Row {
     let [cpu_s, other_cpu_s] = [0, 1].map(|at| reports.get(at).map_or(f64::NAN, |reports| median_s(reports)));
     let mut states: Vec<_> = reports.iter().flatten().map(|report| &report.state_hash).collect();
     states.dedup();
-    let same_state = reports.get(1).filter(|reports| !reports.is_empty()).map(|_| states.len() == 1);
+    let same_state = reports.get(1).map(|_| states.len() == 1);
     let over_other = cpu_s / other_cpu_s;
     Row { scene: scene.to_owned(), cpu_s, other_cpu_s, over_other, same_state, machine: processor() }
 }
@@ -125,7 +122,11 @@ impl Subject for Scenes {
                 Ok(reports) => rows.push(row(scene, &reports)),
                 // Ctrl-C ends what plays, too
                 Err(_) if !progress.continues(done, String::new()) => break,
-                Err(error) => return Err(error),
+                Err(error) if rows.is_empty() => return Err(error),
+                Err(error) => {
+                    message(&format!("{error:#}"));
+                    break;
+                }
             }
         }
         Ok(rows)

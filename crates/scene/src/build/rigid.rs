@@ -445,11 +445,10 @@ fn weighted_m3(solid: &Solid) -> f64 {
     }
 }
 
-/// The volume a solid encloses; zero of one whose surface is none. Hulls, as simplified, and meshes have that of their shapes in single
-/// precision.
+/// The volume a solid encloses; zero of one whose surface is none, as of an open mesh.
 fn volume_m3(solid: &Solid) -> f64 {
     match solid {
-        Solid::Hull { .. } | Solid::Mesh { .. } => {
+        Solid::Mesh { .. } => {
             solid.to_shared_shape().map_or(0.0, |shape| f64::from(shape.mass_properties(1.0).mass()).abs())
         }
         solid => solid.volume_m3().unwrap_or(0.0),

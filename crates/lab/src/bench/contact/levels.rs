@@ -300,7 +300,7 @@ impl Experiment for SolveLevels {
         vec![
             Finding::at_most(
                 "from five factors a solve on: by how much the tower sinks, mm",
-                most(|row| row.sank_mm),
+                most(|row| row.sank_mm.abs()),
                 1.0,
             ),
             Finding::at_most("how far a box of it creeps in half a second at rest, mm", most(|row| row.drift_mm), 0.01),
