@@ -67,7 +67,7 @@ fn agents_that_are_all_behind_take_turns() {
     let run = running(Threads::start(spawns, Arc::new(SystemClock::new()), Priority::Normal).unwrap());
     let steps = || run.agents().iter().map(AgentHandle::steps).collect::<Vec<_>>();
     eventually("all have begun", || steps().iter().all(|made| *made > 0));
-    let (before, each) = (steps(), 200);
+    let (before, each) = (steps(), 1000);
     let made = || steps().iter().zip(&before).map(|(now, then)| now - then).collect::<Vec<_>>();
     eventually("they have gone on", || made().iter().sum::<u64>() >= 200 * each);
     let least = made().into_iter().min();
