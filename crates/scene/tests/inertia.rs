@@ -78,3 +78,17 @@ fn a_hull_has_the_corners_that_its_tolerance_tells_apart() {
     let said = corners("mesh", "hull_within_m = 1e-3").unwrap_err();
     assert!(said.starts_with("`hull_within_m` of `a` does not belong to a mesh"), "{said}");
 }
+
+#[test]
+fn the_mass_of_a_hull_of_many_corners_is_that_of_what_it_encloses() {
+    for keys in ["", "hull_within_m = 0.0\n"] {
+        let text = format!(
+            "format = 1\n[[object]]\nname = \"a\"\nmodel = \"rigid\"\nshape = \"hull\"\ngenerate = \"sphere\"\ntriangles = 40000\nscale = 0.5\ndensity_kg_m3 = 1000\n{keys}"
+        );
+        let source = Source::memory("hull", text.as_bytes()).unwrap();
+        let scene = load(&source, &[]).unwrap();
+        let Spec::Rigid(body) = &scene.agents[0].spec else { panic!("it is not rigid") };
+        let ball_kg = 1000.0 * 4.0 / 3.0 * std::f64::consts::PI * 0.125;
+        assert!((body.mass_kg / ball_kg - 1.0).abs() < 2e-3, "{} kg with {keys}", body.mass_kg);
+    }
+}
