@@ -182,7 +182,7 @@ class Mujoco:
 
 
 class Pybullet:
-    """A scene in PyBullet, without joints, of at most 500 bodies."""
+    """A scene in PyBullet, without joints, of at most 512 bodies."""
 
     def __init__(self, text):
         self.module = report.load("pybullet")

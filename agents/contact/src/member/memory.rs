@@ -210,7 +210,7 @@ impl ContactMemory {
         entry(&mut self.pairs, &partner, |pair| pair.partner, new)
     }
 
-    /// What the place `key` of the pair with `partner` remembers, or a place of the same name on another triangle.
+    /// The memory of the place `key` of the pair with `partner`, or else of a place of the same name on another triangle.
     pub(crate) fn recall(&self, partner: Partner, key: TouchKey) -> Remembered {
         self.recall_left(partner, key, |_| true)
     }
@@ -396,10 +396,10 @@ mod tests {
         memory.turn(SimTime::ZERO);
         let force_n =
             |key, there: &[TouchKey]| memory.recall_left(partner, key, |other| !there.contains(&other)).force_n.z;
-        for (key, borne_n) in places {
-            assert_eq!(force_n(key, &places.map(|(key, _)| key)), borne_n);
+        for (key, own_n) in places {
+            assert_eq!(force_n(key, &places.map(|(key, _)| key)), own_n);
         }
-        // a contact that is new on triangle 4 takes over what was borne on triangle 9 once nothing touches there
+        // a contact that is new on triangle 4 takes over the force of triangle 9 once nothing touches there
         assert_eq!(force_n(on(4, 0), &[on(4, 0), on(7, 0)]), 5.0);
         assert_eq!(force_n(on(4, 0), &[on(4, 0), on(7, 0), on(9, 0)]), 0.0);
     }

@@ -10,7 +10,7 @@ use super::super::peers::Peers;
 use super::course::Course;
 use super::peer::PeerRun;
 use super::stage::Stage;
-use super::{Case as BenchCase, cases};
+use super::{Case as BenchCase, Row as BenchRow, cases, peer_row, row};
 use anyhow::Context;
 use metachron_console::output::message;
 use serde::{Deserialize, Serialize};
@@ -33,7 +33,7 @@ const EXACT: &str = "exact";
 /// Smaller errors are drawn here, in the unit of the measure.
 const LEAST: f64 = 1e-5;
 
-/// What a scene is about.
+/// The error that is charted of a scene.
 #[derive(Debug, Clone, Copy, PartialEq)]
 enum Measure {
     /// Depth at rest, mm.
@@ -100,31 +100,17 @@ pub(crate) struct Row {
 }
 
 impl Row {
-    fn of(case: &Case, course: &Course, seconds: f64) -> Self {
-        Self {
-            cpu_ms_per_s: course.cpu_s() * 1e3 / seconds,
-            ms_p50: course.ms_at(0.5),
-            ms_p99: course.ms_at(0.99),
-            landing_mm: course.landing_m * 1e3,
-            rest_mm: course.rest_m * 1e3,
-            drift_mm: course.drift_most_m * 1e3,
-            sank_mm: course.sank_m * 1e3,
-            made_j: course.made_j,
-            lost_j: course.lost_j,
-            ..Self::unknown(case)
-        }
-    }
-
-    fn of_peer(case: &Case, run: &PeerRun, seconds: f64) -> Self {
+    fn of(case: &Case, run: &BenchRow, seconds: f64) -> Self {
         Self {
             cpu_ms_per_s: run.cpu_s * 1e3 / seconds,
-            ms_p50: run.ms_p50,
-            ms_p99: run.ms_p99,
+            ms_p50: run.ms_per_step_p50,
+            ms_p99: run.ms_per_step_p99,
             landing_mm: run.landing_m * 1e3,
             rest_mm: run.rest_m * 1e3,
             drift_mm: run.drift_most_m * 1e3,
             sank_mm: run.sank_m * 1e3,
             made_j: run.made_j,
+            lost_j: run.lost_j,
             ..Self::unknown(case)
         }
     }
@@ -170,7 +156,7 @@ fn peers() -> impl Iterator<Item = Peers<PeerRun>> {
 fn measured(case: &Case) -> anyhow::Result<Row> {
     let BenchCase { seconds, stage, .. } = scene(&case.test).context("no such scene")?;
     if let Some(peer) = peers().find(|peer| name(peer) == case.engine) {
-        return Ok(Row::of_peer(case, peer.of(&case.test).context("no such run of it")?, seconds));
+        return Ok(Row::of(case, &peer_row(&peer, peer.of(&case.test).context("no such run of it")?), seconds));
     }
     let stage: Stage = stage()?;
     let course = if case.engine == RAPIER {
@@ -180,7 +166,7 @@ fn measured(case: &Case) -> anyhow::Result<Row> {
     } else {
         Course::of_cluster(&mut stage.play()?.within(case.level.parse().ok()), seconds)?
     };
-    Ok(Row::of(case, &course, seconds))
+    Ok(Row::of(case, &row(case.test.clone(), &case.engine, &course), seconds))
 }
 
 /// An engine and the processor that it ran on.

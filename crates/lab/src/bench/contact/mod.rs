@@ -215,7 +215,13 @@ fn row(test: String, engine: &str, course: &Course) -> Row {
 fn beside(rows: Vec<Row>, peers: Option<&Peers<PeerRun>>) -> Vec<Row> {
     let Some((peers, run)) = peers.and_then(|peers| Some((peers, peers.of(&rows.first()?.test)?))) else { return rows };
     let mut rows: Vec<_> = rows.into_iter().map(|row| Row { over_peer: row.cpu_s / run.cpu_s, ..row }).collect();
-    rows.push(Row {
+    rows.push(peer_row(peers, run));
+    rows
+}
+
+/// Another engine's run as a row.
+fn peer_row(peers: &Peers<PeerRun>, run: &PeerRun) -> Row {
+    Row {
         contacts: f64::NAN,
         bodies: run.bodies,
         steps: run.steps,
@@ -237,8 +243,7 @@ fn beside(rows: Vec<Row>, peers: Option<&Peers<PeerRun>>) -> Vec<Row> {
         lost_j: f64::NAN,
         machine: peers.machine.clone(),
         ..row(run.test.clone(), &peers.engine, &Course::default())
-    });
-    rows
+    }
 }
 
 impl Subject for Contact {
