@@ -202,7 +202,7 @@ impl PlacedShape<'_> {
 }
 
 /// A point of a body's skin.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
 pub enum Place {
     /// A point in space, fixed to a solid or a tool.
     Point(DVec3),
@@ -225,7 +225,7 @@ pub enum Place {
 }
 
 /// A place where two forms touch, or may touch soon.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Touch {
     /// Its name from step to step, unique among the places of the pair.
     pub key: TouchKey,

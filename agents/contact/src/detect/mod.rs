@@ -6,6 +6,7 @@
 pub(crate) mod domain;
 mod pair;
 mod reach;
+mod recycled;
 mod scene;
 mod sensor;
 mod thinning;
@@ -16,11 +17,13 @@ use crate::member::memory::{Partner, Spin};
 use crate::member::{ClusterMember, Role};
 use crate::solve::Contact;
 use glam::DVec3;
+use metachron_core::{Archive, ArchiveError};
 use metachron_geometry::narrow_phase::{NarrowPhaseScratch, TouchKey, self_touches, touches};
 use metachron_geometry::{CollisionShape, Place, Touch};
 use pair::{Against, LOOK_M, Pair, Reaching, closes, taken_up};
 pub(crate) use pair::{Judge, Owner, Round};
 use reach::{Boxes, FAR_M, Meeting, Sought, Sweep, Sweeping};
+use recycled::{Recycled, TwoSolids};
 pub use scene::{
     BadDepth, BadLeastSteps, ClusterScene, DEPTH_RANGE_M, LEAST_STEPS_DEFAULT, LEAST_STEPS_RANGE, Passage, SolveBudget,
 };
@@ -62,8 +65,11 @@ pub(crate) struct Search {
     /// Pairs near each other by the velocities of a solution.
     again: Vec<[usize; 2]>,
     boxes: Boxes,
+    /// Numbers of the static solids near a member.
+    solids: Vec<u32>,
     sweep: Sweep,
     thinning: Thinning,
+    recycled: Recycled,
     touches: Vec<Touch>,
     scratch: NarrowPhaseScratch,
     sorted: Vec<Named>,
@@ -85,6 +91,11 @@ struct Look {
 }
 
 impl Search {
+    /// Writes or reads what the next search needs of those before.
+    pub(crate) fn archive(&mut self, archive: &mut Archive<'_>) -> Result<(), ArchiveError> {
+        self.recycled.archive(archive)
+    }
+
     /// Finds all places of a fine step, but for those of a rigid pile among itself and with static solids; `domains` is empty where there is none.
     pub fn find(&mut self, round: &Round<'_, '_>, domains: &[Domain]) {
         self.find_near(round);
@@ -92,6 +103,7 @@ impl Search {
         let near = std::mem::take(&mut self.near);
         self.find_all(round, &near);
         self.near = near;
+        self.recycled.end();
         self.sort();
     }
 
@@ -103,6 +115,7 @@ impl Search {
         self.near.clear();
         self.looks.clear();
         self.thinning.begin();
+        self.recycled.begin();
         self.boxes.place(all, |member| {
             let (body, state) = (&all[member].member, &progress[member]);
             body.speed_bound(&state.v_before).max(body.speed_bound(&state.v_predicted))
@@ -132,35 +145,46 @@ impl Search {
         more
     }
 
-    /// Places of some pairs of members, and of all members with static solids and with themselves.
+    /// Places of all members with themselves and with static solids, and of some pairs of members, sorted: by rising names.
     fn find_all(&mut self, round: &Round<'_, '_>, pairs: &[[usize; 2]]) {
         let Round { scene, all, .. } = *round;
-        for &[a, b] in pairs {
-            if !(self.is_pile(a) && self.is_pile(b))
-                && all[a].may_touch(&all[b])
-                && [a, b].iter().any(|at| all[*at].member.role() != Role::Kinematic)
-                && !scene.lets_through([all[a].id, all[b].id])
-            {
-                self.find_of(round, Pair { member: a, against: Against::Member(b) });
+        let mut pairs = pairs.iter().peekable();
+        for member in 0..all.len() {
+            if !self.is_pile(member) {
+                self.find_around(round, member);
+            }
+            while let Some(&[_, other]) = pairs.next_if(|pair| pair[0] == member) {
+                if !(self.is_pile(member) && self.is_pile(other))
+                    && all[member].may_touch(&all[other])
+                    && [member, other].iter().any(|at| all[*at].member.role() != Role::Kinematic)
+                    && !scene.lets_through([all[member].id, all[other].id])
+                {
+                    self.find_of(round, Pair { member, against: Against::Member(other) });
+                }
             }
         }
-        for (member, one) in all.iter().enumerate() {
-            if self.is_pile(member) {
-                continue;
-            }
-            if one.member.rest_shape().is_some() {
-                self.find_of(round, Pair { member, against: Against::Own });
-            }
-            if one.member.is_led() {
-                continue; // what leads it is stronger than what never moves
-            }
-            let Some(form) = one.member.skin().map(|skin| skin.form) else { continue };
-            let met = |number: u32| !scene.has_passage(Passage { body: one.id, solid: number });
-            let all = (0..).zip(scene.statics());
-            for (number, solid) in all.filter(|(number, solid)| met(*number) && form.meets(&solid.form)) {
+    }
+
+    /// Places of a member with itself and with static solids.
+    fn find_around(&mut self, round: &Round<'_, '_>, member: usize) {
+        let (scene, one) = (round.scene, &round.all[member]);
+        if one.member.rest_shape().is_some() {
+            self.find_of(round, Pair { member, against: Against::Own });
+        }
+        if one.member.is_led() {
+            return; // what leads it is stronger than what never moves
+        }
+        let Some(form) = one.member.skin().map(|skin| skin.form) else { return };
+        let Some(reach) = self.boxes.of(member) else { return };
+        let mut solids = std::mem::take(&mut self.solids);
+        scene.statics_near(reach.skin.grown(LOOK_M + reach.speed_m_s * round.h_s), &mut solids);
+        for &number in &solids {
+            let solid = &scene.statics()[number as usize];
+            if form.meets(&solid.form) && !scene.has_passage(Passage { body: one.id, solid: number }) {
                 self.find_of(round, Pair { member, against: Against::Static { number, solid } });
             }
         }
+        self.solids = solids;
     }
 
     fn is_pile(&self, member: usize) -> bool {
@@ -214,7 +238,7 @@ impl Search {
     /// Finds the places of a pair that may come within reach, and when: at their first meeting, of a pair that is apart now and goes far.
     fn touch(&mut self, round: &Round<'_, '_>, pair: Pair<'_>, reaching: Reaching) -> Meeting {
         let Reaching { reach_m, swept_m } = reaching;
-        let Self { touches: into, scratch, sweep, .. } = self;
+        let Self { touches: into, scratch, sweep, recycled, boxes, .. } = self;
         let body = &round.all[pair.member].member;
         let (now, end) = (Meeting::default(), Meeting { after_s: round.h_s, ..Meeting::default() });
         let Some(skin) = body.skin() else { return now };
@@ -225,15 +249,19 @@ impl Search {
                 Sweeping::Meets(_) | Sweeping::Unknown => {}
             }
         }
-        match pair.against {
+        let there = pair.other().and_then(|other| round.all[other].member.skin());
+        let mut find = |reach_m: f64, into: &mut Vec<Touch>| match pair.against {
             Against::Own => {
                 body.rest_shape().into_iter().for_each(|rest| self_touches(&skin, rest, reach_m, scratch, into));
             }
             Against::Static { solid, .. } => solid.touches(&skin, reach_m, scratch, into),
-            Against::Member(other) => {
-                let there = round.all[other].member.skin();
-                there.into_iter().for_each(|there| touches(&skin, &there, reach_m, scratch, into));
-            }
+            Against::Member(_) => there.iter().for_each(|there| touches(&skin, there, reach_m, scratch, into)),
+        };
+        let radius_m = boxes.of(pair.member).map_or(f64::INFINITY, |reach| reach.skin.low.distance(reach.skin.high));
+        let solids = TwoSolids::of(skin.view, there.map(|there| there.view), radius_m);
+        match solids.filter(|_| round.predicts()) {
+            Some(solids) => recycled.touches(pair.name(round.all), &solids, reach_m, into, find),
+            None => find(reach_m, into),
         }
         now
     }

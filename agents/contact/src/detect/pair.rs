@@ -10,6 +10,7 @@ use crate::member::{ClusterMember, Participant};
 use crate::push_out::push_out_m_s;
 use crate::solve::{Contact, Side};
 use glam::DVec3;
+use metachron_core::AgentId;
 use metachron_geometry::narrow_phase::{StaticSolid, TouchKey};
 use metachron_geometry::{CollisionShape, ContactSide, Place, Touch};
 
@@ -117,6 +118,16 @@ impl<'a> Round<'a, '_> {
 }
 
 impl Pair<'_> {
+    /// What it is remembered by.
+    pub(crate) fn name(&self, all: &[Participant<'_>]) -> (AgentId, Partner) {
+        let partner = match self.against {
+            Against::Member(other) => Partner::Agent(all[other].id),
+            Against::Static { number, .. } => Partner::Static(number),
+            Against::Own => Partner::Own,
+        };
+        (all[self.member].id, partner)
+    }
+
     /// The member on side 1; `None` for a static solid.
     pub(crate) fn other(&self) -> Option<usize> {
         match self.against {

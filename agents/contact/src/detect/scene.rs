@@ -3,10 +3,13 @@
 //! In: the obstacles and joints of a scene. Out: the same, ready for searches; shared by all clusters. Never here: what moves.
 
 use crate::joint::{Joint, JointError};
+use crate::lists::refill;
 use crate::solve::DEPTH_DEFAULT_M;
 use metachron_core::AgentId;
-use metachron_geometry::Obstacle;
 use metachron_geometry::narrow_phase::{StaticSolid, StaticSolidError};
+use metachron_geometry::{Aabb, Obstacle};
+use rapier3d::parry;
+use rapier3d::parry::partitioning::{Bvh, BvhBuildStrategy};
 use std::ops::RangeInclusive;
 use std::sync::Arc;
 
@@ -16,6 +19,7 @@ pub struct ClusterScene {
     depth_m: f64,
     budget: SolveBudget,
     statics: Vec<StaticSolid>,
+    by_place: StaticTree,
     joints: Arc<[Joint]>,
     /// Numbers of joints, by their first bodies and then by themselves.
     by_body: Vec<u32>,
@@ -23,6 +27,41 @@ pub struct ClusterScene {
     apart: Vec<[AgentId; 2]>,
     /// Sorted.
     passages: Vec<Passage>,
+}
+
+/// The boxes of static solids by where they are.
+#[derive(Debug, Default)]
+struct StaticTree {
+    tree: Bvh,
+    /// The numbers of the solids in the tree, by its leaves, and of those without an end, as a plane.
+    bounded: Vec<u32>,
+    endless: Vec<u32>,
+}
+
+impl StaticTree {
+    fn of(statics: &[StaticSolid]) -> Self {
+        let bounds = |number: &u32| statics[*number as usize].bounds();
+        let is_bounded = |number: &u32| bounds(number).low.is_finite() && bounds(number).high.is_finite();
+        let (bounded, endless): (Vec<_>, _) = (0..statics.len() as u32).partition(is_bounded);
+        let boxes: Vec<_> = bounded.iter().map(|number| outward(bounds(number))).collect();
+        Self { tree: Bvh::from_leaves(BvhBuildStrategy::Binned, &boxes), bounded, endless }
+    }
+
+    fn near(&self, around: Aabb, into: &mut Vec<u32>) {
+        let around = outward(around);
+        let leaves = self.tree.intersect_aabb(&around);
+        refill(into, leaves.map(|leaf| self.bounded[leaf as usize]).chain(self.endless.iter().copied()));
+        into.sort_unstable();
+    }
+}
+
+/// A box in single precision with this one in it.
+fn outward(Aabb { low, high }: Aabb) -> parry::bounding_volume::Aabb {
+    let [low, high] = [(low, f32::next_down as fn(f32) -> f32), (high, f32::next_up)].map(|(corner, beyond)| {
+        let [x, y, z] = corner.to_array().map(|x| beyond(x as f32));
+        parry::math::Vec3::new(x, y, z)
+    });
+    parry::bounding_volume::Aabb::new(low, high)
 }
 
 /// A static solid that a body passes through: one through which it is held on both sides.
@@ -82,6 +121,7 @@ impl Default for ClusterScene {
             depth_m: DEPTH_DEFAULT_M,
             budget: SolveBudget::Exact,
             statics: Vec::new(),
+            by_place: StaticTree::default(),
             joints: Arc::default(),
             by_body: Vec::new(),
             apart: Vec::new(),
@@ -96,8 +136,8 @@ impl ClusterScene {
     /// # Errors
     /// [`StaticSolidError`] for an invalid solid.
     pub fn new(obstacles: &[Obstacle]) -> Result<Self, StaticSolidError> {
-        let statics = obstacles.iter().map(StaticSolid::new).collect::<Result<_, _>>()?;
-        Ok(Self { statics, ..Self::default() })
+        let statics = obstacles.iter().map(StaticSolid::new).collect::<Result<Vec<_>, _>>()?;
+        Ok(Self { by_place: StaticTree::of(&statics), statics, ..Self::default() })
     }
 
     /// The same with `joints` between rigid bodies.
@@ -185,8 +225,41 @@ impl ClusterScene {
         self.statics.iter().any(|solid| solid.form.traits.is_sensor)
     }
 
+    /// Fills `into` with the numbers, rising, of the static solids whose boxes meet this one.
+    pub(crate) fn statics_near(&self, around: Aabb, into: &mut Vec<u32>) {
+        self.by_place.near(around, into);
+    }
+
     /// The static solids, by their numbers.
     pub fn statics(&self) -> &[StaticSolid] {
         &self.statics
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use glam::DVec3;
+    use metachron_geometry::Solid;
+
+    #[test]
+    fn solids_near_a_box_are_those_whose_boxes_meet_it_and_all_without_an_end() {
+        let ball =
+            |x_m: f64| Obstacle { position: DVec3::X * x_m, ..Obstacle::new("ball", Solid::Ball { radius_m: 0.25 }) };
+        let mut obstacles: Vec<_> = (0..200).map(|at| ball(f64::from(at * 37 % 200))).collect();
+        obstacles.insert(100, Obstacle::new("floor", Solid::Plane));
+        let scene = ClusterScene::new(&obstacles).unwrap();
+        let mut near = vec![7];
+        // up to the touch, as single precision tells it
+        let around = Aabb { low: DVec3::new(10.75, -1.0, -1.0), high: DVec3::new(13.25, 1.0, 1.0) };
+        scene.statics_near(around, &mut near);
+        let meets = |solid: &StaticSolid| solid.bounds().meets(around);
+        let all = (0..).zip(scene.statics()).filter(|(_, solid)| meets(solid)).map(|(number, _)| number);
+        assert_eq!(near, all.collect::<Vec<u32>>());
+        assert_eq!(near.len(), 4);
+        scene.statics_near(Aabb::about(DVec3::Y * 9.0, 1.0), &mut near);
+        assert_eq!(near, [100]);
+        ClusterScene::default().statics_near(around, &mut near);
+        assert!(near.is_empty());
     }
 }

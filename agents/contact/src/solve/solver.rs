@@ -29,7 +29,7 @@ pub struct Settings {
     /// The velocity by which what velocities leave unanswered in the iterative form may change a block by itself, m/s, > 0 (eq. 17). By
     /// factors momentum is balanced to rounding.
     pub still_m_s: f64,
-    /// The most steps of a solve, each a factor or what serves gradients for one; `None` for as many as the tolerance takes. After five from
+    /// The most factors of a solve; `None` for as many as the tolerance takes, as in the iterative form, which makes none. After five from
     /// interior points an answer is safe, and contacts are some hundredths of a millimetre deeper.
     pub factors_max: Option<u32>,
 }
@@ -238,9 +238,10 @@ impl Solver {
     /// One loop, each level of which is the start of the next.
     fn improve(&mut self, aim: &Aim<'_>) -> SolveLevel {
         let Self { iterate, interior, kept, settings, .. } = self;
-        let last = iterate.steps + settings.factors_max.map_or(STEPS_MAX, |most| most as usize);
+        let most = settings.factors_max.filter(|_| iterate.system.form == StepForm::Direct);
+        let last = iterate.steps + most.map_or(STEPS_MAX, |most| most as usize);
         let mut patience = PATIENCE;
-        if settings.factors_max.is_some() {
+        if most.is_some() {
             patience.stale = 1;
         }
         // a miss of velocities that do not answer the impulses yet does not tell how near they are

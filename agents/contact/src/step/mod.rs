@@ -38,7 +38,7 @@ use crate::step::report::Sums;
 pub use doubling::StepDoubling;
 pub use external::{ExternalImpulses, KnownImpulse, LineRow, RemoteImpulse};
 use glam::DVec3;
-use metachron_core::{Archive, ArchiveError, ParallelFor, SimSpan, StepError, Wrench, check_span};
+use metachron_core::{Archive, ArchiveError, ParallelFor, SimSpan, StepError, Wrench, archive_values, check_span};
 use metachron_geometry::narrow_phase::TouchKey;
 pub use plan::Plan;
 pub use report::{ClusterReport, PairTotal};
@@ -74,6 +74,8 @@ pub struct ClusterStepper {
     /// Storage of the places that contacts have taken over in this fine step, and of how their sides are moved.
     taken_over: Vec<(usize, Partner, TouchKey)>,
     moved_m_s: Vec<DVec3>,
+    /// No step of a member is longer in the next macro step, seconds; `None` where each is as long as it wants.
+    most_s: Option<f64>,
     /// The macro step that is made and its fine steps, seconds.
     pub(crate) macro_s: f64,
     pub(crate) fine_s: f64,
@@ -86,6 +88,8 @@ impl ClusterStepper {
     /// [`ArchiveError`] for what is no state of a stepper.
     pub fn archive(&mut self, archive: &mut Archive<'_>) -> Result<(), ArchiveError> {
         self.solver.archive(archive)?;
+        self.search.archive(archive)?;
+        archive_values!(archive, self.most_s)?;
         self.pile.archive(archive)
     }
 
@@ -156,6 +160,7 @@ impl ClusterStepper {
             }
         }
         self.failures.end(all, self.macro_s);
+        self.note_plan(all.iter().map(|one| one.parts).max().unwrap_or(1), report.fine_steps);
         report.work = self.progress.iter().map(|state| state.work).sum();
         Ok(report)
     }

@@ -15,6 +15,9 @@ const PARTS_MAX: u32 = 16;
 /// The most times as many steps that a member makes whose motion strains it too far.
 const DIVIDED_MAX: u32 = 64;
 
+/// Longer than this, seconds, no member wants its steps: a bound above it is none.
+const MOST_S: f64 = 1.0;
+
 /// How many steps of its own each of some bodies makes within a macro step, and how long that is, seconds.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Plan {
@@ -62,6 +65,22 @@ impl Plan {
 }
 
 impl ClusterStepper {
+    /// The plan for members with these roles and wanted steps, seconds, after the macro steps made so far: after one that had to be made again in
+    /// shorter steps none of theirs is longer than half of it, and then each time twice as long again.
+    #[must_use]
+    pub fn plan_for(&self, members: impl Iterator<Item = (Role, f64)> + Clone) -> Plan {
+        let most_s = self.most_s.unwrap_or(f64::INFINITY);
+        Plan::of(members.map(|(role, wanted_s)| (role, wanted_s.min(most_s))))
+    }
+
+    /// Notes what the macro step just made says of the length of the next: the fastest members would have made it in `planned` steps. What begins anew
+    /// repeats the whole macro step, and a short one repeats less.
+    pub(super) fn note_plan(&mut self, planned: u32, made: u32) {
+        let longer_s = self.most_s.map(|most_s| 2.0 * most_s).filter(|most_s| *most_s <= MOST_S);
+        let shorter_s = self.macro_s * f64::max(0.5, f64::from(planned).recip());
+        self.most_s = if made > planned { Some(shorter_s) } else { longer_s };
+    }
+
     /// Begins the first step of every member, in as many parts as its free motion needs.
     pub(super) fn plan(
         &mut self,
@@ -158,5 +177,31 @@ impl ClusterStepper {
             one.memory.clone_from(kept);
             state.begun_s = 0.0;
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn after_a_macro_step_that_began_again_the_next_is_half_as_long_and_grows_from_there() {
+        let mut stepper = ClusterStepper { macro_s: 0.032, ..ClusterStepper::default() };
+        let wishes = [(Role::Deformable, 0.032), (Role::Rigid, 0.002)];
+        let lengths = |stepper: &ClusterStepper| {
+            let plan = stepper.plan_for(wishes.iter().copied());
+            (plan.macro_s, plan.parts)
+        };
+        assert_eq!(lengths(&stepper), (0.032, 16));
+        stepper.note_plan(16, 64);
+        assert_eq!(lengths(&stepper), (0.016, 8));
+        stepper.macro_s = 0.016;
+        stepper.note_plan(8, 8);
+        assert_eq!(lengths(&stepper), (0.032, 16));
+        stepper.macro_s = 0.002;
+        stepper.note_plan(1, 8);
+        assert_eq!(lengths(&stepper), (0.002, 1), "no member makes shorter steps than it wants");
+        (0..9).for_each(|_| stepper.note_plan(1, 1));
+        assert_eq!((lengths(&stepper), stepper.most_s), ((0.032, 16), None));
     }
 }

@@ -5,11 +5,10 @@
 
 use super::primitives::{Strand, StrandPoint};
 use super::touch_key::{TouchKey, TouchKind};
-use crate::Touch;
 use crate::capsule_chain::facing;
 use crate::signed_distance;
 use crate::signed_distance::Ball;
-use crate::{Grid, near_segments};
+use crate::{Aabb, Grid, Touch, near_segments};
 use glam::DVec3;
 
 /// Up to this many spans of the shorter strand all pairs are tested: a capsule against a tube needs no grid.
@@ -79,9 +78,13 @@ impl ChainScratch {
         let Self { grid, span_bounds, pairs, .. } = self;
         pairs.clear();
         span_bounds.clear();
-        span_bounds.extend(span_bounds_of(a, b, reach_m, false));
-        let first = span_bounds.len();
-        span_bounds.extend(span_bounds_of(b, a, reach_m, true));
+        // of long strands that cross few spans are near the other, and fewer near these
+        span_bounds.extend(span_bounds_of(a, false).filter(|spot| spot.is_near(b.bounds, b.widest_m + reach_m)));
+        let near = region(span_bounds.iter());
+        span_bounds.extend(span_bounds_of(b, true).filter(|spot| spot.is_near(near, reach_m)));
+        let near = region(span_bounds.iter().filter(|spot| spot.second));
+        span_bounds.retain(|spot| spot.second || spot.is_near(near, reach_m));
+        let first = span_bounds.partition_point(|spot| !spot.second);
         let mut tried = 0;
         let mut try_pair = |i: usize, j: usize| {
             tried += 1;
@@ -106,24 +109,27 @@ impl ChainScratch {
     }
 }
 
-/// The spans of `strand` that come near the bounds of `other`.
-fn span_bounds_of(
-    strand: &Strand<'_>,
-    other: &Strand<'_>,
-    reach_m: f64,
-    second: bool,
-) -> impl Iterator<Item = SpanBounds> {
-    let (crate::Aabb { low, high }, widest_m) = (other.bounds, other.widest_m);
-    let spot = move |span: usize| {
+/// The spans of a strand.
+fn span_bounds_of(strand: &Strand<'_>, second: bool) -> impl Iterator<Item = SpanBounds> {
+    (0..strand.spans()).map(move |span| {
         let [a, b] = strand.ends(span);
         let ball_m = 0.5 * a.centre.distance(b.centre) + a.radius_m.max(b.radius_m);
         SpanBounds { middle: (a.centre + b.centre) * 0.5, ball_m, span: span as u32, second }
-    };
-    let near = move |spot: &SpanBounds| {
-        let apart = (low - spot.middle).max(spot.middle - high).max(DVec3::ZERO).length();
-        apart <= spot.ball_m + widest_m + reach_m
-    };
-    (0..strand.spans()).map(spot).filter(near)
+    })
+}
+
+/// The box around the balls of some spans; of none it is near nothing.
+fn region<'a>(spans: impl Iterator<Item = &'a SpanBounds>) -> Aabb {
+    let none = Aabb { low: DVec3::INFINITY, high: DVec3::NEG_INFINITY };
+    spans.map(|spot| Aabb::about(spot.middle, spot.ball_m)).fold(none, Aabb::union)
+}
+
+impl SpanBounds {
+    /// Whether the ball comes within `reach_m` of a box.
+    fn is_near(&self, Aabb { low, high }: Aabb, reach_m: f64) -> bool {
+        let apart = (low - self.middle).max(self.middle - high).max(DVec3::ZERO).length();
+        apart <= self.ball_m + reach_m
+    }
 }
 
 /// Two spans that are near each other.

@@ -13,6 +13,9 @@ pub(super) const LEAN_SHARE: f64 = 1e-3;
 /// By how much two features may lean over what is next to them, where their own directions make the normal: about what a body turns by in
 /// a step, radians.
 pub(super) const LEAN: f64 = 0.1;
+/// The least by which the slopes on both sides of an edge that stands out differ: the middle of an edge of a centimetre across it then stands out
+/// by 0.008 mm, less than contacts give way.
+const RIDGE: f64 = 3e-3;
 /// A vector is no way out when removing its parts along the skin leaves less than this share of it.
 const OUT_SHARE: f64 = 0.5;
 
@@ -97,6 +100,20 @@ impl Feature {
         let mut faces = true;
         self.along(surface, |along| faces &= out.dot(along) <= lean * along.length());
         faces
+    }
+
+    /// Whether the skin falls away from here, seen along the unit vector `out` of it. Where the skin is flat across an edge, the gap to whatever
+    /// crosses that edge changes evenly: it is least beside the edge, at a place of its own. Vertices and borders stand out.
+    pub fn stands_out(self, surface: &Surface<'_>, out: DVec3) -> bool {
+        let Self::Edge(number, [a, b]) = self else { return true };
+        let fans = &surface.form.fans;
+        let along = (b - a).normalize_or_zero();
+        let slope = |corner: u32| {
+            let across = (surface.positions[corner as usize] - a).reject_from_normalized(along);
+            across.dot(out) / across.length()
+        };
+        let corners = fans.opposite[number as usize];
+        corners.contains(&NONE) || -corners.map(slope).iter().sum::<f64>() > RIDGE
     }
 
     /// The unit vector out of the skin that is close to `way`: its parts along the skin are removed. `None` if they were most of it.

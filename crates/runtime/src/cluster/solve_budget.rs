@@ -42,8 +42,6 @@ pub(in super::super) struct Solved {
 #[derive(Debug, Clone, Copy, PartialEq, Default, serde::Serialize, serde::Deserialize)]
 pub(in super::super) struct FactorPrice {
     turns: u32,
-    /// Solves of the last turn went by gradients, whose steps have no price.
-    by_gradients: bool,
     solves: f64,
     factors: f64,
     turn_s: f64,
@@ -53,10 +51,9 @@ pub(in super::super) struct FactorPrice {
 }
 
 impl FactorPrice {
-    /// Takes a turn of `turn_s` seconds; one without a factor says nothing of its price.
+    /// Takes a turn of `turn_s` seconds; one without a factor, or with gradients beside them, says nothing of its price.
     pub fn note(&mut self, Solved { solves, factors, products, .. }: Solved, turn_s: f64) {
-        self.by_gradients = products > 0 || (factors == 0 && self.by_gradients);
-        if factors == 0 || self.by_gradients || !turn_s.is_finite() {
+        if factors == 0 || products > 0 || !turn_s.is_finite() {
             return;
         }
         self.turns = (self.turns + 1).min(TURNS_KEPT);
@@ -78,11 +75,8 @@ impl FactorPrice {
     }
 
     /// How many factors each solve of a turn of `turn_s` seconds may make: at least `least`, and that where no price is known yet; `None` where
-    /// there is time for as many as any solve makes, and for solves by gradients.
+    /// there is time for as many as any solve makes.
     pub fn factors_max(&self, turn_s: f64, least: u32) -> Option<u32> {
-        if self.by_gradients {
-            return None;
-        }
         let Some(factor_s) = self.factor_s() else { return Some(least) };
         let rest_s = self.turn_s - factor_s * self.factors;
         let each = (turn_s - rest_s) / (factor_s * self.solves);
@@ -157,12 +151,9 @@ mod tests {
         assert_eq!(price.factors_max(-1.0, 7), Some(7), "late");
         assert_eq!(price.factors_max(0.1, 5), None, "there is time for all");
         price.note(Solved { solves: 4, factors: 0, products: 90, contacts: 8 }, 5e-3);
-        price.note(Solved { solves: 0, factors: 0, products: 0, contacts: 0 }, 1e-4);
-        assert_eq!(price.factors_max(0.01e-3, 5), None, "by gradients");
         price.note(Solved { solves: 2, factors: 3, products: 90, contacts: 8 }, 5e-3);
-        assert_eq!(price.factors_max(0.01e-3, 5), None, "one of two by gradients");
-        price.note(Solved { solves: 4, factors: 40, products: 0, contacts: 8 }, 0.4e-3);
-        assert_eq!(price.factors_max(0.01e-3, 5), Some(5));
+        price.note(Solved { solves: 0, factors: 0, products: 0, contacts: 0 }, 1e-4);
+        assert_eq!(price.factors_max(0.801e-3, 5), Some(20), "gradients say nothing of the price of a factor");
     }
 
     #[test]

@@ -157,6 +157,9 @@ impl SurfaceQuery<'_> {
         if rim.faces.iter().any(|face| face.dot(normal) < -LEAN) || !edge.feature().faces(self.surface, -normal, LEAN) {
             return None;
         }
+        if !edge.feature().stands_out(self.surface, -normal) {
+            return None;
+        }
         let (s, t) = near_segments(edge.ends, rim.ends);
         if !(inner.contains(&s) && inner.contains(&t)) {
             return None;

@@ -187,6 +187,13 @@ impl<'a> SkinPair<'a> {
         }
         let (a, b) = (edge.at(s), other.at(t));
         let (normal, distance_m) = self.crossing([a, b], [edge.feature(), other.feature()])?;
+        // in a fold of one skin its layers turn along each other, and vertices alone let them sink
+        let stand_out = self.own.is_some()
+            || edge.feature().stands_out(self.here.surface, -normal)
+                && other.feature().stands_out(self.there.surface, normal);
+        if !stand_out {
+            return None;
+        }
         let key = TouchKey::new(TouchKind::Edge, [edge.number, other.number]);
         Some(Touch { key, normal, gap_m: distance_m - self.thick_m, on_a: a.spot.place(), on_b: b.spot.place() })
     }
