@@ -11,7 +11,7 @@
 use super::mesh::{Parts, TRIANGLES_MAX};
 use glam::{DVec3, Vec2};
 use metachron_geometry::branch;
-use std::collections::HashMap;
+use std::collections::{BTreeSet, HashMap};
 
 /// Byte order mark that text editors put before UTF-8; skipped.
 const BYTE_ORDER_MARK: &[u8] = b"\xef\xbb\xbf";
@@ -47,6 +47,18 @@ struct Face {
 
 /// Points, their texture coordinates and triangles of a file.
 pub(super) fn read(bytes: &[u8]) -> Result<Parts, String> {
+    lines(bytes)?.parts()
+}
+
+/// The points of a file that its faces use, or all where it has none.
+pub(super) fn points(bytes: &[u8]) -> Result<Vec<DVec3>, String> {
+    let Reader { points, faces, .. } = lines(bytes)?;
+    let used: BTreeSet<u32> = faces.iter().flat_map(|face| face.corners.map(|[point, ..]| point)).collect();
+    Ok(if used.is_empty() { points } else { used.into_iter().map(|at| points[at as usize]).collect() })
+}
+
+/// All lines of a file, every face of points that there are.
+fn lines(bytes: &[u8]) -> Result<Reader, String> {
     let bytes = bytes.strip_prefix(BYTE_ORDER_MARK).unwrap_or(bytes);
     let mut reader = Reader::default();
     let mut pending = Vec::new();
@@ -69,7 +81,7 @@ pub(super) fn read(bytes: &[u8]) -> Result<Parts, String> {
         return Err(format!("line {last} is continued, but nothing follows: the file is truncated"));
     }
     reader.check()?;
-    reader.parts()
+    Ok(reader)
 }
 
 impl Reader {
