@@ -197,12 +197,18 @@ pub struct ImportArgs {
     /// Start an MJCF model from the keyframe of this name: its qpos and ctrl
     #[arg(long, value_name = "NAME")]
     pub key: Option<String>,
+    /// The SRDF file of a URDF robot, whose disabled collisions are in the scene; default: the one beside it with its name
+    #[arg(long, value_name = "FILE", value_hint = ValueHint::FilePath)]
+    pub srdf: Option<PathBuf>,
     /// Write the scene to this file instead of standard output
     #[arg(long, value_name = "FILE", value_hint = ValueHint::FilePath)]
     pub out: Option<PathBuf>,
     /// Overwrite an existing file
     #[arg(long, requires = "out")]
     pub force: bool,
+    /// Print what has no place in the scene as JSON on standard output
+    #[arg(long, requires = "out")]
+    pub json: bool,
 }
 
 impl OutputArgs {

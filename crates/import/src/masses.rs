@@ -138,6 +138,8 @@ mod tests {
         let inertia_kg_m2 = Some(DMat3::from_diagonal(DVec3::from_array(moments)));
         let mut link = Link {
             name: String::new(),
+            root: 0,
+            is_free: false,
             place: Place { file: None, line: 1, label: String::new() },
             pose: Pose::IDENTITY,
             mass: Mass::Given { mass_kg: 2.0, com_m: DVec3::ZERO, inertia_kg_m2 },

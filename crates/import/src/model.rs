@@ -17,16 +17,43 @@ pub(crate) struct Model {
     pub(crate) links: Vec<Link>,
     pub(crate) joints: Vec<Joint>,
     pub(crate) ties: Vec<Tie>,
-    /// Pairs of links that pass through each other.
-    pub(crate) apart: Vec<[usize; 2]>,
+    /// Pairs of links that the file lets pass through each other.
+    pub(crate) excluded: Vec<[usize; 2]>,
+    /// Whether what is on a fixed body collides with it: as in MuJoCo, not as in URDF.
+    pub(crate) collides_with_base: bool,
+    /// Bodies that pass through each other, with those of `excluded`: `settle` finds them.
+    pub(crate) apart: Vec<Apart>,
     /// Solids of the world itself, in its axes.
     pub(crate) fixed: Vec<Fixed>,
+}
+
+/// Two bodies of a scene, by name, that pass through each other.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct Apart {
+    pub(crate) a: String,
+    pub(crate) b: String,
+    pub(crate) why: Why,
+}
+
+/// Why two bodies pass through each other.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) enum Why {
+    /// The file says so, or another beside it.
+    Excluded,
+    /// They are next to each other, across joints that hold fast.
+    Neighbours,
+    /// They start this deep inside each other.
+    Overlap { depth_m: f64 },
 }
 
 /// A body.
 #[derive(Debug)]
 pub(crate) struct Link {
     pub(crate) name: String,
+    /// The link that all of its tree hangs on, by its number in the file: of two bodies with one such link both are of one robot.
+    pub(crate) root: usize,
+    /// Whether it moves freely although it may have no mass of its own.
+    pub(crate) is_free: bool,
     pub(crate) place: Place,
     /// Its axes in the world at the start.
     pub(crate) pose: Pose,
@@ -111,6 +138,10 @@ pub(crate) enum Shape {
 #[derive(Debug)]
 pub(crate) struct Fixed {
     pub(crate) name: String,
+    /// The root of the link that it was; `None` of the world's own.
+    pub(crate) root: Option<usize>,
+    /// The link that it was, by its number in the file.
+    pub(crate) link: Option<usize>,
     pub(crate) part: Part,
     pub(crate) look: Look,
 }

@@ -6,11 +6,20 @@
 use crate::folders::{Folders, is_readable};
 use crate::model::{Joint, Kind, Link, Look, Mass, Model, Motor, Part, Shape};
 use crate::pose::{Pose, fixed_angles};
-use crate::xml::Element;
+use crate::xml::{Element, Harmless};
 use crate::{ImportError, LeftOut};
 use glam::{DMat3, DVec3};
 use metachron_geometry::Solid;
 use std::collections::BTreeMap;
+
+/// Looks, other programs' tables, and limits of drives, which a robot has none of until a program drives it. What a joint that does not move says about
+/// its motion has no meaning.
+pub(crate) const HARMLESS: Harmless = Harmless {
+    elements: "visual material color texture transmission safety_controller calibration sensor plugin ros2_control verbose \
+        self_collision_checking axis limit dynamics",
+    containers: "gazebo",
+    attributes: "effort velocity version type id",
+};
 
 /// A joint as the file has it, between names.
 struct Draft<'a> {
@@ -174,7 +183,8 @@ fn start(draft: &Draft<'_>, notes: &mut Vec<LeftOut>) -> f64 {
     let Some([lower, upper]) = draft.limits else { return 0.0 };
     let start = 0.0_f64.clamp(lower, upper);
     if start != 0.0 {
-        notes.push(draft.element.note(format!("starts at {start}, the end of its limits that is nearest to zero")));
+        let what = format!("starts at {start}, the end of its limits that is nearest to zero");
+        notes.push(draft.element.note(what).harmless());
     }
     start
 }
@@ -218,7 +228,8 @@ fn link(
     }
     let look = Look { colour: colour(element, touches, colours)?, surface: None };
     let name = element.needed("name")?.to_owned();
-    Ok(Link { name, place: element.place.clone(), pose, mass: mass(element)?, parts, look, is_lent: false })
+    let (place, mass) = (element.place.clone(), mass(element)?);
+    Ok(Link { name, root: 0, is_free: false, place, pose, mass, parts, look, is_lent: false })
 }
 
 fn mass(element: &Element) -> Result<Mass, ImportError> {

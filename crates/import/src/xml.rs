@@ -27,6 +27,26 @@ struct Attribute {
     is_read: Cell<bool>,
 }
 
+/// What of a kind of files moves nothing; all else that is not read may change the motion.
+pub(crate) struct Harmless {
+    /// Words, as all of these.
+    pub(crate) elements: &'static str,
+    /// Those that are what is in them.
+    pub(crate) containers: &'static str,
+    pub(crate) attributes: &'static str,
+}
+
+impl Harmless {
+    fn has(&self, element: &Element) -> bool {
+        Self::is_in(self.elements, &element.tag)
+            || (Self::is_in(self.containers, &element.tag) && element.children.iter().all(|child| self.has(child)))
+    }
+
+    fn is_in(words: &str, word: &str) -> bool {
+        words.split_whitespace().any(|one| one == word)
+    }
+}
+
 /// The root element of a text: of an included `file`, or of the model's own.
 ///
 /// # Errors
@@ -185,22 +205,33 @@ impl Element {
         self.place.wrong(reason)
     }
 
-    /// A note about this element.
+    /// A note about this element, which changes the motion.
     pub(crate) fn note(&self, what: impl Into<String>) -> LeftOut {
         self.place.note(what)
     }
 
+    /// Counts attributes as read: they have no meaning where they are.
+    pub(crate) fn read_all(&self, names: &[&str]) {
+        for name in names {
+            self.text(name);
+        }
+    }
+
     /// Lists every element and attribute that nothing has read.
-    pub(crate) fn list_unread(&self, into: &mut Vec<LeftOut>) {
+    pub(crate) fn list_unread(&self, harmless: &Harmless, into: &mut Vec<LeftOut>) {
+        let note = |what: String, is_harmless: bool| {
+            let note = self.note(what);
+            if is_harmless { note.harmless() } else { note }
+        };
         if !self.is_read.get() {
-            into.push(self.note("is left out"));
+            into.push(note("is left out".to_owned(), harmless.has(self)));
             return;
         }
-        for attribute in self.attributes.iter().filter(|a| !a.is_read.get()) {
-            into.push(self.note(format!("`{}` is left out", attribute.name)));
+        for Attribute { name, .. } in self.attributes.iter().filter(|a| !a.is_read.get()) {
+            into.push(note(format!("`{name}` is left out"), Harmless::is_in(harmless.attributes, name)));
         }
         for child in &self.children {
-            child.list_unread(into);
+            child.list_unread(harmless, into);
         }
     }
 }

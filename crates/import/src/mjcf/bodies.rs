@@ -128,7 +128,8 @@ impl<'a> BodyReader<'a> {
         for placed in &contents.geoms {
             let Some(geom) = self.geom(*placed)? else { continue };
             let name = self.unused(placed.element.text("name"), "geom");
-            self.model.fixed.push(Fixed { name, look: look(std::slice::from_ref(&geom)), part: geom.part });
+            let look = look(std::slice::from_ref(&geom));
+            self.model.fixed.push(Fixed { name, root: None, link: None, look, part: geom.part });
         }
         let world = Host { link: None, pose: Pose::IDENTITY, at_springs: Pose::IDENTITY, is_fixed: true };
         self.note_sites(&contents, world)?;
@@ -172,7 +173,18 @@ impl<'a> BodyReader<'a> {
             ));
         }
         let parts = geoms.into_iter().map(|geom| density(geom, &mass)).collect();
-        self.model.links.push(Link { name, place: place.clone(), pose, mass, parts, look, is_lent: false });
+        let is_free = joint.as_ref().is_some_and(|joint| joint.between.is_none());
+        self.model.links.push(Link {
+            name,
+            root: 0,
+            is_free,
+            place: place.clone(),
+            pose,
+            mass,
+            parts,
+            look,
+            is_lent: false,
+        });
         match joint {
             None => self.push_joint(Joint::weld(place, host.link, index), 0.0),
             Some(StartedJoint { between, zero, .. }) => between.into_iter().for_each(|one| self.push_joint(one, zero)),
@@ -194,6 +206,8 @@ impl<'a> BodyReader<'a> {
             let (mass, parts, look) = (Mass::None, Vec::new(), Look::default());
             self.model.links.push(Link {
                 name,
+                root: 0,
+                is_free: false,
                 place: place.clone(),
                 pose: at.pose,
                 mass,

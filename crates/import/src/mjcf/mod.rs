@@ -18,13 +18,24 @@ pub(crate) use include::include;
 
 use crate::folders::Folders;
 use crate::model::Model;
-use crate::xml::Element;
+use crate::xml::{Element, Harmless};
 use crate::{ImportError, LeftOut};
 use bodies::BodyReader;
 use compiler::Compiler;
 use glam::DVec3;
 use keyframe::Keyframe;
 use std::collections::BTreeMap;
+
+/// Looks, sensors, numbers of solvers and of programs.
+pub(crate) const HARMLESS: Harmless = Harmless {
+    elements: "visual statistic size custom texture material skin mesh hfield light camera site sensor keyframe key extension",
+    containers: "asset default worldbody",
+    attributes: "rgba material group user class childclass width texturedir strippath discardvisual usethread timestep \
+        integrator solver iterations tolerance ls_iterations ls_tolerance noslip_iterations noslip_tolerance \
+        mpr_iterations mpr_tolerance ccd_iterations ccd_tolerance sdf_iterations sdf_initpoints jacobian apirate magnetic \
+        energy fwdinv sensor sensornoise multiccd warmstart island fluidshape fluidcoef maxhullvert content_type \
+        smoothnormal refpos refquat ctrlrange ctrllimited",
+};
 
 /// What a model is read with.
 pub(crate) struct Given<'a> {
@@ -63,7 +74,8 @@ pub(crate) fn read(root: &Element, given: Given<'_>, notes: &mut Vec<LeftOut>) -
             let name = exclude.needed(key)?;
             names.get(name).copied().ok_or_else(|| exclude.wrong(format!("names `{name}`, and there is no such body")))
         };
-        model.apart.push([find("body1")?, find("body2")?]);
+        model.excluded.push([find("body1")?, find("body2")?]);
     }
+    model.collides_with_base = true;
     Ok(model)
 }

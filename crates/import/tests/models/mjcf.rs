@@ -1,11 +1,15 @@
 //! MJCF models.
 
 use crate::play::{advance, left_out, position, start};
-use metachron_import::{Folders, ImportError, Imported, mjcf};
+use metachron_import::{Folders, ImportError, Imported, Options, mjcf, model};
 use std::path::Path;
 
 fn import(text: &str) -> Result<Imported, ImportError> {
     mjcf(text, Path::new("."))
+}
+
+fn at_key(text: &str, key: &str) -> Result<Imported, ImportError> {
+    model(text, Path::new("."), &Options { key: Some(key), ..Options::default() })
 }
 
 /// What MuJoCo makes of `arm.xml` (`reference.py`).
@@ -70,7 +74,7 @@ fn a_servo_without_damping_swings_on_where_steps_resolve_it_and_is_still_where_t
             <actuator><position joint="axle" kp="{kp}"/></actuator>
             <keyframe><key name="turned" qpos="0.1"/></keyframe></mujoco>"#
         );
-        let imported = metachron_import::mjcf_at_key(&text, Path::new("."), "turned").unwrap();
+        let imported = at_key(&text, "turned").unwrap();
         let world = start(&imported, &["axle"], 100.0);
         advance(&world, 9.0);
         let last = (0..50).map(|_| {
@@ -250,11 +254,11 @@ fn tendons_between_two_sites_are_ropes_and_springs() {
     assert_eq!(
         left_out(&imported),
         [
-            "line 2: site `unused`: is left out",
-            "line 4: spatial `spring`: `width` is left out",
             "line 5: spatial `short`: is left out: its ends start 0.2000 m apart, and it is at most 0.1 m long",
             "line 6: spatial `bent`: is left out: scenes have ropes and springs between two points alone",
             "line 7: fixed `geared`: is left out: it couples joints, and scenes have no such coupling",
+            "line 2: site `unused`: is left out",
+            "line 4: spatial `spring`: `width` is left out",
         ]
     );
     let world = start(&imported, &[], 500.0);
@@ -287,7 +291,7 @@ const KEYED: &str = r#"<mujoco><compiler angle="degree"/><option gravity="0 0 0"
 
 #[test]
 fn a_keyframe_is_where_the_model_starts_and_what_its_servos_hold() {
-    let imported = metachron_import::mjcf_at_key(KEYED, Path::new("."), "home").unwrap();
+    let imported = at_key(KEYED, "home").unwrap();
     let world = start(&imported, &["hinge"], 500.0);
     // 0.5 rad from where the file has it, which is at 10 degrees
     let (sin, cos) = 0.5_f64.sin_cos();
@@ -311,7 +315,7 @@ fn a_keyframe_is_where_the_model_starts_and_what_its_servos_hold() {
         ("short", "line 9: key `short`: `qpos` has 2 numbers; expected 13"),
         ("none", "line 1: mujoco: has no keyframe `none`"),
     ] {
-        let error = metachron_import::mjcf_at_key(KEYED, Path::new("."), key).expect_err(key).to_string();
+        let error = at_key(KEYED, key).expect_err(key).to_string();
         assert_eq!(error, expected);
     }
 }

@@ -1,7 +1,7 @@
 //! Imported scenes in lockstep.
 
 use metachron_core::SimSpan;
-use metachron_import::Imported;
+use metachron_import::{Imported, Overlap};
 use metachron_scene::{Source, load};
 use metachron_world::kinds::ExecutorKind;
 use metachron_world::{Scene, World};
@@ -18,6 +18,12 @@ pub fn scene(imported: &Imported, joints: &[&str], rate_hz: f64) -> Scene {
         (agent.pace.rate_hz, agent.pace.dt, agent.pace.dt_range) = (rate_hz, dt, (dt, dt));
     }
     scene
+}
+
+/// The objects of an imported scene that start inside each other.
+pub fn overlaps(imported: &Imported) -> Vec<Overlap> {
+    let found = scene(imported, &[], 500.0).overlaps.into_iter();
+    found.map(|metachron_world::Overlap { a, b, depth_m }| Overlap { a, b, depth_m }).collect()
 }
 
 pub fn start(imported: &Imported, joints: &[&str], rate_hz: f64) -> World {
