@@ -47,9 +47,10 @@ pub(super) fn read(bytes: &[u8]) -> Result<Parts, String> {
     Ok((reader.points, reader.uvs, reader.triangles))
 }
 
-/// The points of a file.
-pub(super) fn points(bytes: &[u8]) -> Result<Vec<DVec3>, String> {
-    Ok(nodes(bytes)?.points)
+/// The points and triangles of a file, however they are connected.
+pub(super) fn surface(bytes: &[u8]) -> Result<(Vec<DVec3>, Vec<[u32; 3]>), String> {
+    let Reader { points, triangles, .. } = nodes(bytes)?;
+    Ok((points, triangles))
 }
 
 /// All nodes of a file.

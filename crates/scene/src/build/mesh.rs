@@ -40,16 +40,26 @@ pub(super) fn read(bytes: &[u8], scale: f64) -> Result<Mesh, String> {
     Ok(Mesh { points, uvs, triangles })
 }
 
-/// The points of a file, of which a hull is made: no matter how its triangles are connected.
+/// The points of a file, of which a hull is made.
 pub(super) fn hull_points(bytes: &[u8], scale: f64) -> Result<Vec<DVec3>, String> {
-    let points = match bytes {
-        [] => return Err("it is empty".to_owned()),
-        _ if bytes.starts_with(glb::MAGIC) => glb::points(bytes)?,
-        _ if stl::is_stl(bytes) => stl::read(bytes)?.0,
-        _ => obj::points(text(bytes)?)?,
-    };
+    let points = surface(bytes)?.points;
     check_points(&points, scale)?;
     Ok(points)
+}
+
+/// The points and triangles of an STL, OBJ or .glb file in its own unit, no matter how its triangles are connected; of an OBJ file without faces its
+/// points alone.
+///
+/// # Errors
+/// What is wrong with the file.
+pub fn surface(bytes: &[u8]) -> Result<Triangles, String> {
+    let (points, triangles) = match bytes {
+        [] => return Err("it is empty".to_owned()),
+        _ if bytes.starts_with(glb::MAGIC) => glb::surface(bytes)?,
+        _ if stl::is_stl(bytes) => stl::read(bytes).map(|(points, _, triangles)| (points, triangles))?,
+        _ => obj::surface(text(bytes)?)?,
+    };
+    Ok(Triangles { points, triangles })
 }
 
 /// Reads a file as [`read`] does: its triangles in metres.

@@ -50,11 +50,16 @@ pub(super) fn read(bytes: &[u8]) -> Result<Parts, String> {
     lines(bytes)?.parts()
 }
 
-/// The points of a file that its faces use, or all where it has none.
-pub(super) fn points(bytes: &[u8]) -> Result<Vec<DVec3>, String> {
+/// The points and triangles of a file, however they are connected: the points that faces use, or all where there are no faces.
+pub(super) fn surface(bytes: &[u8]) -> Result<(Vec<DVec3>, Vec<[u32; 3]>), String> {
     let Reader { points, faces, .. } = lines(bytes)?;
+    if faces.is_empty() {
+        return Ok((points, Vec::new()));
+    }
     let used: BTreeSet<u32> = faces.iter().flat_map(|face| face.corners.map(|[point, ..]| point)).collect();
-    Ok(if used.is_empty() { points } else { used.into_iter().map(|at| points[at as usize]).collect() })
+    let numbers: HashMap<u32, u32> = (0..).zip(&used).map(|(number, point)| (*point, number)).collect();
+    let triangles = faces.iter().map(|face| face.corners.map(|[point, ..]| numbers[&point])).collect();
+    Ok((used.into_iter().map(|at| points[at as usize]).collect(), triangles))
 }
 
 /// All lines of a file, every face of points that there are.
