@@ -1,17 +1,20 @@
 //! `import`: a URDF robot or an MJCF model as a scene.
 //!
-//! In: the model's file, those that it includes, the SRDF file beside a robot. Out: TOML on standard output or in a file, on standard error or as JSON
-//! what has no place in it. Never here: what a model means.
+//! In: the model's file, those that it names, the SRDF file beside a robot. Out: TOML on standard output or in a file with meshes beside it, on
+//! standard error or as JSON what has no place in it. Never here: what a model means.
 
 use super::args::ImportArgs;
 use metachron_console::exit::Exit;
 use metachron_console::gains::check_output_path;
 use metachron_console::output::{BadInput, data, message, print_overlaps, rendered};
 use metachron_import::{Folders, Imported, LeftOut, Options, Overlap};
-use metachron_scene::{SCENE_BYTES_MAX, SceneError, Source, load};
+use metachron_scene::{SCENE_BYTES_MAX, SceneError, Source, load, read_surface};
 use metachron_world::Scene;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
+
+/// Longest file that a model names, bytes: as of those beside a scene.
+const MESH_BYTES_MAX: u64 = 64 << 20;
 
 /// Writes the scene.
 pub(super) fn command(args: &ImportArgs) -> anyhow::Result<Exit> {
@@ -22,15 +25,27 @@ pub(super) fn command(args: &ImportArgs) -> anyhow::Result<Exit> {
     let folder = |path: &Path| path.parent().map_or_else(PathBuf::new, Path::to_path_buf);
     let (model_folder, out) = (folder(&args.model), args.out.as_deref().unwrap_or(&args.model));
     let scene_folder = folder(out);
-    let folders = Folders { model: &model_folder, scene: &scene_folder, read: Some(&read_included) };
+    let folders =
+        Folders { model: &model_folder, scene: &scene_folder, read: Some(&read_plain), surface: Some(&read_surface) };
     let text = read(&args.model).map_err(|why| BadInput(format!("{model} cannot be read: {why}")))?;
     let name = args.out.as_ref().map_or_else(|| format!("of {model}"), |path| path.display().to_string());
     let scene = |imported: &Imported| -> Result<Scene, SceneError> {
-        load(&Source::recorded(&name, &imported.toml, Some(&scene_folder))?, &[])
+        let files = imported.files.iter().map(|file| (file.path.clone(), file.bytes.clone()));
+        let source = Source::recorded(&name, &imported.toml, Some(&scene_folder))?;
+        load(&source.with_files(files.collect()), &[])
     };
     let overlaps = |draft: &Imported| scene(draft).map_or_else(|_| Vec::new(), |scene| overlaps(&scene));
     let srdf = srdf(args)?;
-    let options = Options { key: args.key.as_deref(), srdf: srdf.as_deref(), overlaps: Some(&overlaps) };
+    let stem = out.file_stem().map_or("scene".into(), |stem| stem.to_string_lossy());
+    let meshes = format!("{stem}-meshes");
+    let options = Options {
+        key: args.key.as_deref(),
+        srdf: srdf.as_deref(),
+        overlaps: Some(&overlaps),
+        meshes: Some(&meshes),
+        copy_meshes: args.copy_meshes,
+        fixed_base: args.fixed_base,
+    };
     let imported = metachron_import::model(&text, folders, &options);
     let imported = imported.map_err(|why| BadInput(format!("{model}: {why}")))?;
     // a model may have numbers that are beyond those of scenes, and a mesh that is none
@@ -44,14 +59,27 @@ pub(super) fn command(args: &ImportArgs) -> anyhow::Result<Exit> {
         }
     }
     match &args.out {
+        None if !imported.files.is_empty() => {
+            let what = format!("{model}: {} meshes of the scene have to be written beside it", imported.files.len());
+            return Err(BadInput(format!("{what}; expected --out FILE")).into());
+        }
         None => data(&imported.toml)?,
         Some(path) => {
-            let refused = |why: std::io::Error| BadInput(format!("{} cannot be written: {why}", path.display()));
-            std::fs::write(path, imported.toml).map_err(refused)?;
+            for file in &imported.files {
+                write(&scene_folder.join(&file.path), &file.bytes)?;
+            }
+            write(path, imported.toml.as_bytes())?;
             message(&format!("scene: {}", path.display()));
         }
     }
     Ok(Exit::Ok)
+}
+
+/// Writes a file, and the folder that it is in where there is none.
+fn write(path: &Path, bytes: &[u8]) -> anyhow::Result<()> {
+    let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty());
+    let made = folder.map_or(Ok(()), std::fs::create_dir_all).and_then(|()| std::fs::write(path, bytes));
+    made.map_err(|why| BadInput(format!("{} cannot be written: {why}", path.display())).into())
 }
 
 fn overlaps(scene: &Scene) -> Vec<Overlap> {
@@ -77,6 +105,7 @@ fn print_list(args: &ImportArgs, imported: &Imported) -> anyhow::Result<()> {
         let list = serde_json::json!({
             "changes_motion": moving.into_iter().map(entry).collect::<Vec<_>>(),
             "harmless": harmless.into_iter().map(entry).collect::<Vec<_>>(),
+            "files": imported.files.iter().map(|file| &file.path).collect::<Vec<_>>(),
             "overlaps": imported.overlaps.iter().map(overlap).collect::<Vec<_>>(),
         });
         return data(&format!("{}\n", serde_json::to_string_pretty(&list)?));
@@ -109,10 +138,14 @@ fn kind(element: &str) -> String {
     element.split('`').step_by(2).collect()
 }
 
-/// The text of a file that the model includes: only the caller of the program may make it wait for a stream.
-fn read_included(path: &Path) -> std::io::Result<String> {
-    match std::fs::metadata(path)?.is_file() {
-        true => read(path),
+/// A file that the model names: only the caller of the program may make it wait for a stream.
+fn read_plain(path: &Path) -> std::io::Result<Vec<u8>> {
+    let about = std::fs::metadata(path)?;
+    match about.is_file() {
+        true if about.len() > MESH_BYTES_MAX => {
+            Err(std::io::Error::other(format!("it has {} bytes, more than {MESH_BYTES_MAX}", about.len())))
+        }
+        true => std::fs::read(path),
         false => Err(std::io::Error::other("it is no plain file")),
     }
 }

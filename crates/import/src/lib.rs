@@ -1,26 +1,32 @@
 //! URDF robots and MJCF models as scene files.
 //!
 //! In: the text of a model and its folder. Out: the text of a scene, and a list of all that has no place in one ([`Imported`]).
-//! Never here: files that are opened (the caller reads what a model includes, [`ReadText`]), running a scene, the points of meshes, checking the
+//! Never here: files that are opened (the caller reads what a model includes, [`ReadFile`]), running a scene, checking the
 //! scene that comes out (`metachron-scene` does).
 //!
 //! Links become rigid objects whose axes are those of the link, joints `[[joint]]` tables, collision geometries shapes and parts.
 //! Everything in the file that no line of this crate has read is in the list: an element or attribute cannot be dropped unseen.
 
 mod apart;
+mod dae;
 mod folders;
 mod masses;
+mod meshes;
 mod mjcf;
 mod model;
+mod msh;
 mod place;
 mod pose;
 mod scene_text;
 mod settle;
 mod srdf;
 mod urdf;
+mod weight;
 mod xml;
 
-pub use folders::{Folders, ReadText};
+pub use folders::{Folders, ReadFile, ReadSurface};
+
+use meshes::Meshes;
 
 /// The page of the crate: its code runs as a test.
 #[cfg(doctest)]
@@ -36,6 +42,17 @@ pub struct Imported {
     pub left_out: Vec<LeftOut>,
     /// The bodies of one robot that start inside each other, and pass through each other for that.
     pub overlaps: Vec<Overlap>,
+    /// The files that the scene names and that are not there yet.
+    pub files: Vec<MeshFile>,
+}
+
+/// A mesh that a scene needs beside it.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct MeshFile {
+    /// Relative to the folder of the scene, with `/` between its parts.
+    pub path: String,
+    /// What is in it.
+    pub bytes: Vec<u8>,
 }
 
 /// Two objects of a scene that start inside each other.
@@ -62,6 +79,18 @@ pub struct Options<'a> {
     pub srdf: Option<&'a str>,
     /// What finds bodies that start inside each other: those of one robot pass through each other then. Default: they collide.
     pub overlaps: Option<FindOverlaps<'a>>,
+    /// The folder of new mesh files, from that of the scene. Default: `meshes`.
+    pub meshes: Option<&'a str>,
+    /// Whether meshes that the scene could name where they are become new files, too: the scene can be moved with its folder then. Default false.
+    pub copy_meshes: bool,
+    /// Whether bodies that move freely and that others hang on are fixed where they start, and the root of a robot. Default false.
+    pub fixed_base: bool,
+}
+
+impl<'a> Options<'a> {
+    fn meshes(&self, folders: Folders<'a>) -> Meshes<'a> {
+        Meshes::new(folders, self.meshes.unwrap_or("meshes"), self.copy_meshes)
+    }
 }
 
 impl std::fmt::Debug for Options<'_> {
@@ -150,9 +179,9 @@ pub fn mjcf<'a>(text: &str, folders: impl Into<Folders<'a>>) -> Result<Imported,
     of_mjcf(xml::parse(text, None)?, folders.into(), &Options::default())
 }
 
-fn of_urdf(root: &xml::Element, folders: Folders<'_>, options: &Options<'_>) -> Result<Imported, ImportError> {
+fn of_urdf<'a>(root: &xml::Element, folders: Folders<'a>, options: &Options<'a>) -> Result<Imported, ImportError> {
     let mut notes = Vec::new();
-    let mut model = urdf::read(root, folders, &mut notes)?;
+    let mut model = urdf::read(root, options.meshes(folders), &mut notes)?;
     if let Some(srdf) = options.srdf {
         srdf::read(srdf, &mut model)?;
     }
@@ -160,20 +189,21 @@ fn of_urdf(root: &xml::Element, folders: Folders<'_>, options: &Options<'_>) -> 
     imported(model, options, notes)
 }
 
-fn of_mjcf(mut root: xml::Element, folders: Folders<'_>, options: &Options<'_>) -> Result<Imported, ImportError> {
+fn of_mjcf<'a>(mut root: xml::Element, folders: Folders<'a>, options: &Options<'a>) -> Result<Imported, ImportError> {
     let mut notes = Vec::new();
     mjcf::include(&mut root, folders, &mut notes)?;
     mjcf::resolve_defaults(&mut root)?;
-    let model = mjcf::read(&root, mjcf::Given { folders, key: options.key }, &mut notes)?;
+    let model = mjcf::read(&root, options.key, options.meshes(folders), &mut notes)?;
     root.list_unread(&mjcf::HARMLESS, &mut notes);
     imported(model, options, notes)
 }
 
 fn imported(model: model::Model, options: &Options<'_>, mut notes: Vec<LeftOut>) -> Result<Imported, ImportError> {
-    let mut settled = settle::settle(model, &mut notes)?;
+    let mut settled = settle::settle(model, options.fixed_base, &mut notes)?;
     let toml = scene_text::write(&settled, &mut notes);
     notes.sort_by(|a, b| (!a.changes_motion, &a.file, a.line).cmp(&(!b.changes_motion, &b.file, b.line)));
-    let mut imported = Imported { toml, left_out: notes, overlaps: Vec::new() };
+    let files = std::mem::take(&mut settled.files);
+    let mut imported = Imported { toml, left_out: notes, overlaps: Vec::new(), files };
     if let Some(find) = options.overlaps {
         imported.overlaps = settled.pass_overlaps(find(&imported));
         // the text has the pairs now; what it leaves out is what it was

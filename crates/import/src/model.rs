@@ -2,6 +2,7 @@
 //!
 //! In: what the readers found. Out: plain data. Never here: XML, TOML.
 
+use crate::MeshFile;
 use crate::place::Place;
 use crate::pose::Pose;
 use glam::{DMat3, DVec3};
@@ -25,6 +26,10 @@ pub(crate) struct Model {
     pub(crate) apart: Vec<Apart>,
     /// Solids of the world itself, in its axes.
     pub(crate) fixed: Vec<Fixed>,
+    /// Whether nothing touches anything.
+    pub(crate) has_no_contacts: bool,
+    /// Meshes that shapes name and that are not there yet.
+    pub(crate) files: Vec<MeshFile>,
 }
 
 /// Two bodies of a scene, by name, that pass through each other.
@@ -132,6 +137,11 @@ pub(crate) enum Shape {
         file: String,
         scale: f64,
     },
+    /// An ellipsoid, and the file of its hull.
+    Ellipsoid {
+        file: String,
+        semi_axes_m: DVec3,
+    },
 }
 
 /// A solid of the world.
@@ -227,6 +237,23 @@ impl Kind {
             }
             Self::Prismatic => Pose { position: axis * position, ..Pose::IDENTITY },
             Self::Fixed | Self::Spherical => Pose::IDENTITY,
+        }
+    }
+}
+
+impl Joint {
+    /// A joint that lets nothing move.
+    pub(crate) fn weld(place: Place, parent: Option<usize>, child: usize) -> Self {
+        Self {
+            name: String::new(),
+            place,
+            parent,
+            child,
+            kind: Kind::Fixed,
+            anchor_m: DVec3::ZERO,
+            axis: DVec3::Z,
+            range: None,
+            motor: None,
         }
     }
 }

@@ -23,9 +23,14 @@ const SAME_M: f64 = 1e-12;
 pub(crate) fn write(model: &Model, notes: &mut Vec<LeftOut>) -> String {
     let mut out = String::from("format = 1\n");
     put(&mut out, "description", &quoted(&format!("{}, imported", model.name)));
-    if let Some(gravity) = model.gravity_m_s2 {
+    if model.gravity_m_s2.is_some() || model.has_no_contacts {
         out.push_str("\n[world]\n");
+    }
+    if let Some(gravity) = model.gravity_m_s2 {
         put(&mut out, "gravity_m_s2", &vector(gravity));
+    }
+    if model.has_no_contacts {
+        put(&mut out, "contacts", "false");
     }
     let masks = all_masks(model);
     for fixed in &model.fixed {
@@ -146,6 +151,7 @@ fn write_shape(out: &mut String, shape: &Shape) {
             let scale = (*scale != 1.0).then(|| ("scale", exact(*scale)));
             ("hull", std::iter::once(("file", quoted(file))).chain(scale).collect())
         }
+        Shape::Ellipsoid { file, .. } => ("hull", vec![("file", quoted(file))]),
     };
     put(out, "shape", &quoted(name));
     for (key, value) in keys {

@@ -24,9 +24,12 @@ enum Fate {
 ///
 /// # Errors
 /// For a link without mass on a joint that moves.
-pub(crate) fn settle(mut model: Model, notes: &mut Vec<LeftOut>) -> Result<Model, ImportError> {
+pub(crate) fn settle(mut model: Model, fixed_base: bool, notes: &mut Vec<LeftOut>) -> Result<Model, ImportError> {
     lend(&mut model, notes);
     find_roots(&mut model);
+    if fixed_base {
+        fix_bases(&mut model);
+    }
     let mut fates: Vec<Fate> = Vec::with_capacity(model.links.len());
     for (at, link) in model.links.iter().enumerate() {
         fates.push(fate(link, model.joints.iter().find(|joint| joint.child == at), &fates, &model)?);
@@ -71,6 +74,18 @@ fn find_roots(model: &mut Model) {
     }
 }
 
+/// Fixes what moves freely and others hang on, and a robot that is one link.
+fn fix_bases(model: &mut Model) {
+    let joints = std::mem::take(&mut model.joints);
+    let is_base = |at: usize| {
+        joints.iter().all(|joint| joint.child != at)
+            && (model.links.len() == 1 || joints.iter().any(|joint| joint.parent == Some(at)))
+    };
+    let bases = (0..model.links.len()).filter(|at| is_base(*at) && !matches!(model.links[*at].mass, Mass::None));
+    let welds: Vec<Joint> = bases.map(|at| Joint::weld(model.links[at].place.clone(), None, at)).collect();
+    model.joints = welds.into_iter().chain(joints).collect();
+}
+
 /// Brings the pairs that the file excludes to the bodies that links become.
 fn pass_excluded(model: &mut Model, fates: &[Fate]) {
     let names = |link: usize| -> Vec<String> {
@@ -96,6 +111,9 @@ fn pass_excluded(model: &mut Model, fates: &[Fate]) {
 fn fate(link: &Link, joint: Option<&Joint>, before: &[Fate], model: &Model) -> Result<Fate, ImportError> {
     if !matches!(link.mass, Mass::None) {
         return Ok(Fate::Itself);
+    }
+    if link.is_free {
+        return Err(link.place.wrong("has no mass, and moves freely; expected a mass above zero"));
     }
     let Some(joint) = joint else { return Ok(Fate::World) };
     if joint.kind != Kind::Fixed {

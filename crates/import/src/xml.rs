@@ -217,6 +217,22 @@ impl Element {
         }
     }
 
+    /// Counts an attribute as read where it says what is so without it.
+    pub(crate) fn read_if(&self, name: &str, usual: &str) {
+        for attribute in self.attributes.iter().filter(|attribute| attribute.name == name && attribute.value == usual) {
+            attribute.is_read.set(true);
+        }
+    }
+
+    /// Counts those attributes as read that are zero, or several zeros, and mean what they mean where they are missing.
+    pub(crate) fn read_zeros(&self, names: &[&str]) {
+        for attribute in self.attributes.iter().filter(|attribute| names.contains(&attribute.name.as_str())) {
+            if attribute.value.split_whitespace().all(|word| word.parse() == Ok(0.0)) {
+                attribute.is_read.set(true);
+            }
+        }
+    }
+
     /// Lists every element and attribute that nothing has read.
     pub(crate) fn list_unread(&self, harmless: &Harmless, into: &mut Vec<LeftOut>) {
         let note = |what: String, is_harmless: bool| {

@@ -6,10 +6,12 @@ use super::compiler::Compiler;
 use super::geoms::{Geom, Mesh};
 use super::joints::StartedJoint;
 use super::keyframe::Keyframe;
-use crate::folders::Folders;
-use crate::model::{End, Fixed, Joint, Link, Look, Masks, Mass, Model, Part, Surface};
+use crate::masses::kilograms;
+use crate::meshes::Meshes;
+use crate::model::{End, Fixed, Joint, Link, Look, Masks, Mass, Model, Part, Shape, Surface};
 use crate::place::Place;
 use crate::pose::Pose;
+use crate::weight::Weight;
 use crate::xml::Element;
 use crate::{ImportError, LeftOut};
 use glam::{DMat3, DQuat, DVec3};
@@ -19,7 +21,7 @@ use std::collections::{BTreeMap, BTreeSet};
 pub(super) struct BodyReader<'a> {
     pub(super) compiler: &'a Compiler,
     pub(super) meshes: BTreeMap<String, Mesh<'a>>,
-    pub(super) folders: Folders<'a>,
+    pub(super) files: Meshes<'a>,
     pub(super) notes: &'a mut Vec<LeftOut>,
     pub(super) model: Model,
     /// For each joint of the model, where the zero of its file is: from its start, radians or metres.
@@ -27,6 +29,8 @@ pub(super) struct BodyReader<'a> {
     pub(super) sites: BTreeMap<String, Site<'a>>,
     /// `None` for a start where the file has its bodies.
     pub(super) keyframe: Option<Keyframe<'a>>,
+    /// What bodies weigh that never move; `None` where that is not known.
+    pub(super) static_kg: Option<f64>,
     names: BTreeSet<String>,
 }
 
@@ -102,24 +106,25 @@ impl<'e> Contents<'e> {
 }
 
 impl<'a> BodyReader<'a> {
-    pub(super) fn new(compiler: &'a Compiler, folders: Folders<'a>, notes: &'a mut Vec<LeftOut>) -> Self {
+    pub(super) fn new(compiler: &'a Compiler, files: Meshes<'a>, notes: &'a mut Vec<LeftOut>) -> Self {
         // no object of a scene can have the name of the world
         let names = BTreeSet::from(["world".to_owned()]);
         Self {
             compiler,
             meshes: BTreeMap::new(),
-            folders,
+            files,
             notes,
             model: Model::default(),
             zeros: Vec::new(),
             sites: BTreeMap::new(),
             keyframe: None,
+            static_kg: Some(0.0),
             names,
         }
     }
 
     pub(super) fn finish(self) -> Model {
-        self.model
+        Model { files: self.files.finish(), ..self.model }
     }
 
     /// Reads the world and all bodies in it.
@@ -158,12 +163,8 @@ impl<'a> BodyReader<'a> {
         let above = joint.as_ref().map_or(above, |joint| above.moved(joint));
         let pose = above.pose;
         let geoms = self.geoms(&contents)?;
-        let mass = if is_fixed {
-            contents.inertial.inspect(|inertial| inertial.read_all_within());
-            Mass::None
-        } else {
-            self.mass(contents.inertial, &geoms)?
-        };
+        let mass =
+            if is_fixed { self.static_mass(contents.inertial, &geoms)? } else { self.mass(contents.inertial, &geoms)? };
         let look = look(&geoms);
         if let Some(one) = look.surface
             && geoms.iter().any(|geom| geom.part.touches && geom.surface != one)
@@ -172,7 +173,7 @@ impl<'a> BodyReader<'a> {
                 "has geoms of several frictions or masks: the largest friction is that of all, and all masks together",
             ));
         }
-        let parts = geoms.into_iter().map(|geom| density(geom, &mass)).collect();
+        let parts: Vec<Part> = geoms.iter().map(|geom| density(geom, &mass)).collect();
         let is_free = joint.as_ref().is_some_and(|joint| joint.between.is_none());
         self.model.links.push(Link {
             name,
@@ -248,14 +249,24 @@ impl<'a> BodyReader<'a> {
         if let Some(inertial) = inertial.filter(|_| !self.compiler.mass_from_geoms) {
             return self.given_mass(inertial);
         }
-        let mut weighing = geoms.iter().filter(|geom| geom.density_kg_m3 != Some(0.0));
-        match (weighing.next(), weighing.next()) {
-            (None, _) => Ok(Mass::None),
-            // of a hull the scene alone knows the volume
-            (Some(Geom { density_kg_m3: None, mass_kg: Some(mass_kg), .. }), None) => {
+        let weighing: Vec<&Geom> = geoms.iter().filter(|geom| geom.density_kg_m3 != Some(0.0)).collect();
+        if weighing.is_empty() {
+            return Ok(Mass::None);
+        }
+        // a scene takes the mass of solids that are all touched, or none, from their densities
+        let is_seen_alone = geoms.iter().all(|geom| !geom.part.touches);
+        if weighing.iter().all(|g| matches!(g.part.shape, Shape::Solid(_)) && (g.part.touches || is_seen_alone)) {
+            return Ok(Mass::OfParts);
+        }
+        if let Some(all) = weighing.iter().map(|geom| self.weight(geom)).collect::<Option<Vec<_>>>() {
+            return Ok(Weight::together(&all));
+        }
+        // of a mesh that cannot be read here the scene alone knows the volume
+        match weighing.as_slice() {
+            [Geom { density_kg_m3: None, mass_kg: Some(mass_kg), .. }] => {
                 Ok(Mass::Given { mass_kg: *mass_kg, com_m: DVec3::ZERO, inertia_kg_m2: None })
             }
-            _ => match geoms.iter().find(|geom| geom.density_kg_m3.is_none()) {
+            _ => match weighing.iter().find(|geom| geom.density_kg_m3.is_none()) {
                 Some(geom) => {
                     let reason = "is a mesh with a `mass` beside other geoms; expected an `inertial` in its body";
                     Err(geom.part.place.wrong(reason))
@@ -263,6 +274,17 @@ impl<'a> BodyReader<'a> {
                 None => Ok(Mass::OfParts),
             },
         }
+    }
+
+    /// None: a body that never moves weighs only in the sum of all.
+    fn static_mass(&mut self, inertial: Option<&Element>, geoms: &[Geom]) -> Result<Mass, ImportError> {
+        inertial.inspect(|inertial| inertial.read_all_within());
+        if self.compiler.total_kg.is_some() {
+            let mass = self.mass(inertial, geoms)?;
+            let parts: Vec<Part> = geoms.iter().map(|geom| density(geom, &mass)).collect();
+            self.static_kg = self.static_kg.zip(kilograms(&mass, &parts)).map(|(sum, more)| sum + more);
+        }
+        Ok(Mass::None)
     }
 
     fn given_mass(&self, inertial: &Element) -> Result<Mass, ImportError> {
@@ -295,9 +317,9 @@ fn free_with_others(joint: Placed<'_>) -> ImportError {
 }
 
 /// The part of a geom, with its density where the body's mass comes from that.
-fn density(geom: Geom, mass: &Mass) -> Part {
+fn density(geom: &Geom, mass: &Mass) -> Part {
     let density_kg_m3 = geom.density_kg_m3.filter(|_| matches!(mass, Mass::OfParts));
-    Part { density_kg_m3, ..geom.part }
+    Part { density_kg_m3, ..geom.part.clone() }
 }
 
 /// The look of a body: the colour of its first coloured geom, the friction of its roughest, the masks of all.
@@ -308,23 +330,6 @@ fn look(geoms: &[Geom]) -> Look {
         masks: Masks { types: a.masks.types | b.masks.types, partners: a.masks.partners | b.masks.partners },
     };
     Look { colour: geoms.iter().find_map(|geom| geom.colour), surface: touched.reduce(both) }
-}
-
-impl Joint {
-    /// A joint that lets nothing move.
-    fn weld(place: Place, parent: Option<usize>, child: usize) -> Self {
-        Self {
-            name: String::new(),
-            place,
-            parent,
-            child,
-            kind: crate::model::Kind::Fixed,
-            anchor_m: DVec3::ZERO,
-            axis: DVec3::Z,
-            range: None,
-            motor: None,
-        }
-    }
 }
 
 /// A rotation that brings z to a direction.

@@ -20,6 +20,8 @@ pub(super) struct Compiler {
     pub(super) mesh_folder: String,
     /// Whether geoms give masses even where a body says its own.
     pub(super) mass_from_geoms: bool,
+    /// What all bodies together weigh; `None` for what they say.
+    pub(super) total_kg: Option<f64>,
 }
 
 impl Compiler {
@@ -30,6 +32,7 @@ impl Compiler {
             auto_limits: true,
             mesh_folder: String::new(),
             mass_from_geoms: false,
+            total_kg: None,
         };
         for compiler in root.children("compiler") {
             if let Some(unit) = compiler.text("angle") {
@@ -44,6 +47,8 @@ impl Compiler {
             if let Some(given) = compiler.text("autolimits") {
                 settings.auto_limits = given == "true";
             }
+            compiler.read_if("coordinate", "local");
+            settings.total_kg = compiler.number("settotalmass")?.filter(|total| *total > 0.0).or(settings.total_kg);
             if let Some(given) = compiler.text("inertiafromgeom") {
                 settings.mass_from_geoms = given == "true";
             }

@@ -16,7 +16,8 @@ mod tendons;
 pub(crate) use defaults::resolve_defaults;
 pub(crate) use include::include;
 
-use crate::folders::Folders;
+use crate::masses::rescale;
+use crate::meshes::Meshes;
 use crate::model::Model;
 use crate::xml::{Element, Harmless};
 use crate::{ImportError, LeftOut};
@@ -37,37 +38,38 @@ pub(crate) const HARMLESS: Harmless = Harmless {
         smoothnormal refpos refquat ctrlrange ctrllimited",
 };
 
-/// What a model is read with.
-pub(crate) struct Given<'a> {
-    pub(crate) folders: Folders<'a>,
-    /// The name of the keyframe that it starts from.
-    pub(crate) key: Option<&'a str>,
-}
-
-/// Reads a model.
+/// Reads a model, which starts from the keyframe `key`.
 ///
 /// # Errors
 /// [`ImportError`] at the first element that no scene can have.
-pub(crate) fn read(root: &Element, given: Given<'_>, notes: &mut Vec<LeftOut>) -> Result<Model, ImportError> {
+pub(crate) fn read(
+    root: &Element,
+    key: Option<&str>,
+    meshes: Meshes<'_>,
+    notes: &mut Vec<LeftOut>,
+) -> Result<Model, ImportError> {
     if root.tag != "mujoco" {
         return Err(root.wrong("is not the root of a model; expected `mujoco`"));
     }
     let compiler = Compiler::read(root)?;
-    let mut reader = BodyReader::new(&compiler, given.folders, notes);
+    let mut reader = BodyReader::new(&compiler, meshes, notes);
     reader.meshes = geoms::meshes(root, &compiler)?;
-    reader.keyframe = given.key.map(|name| Keyframe::find(root, name)).transpose()?;
+    reader.keyframe = key.map(|name| Keyframe::find(root, name)).transpose()?;
     for body in root.children("worldbody") {
         reader.world(body)?;
     }
     actuators::read(root, &mut reader)?;
     tendons::read(root, &mut reader)?;
+    let static_kg = reader.static_kg;
     let mut model = reader.finish();
-    model.name = root.text("model").unwrap_or("model").to_owned();
-    for option in root.children("option") {
-        if let Some(gravity) = option.numbers("gravity")? {
-            model.gravity_m_s2 = Some(DVec3::from_array(gravity));
-        }
+    if let Some(total_kg) = compiler.total_kg
+        && !rescale(&mut model, static_kg, total_kg)
+    {
+        let what = "`settotalmass` is left out: a mesh that weighs cannot be read here";
+        notes.extend(root.child("compiler").map(|compiler| compiler.note(what)));
     }
+    model.name = root.text("model").unwrap_or("model").to_owned();
+    read_options(root, &mut model, notes)?;
     let names: BTreeMap<String, usize> = model.links.iter().enumerate().map(|(i, l)| (l.name.clone(), i)).collect();
     for exclude in root.children("contact").flat_map(|contact| contact.children("exclude")) {
         let find = |key: &'static str| {
@@ -78,4 +80,26 @@ pub(crate) fn read(root: &Element, given: Given<'_>, notes: &mut Vec<LeftOut>) -
     }
     model.collides_with_base = true;
     Ok(model)
+}
+
+/// Gravity, whether there are contacts, and what surrounds the bodies.
+fn read_options(root: &Element, model: &mut Model, notes: &mut Vec<LeftOut>) -> Result<(), ImportError> {
+    for option in root.children("option") {
+        if let Some(gravity) = option.numbers("gravity")? {
+            model.gravity_m_s2 = Some(DVec3::from_array(gravity));
+        }
+        for name in ["density", "viscosity"] {
+            if option.number(name)?.is_some_and(|value| value != 0.0) {
+                notes.push(option.note(format!("`{name}` is left out: nothing surrounds the bodies of a scene")));
+            }
+        }
+    }
+    let is_off = |flag: &Element, name: &str| flag.text(name) == Some("disable");
+    for flag in root.children("option").flat_map(|option| option.children("flag")) {
+        if is_off(flag, "gravity") {
+            model.gravity_m_s2 = Some(DVec3::ZERO);
+        }
+        model.has_no_contacts |= is_off(flag, "contact");
+    }
+    Ok(())
 }

@@ -3,4 +3,5 @@
 mod mjcf;
 mod overlaps;
 mod play;
+mod shapes;
 mod urdf;

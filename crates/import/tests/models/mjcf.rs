@@ -187,7 +187,7 @@ fn folder(files: &[(&str, &str)]) -> tempfile::TempDir {
 
 /// Where the files of a model are, which are read from the disk.
 fn several(folder: &Path) -> Folders<'_> {
-    Folders { read: Some(&|path| std::fs::read_to_string(path)), ..Folders::from(folder) }
+    Folders { read: Some(&|path| std::fs::read(path)), ..Folders::from(folder) }
 }
 
 #[test]
@@ -318,4 +318,78 @@ fn a_keyframe_is_where_the_model_starts_and_what_its_servos_hold() {
         let error = at_key(KEYED, key).expect_err(key).to_string();
         assert_eq!(error, expected);
     }
+}
+
+#[test]
+fn flags_turn_gravity_and_contacts_off() {
+    let text = r#"<mujoco><option><flag gravity="disable" contact="disable"/></option><worldbody>
+        <body name="a" pos="0 0 1"><freejoint/><geom size="0.1"/></body></worldbody></mujoco>"#;
+    let imported = import(text).unwrap();
+    assert_eq!(left_out(&imported), [""; 0]);
+    let world = start(&imported, &[], 500.0);
+    advance(&world, 1.0);
+    assert_eq!(centre(&world, "a").z, 1.0);
+    assert!(!crate::play::scene(&imported, &[], 500.0).contacts);
+}
+
+#[test]
+fn what_changes_the_motion_comes_first_and_zeros_change_none() {
+    let text = r#"<mujoco><option timestep="0.01" density="1.2" viscosity="0"/><worldbody><light/><body name="a">
+        <joint name="hinge" armature="0.1" frictionloss="2" damping="3"/>
+        <joint name="slide" type="slide" armature="0" frictionloss="0" margin="0"/>
+        <geom size="0.1" rgba="1 0 0 1" user="1" margin="0" solref="0.1 1"/></body></worldbody>
+        <actuator><motor joint="hinge" gear="5"/><muscle joint="hinge"/></actuator></mujoco>"#;
+    let imported = import(text).unwrap();
+    let lists = |changes: bool| {
+        let of = imported.left_out.iter().filter(move |entry| entry.changes_motion == changes);
+        of.map(ToString::to_string).collect::<Vec<_>>()
+    };
+    assert_eq!(
+        lists(true),
+        [
+            "line 1: option: `density` is left out: nothing surrounds the bodies of a scene",
+            "line 1: body `a`: has no mass, and moves: a thousandth of that of `a` is added",
+            "line 2: joint `hinge`: `armature` is left out: scenes have no inertia about the axis of a joint",
+            "line 2: joint `hinge`: `frictionloss` is left out: a joint of a scene has a spring and damper, or friction",
+            "line 4: body `a`, geom: `solref` is left out",
+            "line 5: actuator, muscle: is left out: it gives what a program commands",
+        ]
+    );
+    assert_eq!(
+        lists(false),
+        [
+            "line 1: option: `timestep` is left out",
+            "line 1: worldbody, light: is left out",
+            "line 4: body `a`, geom: `user` is left out",
+            "line 5: actuator, motor: is left out: it gives what a program commands",
+        ]
+    );
+    assert!(imported.left_out.iter().map(|entry| !entry.changes_motion).is_sorted());
+}
+
+#[test]
+fn a_general_actuator_with_an_affine_bias_is_a_servo_and_shares_its_joint_with_a_spring() {
+    // 30 (0.4 − q) − 2 q' of the actuator, whose bias of 3 is 0.1 rad more, and 10 (−0.2 − q) of the joint: rest at (30 · 0.5 − 10 · 0.2)/40
+    let text = r#"<mujoco><compiler angle="radian"/><option gravity="0 0 0"/><worldbody><body name="arm">
+        <joint name="hinge" stiffness="10" springref="-0.2" damping="3"/><geom size="0.1"/></body></worldbody>
+        <actuator><general joint="hinge" biastype="affine" gainprm="30" biasprm="3 -30 -2"/></actuator>
+        <keyframe><key name="k" qpos="0" ctrl="0.4"/></keyframe></mujoco>"#;
+    let imported = at_key(text, "k").unwrap();
+    assert_eq!(left_out(&imported), [""; 0]);
+    let world = start(&imported, &["hinge"], 500.0);
+    advance(&world, 4.0);
+    // it rests where what a step would still give is below what solves stop at
+    assert!((position(&world, "hinge") - 0.325).abs() < 1e-4, "{}", position(&world, "hinge"));
+}
+
+#[test]
+fn a_base_is_fixed_on_demand() {
+    let text = r#"<mujoco><worldbody><body name="base" pos="0 0 1"><freejoint/><geom size="0.1"/>
+        <body name="arm"><joint axis="0 1 0"/><geom size="0.1" pos="0.5 0 0"/></body></body>
+        <body name="ball" pos="5 0 1"><freejoint/><geom size="0.1"/></body></worldbody></mujoco>"#;
+    let imported = model(text, Path::new("."), &Options { fixed_base: true, ..Options::default() }).unwrap();
+    let world = start(&imported, &[], 500.0);
+    advance(&world, 0.5);
+    let fallen = |name: &str| 1.0 - centre(&world, name).z;
+    assert!(fallen("base").abs() < 1e-6 && fallen("ball") > 1.0 && fallen("arm") > 0.3, "{}", fallen("arm"));
 }

@@ -199,9 +199,9 @@ fn meshes_are_named_from_the_folder_of_the_scene_and_others_are_listed() {
         imported.toml
     );
     let noted = urdf(&robot(r#"filename="../meshes/a.stl" scale="1 -1 1""#), urdfs.as_path()).unwrap();
-    assert!(left_out(&noted)[0].ends_with("scenes have one scale above zero for all three axes"));
-    let noted = urdf(&robot(r#"filename="a.dae""#), urdfs.as_path()).unwrap();
-    assert!(left_out(&noted)[0].ends_with("`a.dae` is left out: scenes read .glb, .stl and .obj"));
+    assert!(left_out(&noted)[0].ends_with("`../meshes/a.stl` is left out: no file is read here"));
+    let noted = urdf(&robot(r#"filename="a.ply""#), urdfs.as_path()).unwrap();
+    assert!(left_out(&noted)[0].ends_with("`a.ply` is left out: expected a .glb, .stl, .obj, .dae or MuJoCo's .msh"));
     let error = urdf(&robot(r#"filename="b.stl""#), urdfs.as_path()).unwrap_err();
     assert_eq!(
         error.to_string(),
