@@ -26,8 +26,6 @@ pub(crate) struct Model {
     pub(crate) apart: Vec<Apart>,
     /// Solids of the world itself, in its axes.
     pub(crate) fixed: Vec<Fixed>,
-    /// Whether nothing touches anything.
-    pub(crate) has_no_contacts: bool,
     /// Meshes that shapes name and that are not there yet.
     pub(crate) files: Vec<MeshFile>,
 }

@@ -23,14 +23,9 @@ const SAME_M: f64 = 1e-12;
 pub(crate) fn write(model: &Model, notes: &mut Vec<LeftOut>) -> String {
     let mut out = String::from("format = 1\n");
     put(&mut out, "description", &quoted(&format!("{}, imported", model.name)));
-    if model.gravity_m_s2.is_some() || model.has_no_contacts {
-        out.push_str("\n[world]\n");
-    }
     if let Some(gravity) = model.gravity_m_s2 {
+        out.push_str("\n[world]\n");
         put(&mut out, "gravity_m_s2", &vector(gravity));
-    }
-    if model.has_no_contacts {
-        put(&mut out, "contacts", "false");
     }
     let masks = all_masks(model);
     for fixed in &model.fixed {

@@ -8,7 +8,7 @@ use super::joints::StartedJoint;
 use super::keyframe::Keyframe;
 use crate::masses::kilograms;
 use crate::meshes::Meshes;
-use crate::model::{End, Fixed, Joint, Link, Look, Masks, Mass, Model, Part, Shape, Surface};
+use crate::model::{End, Fixed, Joint, Kind, Link, Look, Masks, Mass, Model, Part, Shape, Surface};
 use crate::place::Place;
 use crate::pose::Pose;
 use crate::weight::Weight;
@@ -193,6 +193,15 @@ impl<'a> BodyReader<'a> {
         let here = Host { link: Some(index), is_fixed, ..above };
         self.note_sites(&contents, here)?;
         contents.bodies.iter().try_for_each(|body| self.body(*body, here))
+    }
+
+    /// Whether a body is part of the world.
+    pub(super) fn is_static(&self, link: usize) -> bool {
+        let mut above = self.model.joints.iter().find(|joint| joint.child == link);
+        while let Some(joint) = above.filter(|joint| joint.kind == Kind::Fixed && joint.parent.is_some()) {
+            above = self.model.joints.iter().find(|one| Some(one.child) == joint.parent);
+        }
+        above.is_some_and(|joint| joint.kind == Kind::Fixed && joint.parent.is_none())
     }
 
     /// Links without mass, one for each joint of a body but its last, as the joints follow each other; the last of them.

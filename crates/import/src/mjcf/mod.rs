@@ -7,6 +7,7 @@ mod actuators;
 mod bodies;
 mod compiler;
 mod defaults;
+mod equality;
 mod geoms;
 mod include;
 mod joints;
@@ -35,7 +36,7 @@ pub(crate) const HARMLESS: Harmless = Harmless {
         integrator solver iterations tolerance ls_iterations ls_tolerance noslip_iterations noslip_tolerance \
         mpr_iterations mpr_tolerance ccd_iterations ccd_tolerance sdf_iterations sdf_initpoints jacobian apirate magnetic \
         energy fwdinv sensor sensornoise multiccd warmstart island fluidshape fluidcoef maxhullvert content_type \
-        smoothnormal refpos refquat ctrlrange ctrllimited",
+        smoothnormal refpos refquat ctrlrange ctrllimited model",
 };
 
 /// Reads a model, which starts from the keyframe `key`.
@@ -60,6 +61,7 @@ pub(crate) fn read(
     }
     actuators::read(root, &mut reader)?;
     tendons::read(root, &mut reader)?;
+    equality::read(root, &mut reader)?;
     let static_kg = reader.static_kg;
     let mut model = reader.finish();
     if let Some(total_kg) = compiler.total_kg
@@ -82,7 +84,7 @@ pub(crate) fn read(
     Ok(model)
 }
 
-/// Gravity, whether there are contacts, and what surrounds the bodies.
+/// Gravity, whether anything touches anything, and what surrounds the bodies.
 fn read_options(root: &Element, model: &mut Model, notes: &mut Vec<LeftOut>) -> Result<(), ImportError> {
     for option in root.children("option") {
         if let Some(gravity) = option.numbers("gravity")? {
@@ -99,7 +101,10 @@ fn read_options(root: &Element, model: &mut Model, notes: &mut Vec<LeftOut>) -> 
         if is_off(flag, "gravity") {
             model.gravity_m_s2 = Some(DVec3::ZERO);
         }
-        model.has_no_contacts |= is_off(flag, "contact");
+        if is_off(flag, "contact") {
+            let parts = model.links.iter_mut().flat_map(|link| &mut link.parts);
+            parts.chain(model.fixed.iter_mut().map(|fixed| &mut fixed.part)).for_each(|part| part.touches = false);
+        }
     }
     Ok(())
 }

@@ -322,14 +322,21 @@ fn a_keyframe_is_where_the_model_starts_and_what_its_servos_hold() {
 
 #[test]
 fn flags_turn_gravity_and_contacts_off() {
-    let text = r#"<mujoco><option><flag gravity="disable" contact="disable"/></option><worldbody>
-        <body name="a" pos="0 0 1"><freejoint/><geom size="0.1"/></body></worldbody></mujoco>"#;
-    let imported = import(text).unwrap();
-    assert_eq!(left_out(&imported), [""; 0]);
-    let world = start(&imported, &[], 500.0);
-    advance(&world, 1.0);
-    assert_eq!(centre(&world, "a").z, 1.0);
-    assert!(!crate::play::scene(&imported, &[], 500.0).contacts);
+    let height = |flags: &str| {
+        let text = format!(
+            r#"<mujoco><option><flag {flags}/></option><worldbody><geom type="plane" size="1 1 1"/>
+            <body name="a" pos="0 0 0.1"><freejoint/><geom size="0.1"/></body></worldbody></mujoco>"#
+        );
+        let imported = import(&text).unwrap();
+        assert_eq!(left_out(&imported), [""; 0]);
+        let world = start(&imported, &[], 500.0);
+        advance(&world, 1.0);
+        centre(&world, "a").z
+    };
+    assert_eq!(height(r#"gravity="disable" contact="disable""#), 0.1);
+    // steps of first order err by g h/2 in a second
+    assert!((height(r#"contact="disable""#) - (0.1 - 9.81 / 2.0)).abs() < 0.02);
+    assert!((height(r#"gravity="enable""#) - 0.1).abs() < 1e-4);
 }
 
 #[test]
@@ -392,4 +399,36 @@ fn a_base_is_fixed_on_demand() {
     advance(&world, 0.5);
     let fallen = |name: &str| 1.0 - centre(&world, name).z;
     assert!(fallen("base").abs() < 1e-6 && fallen("ball") > 1.0 && fallen("arm") > 0.3, "{}", fallen("arm"));
+}
+
+#[test]
+fn bodies_that_share_a_point_or_a_pose_are_joined() {
+    // a ball that starts beside its anchor, one welded to a post, and a chain whose end is held where it starts
+    let text = r#"<mujoco><default><geom contype="0" conaffinity="0"/></default><worldbody>
+        <body name="post" pos="0 0 2"><geom size="0.1"/></body>
+        <body name="bob" pos="0.5 0 2"><freejoint/><geom size="0.1"/></body>
+        <body name="held" pos="2 0 2"><freejoint/><geom size="0.1"/></body>
+        <body name="upper" pos="5 0 2"><joint axis="0 1 0"/><geom size="0.1" pos="0.5 0 0"/>
+        <body name="lower" pos="1 0 0"><joint axis="0 1 0"/><geom size="0.1" pos="0.5 0 0"/></body></body></worldbody>
+        <equality><connect body1="bob" body2="post" anchor="-0.5 0 0"/><weld body1="post" body2="held"/>
+        <connect body1="lower" anchor="1 0 0"/><weld body1="held" active="false"/><joint joint1="a" joint2="b"/></equality>
+        </mujoco>"#;
+    let imported = import(text).unwrap();
+    assert_eq!(
+        left_out(&imported),
+        [
+            "line 8: equality, joint: is left out: scenes have joints between two bodies, and nothing that couples joints"
+        ]
+    );
+    let world = start(&imported, &[], 1000.0);
+    // from the level a pendulum of a point takes K(1/√2) √(l/g) to its lowest, where a ball has 2/5 r² more than l²
+    let (l, r) = (0.5_f64, 0.1_f64);
+    advance(&world, 1.854_074_677 * ((l * l + 0.4 * r * r) / (l * 9.81)).sqrt());
+    assert!(centre(&world, "bob").distance(glam::DVec3::new(0.0, 0.0, 1.5)) < 5e-3, "{}", centre(&world, "bob"));
+    assert!(centre(&world, "held").distance(glam::DVec3::new(2.0, 0.0, 2.0)) < 1e-6);
+    // both rods are stretched, and held at both ends
+    assert!(centre(&world, "lower").distance(glam::DVec3::new(6.5, 0.0, 2.0)) < 0.05);
+    let none = r#"<mujoco><equality><connect body1="none" anchor="0 0 0"/></equality></mujoco>"#;
+    let error = import(none).unwrap_err().to_string();
+    assert_eq!(error, "line 1: equality, connect: names `none`, and there is no such body");
 }
