@@ -10,6 +10,7 @@ use metachron_console::output::{BadInput, data, message, print_overlaps, rendere
 use metachron_import::{Folders, Imported, LeftOut, Options, Overlap};
 use metachron_scene::{SCENE_BYTES_MAX, SceneError, Source, load, read_surface};
 use metachron_world::Scene;
+use serde_json::json;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
@@ -60,8 +61,8 @@ pub(super) fn command(args: &ImportArgs) -> anyhow::Result<Exit> {
     }
     match &args.out {
         None if !imported.files.is_empty() => {
-            let what = format!("{model}: {} meshes of the scene have to be written beside it", imported.files.len());
-            return Err(BadInput(format!("{what}; expected --out FILE")).into());
+            let what = "meshes of the scene have to be written beside it; expected --out FILE";
+            return Err(BadInput(format!("{model}: {what}")).into());
         }
         None => data(&imported.toml)?,
         Some(path) => {
@@ -100,9 +101,8 @@ fn srdf(args: &ImportArgs) -> anyhow::Result<Option<String>> {
 fn print_list(args: &ImportArgs, imported: &Imported) -> anyhow::Result<()> {
     let (moving, harmless): (Vec<_>, Vec<_>) = imported.left_out.iter().partition(|entry| entry.changes_motion);
     if args.json {
-        let entry = |LeftOut { file, line, element, what, .. }: &LeftOut| serde_json::json!({ "file": file, "line": line, "element": element, "what": what });
-        let overlap = |Overlap { a, b, depth_m }: &Overlap| serde_json::json!({ "a": a, "b": b, "depth_m": depth_m });
-        let list = serde_json::json!({
+        let overlap = |Overlap { a, b, depth_m }: &Overlap| json!({ "a": a, "b": b, "depth_m": depth_m });
+        let list = json!({
             "changes_motion": moving.into_iter().map(entry).collect::<Vec<_>>(),
             "harmless": harmless.into_iter().map(entry).collect::<Vec<_>>(),
             "files": imported.files.iter().map(|file| &file.path).collect::<Vec<_>>(),
@@ -131,6 +131,10 @@ fn print_list(args: &ImportArgs, imported: &Imported) -> anyhow::Result<()> {
         message(&format!("{model}: `{a}` and `{b}` {what}: {:.3} mm deep", depth_m * 1e3));
     }
     Ok(())
+}
+
+fn entry(LeftOut { file, line, element, what, .. }: &LeftOut) -> serde_json::Value {
+    json!({ "file": file, "line": line, "element": element, "what": what })
 }
 
 /// What an element is, without the names in it.

@@ -11,7 +11,8 @@ impl Model {
     /// Adds the pairs of one robot that overlap; those of two, and those with the world's own solids, stay as they are.
     pub(crate) fn pass_overlaps(&mut self, overlaps: Vec<Overlap>) -> Vec<Overlap> {
         let root = |name: &str| {
-            let fixed = self.fixed.iter().filter(|fixed| fixed.name == name).map(|fixed| fixed.root);
+            let fixed =
+                self.fixed.iter().filter(|fixed| fixed.name == name && fixed.can_pass()).map(|fixed| fixed.root);
             self.links.iter().filter(|link| link.name == name).map(|link| Some(link.root)).chain(fixed).next().flatten()
         };
         let of_one = |pair: &Overlap| root(&pair.a).is_some_and(|one| root(&pair.b) == Some(one));
@@ -53,7 +54,7 @@ impl Model {
         let name = |link: usize| self.links[link].name.clone();
         let mut found: Vec<[String; 2]> = pairs.map(|pair| pair.map(name)).collect();
         for (at, link) in self.links.iter().enumerate().filter(|_| !self.collides_with_base) {
-            let own = self.fixed.iter().filter(|fixed| fixed.root == Some(link.root) && fixed.part.touches);
+            let own = self.fixed.iter().filter(|fixed| fixed.root == Some(link.root) && fixed.can_pass());
             found.extend(own.filter(|_| meets(bodies[at], None)).map(|fixed| [fixed.name.clone(), link.name.clone()]));
         }
         for [a, b] in found {

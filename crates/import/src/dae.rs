@@ -9,6 +9,8 @@ use std::collections::BTreeMap;
 
 /// Deepest nesting of nodes, those included that others name.
 const DEPTH_MAX: usize = 64;
+/// Most nodes of a file, each as often as others name it.
+const NODES_MAX: usize = 100_000;
 /// Most points of a file.
 const POINTS_MAX: usize = 3_000_000;
 
@@ -16,7 +18,7 @@ const POINTS_MAX: usize = 3_000_000;
 pub(crate) fn read(text: &str) -> Result<Vec<DVec3>, String> {
     let document = Document::parse(text).map_err(|why| format!("it is no XML: {why}"))?;
     let named = document.descendants().filter_map(|node| Some((node.attribute("id")?, node)));
-    let mut reader = Reader { named: named.collect(), points: Vec::new() };
+    let mut reader = Reader { named: named.collect(), points: Vec::new(), nodes: 0 };
     let unit = document.descendants().find(|node| is(node, "unit"));
     let metres = unit.and_then(|unit| unit.attribute("meter")?.parse().ok()).unwrap_or(1.0);
     let scale = DMat4::from_scale(DVec3::splat(metres));
@@ -40,6 +42,7 @@ fn is(node: &Node<'_, '_>, tag: &str) -> bool {
 struct Reader<'a, 'i> {
     named: BTreeMap<&'a str, Node<'a, 'i>>,
     points: Vec<DVec3>,
+    nodes: usize,
 }
 
 impl<'a, 'i> Reader<'a, 'i> {
@@ -49,8 +52,9 @@ impl<'a, 'i> Reader<'a, 'i> {
 
     /// A node: its motions in their order, then what is in it.
     fn node(&mut self, node: Node<'a, 'i>, above: DMat4, depth: usize) -> Result<(), String> {
-        if depth > DEPTH_MAX {
-            return Err(format!("its nodes are nested more than {DEPTH_MAX} deep"));
+        self.nodes += 1;
+        if depth > DEPTH_MAX || self.nodes > NODES_MAX {
+            return Err("its nodes are too many or nested too deeply".to_owned());
         }
         let children = || node.children().filter(Node::is_element);
         let mut place = above;

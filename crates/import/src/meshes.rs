@@ -71,10 +71,9 @@ impl<'a> Meshes<'a> {
         Ok(surface.and_then(|surface| self.add(key, stem, surface)))
     }
 
-    /// The hull of points, by the name of their mesh.
+    /// The hull of the points that a model has of a mesh.
     pub(crate) fn hull_of(&mut self, name: &str, points: Vec<DVec3>) -> Result<Shape, String> {
-        let key = format!("{name} {points:?}");
-        self.add(key, name, Triangles { points, triangles: Vec::new() })
+        self.add(format!("points of {name}"), name, Triangles { points, triangles: Vec::new() })
     }
 
     pub(crate) fn ellipsoid(&mut self, semi_axes_m: DVec3) -> Result<Shape, String> {
@@ -85,7 +84,8 @@ impl<'a> Meshes<'a> {
             let on = DVec3::new(f64::from(x), f64::from(y), f64::from(side * z));
             (z > 0 || (z == 0 && side > 0)).then(|| on.normalize() * semi_axes_m)
         });
-        match self.hull_of("ellipsoid", points.collect())? {
+        let surface = Triangles { points: points.collect(), triangles: Vec::new() };
+        match self.add(format!("ellipsoid {semi_axes_m:?}"), "ellipsoid", surface)? {
             Shape::Hull { file, .. } => Ok(Shape::Ellipsoid { file, semi_axes_m }),
             other => Ok(other),
         }

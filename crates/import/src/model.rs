@@ -22,6 +22,8 @@ pub(crate) struct Model {
     pub(crate) excluded: Vec<[usize; 2]>,
     /// Whether what is on a fixed body collides with it: as in MuJoCo, not as in URDF.
     pub(crate) collides_with_base: bool,
+    /// Whether what has no mass and carries none is fixed where it starts: as programs that read URDF do, and MuJoCo refuses it.
+    pub(crate) fixes_massless: bool,
     /// Bodies that pass through each other, with those of `excluded`: `settle` finds them.
     pub(crate) apart: Vec<Apart>,
     /// Solids of the world itself, in its axes.
@@ -152,6 +154,13 @@ pub(crate) struct Fixed {
     pub(crate) link: Option<usize>,
     pub(crate) part: Part,
     pub(crate) look: Look,
+}
+
+impl Fixed {
+    /// Whether it can be let through: couplings are between what can move, and a plane never does.
+    pub(crate) const fn can_pass(&self) -> bool {
+        self.part.touches && !matches!(self.part.shape, Shape::Solid(Solid::Plane))
+    }
 }
 
 /// A joint: the motion that it leaves to `child`.

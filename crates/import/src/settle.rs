@@ -32,7 +32,12 @@ pub(crate) fn settle(mut model: Model, fixed_base: bool, notes: &mut Vec<LeftOut
     }
     let mut fates: Vec<Fate> = Vec::with_capacity(model.links.len());
     for (at, link) in model.links.iter().enumerate() {
-        fates.push(fate(link, model.joints.iter().find(|joint| joint.child == at), &fates, &model)?);
+        let joint = model.joints.iter().find(|joint| joint.child == at);
+        let own = fate(link, joint, &fates, &model)?;
+        if let Some(joint) = joint.filter(|joint| own != Fate::Itself && joint.kind != Kind::Fixed) {
+            notes.push(link.place.note(format!("has no mass, and carries none: {} is fixed", joint.place.label)));
+        }
+        fates.push(own);
     }
     for (at, fate) in fates.iter().enumerate() {
         let parts = if *fate == Fate::Itself { continue } else { std::mem::take(&mut model.links[at].parts) };
@@ -93,7 +98,7 @@ fn pass_excluded(model: &mut Model, fates: &[Fate]) {
             Fate::Itself => vec![model.links[link].name.clone()],
             Fate::PartOf(host, _) => vec![model.links[host].name.clone()],
             Fate::World => {
-                let own = model.fixed.iter().filter(|fixed| fixed.link == Some(link));
+                let own = model.fixed.iter().filter(|fixed| fixed.link == Some(link) && fixed.can_pass());
                 own.map(|fixed| fixed.name.clone()).collect()
             }
         }
@@ -116,7 +121,7 @@ fn fate(link: &Link, joint: Option<&Joint>, before: &[Fate], model: &Model) -> R
         return Err(link.place.wrong("has no mass, and moves freely; expected a mass above zero"));
     }
     let Some(joint) = joint else { return Ok(Fate::World) };
-    if joint.kind != Kind::Fixed {
+    if joint.kind != Kind::Fixed && !model.fixes_massless {
         let reason = format!("has no mass, and {} lets it move; expected a mass above zero", joint.place.label);
         return Err(link.place.wrong(reason));
     }

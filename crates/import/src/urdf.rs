@@ -18,7 +18,7 @@ pub(crate) const HARMLESS: Harmless = Harmless {
     elements: "visual material color texture transmission safety_controller calibration sensor plugin ros2_control verbose \
         self_collision_checking axis limit dynamics implicitSpringDamper provideFeedback selfCollide",
     containers: "gazebo",
-    attributes: "effort velocity command_effort current gear_velocity version type id",
+    attributes: "effort velocity command_effort current gear_velocity version type id dont_collapse",
 };
 
 /// A joint as the file has it, between names.
@@ -62,7 +62,8 @@ pub(crate) fn read(root: &Element, mut meshes: Meshes<'_>, notes: &mut Vec<LeftO
             }
         }
     }
-    let mut model = Model { name: root.text("name").unwrap_or("robot").to_owned(), ..Model::default() };
+    let name = root.text("name").unwrap_or("robot").to_owned();
+    let mut model = Model { name, fixes_massless: true, ..Model::default() };
     let order = order(root, &links, &drafts)?;
     let mut numbers: BTreeMap<&str, usize> = BTreeMap::new();
     for Placed { element, above } in order {

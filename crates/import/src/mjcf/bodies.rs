@@ -146,6 +146,7 @@ impl<'a> BodyReader<'a> {
         let contents = Contents::of(element, self.compiler)?;
         let place = element.place.clone();
         let name = self.unused(element.text("name"), "body");
+        element.read_zeros(&["gravcomp"]);
         let rest = placed.frame.then(self.compiler.pose(element)?);
         let is_fixed = host.is_fixed && contents.joints.is_empty();
         let from = Host { pose: host.pose.then(rest), at_springs: host.at_springs.then(rest), ..host };

@@ -74,6 +74,10 @@ pub(crate) fn read(
     read_options(root, &mut model, notes)?;
     let names: BTreeMap<String, usize> = model.links.iter().enumerate().map(|(i, l)| (l.name.clone(), i)).collect();
     for exclude in root.children("contact").flat_map(|contact| contact.children("exclude")) {
+        if ["body1", "body2"].iter().any(|key| exclude.text(key) == Some("world")) {
+            notes.push(exclude.note("is left out: scenes exclude bodies from each other, not from the world"));
+            continue;
+        }
         let find = |key: &'static str| {
             let name = exclude.needed(key)?;
             names.get(name).copied().ok_or_else(|| exclude.wrong(format!("names `{name}`, and there is no such body")))

@@ -91,6 +91,11 @@ fn an_exclude_with_a_body_that_never_moves_is_in_the_scene() {
         <body name="arm"><joint/><geom size="0.1" pos="0 0 1"/></body></body></worldbody>
         <contact><exclude body1="post" body2="arm"/></contact></mujoco>"#;
     assert_eq!(apart(&import(text, None)), [["post", "arm"]]);
+    let world = text.replace("body1=\"post\"", "body1=\"world\"");
+    let noted = crate::play::left_out(&import(&world, None));
+    assert!(noted[0].ends_with("exclude: is left out: scenes exclude bodies from each other, not from the world"));
+    // a plane is always fixed
+    assert!(apart(&import(&text.replace("size=\"0.1\"/>\n", "type=\"plane\" size=\"1 1 1\"/>\n"), None)).is_empty());
     // without it they collide, as MuJoCo's filter of parents is not for what is part of the world
     assert!(apart(&import(&text.replace("exclude", "pair"), None)).is_empty());
 }

@@ -146,6 +146,14 @@ fn meshes_of_msh_and_collada_and_mirrored_ones_become_hulls_of_the_same_points()
         }
         assert_eq!(points_m.len(), 8, "{mesh}");
     }
+    // a node that names itself
+    let looped = r##"<COLLADA><visual_scene><node id="n"><instance_node url="#n"/><instance_node url="#n"/></node>
+        </visual_scene></COLLADA>"##;
+    std::fs::write(folder.path().join("d.dae"), looped).unwrap();
+    let robot =
+        r#"<mujoco><asset><mesh file="d.dae"/></asset><worldbody><geom type="mesh" mesh="d"/></worldbody></mujoco>"#;
+    let noted = model(robot, read_from(folder.path()), &Options::default()).unwrap();
+    assert!(left_out(&noted)[0].ends_with("`d.dae`: its nodes are too many or nested too deeply"), "{noted:?}");
     std::fs::write(folder.path().join("a.msh"), &msh(&corners(half, at))[..40]).unwrap();
     let robot =
         r#"<mujoco><asset><mesh file="a.msh"/></asset><worldbody><geom type="mesh" mesh="a"/></worldbody></mujoco>"#;
