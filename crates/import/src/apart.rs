@@ -4,7 +4,7 @@
 //! As in `MuJoCo`'s filter of parents and the collision matrices of `MoveIt`: bodies on two sides of a joint do not collide, wherever fixed joints
 //! have put them, and nor do those that their joints hold inside each other.
 
-use crate::Overlap;
+use crate::imported::Overlap;
 use crate::model::{Apart, Joint, Kind, Model, Why};
 
 impl Model {

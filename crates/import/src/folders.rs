@@ -3,7 +3,7 @@
 //! In: a path as a model writes it. Out: the path as the scene writes it, the text of what is included. Never here: what that means, files that
 //! are opened (the caller's [`ReadFile`] does).
 
-use crate::ImportError;
+use crate::imported::ImportError;
 use crate::xml::Element;
 use metachron_geometry::Triangles;
 use std::path::{Component, Path, PathBuf};

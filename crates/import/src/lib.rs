@@ -10,6 +10,7 @@
 mod apart;
 mod dae;
 mod folders;
+mod imported;
 mod masses;
 mod meshes;
 mod mjcf;
@@ -25,6 +26,7 @@ mod weight;
 mod xml;
 
 pub use folders::{Folders, ReadFile, ReadSurface};
+pub use imported::{ImportError, Imported, LeftOut, MeshFile, Overlap};
 
 use meshes::Meshes;
 
@@ -32,39 +34,6 @@ use meshes::Meshes;
 #[cfg(doctest)]
 #[doc = include_str!("../README.md")]
 struct Page;
-
-/// A model as a scene.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Imported {
-    /// The text of the scene file.
-    pub toml: String,
-    /// What of the model is not in it: first all that changes the motion, each in the order of the file.
-    pub left_out: Vec<LeftOut>,
-    /// The bodies of one robot that start inside each other, and pass through each other for that.
-    pub overlaps: Vec<Overlap>,
-    /// The files that the scene names and that are not there yet.
-    pub files: Vec<MeshFile>,
-}
-
-/// A mesh that a scene needs beside it.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub struct MeshFile {
-    /// Relative to the folder of the scene, with `/` between its parts.
-    pub path: String,
-    /// What is in it.
-    pub bytes: Vec<u8>,
-}
-
-/// Two objects of a scene that start inside each other.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Overlap {
-    /// The name of one.
-    pub a: String,
-    /// That of the other.
-    pub b: String,
-    /// Depth at the deepest point, metres.
-    pub depth_m: f64,
-}
 
 /// Finds the objects of a scene that start inside each other: the caller reads scenes. Where it finds none because the scene cannot be read, the
 /// caller finds so again.
@@ -97,53 +66,6 @@ impl std::fmt::Debug for Options<'_> {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         f.debug_struct("Options").field("key", &self.key).field("srdf", &self.srdf).finish_non_exhaustive()
     }
-}
-
-/// A part of a model that a scene has no place for, or that is in it otherwise than in the model.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub struct LeftOut {
-    /// The included file that it is in, as the model names it; `None` for the model's own.
-    pub file: Option<String>,
-    /// Line of that file, from 1.
-    pub line: u32,
-    /// Which element, such as ``joint `elbow`, dynamics``.
-    pub element: String,
-    /// What about it.
-    pub what: String,
-    /// Whether the scene moves otherwise than the model for that.
-    pub changes_motion: bool,
-}
-
-impl LeftOut {
-    /// The same, which changes no motion.
-    pub(crate) fn harmless(self) -> Self {
-        Self { changes_motion: false, ..self }
-    }
-}
-
-impl std::fmt::Display for LeftOut {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        write!(f, "{}: {}: {}", spot(self.file.as_deref(), self.line), self.element, self.what)
-    }
-}
-
-/// A line, and the file that it is in where that is not the model's own.
-fn spot(file: Option<&str>, line: u32) -> String {
-    file.map_or_else(|| format!("line {line}"), |file| format!("line {line} of `{file}`"))
-}
-
-/// Why a model cannot be a scene.
-#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
-#[error("{}: {element}: {reason}", spot(file.as_deref(), *line))]
-pub struct ImportError {
-    /// The included file that it is in, as the model names it; `None` for the model's own.
-    pub file: Option<String>,
-    /// Line of that file, from 1.
-    pub line: u32,
-    /// Which element, such as ``link `arm`, inertial``.
-    pub element: String,
-    /// What is wrong with it, and what was expected.
-    pub reason: String,
 }
 
 /// Reads a model of the kind that its root element says: a robot as [`urdf`], an MJCF model as [`mjcf`].

@@ -3,7 +3,7 @@
 //! In: a [`Model`] as the file has it. Out: the same where what moves weighs something, and moments are those of bodies; all that was changed is
 //! noted. Never here: shapes that are touched.
 
-use crate::LeftOut;
+use crate::imported::LeftOut;
 use crate::model::{Kind, Link, Mass, Model, Part, Shape};
 use crate::pose::Pose;
 use glam::{DMat3, DVec3};

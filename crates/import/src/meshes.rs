@@ -4,9 +4,10 @@
 //! written (the caller does), what a mesh is on.
 
 use crate::folders::{Folders, extension};
+use crate::imported::{ImportError, MeshFile};
 use crate::model::Shape;
 use crate::xml::Element;
-use crate::{ImportError, MeshFile, dae, msh};
+use crate::{dae, msh};
 use glam::DVec3;
 use metachron_geometry::{Triangles, hull_triangles};
 use std::collections::BTreeMap;

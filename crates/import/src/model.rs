@@ -2,7 +2,7 @@
 //!
 //! In: what the readers found. Out: plain data. Never here: XML, TOML.
 
-use crate::MeshFile;
+use crate::imported::MeshFile;
 use crate::place::Place;
 use crate::pose::Pose;
 use glam::{DMat3, DVec3};

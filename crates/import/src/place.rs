@@ -2,7 +2,7 @@
 //!
 //! In: what a reader knows of an element. Out: notes and errors about it. Never here: XML, what an element means.
 
-use crate::{ImportError, LeftOut};
+use crate::imported::{ImportError, LeftOut};
 use std::rc::Rc;
 
 /// An element of a file, for messages.

@@ -2,7 +2,7 @@
 //!
 //! In: a [`Model`] where every link has a mass and a part. Out: TOML. Never here: what the model was read from.
 
-use crate::LeftOut;
+use crate::imported::LeftOut;
 use crate::model::{
     Apart, End, Fixed, Joint, Kind, Link, Look, Masks, Mass, Model, Motor, Part, Shape, Tie, TieKind, Why,
 };

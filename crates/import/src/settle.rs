@@ -2,10 +2,10 @@
 //!
 //! In: a [`Model`] as the file has it. Out: the same where every link has a mass and a part. Never here: XML, TOML.
 
+use crate::imported::{ImportError, LeftOut};
 use crate::masses::{STAND_IN_M, ball, lend, repair};
 use crate::model::{End, Fixed, Joint, Kind, Link, Mass, Model, Part, TieKind, Why};
 use crate::pose::Pose;
-use crate::{ImportError, LeftOut};
 use glam::{DMat3, DVec3};
 use metachron_geometry::COMPOUND_PARTS_MAX;
 

@@ -3,7 +3,7 @@
 //! In: the text of a file, the [`Model`] of its robot. Out: pairs that the model excludes. Never here: groups and postures, which are for planning
 //! and move nothing.
 
-use crate::ImportError;
+use crate::imported::ImportError;
 use crate::model::Model;
 use crate::xml;
 

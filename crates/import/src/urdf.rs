@@ -3,11 +3,11 @@
 //! In: the tree of a file. Out: a [`Model`]. Never here: TOML, links without mass (`settle` has them).
 //! The axes of a link are those of the joint that it hangs on, so that a joint is at the origin of its child.
 
+use crate::imported::{ImportError, LeftOut};
 use crate::meshes::Meshes;
 use crate::model::{Joint, Kind, Link, Look, Mass, Model, Motor, Part, Shape};
 use crate::pose::{Pose, fixed_angles};
 use crate::xml::{Element, Harmless};
-use crate::{ImportError, LeftOut};
 use glam::{DMat3, DVec3};
 use metachron_geometry::Solid;
 use std::collections::BTreeMap;

@@ -2,8 +2,8 @@
 //!
 //! In: text. Out: [`Element`]s, numbers of their attributes, and the list of what no reader asked for. Never here: the meaning of a tag.
 
+use crate::imported::{ImportError, LeftOut};
 use crate::place::Place;
-use crate::{ImportError, LeftOut};
 use std::cell::Cell;
 use std::rc::Rc;
 

@@ -4,7 +4,7 @@
 //! In: `actuator` elements. Out: motors of joints. Never here: actuators of forces (they are listed).
 
 use super::bodies::BodyReader;
-use crate::ImportError;
+use crate::imported::ImportError;
 use crate::model::{Joint, Kind, Motor};
 use crate::xml::Element;
 

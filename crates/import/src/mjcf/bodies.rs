@@ -6,6 +6,7 @@ use super::compiler::Compiler;
 use super::geoms::{Geom, Mesh};
 use super::joints::StartedJoint;
 use super::keyframe::Keyframe;
+use crate::imported::{ImportError, LeftOut};
 use crate::masses::kilograms;
 use crate::meshes::Meshes;
 use crate::model::{End, Fixed, Joint, Kind, Link, Look, Masks, Mass, Model, Part, Shape, Surface};
@@ -13,7 +14,6 @@ use crate::place::Place;
 use crate::pose::Pose;
 use crate::weight::Weight;
 use crate::xml::Element;
-use crate::{ImportError, LeftOut};
 use glam::{DMat3, DQuat, DVec3};
 use std::collections::{BTreeMap, BTreeSet};
 

@@ -3,7 +3,7 @@
 //! In: `equality` elements. Out: joints that close loops. Never here: couplings of joints and of tendons (they are listed: scenes have none).
 
 use super::bodies::BodyReader;
-use crate::ImportError;
+use crate::imported::ImportError;
 use crate::model::{Joint, Kind};
 use crate::xml::Element;
 use glam::DVec3;

@@ -4,7 +4,7 @@
 
 use super::bodies::{BodyReader, Placed, z_to};
 use super::compiler::Compiler;
-use crate::ImportError;
+use crate::imported::ImportError;
 use crate::model::{Masks, Part, Shape, Surface};
 use crate::pose::Pose;
 use crate::weight::Weight;

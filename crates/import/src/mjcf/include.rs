@@ -3,8 +3,8 @@
 //! In: the tree of a model, its folder. Out: the same with all that it includes, each element knowing its file. Never here: what one means.
 
 use crate::folders::Folders;
+use crate::imported::{ImportError, LeftOut};
 use crate::xml::{self, DEPTH_MAX, Element};
-use crate::{ImportError, LeftOut};
 use std::collections::BTreeSet;
 use std::path::PathBuf;
 

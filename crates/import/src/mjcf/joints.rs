@@ -4,10 +4,10 @@
 
 use super::bodies::{BodyReader, Host, Placed};
 use super::keyframe::Keyframe;
+use crate::imported::{ImportError, LeftOut};
 use crate::model::{Joint, Kind, Motor};
 use crate::pose::Pose;
 use crate::xml::Element;
-use crate::{ImportError, LeftOut};
 use glam::DVec3;
 
 /// A joint, and where its body starts on it.
@@ -116,7 +116,7 @@ impl BodyReader<'_> {
         if limited && least > greatest {
             return Err(element.wrong(format!("has the `range` {least} {greatest}; expected the lesser first")));
         }
-        Ok(limited.then_some([least, greatest]))
+        Ok((limited && self.compiler.has_limits).then_some([least, greatest]))
     }
 }
 

@@ -17,11 +17,11 @@ mod tendons;
 pub(crate) use defaults::resolve_defaults;
 pub(crate) use include::include;
 
+use crate::imported::{ImportError, LeftOut};
 use crate::masses::rescale;
 use crate::meshes::Meshes;
-use crate::model::Model;
+use crate::model::{Model, Motor};
 use crate::xml::{Element, Harmless};
-use crate::{ImportError, LeftOut};
 use bodies::BodyReader;
 use compiler::Compiler;
 use glam::DVec3;
@@ -52,7 +52,8 @@ pub(crate) fn read(
     if root.tag != "mujoco" {
         return Err(root.wrong("is not the root of a model; expected `mujoco`"));
     }
-    let compiler = Compiler::read(root)?;
+    let mut compiler = Compiler::read(root)?;
+    compiler.has_limits = !is_off(root, "limit");
     let mut reader = BodyReader::new(&compiler, meshes, notes);
     reader.meshes = geoms::meshes(root, &compiler)?;
     reader.keyframe = key.map(|name| Keyframe::find(root, name)).transpose()?;
@@ -61,7 +62,10 @@ pub(crate) fn read(
     }
     actuators::read(root, &mut reader)?;
     tendons::read(root, &mut reader)?;
-    equality::read(root, &mut reader)?;
+    match is_off(root, "equality") {
+        true => root.children("equality").for_each(Element::read_all_within),
+        false => equality::read(root, &mut reader)?,
+    }
     let static_kg = reader.static_kg;
     let mut model = reader.finish();
     if let Some(total_kg) = compiler.total_kg
@@ -100,15 +104,26 @@ fn read_options(root: &Element, model: &mut Model, notes: &mut Vec<LeftOut>) -> 
             }
         }
     }
-    let is_off = |flag: &Element, name: &str| flag.text(name) == Some("disable");
-    for flag in root.children("option").flat_map(|option| option.children("flag")) {
-        if is_off(flag, "gravity") {
-            model.gravity_m_s2 = Some(DVec3::ZERO);
-        }
-        if is_off(flag, "contact") {
-            let parts = model.links.iter_mut().flat_map(|link| &mut link.parts);
-            parts.chain(model.fixed.iter_mut().map(|fixed| &mut fixed.part)).for_each(|part| part.touches = false);
-        }
+    if is_off(root, "gravity") {
+        model.gravity_m_s2 = Some(DVec3::ZERO);
+    }
+    if is_off(root, "contact") {
+        let parts = model.links.iter_mut().flat_map(|link| &mut link.parts);
+        parts.chain(model.fixed.iter_mut().map(|fixed| &mut fixed.part)).for_each(|part| part.touches = false);
+    }
+    if is_off(root, "frictionloss") {
+        let brakes = model.joints.iter_mut().filter(|joint| matches!(joint.motor, Some(Motor::Brake { .. })));
+        brakes.for_each(|joint| joint.motor = None);
     }
     Ok(())
+}
+
+/// Whether a flag of the file is off; `constraint` is all that bounds or holds.
+fn is_off(root: &Element, name: &str) -> bool {
+    let mut flags = root.children("option").flat_map(|option| option.children("flag"));
+    let constrains = ["contact", "limit", "equality", "frictionloss"].contains(&name);
+    flags.any(|flag| {
+        let [own, all] = [name, "constraint"].map(|name| flag.text(name) == Some("disable"));
+        own || (constrains && all)
+    })
 }

@@ -340,6 +340,23 @@ fn flags_turn_gravity_and_contacts_off() {
 }
 
 #[test]
+fn a_flag_turns_all_off_that_bounds_or_holds() {
+    let toml = |flags: &str| {
+        let text = format!(
+            r#"<mujoco><option><flag {flags}/></option><worldbody><site name="s"/><body name="a"><joint range="-9 9" frictionloss="1"/>
+            <geom size="0.1"/><site name="t"/></body></worldbody><equality><weld body1="a"/></equality>
+            <tendon><spatial range="0 1"><site site="s"/><site site="t"/></spatial></tendon></mujoco>"#
+        );
+        import(&text).unwrap().toml
+    };
+    let bounds = ["range_deg", "motor", "kind = \"fixed\"", "kind = \"rope\"", "collides_with = []"];
+    let (all, none) = (toml(r#"warmstart="enable""#), toml(r#"constraint="disable""#));
+    assert!(bounds[..4].iter().all(|bound| all.contains(bound)) && !all.contains(bounds[4]), "{all}");
+    assert!(!bounds[..4].iter().any(|bound| none.contains(bound)) && none.contains(bounds[4]), "{none}");
+    assert!(toml(r#"limit="disable""#).contains("motor") && !toml(r#"frictionloss="disable""#).contains("motor"));
+}
+
+#[test]
 fn what_changes_the_motion_comes_first_and_zeros_change_none() {
     let text = r#"<mujoco><option timestep="0.01" density="1.2" viscosity="0"/><worldbody><light/><body name="a">
         <joint name="hinge" armature="0.1" frictionloss="2" damping="3"/>
