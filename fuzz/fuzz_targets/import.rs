@@ -2,12 +2,12 @@
 #![no_main]
 
 use libfuzzer_sys::fuzz_target;
-use metachron::import::model;
+use metachron::import::{Options, model};
 use metachron::scene::{Source, load};
 use std::path::Path;
 
 fuzz_target!(|text: &str| {
-    match model(text, Path::new("/nowhere")) {
+    match model(text, Path::new("/nowhere"), &Options::default()) {
         Ok(imported) => {
             let source = Source::memory("fuzz", imported.toml.as_bytes()).expect("a scene's text is text");
             drop(load(&source, &[]));

@@ -71,9 +71,10 @@ const IMPORT_EXAMPLES: &str = "\
 Examples:
   metachron import robot.urdf                          the scene on standard output, the list on standard error
   metachron import arm.xml --out arm.toml
+  metachron import robot.urdf --fixed-base --copy-meshes --out robot.toml
   metachron run arm.toml
 
-Meshes are named from the folder of --out, or else from that of the model.";
+Meshes are named from the folder of --out, or else from that of the model; those that scenes do not read are written beside --out.";
 
 /// A real-time physics engine in which every object keeps its own time and the frame never waits.
 ///
@@ -197,12 +198,24 @@ pub struct ImportArgs {
     /// Start an MJCF model from the keyframe of this name: its qpos and ctrl
     #[arg(long, value_name = "NAME")]
     pub key: Option<String>,
+    /// The SRDF file of a URDF robot, whose disabled collisions are in the scene; default: the one beside it with its name
+    #[arg(long, value_name = "FILE", value_hint = ValueHint::FilePath)]
+    pub srdf: Option<PathBuf>,
     /// Write the scene to this file instead of standard output
     #[arg(long, value_name = "FILE", value_hint = ValueHint::FilePath)]
     pub out: Option<PathBuf>,
     /// Overwrite an existing file
     #[arg(long, requires = "out")]
     pub force: bool,
+    /// Fix the root of a robot, or an MJCF body that moves freely and carries others, where it starts
+    #[arg(long)]
+    pub fixed_base: bool,
+    /// Copy all meshes beside the scene, so that it can be moved with them
+    #[arg(long, requires = "out")]
+    pub copy_meshes: bool,
+    /// Print what has no place in the scene as JSON on standard output
+    #[arg(long, requires = "out")]
+    pub json: bool,
 }
 
 impl OutputArgs {

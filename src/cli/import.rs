@@ -1,14 +1,21 @@
 //! `import`: a URDF robot or an MJCF model as a scene.
 //!
-//! In: the model's file, and those that it includes. Out: TOML on standard output or in a file, on standard error what has no place in it. Never here: what a model means.
+//! In: the model's file, those that it names, the SRDF file beside a robot. Out: TOML on standard output or in a file with meshes beside it, on
+//! standard error or as JSON what has no place in it. Never here: what a model means.
 
 use super::args::ImportArgs;
 use metachron_console::exit::Exit;
 use metachron_console::gains::check_output_path;
-use metachron_console::output::{BadInput, data, message, rendered};
-use metachron_import::{Folders, Imported};
-use metachron_scene::{SCENE_BYTES_MAX, Source, load};
+use metachron_console::output::{BadInput, data, message, print_overlaps, rendered};
+use metachron_import::{Folders, Imported, LeftOut, Options, Overlap};
+use metachron_scene::{SCENE_BYTES_MAX, SceneError, Source, load, read_surface};
+use metachron_world::Scene;
+use serde_json::json;
+use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
+
+/// Longest file that a model names, bytes: as of those beside a scene.
+const MESH_BYTES_MAX: u64 = 64 << 20;
 
 /// Writes the scene.
 pub(super) fn command(args: &ImportArgs) -> anyhow::Result<Exit> {
@@ -19,39 +26,130 @@ pub(super) fn command(args: &ImportArgs) -> anyhow::Result<Exit> {
     let folder = |path: &Path| path.parent().map_or_else(PathBuf::new, Path::to_path_buf);
     let (model_folder, out) = (folder(&args.model), args.out.as_deref().unwrap_or(&args.model));
     let scene_folder = folder(out);
-    let folders = Folders { model: &model_folder, scene: &scene_folder, read: Some(&read_included) };
+    let folders =
+        Folders { model: &model_folder, scene: &scene_folder, read: Some(&read_plain), surface: Some(&read_surface) };
     let text = read(&args.model).map_err(|why| BadInput(format!("{model} cannot be read: {why}")))?;
-    let imported = match &args.key {
-        Some(key) => metachron_import::mjcf_at_key(&text, folders, key),
-        None => metachron_import::model(&text, folders),
-    };
-    let imported = imported.map_err(|why| BadInput(format!("{model}: {why}")))?;
-    let Imported { toml, left_out } = imported;
-    for entry in left_out {
-        message(&format!("{model}: {entry}"));
-    }
-    // a model may have numbers that are beyond those of scenes, and a mesh that is none
     let name = args.out.as_ref().map_or_else(|| format!("of {model}"), |path| path.display().to_string());
-    let checked = Source::recorded(&name, &toml, Some(&scene_folder)).and_then(|source| load(&source, &[]));
-    if let Err(error) = checked {
-        message(&rendered(&error));
-        return Ok(Exit::BadInput);
+    let scene = |imported: &Imported| -> Result<Scene, SceneError> {
+        let files = imported.files.iter().map(|file| (file.path.clone(), file.bytes.clone()));
+        let source = Source::recorded(&name, &imported.toml, Some(&scene_folder))?;
+        load(&source.with_files(files.collect()), &[])
+    };
+    let overlaps = |draft: &Imported| scene(draft).map_or_else(|_| Vec::new(), |scene| overlaps(&scene));
+    let srdf = srdf(args)?;
+    let stem = out.file_stem().map_or("scene".into(), |stem| stem.to_string_lossy());
+    let meshes = format!("{stem}-meshes");
+    let options = Options {
+        key: args.key.as_deref(),
+        srdf: srdf.as_deref(),
+        overlaps: Some(&overlaps),
+        meshes: Some(&meshes),
+        copy_meshes: args.copy_meshes,
+        fixed_base: args.fixed_base,
+    };
+    let imported = metachron_import::model(&text, folders, &options);
+    let imported = imported.map_err(|why| BadInput(format!("{model}: {why}")))?;
+    // a model may have numbers that are beyond those of scenes, and a mesh that is none
+    let checked = scene(&imported);
+    print_list(args, &imported)?;
+    match checked {
+        Ok(scene) => print_overlaps(&scene),
+        Err(error) => {
+            message(&rendered(&error));
+            return Ok(Exit::BadInput);
+        }
     }
     match &args.out {
-        None => data(&toml)?,
+        None if !imported.files.is_empty() => {
+            let what = "meshes of the scene have to be written beside it; expected --out FILE";
+            return Err(BadInput(format!("{model}: {what}")).into());
+        }
+        None => data(&imported.toml)?,
         Some(path) => {
-            let refused = |why: std::io::Error| BadInput(format!("{} cannot be written: {why}", path.display()));
-            std::fs::write(path, toml).map_err(refused)?;
+            for file in &imported.files {
+                write(&scene_folder.join(&file.path), &file.bytes)?;
+            }
+            write(path, imported.toml.as_bytes())?;
             message(&format!("scene: {}", path.display()));
         }
     }
     Ok(Exit::Ok)
 }
 
-/// The text of a file that the model includes: only the caller of the program may make it wait for a stream.
-fn read_included(path: &Path) -> std::io::Result<String> {
-    match std::fs::metadata(path)?.is_file() {
-        true => read(path),
+/// Writes a file, and the folder that it is in where there is none.
+fn write(path: &Path, bytes: &[u8]) -> anyhow::Result<()> {
+    let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty());
+    let made = folder.map_or(Ok(()), std::fs::create_dir_all).and_then(|()| std::fs::write(path, bytes));
+    made.map_err(|why| BadInput(format!("{} cannot be written: {why}", path.display())).into())
+}
+
+fn overlaps(scene: &Scene) -> Vec<Overlap> {
+    let overlap =
+        |found: &metachron_world::Overlap| Overlap { a: found.a.clone(), b: found.b.clone(), depth_m: found.depth_m };
+    scene.overlaps.iter().map(overlap).collect()
+}
+
+/// The text of the SRDF file that is named, or else of one beside the model with its name.
+fn srdf(args: &ImportArgs) -> anyhow::Result<Option<String>> {
+    let beside = args.model.with_extension("srdf");
+    let Some(path) = args.srdf.clone().or_else(|| beside.is_file().then_some(beside)) else { return Ok(None) };
+    let text = read(&path).map_err(|why| BadInput(format!("{} cannot be read: {why}", path.display())))?;
+    Ok(Some(text))
+}
+
+/// Prints what the scene has otherwise than the model: as JSON, or in two lists, of equal entries the first with their number.
+fn print_list(args: &ImportArgs, imported: &Imported) -> anyhow::Result<()> {
+    let (moving, harmless): (Vec<_>, Vec<_>) = imported.left_out.iter().partition(|entry| entry.changes_motion);
+    if args.json {
+        let overlap = |Overlap { a, b, depth_m }: &Overlap| json!({ "a": a, "b": b, "depth_m": depth_m });
+        let list = json!({
+            "changes_motion": moving.into_iter().map(entry).collect::<Vec<_>>(),
+            "harmless": harmless.into_iter().map(entry).collect::<Vec<_>>(),
+            "files": imported.files.iter().map(|file| &file.path).collect::<Vec<_>>(),
+            "overlaps": imported.overlaps.iter().map(overlap).collect::<Vec<_>>(),
+        });
+        return data(&format!("{}\n", serde_json::to_string_pretty(&list)?));
+    }
+    let model = args.model.display();
+    for (title, entries) in [("change the motion", moving), ("change no motion", harmless)] {
+        if !entries.is_empty() {
+            message(&format!("{model}: {title}: {}", entries.len()));
+        }
+        let mut counts: BTreeMap<(String, &str), (usize, &LeftOut)> = BTreeMap::new();
+        for entry in entries {
+            counts.entry((kind(&entry.element), &entry.what)).or_insert((0, entry)).0 += 1;
+        }
+        let mut counts: Vec<_> = counts.into_values().collect();
+        counts.sort_by_key(|(_, first)| (&first.file, first.line));
+        for (count, first) in counts {
+            let more = if count > 1 { format!(" (and {} more of that kind)", count - 1) } else { String::new() };
+            message(&format!("{model}: {first}{more}"));
+        }
+    }
+    for Overlap { a, b, depth_m } in &imported.overlaps {
+        let what = "start inside each other and pass through each other";
+        message(&format!("{model}: `{a}` and `{b}` {what}: {:.3} mm deep", depth_m * 1e3));
+    }
+    Ok(())
+}
+
+fn entry(LeftOut { file, line, element, what, .. }: &LeftOut) -> serde_json::Value {
+    json!({ "file": file, "line": line, "element": element, "what": what })
+}
+
+/// What an element is, without the names in it.
+fn kind(element: &str) -> String {
+    element.split('`').step_by(2).collect()
+}
+
+/// A file that the model names: only the caller of the program may make it wait for a stream.
+fn read_plain(path: &Path) -> std::io::Result<Vec<u8>> {
+    let about = std::fs::metadata(path)?;
+    match about.is_file() {
+        true if about.len() > MESH_BYTES_MAX => {
+            Err(std::io::Error::other(format!("it has {} bytes, more than {MESH_BYTES_MAX}", about.len())))
+        }
+        true => std::fs::read(path),
         false => Err(std::io::Error::other("it is no plain file")),
     }
 }

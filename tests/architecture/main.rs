@@ -98,7 +98,7 @@ const RINGS: [(&str, usize); 18] = [
     ("crates/devices", 0),
     ("crates/export", 0),
     ("crates/bevy", 5),
-    ("crates/import", 19),
+    ("crates/import", 3),
     ("crates/lod", 9),
     ("crates/render", 12),
     ("crates/session", 3),

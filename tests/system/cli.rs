@@ -88,6 +88,48 @@ fn import_writes_scenes_that_load_lists_what_is_left_out_and_refuses_broken_mode
 }
 
 #[test]
+fn import_writes_the_meshes_that_scenes_do_not_read_and_its_list_as_json() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = |name: &str| folder.path().join(name).to_str().unwrap().to_owned();
+    let ball = |name: &str, inside: &str| {
+        format!(
+            "<link name=\"{name}\"><inertial><mass value=\"1\"/><inertia ixx=\"1\" iyy=\"1\" izz=\"1\"/></inertial>\
+             <collision><geometry>{inside}</geometry></collision></link>"
+        )
+    };
+    let hinge = |parent: &str, child: &str| {
+        format!(
+            "<joint name=\"{child}\" type=\"continuous\"><parent link=\"{parent}\"/><child link=\"{child}\"/></joint>"
+        )
+    };
+    // a tetrahedron that is mirrored, on a ball, and a ball inside that one beyond it
+    std::fs::write(path("t.obj"), "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 2 3 4\nf 3 1 4\n").unwrap();
+    let links = [
+        ball("a", "<sphere radius=\"0.1\"/>"),
+        ball("b", "<mesh filename=\"t.obj\" scale=\"1 -1 1\"/>"),
+        ball("c", "<sphere radius=\"0.1\"/>"),
+    ];
+    let robot = format!("<robot name=\"r\">{}{}{}<mimic/></robot>", links.concat(), hinge("a", "b"), hinge("b", "c"));
+    std::fs::write(path("r.urdf"), robot).unwrap();
+    let refused = metachron(&["import", &path("r.urdf")]);
+    assert!(code(&refused) == 2 && err(&refused).contains("expected --out FILE"), "{}", err(&refused));
+    let done = metachron(&["import", &path("r.urdf"), "--fixed-base", "--json", "--out", &path("scene.toml")]);
+    assert_eq!(code(&done), 0, "{}", err(&done));
+    let list: serde_json::Value = serde_json::from_slice(&done.stdout).unwrap();
+    assert_eq!(list["changes_motion"][0]["element"], "mimic");
+    assert_eq!(
+        (list["files"][0].as_str(), list["harmless"].as_array().unwrap().len()),
+        (Some("scene-meshes/t.obj"), 0)
+    );
+    assert_eq!((list["overlaps"][0]["a"].as_str(), list["overlaps"][0]["b"].as_str()), (Some("a"), Some("c")));
+    assert_eq!(code(&metachron(&["check", &path("scene.toml")])), 0);
+    std::fs::write(path("r.srdf"), "<robot><disable_collisions link1=\"a\" link2=\"c\"/></robot>").unwrap();
+    let done = metachron(&["import", &path("r.urdf"), "--json", "--force", "--out", &path("scene.toml")]);
+    let list: serde_json::Value = serde_json::from_slice(&done.stdout).unwrap();
+    assert!(code(&done) == 0 && list["overlaps"].as_array().unwrap().is_empty(), "{list}");
+}
+
+#[test]
 fn the_schema_is_json_with_every_model() {
     let schema = metachron(&["schema"]);
     let json: serde_json::Value = serde_json::from_slice(&schema.stdout).unwrap();

@@ -1,14 +1,18 @@
 //! Where files that a model names are.
 //!
 //! In: a path as a model writes it. Out: the path as the scene writes it, the text of what is included. Never here: what that means, files that
-//! are opened (the caller's [`ReadText`] does).
+//! are opened (the caller's [`ReadFile`] does).
 
-use crate::ImportError;
+use crate::imported::ImportError;
 use crate::xml::Element;
+use metachron_geometry::Triangles;
 use std::path::{Component, Path, PathBuf};
 
-/// Gives the text of the file at a path, or why there is none: [`std::fs::read_to_string`], or one that reads an archive.
-pub type ReadText<'a> = &'a dyn Fn(&Path) -> std::io::Result<String>;
+/// Gives the bytes of the file at a path, or why there are none: [`std::fs::read`], or one that reads an archive.
+pub type ReadFile<'a> = &'a dyn Fn(&Path) -> std::io::Result<Vec<u8>>;
+
+/// Gives the triangles of an STL, OBJ or .glb file, or what is wrong with it; none of a file of points.
+pub type ReadSurface<'a> = &'a dyn Fn(&[u8]) -> Result<Triangles, String>;
 
 /// The folder of a model's file, and that of the scene which it becomes: scenes name meshes relative to their own.
 #[derive(Clone, Copy)]
@@ -17,8 +21,10 @@ pub struct Folders<'a> {
     pub model: &'a Path,
     /// The folder of the scene.
     pub scene: &'a Path,
-    /// Reads what the model includes; `None` refuses a model in several files.
-    pub read: Option<ReadText<'a>>,
+    /// Reads what the model includes, and meshes that scenes cannot name; `None` refuses a model in several files.
+    pub read: Option<ReadFile<'a>>,
+    /// Reads the meshes that are mirrored, stretched or weigh; `None` lists those.
+    pub surface: Option<ReadSurface<'a>>,
 }
 
 impl std::fmt::Debug for Folders<'_> {
@@ -30,30 +36,33 @@ impl std::fmt::Debug for Folders<'_> {
 /// One folder for both, of a model in one file.
 impl<'a> From<&'a Path> for Folders<'a> {
     fn from(folder: &'a Path) -> Self {
-        Self { model: folder, scene: folder, read: None }
+        Self { model: folder, scene: folder, read: None, surface: None }
     }
 }
 
-/// Mesh files that a scene can name.
-const MESHES: [&str; 3] = ["glb", "obj", "stl"];
-
-/// Whether scenes read meshes of a file's kind.
-pub(crate) fn is_readable(name: &str) -> bool {
-    let extension = Path::new(name).extension().and_then(|e| e.to_str()).map(str::to_lowercase);
-    extension.is_some_and(|e| MESHES.contains(&e.as_str()))
+/// What a file's name ends with, after its last point, in small letters.
+pub(crate) fn extension(name: &str) -> String {
+    Path::new(name).extension().and_then(|e| e.to_str()).map(str::to_lowercase).unwrap_or_default()
 }
 
 impl Folders<'_> {
-    /// The path in the scene of a file that `element` names.
+    /// A file that `element` names.
     ///
     /// # Errors
     /// Where there is no such file.
-    pub(crate) fn mesh(&self, element: &Element, name: &str) -> Result<String, ImportError> {
+    pub(crate) fn find(&self, element: &Element, name: &str) -> Result<PathBuf, ImportError> {
         let found = self.candidates(name).into_iter().find(|path| path.is_file());
-        let found = found.ok_or_else(|| {
+        found.ok_or_else(|| {
             element.wrong(format!("names `{name}`, and there is no such file; expected it beside the model"))
-        })?;
-        self.in_scene(&found).ok_or_else(|| {
+        })
+    }
+
+    /// The path in the scene of a file that `element` names.
+    ///
+    /// # Errors
+    /// Where it has none.
+    pub(crate) fn in_scene(&self, element: &Element, name: &str, found: &Path) -> Result<String, ImportError> {
+        self.relative(found).ok_or_else(|| {
             element.wrong(format!("names `{name}`, which cannot be reached from the folder of the scene"))
         })
     }
@@ -68,7 +77,9 @@ impl Folders<'_> {
             return Err(element.wrong(reason));
         };
         let path = self.model.join(name);
+        let utf8 = |bytes| String::from_utf8(bytes).map_err(std::io::Error::other);
         let text = read(&path)
+            .and_then(utf8)
             .map_err(|why| element.wrong(format!("names `{name}`, which cannot be read beside the model: {why}")))?;
         Ok(IncludedFile { path: plain(&path).unwrap_or(path), text })
     }
@@ -84,7 +95,7 @@ impl Folders<'_> {
     }
 
     /// A file's path from the folder of the scene, with `/` between its parts.
-    fn in_scene(&self, file: &Path) -> Option<String> {
+    fn relative(&self, file: &Path) -> Option<String> {
         let (file, scene) = (plain(file)?, plain(self.scene)?);
         let common = file.iter().zip(&scene).take_while(|(a, b)| a == b).count();
         // on another drive

@@ -1,86 +1,82 @@
 //! URDF robots and MJCF models as scene files.
 //!
 //! In: the text of a model and its folder. Out: the text of a scene, and a list of all that has no place in one ([`Imported`]).
-//! Never here: files that are opened (the caller reads what a model includes, [`ReadText`]), running a scene, the points of meshes, checking the
+//! Never here: files that are opened (the caller reads what a model includes, [`ReadFile`]), running a scene, checking the
 //! scene that comes out (`metachron-scene` does).
 //!
 //! Links become rigid objects whose axes are those of the link, joints `[[joint]]` tables, collision geometries shapes and parts.
 //! Everything in the file that no line of this crate has read is in the list: an element or attribute cannot be dropped unseen.
 
+mod apart;
+mod dae;
 mod folders;
+mod imported;
 mod masses;
+mod meshes;
 mod mjcf;
 mod model;
+mod msh;
 mod place;
 mod pose;
 mod scene_text;
 mod settle;
+mod srdf;
 mod urdf;
+mod weight;
 mod xml;
 
-pub use folders::{Folders, ReadText};
+pub use folders::{Folders, ReadFile, ReadSurface};
+pub use imported::{ImportError, Imported, LeftOut, MeshFile, Overlap};
+
+use meshes::Meshes;
 
 /// The page of the crate: its code runs as a test.
 #[cfg(doctest)]
 #[doc = include_str!("../README.md")]
 struct Page;
 
-/// A model as a scene.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Imported {
-    /// The text of the scene file.
-    pub toml: String,
-    /// What of the model is not in it, in the order of the file.
-    pub left_out: Vec<LeftOut>,
+/// Finds the objects of a scene that start inside each other: the caller reads scenes. Where it finds none because the scene cannot be read, the
+/// caller finds so again.
+pub type FindOverlaps<'a> = &'a dyn Fn(&Imported) -> Vec<Overlap>;
+
+/// How a model is read.
+#[derive(Clone, Copy, Default)]
+pub struct Options<'a> {
+    /// The keyframe that an MJCF model starts from: joints at its `qpos`, servos at its `ctrl`. Default: where the file has its bodies.
+    pub key: Option<&'a str>,
+    /// The text of the SRDF file of a URDF robot: its `disable_collisions` are pairs that pass through each other. Default: none.
+    pub srdf: Option<&'a str>,
+    /// What finds bodies that start inside each other: those of one robot pass through each other then. Default: they collide.
+    pub overlaps: Option<FindOverlaps<'a>>,
+    /// The folder of new mesh files, from that of the scene. Default: `meshes`.
+    pub meshes: Option<&'a str>,
+    /// Whether meshes that the scene could name where they are become new files, too: the scene can be moved with its folder then. Default false.
+    pub copy_meshes: bool,
+    /// Whether bodies that move freely and that others hang on are fixed where they start, and the root of a robot. Default false.
+    pub fixed_base: bool,
 }
 
-/// A part of a model that a scene has no place for, or that is in it otherwise than in the model.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub struct LeftOut {
-    /// The included file that it is in, as the model names it; `None` for the model's own.
-    pub file: Option<String>,
-    /// Line of that file, from 1.
-    pub line: u32,
-    /// Which element, such as ``joint `elbow`, dynamics``.
-    pub element: String,
-    /// What about it.
-    pub what: String,
-}
-
-impl std::fmt::Display for LeftOut {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        write!(f, "{}: {}: {}", spot(self.file.as_deref(), self.line), self.element, self.what)
+impl<'a> Options<'a> {
+    fn meshes(&self, folders: Folders<'a>) -> Meshes<'a> {
+        Meshes::new(folders, self.meshes.unwrap_or("meshes"), self.copy_meshes)
     }
 }
 
-/// A line, and the file that it is in where that is not the model's own.
-fn spot(file: Option<&str>, line: u32) -> String {
-    file.map_or_else(|| format!("line {line}"), |file| format!("line {line} of `{file}`"))
+impl std::fmt::Debug for Options<'_> {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.debug_struct("Options").field("key", &self.key).field("srdf", &self.srdf).finish_non_exhaustive()
+    }
 }
 
-/// Why a model cannot be a scene.
-#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
-#[error("{}: {element}: {reason}", spot(file.as_deref(), *line))]
-pub struct ImportError {
-    /// The included file that it is in, as the model names it; `None` for the model's own.
-    pub file: Option<String>,
-    /// Line of that file, from 1.
-    pub line: u32,
-    /// Which element, such as ``link `arm`, inertial``.
-    pub element: String,
-    /// What is wrong with it, and what was expected.
-    pub reason: String,
-}
-
-/// Reads a model of the kind that its root element says: [`urdf`] of `robot`, [`mjcf`] of `mujoco`.
+/// Reads a model of the kind that its root element says: a robot as [`urdf`], an MJCF model as [`mjcf`].
 ///
 /// # Errors
-/// As those two, and for another root.
-pub fn model<'a>(text: &str, folders: impl Into<Folders<'a>>) -> Result<Imported, ImportError> {
+/// As those two, for another root, and where an MJCF model has no such keyframe or it has other numbers than the model has coordinates.
+pub fn model<'a>(text: &str, folders: impl Into<Folders<'a>>, options: &Options<'_>) -> Result<Imported, ImportError> {
     let root = xml::parse(text, None)?;
     match root.tag.as_str() {
-        "robot" => of_urdf(&root, folders.into()),
-        "mujoco" => of_mjcf(root, folders.into(), None),
+        "robot" => of_urdf(&root, folders.into(), options),
+        "mujoco" => of_mjcf(root, folders.into(), options),
         _ => Err(root.wrong("is the root of no model that is known here; expected `robot` (URDF) or `mujoco` (MJCF)")),
     }
 }
@@ -93,7 +89,7 @@ pub fn model<'a>(text: &str, folders: impl Into<Folders<'a>>) -> Result<Imported
 /// [`ImportError`] at the first element that no scene can have: text that is no XML, a missing mesh, a mass that is not above zero, links that
 /// are no tree.
 pub fn urdf<'a>(text: &str, folders: impl Into<Folders<'a>>) -> Result<Imported, ImportError> {
-    of_urdf(&xml::parse(text, None)?, folders.into())
+    of_urdf(&xml::parse(text, None)?, folders.into(), &Options::default())
 }
 
 /// Reads an MJCF model, its classes of defaults and frames resolved. Meshes and included files are looked for in the folder of the model; what is
@@ -102,35 +98,38 @@ pub fn urdf<'a>(text: &str, folders: impl Into<Folders<'a>>) -> Result<Imported,
 /// # Errors
 /// [`ImportError`] at the first element that no scene can have, as [`urdf`].
 pub fn mjcf<'a>(text: &str, folders: impl Into<Folders<'a>>) -> Result<Imported, ImportError> {
-    of_mjcf(xml::parse(text, None)?, folders.into(), None)
+    of_mjcf(xml::parse(text, None)?, folders.into(), &Options::default())
 }
 
-/// The same, begun at the keyframe `key`: joints at its `qpos`, servos at its `ctrl`.
-///
-/// # Errors
-/// As [`mjcf`], and where there is no such keyframe or it has other numbers than the model has coordinates.
-pub fn mjcf_at_key<'a>(text: &str, folders: impl Into<Folders<'a>>, key: &str) -> Result<Imported, ImportError> {
-    of_mjcf(xml::parse(text, None)?, folders.into(), Some(key))
-}
-
-fn of_urdf(root: &xml::Element, folders: Folders<'_>) -> Result<Imported, ImportError> {
+fn of_urdf<'a>(root: &xml::Element, folders: Folders<'a>, options: &Options<'a>) -> Result<Imported, ImportError> {
     let mut notes = Vec::new();
-    let model = urdf::read(root, folders, &mut notes)?;
-    imported(root, model, notes)
+    let mut model = urdf::read(root, options.meshes(folders), &mut notes)?;
+    if let Some(srdf) = options.srdf {
+        srdf::read(srdf, &mut model)?;
+    }
+    root.list_unread(&urdf::HARMLESS, &mut notes);
+    imported(model, options, notes)
 }
 
-fn of_mjcf(mut root: xml::Element, folders: Folders<'_>, key: Option<&str>) -> Result<Imported, ImportError> {
+fn of_mjcf<'a>(mut root: xml::Element, folders: Folders<'a>, options: &Options<'a>) -> Result<Imported, ImportError> {
     let mut notes = Vec::new();
     mjcf::include(&mut root, folders, &mut notes)?;
     mjcf::resolve_defaults(&mut root)?;
-    let model = mjcf::read(&root, mjcf::Given { folders, key }, &mut notes)?;
-    imported(&root, model, notes)
+    let model = mjcf::read(&root, options.key, options.meshes(folders), &mut notes)?;
+    root.list_unread(&mjcf::HARMLESS, &mut notes);
+    imported(model, options, notes)
 }
 
-fn imported(root: &xml::Element, model: model::Model, mut notes: Vec<LeftOut>) -> Result<Imported, ImportError> {
-    let settled = settle::settle(model, &mut notes)?;
+fn imported(model: model::Model, options: &Options<'_>, mut notes: Vec<LeftOut>) -> Result<Imported, ImportError> {
+    let mut settled = settle::settle(model, options.fixed_base, &mut notes)?;
     let toml = scene_text::write(&settled, &mut notes);
-    root.list_unread(&mut notes);
-    notes.sort_by(|a, b| (&a.file, a.line).cmp(&(&b.file, b.line)));
-    Ok(Imported { toml, left_out: notes })
+    notes.sort_by(|a, b| (!a.changes_motion, &a.file, a.line).cmp(&(!b.changes_motion, &b.file, b.line)));
+    let files = std::mem::take(&mut settled.files);
+    let mut imported = Imported { toml, left_out: notes, overlaps: Vec::new(), files };
+    if let Some(find) = options.overlaps {
+        imported.overlaps = settled.pass_overlaps(find(&imported));
+        // the text has the pairs now; what it leaves out is what it was
+        imported.toml = scene_text::write(&settled, &mut Vec::new());
+    }
+    Ok(imported)
 }

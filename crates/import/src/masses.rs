@@ -3,7 +3,7 @@
 //! In: a [`Model`] as the file has it. Out: the same where what moves weighs something, and moments are those of bodies; all that was changed is
 //! noted. Never here: shapes that are touched.
 
-use crate::LeftOut;
+use crate::imported::LeftOut;
 use crate::model::{Kind, Link, Mass, Model, Part, Shape};
 use crate::pose::Pose;
 use glam::{DMat3, DVec3};
@@ -32,13 +32,17 @@ struct Weight {
 pub(crate) fn lend(model: &mut Model, notes: &mut Vec<LeftOut>) {
     let weights: Vec<Option<Weight>> = model.links.iter().map(weight).collect();
     for at in 0..model.links.len() {
-        let Some(joint) = model.joints.iter().find(|joint| joint.child == at && joint.kind != Kind::Fixed) else {
+        let joint = model.joints.iter().find(|joint| joint.child == at);
+        let Some(com_m) = joint
+            .filter(|joint| joint.kind != Kind::Fixed)
+            .map(|joint| joint.anchor_m)
+            .or(model.links[at].is_free.then_some(DVec3::ZERO))
+        else {
             continue;
         };
         let is_massless = matches!(model.links[at].mass, Mass::None);
         let Some((carried, weight)) = carried(model, at, &weights).filter(|_| is_massless) else { continue };
         let what = format!("has no mass, and moves: a thousandth of that of `{}` is added", model.links[carried].name);
-        let com_m = joint.anchor_m;
         let link = &mut model.links[at];
         notes.push(link.place.note(what));
         let inertia_kg_m2 = Some(DMat3::from_diagonal(DVec3::splat(LENT * weight.moment_kg_m2)));
@@ -75,7 +79,7 @@ fn weight(link: &Link) -> Option<Weight> {
         Mass::OfParts => {
             let solids = link.parts.iter().filter_map(|part| match &part.shape {
                 Shape::Solid(solid) => Some((solid.volume_m3().ok()?, part.density_kg_m3?)),
-                Shape::Hull { .. } => None,
+                Shape::Hull { .. } | Shape::Ellipsoid { .. } => None,
             });
             let mut sum = Weight { mass_kg: 0.0, moment_kg_m2: 0.0 };
             for (volume_m3, density_kg_m3) in solids {
@@ -87,6 +91,37 @@ fn weight(link: &Link) -> Option<Weight> {
             (sum.mass_kg > 0.0).then_some(sum)
         }
     }
+}
+
+/// What a body weighs; `None` where the scene alone knows a volume.
+pub(crate) fn kilograms(mass: &Mass, parts: &[Part]) -> Option<f64> {
+    match mass {
+        Mass::None => Some(0.0),
+        Mass::Given { mass_kg, .. } => Some(*mass_kg),
+        Mass::OfParts => {
+            let weighing = parts.iter().filter(|part| part.density_kg_m3 != Some(0.0));
+            let weights = weighing.map(|part| match &part.shape {
+                Shape::Solid(solid) => Some(solid.volume_m3().ok()? * part.density_kg_m3?),
+                Shape::Hull { .. } | Shape::Ellipsoid { .. } => None,
+            });
+            weights.sum()
+        }
+    }
+}
+
+/// Makes all bodies heavier or lighter, so that they weigh `total_kg` together with `static_kg` that never move; returns whether their masses are
+/// known here.
+pub(crate) fn rescale(model: &mut Model, static_kg: Option<f64>, total_kg: f64) -> bool {
+    let all = model.links.iter().map(|link| kilograms(&link.mass, &link.parts)).chain([static_kg]).sum::<Option<f64>>();
+    let Some(factor) = all.filter(|all| *all > 0.0).map(|all| total_kg / all) else { return false };
+    for link in &mut model.links {
+        if let Mass::Given { mass_kg, inertia_kg_m2, .. } = &mut link.mass {
+            *mass_kg *= factor;
+            *inertia_kg_m2 = inertia_kg_m2.map(|tensor| tensor * factor);
+        }
+        link.parts.iter_mut().filter_map(|part| part.density_kg_m3.as_mut()).for_each(|density| *density *= factor);
+    }
+    true
 }
 
 /// A ball on a link that nothing touches.
@@ -138,6 +173,8 @@ mod tests {
         let inertia_kg_m2 = Some(DMat3::from_diagonal(DVec3::from_array(moments)));
         let mut link = Link {
             name: String::new(),
+            root: 0,
+            is_free: false,
             place: Place { file: None, line: 1, label: String::new() },
             pose: Pose::IDENTITY,
             mass: Mass::Given { mass_kg: 2.0, com_m: DVec3::ZERO, inertia_kg_m2 },

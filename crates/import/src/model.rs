@@ -2,6 +2,7 @@
 //!
 //! In: what the readers found. Out: plain data. Never here: XML, TOML.
 
+use crate::imported::MeshFile;
 use crate::place::Place;
 use crate::pose::Pose;
 use glam::{DMat3, DVec3};
@@ -17,16 +18,47 @@ pub(crate) struct Model {
     pub(crate) links: Vec<Link>,
     pub(crate) joints: Vec<Joint>,
     pub(crate) ties: Vec<Tie>,
-    /// Pairs of links that pass through each other.
-    pub(crate) apart: Vec<[usize; 2]>,
+    /// Pairs of links that the file lets pass through each other.
+    pub(crate) excluded: Vec<[usize; 2]>,
+    /// Whether what is on a fixed body collides with it: as in MuJoCo, not as in URDF.
+    pub(crate) collides_with_base: bool,
+    /// Whether what has no mass and carries none is fixed where it starts: as programs that read URDF do, and MuJoCo refuses it.
+    pub(crate) fixes_massless: bool,
+    /// Bodies that pass through each other, with those of `excluded`: `settle` finds them.
+    pub(crate) apart: Vec<Apart>,
     /// Solids of the world itself, in its axes.
     pub(crate) fixed: Vec<Fixed>,
+    /// Meshes that shapes name and that are not there yet.
+    pub(crate) files: Vec<MeshFile>,
+}
+
+/// Two bodies of a scene, by name, that pass through each other.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct Apart {
+    pub(crate) a: String,
+    pub(crate) b: String,
+    pub(crate) why: Why,
+}
+
+/// Why two bodies pass through each other.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) enum Why {
+    /// The file says so, or another beside it.
+    Excluded,
+    /// They are next to each other, across joints that hold fast.
+    Neighbours,
+    /// They start this deep inside each other.
+    Overlap { depth_m: f64 },
 }
 
 /// A body.
 #[derive(Debug)]
 pub(crate) struct Link {
     pub(crate) name: String,
+    /// The link that all of its tree hangs on, by its number in the file: of two bodies with one such link both are of one robot.
+    pub(crate) root: usize,
+    /// Whether it moves freely although it may have no mass of its own.
+    pub(crate) is_free: bool,
     pub(crate) place: Place,
     /// Its axes in the world at the start.
     pub(crate) pose: Pose,
@@ -105,14 +137,30 @@ pub(crate) enum Shape {
         file: String,
         scale: f64,
     },
+    /// An ellipsoid, and the file of its hull.
+    Ellipsoid {
+        file: String,
+        semi_axes_m: DVec3,
+    },
 }
 
 /// A solid of the world.
 #[derive(Debug)]
 pub(crate) struct Fixed {
     pub(crate) name: String,
+    /// The root of the link that it was; `None` of the world's own.
+    pub(crate) root: Option<usize>,
+    /// The link that it was, by its number in the file.
+    pub(crate) link: Option<usize>,
     pub(crate) part: Part,
     pub(crate) look: Look,
+}
+
+impl Fixed {
+    /// Whether it can be let through: couplings are between what can move, and a plane never does.
+    pub(crate) const fn can_pass(&self) -> bool {
+        self.part.touches && !matches!(self.part.shape, Shape::Solid(Solid::Plane))
+    }
 }
 
 /// A joint: the motion that it leaves to `child`.
@@ -196,6 +244,23 @@ impl Kind {
             }
             Self::Prismatic => Pose { position: axis * position, ..Pose::IDENTITY },
             Self::Fixed | Self::Spherical => Pose::IDENTITY,
+        }
+    }
+}
+
+impl Joint {
+    /// A joint that lets nothing move.
+    pub(crate) fn weld(place: Place, parent: Option<usize>, child: usize) -> Self {
+        Self {
+            name: String::new(),
+            place,
+            parent,
+            child,
+            kind: Kind::Fixed,
+            anchor_m: DVec3::ZERO,
+            axis: DVec3::Z,
+            range: None,
+            motor: None,
         }
     }
 }

@@ -2,7 +2,7 @@
 //!
 //! In: what a reader knows of an element. Out: notes and errors about it. Never here: XML, what an element means.
 
-use crate::{ImportError, LeftOut};
+use crate::imported::{ImportError, LeftOut};
 use std::rc::Rc;
 
 /// An element of a file, for messages.
@@ -26,8 +26,9 @@ impl Place {
         ImportError { file: self.file(), line: self.line, element: self.label.clone(), reason: reason.into() }
     }
 
-    /// A note about what is here.
+    /// A note about what is here, which changes the motion.
     pub(crate) fn note(&self, what: impl Into<String>) -> LeftOut {
-        LeftOut { file: self.file(), line: self.line, element: self.label.clone(), what: what.into() }
+        let (file, line, element, what) = (self.file(), self.line, self.label.clone(), what.into());
+        LeftOut { file, line, element, what, changes_motion: true }
     }
 }

@@ -2,8 +2,10 @@
 //!
 //! In: a [`Model`] where every link has a mass and a part. Out: TOML. Never here: what the model was read from.
 
-use crate::LeftOut;
-use crate::model::{End, Fixed, Joint, Kind, Link, Look, Masks, Mass, Model, Motor, Part, Shape, Tie, TieKind};
+use crate::imported::LeftOut;
+use crate::model::{
+    Apart, End, Fixed, Joint, Kind, Link, Look, Masks, Mass, Model, Motor, Part, Shape, Tie, TieKind, Why,
+};
 use crate::pose::{Pose, fixed_angles_deg};
 use glam::{DMat3, DQuat, DVec3};
 use metachron_geometry::Solid;
@@ -27,7 +29,8 @@ pub(crate) fn write(model: &Model, notes: &mut Vec<LeftOut>) -> String {
     }
     let masks = all_masks(model);
     for fixed in &model.fixed {
-        write_fixed(&mut out, fixed, &masks);
+        let way = if model.is_apart(&fixed.name) { "kinematic" } else { "fixed" };
+        write_fixed(&mut out, fixed, way, &masks);
     }
     for link in &model.links {
         write_link(&mut out, link, &masks);
@@ -38,13 +41,25 @@ pub(crate) fn write(model: &Model, notes: &mut Vec<LeftOut>) -> String {
     for tie in &model.ties {
         write_tie(&mut out, model, tie);
     }
-    for [a, b] in &model.apart {
-        out.push_str("\n[[coupling]]\n");
-        put(&mut out, "a", &quoted(&model.links[*a].name));
-        put(&mut out, "b", &quoted(&model.links[*b].name));
-        put(&mut out, "law", "\"off\"");
+    for pair in &model.apart {
+        write_apart(&mut out, pair);
     }
     out
+}
+
+fn write_apart(out: &mut String, Apart { a, b, why }: &Apart) {
+    out.push('\n');
+    match why {
+        Why::Excluded => {}
+        Why::Neighbours => out.push_str("# neighbours\n"),
+        Why::Overlap { depth_m } => {
+            writeln!(out, "# they overlap by {:.3} mm at the start", depth_m * 1e3).expect("a string takes all");
+        }
+    }
+    out.push_str("[[coupling]]\n");
+    put(out, "a", &quoted(a));
+    put(out, "b", &quoted(b));
+    put(out, "law", "\"off\"");
 }
 
 fn put(out: &mut String, key: &str, value: &str) {
@@ -76,11 +91,12 @@ fn vector(v: DVec3) -> String {
     format!("[{}, {}, {}]", number(v.x), number(v.y), number(v.z))
 }
 
-fn write_fixed(out: &mut String, fixed: &Fixed, masks: &BTreeSet<Masks>) {
+/// A solid that stays: `fixed`, or `kinematic` where something passes through it, as couplings are between what can move.
+fn write_fixed(out: &mut String, fixed: &Fixed, way: &str, masks: &BTreeSet<Masks>) {
     out.push_str("\n[[object]]\n");
     put(out, "name", &quoted(&fixed.name));
     put(out, "model", "\"rigid\"");
-    put(out, "fixed", "true");
+    put(out, way, "true");
     write_shape(out, &fixed.part.shape);
     write_pose(out, fixed.part.pose);
     write_look(out, &fixed.look, fixed.part.touches, masks);
@@ -130,6 +146,7 @@ fn write_shape(out: &mut String, shape: &Shape) {
             let scale = (*scale != 1.0).then(|| ("scale", exact(*scale)));
             ("hull", std::iter::once(("file", quoted(file))).chain(scale).collect())
         }
+        Shape::Ellipsoid { file, .. } => ("hull", vec![("file", quoted(file))]),
     };
     put(out, "shape", &quoted(name));
     for (key, value) in keys {

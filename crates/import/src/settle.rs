@@ -2,10 +2,10 @@
 //!
 //! In: a [`Model`] as the file has it. Out: the same where every link has a mass and a part. Never here: XML, TOML.
 
+use crate::imported::{ImportError, LeftOut};
 use crate::masses::{STAND_IN_M, ball, lend, repair};
-use crate::model::{End, Fixed, Joint, Kind, Link, Look, Mass, Model, Part, TieKind};
+use crate::model::{End, Fixed, Joint, Kind, Link, Mass, Model, Part, TieKind, Why};
 use crate::pose::Pose;
-use crate::{ImportError, LeftOut};
 use glam::{DMat3, DVec3};
 use metachron_geometry::COMPOUND_PARTS_MAX;
 
@@ -24,11 +24,20 @@ enum Fate {
 ///
 /// # Errors
 /// For a link without mass on a joint that moves.
-pub(crate) fn settle(mut model: Model, notes: &mut Vec<LeftOut>) -> Result<Model, ImportError> {
+pub(crate) fn settle(mut model: Model, fixed_base: bool, notes: &mut Vec<LeftOut>) -> Result<Model, ImportError> {
     lend(&mut model, notes);
+    find_roots(&mut model);
+    if fixed_base {
+        fix_bases(&mut model);
+    }
     let mut fates: Vec<Fate> = Vec::with_capacity(model.links.len());
     for (at, link) in model.links.iter().enumerate() {
-        fates.push(fate(link, model.joints.iter().find(|joint| joint.child == at), &fates, &model)?);
+        let joint = model.joints.iter().find(|joint| joint.child == at);
+        let own = fate(link, joint, &fates, &model)?;
+        if let Some(joint) = joint.filter(|joint| own != Fate::Itself && joint.kind != Kind::Fixed) {
+            notes.push(link.place.note(format!("has no mass, and carries none: {} is fixed", joint.place.label)));
+        }
+        fates.push(own);
     }
     for (at, fate) in fates.iter().enumerate() {
         let parts = if *fate == Fate::Itself { continue } else { std::mem::take(&mut model.links[at].parts) };
@@ -38,16 +47,16 @@ pub(crate) fn settle(mut model: Model, notes: &mut Vec<LeftOut>) -> Result<Model
                 model.links[host].parts.extend(moved);
             }
             _ => {
-                let (name, pose, look) =
-                    (model.links[at].name.clone(), model.links[at].pose, model.links[at].look.clone());
-                model.fixed.extend(parts.into_iter().enumerate().map(|(i, part)| fixed(&name, i, pose, part, &look)));
+                let link = &model.links[at];
+                let fixed = parts.into_iter().enumerate().map(|(i, part)| fixed(link, at, i, part));
+                model.fixed.extend(fixed.collect::<Vec<_>>());
             }
         }
     }
     move_ties(&mut model, &fates, notes);
+    pass_excluded(&mut model, &fates);
     keep(&mut model, &fates);
-    let neighbours = neighbours(&model);
-    model.apart.extend(neighbours);
+    model.pass_neighbours();
     for link in &mut model.links {
         repair(link, notes);
         choose_parts(link, notes)?;
@@ -55,9 +64,52 @@ pub(crate) fn settle(mut model: Model, notes: &mut Vec<LeftOut>) -> Result<Model
     Ok(model)
 }
 
-fn fixed(link: &str, index: usize, pose: Pose, part: Part, look: &Look) -> Fixed {
-    let name = if index == 0 { link.to_owned() } else { format!("{link}-{}", index + 1) };
-    Fixed { name, part: Part { pose: pose.then(part.pose), ..part }, look: look.clone() }
+/// A part of a link that is part of the world.
+fn fixed(link: &Link, number: usize, index: usize, part: Part) -> Fixed {
+    let name = if index == 0 { link.name.clone() } else { format!("{}-{}", link.name, index + 1) };
+    let part = Part { pose: link.pose.then(part.pose), ..part };
+    Fixed { name, root: Some(link.root), link: Some(number), part, look: link.look.clone() }
+}
+
+/// Finds for each link the one that all of its tree hangs on.
+fn find_roots(model: &mut Model) {
+    for at in 0..model.links.len() {
+        let parent = model.joints.iter().find(|joint| joint.child == at).and_then(|joint| joint.parent);
+        model.links[at].root = parent.map_or(at, |parent| model.links[parent].root);
+    }
+}
+
+/// Fixes what moves freely and others hang on, and a robot that is one link.
+fn fix_bases(model: &mut Model) {
+    let joints = std::mem::take(&mut model.joints);
+    let is_base = |at: usize| {
+        joints.iter().all(|joint| joint.child != at)
+            && (model.links.len() == 1 || joints.iter().any(|joint| joint.parent == Some(at)))
+    };
+    let bases = (0..model.links.len()).filter(|at| is_base(*at) && !matches!(model.links[*at].mass, Mass::None));
+    let welds: Vec<Joint> = bases.map(|at| Joint::weld(model.links[at].place.clone(), None, at)).collect();
+    model.joints = welds.into_iter().chain(joints).collect();
+}
+
+/// Brings the pairs that the file excludes to the bodies that links become.
+fn pass_excluded(model: &mut Model, fates: &[Fate]) {
+    let names = |link: usize| -> Vec<String> {
+        match fates[link] {
+            Fate::Itself => vec![model.links[link].name.clone()],
+            Fate::PartOf(host, _) => vec![model.links[host].name.clone()],
+            Fate::World => {
+                let own = model.fixed.iter().filter(|fixed| fixed.link == Some(link) && fixed.can_pass());
+                own.map(|fixed| fixed.name.clone()).collect()
+            }
+        }
+    };
+    let moving = model.excluded.iter().filter(|pair| pair.iter().any(|link| fates[*link] != Fate::World));
+    let pairs: Vec<[Vec<String>; 2]> = moving.map(|pair| pair.map(names)).collect();
+    for [first, second] in pairs {
+        for (a, b) in first.iter().flat_map(|a| second.iter().map(move |b| (a, b))) {
+            model.let_pass(a, b, Why::Excluded);
+        }
+    }
 }
 
 /// What a link becomes, where those before it have their fates.
@@ -65,8 +117,11 @@ fn fate(link: &Link, joint: Option<&Joint>, before: &[Fate], model: &Model) -> R
     if !matches!(link.mass, Mass::None) {
         return Ok(Fate::Itself);
     }
+    if link.is_free {
+        return Err(link.place.wrong("has no mass, and moves freely; expected a mass above zero"));
+    }
     let Some(joint) = joint else { return Ok(Fate::World) };
-    if joint.kind != Kind::Fixed {
+    if joint.kind != Kind::Fixed && !model.fixes_massless {
         let reason = format!("has no mass, and {} lets it move; expected a mass above zero", joint.place.label);
         return Err(link.place.wrong(reason));
     }
@@ -106,7 +161,7 @@ fn move_ties(model: &mut Model, fates: &[Fate], notes: &mut Vec<LeftOut>) {
     });
 }
 
-/// Leaves the links that remain themselves, and the joints and pairs between them.
+/// Leaves the links that remain themselves, and the joints between them.
 fn keep(model: &mut Model, fates: &[Fate]) {
     let mut numbers = Vec::with_capacity(fates.len());
     let mut count = 0;
@@ -126,8 +181,6 @@ fn keep(model: &mut Model, fates: &[Fate]) {
     for end in model.ties.iter_mut().flat_map(|tie| &mut tie.ends) {
         end.link = end.link.and_then(standing);
     }
-    let pairs = std::mem::take(&mut model.apart).into_iter();
-    model.apart = pairs.filter_map(|[a, b]| Some([standing(a)?, standing(b)?])).filter(|[a, b]| a != b).collect();
     let mut at = 0;
     model.links.retain(|_| {
         at += 1;
@@ -135,36 +188,13 @@ fn keep(model: &mut Model, fates: &[Fate]) {
     });
 }
 
-/// Links that no joint connects itself, and that are on bodies which one does, or on one body: a body is all that fixed joints make of links, with those
-/// without mass that carry it.
-/// Shapes overlap there, as those of connected links do.
-fn neighbours(model: &Model) -> Vec<[usize; 2]> {
-    let above = |link: usize| model.joints.iter().find(|joint| joint.child == link);
-    // the first link of each body; none is the world
-    let mut bodies: Vec<Option<usize>> = Vec::with_capacity(model.links.len());
-    for link in 0..model.links.len() {
-        let is_lent = |joint: &&Joint| joint.parent.is_some_and(|parent| model.links[parent].is_lent);
-        let welded = above(link).filter(|joint| joint.kind == Kind::Fixed || is_lent(joint));
-        bodies.push(welded.map_or(Some(link), |joint| joint.parent.and_then(|parent| bodies[parent])));
-    }
-    // the body that a body hangs on
-    let host = |body: Option<usize>| Some(above(body?)?.parent.and_then(|parent| bodies[parent]));
-    let meets = |a: usize, b: usize| {
-        let [one, other] = [bodies[a], bodies[b]];
-        one == other || host(one) == Some(other) || host(other) == Some(one)
-    };
-    let jointed = |a: usize, b: usize| {
-        let between = |child: usize, parent: usize| above(child).is_some_and(|joint| joint.parent == Some(parent));
-        between(a, b) || between(b, a)
-    };
-    let pairs = (0..model.links.len()).flat_map(|b| (0..b).map(move |a| [a, b]));
-    pairs.filter(|[a, b]| meets(*a, *b) && !jointed(*a, *b) && !model.apart.contains(&[*a, *b])).collect()
-}
-
 /// Leaves a link the parts that are touched, or else those that are seen, or else a ball with its moments of inertia.
 fn choose_parts(link: &mut Link, notes: &mut Vec<LeftOut>) -> Result<(), ImportError> {
     let touched = link.parts.iter().any(|part| part.touches);
-    let mut left_out = |part: &Part, what: String| notes.push(part.place.note(what));
+    let mut left_out = |part: &Part, what: String| {
+        let note = part.place.note(what);
+        notes.push(if part.touches { note } else { note.harmless() });
+    };
     let weighs = |part: &Part| matches!(link.mass, Mass::OfParts) && part.density_kg_m3 != Some(0.0);
     if touched {
         if let Some(part) = link.parts.iter().find(|part| !part.touches && weighs(part)) {

@@ -3,14 +3,23 @@
 //! In: the tree of a file. Out: a [`Model`]. Never here: TOML, links without mass (`settle` has them).
 //! The axes of a link are those of the joint that it hangs on, so that a joint is at the origin of its child.
 
-use crate::folders::{Folders, is_readable};
+use crate::imported::{ImportError, LeftOut};
+use crate::meshes::Meshes;
 use crate::model::{Joint, Kind, Link, Look, Mass, Model, Motor, Part, Shape};
 use crate::pose::{Pose, fixed_angles};
-use crate::xml::Element;
-use crate::{ImportError, LeftOut};
+use crate::xml::{Element, Harmless};
 use glam::{DMat3, DVec3};
 use metachron_geometry::Solid;
 use std::collections::BTreeMap;
+
+/// Looks, other programs' tables, and limits of drives, which a robot has none of until a program drives it. What a joint that does not move says about
+/// its motion has no meaning.
+pub(crate) const HARMLESS: Harmless = Harmless {
+    elements: "visual material color texture transmission safety_controller calibration sensor plugin ros2_control verbose \
+        self_collision_checking axis limit dynamics implicitSpringDamper provideFeedback selfCollide",
+    containers: "gazebo",
+    attributes: "effort velocity command_effort current gear_velocity version type id dont_collapse",
+};
 
 /// A joint as the file has it, between names.
 struct Draft<'a> {
@@ -30,7 +39,7 @@ struct Draft<'a> {
 ///
 /// # Errors
 /// [`ImportError`] at the first element that no scene can have.
-pub(crate) fn read(root: &Element, folders: Folders<'_>, notes: &mut Vec<LeftOut>) -> Result<Model, ImportError> {
+pub(crate) fn read(root: &Element, mut meshes: Meshes<'_>, notes: &mut Vec<LeftOut>) -> Result<Model, ImportError> {
     if root.tag != "robot" {
         return Err(root.wrong("is not the root of a robot; expected `robot`"));
     }
@@ -53,7 +62,8 @@ pub(crate) fn read(root: &Element, folders: Folders<'_>, notes: &mut Vec<LeftOut
             }
         }
     }
-    let mut model = Model { name: root.text("name").unwrap_or("robot").to_owned(), ..Model::default() };
+    let name = root.text("name").unwrap_or("robot").to_owned();
+    let mut model = Model { name, fixes_massless: true, ..Model::default() };
     let order = order(root, &links, &drafts)?;
     let mut numbers: BTreeMap<&str, usize> = BTreeMap::new();
     for Placed { element, above } in order {
@@ -67,8 +77,10 @@ pub(crate) fn read(root: &Element, folders: Folders<'_>, notes: &mut Vec<LeftOut
             }
         }
         numbers.insert(element.needed("name")?, model.links.len());
-        model.links.push(link(element, pose, folders, &colours, notes)?);
+        let is_free = above.is_some_and(|draft| draft.is_free);
+        model.links.push(Link { is_free, ..link(element, pose, &mut meshes, &colours, notes)? });
     }
+    model.files = meshes.finish();
     Ok(model)
 }
 
@@ -130,7 +142,7 @@ fn draft(element: &Element) -> Result<Draft<'_>, ImportError> {
     };
     let moves = matches!(kind, Kind::Revolute | Kind::Prismatic);
     let mut axis = DVec3::X;
-    if let (true, Some(given)) = (moves, element.child("axis")) {
+    if let Some(given) = moves.then(|| element.child("axis")).flatten() {
         axis = given.numbers("xyz")?.map_or(axis, DVec3::from_array);
         if axis.length() < 1e-9 {
             return Err(given.wrong("has no direction; expected a vector longer than 0"));
@@ -161,6 +173,7 @@ fn damper(element: &Element) -> Result<Option<Motor>, ImportError> {
         let value = given.number(name)?.unwrap_or(0.0);
         if value < 0.0 { Err(given.wrong(format!("`{name}` is {value}; expected 0 or more"))) } else { Ok(value) }
     };
+    given.read_zeros(&["friction", "spring_stiffness", "spring_reference"]);
     let damping = brakes("damping")?;
     if damping > 0.0 {
         return Ok(Some(Motor::Damper { velocity: 0.0, damping, max_effort: None }));
@@ -174,7 +187,8 @@ fn start(draft: &Draft<'_>, notes: &mut Vec<LeftOut>) -> f64 {
     let Some([lower, upper]) = draft.limits else { return 0.0 };
     let start = 0.0_f64.clamp(lower, upper);
     if start != 0.0 {
-        notes.push(draft.element.note(format!("starts at {start}, the end of its limits that is nearest to zero")));
+        let what = format!("starts at {start}, the end of its limits that is nearest to zero");
+        notes.push(draft.element.note(what).harmless());
     }
     start
 }
@@ -204,21 +218,25 @@ fn origin(element: &Element) -> Result<Pose, ImportError> {
 fn link(
     element: &Element,
     pose: Pose,
-    folders: Folders<'_>,
+    meshes: &mut Meshes<'_>,
     colours: &BTreeMap<&str, [u8; 3]>,
     notes: &mut Vec<LeftOut>,
 ) -> Result<Link, ImportError> {
     // what is seen stands in where nothing is touched; otherwise it stays unread, and is listed
     let touches = element.all().iter().any(|child| child.tag == "collision");
-    let mut parts = Vec::new();
+    let (mut parts, first) = (Vec::new(), notes.len());
     for geometry in element.children(if touches { "collision" } else { "visual" }) {
-        let Some(shape) = shape(geometry, folders, notes)? else { continue };
+        let Some(shape) = shape(geometry, meshes, notes)? else { continue };
         let pose = origin(geometry)?;
         parts.push(Part { place: geometry.place.clone(), shape, pose, density_kg_m3: None, touches });
     }
+    if !touches {
+        notes[first..].iter_mut().for_each(|note| note.changes_motion = false);
+    }
     let look = Look { colour: colour(element, touches, colours)?, surface: None };
     let name = element.needed("name")?.to_owned();
-    Ok(Link { name, place: element.place.clone(), pose, mass: mass(element)?, parts, look, is_lent: false })
+    let (place, mass) = (element.place.clone(), mass(element)?);
+    Ok(Link { name, root: 0, is_free: false, place, pose, mass, parts, look, is_lent: false })
 }
 
 fn mass(element: &Element) -> Result<Mass, ImportError> {
@@ -244,7 +262,7 @@ fn mass(element: &Element) -> Result<Mass, ImportError> {
 }
 
 /// The shape of a `visual` or `collision`; a mesh that scenes cannot have is noted.
-fn shape(element: &Element, folders: Folders<'_>, notes: &mut Vec<LeftOut>) -> Result<Option<Shape>, ImportError> {
+fn shape(element: &Element, meshes: &mut Meshes<'_>, notes: &mut Vec<LeftOut>) -> Result<Option<Shape>, ImportError> {
     let geometry = element.child("geometry").ok_or_else(|| element.wrong("has no `geometry`"))?;
     let Some(kind) = geometry.all().first() else { return Err(geometry.wrong("is empty; expected a shape")) };
     Ok(match kind.tag.as_str() {
@@ -264,7 +282,7 @@ fn shape(element: &Element, folders: Folders<'_>, notes: &mut Vec<LeftOut>) -> R
                 Solid::Capsule { radius_m, half_height_m }
             }))
         }
-        "mesh" => mesh(kind, folders, notes)?,
+        "mesh" => mesh(kind, meshes, notes)?,
         _ => {
             notes.push(kind.read().note("is left out: it is no shape of a scene"));
             None
@@ -272,19 +290,16 @@ fn shape(element: &Element, folders: Folders<'_>, notes: &mut Vec<LeftOut>) -> R
     })
 }
 
-fn mesh(kind: &Element, folders: Folders<'_>, notes: &mut Vec<LeftOut>) -> Result<Option<Shape>, ImportError> {
+fn mesh(kind: &Element, meshes: &mut Meshes<'_>, notes: &mut Vec<LeftOut>) -> Result<Option<Shape>, ImportError> {
     let name = kind.read().needed("filename")?;
-    let [x, y, z] = kind.numbers("scale")?.unwrap_or([1.0; 3]);
-    if !is_readable(name) {
-        notes.push(kind.note(format!("`{name}` is left out: scenes read .glb, .stl and .obj")));
-        return Ok(None);
+    let scale = kind.numbers("scale")?.unwrap_or([1.0; 3]);
+    match meshes.hull(kind, name, scale)? {
+        Ok(hull) => Ok(Some(hull)),
+        Err(why) => {
+            notes.push(kind.note(format!("`{name}` is left out: {why}")));
+            Ok(None)
+        }
     }
-    let file = folders.mesh(kind, name)?;
-    if !(x > 0.0 && x == y && y == z) {
-        notes.push(kind.note(format!("`{name}` is left out: scenes have one scale above zero for all three axes")));
-        return Ok(None);
-    }
-    Ok(Some(Shape::Hull { file, scale: x }))
 }
 
 /// The colours of a robot's materials by name.

@@ -2,8 +2,8 @@
 //!
 //! In: text. Out: [`Element`]s, numbers of their attributes, and the list of what no reader asked for. Never here: the meaning of a tag.
 
+use crate::imported::{ImportError, LeftOut};
 use crate::place::Place;
-use crate::{ImportError, LeftOut};
 use std::cell::Cell;
 use std::rc::Rc;
 
@@ -25,6 +25,26 @@ struct Attribute {
     name: String,
     value: String,
     is_read: Cell<bool>,
+}
+
+/// What of a kind of files moves nothing; all else that is not read may change the motion.
+pub(crate) struct Harmless {
+    /// Words, as all of these.
+    pub(crate) elements: &'static str,
+    /// Those that are what is in them.
+    pub(crate) containers: &'static str,
+    pub(crate) attributes: &'static str,
+}
+
+impl Harmless {
+    fn has(&self, element: &Element) -> bool {
+        Self::is_in(self.elements, &element.tag)
+            || (Self::is_in(self.containers, &element.tag) && element.children.iter().all(|child| self.has(child)))
+    }
+
+    fn is_in(words: &str, word: &str) -> bool {
+        words.split_whitespace().any(|one| one == word)
+    }
 }
 
 /// The root element of a text: of an included `file`, or of the model's own.
@@ -185,22 +205,49 @@ impl Element {
         self.place.wrong(reason)
     }
 
-    /// A note about this element.
+    /// A note about this element, which changes the motion.
     pub(crate) fn note(&self, what: impl Into<String>) -> LeftOut {
         self.place.note(what)
     }
 
+    /// Counts attributes as read: they have no meaning where they are.
+    pub(crate) fn read_all(&self, names: &[&str]) {
+        for name in names {
+            self.text(name);
+        }
+    }
+
+    /// Counts an attribute as read where it says what is so without it.
+    pub(crate) fn read_if(&self, name: &str, usual: &str) {
+        for attribute in self.attributes.iter().filter(|attribute| attribute.name == name && attribute.value == usual) {
+            attribute.is_read.set(true);
+        }
+    }
+
+    /// Counts those attributes as read that are zero, or several zeros, and mean what they mean where they are missing.
+    pub(crate) fn read_zeros(&self, names: &[&str]) {
+        for attribute in self.attributes.iter().filter(|attribute| names.contains(&attribute.name.as_str())) {
+            if attribute.value.split_whitespace().all(|word| word.parse() == Ok(0.0)) {
+                attribute.is_read.set(true);
+            }
+        }
+    }
+
     /// Lists every element and attribute that nothing has read.
-    pub(crate) fn list_unread(&self, into: &mut Vec<LeftOut>) {
+    pub(crate) fn list_unread(&self, harmless: &Harmless, into: &mut Vec<LeftOut>) {
+        let note = |what: String, is_harmless: bool| {
+            let note = self.note(what);
+            if is_harmless { note.harmless() } else { note }
+        };
         if !self.is_read.get() {
-            into.push(self.note("is left out"));
+            into.push(note("is left out".to_owned(), harmless.has(self)));
             return;
         }
-        for attribute in self.attributes.iter().filter(|a| !a.is_read.get()) {
-            into.push(self.note(format!("`{}` is left out", attribute.name)));
+        for Attribute { name, .. } in self.attributes.iter().filter(|a| !a.is_read.get()) {
+            into.push(note(format!("`{name}` is left out"), Harmless::is_in(harmless.attributes, name)));
         }
         for child in &self.children {
-            child.list_unread(into);
+            child.list_unread(harmless, into);
         }
     }
 }

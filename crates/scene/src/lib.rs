@@ -30,6 +30,7 @@ mod schema;
 mod snippet;
 mod source;
 
+pub use build::surface as read_surface;
 pub use diagnostic::{SceneError, SceneProblem};
 pub use schema::json_schema;
 pub use source::{FileVersion, SCENE_BYTES_MAX, Source, SourceFile};

@@ -24,6 +24,8 @@ pub struct Source {
     name: String,
     text: String,
     siblings: SiblingFiles,
+    /// Files beside it that are not on the disk, by their names.
+    made: Arc<BTreeMap<String, Vec<u8>>>,
     /// The files on the disk that it has been read from, by all copies of this source.
     files: Files,
 }
@@ -71,7 +73,8 @@ impl Source {
     pub fn open(name_or_path: &str) -> Result<Self, SceneError> {
         if let Some(scene) = builtin::find(name_or_path) {
             let (name, text) = (scene.name.to_owned(), scene.text.to_owned());
-            return Ok(Self { name, text, siblings: SiblingFiles::BuiltIn, files: Arc::default() });
+            let siblings = SiblingFiles::BuiltIn;
+            return Ok(Self { name, text, siblings, made: Arc::default(), files: Arc::default() });
         }
         let path = Path::new(name_or_path);
         let version = FileVersion::of(path);
@@ -104,9 +107,15 @@ impl Source {
         Ok(Self { siblings, ..Self::memory(name, text.as_bytes())? })
     }
 
+    /// The same with files beside it that are not written yet, by their names in the scene.
+    #[must_use]
+    pub fn with_files(self, files: BTreeMap<String, Vec<u8>>) -> Self {
+        Self { made: Arc::new(files), ..self }
+    }
+
     fn from_bytes(name: &str, bytes: Vec<u8>, siblings: SiblingFiles) -> Result<Self, SceneError> {
         match String::from_utf8(bytes) {
-            Ok(text) => Ok(Self { name: name.to_owned(), text, siblings, files: Arc::default() }),
+            Ok(text) => Ok(Self { name: name.to_owned(), text, siblings, made: Arc::default(), files: Arc::default() }),
             Err(error) => {
                 let valid = error.utf8_error().valid_up_to();
                 let before = &error.as_bytes()[..valid];
@@ -167,6 +176,9 @@ impl Source {
         let path = Path::new(name);
         if name.is_empty() || path.components().any(|c| matches!(c, Component::Prefix(_) | Component::RootDir)) {
             return Err("expected a path relative to the scene".to_owned());
+        }
+        if let Some(bytes) = self.made.get(name) {
+            return Ok(bytes.clone());
         }
         match &self.siblings {
             SiblingFiles::BuiltIn => {

@@ -1,14 +1,14 @@
 //! Actuators that a joint can have for its motor: servos of position and of velocity, with the controls that the model starts with, zero without a
 //! keyframe.
 //!
-//! In: `actuator` elements. Out: motors of joints. Never here: actuators of forces (they stay unread, and are listed).
+//! In: `actuator` elements. Out: motors of joints. Never here: actuators of forces (they are listed).
 
 use super::bodies::BodyReader;
-use crate::ImportError;
+use crate::imported::ImportError;
 use crate::model::{Joint, Kind, Motor};
 use crate::xml::Element;
 
-/// Reads the actuators.
+/// Reads the actuators. Those of forces give none without a command, and programs command joints themselves.
 ///
 /// # Errors
 /// For one on a joint that there is none of.
@@ -18,34 +18,95 @@ pub(super) fn read(root: &Element, reader: &mut BodyReader<'_>) -> Result<(), Im
         key.check(all.len())?;
     }
     for (number, element) in all.into_iter().enumerate() {
-        if !["position", "velocity"].contains(&element.tag.as_str()) || !element.has("joint") {
+        let Some(law) = Law::of(element)?.filter(|_| element.has("joint")) else {
+            let command = reader.keyframe.as_ref().map_or(0.0, |key| key.control(number));
+            let is_force = ["motor", "general", "adhesion"].contains(&element.tag.as_str());
+            let acts = command != 0.0 || !is_force || element.has("biastype");
+            element.read_all_within();
+            let note = element.note("is left out: it gives what a program commands");
+            reader.notes.push(if acts { note } else { note.harmless() });
             continue;
-        }
+        };
         let name = element.needed("joint")?;
         let drives = |joint: &Joint| joint.name == name && matches!(joint.kind, Kind::Revolute | Kind::Prismatic);
         let Some(at) = reader.model.joints.iter().position(drives) else {
             return Err(element.wrong(format!("drives `{name}`, and there is no hinge or slide of that name")));
         };
-        let damping = match reader.model.joints[at].motor {
-            None => 0.0,
-            Some(Motor::Damper { velocity: 0.0, damping, max_effort: None }) => damping,
-            // a motor is one spring or one brake
-            Some(_) => continue,
+        let own = match reader.model.joints[at].motor {
+            None => Own::default(),
+            Some(Motor::Damper { velocity: 0.0, damping, max_effort: None }) => Own { damping, ..Own::default() },
+            Some(Motor::Spring { position, stiffness, damping, max_effort: None }) => {
+                Own { position, stiffness, damping }
+            }
+            Some(_) => {
+                element.read_all_within();
+                let what = "is left out: a joint of a scene has one motor or its friction, and this one has that";
+                reader.notes.push(element.note(what));
+                continue;
+            }
         };
-        reader.model.joints[at].motor = Some(servo(Servo { element: element.read(), number }, reader, at, damping)?);
+        reader.model.joints[at].motor = Some(servo(Servo { element: element.read(), number, law }, reader, at, own)?);
     }
     Ok(())
+}
+
+/// The force of a servo: gain · command + bias − stiffness · length − damping · its rate.
+#[derive(Clone, Copy)]
+struct Law {
+    gain: f64,
+    bias: f64,
+    stiffness: f64,
+    damping: f64,
+}
+
+impl Law {
+    /// That of an actuator; `None` for one that is no servo.
+    fn of(element: &Element) -> Result<Option<Self>, ImportError> {
+        let value = |name: &str, default: f64| {
+            let value = element.number(name)?.unwrap_or(default);
+            if value < 0.0 { Err(element.wrong(format!("`{name}` is {value}; expected 0 or more"))) } else { Ok(value) }
+        };
+        let law = match element.tag.as_str() {
+            "position" => {
+                let (gain, damping) = (value("kp", 1.0)?, value("kv", 0.0)?);
+                Self { gain, bias: 0.0, stiffness: gain, damping }
+            }
+            "velocity" => {
+                let gain = value("kv", 1.0)?;
+                Self { gain, bias: 0.0, stiffness: 0.0, damping: gain }
+            }
+            "general" if element.text("biastype") == Some("affine") => {
+                let first = |name: &str, at: usize| {
+                    Ok::<_, ImportError>(element.list(name)?.and_then(|all| all.get(at).copied()).unwrap_or(0.0))
+                };
+                let gain = element.list("gainprm")?.and_then(|all| all.first().copied()).unwrap_or(1.0);
+                let (bias, stiffness, damping) = (first("biasprm", 0)?, -first("biasprm", 1)?, -first("biasprm", 2)?);
+                Self { gain, bias, stiffness, damping }
+            }
+            _ => return Ok(None),
+        };
+        Ok(Some(law).filter(|law| law.stiffness >= 0.0 && law.damping >= 0.0 && law.stiffness + law.damping > 0.0))
+    }
+}
+
+/// The spring and the damper that a joint has without actuators.
+#[derive(Clone, Copy, Default)]
+struct Own {
+    position: f64,
+    stiffness: f64,
+    damping: f64,
 }
 
 /// A servo, by its number among actuators.
 struct Servo<'a> {
     element: &'a Element,
     number: usize,
+    law: Law,
 }
 
-/// The motor of a servo, with the damping that its joint has.
-fn servo(servo: Servo<'_>, reader: &mut BodyReader<'_>, joint: usize, damping: f64) -> Result<Motor, ImportError> {
-    let Servo { element, number } = servo;
+/// The motor of a servo, with the spring and damper that its joint has: of two springs a stiffer one that rests between them.
+fn servo(servo: Servo<'_>, reader: &mut BodyReader<'_>, joint: usize, own: Own) -> Result<Motor, ImportError> {
+    let Servo { element, number, law } = servo;
     let gear = element.list("gear")?.and_then(|all| all.first().copied()).unwrap_or(1.0);
     let limited = match element.text("forcelimited").unwrap_or("auto") {
         "auto" => reader.compiler.auto_limits,
@@ -56,26 +117,19 @@ fn servo(servo: Servo<'_>, reader: &mut BodyReader<'_>, joint: usize, damping: f
     if force.is_some_and(|[least, greatest]| least != -greatest) {
         reader.notes.push(element.note("gives as much either way: `forcerange` is not the same both ways"));
     }
-    if max_effort.is_some() && damping > 0.0 {
-        reader.notes.push(element.note("bounds the joint's own damping, too: a motor has one greatest effort"));
+    if max_effort.is_some() && own.damping + own.stiffness > 0.0 {
+        reader
+            .notes
+            .push(element.note("bounds the joint's own spring and damper, too: a motor has one greatest effort"));
     }
-    let value = |name: &str, default: f64| {
-        let value = element.number(name)?.unwrap_or(default);
-        if value < 0.0 {
-            Err(element.wrong(format!("`{name}` is {value}; expected 0 or more")))
-        } else {
-            Ok(value * gear * gear)
-        }
-    };
     // of an actuator, whose length is that of its joint times its gear
-    let control = reader.keyframe.as_ref().map_or(0.0, |key| key.control(number));
-    let goal = if gear == 0.0 { 0.0 } else { control / gear };
-    if element.tag == "velocity" {
-        let gain = value("kv", 1.0)?;
-        let both = gain + damping;
-        let velocity = if both > 0.0 { goal * gain / both } else { 0.0 };
-        return Ok(Motor::Damper { velocity, damping: both, max_effort });
+    let command = law.gain * reader.keyframe.as_ref().map_or(0.0, |key| key.control(number)) + law.bias;
+    let of_servo = law.stiffness * gear * gear;
+    let (stiffness, damping) = (of_servo + own.stiffness, law.damping * gear * gear + own.damping);
+    if stiffness > 0.0 {
+        let pull = of_servo * reader.zeros[joint] + own.stiffness * own.position + command * gear;
+        return Ok(Motor::Spring { position: pull / stiffness, stiffness, damping, max_effort });
     }
-    let position = reader.zeros[joint] + goal;
-    Ok(Motor::Spring { position, stiffness: value("kp", 1.0)?, damping: value("kv", 0.0)? + damping, max_effort })
+    let velocity = if damping > 0.0 { command * gear / damping } else { 0.0 };
+    Ok(Motor::Damper { velocity, damping, max_effort })
 }

@@ -6,12 +6,14 @@ use super::compiler::Compiler;
 use super::geoms::{Geom, Mesh};
 use super::joints::StartedJoint;
 use super::keyframe::Keyframe;
-use crate::folders::Folders;
-use crate::model::{End, Fixed, Joint, Link, Look, Masks, Mass, Model, Part, Surface};
+use crate::imported::{ImportError, LeftOut};
+use crate::masses::kilograms;
+use crate::meshes::Meshes;
+use crate::model::{End, Fixed, Joint, Kind, Link, Look, Masks, Mass, Model, Part, Shape, Surface};
 use crate::place::Place;
 use crate::pose::Pose;
+use crate::weight::Weight;
 use crate::xml::Element;
-use crate::{ImportError, LeftOut};
 use glam::{DMat3, DQuat, DVec3};
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -19,7 +21,7 @@ use std::collections::{BTreeMap, BTreeSet};
 pub(super) struct BodyReader<'a> {
     pub(super) compiler: &'a Compiler,
     pub(super) meshes: BTreeMap<String, Mesh<'a>>,
-    pub(super) folders: Folders<'a>,
+    pub(super) files: Meshes<'a>,
     pub(super) notes: &'a mut Vec<LeftOut>,
     pub(super) model: Model,
     /// For each joint of the model, where the zero of its file is: from its start, radians or metres.
@@ -27,6 +29,8 @@ pub(super) struct BodyReader<'a> {
     pub(super) sites: BTreeMap<String, Site<'a>>,
     /// `None` for a start where the file has its bodies.
     pub(super) keyframe: Option<Keyframe<'a>>,
+    /// What bodies weigh that never move; `None` where that is not known.
+    pub(super) static_kg: Option<f64>,
     names: BTreeSet<String>,
 }
 
@@ -102,24 +106,25 @@ impl<'e> Contents<'e> {
 }
 
 impl<'a> BodyReader<'a> {
-    pub(super) fn new(compiler: &'a Compiler, folders: Folders<'a>, notes: &'a mut Vec<LeftOut>) -> Self {
+    pub(super) fn new(compiler: &'a Compiler, files: Meshes<'a>, notes: &'a mut Vec<LeftOut>) -> Self {
         // no object of a scene can have the name of the world
         let names = BTreeSet::from(["world".to_owned()]);
         Self {
             compiler,
             meshes: BTreeMap::new(),
-            folders,
+            files,
             notes,
             model: Model::default(),
             zeros: Vec::new(),
             sites: BTreeMap::new(),
             keyframe: None,
+            static_kg: Some(0.0),
             names,
         }
     }
 
     pub(super) fn finish(self) -> Model {
-        self.model
+        Model { files: self.files.finish(), ..self.model }
     }
 
     /// Reads the world and all bodies in it.
@@ -128,7 +133,8 @@ impl<'a> BodyReader<'a> {
         for placed in &contents.geoms {
             let Some(geom) = self.geom(*placed)? else { continue };
             let name = self.unused(placed.element.text("name"), "geom");
-            self.model.fixed.push(Fixed { name, look: look(std::slice::from_ref(&geom)), part: geom.part });
+            let look = look(std::slice::from_ref(&geom));
+            self.model.fixed.push(Fixed { name, root: None, link: None, look, part: geom.part });
         }
         let world = Host { link: None, pose: Pose::IDENTITY, at_springs: Pose::IDENTITY, is_fixed: true };
         self.note_sites(&contents, world)?;
@@ -140,6 +146,7 @@ impl<'a> BodyReader<'a> {
         let contents = Contents::of(element, self.compiler)?;
         let place = element.place.clone();
         let name = self.unused(element.text("name"), "body");
+        element.read_zeros(&["gravcomp"]);
         let rest = placed.frame.then(self.compiler.pose(element)?);
         let is_fixed = host.is_fixed && contents.joints.is_empty();
         let from = Host { pose: host.pose.then(rest), at_springs: host.at_springs.then(rest), ..host };
@@ -157,12 +164,8 @@ impl<'a> BodyReader<'a> {
         let above = joint.as_ref().map_or(above, |joint| above.moved(joint));
         let pose = above.pose;
         let geoms = self.geoms(&contents)?;
-        let mass = if is_fixed {
-            contents.inertial.inspect(|inertial| inertial.read_all_within());
-            Mass::None
-        } else {
-            self.mass(contents.inertial, &geoms)?
-        };
+        let mass =
+            if is_fixed { self.static_mass(contents.inertial, &geoms)? } else { self.mass(contents.inertial, &geoms)? };
         let look = look(&geoms);
         if let Some(one) = look.surface
             && geoms.iter().any(|geom| geom.part.touches && geom.surface != one)
@@ -171,8 +174,19 @@ impl<'a> BodyReader<'a> {
                 "has geoms of several frictions or masks: the largest friction is that of all, and all masks together",
             ));
         }
-        let parts = geoms.into_iter().map(|geom| density(geom, &mass)).collect();
-        self.model.links.push(Link { name, place: place.clone(), pose, mass, parts, look, is_lent: false });
+        let parts: Vec<Part> = geoms.iter().map(|geom| density(geom, &mass)).collect();
+        let is_free = joint.as_ref().is_some_and(|joint| joint.between.is_none());
+        self.model.links.push(Link {
+            name,
+            root: 0,
+            is_free,
+            place: place.clone(),
+            pose,
+            mass,
+            parts,
+            look,
+            is_lent: false,
+        });
         match joint {
             None => self.push_joint(Joint::weld(place, host.link, index), 0.0),
             Some(StartedJoint { between, zero, .. }) => between.into_iter().for_each(|one| self.push_joint(one, zero)),
@@ -180,6 +194,15 @@ impl<'a> BodyReader<'a> {
         let here = Host { link: Some(index), is_fixed, ..above };
         self.note_sites(&contents, here)?;
         contents.bodies.iter().try_for_each(|body| self.body(*body, here))
+    }
+
+    /// Whether a body is part of the world.
+    pub(super) fn is_static(&self, link: usize) -> bool {
+        let mut above = self.model.joints.iter().find(|joint| joint.child == link);
+        while let Some(joint) = above.filter(|joint| joint.kind == Kind::Fixed && joint.parent.is_some()) {
+            above = self.model.joints.iter().find(|one| Some(one.child) == joint.parent);
+        }
+        above.is_some_and(|joint| joint.kind == Kind::Fixed && joint.parent.is_none())
     }
 
     /// Links without mass, one for each joint of a body but its last, as the joints follow each other; the last of them.
@@ -194,6 +217,8 @@ impl<'a> BodyReader<'a> {
             let (mass, parts, look) = (Mass::None, Vec::new(), Look::default());
             self.model.links.push(Link {
                 name,
+                root: 0,
+                is_free: false,
                 place: place.clone(),
                 pose: at.pose,
                 mass,
@@ -234,14 +259,24 @@ impl<'a> BodyReader<'a> {
         if let Some(inertial) = inertial.filter(|_| !self.compiler.mass_from_geoms) {
             return self.given_mass(inertial);
         }
-        let mut weighing = geoms.iter().filter(|geom| geom.density_kg_m3 != Some(0.0));
-        match (weighing.next(), weighing.next()) {
-            (None, _) => Ok(Mass::None),
-            // of a hull the scene alone knows the volume
-            (Some(Geom { density_kg_m3: None, mass_kg: Some(mass_kg), .. }), None) => {
+        let weighing: Vec<&Geom> = geoms.iter().filter(|geom| geom.density_kg_m3 != Some(0.0)).collect();
+        if weighing.is_empty() {
+            return Ok(Mass::None);
+        }
+        // a scene takes the mass of solids that are all touched, or none, from their densities
+        let is_seen_alone = geoms.iter().all(|geom| !geom.part.touches);
+        if weighing.iter().all(|g| matches!(g.part.shape, Shape::Solid(_)) && (g.part.touches || is_seen_alone)) {
+            return Ok(Mass::OfParts);
+        }
+        if let Some(all) = weighing.iter().map(|geom| self.weight(geom)).collect::<Option<Vec<_>>>() {
+            return Ok(Weight::together(&all));
+        }
+        // of a mesh that cannot be read here the scene alone knows the volume
+        match weighing.as_slice() {
+            [Geom { density_kg_m3: None, mass_kg: Some(mass_kg), .. }] => {
                 Ok(Mass::Given { mass_kg: *mass_kg, com_m: DVec3::ZERO, inertia_kg_m2: None })
             }
-            _ => match geoms.iter().find(|geom| geom.density_kg_m3.is_none()) {
+            _ => match weighing.iter().find(|geom| geom.density_kg_m3.is_none()) {
                 Some(geom) => {
                     let reason = "is a mesh with a `mass` beside other geoms; expected an `inertial` in its body";
                     Err(geom.part.place.wrong(reason))
@@ -249,6 +284,17 @@ impl<'a> BodyReader<'a> {
                 None => Ok(Mass::OfParts),
             },
         }
+    }
+
+    /// None: a body that never moves weighs only in the sum of all.
+    fn static_mass(&mut self, inertial: Option<&Element>, geoms: &[Geom]) -> Result<Mass, ImportError> {
+        inertial.inspect(|inertial| inertial.read_all_within());
+        if self.compiler.total_kg.is_some() {
+            let mass = self.mass(inertial, geoms)?;
+            let parts: Vec<Part> = geoms.iter().map(|geom| density(geom, &mass)).collect();
+            self.static_kg = self.static_kg.zip(kilograms(&mass, &parts)).map(|(sum, more)| sum + more);
+        }
+        Ok(Mass::None)
     }
 
     fn given_mass(&self, inertial: &Element) -> Result<Mass, ImportError> {
@@ -281,9 +327,9 @@ fn free_with_others(joint: Placed<'_>) -> ImportError {
 }
 
 /// The part of a geom, with its density where the body's mass comes from that.
-fn density(geom: Geom, mass: &Mass) -> Part {
+fn density(geom: &Geom, mass: &Mass) -> Part {
     let density_kg_m3 = geom.density_kg_m3.filter(|_| matches!(mass, Mass::OfParts));
-    Part { density_kg_m3, ..geom.part }
+    Part { density_kg_m3, ..geom.part.clone() }
 }
 
 /// The look of a body: the colour of its first coloured geom, the friction of its roughest, the masks of all.
@@ -294,23 +340,6 @@ fn look(geoms: &[Geom]) -> Look {
         masks: Masks { types: a.masks.types | b.masks.types, partners: a.masks.partners | b.masks.partners },
     };
     Look { colour: geoms.iter().find_map(|geom| geom.colour), surface: touched.reduce(both) }
-}
-
-impl Joint {
-    /// A joint that lets nothing move.
-    fn weld(place: Place, parent: Option<usize>, child: usize) -> Self {
-        Self {
-            name: String::new(),
-            place,
-            parent,
-            child,
-            kind: crate::model::Kind::Fixed,
-            anchor_m: DVec3::ZERO,
-            axis: DVec3::Z,
-            range: None,
-            motor: None,
-        }
-    }
 }
 
 /// A rotation that brings z to a direction.

@@ -3,7 +3,7 @@
 //! In: `compiler` elements. Out: poses and angles as the file means them. Never here: bodies.
 
 use super::defaults::ROTATIONS;
-use crate::ImportError;
+use crate::imported::ImportError;
 use crate::pose::Pose;
 use crate::xml::Element;
 use glam::{DMat3, DQuat, DVec3};
@@ -17,9 +17,13 @@ pub(super) struct Compiler {
     euler_axes: String,
     /// Whether a range alone makes a limit.
     pub(super) auto_limits: bool,
+    /// Whether ranges are limits at all.
+    pub(super) has_limits: bool,
     pub(super) mesh_folder: String,
     /// Whether geoms give masses even where a body says its own.
     pub(super) mass_from_geoms: bool,
+    /// What all bodies together weigh; `None` for what they say.
+    pub(super) total_kg: Option<f64>,
 }
 
 impl Compiler {
@@ -28,8 +32,10 @@ impl Compiler {
             angle_rad: 1.0_f64.to_radians(),
             euler_axes: "xyz".to_owned(),
             auto_limits: true,
+            has_limits: true,
             mesh_folder: String::new(),
             mass_from_geoms: false,
+            total_kg: None,
         };
         for compiler in root.children("compiler") {
             if let Some(unit) = compiler.text("angle") {
@@ -44,6 +50,8 @@ impl Compiler {
             if let Some(given) = compiler.text("autolimits") {
                 settings.auto_limits = given == "true";
             }
+            compiler.read_if("coordinate", "local");
+            settings.total_kg = compiler.number("settotalmass")?.filter(|total| *total > 0.0).or(settings.total_kg);
             if let Some(given) = compiler.text("inertiafromgeom") {
                 settings.mass_from_geoms = given == "true";
             }

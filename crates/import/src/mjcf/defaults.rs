@@ -2,7 +2,7 @@
 //!
 //! In: the tree of a file. Out: the same without `default` elements. Never here: what an attribute means.
 
-use crate::ImportError;
+use crate::imported::ImportError;
 use crate::xml::Element;
 use std::collections::BTreeMap;
 

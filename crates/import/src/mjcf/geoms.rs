@@ -4,10 +4,10 @@
 
 use super::bodies::{BodyReader, Placed, z_to};
 use super::compiler::Compiler;
-use crate::ImportError;
-use crate::folders::is_readable;
+use crate::imported::ImportError;
 use crate::model::{Masks, Part, Shape, Surface};
 use crate::pose::Pose;
+use crate::weight::Weight;
 use crate::xml::Element;
 use glam::DVec3;
 use metachron_geometry::Solid;
@@ -22,7 +22,7 @@ const FRICTION_DEFAULT: f64 = 1.0;
 #[derive(Debug)]
 pub(super) struct Geom {
     pub(super) part: Part,
-    /// `None` of a mesh that says a mass: its volume is not known here.
+    /// `None` of a mesh or ellipsoid that says a mass.
     pub(super) density_kg_m3: Option<f64>,
     pub(super) mass_kg: Option<f64>,
     pub(super) colour: Option<[u8; 3]>,
@@ -33,21 +33,35 @@ pub(super) struct Geom {
 #[derive(Debug)]
 pub(super) struct Mesh<'a> {
     element: &'a Element,
-    file: String,
+    points: MeshPoints,
     scale: [f64; 3],
+}
+
+/// Where the points of a mesh are.
+#[derive(Debug)]
+enum MeshPoints {
+    File(String),
+    Here(Vec<DVec3>),
 }
 
 /// The meshes of a file by name: that of the file where they have none.
 pub(super) fn meshes<'a>(root: &'a Element, compiler: &Compiler) -> Result<BTreeMap<String, Mesh<'a>>, ImportError> {
     let mut found = BTreeMap::new();
     for element in root.children("asset").flat_map(|asset| asset.children("mesh")) {
-        let Some(file) = element.text("file") else { continue };
-        let stem = std::path::Path::new(file).file_stem().and_then(|stem| stem.to_str()).unwrap_or(file);
-        let name = element.text("name").unwrap_or(stem).to_owned();
-        let folder = compiler.mesh_folder.trim_end_matches('/');
-        let file = if folder.is_empty() { file.to_owned() } else { format!("{folder}/{file}") };
         let scale = element.numbers("scale")?.unwrap_or([1.0; 3]);
-        found.insert(name, Mesh { element, file, scale });
+        let (stem, points) = if let Some(file) = element.text("file") {
+            let stem = std::path::Path::new(file).file_stem().and_then(|stem| stem.to_str()).unwrap_or(file);
+            let folder = compiler.mesh_folder.trim_end_matches('/');
+            let file = if folder.is_empty() { file.to_owned() } else { format!("{folder}/{file}") };
+            (stem, MeshPoints::File(file))
+        } else if let Some(all) = element.list("vertex")? {
+            let scaled = |point: &[f64]| DVec3::from_slice(point) * DVec3::from_array(scale);
+            ("mesh", MeshPoints::Here(all.chunks_exact(3).map(scaled).collect()))
+        } else {
+            continue;
+        };
+        let name = element.text("name").unwrap_or(stem).to_owned();
+        found.insert(name, Mesh { element, points, scale });
     }
     Ok(found)
 }
@@ -57,9 +71,20 @@ impl BodyReader<'_> {
     pub(super) fn geom(&mut self, placed: Placed<'_>) -> Result<Option<Geom>, ImportError> {
         let element = placed.element.read();
         let own = self.compiler.pose(element)?;
-        let Some((shape, pose)) = self.shape(element, own)? else { return Ok(None) };
         let masks = Masks { types: mask(element, "contype")?, partners: mask(element, "conaffinity")? };
         let touches = masks.types != 0 || masks.partners != 0;
+        element.read_zeros(&["margin", "gap", "priority"]);
+        element.read_if("condim", "3");
+        if !touches {
+            element.read_all(&["condim", "solref", "solimp", "solmix", "margin", "gap", "priority"]);
+        }
+        let (shape, pose) = match self.shape(element, own)? {
+            Ok(found) => found,
+            Err(why) => {
+                self.notes.push(element.note(format!("is left out: {why}")));
+                return Ok(None);
+            }
+        };
         let friction = element.list("friction")?.and_then(|all| all.first().copied()).unwrap_or(FRICTION_DEFAULT);
         if !(0.0..=10.0).contains(&friction) {
             return Err(element.wrong(format!("`friction` is {friction}; expected 0 to 10")));
@@ -74,7 +99,7 @@ impl BodyReader<'_> {
             (Some(mass), Shape::Solid(solid)) => {
                 Some(mass / solid.volume_m3().map_err(|why| element.wrong(why.to_string()))?)
             }
-            (Some(_), Shape::Hull { .. }) => None,
+            (Some(_), Shape::Hull { .. } | Shape::Ellipsoid { .. }) => None,
         };
         let colour = element.numbers::<4>("rgba")?;
         let colour = colour.map(|[r, g, b, _]| [r, g, b].map(|c| (c.clamp(0.0, 1.0) * 255.0).round() as u8));
@@ -84,7 +109,8 @@ impl BodyReader<'_> {
     }
 
     /// The shape of a geom and where it is, which `fromto` says otherwise than `own`.
-    fn shape(&mut self, element: &Element, own: Pose) -> Result<Option<(Shape, Pose)>, ImportError> {
+    /// Or why scenes have none such.
+    fn shape(&mut self, element: &Element, own: Pose) -> Result<Result<(Shape, Pose), String>, ImportError> {
         let size = element.list("size")?.unwrap_or_default();
         let edge = |i: usize| {
             let value = size.get(i).copied().unwrap_or(0.0);
@@ -103,31 +129,39 @@ impl BodyReader<'_> {
                 Solid::Box { half_extents_m: DVec3::new(edge(0)?, across, half(2)?) }
             }
             "plane" => Solid::Plane,
-            "mesh" => return Ok(self.mesh(element)?.map(|shape| (shape, pose))),
-            other => {
-                self.notes.push(element.note(format!("is left out: scenes have no {other}")));
-                return Ok(None);
+            "ellipsoid" => {
+                let along = half(2)?;
+                let across = edge(if line.is_some() { 0 } else { 1 })?;
+                return Ok(self.files.ellipsoid(DVec3::new(edge(0)?, across, along)).map(|shape| (shape, pose)));
             }
+            "mesh" => return Ok(self.mesh(element)?.map(|shape| (shape, pose))),
+            other => return Ok(Err(format!("scenes have no {other}"))),
         };
-        Ok(Some((Shape::Solid(solid), pose)))
+        Ok(Ok((Shape::Solid(solid), pose)))
     }
 
-    fn mesh(&mut self, element: &Element) -> Result<Option<Shape>, ImportError> {
+    /// The hull of a mesh, or why there is none.
+    fn mesh(&mut self, element: &Element) -> Result<Result<Shape, String>, ImportError> {
         let name = element.needed("mesh")?;
-        let Some(mesh) = self.meshes.get(name) else {
-            return Err(element.wrong(format!("names the mesh `{name}`, and there is none of that name with a file")));
+        let Some(Mesh { element: mesh, points, scale }) = self.meshes.get(name) else {
+            return Err(element.wrong(format!("names the mesh `{name}`, and there is none of that name with points")));
         };
-        let [x, y, z] = mesh.scale;
-        let why = if !is_readable(&mesh.file) {
-            "scenes read .glb, .stl and .obj"
-        } else if !(x > 0.0 && x == y && y == z) {
-            "scenes have one scale above zero for all three axes"
-        } else {
-            let file = self.folders.mesh(mesh.element, &mesh.file)?;
-            return Ok(Some(Shape::Hull { file, scale: x }));
+        let hull = match points {
+            MeshPoints::File(file) => self.files.hull(mesh, file, *scale)?.map_err(|why| format!("`{file}`: {why}")),
+            MeshPoints::Here(points) => self.files.hull_of(name, points.clone()),
         };
-        self.notes.push(element.note(format!("`{}` is left out: {why}", mesh.file)));
-        Ok(None)
+        Ok(hull)
+    }
+
+    /// What a geom weighs in the axes of its body; `None` where its mesh cannot be read.
+    pub(super) fn weight(&self, geom: &Geom) -> Option<Weight> {
+        let density_kg_m3 = geom.density_kg_m3.unwrap_or(DENSITY_DEFAULT_KG_M3);
+        let own = match &geom.part.shape {
+            Shape::Solid(solid) => Weight::of_solid(solid, density_kg_m3)?,
+            Shape::Ellipsoid { semi_axes_m, .. } => Weight::of_ellipsoid(*semi_axes_m, density_kg_m3),
+            Shape::Hull { file, scale } => Weight::of_surface(&self.files.surface(file, *scale)?, density_kg_m3)?,
+        };
+        Some(geom.mass_kg.map_or(own, |mass_kg| own.with_mass(mass_kg)).at(geom.part.pose))
     }
 }
 

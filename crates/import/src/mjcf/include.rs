@@ -3,8 +3,8 @@
 //! In: the tree of a model, its folder. Out: the same with all that it includes, each element knowing its file. Never here: what one means.
 
 use crate::folders::Folders;
+use crate::imported::{ImportError, LeftOut};
 use crate::xml::{self, DEPTH_MAX, Element};
-use crate::{ImportError, LeftOut};
 use std::collections::BTreeSet;
 use std::path::PathBuf;
 
@@ -52,8 +52,8 @@ impl Includes<'_> {
         let mut root = xml::parse(&file.text, Some(name))?;
         let inside = std::mem::take(root.all_mut());
         // neither of the two remains, nor do other attributes of theirs
-        include.list_unread(self.notes);
-        root.list_unread(self.notes);
+        include.list_unread(&super::HARMLESS, self.notes);
+        root.list_unread(&super::HARMLESS, self.notes);
         Ok(inside)
     }
 }

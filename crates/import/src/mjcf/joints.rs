@@ -4,7 +4,7 @@
 
 use super::bodies::{BodyReader, Host, Placed};
 use super::keyframe::Keyframe;
-use crate::ImportError;
+use crate::imported::{ImportError, LeftOut};
 use crate::model::{Joint, Kind, Motor};
 use crate::pose::Pose;
 use crate::xml::Element;
@@ -33,9 +33,21 @@ impl BodyReader<'_> {
     pub(super) fn joint(&mut self, placed: Placed<'_>, host: Host, child: usize) -> Result<StartedJoint, ImportError> {
         let Placed { element, frame } = placed;
         let parent = host.link;
+        element.read_zeros(&["armature", "frictionloss", "margin", "damping", "stiffness"]);
         let kind = match element.text("type").unwrap_or("hinge") {
-            _ if element.tag == "freejoint" => return self.free(host),
-            "free" => return self.free(host),
+            free if element.tag == "freejoint" || free == "free" => {
+                element.read_all(&[
+                    "axis",
+                    "pos",
+                    "ref",
+                    "springref",
+                    "range",
+                    "limited",
+                    "solreflimit",
+                    "solimplimit",
+                ]);
+                return self.free(host);
+            }
             "hinge" => Kind::Revolute,
             "slide" => Kind::Prismatic,
             "ball" => Kind::Spherical,
@@ -48,6 +60,7 @@ impl BodyReader<'_> {
         let name = element.text("name").unwrap_or_default().to_owned();
         let joint = Joint { name, place, parent, child, kind, anchor_m, axis: DVec3::Z, range: None, motor: None };
         if kind == Kind::Spherical {
+            element.read_all(&["axis", "ref", "springref"]);
             return self.ball(joint);
         }
         let given = element.numbers("axis")?.map_or(DVec3::Z, DVec3::from_array);
@@ -67,7 +80,10 @@ impl BodyReader<'_> {
         let zero = -at_rest - start;
         let axis = frame.rotation * given;
         let spring = element.number("springref")?.unwrap_or(0.0) * unit - at_rest;
-        let motor = passive(element, spring - start)?;
+        let motor = passive(element, spring - start, self.notes)?;
+        if range.is_none() {
+            element.read_all(&["limited", "solreflimit", "solimplimit", "margin"]);
+        }
         let range = range.map(|range| range.map(|end| end - start));
         let [motion, to_spring] = [start, spring].map(|travel| kind.motion(anchor_m, axis, travel));
         Ok(StartedJoint { between: Some(Joint { axis, range, motor, ..joint }), motion, to_spring, zero })
@@ -100,23 +116,29 @@ impl BodyReader<'_> {
         if limited && least > greatest {
             return Err(element.wrong(format!("has the `range` {least} {greatest}; expected the lesser first")));
         }
-        Ok(limited.then_some([least, greatest]))
+        Ok((limited && self.compiler.has_limits).then_some([least, greatest]))
     }
 }
 
 /// What holds or brakes a joint by itself: a spring to a position, with a damper, a damper, or dry friction where it has neither.
-fn passive(element: &Element, position: f64) -> Result<Option<Motor>, ImportError> {
+fn passive(element: &Element, position: f64, notes: &mut Vec<LeftOut>) -> Result<Option<Motor>, ImportError> {
     let at_least_0 = |name: &str| {
         let value = element.number(name)?.unwrap_or(0.0);
         if value < 0.0 { Err(element.wrong(format!("`{name}` is {value}; expected 0 or more"))) } else { Ok(value) }
     };
-    let (stiffness, damping) = (at_least_0("stiffness")?, at_least_0("damping")?);
+    let (stiffness, damping, friction) =
+        (at_least_0("stiffness")?, at_least_0("damping")?, at_least_0("frictionloss")?);
+    if at_least_0("armature")? > 0.0 {
+        notes.push(element.note("`armature` is left out: scenes have no inertia about the axis of a joint"));
+    }
+    if friction > 0.0 && stiffness + damping > 0.0 {
+        notes.push(element.note("`frictionloss` is left out: a joint of a scene has a spring and damper, or friction"));
+    }
     if stiffness > 0.0 {
         return Ok(Some(Motor::Spring { position, stiffness, damping, max_effort: None }));
     }
     if damping > 0.0 {
         return Ok(Some(Motor::Damper { velocity: 0.0, damping, max_effort: None }));
     }
-    let friction = at_least_0("frictionloss")?;
     Ok((friction > 0.0).then_some(Motor::Brake { max_effort: friction }))
 }

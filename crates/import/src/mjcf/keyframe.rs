@@ -2,7 +2,7 @@
 //!
 //! In: `key` elements. Out: their numbers, joint by joint. Never here: what a joint makes of them; the keyframes that are not started from.
 
-use crate::ImportError;
+use crate::imported::ImportError;
 use crate::xml::Element;
 
 /// A keyframe, and how much of it joints have taken.

@@ -4,7 +4,7 @@
 //! (they are listed: scenes have neither), actuators on tendons.
 
 use super::bodies::BodyReader;
-use crate::ImportError;
+use crate::imported::ImportError;
 use crate::model::{End, Tie, TieKind};
 use crate::xml::Element;
 
@@ -43,7 +43,7 @@ fn tie(element: &Element, sites: [&Element; 2], reader: &mut BodyReader<'_>) -> 
         if value < 0.0 { Err(element.wrong(format!("`{name}` is {value}; expected 0 or more"))) } else { Ok(value) }
     };
     let (stiffness_n_m, damping_n_s_m) = (number("stiffness")?, number("damping")?);
-    let limits = limits(element, reader.compiler.auto_limits)?;
+    let limits = limits(element, reader.compiler.auto_limits)?.filter(|_| reader.compiler.has_limits);
     let mut push = |kind: TieKind| reader.model.ties.push(Tie { place: element.place.clone(), ends, kind });
     if let Some([least, greatest]) = limits {
         push(TieKind::Rope { length_m: greatest });

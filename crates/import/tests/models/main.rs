@@ -1,5 +1,7 @@
 //! Imported models against closed forms, and against what MuJoCo makes of the same file.
 
 mod mjcf;
+mod overlaps;
 mod play;
+mod shapes;
 mod urdf;

@@ -1,11 +1,15 @@
 //! MJCF models.
 
 use crate::play::{advance, left_out, position, start};
-use metachron_import::{Folders, ImportError, Imported, mjcf};
+use metachron_import::{Folders, ImportError, Imported, Options, mjcf, model};
 use std::path::Path;
 
 fn import(text: &str) -> Result<Imported, ImportError> {
     mjcf(text, Path::new("."))
+}
+
+fn at_key(text: &str, key: &str) -> Result<Imported, ImportError> {
+    model(text, Path::new("."), &Options { key: Some(key), ..Options::default() })
 }
 
 /// What MuJoCo makes of `arm.xml` (`reference.py`).
@@ -70,7 +74,7 @@ fn a_servo_without_damping_swings_on_where_steps_resolve_it_and_is_still_where_t
             <actuator><position joint="axle" kp="{kp}"/></actuator>
             <keyframe><key name="turned" qpos="0.1"/></keyframe></mujoco>"#
         );
-        let imported = metachron_import::mjcf_at_key(&text, Path::new("."), "turned").unwrap();
+        let imported = at_key(&text, "turned").unwrap();
         let world = start(&imported, &["axle"], 100.0);
         advance(&world, 9.0);
         let last = (0..50).map(|_| {
@@ -183,7 +187,7 @@ fn folder(files: &[(&str, &str)]) -> tempfile::TempDir {
 
 /// Where the files of a model are, which are read from the disk.
 fn several(folder: &Path) -> Folders<'_> {
-    Folders { read: Some(&|path| std::fs::read_to_string(path)), ..Folders::from(folder) }
+    Folders { read: Some(&|path| std::fs::read(path)), ..Folders::from(folder) }
 }
 
 #[test]
@@ -250,11 +254,11 @@ fn tendons_between_two_sites_are_ropes_and_springs() {
     assert_eq!(
         left_out(&imported),
         [
-            "line 2: site `unused`: is left out",
-            "line 4: spatial `spring`: `width` is left out",
             "line 5: spatial `short`: is left out: its ends start 0.2000 m apart, and it is at most 0.1 m long",
             "line 6: spatial `bent`: is left out: scenes have ropes and springs between two points alone",
             "line 7: fixed `geared`: is left out: it couples joints, and scenes have no such coupling",
+            "line 2: site `unused`: is left out",
+            "line 4: spatial `spring`: `width` is left out",
         ]
     );
     let world = start(&imported, &[], 500.0);
@@ -287,7 +291,7 @@ const KEYED: &str = r#"<mujoco><compiler angle="degree"/><option gravity="0 0 0"
 
 #[test]
 fn a_keyframe_is_where_the_model_starts_and_what_its_servos_hold() {
-    let imported = metachron_import::mjcf_at_key(KEYED, Path::new("."), "home").unwrap();
+    let imported = at_key(KEYED, "home").unwrap();
     let world = start(&imported, &["hinge"], 500.0);
     // 0.5 rad from where the file has it, which is at 10 degrees
     let (sin, cos) = 0.5_f64.sin_cos();
@@ -311,7 +315,137 @@ fn a_keyframe_is_where_the_model_starts_and_what_its_servos_hold() {
         ("short", "line 9: key `short`: `qpos` has 2 numbers; expected 13"),
         ("none", "line 1: mujoco: has no keyframe `none`"),
     ] {
-        let error = metachron_import::mjcf_at_key(KEYED, Path::new("."), key).expect_err(key).to_string();
+        let error = at_key(KEYED, key).expect_err(key).to_string();
         assert_eq!(error, expected);
     }
+}
+
+#[test]
+fn flags_turn_gravity_and_contacts_off() {
+    let height = |flags: &str| {
+        let text = format!(
+            r#"<mujoco><option><flag {flags}/></option><worldbody><geom type="plane" size="1 1 1"/>
+            <body name="a" pos="0 0 0.1"><freejoint/><geom size="0.1"/></body></worldbody></mujoco>"#
+        );
+        let imported = import(&text).unwrap();
+        assert_eq!(left_out(&imported), [""; 0]);
+        let world = start(&imported, &[], 500.0);
+        advance(&world, 1.0);
+        centre(&world, "a").z
+    };
+    assert_eq!(height(r#"gravity="disable" contact="disable""#), 0.1);
+    // steps of first order err by g h/2 in a second
+    assert!((height(r#"contact="disable""#) - (0.1 - 9.81 / 2.0)).abs() < 0.02);
+    assert!((height(r#"gravity="enable""#) - 0.1).abs() < 1e-4);
+}
+
+#[test]
+fn a_flag_turns_all_off_that_bounds_or_holds() {
+    let toml = |flags: &str| {
+        let text = format!(
+            r#"<mujoco><option><flag {flags}/></option><worldbody><site name="s"/><body name="a"><joint range="-9 9" frictionloss="1"/>
+            <geom size="0.1"/><site name="t"/></body></worldbody><equality><weld body1="a"/></equality>
+            <tendon><spatial range="0 1"><site site="s"/><site site="t"/></spatial></tendon></mujoco>"#
+        );
+        import(&text).unwrap().toml
+    };
+    let bounds = ["range_deg", "motor", "kind = \"fixed\"", "kind = \"rope\"", "collides_with = []"];
+    let (all, none) = (toml(r#"warmstart="enable""#), toml(r#"constraint="disable""#));
+    assert!(bounds[..4].iter().all(|bound| all.contains(bound)) && !all.contains(bounds[4]), "{all}");
+    assert!(!bounds[..4].iter().any(|bound| none.contains(bound)) && none.contains(bounds[4]), "{none}");
+    assert!(toml(r#"limit="disable""#).contains("motor") && !toml(r#"frictionloss="disable""#).contains("motor"));
+}
+
+#[test]
+fn what_changes_the_motion_comes_first_and_zeros_change_none() {
+    let text = r#"<mujoco><option timestep="0.01" density="1.2" viscosity="0"/><worldbody><light/><body name="a">
+        <joint name="hinge" armature="0.1" frictionloss="2" damping="3"/>
+        <joint name="slide" type="slide" armature="0" frictionloss="0" margin="0"/>
+        <geom size="0.1" rgba="1 0 0 1" user="1" margin="0" solref="0.1 1"/></body></worldbody>
+        <actuator><motor joint="hinge" gear="5"/><muscle joint="hinge"/></actuator></mujoco>"#;
+    let imported = import(text).unwrap();
+    let lists = |changes: bool| {
+        let of = imported.left_out.iter().filter(move |entry| entry.changes_motion == changes);
+        of.map(ToString::to_string).collect::<Vec<_>>()
+    };
+    assert_eq!(
+        lists(true),
+        [
+            "line 1: option: `density` is left out: nothing surrounds the bodies of a scene",
+            "line 1: body `a`: has no mass, and moves: a thousandth of that of `a` is added",
+            "line 2: joint `hinge`: `armature` is left out: scenes have no inertia about the axis of a joint",
+            "line 2: joint `hinge`: `frictionloss` is left out: a joint of a scene has a spring and damper, or friction",
+            "line 4: body `a`, geom: `solref` is left out",
+            "line 5: actuator, muscle: is left out: it gives what a program commands",
+        ]
+    );
+    assert_eq!(
+        lists(false),
+        [
+            "line 1: option: `timestep` is left out",
+            "line 1: worldbody, light: is left out",
+            "line 4: body `a`, geom: `user` is left out",
+            "line 5: actuator, motor: is left out: it gives what a program commands",
+        ]
+    );
+    assert!(imported.left_out.iter().map(|entry| !entry.changes_motion).is_sorted());
+}
+
+#[test]
+fn a_general_actuator_with_an_affine_bias_is_a_servo_and_shares_its_joint_with_a_spring() {
+    // 30 (0.4 − q) − 2 q' of the actuator, whose bias of 3 is 0.1 rad more, and 10 (−0.2 − q) of the joint: rest at (30 · 0.5 − 10 · 0.2)/40
+    let text = r#"<mujoco><compiler angle="radian"/><option gravity="0 0 0"/><worldbody><body name="arm">
+        <joint name="hinge" stiffness="10" springref="-0.2" damping="3"/><geom size="0.1"/></body></worldbody>
+        <actuator><general joint="hinge" biastype="affine" gainprm="30" biasprm="3 -30 -2"/></actuator>
+        <keyframe><key name="k" qpos="0" ctrl="0.4"/></keyframe></mujoco>"#;
+    let imported = at_key(text, "k").unwrap();
+    assert_eq!(left_out(&imported), [""; 0]);
+    let world = start(&imported, &["hinge"], 500.0);
+    advance(&world, 4.0);
+    // it rests where what a step would still give is below what solves stop at
+    assert!((position(&world, "hinge") - 0.325).abs() < 1e-4, "{}", position(&world, "hinge"));
+}
+
+#[test]
+fn a_base_is_fixed_on_demand() {
+    let text = r#"<mujoco><worldbody><body name="base" pos="0 0 1"><freejoint/><geom size="0.1"/>
+        <body name="arm"><joint axis="0 1 0"/><geom size="0.1" pos="0.5 0 0"/></body></body>
+        <body name="ball" pos="5 0 1"><freejoint/><geom size="0.1"/></body></worldbody></mujoco>"#;
+    let imported = model(text, Path::new("."), &Options { fixed_base: true, ..Options::default() }).unwrap();
+    let world = start(&imported, &[], 500.0);
+    advance(&world, 0.5);
+    let fallen = |name: &str| 1.0 - centre(&world, name).z;
+    assert!(fallen("base").abs() < 1e-6 && fallen("ball") > 1.0 && fallen("arm") > 0.3, "{}", fallen("arm"));
+}
+
+#[test]
+fn bodies_that_share_a_point_or_a_pose_are_joined() {
+    // a ball that starts beside its anchor, one welded to a post, and a chain whose end is held where it starts
+    let text = r#"<mujoco><default><geom contype="0" conaffinity="0"/></default><worldbody>
+        <body name="post" pos="0 0 2"><geom size="0.1"/></body>
+        <body name="bob" pos="0.5 0 2"><freejoint/><geom size="0.1"/></body>
+        <body name="held" pos="2 0 2"><freejoint/><geom size="0.1"/></body>
+        <body name="upper" pos="5 0 2"><joint axis="0 1 0"/><geom size="0.1" pos="0.5 0 0"/>
+        <body name="lower" pos="1 0 0"><joint axis="0 1 0"/><geom size="0.1" pos="0.5 0 0"/></body></body></worldbody>
+        <equality><connect body1="bob" body2="post" anchor="-0.5 0 0"/><weld body1="post" body2="held"/>
+        <connect body1="lower" anchor="1 0 0"/><weld body1="held" active="false"/><joint joint1="a" joint2="b"/></equality>
+        </mujoco>"#;
+    let imported = import(text).unwrap();
+    assert_eq!(
+        left_out(&imported),
+        [
+            "line 8: equality, joint: is left out: scenes have joints between two bodies, and nothing that couples joints"
+        ]
+    );
+    let world = start(&imported, &[], 1000.0);
+    // from the level a pendulum of a point takes K(1/√2) √(l/g) to its lowest, where a ball has 2/5 r² more than l²
+    let (l, r) = (0.5_f64, 0.1_f64);
+    advance(&world, 1.854_074_677 * ((l * l + 0.4 * r * r) / (l * 9.81)).sqrt());
+    assert!(centre(&world, "bob").distance(glam::DVec3::new(0.0, 0.0, 1.5)) < 5e-3, "{}", centre(&world, "bob"));
+    assert!(centre(&world, "held").distance(glam::DVec3::new(2.0, 0.0, 2.0)) < 1e-6);
+    // both rods are stretched, and held at both ends
+    assert!(centre(&world, "lower").distance(glam::DVec3::new(6.5, 0.0, 2.0)) < 0.05);
+    let none = r#"<mujoco><equality><connect body1="none" anchor="0 0 0"/></equality></mujoco>"#;
+    let error = import(none).unwrap_err().to_string();
+    assert_eq!(error, "line 1: equality, connect: names `none`, and there is no such body");
 }

@@ -199,9 +199,9 @@ fn meshes_are_named_from_the_folder_of_the_scene_and_others_are_listed() {
         imported.toml
     );
     let noted = urdf(&robot(r#"filename="../meshes/a.stl" scale="1 -1 1""#), urdfs.as_path()).unwrap();
-    assert!(left_out(&noted)[0].ends_with("scenes have one scale above zero for all three axes"));
-    let noted = urdf(&robot(r#"filename="a.dae""#), urdfs.as_path()).unwrap();
-    assert!(left_out(&noted)[0].ends_with("`a.dae` is left out: scenes read .glb, .stl and .obj"));
+    assert!(left_out(&noted)[0].ends_with("`../meshes/a.stl` is left out: no file is read here"));
+    let noted = urdf(&robot(r#"filename="a.ply""#), urdfs.as_path()).unwrap();
+    assert!(left_out(&noted)[0].ends_with("`a.ply` is left out: expected a .glb, .stl, .obj, .dae or MuJoCo's .msh"));
     let error = urdf(&robot(r#"filename="b.stl""#), urdfs.as_path()).unwrap_err();
     assert_eq!(
         error.to_string(),
@@ -239,14 +239,35 @@ fn what_no_scene_can_have_is_refused_with_line_element_and_reason() {
             format!("<robot>{two}\n{}</robot>", joint("fixed", "a", "b") + &joint("fixed", "b", "a")),
             "line 1: link `a`: hangs on itself",
         ),
-        (
-            format!("<robot>{two}<link name=\"c\"/>\n{}</robot>", joint("continuous", "a", "c")),
-            "line 2: link `c`: has no mass",
-        ),
     ] {
         let error = import(&text).unwrap_err().to_string();
         assert!(error.starts_with(expected), "{error}\nis not {expected}");
     }
+}
+
+#[test]
+fn a_link_without_mass_at_the_end_of_a_chain_is_part_of_what_it_is_on() {
+    let heavy = r#"<inertial><mass value="1"/><inertia ixx="1" iyy="1" izz="1"/></inertial>"#;
+    let hinge = |parent: &str, child: &str| {
+        format!(
+            r#"<joint name="to {child}" type="continuous"><parent link="{parent}"/><child link="{child}"/></joint>"#
+        )
+    };
+    let robot = format!(
+        "<robot><link name=\"hand\">{heavy}</link>\n<link name=\"finger\"/>\n<link name=\"tip\"/>{}{}</robot>",
+        hinge("hand", "finger"),
+        hinge("finger", "tip")
+    );
+    let imported = import(&robot).unwrap();
+    assert_eq!(
+        left_out(&imported),
+        [
+            "line 2: link `finger`: has no mass, and carries none: joint `to finger` is fixed",
+            "line 3: link `tip`: has no mass, and carries none: joint `to tip` is fixed",
+        ]
+    );
+    let scene = crate::play::scene(&imported, &[], 500.0);
+    assert_eq!((scene.agents.len(), scene.joints.len()), (1, 0));
 }
 
 #[test]

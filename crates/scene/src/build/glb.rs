@@ -42,6 +42,19 @@ struct Reader<'d> {
 
 /// Points, their texture coordinates on the image of [`image`], and triangles of a file.
 pub(super) fn read(bytes: &[u8]) -> Result<Parts, String> {
+    let reader = nodes(bytes)?;
+    reader.check()?;
+    Ok((reader.points, reader.uvs, reader.triangles))
+}
+
+/// The points and triangles of a file, however they are connected.
+pub(super) fn surface(bytes: &[u8]) -> Result<(Vec<DVec3>, Vec<[u32; 3]>), String> {
+    let Reader { points, triangles, .. } = nodes(bytes)?;
+    Ok((points, triangles))
+}
+
+/// All nodes of a file.
+fn nodes(bytes: &[u8]) -> Result<Reader<'_>, String> {
     let (tables, data) = tables::read(bytes)?;
     let roots = tables.scenes.get(tables.scene).ok_or("it has no scene")?.nodes.clone();
     let mut reader = Reader {
@@ -59,8 +72,7 @@ pub(super) fn read(bytes: &[u8]) -> Result<Parts, String> {
     for node in roots {
         reader.node(node, UPRIGHT, 0)?;
     }
-    reader.check()?;
-    Ok((reader.points, reader.uvs, reader.triangles))
+    Ok(reader)
 }
 
 /// The bytes of the one image that all base colours of a file use; `None` where they use none or several.

@@ -36,12 +36,30 @@ pub(super) fn read(bytes: &[u8], scale: f64) -> Result<Mesh, String> {
         _ => obj::read(text(bytes)?)?,
     };
     check(&points, &triangles)?;
-    let far = |point: &DVec3| point.abs().max_element();
-    if let Some(point) = points.iter().max_by(|a, b| far(a).total_cmp(&far(b))) {
-        let at = point.to_array().map(|x| format!("{x:.3e}")).join(", ");
-        within(far(point), scale).map_err(|why| format!("{why}: a point of it is at ({at})"))?;
-    }
+    check_points(&points, scale)?;
     Ok(Mesh { points, uvs, triangles })
+}
+
+/// The points of a file, of which a hull is made.
+pub(super) fn hull_points(bytes: &[u8], scale: f64) -> Result<Vec<DVec3>, String> {
+    let points = surface(bytes)?.points;
+    check_points(&points, scale)?;
+    Ok(points)
+}
+
+/// The points and triangles of an STL, OBJ or .glb file in its own unit, no matter how its triangles are connected; of an OBJ file without faces its
+/// points alone.
+///
+/// # Errors
+/// What is wrong with the file.
+pub fn surface(bytes: &[u8]) -> Result<Triangles, String> {
+    let (points, triangles) = match bytes {
+        [] => return Err("it is empty".to_owned()),
+        _ if bytes.starts_with(glb::MAGIC) => glb::surface(bytes)?,
+        _ if stl::is_stl(bytes) => stl::read(bytes).map(|(points, _, triangles)| (points, triangles))?,
+        _ => obj::surface(text(bytes)?)?,
+    };
+    Ok(Triangles { points, triangles })
 }
 
 /// Reads a file as [`read`] does: its triangles in metres.
@@ -73,6 +91,17 @@ fn text(bytes: &[u8]) -> Result<&[u8], String> {
     }
 }
 
+/// Checks that points are finite and within the bounds of a scene.
+fn check_points(points: &[DVec3], scale: f64) -> Result<(), String> {
+    if let Some(bad) = points.iter().position(|p| !p.is_finite()) {
+        return Err(format!("point {} is not finite", bad + 1));
+    }
+    let far = |point: &DVec3| point.abs().max_element();
+    let Some(point) = points.iter().max_by(|a, b| far(a).total_cmp(&far(b))) else { return Ok(()) };
+    let at = point.to_array().map(|x| format!("{x:.3e}")).join(", ");
+    within(far(point), scale).map_err(|why| format!("{why}: a point of it is at ({at})"))
+}
+
 fn check(points: &[DVec3], triangles: &[[u32; 3]]) -> Result<(), String> {
     if triangles.is_empty() {
         return Err(
@@ -82,9 +111,6 @@ fn check(points: &[DVec3], triangles: &[[u32; 3]]) -> Result<(), String> {
     }
     if triangles.len() > TRIANGLES_MAX {
         return Err(format!("it has {} triangles, more than {TRIANGLES_MAX}", triangles.len()));
-    }
-    if let Some(bad) = points.iter().position(|p| !p.is_finite()) {
-        return Err(format!("point {} is not finite", bad + 1));
     }
     let count = points.len();
     if let Some(bad) = triangles.iter().position(|t| t.iter().any(|i| *i as usize >= count)) {
@@ -107,6 +133,18 @@ mod tests {
     use proptest::prelude::*;
 
     const TETRAHEDRON: &str = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 2 3 4\nf 3 1 4\n";
+
+    #[test]
+    fn a_hull_takes_the_points_of_faces_that_make_no_surface() {
+        // a fourth face on the edge from the first vertex to the third, and a vertex that is on no face
+        let text = format!("{TETRAHEDRON}v 9 9 9\nv 1 1 0\nf 1 3 6\n");
+        assert!(read(text.as_bytes(), 1.0).unwrap_err().contains("not manifold"));
+        let mut corners = hull_points(text.as_bytes(), 1.0).unwrap();
+        corners.sort_by(|a, b| a.to_array().partial_cmp(&b.to_array()).unwrap());
+        assert_eq!(corners, [DVec3::ZERO, DVec3::Z, DVec3::Y, DVec3::X, DVec3::new(1.0, 1.0, 0.0)]);
+        assert_eq!(hull_points(b"v 0 0 0\nv 1 0 0\n", 1.0).unwrap().len(), 2);
+        assert!(hull_points(b"v 1e30 0 0\n", 1.0).unwrap_err().contains("extends"));
+    }
 
     #[test]
     fn a_tetrahedron_is_read() {

@@ -40,6 +40,7 @@ pub(super) use common::world_faults;
 pub(super) use coupling::couplings;
 pub(super) use group::groups;
 pub(super) use joint::joints;
+pub use mesh::surface;
 pub(super) use mesh::triangles;
 pub(super) use object::{AGENTS_MAX, Names, Objects, SceneContext, read_objects};
 pub(super) use sensor::{joint_names, sensors};

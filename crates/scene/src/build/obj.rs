@@ -11,7 +11,7 @@
 use super::mesh::{Parts, TRIANGLES_MAX};
 use glam::{DVec3, Vec2};
 use metachron_geometry::branch;
-use std::collections::HashMap;
+use std::collections::{BTreeSet, HashMap};
 
 /// Byte order mark that text editors put before UTF-8; skipped.
 const BYTE_ORDER_MARK: &[u8] = b"\xef\xbb\xbf";
@@ -47,6 +47,23 @@ struct Face {
 
 /// Points, their texture coordinates and triangles of a file.
 pub(super) fn read(bytes: &[u8]) -> Result<Parts, String> {
+    lines(bytes)?.parts()
+}
+
+/// The points and triangles of a file, however they are connected: the points that faces use, or all where there are no faces.
+pub(super) fn surface(bytes: &[u8]) -> Result<(Vec<DVec3>, Vec<[u32; 3]>), String> {
+    let Reader { points, faces, .. } = lines(bytes)?;
+    if faces.is_empty() {
+        return Ok((points, Vec::new()));
+    }
+    let used: BTreeSet<u32> = faces.iter().flat_map(|face| face.corners.map(|[point, ..]| point)).collect();
+    let numbers: HashMap<u32, u32> = (0..).zip(&used).map(|(number, point)| (*point, number)).collect();
+    let triangles = faces.iter().map(|face| face.corners.map(|[point, ..]| numbers[&point])).collect();
+    Ok((used.into_iter().map(|at| points[at as usize]).collect(), triangles))
+}
+
+/// All lines of a file, every face of points that there are.
+fn lines(bytes: &[u8]) -> Result<Reader, String> {
     let bytes = bytes.strip_prefix(BYTE_ORDER_MARK).unwrap_or(bytes);
     let mut reader = Reader::default();
     let mut pending = Vec::new();
@@ -69,7 +86,7 @@ pub(super) fn read(bytes: &[u8]) -> Result<Parts, String> {
         return Err(format!("line {last} is continued, but nothing follows: the file is truncated"));
     }
     reader.check()?;
-    reader.parts()
+    Ok(reader)
 }
 
 impl Reader {

@@ -311,7 +311,7 @@ impl ShapeKeys<'_> {
             }
             Shape::Plane => Solid::Plane,
             Shape::Hull => {
-                let (points_m, _) = self.surface(c, place, source)?;
+                let points_m = self.points(c, place, source)?;
                 let given_m = c.optional(place, "hull_within_m", self.hull_within_m, &HULL_WITHIN);
                 let Aabb { low, high } = Aabb::of(&points_m);
                 let tolerance_m = given_m.unwrap_or(HULL_WITHIN_M.min(HULL_SHARE * low.distance(high)));
@@ -324,6 +324,17 @@ impl ShapeKeys<'_> {
             }
             Shape::Compound => return None,
         })
+    }
+
+    /// The points of a hull.
+    fn points(&self, c: &mut Checker<'_, '_>, place: &Place, source: &Source) -> Option<Arc<[DVec3]>> {
+        let Some(name) = self.file.filter(|_| self.generate.is_none()) else {
+            return Some(self.surface(c, place, source)?.0);
+        };
+        let scale = c.optional(place, "scale", self.scale, &SCALE).unwrap_or(1.0);
+        let read = source.sibling(name).and_then(|bytes| mesh::hull_points(&bytes, scale));
+        let points = read.map_err(|why| refuse_file(c, place, name, &why)).ok()?;
+        Some(points.iter().map(|p| *p * scale).collect())
     }
 
     fn surface(&self, c: &mut Checker<'_, '_>, place: &Place, source: &Source) -> Option<Surface> {
@@ -340,12 +351,16 @@ impl ShapeKeys<'_> {
         match read {
             Ok(Mesh { points, triangles, .. }) => Some((points.iter().map(|p| *p * scale).collect(), triangles.into())),
             Err(why) => {
-                let expected = "expected a .glb, STL or OBJ file beside the scene";
-                c.wrong(place, "file", format_args!("cannot be used: {name}: {why}"), expected);
+                refuse_file(c, place, name, &why);
                 None
             }
         }
     }
+}
+
+fn refuse_file(c: &mut Checker<'_, '_>, place: &Place, name: &str, why: &str) {
+    let expected = "expected a .glb, STL or OBJ file beside the scene";
+    c.wrong(place, "file", format_args!("cannot be used: {name}: {why}"), expected);
 }
 
 fn solid(c: &mut Checker<'_, '_>, place: &Place, file: &RigidFile, among: PartContext<'_>) -> Option<Solid> {

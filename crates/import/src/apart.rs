@@ -1,0 +1,79 @@
+//! Bodies of one robot that pass through each other: those that the file names, those next to each other, those that start inside each other.
+//!
+//! In: a settled [`Model`], and which of its bodies overlap. Out: pairs by name. Never here: shapes, TOML.
+//! As in `MuJoCo`'s filter of parents and the collision matrices of `MoveIt`: bodies on two sides of a joint do not collide, wherever fixed joints
+//! have put them, and nor do those that their joints hold inside each other.
+
+use crate::imported::Overlap;
+use crate::model::{Apart, Joint, Kind, Model, Why};
+
+impl Model {
+    /// Adds the pairs of one robot that overlap; those of two, and those with the world's own solids, stay as they are.
+    pub(crate) fn pass_overlaps(&mut self, overlaps: Vec<Overlap>) -> Vec<Overlap> {
+        let root = |name: &str| {
+            let fixed =
+                self.fixed.iter().filter(|fixed| fixed.name == name && fixed.can_pass()).map(|fixed| fixed.root);
+            self.links.iter().filter(|link| link.name == name).map(|link| Some(link.root)).chain(fixed).next().flatten()
+        };
+        let of_one = |pair: &Overlap| root(&pair.a).is_some_and(|one| root(&pair.b) == Some(one));
+        let found: Vec<Overlap> = overlaps.into_iter().filter(of_one).collect();
+        for Overlap { a, b, depth_m } in found.iter().cloned() {
+            self.apart.push(Apart { a, b, why: Why::Overlap { depth_m } });
+        }
+        found
+    }
+
+    /// Whether a fixed solid is named in a pair: couplings are between what can move.
+    pub(crate) fn is_apart(&self, name: &str) -> bool {
+        self.apart.iter().any(|pair| pair.a == name || pair.b == name)
+    }
+
+    /// Adds pairs that are not there yet.
+    pub(crate) fn let_pass(&mut self, a: &str, b: &str, why: Why) {
+        let is_it = |pair: &Apart| (pair.a == a && pair.b == b) || (pair.a == b && pair.b == a);
+        if a != b && !self.apart.iter().any(is_it) {
+            self.apart.push(Apart { a: a.to_owned(), b: b.to_owned(), why });
+        }
+    }
+
+    /// Adds the pairs that no joint connects itself, and that are on bodies which one does, or on one body: a body is all that fixed joints make of
+    /// links, with those without mass that carry it. Shapes overlap there, as those of connected links do.
+    pub(crate) fn pass_neighbours(&mut self) {
+        let bodies = self.bodies();
+        // the body that a body hangs on
+        let host = |body: Option<usize>| Some(self.above(body?)?.parent.and_then(|parent| bodies[parent]));
+        let meets = |one: Option<usize>, other: Option<usize>| {
+            one == other || host(one) == Some(other) || host(other) == Some(one)
+        };
+        let jointed = |a: usize, b: usize| {
+            let between = |child: usize, parent: usize| self.above(child).is_some_and(|j| j.parent == Some(parent));
+            between(a, b) || between(b, a)
+        };
+        let pairs = (0..self.links.len()).flat_map(|b| (0..b).map(move |a| [a, b]));
+        let pairs = pairs.filter(|[a, b]| meets(bodies[*a], bodies[*b]) && !jointed(*a, *b));
+        let name = |link: usize| self.links[link].name.clone();
+        let mut found: Vec<[String; 2]> = pairs.map(|pair| pair.map(name)).collect();
+        for (at, link) in self.links.iter().enumerate().filter(|_| !self.collides_with_base) {
+            let own = self.fixed.iter().filter(|fixed| fixed.root == Some(link.root) && fixed.can_pass());
+            found.extend(own.filter(|_| meets(bodies[at], None)).map(|fixed| [fixed.name.clone(), link.name.clone()]));
+        }
+        for [a, b] in found {
+            self.let_pass(&a, &b, Why::Neighbours);
+        }
+    }
+
+    /// For each link the first link of its body; none is the world.
+    fn bodies(&self) -> Vec<Option<usize>> {
+        let mut bodies: Vec<Option<usize>> = Vec::with_capacity(self.links.len());
+        for link in 0..self.links.len() {
+            let is_lent = |joint: &&Joint| joint.parent.is_some_and(|parent| self.links[parent].is_lent);
+            let welded = self.above(link).filter(|joint| joint.kind == Kind::Fixed || is_lent(joint));
+            bodies.push(welded.map_or(Some(link), |joint| joint.parent.and_then(|parent| bodies[parent])));
+        }
+        bodies
+    }
+
+    fn above(&self, link: usize) -> Option<&Joint> {
+        self.joints.iter().find(|joint| joint.child == link)
+    }
+}
