@@ -53,7 +53,7 @@ fn where_the_budget_ends_solves_steps_are_as_long_as_asked_for() {
     // an exact solve takes four or five factors: more than a step lasts
     let [exact, budget] = budgets.map(|budget| played(&pile(budget, 600.0), Pace::RealTime));
     assert_eq!(exact.solves.unfinished, 0);
-    assert!(budget.solves.factors < exact.solves.factors, "{:?}, {:?}", budget.solves, exact.solves);
+    assert!(budget.solves.unfinished > 20, "{:?}", budget.solves);
     assert!(exact.lengthened > 4 * budget.lengthened, "{} of {} steps", budget.lengthened, exact.lengthened);
 }
 

@@ -6,7 +6,7 @@
 pub(crate) mod domain;
 mod pair;
 mod reach;
-mod recycled;
+pub(crate) mod recycled;
 mod scene;
 mod sensor;
 mod thinning;
@@ -17,7 +17,6 @@ use crate::member::memory::{Partner, Spin};
 use crate::member::{ClusterMember, Role};
 use crate::solve::Contact;
 use glam::DVec3;
-use metachron_core::{Archive, ArchiveError};
 use metachron_geometry::narrow_phase::{NarrowPhaseScratch, TouchKey, self_touches, touches};
 use metachron_geometry::{CollisionShape, Place, Touch};
 use pair::{Against, LOOK_M, Pair, Reaching, closes, taken_up};
@@ -69,7 +68,7 @@ pub(crate) struct Search {
     solids: Vec<u32>,
     sweep: Sweep,
     thinning: Thinning,
-    recycled: Recycled,
+    pub recycled: Recycled,
     touches: Vec<Touch>,
     scratch: NarrowPhaseScratch,
     sorted: Vec<Named>,
@@ -91,11 +90,6 @@ struct Look {
 }
 
 impl Search {
-    /// Writes or reads what the next search needs of those before.
-    pub(crate) fn archive(&mut self, archive: &mut Archive<'_>) -> Result<(), ArchiveError> {
-        self.recycled.archive(archive)
-    }
-
     /// Finds all places of a fine step, but for those of a rigid pile among itself and with static solids; `domains` is empty where there is none.
     pub fn find(&mut self, round: &Round<'_, '_>, domains: &[Domain]) {
         self.find_near(round);
@@ -103,7 +97,6 @@ impl Search {
         let near = std::mem::take(&mut self.near);
         self.find_all(round, &near);
         self.near = near;
-        self.recycled.end();
         self.sort();
     }
 
@@ -257,10 +250,15 @@ impl Search {
             Against::Static { solid, .. } => solid.touches(&skin, reach_m, scratch, into),
             Against::Member(_) => there.iter().for_each(|there| touches(&skin, there, reach_m, scratch, into)),
         };
+        // no point is farther from the middle than the corners of its box are from each other, whatever way it is turned
         let radius_m = boxes.of(pair.member).map_or(f64::INFINITY, |reach| reach.skin.low.distance(reach.skin.high));
         let solids = TwoSolids::of(skin.view, there.map(|there| there.view), radius_m);
         match solids.filter(|_| round.predicts()) {
-            Some(solids) => recycled.touches(pair.name(round.all), &solids, reach_m, into, find),
+            Some(solids) => {
+                let partner = pair.partner(round.all);
+                let known = round.all[pair.member].memory.known(partner);
+                recycled.touches((pair.member, partner), known, (&solids, reach_m), into, find);
+            }
             None => find(reach_m, into),
         }
         now

@@ -10,7 +10,6 @@ use crate::member::{ClusterMember, Participant};
 use crate::push_out::push_out_m_s;
 use crate::solve::{Contact, Side};
 use glam::DVec3;
-use metachron_core::AgentId;
 use metachron_geometry::narrow_phase::{StaticSolid, TouchKey};
 use metachron_geometry::{CollisionShape, ContactSide, Place, Touch};
 
@@ -118,14 +117,13 @@ impl<'a> Round<'a, '_> {
 }
 
 impl Pair<'_> {
-    /// What it is remembered by.
-    pub(crate) fn name(&self, all: &[Participant<'_>]) -> (AgentId, Partner) {
-        let partner = match self.against {
+    /// The other side, as the member remembers it.
+    pub(crate) fn partner(&self, all: &[Participant<'_>]) -> Partner {
+        match self.against {
             Against::Member(other) => Partner::Agent(all[other].id),
             Against::Static { number, .. } => Partner::Static(number),
             Against::Own => Partner::Own,
-        };
-        (all[self.member].id, partner)
+        }
     }
 
     /// The member on side 1; `None` for a static solid.

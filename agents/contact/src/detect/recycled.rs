@@ -1,11 +1,14 @@
 //! Places of pairs of solids, kept from step to step: they move along with the two, and what lies still is not searched again.
 //!
-//! In: where two solids are; places that were found of them. Out: their places now, if these are known. Never here: how places are found.
+//! In: where two solids are; what their pair remembers of places found. Out: their places now, if these are known; what the pair is to remember. Never
+//! here: how places are found.
 //! Theory: docs/theory/contact.md, section 1.
 
+use crate::lists::refill;
+use crate::member::Participant;
 use crate::member::memory::Partner;
 use glam::{DQuat, DVec3};
-use metachron_core::{AgentId, Archive, ArchiveError, archive_values};
+use metachron_core::SimTime;
 use metachron_geometry::{Place, ShapePose, Touch};
 
 /// How far a point of one solid may have gone against the other since their places were found, metres: less than what has met is apart by.
@@ -13,12 +16,9 @@ const MOVED_M: f64 = 1e-6;
 /// Places are found within so many times the reach that is asked for, as this follows speeds.
 const FURTHER: f64 = 1.25;
 
-/// A pair, by the body that remembers it.
-pub(super) type PairName = (AgentId, Partner);
-
 /// Where a solid is.
-#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
-pub(super) struct Pose {
+#[derive(Debug, Clone, Copy, PartialEq, Default, serde::Serialize, serde::Deserialize)]
+struct Pose {
     position: DVec3,
     rotation: DQuat,
 }
@@ -32,32 +32,34 @@ pub(super) struct TwoSolids {
     radius_m: f64,
 }
 
-/// A pair whose places were found.
-#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
-struct Found {
-    name: PairName,
+/// All places of a pair that were nearer than a reach when it was searched last; none before.
+#[derive(Debug, PartialEq, Default, serde::Serialize, serde::Deserialize)]
+pub(crate) struct FoundPlaces {
     /// The pose of the first solid then, in the axes of the second.
     first: Pose,
-    /// All places nearer than this were found, metres.
     reach_m: f64,
-    /// How many.
-    count: usize,
-    /// The number of the first of them.
-    from: usize,
-}
-
-/// Pairs by rising names, with their places in the axes of the second solid.
-#[derive(Debug, Default, serde::Serialize, serde::Deserialize)]
-struct FoundPairs {
-    pairs: Vec<Found>,
+    /// The places, in the axes of the second solid.
     touches: Vec<Touch>,
 }
 
-/// The places of the last fine step, and of the one that is searched.
+/// The pairs that were searched in a fine step.
 #[derive(Debug, Default)]
-pub(super) struct Recycled {
-    known: FoundPairs,
-    next: FoundPairs,
+pub(crate) struct Recycled {
+    searched: Vec<Searched>,
+    /// The places of one pair after the other, in the axes of their second solids.
+    touches: Vec<Touch>,
+}
+
+/// A pair that was searched.
+#[derive(Debug, Clone, Copy)]
+struct Searched {
+    /// The participant that remembers it.
+    member: usize,
+    partner: Partner,
+    first: Pose,
+    reach_m: f64,
+    /// How many places it has.
+    count: usize,
 }
 
 impl Pose {
@@ -120,52 +122,67 @@ impl TwoSolids {
     }
 }
 
-impl Recycled {
-    /// Writes or reads what the next search needs.
-    pub fn archive(&mut self, archive: &mut Archive<'_>) -> Result<(), ArchiveError> {
-        archive_values!(archive, self.known)
+impl Clone for FoundPlaces {
+    fn clone(&self) -> Self {
+        let Self { first, reach_m, touches } = self;
+        Self { first: *first, reach_m: *reach_m, touches: touches.clone() }
     }
 
-    /// Fills `into` with the places of a pair within `reach_m`: those known, or else all that `find` gives within the reach it is told.
+    // into storage that is there
+    fn clone_from(&mut self, from: &Self) {
+        (self.first, self.reach_m) = (from.first, from.reach_m);
+        self.touches.clone_from(&from.touches);
+    }
+}
+
+impl FoundPlaces {
+    /// Whether they are all within `reach_m` that there are now.
+    fn last(&self, solids: &TwoSolids, reach_m: f64) -> bool {
+        reach_m + MOVED_M <= self.reach_m && solids.moved_m(self.first) < MOVED_M
+    }
+}
+
+impl Recycled {
+    /// Begins a search.
+    pub fn begin(&mut self) {
+        self.searched.clear();
+        self.touches.clear();
+    }
+
+    /// Fills `into` with the places within `reach_m` of the pair of a member with a partner: those known, or else all that `find` gives within the
+    /// reach that it is told.
     pub fn touches(
         &mut self,
-        name: PairName,
-        solids: &TwoSolids,
-        reach_m: f64,
+        (member, partner): (usize, Partner),
+        known: Option<&FoundPlaces>,
+        (solids, reach_m): (&TwoSolids, f64),
         into: &mut Vec<Touch>,
         find: impl FnOnce(f64, &mut Vec<Touch>),
     ) {
-        let Self { known, next } = self;
-        let from = next.touches.len();
-        let found = known.pairs.binary_search_by_key(&name, |pair| pair.name).ok().map(|at| known.pairs[at]);
-        if let Some(pair) = found.filter(|pair| reach_m <= pair.reach_m && solids.moved_m(pair.first) < MOVED_M) {
-            let touches = &known.touches[pair.from..pair.from + pair.count];
-            into.clear();
-            into.extend(
-                touches.iter().map(|touch| solids.placed(touch, |a| solids.first.to_world(pair.first.to_local(a)))),
-            );
-            next.touches.extend_from_slice(touches);
-            next.pairs.push(Found { from, ..pair });
+        if let Some(known) = known.filter(|known| known.last(solids, reach_m)) {
+            let moved = |a: DVec3| solids.first.to_world(known.first.to_local(a));
+            refill(into, known.touches.iter().map(|touch| solids.placed(touch, moved)));
         } else {
             let further_m = FURTHER * reach_m;
             find(further_m, into);
-            next.touches.extend(into.iter().map(|touch| solids.unplaced(touch)));
-            next.pairs.push(Found { name, first: solids.first, reach_m: further_m, count: into.len(), from });
+            self.touches.extend(into.iter().map(|touch| solids.unplaced(touch)));
+            let count = into.len();
+            self.searched.push(Searched { member, partner, first: solids.first, reach_m: further_m, count });
         }
         into.retain(|touch| touch.gap_m <= reach_m);
     }
 
-    /// Begins a search.
-    pub fn begin(&mut self) {
-        self.next.pairs.clear();
-        self.next.touches.clear();
-    }
-
-    /// Ends a search: what it has found or used is known, and nothing else.
-    pub fn end(&mut self) {
-        std::mem::swap(&mut self.known, &mut self.next);
-        if !self.known.pairs.is_sorted_by_key(|pair| pair.name) {
-            self.known.pairs.sort_unstable_by_key(|pair| pair.name);
+    /// Lets the pairs remember what was found at `now`; those with static solids that are not near are forgotten at once.
+    pub fn note(&mut self, all: &mut [Participant<'_>], now: SimTime) {
+        let mut rest = &self.touches[..];
+        for &Searched { member, partner, first, reach_m, count } in &self.searched {
+            let (touches, others) = rest.split_at(count);
+            rest = others;
+            if count > 0 || matches!(partner, Partner::Agent(_)) {
+                let found = all[member].memory.found(partner, now);
+                (found.first, found.reach_m) = (first, reach_m);
+                touches.clone_into(&mut found.touches);
+            }
         }
     }
 }
@@ -173,6 +190,7 @@ impl Recycled {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use metachron_core::AgentId;
     use metachron_geometry::narrow_phase::{NarrowPhaseScratch, touches};
     use metachron_geometry::{CollisionShape, ContactTraits, PlacedShape, ShapeKind, Solid, SolidShape};
 
@@ -184,23 +202,28 @@ mod tests {
     }
 
     /// The places of two boxes, the second standing askew in the world, the first `up_m` over it and turned by `turn_rad`; whether they were searched.
-    fn places(recycled: &mut Recycled, frame: Pose, [up_m, turn_rad]: [f64; 2]) -> (Vec<Touch>, bool) {
+    fn places(known: &mut FoundPlaces, frame: Pose, [up_m, turn_rad]: [f64; 2]) -> (Vec<Touch>, bool) {
+        within(known, frame, [up_m, turn_rad], 1e-3)
+    }
+
+    fn within(known: &mut FoundPlaces, frame: Pose, [up_m, turn_rad]: [f64; 2], reach_m: f64) -> (Vec<Touch>, bool) {
         let form = form();
         let place = |position: DVec3, turn_rad: f64| {
             let rotation = frame.rotation * DQuat::from_axis_angle(DVec3::new(0.6, 0.0, 0.8), turn_rad);
             PlacedShape { form: &form, view: ShapePose::Solid { position: frame.to_world(position), rotation } }
         };
         let (first, second) = (place(DVec3::new(0.005, 0.003, 0.04 + up_m), turn_rad), place(DVec3::ZERO, 0.0));
-        let (mut into, mut scratch, mut searched) = (Vec::new(), NarrowPhaseScratch::default(), false);
+        let (mut into, mut scratch, mut recycled) = (Vec::new(), NarrowPhaseScratch::default(), Recycled::default());
         let solids = TwoSolids::of(first.view, Some(second.view), 0.07).unwrap();
-        let name = (AgentId(3), Partner::Agent(AgentId(5)));
-        recycled.begin();
-        recycled.touches(name, &solids, 1e-3, &mut into, |reach_m, into| {
-            searched = true;
+        let name = (0, Partner::Agent(AgentId(5)));
+        recycled.touches(name, Some(known), (&solids, reach_m), &mut into, |reach_m, into| {
             touches(&first, &second, reach_m, &mut scratch, into);
         });
-        recycled.end();
-        (into, searched)
+        let searched = recycled.searched.first().copied();
+        if let Some(Searched { first, reach_m, .. }) = searched {
+            *known = FoundPlaces { first, reach_m, touches: recycled.touches };
+        }
+        (into, searched.is_some())
     }
 
     #[test]
@@ -209,12 +232,13 @@ mod tests {
             position: DVec3::new(3.0, angle_rad, -1.0),
             rotation: DQuat::from_axis_angle(DVec3::new(0.48, 0.6, 0.64), angle_rad),
         };
-        let mut recycled = Recycled::default();
+        let mut recycled = FoundPlaces::default();
         assert!(places(&mut recycled, at(0.3), [-20e-6, 0.0]).1, "nothing is known");
         // both go on together, and a little against each other
         let (known, searched) = places(&mut recycled, at(1.7), [-19.6e-6, 4e-6]);
         assert!(!searched && known.len() >= 4, "{}", known.len());
-        let (found, _) = places(&mut Recycled::default(), at(1.7), [-19.6e-6, 4e-6]);
+        let (found, _) = places(&mut FoundPlaces::default(), at(1.7), [-19.6e-6, 4e-6]);
+        assert_eq!(known.len(), found.len());
         for (known, found) in known.iter().zip(&found) {
             assert_eq!(known.key, found.key);
             assert!((known.gap_m - found.gap_m).abs() < 1e-8, "{} {}", known.gap_m, found.gap_m);
@@ -227,25 +251,13 @@ mod tests {
     }
 
     #[test]
-    fn a_pair_that_is_not_searched_for_is_forgotten() {
-        let mut recycled = Recycled::default();
-        let here = Pose::HERE;
-        assert!(places(&mut recycled, here, [0.0, 0.0]).1 && !places(&mut recycled, here, [0.0, 0.0]).1);
-        recycled.begin();
-        recycled.end();
-        assert!(places(&mut recycled, here, [0.0, 0.0]).1);
-    }
-
-    #[test]
-    fn what_is_known_comes_back_from_an_archive() {
-        let mut recycled = Recycled::default();
-        places(&mut recycled, Pose::HERE, [-20e-6, 0.0]);
-        let mut archive = Archive::writer();
-        recycled.archive(&mut archive).unwrap();
-        let (bytes, mut read) = (archive.into_bytes(), Recycled::default());
-        read.archive(&mut Archive::reader(&bytes)).unwrap();
-        let (there, searched) = places(&mut read, Pose::HERE, [-20e-6, 1e-6]);
-        assert!(!searched);
-        assert_eq!(there, places(&mut recycled, Pose::HERE, [-20e-6, 1e-6]).0);
+    fn a_pair_is_searched_again_for_places_farther_than_it_was_searched_for() {
+        let mut known = FoundPlaces::default();
+        let here = [0.5e-3, 0.0];
+        assert!(places(&mut known, Pose::HERE, here).1 && !places(&mut known, Pose::HERE, here).1);
+        let (near, searched) = within(&mut known, Pose::HERE, here, 0.4e-3);
+        assert!(near.is_empty() && !searched, "none is nearer than half a millimetre");
+        assert!(!within(&mut known, Pose::HERE, here, 1.2e-3).1);
+        assert!(within(&mut known, Pose::HERE, here, 1.25e-3).1);
     }
 }

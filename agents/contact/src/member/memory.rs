@@ -4,6 +4,7 @@
 //! A pair is remembered by its lower number, so that nothing has to be moved when clusters join or part.
 
 use crate::agent::Link;
+use crate::detect::recycled::FoundPlaces;
 use crate::joint::{Joint, JointKind};
 use crate::lists::entry;
 use crate::member::Slid;
@@ -84,6 +85,8 @@ pub(crate) struct PairMemory {
     /// Until when the two count as near.
     pub near_until: SimTime,
     pub places: Vec<Remembered>,
+    /// Where the two touch, of solids.
+    pub found: FoundPlaces,
     /// Places of the step that is being made.
     #[serde(skip)]
     pub next: Vec<Remembered>,
@@ -91,14 +94,16 @@ pub(crate) struct PairMemory {
 
 impl Clone for PairMemory {
     fn clone(&self) -> Self {
-        let Self { partner, near_until, places, next } = self;
-        Self { partner: *partner, near_until: *near_until, places: places.clone(), next: next.clone() }
+        let Self { partner, near_until, places, found, next } = self;
+        let (partner, near_until) = (*partner, *near_until);
+        Self { partner, near_until, places: places.clone(), found: found.clone(), next: next.clone() }
     }
 
     // into storage that is there
     fn clone_from(&mut self, from: &Self) {
         (self.partner, self.near_until) = (from.partner, from.near_until);
         self.places.clone_from(&from.places);
+        self.found.clone_from(&from.found);
         self.next.clone_from(&from.next);
     }
 }
@@ -206,7 +211,13 @@ fn sort_key(key: TouchKey) -> [TouchKey; 2] {
 impl ContactMemory {
     /// The pair with `partner`, made where it is new.
     pub(crate) fn pair(&mut self, partner: Partner) -> &mut PairMemory {
-        let new = || PairMemory { partner, near_until: SimTime::ZERO, places: Vec::new(), next: Vec::new() };
+        let new = || PairMemory {
+            partner,
+            near_until: SimTime::ZERO,
+            places: Vec::new(),
+            found: FoundPlaces::default(),
+            next: Vec::new(),
+        };
         entry(&mut self.pairs, &partner, |pair| pair.partner, new)
     }
 
@@ -250,9 +261,26 @@ impl ContactMemory {
 
     /// Notes that an agent is near at `now`: the two belong together from then on until they have not been near for a while.
     pub fn meet(&mut self, id: AgentId, now: SimTime) {
+        self.near_pair(Partner::Agent(id), now);
+    }
+
+    /// The pair with a partner that is near at `now`, kept until that has not been so for a while.
+    fn near_pair(&mut self, partner: Partner, now: SimTime) -> &mut PairMemory {
         let until = now + SimSpan::from_secs_f64(PART_S).unwrap_or(SimSpan::ZERO);
-        let pair = self.pair(Partner::Agent(id));
+        let pair = self.pair(partner);
         pair.near_until = pair.near_until.max(until);
+        pair
+    }
+
+    /// The places found of the pair with `partner`, if there is one.
+    pub(crate) fn known(&self, partner: Partner) -> Option<&FoundPlaces> {
+        let pair = self.pairs.binary_search_by_key(&partner, |pair| pair.partner).ok();
+        pair.map(|at| &self.pairs[at].found)
+    }
+
+    /// The same to be replaced, of a partner that is near at `now`.
+    pub(crate) fn found(&mut self, partner: Partner, now: SimTime) -> &mut FoundPlaces {
+        &mut self.near_pair(partner, now).found
     }
 
     /// The agents that were near lately, at `now`: those that were so in a step in the memory of the lower number.

@@ -88,7 +88,6 @@ impl ClusterStepper {
     /// [`ArchiveError`] for what is no state of a stepper.
     pub fn archive(&mut self, archive: &mut Archive<'_>) -> Result<(), ArchiveError> {
         self.solver.archive(archive)?;
-        self.search.archive(archive)?;
         archive_values!(archive, self.most_s)?;
         self.pile.archive(archive)
     }
@@ -148,11 +147,15 @@ impl ClusterStepper {
         all.iter_mut().for_each(Participant::let_go);
         self.plan(all, self.macro_s, threads)?;
         self.keep(all);
+        let mut made_again = false;
         // each time at least one member makes twice as many steps, at most 64 times as many as it began with
         loop {
             match self.advance(on, all, dt, &mut report) {
                 Ok(true) => break,
-                Ok(false) => self.go_back(all),
+                Ok(false) => {
+                    made_again = true;
+                    self.go_back(all);
+                }
                 Err(error) => {
                     self.go_back(all);
                     return Err(error);
@@ -160,7 +163,7 @@ impl ClusterStepper {
             }
         }
         self.failures.end(all, self.macro_s);
-        self.note_plan(all.iter().map(|one| one.parts).max().unwrap_or(1), report.fine_steps);
+        self.note_length(all.iter().map(|one| one.parts).max().unwrap_or(1), made_again);
         report.work = self.progress.iter().map(|state| state.work).sum();
         Ok(report)
     }

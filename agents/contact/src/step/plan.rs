@@ -65,20 +65,20 @@ impl Plan {
 }
 
 impl ClusterStepper {
-    /// The plan for members with these roles and wanted steps, seconds, after the macro steps made so far: after one that had to be made again in
-    /// shorter steps none of theirs is longer than half of it, and then each time twice as long again.
+    /// The plan for members with these roles and wanted steps, seconds, after the macro steps made so far: after one that had to be made again it is
+    /// half as long, but no shorter than a step of the fastest member, and then each time twice as long again.
     #[must_use]
     pub fn plan_for(&self, members: impl Iterator<Item = (Role, f64)> + Clone) -> Plan {
         let most_s = self.most_s.unwrap_or(f64::INFINITY);
         Plan::of(members.map(|(role, wanted_s)| (role, wanted_s.min(most_s))))
     }
 
-    /// Notes what the macro step just made says of the length of the next: the fastest members would have made it in `planned` steps. What begins anew
-    /// repeats the whole macro step, and a short one repeats less.
-    pub(super) fn note_plan(&mut self, planned: u32, made: u32) {
+    /// Notes what the macro step just made, in which the fastest member was to make so many steps, says of the length of the next: what is made again
+    /// is the whole macro step, and of a short one that is less.
+    pub(super) fn note_length(&mut self, planned: u32, made_again: bool) {
         let longer_s = self.most_s.map(|most_s| 2.0 * most_s).filter(|most_s| *most_s <= MOST_S);
         let shorter_s = self.macro_s * f64::max(0.5, f64::from(planned).recip());
-        self.most_s = if made > planned { Some(shorter_s) } else { longer_s };
+        self.most_s = if made_again { Some(shorter_s) } else { longer_s };
     }
 
     /// Begins the first step of every member, in as many parts as its free motion needs.
@@ -193,15 +193,15 @@ mod tests {
             (plan.macro_s, plan.parts)
         };
         assert_eq!(lengths(&stepper), (0.032, 16));
-        stepper.note_plan(16, 64);
+        stepper.note_length(16, true);
         assert_eq!(lengths(&stepper), (0.016, 8));
         stepper.macro_s = 0.016;
-        stepper.note_plan(8, 8);
+        stepper.note_length(8, false);
         assert_eq!(lengths(&stepper), (0.032, 16));
         stepper.macro_s = 0.002;
-        stepper.note_plan(1, 8);
+        stepper.note_length(1, true);
         assert_eq!(lengths(&stepper), (0.002, 1), "no member makes shorter steps than it wants");
-        (0..9).for_each(|_| stepper.note_plan(1, 1));
+        (0..9).for_each(|_| stepper.note_length(1, false));
         assert_eq!((lengths(&stepper), stepper.most_s), ((0.032, 16), None));
     }
 }

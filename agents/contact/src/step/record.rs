@@ -14,7 +14,7 @@ use crate::solve::Side;
 use crate::step::ClusterStepper;
 use crate::step::report::{PairTotal, total_of};
 use glam::DVec3;
-use metachron_core::{SimSpan, Wrench};
+use metachron_core::{SimSpan, SimTime, Wrench};
 
 /// Bodies that meet deeper inside each other than this many times the depth of contacts began so: a load in motion goes less deep.
 const OVERLAP_SHARE: f64 = 2.0;
@@ -50,6 +50,8 @@ impl ClusterStepper {
         self.record_spins(all, h_s);
         self.record_contacts(all, h_s);
         self.record_constraints(all, h_s);
+        let now = all.first().map_or(SimTime::ZERO, |one| one.context.time + dt);
+        self.search.recycled.note(all, now);
         let Self { solver, search, constraints, external, .. } = self;
         for &[a, b] in &search.near {
             let (now, other) = (all[a].context.time + dt, all[b].id);

@@ -113,7 +113,9 @@ impl Feature {
             across.dot(out) / across.length()
         };
         let corners = fans.opposite[number as usize];
-        corners.contains(&NONE) || -corners.map(slope).iter().sum::<f64>() > RIDGE
+        // so does an edge of a triangle without a width, whose slope is no number
+        let is_flat = || -corners.map(slope).iter().sum::<f64>() <= RIDGE;
+        corners.contains(&NONE) || !is_flat()
     }
 
     /// The unit vector out of the skin that is close to `way`: its parts along the skin are removed. `None` if they were most of it.

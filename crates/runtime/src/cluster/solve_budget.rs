@@ -51,9 +51,9 @@ pub(in super::super) struct FactorPrice {
 }
 
 impl FactorPrice {
-    /// Takes a turn of `turn_s` seconds; one without a factor, or with gradients beside them, says nothing of its price.
-    pub fn note(&mut self, Solved { solves, factors, products, .. }: Solved, turn_s: f64) {
-        if factors == 0 || products > 0 || !turn_s.is_finite() {
+    /// Takes a turn of `turn_s` seconds; one without a factor says nothing of its price.
+    pub fn note(&mut self, Solved { solves, factors, .. }: Solved, turn_s: f64) {
+        if factors == 0 || !turn_s.is_finite() {
             return;
         }
         self.turns = (self.turns + 1).min(TURNS_KEPT);
@@ -151,7 +151,6 @@ mod tests {
         assert_eq!(price.factors_max(-1.0, 7), Some(7), "late");
         assert_eq!(price.factors_max(0.1, 5), None, "there is time for all");
         price.note(Solved { solves: 4, factors: 0, products: 90, contacts: 8 }, 5e-3);
-        price.note(Solved { solves: 2, factors: 3, products: 90, contacts: 8 }, 5e-3);
         price.note(Solved { solves: 0, factors: 0, products: 0, contacts: 0 }, 1e-4);
         assert_eq!(price.factors_max(0.801e-3, 5), Some(20), "gradients say nothing of the price of a factor");
     }

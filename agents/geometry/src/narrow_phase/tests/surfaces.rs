@@ -146,11 +146,14 @@ fn edges_touch_where_both_stand_out_and_nowhere_on_flat_skins() {
     let (form, flat) = flat_sheet();
     let middle = DVec3::new(0.5 * f64::from(CELLS) * EDGE, 0.5 * f64::from(CELLS) * EDGE, 0.0);
     let turned = DQuat::from_rotation_z(0.4);
-    // the crest of the lower one is above its y axis, that of the upper one under its x axis, which is turned
+    // the crest of the lower one is above its y axis, that of the upper one under its x axis, which is turned and moved aside: they cross within
+    // edges
+    let aside = DVec3::new(0.1, 0.3, 0.0) * EDGE;
     let touches = |slope: f64| {
         let from_middle = || flat.iter().map(|x| *x - middle);
         let below: Vec<_> = from_middle().map(|x| x - DVec3::Z * (slope * x.x.abs() + 1.5e-3)).collect();
-        let above: Vec<_> = from_middle().map(|x| turned * x + DVec3::Z * (slope * x.y.abs() + 1.5e-3)).collect();
+        let above: Vec<_> =
+            from_middle().map(|x| turned * x + aside + DVec3::Z * (slope * x.y.abs() + 1.5e-3)).collect();
         let placed = [&below, &above].map(|at| PlacedShape { form: &form, view: ShapePose::Surface(at) });
         all(&placed[1], &placed[0], 2e-3)
     };
@@ -159,7 +162,7 @@ fn edges_touch_where_both_stand_out_and_nowhere_on_flat_skins() {
     assert!(found.len() > 20);
     assert_eq!(crossings(&found), 8, "of the borders of two squares");
     let found = touches(0.3);
-    assert!(crossings(&found) > 8);
+    assert!(crossings(&found) > 0);
     // two half thicknesses less than the crests are apart
     assert!((lowest(&found).gap_m - 1e-3).abs() < 1e-9, "{}", lowest(&found).gap_m);
 }
