@@ -29,6 +29,9 @@ pub(super) fn read(root: &Element, reader: &mut BodyReader<'_>) -> Result<(), Im
             }
         };
         let [first, second] = [body(element.read(), "body1", reader)?, body(element, "body2", reader)?];
+        if first.is_some() && first == second {
+            return Err(element.wrong("holds a body to itself; expected two bodies"));
+        }
         // in the first body
         let anchor_m = element.numbers("anchor")?.map_or(DVec3::ZERO, DVec3::from_array);
         let at_m = first.map_or(anchor_m, |link| reader.model.links[link].pose.point(anchor_m));
