@@ -37,7 +37,8 @@ impl Model {
     }
 
     /// Adds the pairs that no joint connects itself, and that are on bodies which one does, or on one body: a body is all that fixed joints make of
-    /// links, with those without mass that carry it. Shapes overlap there, as those of connected links do.
+    /// links, with those without mass that carry it. Shapes overlap there, as those of connected links do. All of one robot: two that stand on the
+    /// world collide.
     pub(crate) fn pass_neighbours(&mut self) {
         let bodies = self.bodies();
         // the body that a body hangs on
@@ -50,6 +51,7 @@ impl Model {
             between(a, b) || between(b, a)
         };
         let pairs = (0..self.links.len()).flat_map(|b| (0..b).map(move |a| [a, b]));
+        let pairs = pairs.filter(|[a, b]| self.links[*a].root == self.links[*b].root);
         let pairs = pairs.filter(|[a, b]| meets(bodies[*a], bodies[*b]) && !jointed(*a, *b));
         let name = |link: usize| self.links[link].name.clone();
         let mut found: Vec<[String; 2]> = pairs.map(|pair| pair.map(name)).collect();

@@ -1,7 +1,7 @@
 //! Models that no one means, which end with an error or a list.
 
-use crate::play::{advance, left_out, start};
-use metachron_import::{ImportError, Imported, mjcf};
+use crate::play::{advance, left_out, read_from, start};
+use metachron_import::{ImportError, Imported, Options, mjcf, model};
 use std::path::Path;
 
 fn import(text: &str) -> Result<Imported, ImportError> {
@@ -72,4 +72,73 @@ fn what_holds_a_body_without_mass_holds_the_one_that_it_is_part_of() {
         left_out(&import(&text("arm")).unwrap()),
         ["line 3: equality, weld: is left out: both of its ends are on one body"]
     );
+}
+
+/// What is left out of a model with one mesh.
+fn noted_of(file: &str, bytes: &[u8]) -> String {
+    let folder = tempfile::tempdir().unwrap();
+    std::fs::write(folder.path().join(file), bytes).unwrap();
+    let text = format!(
+        r#"<mujoco><asset><mesh name="m" file="{file}" scale="1 1 2"/></asset><worldbody><geom type="mesh" mesh="m"/></worldbody></mujoco>"#
+    );
+    left_out(&model(&text, read_from(folder.path()), &Options::default()).unwrap()).join("\n")
+}
+
+/// A Collada file with as many instances of four points as `instances`, and what its accessor says.
+fn dae(points: &str, accessor: &str, instances: usize) -> String {
+    format!(
+        r##"<COLLADA><geometry id="g"><mesh><source id="s"><float_array>{points}</float_array><accessor {accessor}/></source>
+        <vertices><input semantic="POSITION" source="#s"/></vertices></mesh></geometry><visual_scene><node>{}</node>
+        </visual_scene></COLLADA>"##,
+        r##"<instance_geometry url="#g"/>"##.repeat(instances)
+    )
+}
+
+#[test]
+fn collada_files_of_many_instances_are_read_once_and_bounded() {
+    let four = "0 0 0 1 0 0 0 1 0 0 0 1";
+    assert_eq!(noted_of("a.dae", dae(four, r#"count="4" stride="3""#, 1).as_bytes()), "");
+    // a large array as often as the budget has room for: each time anew, it would take minutes
+    let large = format!("{four} ") + &"0.1 0.1 0.1 ".repeat(100_000);
+    let noted = noted_of("a.dae", dae(&large, "", 20_000).as_bytes());
+    assert!(noted.ends_with("`a.dae`: it has more than 3000000 points"), "{noted}");
+    for accessor in
+        [r#"stride="2""#, r#"offset="13""#, r#"count="5" stride="3""#, r#"count="18446744073709551615" stride="9""#]
+    {
+        let noted = noted_of("a.dae", dae(four, accessor, 1).as_bytes());
+        assert!(noted.contains("`a.dae`: its positions from ") && noted.ends_with("are not in 12 numbers"), "{noted}");
+    }
+}
+
+#[test]
+fn a_control_is_within_its_range_at_the_start() {
+    let text = r#"<mujoco><compiler angle="radian"/><worldbody><body><joint name="hinge"/><geom size="0.1"/></body></worldbody>
+        <actuator><position joint="hinge" kp="5" ctrlrange="-1 1"/><motor joint="hinge" ctrlrange="-1 1"/>
+        <motor joint="hinge" ctrlrange="2 3"/></actuator></mujoco>"#;
+    let imported = import(text).unwrap();
+    let what = "is commanded 2 and not 0, the end of its `ctrlrange`: programs command joints without one";
+    let acts = "is left out: it acts without a program, too, and scenes have servos of joints alone";
+    assert_eq!(
+        left_out(&imported),
+        [
+            format!("line 3: actuator, motor: {what}"),
+            format!("line 3: actuator, motor: {acts}"),
+            "line 2: actuator, motor: is left out: it gives what a program commands".to_owned(),
+        ]
+    );
+    let servo = import(&text.replace("kp=\"5\" ctrlrange=\"-1 1\"", "kp=\"5\" ctrlrange=\"0.5 1\"")).unwrap();
+    assert!(servo.toml.contains("position_deg = 28.64"), "{}", servo.toml); // half a radian
+}
+
+#[test]
+fn equalities_between_sites_are_not_said_to_couple_joints_and_those_at_a_keyframe_are_listed() {
+    let text = r#"<mujoco><worldbody><body name="a"><freejoint/><geom size="0.1"/></body></worldbody>
+        <equality><weld body1="a"/><weld site1="s" site2="t"/></equality>
+        <keyframe><key name="k" qpos="1 0 0 1 0 0 0"/></keyframe></mujoco>"#;
+    let sites =
+        "line 2: equality, weld: is left out: it is between sites; expected `body1`, and of `connect` an `anchor`";
+    assert_eq!(left_out(&import(text).unwrap())[0], sites);
+    let keyed = model(text, Path::new("."), &Options { key: Some("k"), ..Options::default() }).unwrap();
+    let held = "line 2: equality, weld: holds its bodies as they start, not as they are without the keyframe";
+    assert_eq!(left_out(&keyed)[..2], [held, sites]);
 }
