@@ -14,6 +14,8 @@ use std::collections::BTreeMap;
 use std::fmt::Write;
 use std::path::Path;
 
+/// Farthest coordinate of a mesh, metres: that of scenes.
+const FAR_M: f64 = 1e5;
 /// How often an edge of an octahedron is divided for an ellipsoid: its hull is within 0.4 % of it.
 const ELLIPSOID_DIVISIONS: i32 = 16;
 
@@ -103,13 +105,17 @@ impl<'a> Meshes<'a> {
     fn read(&self, path: &Path) -> Result<Triangles, String> {
         let read = self.folders.read.ok_or("no file is read here")?;
         let bytes = read(path).map_err(|why| why.to_string())?;
-        match extension(&path.to_string_lossy()).as_str() {
+        let surface = match extension(&path.to_string_lossy()).as_str() {
             "dae" => {
                 let text = std::str::from_utf8(&bytes).map_err(|why| why.to_string())?;
-                Ok(Triangles { points: dae::read(text)?, triangles: Vec::new() })
+                Triangles { points: dae::read(text)?, triangles: Vec::new() }
             }
-            "msh" => msh::read(&bytes),
-            _ => self.folders.surface.ok_or("no mesh is read here")?(&bytes),
+            "msh" => msh::read(&bytes)?,
+            _ => self.folders.surface.ok_or("no mesh is read here")?(&bytes)?,
+        };
+        match surface.points.iter().position(|point| !point.is_finite()) {
+            Some(bad) => Err(format!("point {} is not finite", bad + 1)),
+            None => Ok(surface),
         }
     }
 
@@ -133,6 +139,9 @@ impl<'a> Meshes<'a> {
     fn add(&mut self, key: String, stem: &str, surface: Triangles) -> Result<Shape, String> {
         if let Some(file) = self.made.get(&key) {
             return Ok(Shape::Hull { file: file.clone(), scale: 1.0 });
+        }
+        if let Some(bad) = surface.points.iter().position(|point| point.abs().max_element() > FAR_M) {
+            return Err(format!("point {} is more than {FAR_M:.0} m from its origin", bad + 1));
         }
         let hull = hull_triangles(&surface.points).map_err(|why| why.to_string())?;
         let mut text = String::new();

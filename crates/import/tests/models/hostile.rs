@@ -142,3 +142,25 @@ fn equalities_between_sites_are_not_said_to_couple_joints_and_those_at_a_keyfram
     let held = "line 2: equality, weld: holds its bodies as they start, not as they are without the keyframe";
     assert_eq!(left_out(&keyed)[..2], [held, sites]);
 }
+
+#[test]
+fn points_that_no_scene_has_are_listed_with_their_file() {
+    let binary = |x: f32| {
+        let counts = [3, 0, 0, 0_i32].into_iter().flat_map(i32::to_le_bytes);
+        let numbers = [0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0, x];
+        counts.chain(numbers.into_iter().flat_map(f32::to_le_bytes)).collect::<Vec<u8>>()
+    };
+    let text = |x: &str| dae(&format!("0 0 0 1 0 0 {x} 1 0"), "", 1).into_bytes();
+    let (none, far) = ("point 3 is not finite", "point 3 is more than 100000 m from its origin");
+    for (file, bytes, why) in [
+        ("a.msh", binary(f32::NAN), none),
+        ("a.msh", binary(6e4), far), // the file is stretched to twice that
+        ("a.dae", text("inf"), none),
+        ("a.dae", text("1e300"), far),
+    ] {
+        let noted = noted_of(file, &bytes);
+        assert!(noted.ends_with(&format!("`{file}`: {why}")), "{noted}");
+    }
+    let cut = noted_of("a.stl", b"solid a\nfacet normal 0 0 1\n");
+    assert!(cut.ends_with("`a.stl`: its text has no vertex: it is cut short, or no STL file"), "{cut}");
+}
