@@ -122,7 +122,7 @@ fn absolute(path: &Path) -> Option<PathBuf> {
 }
 
 /// A path from the root, without `.` and `..`.
-fn plain(path: &Path) -> Option<PathBuf> {
+pub(crate) fn plain(path: &Path) -> Option<PathBuf> {
     let mut plain = PathBuf::new();
     for part in absolute(path)?.components() {
         match part {

@@ -3,16 +3,17 @@
 //! In: names of files with their scale, points, ellipsoids. Out: shapes, and the files that the scene needs. Never here: files that are opened or
 //! written (the caller does), what a mesh is on.
 
-use crate::folders::{Folders, extension};
+use crate::folders::{Folders, extension, plain};
 use crate::imported::{ImportError, MeshFile};
 use crate::model::Shape;
 use crate::xml::Element;
 use crate::{dae, msh};
 use glam::DVec3;
 use metachron_geometry::{Triangles, hull_triangles};
+use std::cell::RefCell;
 use std::collections::BTreeMap;
 use std::fmt::Write;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 /// Farthest coordinate of a mesh, metres: that of scenes.
 const FAR_M: f64 = 1e5;
@@ -32,12 +33,14 @@ pub(crate) struct Meshes<'a> {
     made: BTreeMap<String, String>,
     /// What new files were made of, by their paths.
     surfaces: BTreeMap<String, Triangles>,
+    /// What files have, or why it cannot be read: parts that name one file read it once.
+    read: RefCell<BTreeMap<PathBuf, Result<Triangles, String>>>,
 }
 
 impl<'a> Meshes<'a> {
     pub(crate) fn new(folders: Folders<'a>, folder: &'a str, copies: bool) -> Self {
         let (files, made, surfaces) = (Vec::new(), BTreeMap::new(), BTreeMap::new());
-        Self { folders, folder, copies, files, made, surfaces }
+        Self { folders, folder, copies, files, made, surfaces, read: RefCell::default() }
     }
 
     pub(crate) fn finish(self) -> Vec<MeshFile> {
@@ -65,7 +68,7 @@ impl<'a> Meshes<'a> {
             let file = if self.copies { self.copy(&path) } else { Ok(self.folders.in_scene(element, name, &path)?) };
             return Ok(file.map(|file| Shape::Hull { file, scale: x }));
         }
-        let key = format!("{} {scale:?}", path.display());
+        let key = format!("{} {scale:?}", plain(&path).as_ref().unwrap_or(&path).display());
         if let Some(file) = self.made.get(&key) {
             return Ok(Ok(Shape::Hull { file: file.clone(), scale: 1.0 }));
         }
@@ -103,6 +106,11 @@ impl<'a> Meshes<'a> {
     }
 
     fn read(&self, path: &Path) -> Result<Triangles, String> {
+        let key = plain(path).unwrap_or_else(|| path.to_owned());
+        self.read.borrow_mut().entry(key).or_insert_with(|| self.read_anew(path)).clone()
+    }
+
+    fn read_anew(&self, path: &Path) -> Result<Triangles, String> {
         let read = self.folders.read.ok_or("no file is read here")?;
         let bytes = read(path).map_err(|why| why.to_string())?;
         let surface = match extension(&path.to_string_lossy()).as_str() {
@@ -121,7 +129,7 @@ impl<'a> Meshes<'a> {
 
     /// A new file with the bytes of another.
     fn copy(&mut self, path: &Path) -> Result<String, String> {
-        let key = path.display().to_string();
+        let key = plain(path).as_deref().unwrap_or(path).display().to_string();
         if let Some(file) = self.made.get(&key) {
             return Ok(file.clone());
         }

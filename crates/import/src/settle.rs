@@ -30,9 +30,10 @@ pub(crate) fn settle(mut model: Model, fixed_base: bool, notes: &mut Vec<LeftOut
     if fixed_base {
         fix_bases(&mut model);
     }
+    let above = model.above();
     let mut fates: Vec<Fate> = Vec::with_capacity(model.links.len());
     for (at, link) in model.links.iter().enumerate() {
-        let joint = model.joints.iter().find(|joint| joint.child == at);
+        let joint = above[at].map(|joint| &model.joints[joint]);
         let own = fate(link, joint, &fates, &model)?;
         if let Some(joint) = joint.filter(|joint| own != Fate::Itself && joint.kind != Kind::Fixed) {
             notes.push(link.place.note(format!("has no mass, and carries none: {} is fixed", joint.place.label)));
@@ -62,6 +63,7 @@ pub(crate) fn settle(mut model: Model, fixed_base: bool, notes: &mut Vec<LeftOut
         repair(link, notes)?;
         choose_parts(link, notes)?;
     }
+    model.drop_unnamed_files();
     Ok(model)
 }
 
@@ -74,8 +76,8 @@ fn fixed(link: &Link, number: usize, index: usize, part: Part) -> Fixed {
 
 /// Finds for each link the one that all of its tree hangs on.
 fn find_roots(model: &mut Model) {
-    for at in 0..model.links.len() {
-        let parent = model.joints.iter().find(|joint| joint.child == at).and_then(|joint| joint.parent);
+    for (at, above) in model.above().into_iter().enumerate() {
+        let parent = above.and_then(|joint| model.joints[joint].parent);
         model.links[at].root = parent.map_or(at, |parent| model.links[parent].root);
     }
 }

@@ -164,3 +164,24 @@ fn points_that_no_scene_has_are_listed_with_their_file() {
     let cut = noted_of("a.stl", b"solid a\nfacet normal 0 0 1\n");
     assert!(cut.ends_with("`a.stl`: its text has no vertex: it is cut short, or no STL file"), "{cut}");
 }
+
+#[test]
+fn a_file_that_cannot_be_read_is_read_once_and_files_that_nothing_names_are_not_written() {
+    let folder = tempfile::tempdir().unwrap();
+    std::fs::write(folder.path().join("a.msh"), "no mesh").unwrap();
+    let reads = std::cell::Cell::new(0);
+    let read = |path: &Path| {
+        reads.set(reads.get() + 1);
+        std::fs::read(path)
+    };
+    let folders = metachron_import::Folders { read: Some(&read), ..read_from(folder.path()) };
+    let geom = r#"<geom type="mesh" mesh="a"/><geom type="mesh" mesh="b"/>"#.repeat(10);
+    // one body is touched by its ball alone: its ellipsoid is left out
+    let text = format!(
+        r#"<mujoco><asset><mesh file="a.msh"/><mesh name="b" file="./a.msh"/></asset><worldbody>{geom}
+        <body name="c"><freejoint/><inertial mass="1" diaginertia="1 1 1"/><geom size="0.1"/>
+        <geom type="ellipsoid" size="1 2 3" contype="0" conaffinity="0"/></body></worldbody></mujoco>"#
+    );
+    let imported = model(&text, folders, &Options::default()).unwrap();
+    assert_eq!((imported.left_out.len(), reads.get(), imported.files.len()), (21, 1, 0), "{:?}", left_out(&imported));
+}
