@@ -33,17 +33,19 @@ struct Weight {
 /// such links between them.
 pub(crate) fn lend(model: &mut Model, notes: &mut Vec<LeftOut>) {
     let weights: Vec<Option<Weight>> = model.links.iter().map(weight).collect();
-    for at in 0..model.links.len() {
-        let joint = model.joints.iter().find(|joint| joint.child == at);
-        let Some(com_m) = joint
+    for (at, above) in model.above().into_iter().enumerate() {
+        if !matches!(model.links[at].mass, Mass::None) {
+            continue;
+        }
+        let Some(com_m) = above
+            .map(|joint| &model.joints[joint])
             .filter(|joint| joint.kind != Kind::Fixed)
             .map(|joint| joint.anchor_m)
             .or(model.links[at].is_free.then_some(DVec3::ZERO))
         else {
             continue;
         };
-        let is_massless = matches!(model.links[at].mass, Mass::None);
-        let Some((carried, weight)) = carried(model, at, &weights).filter(|_| is_massless) else { continue };
+        let Some((carried, weight)) = carried(model, at, &weights) else { continue };
         let what = format!("has no mass, and moves: a thousandth of that of `{}` is added", model.links[carried].name);
         let link = &mut model.links[at];
         notes.push(link.place.note(what));
