@@ -95,7 +95,7 @@ impl Folders<'_> {
     }
 
     /// A file's path from the folder of the scene, with `/` between its parts.
-    fn relative(&self, file: &Path) -> Option<String> {
+    pub(crate) fn relative(&self, file: &Path) -> Option<String> {
         let (file, scene) = (plain(file)?, plain(self.scene)?);
         let common = file.iter().zip(&scene).take_while(|(a, b)| a == b).count();
         // on another drive

@@ -11,7 +11,7 @@ use crate::{dae, msh};
 use glam::DVec3;
 use metachron_geometry::{Triangles, hull_triangles};
 use std::cell::RefCell;
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::fmt::Write;
 use std::path::{Path, PathBuf};
 
@@ -29,6 +29,8 @@ pub(crate) struct Meshes<'a> {
     /// Whether files that the scene could name where they are become new ones, too.
     copies: bool,
     files: Vec<MeshFile>,
+    /// The files that the model names, from the folder of the scene: no new one is written over them.
+    named: BTreeSet<String>,
     /// The new files by what they were made of.
     made: BTreeMap<String, String>,
     /// What new files were made of, by their paths.
@@ -40,7 +42,7 @@ pub(crate) struct Meshes<'a> {
 impl<'a> Meshes<'a> {
     pub(crate) fn new(folders: Folders<'a>, folder: &'a str, copies: bool) -> Self {
         let (files, made, surfaces) = (Vec::new(), BTreeMap::new(), BTreeMap::new());
-        Self { folders, folder, copies, files, made, surfaces, read: RefCell::default() }
+        Self { folders, folder, copies, files, named: BTreeSet::new(), made, surfaces, read: RefCell::default() }
     }
 
     pub(crate) fn finish(self) -> Vec<MeshFile> {
@@ -63,9 +65,10 @@ impl<'a> Meshes<'a> {
             return Ok(Err("expected a .glb, .stl, .obj, .dae or MuJoCo's .msh".to_owned()));
         }
         let path = self.folders.find(element, name)?;
+        self.named.extend(self.folders.relative(&path));
         let [x, y, z] = scale;
         if is_scenes && x > 0.0 && x == y && y == z {
-            let file = if self.copies { self.copy(&path) } else { Ok(self.folders.in_scene(element, name, &path)?) };
+            let file = if self.copies { self.copy(&path) } else { self.in_place(element, name, &path)? };
             return Ok(file.map(|file| Shape::Hull { file, scale: x }));
         }
         let key = format!("{} {scale:?}", plain(&path).as_ref().unwrap_or(&path).display());
@@ -127,6 +130,15 @@ impl<'a> Meshes<'a> {
         }
     }
 
+    /// The path of a file that the scene names where it is, or why it cannot.
+    fn in_place(&self, element: &Element, name: &str, path: &Path) -> Result<Result<String, String>, ImportError> {
+        let file = self.folders.in_scene(element, name, path)?;
+        if self.files.iter().any(|new| new.path.eq_ignore_ascii_case(&file)) {
+            return Ok(Err("a new mesh would be written over it; expected it in another folder".to_owned()));
+        }
+        Ok(Ok(file))
+    }
+
     /// A new file with the bytes of another.
     fn copy(&mut self, path: &Path) -> Result<String, String> {
         let key = plain(path).as_deref().unwrap_or(path).display().to_string();
@@ -174,7 +186,8 @@ impl<'a> Meshes<'a> {
     fn unused(&self, stem: &str, kind: &str) -> String {
         let stem = stem.replace(['/', '\\'], "-");
         let more = (2..).map(|i| format!("{}/{stem}-{i}.{kind}", self.folder));
-        let is_new = |path: &String| !self.files.iter().any(|file| file.path.eq_ignore_ascii_case(path));
+        let taken = || self.files.iter().map(|file| &file.path).chain(&self.named);
+        let is_new = |path: &String| !taken().any(|file| file.eq_ignore_ascii_case(path));
         let first = format!("{}/{stem}.{kind}", self.folder);
         std::iter::once(first.clone()).chain(more).find(is_new).unwrap_or(first)
     }

@@ -185,3 +185,27 @@ fn a_file_that_cannot_be_read_is_read_once_and_files_that_nothing_names_are_not_
     let imported = model(&text, folders, &Options::default()).unwrap();
     assert_eq!((imported.left_out.len(), reads.get(), imported.files.len()), (21, 1, 0), "{:?}", left_out(&imported));
 }
+
+#[test]
+fn no_new_mesh_has_the_path_of_one_that_the_scene_names() {
+    let folder = tempfile::tempdir().unwrap();
+    for place in ["meshes", "other"] {
+        std::fs::create_dir(folder.path().join(place)).unwrap();
+        let file = folder.path().join(place).join("a.obj");
+        std::fs::write(file, "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\n").unwrap();
+    }
+    let paths = |first: &str, second: &str| {
+        let text = format!(
+            r#"<mujoco><asset><mesh name="own" file="meshes/a.obj"/><mesh name="new" file="meshes/a.obj" scale="1 1 2"/>
+            <mesh name="other" file="other/a.obj" scale="1 1 2"/>
+            </asset><worldbody><geom type="mesh" mesh="{first}"/><geom type="mesh" mesh="{second}"/></worldbody></mujoco>"#
+        );
+        let imported = model(&text, read_from(folder.path()), &Options::default()).unwrap();
+        (imported.files[0].path.clone(), left_out(&imported).join("\n"))
+    };
+    for [first, second] in [["own", "new"], ["new", "own"], ["own", "other"]] {
+        assert_eq!(paths(first, second), ("meshes/a-2.obj".to_owned(), String::new()), "{first} {second}");
+    }
+    let (path, noted) = paths("other", "own");
+    assert!(path == "meshes/a.obj" && noted.contains("a new mesh would be written over it"), "{path} {noted}");
+}
