@@ -204,7 +204,7 @@ pub struct ImportArgs {
     /// Write the scene to this file instead of standard output
     #[arg(long, value_name = "FILE", value_hint = ValueHint::FilePath)]
     pub out: Option<PathBuf>,
-    /// Overwrite an existing file
+    /// Overwrite an existing file, and existing meshes in the folder beside it
     #[arg(long, requires = "out")]
     pub force: bool,
     /// Fix the root of a robot, or an MJCF body that moves freely and carries others, where it starts

@@ -7,10 +7,11 @@ use super::args::ImportArgs;
 use metachron_console::exit::Exit;
 use metachron_console::gains::check_output_path;
 use metachron_console::output::{BadInput, data, message, print_overlaps, rendered};
-use metachron_import::{Folders, Imported, LeftOut, Options, Overlap};
+use metachron_import::{Folders, Imported, LeftOut, MeshFile, Options, Overlap};
 use metachron_scene::{SCENE_BYTES_MAX, SceneError, Source, load, read_surface};
 use metachron_world::Scene;
 use serde_json::json;
+use std::cell::RefCell;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
@@ -26,6 +27,11 @@ pub(super) fn command(args: &ImportArgs) -> anyhow::Result<Exit> {
     let folder = |path: &Path| path.parent().map_or_else(PathBuf::new, Path::to_path_buf);
     let (model_folder, out) = (folder(&args.model), args.out.as_deref().unwrap_or(&args.model));
     let scene_folder = folder(out);
+    let files_read = RefCell::new(vec![args.model.clone()]);
+    let read_plain = |path: &Path| {
+        files_read.borrow_mut().push(path.to_owned());
+        read_plain(path)
+    };
     let folders =
         Folders { model: &model_folder, scene: &scene_folder, read: Some(&read_plain), surface: Some(&read_surface) };
     let text = read(&args.model).map_err(|why| BadInput(format!("{model} cannot be read: {why}")))?;
@@ -66,14 +72,41 @@ pub(super) fn command(args: &ImportArgs) -> anyhow::Result<Exit> {
         }
         None => data(&imported.toml)?,
         Some(path) => {
-            for file in &imported.files {
-                write(&scene_folder.join(&file.path), &file.bytes)?;
-            }
+            let srdf = args.srdf.clone().unwrap_or_else(|| args.model.with_extension("srdf"));
+            let files_read = files_read.into_inner().into_iter().chain([srdf]);
+            let files_read: Vec<_> = files_read.filter_map(|file| file.canonicalize().ok()).collect();
+            check_unread(path, &files_read)?;
+            let at = |file: &MeshFile| scene_folder.join(&file.path);
+            imported.files.iter().try_for_each(|file| check_mesh(&at(file), &files_read, args.force))?;
+            imported.files.iter().try_for_each(|file| write(&at(file), &file.bytes))?;
             write(path, imported.toml.as_bytes())?;
             message(&format!("scene: {}", path.display()));
         }
     }
     Ok(Exit::Ok)
+}
+
+/// Refuses to write over a file that the model was read from.
+fn check_unread(path: &Path, files_read: &[PathBuf]) -> anyhow::Result<()> {
+    match path.canonicalize().is_ok_and(|path| files_read.contains(&path)) {
+        true => Err(BadInput(format!("{} is read; expected another --out", path.display())).into()),
+        false => Ok(()),
+    }
+}
+
+/// Refuses a mesh where a link leads elsewhere, or where a file is that may not be written over.
+fn check_mesh(path: &Path, files_read: &[PathBuf], force: bool) -> anyhow::Result<()> {
+    let refuse = |path: &Path, what: &str| Err(BadInput(format!("{} {what}", path.display())).into());
+    let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty());
+    if let Some(link) = folder.into_iter().chain([path]).find(|path| path.is_symlink()) {
+        return refuse(link, "is a link; expected a folder or file of its own for meshes");
+    }
+    check_unread(path, files_read)?;
+    match std::fs::symlink_metadata(path) {
+        Ok(_) if !force => refuse(path, "exists already; --force overwrites it, --out FILE names another scene"),
+        Ok(about) if !about.is_file() => refuse(path, "is no plain file"),
+        _ => Ok(()),
+    }
 }
 
 /// Writes a file, and the folder that it is in where there is none.

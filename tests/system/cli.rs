@@ -127,6 +127,20 @@ fn import_writes_the_meshes_that_scenes_do_not_read_and_its_list_as_json() {
     let done = metachron(&["import", &path("r.urdf"), "--json", "--force", "--out", &path("scene.toml")]);
     let list: serde_json::Value = serde_json::from_slice(&done.stdout).unwrap();
     assert!(code(&done) == 0 && list["overlaps"].as_array().unwrap().is_empty(), "{list}");
+    // neither a mesh that is there nor the model is written over, and no link is followed
+    std::fs::remove_file(path("scene.toml")).unwrap();
+    let refused = |out: &str, force: &[&str], why: &str| {
+        let done = metachron(&[&["import", &path("r.urdf"), "--out", &path(out)][..], force].concat());
+        assert!(code(&done) == 2 && err(&done).contains(why), "{out}: {}", err(&done));
+    };
+    refused("scene.toml", &[], "t.obj exists already; --force overwrites it");
+    refused("r.urdf", &["--force"], "r.urdf is read; expected another --out");
+    #[cfg(unix)]
+    {
+        std::os::unix::fs::symlink(path("scene-meshes"), path("other-meshes")).unwrap();
+        refused("other.toml", &["--force"], "other-meshes is a link");
+    }
+    assert!(!std::path::Path::new(&path("scene.toml")).exists());
 }
 
 #[test]

@@ -37,19 +37,24 @@ impl Model {
     }
 
     /// Adds the pairs that no joint connects itself, and that are on bodies which one does, or on one body: a body is all that fixed joints make of
-    /// links, with those without mass that carry it. Shapes overlap there, as those of connected links do.
+    /// links, with those without mass that carry it. Shapes overlap there, as those of connected links do. All of one robot: two that stand on the
+    /// world collide.
     pub(crate) fn pass_neighbours(&mut self) {
-        let bodies = self.bodies();
-        // the body that a body hangs on
-        let host = |body: Option<usize>| Some(self.above(body?)?.parent.and_then(|parent| bodies[parent]));
+        let above: Vec<Option<&Joint>> = self.above().into_iter().map(|joint| Some(&self.joints[joint?])).collect();
+        let bodies = self.bodies(&above);
+        // the body that each hangs on
+        let hosts: Vec<_> =
+            above.iter().map(|joint| Some((*joint)?.parent.and_then(|parent| bodies[parent]))).collect();
+        let host = |body: Option<usize>| hosts[body?];
         let meets = |one: Option<usize>, other: Option<usize>| {
             one == other || host(one) == Some(other) || host(other) == Some(one)
         };
         let jointed = |a: usize, b: usize| {
-            let between = |child: usize, parent: usize| self.above(child).is_some_and(|j| j.parent == Some(parent));
+            let between = |child: usize, parent: usize| above[child].is_some_and(|j| j.parent == Some(parent));
             between(a, b) || between(b, a)
         };
         let pairs = (0..self.links.len()).flat_map(|b| (0..b).map(move |a| [a, b]));
+        let pairs = pairs.filter(|[a, b]| self.links[*a].root == self.links[*b].root);
         let pairs = pairs.filter(|[a, b]| meets(bodies[*a], bodies[*b]) && !jointed(*a, *b));
         let name = |link: usize| self.links[link].name.clone();
         let mut found: Vec<[String; 2]> = pairs.map(|pair| pair.map(name)).collect();
@@ -63,17 +68,13 @@ impl Model {
     }
 
     /// For each link the first link of its body; none is the world.
-    fn bodies(&self) -> Vec<Option<usize>> {
+    fn bodies(&self, above: &[Option<&Joint>]) -> Vec<Option<usize>> {
         let mut bodies: Vec<Option<usize>> = Vec::with_capacity(self.links.len());
-        for link in 0..self.links.len() {
+        for (link, above) in above.iter().enumerate() {
             let is_lent = |joint: &&Joint| joint.parent.is_some_and(|parent| self.links[parent].is_lent);
-            let welded = self.above(link).filter(|joint| joint.kind == Kind::Fixed || is_lent(joint));
+            let welded = above.filter(|joint| joint.kind == Kind::Fixed || is_lent(joint));
             bodies.push(welded.map_or(Some(link), |joint| joint.parent.and_then(|parent| bodies[parent])));
         }
         bodies
-    }
-
-    fn above(&self, link: usize) -> Option<&Joint> {
-        self.joints.iter().find(|joint| joint.child == link)
     }
 }

@@ -6,19 +6,21 @@
 use glam::{DMat4, DQuat, DVec3};
 use roxmltree::{Document, Node};
 use std::collections::BTreeMap;
+use std::rc::Rc;
 
 /// Deepest nesting of nodes, those included that others name.
 const DEPTH_MAX: usize = 64;
-/// Most nodes of a file, each as often as others name it.
-const NODES_MAX: usize = 100_000;
-/// Most points of a file.
+/// Most elements of a file, each as often as others name it.
+const ELEMENTS_MAX: usize = 1_000_000;
+/// Most points of a file, each as often as others name it.
 const POINTS_MAX: usize = 3_000_000;
 
 /// Reads a file.
 pub(crate) fn read(text: &str) -> Result<Vec<DVec3>, String> {
     let document = Document::parse(text).map_err(|why| format!("it is no XML: {why}"))?;
     let named = document.descendants().filter_map(|node| Some((node.attribute("id")?, node)));
-    let mut reader = Reader { named: named.collect(), points: Vec::new(), nodes: 0 };
+    let mut reader =
+        Reader { named: named.collect(), points: Vec::new(), sources: BTreeMap::new(), elements: 0, read: 0 };
     let unit = document.descendants().find(|node| is(node, "unit"));
     let metres = unit.and_then(|unit| unit.attribute("meter")?.parse().ok()).unwrap_or(1.0);
     let scale = DMat4::from_scale(DVec3::splat(metres));
@@ -42,7 +44,12 @@ fn is(node: &Node<'_, '_>, tag: &str) -> bool {
 struct Reader<'a, 'i> {
     named: BTreeMap<&'a str, Node<'a, 'i>>,
     points: Vec<DVec3>,
-    nodes: usize,
+    /// The points of sources that have been read, by the numbers of their elements.
+    sources: BTreeMap<usize, Rc<[DVec3]>>,
+    /// How many elements have been looked at.
+    elements: usize,
+    /// How many points have been read.
+    read: usize,
 }
 
 impl<'a, 'i> Reader<'a, 'i> {
@@ -52,8 +59,8 @@ impl<'a, 'i> Reader<'a, 'i> {
 
     /// A node: its motions in their order, then what is in it.
     fn node(&mut self, node: Node<'a, 'i>, above: DMat4, depth: usize) -> Result<(), String> {
-        self.nodes += 1;
-        if depth > DEPTH_MAX || self.nodes > NODES_MAX {
+        self.elements += node.children().count() + 1;
+        if depth > DEPTH_MAX || self.elements > ELEMENTS_MAX {
             return Err("its nodes are too many or nested too deeply".to_owned());
         }
         let children = || node.children().filter(Node::is_element);
@@ -81,23 +88,53 @@ impl<'a, 'i> Reader<'a, 'i> {
 
     /// The points of a geometry: those that its `vertices` name as positions.
     fn geometry(&mut self, geometry: Node<'a, 'i>, place: DMat4) -> Result<(), String> {
+        self.elements += geometry.descendants().count();
+        if self.elements > ELEMENTS_MAX {
+            return Err("its geometries are too many".to_owned());
+        }
         let vertices = geometry.descendants().filter(|node| is(node, "vertices"));
         let inputs = vertices.flat_map(|vertices| vertices.children());
         for input in inputs.filter(|input| input.attribute("semantic") == Some("POSITION")) {
             let source = self.named(input, "source").ok_or("its positions are of a source that there is none of")?;
-            let part = |name: &str| source.descendants().find(|node| is(node, name));
-            let array = part("float_array").ok_or("a source of positions has no numbers")?;
-            let number = |key: &str| part("accessor").and_then(|a| a.attribute(key)?.parse::<usize>().ok());
-            let (stride, offset) = (number("stride").unwrap_or(3).max(3), number("offset").unwrap_or(0));
-            let all = numbers(array)?;
-            let points = all.get(offset..).unwrap_or_default().chunks(stride).filter(|point| point.len() >= 3);
-            self.points.extend(points.map(|p| place.transform_point3(DVec3::new(p[0], p[1], p[2]))));
-            if self.points.len() > POINTS_MAX {
+            let points = self.source(source)?;
+            if self.points.len() + points.len() > POINTS_MAX {
                 return Err(format!("it has more than {POINTS_MAX} points"));
             }
+            self.points.extend(points.iter().map(|point| place.transform_point3(*point)));
         }
         Ok(())
     }
+
+    /// The points of a source, which is read once.
+    fn source(&mut self, source: Node<'a, 'i>) -> Result<Rc<[DVec3]>, String> {
+        if let Some(known) = self.sources.get(&source.id().get_usize()) {
+            return Ok(known.clone());
+        }
+        let points: Rc<[DVec3]> = points_of(source)?.into();
+        self.read += points.len();
+        if self.read > POINTS_MAX {
+            return Err(format!("it has more than {POINTS_MAX} points"));
+        }
+        self.sources.insert(source.id().get_usize(), points.clone());
+        Ok(points)
+    }
+}
+
+/// The points that a source has, as its accessor counts them.
+fn points_of(source: Node<'_, '_>) -> Result<Vec<DVec3>, String> {
+    let part = |name: &str| source.descendants().find(|node| is(node, name));
+    let all = numbers(part("float_array").ok_or("a source of positions has no numbers")?)?;
+    let accessor = part("accessor");
+    let number = |key: &str| accessor.and_then(|a| a.attribute(key)?.parse::<usize>().ok());
+    let (stride, offset) = (number("stride").unwrap_or(3), number("offset").unwrap_or(0));
+    let wrong = || format!("its positions from {offset} by {stride} are not in {} numbers", all.len());
+    let own = all.get(offset..).filter(|_| stride >= 3).ok_or_else(wrong)?;
+    let count = number("count").unwrap_or(own.len() / stride);
+    let last = count.checked_sub(1).map(|last| last.checked_mul(stride).and_then(|at| at.checked_add(3)));
+    if last.is_some_and(|end| end.is_none_or(|end| end > own.len())) {
+        return Err(wrong());
+    }
+    Ok(own.chunks(stride).take(count).map(|p| DVec3::new(p[0], p[1], p[2])).collect())
 }
 
 /// The motion that an element of a node is.

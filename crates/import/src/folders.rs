@@ -95,7 +95,7 @@ impl Folders<'_> {
     }
 
     /// A file's path from the folder of the scene, with `/` between its parts.
-    fn relative(&self, file: &Path) -> Option<String> {
+    pub(crate) fn relative(&self, file: &Path) -> Option<String> {
         let (file, scene) = (plain(file)?, plain(self.scene)?);
         let common = file.iter().zip(&scene).take_while(|(a, b)| a == b).count();
         // on another drive
@@ -122,7 +122,7 @@ fn absolute(path: &Path) -> Option<PathBuf> {
 }
 
 /// A path from the root, without `.` and `..`.
-fn plain(path: &Path) -> Option<PathBuf> {
+pub(crate) fn plain(path: &Path) -> Option<PathBuf> {
     let mut plain = PathBuf::new();
     for part in absolute(path)?.components() {
         match part {

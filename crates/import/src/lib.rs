@@ -105,7 +105,7 @@ fn of_urdf<'a>(root: &xml::Element, folders: Folders<'a>, options: &Options<'a>)
     let mut notes = Vec::new();
     let mut model = urdf::read(root, options.meshes(folders), &mut notes)?;
     if let Some(srdf) = options.srdf {
-        srdf::read(srdf, &mut model)?;
+        srdf::read(srdf, &mut model, &mut notes)?;
     }
     root.list_unread(&urdf::HARMLESS, &mut notes);
     imported(model, options, notes)
@@ -113,6 +113,9 @@ fn of_urdf<'a>(root: &xml::Element, folders: Folders<'a>, options: &Options<'a>)
 
 fn of_mjcf<'a>(mut root: xml::Element, folders: Folders<'a>, options: &Options<'a>) -> Result<Imported, ImportError> {
     let mut notes = Vec::new();
+    if options.srdf.is_some() {
+        notes.push(root.note("the SRDF file is not read: it is one of a URDF robot").harmless());
+    }
     mjcf::include(&mut root, folders, &mut notes)?;
     mjcf::resolve_defaults(&mut root)?;
     let model = mjcf::read(&root, options.key, options.meshes(folders), &mut notes)?;

@@ -3,7 +3,7 @@
 //! In: a [`Model`] as the file has it. Out: the same where what moves weighs something, and moments are those of bodies; all that was changed is
 //! noted. Never here: shapes that are touched.
 
-use crate::imported::LeftOut;
+use crate::imported::{ImportError, LeftOut};
 use crate::model::{Kind, Link, Mass, Model, Part, Shape};
 use crate::pose::Pose;
 use glam::{DMat3, DVec3};
@@ -19,6 +19,8 @@ const MASS_MIN_KG: f64 = 1e-9;
 const LEAST: f64 = 1e-9;
 /// How much of the sum the triangle inequality may be missed by: files write few digits.
 const SLACK: f64 = 2e-4;
+/// How often what is added to moments is doubled: from 1e-4 of the largest to far beyond it.
+const DOUBLINGS: i32 = 32;
 
 /// A mass with its mean moment of inertia.
 #[derive(Debug, Clone, Copy)]
@@ -31,17 +33,19 @@ struct Weight {
 /// such links between them.
 pub(crate) fn lend(model: &mut Model, notes: &mut Vec<LeftOut>) {
     let weights: Vec<Option<Weight>> = model.links.iter().map(weight).collect();
-    for at in 0..model.links.len() {
-        let joint = model.joints.iter().find(|joint| joint.child == at);
-        let Some(com_m) = joint
+    for (at, above) in model.above().into_iter().enumerate() {
+        if !matches!(model.links[at].mass, Mass::None) {
+            continue;
+        }
+        let Some(com_m) = above
+            .map(|joint| &model.joints[joint])
             .filter(|joint| joint.kind != Kind::Fixed)
             .map(|joint| joint.anchor_m)
             .or(model.links[at].is_free.then_some(DVec3::ZERO))
         else {
             continue;
         };
-        let is_massless = matches!(model.links[at].mass, Mass::None);
-        let Some((carried, weight)) = carried(model, at, &weights).filter(|_| is_massless) else { continue };
+        let Some((carried, weight)) = carried(model, at, &weights) else { continue };
         let what = format!("has no mass, and moves: a thousandth of that of `{}` is added", model.links[carried].name);
         let link = &mut model.links[at];
         notes.push(link.place.note(what));
@@ -57,7 +61,12 @@ pub(crate) fn lend(model: &mut Model, notes: &mut Vec<LeftOut>) {
 /// The first link with a mass that hangs on a link, through others without one.
 fn carried(model: &Model, at: usize, weights: &[Option<Weight>]) -> Option<(usize, Weight)> {
     let mut open = vec![at];
+    // joints that close loops reach a link by several ways
+    let mut seen = vec![false; weights.len()];
     while let Some(link) = open.pop() {
+        if std::mem::replace(&mut seen[link], true) {
+            continue;
+        }
         for joint in model.joints.iter().filter(|joint| joint.parent == Some(link)) {
             match weights[joint.child] {
                 Some(weight) => return Some((joint.child, weight)),
@@ -136,24 +145,34 @@ pub(crate) fn ball(link: &Link, at_m: DVec3, radius_m: f64) -> Part {
 }
 
 /// Adds to all three moments of inertia of a link as little as makes them those of a body.
-pub(crate) fn repair(link: &mut Link, notes: &mut Vec<LeftOut>) {
-    let Mass::Given { mass_kg, inertia_kg_m2: Some(tensor), .. } = &mut link.mass else { return };
+///
+/// # Errors
+/// For moments that nothing makes those of a body: they or their sum are not finite.
+pub(crate) fn repair(link: &mut Link, notes: &mut Vec<LeftOut>) -> Result<(), ImportError> {
+    let Mass::Given { mass_kg, inertia_kg_m2: Some(tensor), .. } = &mut link.mass else { return Ok(()) };
     if is_of_a_body(*tensor) {
-        return;
+        return Ok(());
     }
     let scale = tensor.to_cols_array().iter().fold(0.0_f64, |most, value| most.max(value.abs()));
-    let mut added = if scale > 0.0 { 1e-4 * scale } else { 0.4 * *mass_kg * STAND_IN_M * STAND_IN_M };
-    while !is_of_a_body(*tensor + DMat3::from_diagonal(DVec3::splat(added))) {
-        added *= 2.0;
-    }
-    *tensor += DMat3::from_diagonal(DVec3::splat(added));
+    let least = if scale > 0.0 { 1e-4 * scale } else { 0.4 * *mass_kg * STAND_IN_M * STAND_IN_M };
+    let raised = |by: f64| *tensor + DMat3::from_diagonal(DVec3::splat(by));
+    let Some(added) = (0..DOUBLINGS).map(|i| least * 2.0_f64.powi(i)).find(|by| is_of_a_body(raised(*by))) else {
+        return Err(link.place.wrong("has moments of inertia that no body can have; expected some with a finite sum"));
+    };
+    *tensor = raised(added);
     let what = format!("has moments of inertia that no body has: {added:.3e} kg·m² is added to each");
     notes.push(link.place.note(what));
+    Ok(())
 }
 
 /// Whether all principal moments are above zero, and none is larger than the sum of the others.
 fn is_of_a_body(tensor: DMat3) -> bool {
     let sum = tensor.diagonal().element_sum();
+    if !(sum > 0.0 && sum.is_finite()) {
+        return false;
+    }
+    // products of large or small moments would be beyond all numbers
+    let (tensor, sum) = (tensor * sum.recip(), 1.0);
     let shifted = |by: f64| DMat3::from_diagonal(DVec3::splat(by));
     is_positive(tensor - shifted(LEAST * sum)) && is_positive(shifted(0.5 * sum * (1.0 + SLACK)) - tensor)
 }
@@ -183,7 +202,7 @@ mod tests {
             is_lent: false,
         };
         let mut notes = Vec::new();
-        repair(&mut link, &mut notes);
+        repair(&mut link, &mut notes).unwrap();
         let Mass::Given { inertia_kg_m2: Some(tensor), .. } = link.mass else { panic!("the mass is gone") };
         (tensor.diagonal(), notes.len())
     }

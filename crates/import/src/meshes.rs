@@ -3,17 +3,20 @@
 //! In: names of files with their scale, points, ellipsoids. Out: shapes, and the files that the scene needs. Never here: files that are opened or
 //! written (the caller does), what a mesh is on.
 
-use crate::folders::{Folders, extension};
+use crate::folders::{Folders, extension, plain};
 use crate::imported::{ImportError, MeshFile};
 use crate::model::Shape;
 use crate::xml::Element;
 use crate::{dae, msh};
 use glam::DVec3;
 use metachron_geometry::{Triangles, hull_triangles};
-use std::collections::BTreeMap;
+use std::cell::RefCell;
+use std::collections::{BTreeMap, BTreeSet};
 use std::fmt::Write;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
+/// Farthest coordinate of a mesh, metres: that of scenes.
+const FAR_M: f64 = 1e5;
 /// How often an edge of an octahedron is divided for an ellipsoid: its hull is within 0.4 % of it.
 const ELLIPSOID_DIVISIONS: i32 = 16;
 
@@ -26,16 +29,20 @@ pub(crate) struct Meshes<'a> {
     /// Whether files that the scene could name where they are become new ones, too.
     copies: bool,
     files: Vec<MeshFile>,
+    /// The files that the model names, from the folder of the scene: no new one is written over them.
+    named: BTreeSet<String>,
     /// The new files by what they were made of.
     made: BTreeMap<String, String>,
     /// What new files were made of, by their paths.
     surfaces: BTreeMap<String, Triangles>,
+    /// What files have, or why it cannot be read: parts that name one file read it once.
+    read: RefCell<BTreeMap<PathBuf, Result<Triangles, String>>>,
 }
 
 impl<'a> Meshes<'a> {
     pub(crate) fn new(folders: Folders<'a>, folder: &'a str, copies: bool) -> Self {
         let (files, made, surfaces) = (Vec::new(), BTreeMap::new(), BTreeMap::new());
-        Self { folders, folder, copies, files, made, surfaces }
+        Self { folders, folder, copies, files, named: BTreeSet::new(), made, surfaces, read: RefCell::default() }
     }
 
     pub(crate) fn finish(self) -> Vec<MeshFile> {
@@ -58,12 +65,13 @@ impl<'a> Meshes<'a> {
             return Ok(Err("expected a .glb, .stl, .obj, .dae or MuJoCo's .msh".to_owned()));
         }
         let path = self.folders.find(element, name)?;
+        self.named.extend(self.folders.relative(&path));
         let [x, y, z] = scale;
         if is_scenes && x > 0.0 && x == y && y == z {
-            let file = if self.copies { self.copy(&path) } else { Ok(self.folders.in_scene(element, name, &path)?) };
+            let file = if self.copies { self.copy(&path) } else { self.in_place(element, name, &path)? };
             return Ok(file.map(|file| Shape::Hull { file, scale: x }));
         }
-        let key = format!("{} {scale:?}", path.display());
+        let key = format!("{} {scale:?}", plain(&path).as_ref().unwrap_or(&path).display());
         if let Some(file) = self.made.get(&key) {
             return Ok(Ok(Shape::Hull { file: file.clone(), scale: 1.0 }));
         }
@@ -101,21 +109,39 @@ impl<'a> Meshes<'a> {
     }
 
     fn read(&self, path: &Path) -> Result<Triangles, String> {
+        let key = plain(path).unwrap_or_else(|| path.to_owned());
+        self.read.borrow_mut().entry(key).or_insert_with(|| self.read_anew(path)).clone()
+    }
+
+    fn read_anew(&self, path: &Path) -> Result<Triangles, String> {
         let read = self.folders.read.ok_or("no file is read here")?;
         let bytes = read(path).map_err(|why| why.to_string())?;
-        match extension(&path.to_string_lossy()).as_str() {
+        let surface = match extension(&path.to_string_lossy()).as_str() {
             "dae" => {
                 let text = std::str::from_utf8(&bytes).map_err(|why| why.to_string())?;
-                Ok(Triangles { points: dae::read(text)?, triangles: Vec::new() })
+                Triangles { points: dae::read(text)?, triangles: Vec::new() }
             }
-            "msh" => msh::read(&bytes),
-            _ => self.folders.surface.ok_or("no mesh is read here")?(&bytes),
+            "msh" => msh::read(&bytes)?,
+            _ => self.folders.surface.ok_or("no mesh is read here")?(&bytes)?,
+        };
+        match surface.points.iter().position(|point| !point.is_finite()) {
+            Some(bad) => Err(format!("point {} is not finite", bad + 1)),
+            None => Ok(surface),
         }
+    }
+
+    /// The path of a file that the scene names where it is, or why it cannot.
+    fn in_place(&self, element: &Element, name: &str, path: &Path) -> Result<Result<String, String>, ImportError> {
+        let file = self.folders.in_scene(element, name, path)?;
+        if self.files.iter().any(|new| new.path.eq_ignore_ascii_case(&file)) {
+            return Ok(Err("a new mesh would be written over it; expected it in another folder".to_owned()));
+        }
+        Ok(Ok(file))
     }
 
     /// A new file with the bytes of another.
     fn copy(&mut self, path: &Path) -> Result<String, String> {
-        let key = path.display().to_string();
+        let key = plain(path).as_deref().unwrap_or(path).display().to_string();
         if let Some(file) = self.made.get(&key) {
             return Ok(file.clone());
         }
@@ -133,6 +159,9 @@ impl<'a> Meshes<'a> {
     fn add(&mut self, key: String, stem: &str, surface: Triangles) -> Result<Shape, String> {
         if let Some(file) = self.made.get(&key) {
             return Ok(Shape::Hull { file: file.clone(), scale: 1.0 });
+        }
+        if let Some(bad) = surface.points.iter().position(|point| point.abs().max_element() > FAR_M) {
+            return Err(format!("point {} is more than {FAR_M:.0} m from its origin", bad + 1));
         }
         let hull = hull_triangles(&surface.points).map_err(|why| why.to_string())?;
         let mut text = String::new();
@@ -157,7 +186,8 @@ impl<'a> Meshes<'a> {
     fn unused(&self, stem: &str, kind: &str) -> String {
         let stem = stem.replace(['/', '\\'], "-");
         let more = (2..).map(|i| format!("{}/{stem}-{i}.{kind}", self.folder));
-        let is_new = |path: &String| !self.files.iter().any(|file| file.path.eq_ignore_ascii_case(path));
+        let taken = || self.files.iter().map(|file| &file.path).chain(&self.named);
+        let is_new = |path: &String| !taken().any(|file| file.eq_ignore_ascii_case(path));
         let first = format!("{}/{stem}.{kind}", self.folder);
         std::iter::once(first.clone()).chain(more).find(is_new).unwrap_or(first)
     }

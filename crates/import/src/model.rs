@@ -7,6 +7,7 @@ use crate::place::Place;
 use crate::pose::Pose;
 use glam::{DMat3, DVec3};
 use metachron_geometry::Solid;
+use std::collections::BTreeSet;
 
 /// What a file describes.
 #[derive(Debug, Default)]
@@ -231,6 +232,34 @@ pub(crate) enum Motor {
     Damper { velocity: f64, damping: f64, max_effort: Option<f64> },
     /// Dry friction.
     Brake { max_effort: f64 },
+}
+
+impl Model {
+    /// For each link the joint that it hangs on, by number: the first of those that hold it, as others close loops.
+    pub(crate) fn above(&self) -> Vec<Option<usize>> {
+        let mut above = vec![None; self.links.len()];
+        for (at, joint) in self.joints.iter().enumerate().rev() {
+            above[joint.child] = Some(at);
+        }
+        above
+    }
+
+    /// Drops the meshes that no part names.
+    pub(crate) fn drop_unnamed_files(&mut self) {
+        let parts = self.links.iter().flat_map(|link| &link.parts).chain(self.fixed.iter().map(|fixed| &fixed.part));
+        let named: BTreeSet<&str> = parts.filter_map(|part| part.shape.file()).collect();
+        self.files.retain(|file| named.contains(file.path.as_str()));
+    }
+}
+
+impl Shape {
+    /// The file that it names.
+    fn file(&self) -> Option<&str> {
+        match self {
+            Self::Solid(_) => None,
+            Self::Hull { file, .. } | Self::Ellipsoid { file, .. } => Some(file),
+        }
+    }
 }
 
 impl Kind {

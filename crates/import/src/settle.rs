@@ -30,9 +30,10 @@ pub(crate) fn settle(mut model: Model, fixed_base: bool, notes: &mut Vec<LeftOut
     if fixed_base {
         fix_bases(&mut model);
     }
+    let above = model.above();
     let mut fates: Vec<Fate> = Vec::with_capacity(model.links.len());
     for (at, link) in model.links.iter().enumerate() {
-        let joint = model.joints.iter().find(|joint| joint.child == at);
+        let joint = above[at].map(|joint| &model.joints[joint]);
         let own = fate(link, joint, &fates, &model)?;
         if let Some(joint) = joint.filter(|joint| own != Fate::Itself && joint.kind != Kind::Fixed) {
             notes.push(link.place.note(format!("has no mass, and carries none: {} is fixed", joint.place.label)));
@@ -54,13 +55,15 @@ pub(crate) fn settle(mut model: Model, fixed_base: bool, notes: &mut Vec<LeftOut
         }
     }
     move_ties(&mut model, &fates, notes);
+    move_joints(&mut model, &fates, notes);
     pass_excluded(&mut model, &fates);
     keep(&mut model, &fates);
     model.pass_neighbours();
     for link in &mut model.links {
-        repair(link, notes);
+        repair(link, notes)?;
         choose_parts(link, notes)?;
     }
+    model.drop_unnamed_files();
     Ok(model)
 }
 
@@ -73,8 +76,8 @@ fn fixed(link: &Link, number: usize, index: usize, part: Part) -> Fixed {
 
 /// Finds for each link the one that all of its tree hangs on.
 fn find_roots(model: &mut Model) {
-    for at in 0..model.links.len() {
-        let parent = model.joints.iter().find(|joint| joint.child == at).and_then(|joint| joint.parent);
+    for (at, above) in model.above().into_iter().enumerate() {
+        let parent = above.and_then(|joint| model.joints[joint].parent);
         model.links[at].root = parent.map_or(at, |parent| model.links[parent].root);
     }
 }
@@ -161,7 +164,33 @@ fn move_ties(model: &mut Model, fates: &[Fate], notes: &mut Vec<LeftOut>) {
     });
 }
 
-/// Leaves the links that remain themselves, and the joints between them.
+/// Brings joints that close loops to the bodies that links become, and leaves of the others those whose link remains itself.
+fn move_joints(model: &mut Model, fates: &[Fate], notes: &mut Vec<LeftOut>) {
+    let Model { links, joints, .. } = model;
+    let host = |link: usize| match fates[link] {
+        Fate::Itself => Some(link),
+        Fate::PartOf(host, _) => Some(host),
+        Fate::World => None,
+    };
+    let mut hangs = vec![false; links.len()];
+    joints.retain_mut(|joint| {
+        // what a link hangs on comes first
+        if !std::mem::replace(&mut hangs[joint.child], true) {
+            return fates[joint.child] == Fate::Itself;
+        }
+        let [one, other] = [host(joint.child), joint.parent.and_then(host)];
+        let Some(child) = one.max(other).filter(|_| one != other) else {
+            notes.push(joint.place.note("is left out: both of its ends are on one body"));
+            return false;
+        };
+        let at_m = links[joint.child].pose.point(joint.anchor_m);
+        joint.anchor_m = links[child].pose.inverse().point(at_m);
+        (joint.parent, joint.child) = (one.min(other), child);
+        true
+    });
+}
+
+/// Leaves the links that remain themselves.
 fn keep(model: &mut Model, fates: &[Fate]) {
     let mut numbers = Vec::with_capacity(fates.len());
     let mut count = 0;
@@ -174,7 +203,6 @@ fn keep(model: &mut Model, fates: &[Fate]) {
         Fate::PartOf(host, _) => Some(numbers[host]),
         Fate::World => None,
     };
-    model.joints.retain(|joint| fates[joint.child] == Fate::Itself);
     for joint in &mut model.joints {
         (joint.parent, joint.child) = (joint.parent.and_then(standing), numbers[joint.child]);
     }

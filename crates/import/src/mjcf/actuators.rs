@@ -19,12 +19,15 @@ pub(super) fn read(root: &Element, reader: &mut BodyReader<'_>) -> Result<(), Im
     }
     for (number, element) in all.into_iter().enumerate() {
         let Some(law) = Law::of(element)?.filter(|_| element.has("joint")) else {
-            let command = reader.keyframe.as_ref().map_or(0.0, |key| key.control(number));
             let is_force = ["motor", "general", "adhesion"].contains(&element.tag.as_str());
-            let acts = command != 0.0 || !is_force || element.has("biastype");
+            let acts = command(element, number, reader)? != 0.0 || !is_force || element.has("biastype");
             element.read_all_within();
-            let note = element.note("is left out: it gives what a program commands");
-            reader.notes.push(if acts { note } else { note.harmless() });
+            reader.notes.push(match acts {
+                true => {
+                    element.note("is left out: it acts without a program, too, and scenes have servos of joints alone")
+                }
+                false => element.note("is left out: it gives what a program commands").harmless(),
+            });
             continue;
         };
         let name = element.needed("joint")?;
@@ -104,15 +107,34 @@ struct Servo<'a> {
     law: Law,
 }
 
+/// A range of an actuator that bounds something.
+fn range(element: &Element, flag: &str, name: &str, reader: &BodyReader<'_>) -> Result<Option<[f64; 2]>, ImportError> {
+    let limited = match element.text(flag).unwrap_or("auto") {
+        "auto" => reader.compiler.auto_limits,
+        given => given == "true",
+    };
+    Ok(element.numbers::<2>(name)?.filter(|_| limited))
+}
+
+/// What an actuator is commanded at the start: as in `MuJoCo`, its control within its range, which may not have zero in it.
+fn command(element: &Element, number: usize, reader: &mut BodyReader<'_>) -> Result<f64, ImportError> {
+    let given = reader.keyframe.as_ref().map_or(0.0, |key| key.control(number));
+    let bounds = range(element, "ctrllimited", "ctrlrange", reader)?;
+    let command = bounds.map_or(given, |[least, greatest]| given.max(least).min(greatest));
+    if command != given {
+        let what = format!(
+            "is commanded {command} and not {given}, the end of its `ctrlrange`: programs command joints without one"
+        );
+        reader.notes.push(element.note(what));
+    }
+    Ok(command)
+}
+
 /// The motor of a servo, with the spring and damper that its joint has: of two springs a stiffer one that rests between them.
 fn servo(servo: Servo<'_>, reader: &mut BodyReader<'_>, joint: usize, own: Own) -> Result<Motor, ImportError> {
     let Servo { element, number, law } = servo;
     let gear = element.list("gear")?.and_then(|all| all.first().copied()).unwrap_or(1.0);
-    let limited = match element.text("forcelimited").unwrap_or("auto") {
-        "auto" => reader.compiler.auto_limits,
-        given => given == "true",
-    };
-    let force = element.numbers::<2>("forcerange")?.filter(|_| limited);
+    let force = range(element, "forcelimited", "forcerange", reader)?;
     let max_effort = force.map(|[least, greatest]| least.abs().max(greatest.abs()) * gear.abs());
     if force.is_some_and(|[least, greatest]| least != -greatest) {
         reader.notes.push(element.note("gives as much either way: `forcerange` is not the same both ways"));
@@ -123,7 +145,7 @@ fn servo(servo: Servo<'_>, reader: &mut BodyReader<'_>, joint: usize, own: Own) 
             .push(element.note("bounds the joint's own spring and damper, too: a motor has one greatest effort"));
     }
     // of an actuator, whose length is that of its joint times its gear
-    let command = law.gain * reader.keyframe.as_ref().map_or(0.0, |key| key.control(number)) + law.bias;
+    let command = law.gain * command(element, number, reader)? + law.bias;
     let of_servo = law.stiffness * gear * gear;
     let (stiffness, damping) = (of_servo + own.stiffness, law.damping * gear * gear + own.damping);
     if stiffness > 0.0 {

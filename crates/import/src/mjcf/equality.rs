@@ -21,14 +21,21 @@ pub(super) fn read(root: &Element, reader: &mut BodyReader<'_>) -> Result<(), Im
         let kind = match element.tag.as_str() {
             "connect" if element.has("body1") && element.has("anchor") => Kind::Spherical,
             "weld" if element.has("body1") => Kind::Fixed,
-            _ => {
+            tag => {
                 element.read_all_within();
-                let what = "is left out: scenes have joints between two bodies, and nothing that couples joints";
-                reader.notes.push(element.note(what));
+                reader.notes.push(element.note(match tag {
+                    "connect" | "weld" => {
+                        "is left out: it is between sites; expected `body1`, and of `connect` an `anchor`"
+                    }
+                    _ => "is left out: scenes have joints between two bodies, and nothing that couples joints",
+                }));
                 continue;
             }
         };
         let [first, second] = [body(element.read(), "body1", reader)?, body(element, "body2", reader)?];
+        if first.is_some() && first == second {
+            return Err(element.wrong("holds a body to itself; expected two bodies"));
+        }
         // in the first body
         let anchor_m = element.numbers("anchor")?.map_or(DVec3::ZERO, DVec3::from_array);
         let at_m = first.map_or(anchor_m, |link| reader.model.links[link].pose.point(anchor_m));
@@ -43,6 +50,9 @@ pub(super) fn read(root: &Element, reader: &mut BodyReader<'_>) -> Result<(), Im
             Kind::Fixed => DVec3::ZERO,
             _ => reader.model.links[child].pose.inverse().point(at_m),
         };
+        if reader.keyframe.is_some() {
+            reader.notes.push(element.note("holds its bodies as they start, not as they are without the keyframe"));
+        }
         let name = element.text("name").unwrap_or_default().to_owned();
         let weld = Joint::weld(element.place.clone(), parent, child);
         reader.model.joints.push(Joint { name, kind, anchor_m, ..weld });

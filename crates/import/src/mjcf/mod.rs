@@ -36,7 +36,7 @@ pub(crate) const HARMLESS: Harmless = Harmless {
         integrator solver iterations tolerance ls_iterations ls_tolerance noslip_iterations noslip_tolerance \
         mpr_iterations mpr_tolerance ccd_iterations ccd_tolerance sdf_iterations sdf_initpoints jacobian apirate magnetic \
         energy fwdinv sensor sensornoise multiccd warmstart island fluidshape fluidcoef maxhullvert content_type \
-        smoothnormal refpos refquat ctrlrange ctrllimited model",
+        smoothnormal refpos refquat model",
 };
 
 /// Reads a model, which starts from the keyframe `key`.

@@ -1,5 +1,6 @@
 //! Imported models against closed forms, and against what MuJoCo makes of the same file.
 
+mod hostile;
 mod mjcf;
 mod overlaps;
 mod play;

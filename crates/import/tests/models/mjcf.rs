@@ -376,7 +376,7 @@ fn what_changes_the_motion_comes_first_and_zeros_change_none() {
             "line 2: joint `hinge`: `armature` is left out: scenes have no inertia about the axis of a joint",
             "line 2: joint `hinge`: `frictionloss` is left out: a joint of a scene has a spring and damper, or friction",
             "line 4: body `a`, geom: `solref` is left out",
-            "line 5: actuator, muscle: is left out: it gives what a program commands",
+            "line 5: actuator, muscle: is left out: it acts without a program, too, and scenes have servos of joints alone",
         ]
     );
     assert_eq!(

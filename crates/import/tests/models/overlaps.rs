@@ -80,6 +80,17 @@ fn pairs_of_an_srdf_do_not_collide_and_links_that_the_robot_has_not_are_none() {
     let srdf = r#"<robot name="chain"><group name="arm"><link name="1"/></group>
         <disable_collisions link1="3" link2="1" reason="Never"/><disable_collisions link1="3" link2="tool"/></robot>"#;
     assert_eq!(apart(&import(&chain(HEAVY, &[0.0, 1.0, 2.0, 3.0]), Some(srdf))), [["3", "1"]]);
+    let more = r#"<robot><virtual_joint name="v"/><disable_collisions link1="3" link2="tool" reason="Never"/>
+        <disable_default_collisions link="1"/><group name="arm"/></robot>"#;
+    assert_eq!(
+        crate::play::left_out(&import(&chain(HEAVY, &[0.0, 1.0]), Some(more))),
+        [
+            "line 1 of `the SRDF file`: virtual_joint `v`: is left out",
+            "line 2 of `the SRDF file`: disable_default_collisions: is left out",
+            "line 1 of `the SRDF file`: disable_collisions: names `3`, and there is no such link",
+            "line 2 of `the SRDF file`: group `arm`: is left out",
+        ]
+    );
     let options = Options { srdf: Some("<robot><disable_collisions/></robot>"), ..Options::default() };
     let error = model(&chain(HEAVY, &[0.0, 1.0]), Path::new("."), &options).unwrap_err().to_string();
     assert_eq!(error, "line 1 of `the SRDF file`: disable_collisions: has no `link1`");
@@ -98,4 +109,23 @@ fn an_exclude_with_a_body_that_never_moves_is_in_the_scene() {
     assert!(apart(&import(&text.replace("size=\"0.1\"/>\n", "type=\"plane\" size=\"1 1 1\"/>\n"), None)).is_empty());
     // without it they collide, as MuJoCo's filter of parents is not for what is part of the world
     assert!(apart(&import(&text.replace("exclude", "pair"), None)).is_empty());
+}
+
+#[test]
+fn a_robot_collides_with_the_base_of_another() {
+    // both bases are welded to the world, with masses of their own
+    let robot = |name: &str, x: f64| {
+        format!(
+            r#"<body name="{name}" pos="{x} 0 0"><freejoint/><geom size="0.1"/>
+            <body name="{name} arm"><joint/><geom size="0.1" pos="0 0 1"/></body></body>"#
+        )
+    };
+    let text = format!("<mujoco><worldbody>{}{}</worldbody></mujoco>", robot("a", 0.0), robot("b", 1.0));
+    for srdf in [None, Some("<robot/>")] {
+        let options = Options { fixed_base: true, srdf, ..Options::default() };
+        let imported = model(&text, Path::new("."), &options).unwrap();
+        assert!(apart(&imported).is_empty(), "{}", imported.toml);
+        let noted = ["line 1: mujoco: the SRDF file is not read: it is one of a URDF robot"];
+        assert_eq!(crate::play::left_out(&imported), &noted[..srdf.iter().count()]);
+    }
 }

@@ -83,7 +83,11 @@ fn corners_of_text(bytes: &[u8]) -> Result<Vec<[f32; 3]>, String> {
         let corner = parsed.and_then(|all| <[f32; 3]>::try_from(all).ok());
         corners.push(corner.ok_or_else(|| format!("line {number}: a vertex has no three numbers"))?);
     }
-    if corners.len() % 3 == 0 { Ok(corners) } else { Err("its last facet has no three corners".to_owned()) }
+    match corners.len() {
+        0 => Err("its text has no vertex: it is cut short, or no STL file".to_owned()),
+        count if count % 3 == 0 => Ok(corners),
+        _ => Err("its last facet has no three corners".to_owned()),
+    }
 }
 
 #[cfg(test)]
@@ -134,6 +138,7 @@ mod tests {
         }
         for (other, why) in [
             (TEXT.replace("vertex 0 1 0\n", ""), "its last facet has no three corners"),
+            ("solid a\nfacet normal 0 0 1\n".to_owned(), "its text has no vertex: it is cut short, or no STL file"),
             (TEXT.replace("vertex 0 1 0", "vertex 0 1"), "line 6: a vertex has no three numbers"),
         ] {
             assert_eq!(read(other.as_bytes()).unwrap_err(), why);
