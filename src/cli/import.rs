@@ -36,11 +36,7 @@ pub(super) fn command(args: &ImportArgs) -> anyhow::Result<Exit> {
         Folders { model: &model_folder, scene: &scene_folder, read: Some(&read_plain), surface: Some(&read_surface) };
     let text = read(&args.model).map_err(|why| BadInput(format!("{model} cannot be read: {why}")))?;
     let name = args.out.as_ref().map_or_else(|| format!("of {model}"), |path| path.display().to_string());
-    let scene = |imported: &Imported| -> Result<Scene, SceneError> {
-        let files = imported.files.iter().map(|file| (file.path.clone(), file.bytes.clone()));
-        let source = Source::recorded(&name, &imported.toml, Some(&scene_folder))?;
-        load(&source.with_files(files.collect()), &[])
-    };
+    let scene = |imported: &Imported| scene_of(imported, &name, &scene_folder);
     let overlaps = |draft: &Imported| scene(draft).map_or_else(|_| Vec::new(), |scene| overlaps(&scene));
     let srdf = srdf(args)?;
     let stem = out.file_stem().map_or("scene".into(), |stem| stem.to_string_lossy());
@@ -76,14 +72,24 @@ pub(super) fn command(args: &ImportArgs) -> anyhow::Result<Exit> {
             let files_read = files_read.into_inner().into_iter().chain([srdf]);
             let files_read: Vec<_> = files_read.filter_map(|file| file.canonicalize().ok()).collect();
             check_unread(path, &files_read)?;
-            let at = |file: &MeshFile| scene_folder.join(&file.path);
-            imported.files.iter().try_for_each(|file| check_mesh(&at(file), &files_read, args.force))?;
-            imported.files.iter().try_for_each(|file| write(&at(file), &file.bytes))?;
+            write_meshes(&imported.files, &scene_folder, |path| check_mesh(path, &files_read, args.force))?;
             write(path, imported.toml.as_bytes())?;
             message(&format!("scene: {}", path.display()));
         }
     }
     Ok(Exit::Ok)
+}
+
+/// Writes the meshes of a scene into its folder, if each of them may be.
+fn write_meshes(files: &[MeshFile], folder: &Path, check: impl Fn(&Path) -> anyhow::Result<()>) -> anyhow::Result<()> {
+    files.iter().try_for_each(|file| check(&folder.join(&file.path)))?;
+    files.iter().try_for_each(|file| write(&folder.join(&file.path), &file.bytes))
+}
+
+/// What a scene of this text and these files is.
+fn scene_of(imported: &Imported, name: &str, folder: &Path) -> Result<Scene, SceneError> {
+    let files = imported.files.iter().map(|file| (file.path.clone(), file.bytes.clone()));
+    load(&Source::recorded(name, &imported.toml, Some(folder))?.with_files(files.collect()), &[])
 }
 
 /// Refuses to write over a file that the model was read from.

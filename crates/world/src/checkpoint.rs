@@ -368,7 +368,8 @@ mod tests {
         let mark = start().checkpoint().unwrap();
         let mut bytes = mark.to_bytes();
         assert_eq!(Checkpoint::from_bytes(&bytes), Ok(mark));
-        bytes[MAGIC.len()] = 9;
-        assert_eq!(Checkpoint::from_bytes(&bytes), Err(BadCheckpoint::OtherFormat { found: 9 }));
+        let found = FORMAT + 1;
+        bytes[MAGIC.len()] = found as u8;
+        assert_eq!(Checkpoint::from_bytes(&bytes), Err(BadCheckpoint::OtherFormat { found }));
     }
 }

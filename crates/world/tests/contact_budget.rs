@@ -50,8 +50,8 @@ fn dear_factors_end_solves_and_cheap_ones_do_not() {
 #[test]
 fn where_the_budget_ends_solves_steps_are_as_long_as_asked_for() {
     let budgets = [SolveBudget::Exact, SolveBudget::Timed { least_steps: 1 }];
-    // an exact solve takes four or five factors: more than a step lasts
-    let [exact, budget] = budgets.map(|budget| played(&pile(budget, 600.0), Pace::RealTime));
+    // where boxes land an exact solve takes two factors and more, and a step lasts for one
+    let [exact, budget] = budgets.map(|budget| played(&pile(budget, 1900.0), Pace::RealTime));
     assert_eq!(exact.solves.unfinished, 0);
     assert!(budget.solves.unfinished > 20, "{:?}", budget.solves);
     assert!(exact.lengthened > 4 * budget.lengthened, "{} of {} steps", budget.lengthened, exact.lengthened);

@@ -22,7 +22,7 @@ use metachron_geometry::{CollisionShape, Place, Touch};
 use pair::{Against, LOOK_M, Pair, Reaching, closes, taken_up};
 pub(crate) use pair::{Judge, Owner, Round};
 use reach::{Boxes, FAR_M, Meeting, Sought, Sweep, Sweeping};
-use recycled::{Recycled, TwoSolids};
+use recycled::{Recycled, SolidPair, TwoSolids};
 pub use scene::{
     BadDepth, BadLeastSteps, ClusterScene, DEPTH_RANGE_M, LEAST_STEPS_DEFAULT, LEAST_STEPS_RANGE, Passage, SolveBudget,
 };
@@ -257,7 +257,8 @@ impl Search {
             Some(solids) => {
                 let partner = pair.partner(round.all);
                 let known = round.all[pair.member].memory.known(partner);
-                recycled.touches((pair.member, partner), known, (&solids, reach_m), into, find);
+                let pair = SolidPair { member: pair.member, partner, solids, known, reach_m };
+                recycled.touches(&pair, into, find);
             }
             None => find(reach_m, into),
         }

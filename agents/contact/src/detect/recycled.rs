@@ -32,6 +32,17 @@ pub(super) struct TwoSolids {
     radius_m: f64,
 }
 
+/// A pair of solids whose places within `reach_m`, metres, are asked for.
+pub(super) struct SolidPair<'a> {
+    /// The participant that remembers it.
+    pub member: usize,
+    pub partner: Partner,
+    pub solids: TwoSolids,
+    /// What it remembers of places found.
+    pub known: Option<&'a FoundPlaces>,
+    pub reach_m: f64,
+}
+
 /// All places of a pair that were nearer than a reach when it was searched last; none before.
 #[derive(Debug, PartialEq, Default, serde::Serialize, serde::Deserialize)]
 pub(crate) struct FoundPlaces {
@@ -149,16 +160,14 @@ impl Recycled {
         self.touches.clear();
     }
 
-    /// Fills `into` with the places within `reach_m` of the pair of a member with a partner: those known, or else all that `find` gives within the
-    /// reach that it is told.
-    pub fn touches(
+    /// Fills `into` with the places of a pair: those known, or else all that `find` gives within the reach that it is told.
+    pub(super) fn touches(
         &mut self,
-        (member, partner): (usize, Partner),
-        known: Option<&FoundPlaces>,
-        (solids, reach_m): (&TwoSolids, f64),
+        pair: &SolidPair<'_>,
         into: &mut Vec<Touch>,
         find: impl FnOnce(f64, &mut Vec<Touch>),
     ) {
+        let SolidPair { member, partner, ref solids, known, reach_m } = *pair;
         if let Some(known) = known.filter(|known| known.last(solids, reach_m)) {
             let moved = |a: DVec3| solids.first.to_world(known.first.to_local(a));
             refill(into, known.touches.iter().map(|touch| solids.placed(touch, moved)));
@@ -215,8 +224,8 @@ mod tests {
         let (first, second) = (place(DVec3::new(0.005, 0.003, 0.04 + up_m), turn_rad), place(DVec3::ZERO, 0.0));
         let (mut into, mut scratch, mut recycled) = (Vec::new(), NarrowPhaseScratch::default(), Recycled::default());
         let solids = TwoSolids::of(first.view, Some(second.view), 0.07).unwrap();
-        let name = (0, Partner::Agent(AgentId(5)));
-        recycled.touches(name, Some(known), (&solids, reach_m), &mut into, |reach_m, into| {
+        let pair = SolidPair { member: 0, partner: Partner::Agent(AgentId(5)), solids, known: Some(known), reach_m };
+        recycled.touches(&pair, &mut into, |reach_m, into| {
             touches(&first, &second, reach_m, &mut scratch, into);
         });
         let searched = recycled.searched.first().copied();
