@@ -374,9 +374,7 @@ impl AgentRunner {
         wishes.clear();
         wishes.extend(self.wish());
         wishes.extend(self.led.members_at(time).filter_map(Self::wish));
-        let wanted = wishes.iter().map(|wish| (wish.role, wish.step_s));
-        let stepper = self.cluster.as_ref().and_then(|seat| seat.stepper.as_deref());
-        let plan = stepper.map_or_else(|| Plan::of(wanted.clone()), |stepper| stepper.plan_for(wanted.clone()));
+        let plan = Plan::of(wishes.iter().map(|wish| (wish.role, wish.step_s)));
         let macro_s = match span {
             // who is alone goes as far as its clock lets it
             Span::Wanted(span) if wishes.len() == 1 => span.as_secs_f64(),

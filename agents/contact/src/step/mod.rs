@@ -38,7 +38,7 @@ use crate::step::report::Sums;
 pub use doubling::StepDoubling;
 pub use external::{ExternalImpulses, KnownImpulse, LineRow, RemoteImpulse};
 use glam::DVec3;
-use metachron_core::{Archive, ArchiveError, ParallelFor, SimSpan, StepError, Wrench, archive_values, check_span};
+use metachron_core::{Archive, ArchiveError, ParallelFor, SimSpan, StepError, Wrench, check_span};
 use metachron_geometry::narrow_phase::TouchKey;
 pub use plan::Plan;
 pub use report::{ClusterReport, PairTotal};
@@ -74,8 +74,6 @@ pub struct ClusterStepper {
     /// Storage of the places that contacts have taken over in this fine step, and of how their sides are moved.
     taken_over: Vec<(usize, Partner, TouchKey)>,
     moved_m_s: Vec<DVec3>,
-    /// No step of a member is longer in the next macro step, seconds; `None` where each is as long as it wants.
-    most_s: Option<f64>,
     /// The macro step that is made and its fine steps, seconds.
     pub(crate) macro_s: f64,
     pub(crate) fine_s: f64,
@@ -88,7 +86,6 @@ impl ClusterStepper {
     /// [`ArchiveError`] for what is no state of a stepper.
     pub fn archive(&mut self, archive: &mut Archive<'_>) -> Result<(), ArchiveError> {
         self.solver.archive(archive)?;
-        archive_values!(archive, self.most_s)?;
         self.pile.archive(archive)
     }
 
@@ -147,15 +144,11 @@ impl ClusterStepper {
         all.iter_mut().for_each(Participant::let_go);
         self.plan(all, self.macro_s, threads)?;
         self.keep(all);
-        let mut made_again = false;
         // each time at least one member makes twice as many steps, at most 64 times as many as it began with
         loop {
             match self.advance(on, all, dt, &mut report) {
                 Ok(true) => break,
-                Ok(false) => {
-                    made_again = true;
-                    self.go_back(all);
-                }
+                Ok(false) => self.go_back(all),
                 Err(error) => {
                     self.go_back(all);
                     return Err(error);
@@ -163,7 +156,6 @@ impl ClusterStepper {
             }
         }
         self.failures.end(all, self.macro_s);
-        self.note_length(all.iter().map(|one| one.parts).max().unwrap_or(1), made_again);
         report.work = self.progress.iter().map(|state| state.work).sum();
         Ok(report)
     }

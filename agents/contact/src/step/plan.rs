@@ -15,9 +15,6 @@ const PARTS_MAX: u32 = 16;
 /// The most times as many steps that a member makes whose motion strains it too far.
 const DIVIDED_MAX: u32 = 64;
 
-/// Longer than this, seconds, no member wants its steps: a bound above it is none.
-const MOST_S: f64 = 1.0;
-
 /// How many steps of its own each of some bodies makes within a macro step, and how long that is, seconds.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Plan {
@@ -65,22 +62,6 @@ impl Plan {
 }
 
 impl ClusterStepper {
-    /// The plan for members with these roles and wanted steps, seconds, after the macro steps made so far: after one that had to be made again it is
-    /// half as long, but no shorter than a step of the fastest member, and then each time twice as long again.
-    #[must_use]
-    pub fn plan_for(&self, members: impl Iterator<Item = (Role, f64)> + Clone) -> Plan {
-        let most_s = self.most_s.unwrap_or(f64::INFINITY);
-        Plan::of(members.map(|(role, wanted_s)| (role, wanted_s.min(most_s))))
-    }
-
-    /// Notes what the macro step just made, in which the fastest member was to make so many steps, says of the length of the next: what is made again
-    /// is the whole macro step, and of a short one that is less.
-    pub(super) fn note_length(&mut self, planned: u32, made_again: bool) {
-        let longer_s = self.most_s.map(|most_s| 2.0 * most_s).filter(|most_s| *most_s <= MOST_S);
-        let shorter_s = self.macro_s * f64::max(0.5, f64::from(planned).recip());
-        self.most_s = if made_again { Some(shorter_s) } else { longer_s };
-    }
-
     /// Begins the first step of every member, in as many parts as its free motion needs.
     pub(super) fn plan(
         &mut self,
@@ -177,31 +158,5 @@ impl ClusterStepper {
             one.memory.clone_from(kept);
             state.begun_s = 0.0;
         }
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn after_a_macro_step_that_began_again_the_next_is_half_as_long_and_grows_from_there() {
-        let mut stepper = ClusterStepper { macro_s: 0.032, ..ClusterStepper::default() };
-        let wishes = [(Role::Deformable, 0.032), (Role::Rigid, 0.002)];
-        let lengths = |stepper: &ClusterStepper| {
-            let plan = stepper.plan_for(wishes.iter().copied());
-            (plan.macro_s, plan.parts)
-        };
-        assert_eq!(lengths(&stepper), (0.032, 16));
-        stepper.note_length(16, true);
-        assert_eq!(lengths(&stepper), (0.016, 8));
-        stepper.macro_s = 0.016;
-        stepper.note_length(8, false);
-        assert_eq!(lengths(&stepper), (0.032, 16));
-        stepper.macro_s = 0.002;
-        stepper.note_length(1, true);
-        assert_eq!(lengths(&stepper), (0.002, 1), "no member makes shorter steps than it wants");
-        (0..9).for_each(|_| stepper.note_length(1, false));
-        assert_eq!((lengths(&stepper), stepper.most_s), ((0.032, 16), None));
     }
 }

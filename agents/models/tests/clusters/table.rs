@@ -5,7 +5,7 @@ use metachron_contact::constraint::FailedAttachment;
 use metachron_contact::detect::ClusterScene;
 use metachron_contact::joint::Joint;
 use metachron_contact::member::{ContactMemory, Participant, Partner};
-use metachron_contact::step::{ClusterReport, ClusterStepper, PairTotal, StepDoubling};
+use metachron_contact::step::{ClusterReport, ClusterStepper, PairTotal, Plan, StepDoubling};
 use metachron_contact::{Agent, AnchorSpring, Law, Link, Neighbour, StepContext};
 use metachron_core::{AgentId, Anchor, Grip, PlainLoop, SensorTouch, SimSpan, SimTime, Snapshot};
 use metachron_geometry::{Obstacle, Solid};
@@ -182,7 +182,7 @@ impl Table {
         for body in &mut self.bodies {
             wishes.push((body.agent.member().unwrap().role(), 1.0 / body.rate_hz));
         }
-        let plan = self.stepper.plan_for(wishes.iter().copied());
+        let plan = Plan::of(wishes.iter().copied());
         let dt = SimSpan::from_secs_f64(share * plan.macro_s).unwrap();
         let mut all = vec![];
         let mut neighbours = self.published();

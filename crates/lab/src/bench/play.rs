@@ -8,7 +8,7 @@ use glam::DVec3;
 use metachron_contact::detect::ClusterScene;
 use metachron_contact::joint::Joint;
 use metachron_contact::member::{ContactMemory, Participant};
-use metachron_contact::step::{ClusterReport, ClusterStepper};
+use metachron_contact::step::{ClusterReport, ClusterStepper, Plan};
 use metachron_contact::{Agent, StepContext};
 use metachron_core::{AgentId, Body, Grip, PlainLoop, SimSpan, SimTime, Snapshot};
 use metachron_geometry::Obstacle;
@@ -103,7 +103,7 @@ impl Play {
         for body in bodies.iter_mut() {
             wishes.push((body.agent.member().context("a body that touches nothing")?.role(), body.step_s));
         }
-        let plan = stepper.plan_for(wishes.iter().copied());
+        let plan = Plan::of(wishes.iter().copied());
         let dt = SimSpan::from_secs_f64(plan.macro_s).context("the length of a step")?;
         let mut all = Vec::with_capacity(bodies.len());
         for ((id, body), (role, wanted_s)) in (0..).zip(bodies.iter_mut()).zip(wishes) {

@@ -6,7 +6,7 @@
 use glam::DVec3;
 use metachron_contact::detect::ClusterScene;
 use metachron_contact::member::{ContactMemory, Participant, Partner};
-use metachron_contact::step::{ClusterReport, ClusterStepper};
+use metachron_contact::step::{ClusterReport, ClusterStepper, Plan};
 use metachron_contact::{Agent, AnchorSpring, Neighbour, StepContext};
 use metachron_core::{AgentId, Grip, PlainLoop, SimSpan, SimTime, Snapshot, StepError, recycled};
 use metachron_geometry::Obstacle;
@@ -159,7 +159,7 @@ impl StepHarness {
         for actor in actors.iter_mut() {
             roles.extend(actor.agent.member().map(|member| (member.role(), actor.step_s)));
         }
-        let plan = stepper.plan_for(roles.iter().copied());
+        let plan = Plan::of(roles.iter().copied());
         let dt = SimSpan::from_secs_f64(plan.macro_s).map_or(most, |dt| dt.min(most));
         let mut all = recycled(std::mem::take(participants));
         for ((id, actor), (role, step_s)) in (0..).map(AgentId).zip(actors.iter_mut()).zip(roles) {
