@@ -6,13 +6,14 @@
 pub(crate) mod domain;
 mod pair;
 mod reach;
-pub(crate) mod recycled;
+mod recycled;
 mod scene;
 mod sensor;
 mod thinning;
 
 use crate::detect::domain::Domain;
 use crate::lists::refill;
+use crate::member::found_places::TwoSolids;
 use crate::member::memory::{Partner, Spin};
 use crate::member::{ClusterMember, Role};
 use crate::solve::Contact;
@@ -22,7 +23,7 @@ use metachron_geometry::{CollisionShape, Place, Touch};
 use pair::{Against, LOOK_M, Pair, Reaching, closes, taken_up};
 pub(crate) use pair::{Judge, Owner, Round};
 use reach::{Boxes, FAR_M, Meeting, Sought, Sweep, Sweeping};
-use recycled::{Recycled, SolidPair, TwoSolids};
+use recycled::{Recycled, SolidPair};
 pub use scene::{
     BadDepth, BadLeastSteps, ClusterScene, DEPTH_RANGE_M, LEAST_STEPS_DEFAULT, LEAST_STEPS_RANGE, Passage, SolveBudget,
 };

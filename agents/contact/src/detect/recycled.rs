@@ -6,31 +6,14 @@
 
 use crate::lists::refill;
 use crate::member::Participant;
+use crate::member::found_places::{FoundPlaces, Pose, TwoSolids};
 use crate::member::memory::Partner;
-use glam::{DQuat, DVec3};
+use glam::DVec3;
 use metachron_core::SimTime;
-use metachron_geometry::{Place, ShapePose, Touch};
+use metachron_geometry::Touch;
 
-/// How far a point of one solid may have gone against the other since their places were found, metres: less than what has met is apart by.
-const MOVED_M: f64 = 1e-6;
 /// Places are found within so many times the reach that is asked for, as this follows speeds.
 const FURTHER: f64 = 1.25;
-
-/// Where a solid is.
-#[derive(Debug, Clone, Copy, PartialEq, Default, serde::Serialize, serde::Deserialize)]
-struct Pose {
-    position: DVec3,
-    rotation: DQuat,
-}
-
-/// Two solids: the pose of the first in the axes of the second, and that of the second.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct TwoSolids {
-    first: Pose,
-    second: Pose,
-    /// No point of the first is farther from its middle, metres.
-    radius_m: f64,
-}
 
 /// A pair of solids whose places within `reach_m`, metres, are asked for.
 pub(super) struct SolidPair<'a> {
@@ -41,16 +24,6 @@ pub(super) struct SolidPair<'a> {
     /// What it remembers of places found.
     pub known: Option<&'a FoundPlaces>,
     pub reach_m: f64,
-}
-
-/// All places of a pair that were nearer than a reach when it was searched last; none before.
-#[derive(Debug, PartialEq, Default, serde::Serialize, serde::Deserialize)]
-pub(crate) struct FoundPlaces {
-    /// The pose of the first solid then, in the axes of the second.
-    first: Pose,
-    reach_m: f64,
-    /// The places, in the axes of the second solid.
-    touches: Vec<Touch>,
 }
 
 /// The pairs that were searched in a fine step.
@@ -71,86 +44,6 @@ struct Searched {
     reach_m: f64,
     /// How many places it has.
     count: usize,
-}
-
-impl Pose {
-    const HERE: Self = Self { position: DVec3::ZERO, rotation: DQuat::IDENTITY };
-
-    /// `None` of what is no solid.
-    fn of(view: ShapePose<'_>) -> Option<Self> {
-        match view {
-            ShapePose::Solid { position, rotation } => Some(Self { position, rotation }),
-            _ => None,
-        }
-    }
-
-    fn to_world(self, point: DVec3) -> DVec3 {
-        self.position + self.rotation * point
-    }
-
-    fn to_local(self, point: DVec3) -> DVec3 {
-        self.rotation.conjugate() * (point - self.position)
-    }
-}
-
-impl TwoSolids {
-    /// Two placed shapes, the second of a static solid where it is `None`; `None` where one is no solid.
-    pub fn of(first: ShapePose<'_>, second: Option<ShapePose<'_>>, radius_m: f64) -> Option<Self> {
-        let (first, second) = (Pose::of(first)?, second.map_or(Some(Pose::HERE), Pose::of)?);
-        let turned = second.rotation.conjugate() * first.rotation;
-        let first = Pose { position: second.to_local(first.position), rotation: turned };
-        Some(Self { first, second, radius_m })
-    }
-
-    /// How far at most a point of the first has gone against the second since it was at `then`, metres.
-    fn moved_m(&self, then: Pose) -> f64 {
-        let turned = self.first.rotation * then.rotation.conjugate();
-        let angle_rad = 2.0 * DVec3::new(turned.x, turned.y, turned.z).length();
-        self.first.position.distance(then.position) + angle_rad * self.radius_m
-    }
-
-    /// A place in the axes of the second, into the world's; `by` moves what is fixed to the first.
-    fn placed(&self, touch: &Touch, by: impl Fn(DVec3) -> DVec3) -> Touch {
-        let Touch { on_a: Place::Point(a), on_b: Place::Point(b), .. } = *touch else { return *touch };
-        let moved = by(a);
-        Touch {
-            normal: self.second.rotation * touch.normal,
-            gap_m: touch.gap_m + touch.normal.dot(moved - a),
-            on_a: Place::Point(self.second.to_world(moved)),
-            on_b: Place::Point(self.second.to_world(b)),
-            ..*touch
-        }
-    }
-
-    /// A place of the world, in the axes of the second.
-    fn unplaced(&self, touch: &Touch) -> Touch {
-        let local = |place: Place| match place {
-            Place::Point(point) => Place::Point(self.second.to_local(point)),
-            other => other,
-        };
-        let normal = self.second.rotation.conjugate() * touch.normal;
-        Touch { normal, on_a: local(touch.on_a), on_b: local(touch.on_b), ..*touch }
-    }
-}
-
-impl Clone for FoundPlaces {
-    fn clone(&self) -> Self {
-        let Self { first, reach_m, touches } = self;
-        Self { first: *first, reach_m: *reach_m, touches: touches.clone() }
-    }
-
-    // into storage that is there
-    fn clone_from(&mut self, from: &Self) {
-        (self.first, self.reach_m) = (from.first, from.reach_m);
-        self.touches.clone_from(&from.touches);
-    }
-}
-
-impl FoundPlaces {
-    /// Whether they are all within `reach_m` that there are now.
-    fn last(&self, solids: &TwoSolids, reach_m: f64) -> bool {
-        reach_m + MOVED_M <= self.reach_m && solids.moved_m(self.first) < MOVED_M
-    }
 }
 
 impl Recycled {
@@ -199,9 +92,13 @@ impl Recycled {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::member::found_places::MOVED_M;
+    use glam::DQuat;
     use metachron_core::AgentId;
     use metachron_geometry::narrow_phase::{NarrowPhaseScratch, touches};
-    use metachron_geometry::{CollisionShape, ContactTraits, PlacedShape, ShapeKind, Solid, SolidShape};
+    use metachron_geometry::{
+        CollisionShape, ContactTraits, Place, PlacedShape, ShapeKind, ShapePose, Solid, SolidShape,
+    };
 
     /// A box of 4 cm.
     fn form() -> CollisionShape {

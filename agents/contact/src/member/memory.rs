@@ -4,10 +4,10 @@
 //! A pair is remembered by its lower number, so that nothing has to be moved when clusters join or part.
 
 use crate::agent::Link;
-use crate::detect::recycled::FoundPlaces;
 use crate::joint::{Joint, JointKind};
 use crate::lists::entry;
 use crate::member::Slid;
+use crate::member::found_places::FoundPlaces;
 use glam::DVec3;
 use metachron_core::{AgentId, Anchor, ContactPartner, SensorTouch, SimSpan, SimTime};
 use metachron_geometry::narrow_phase::{TouchKey, TouchKind};

@@ -2,6 +2,7 @@
 //!
 //! In: steps, velocities. Out: a matrix, velocities without contact, a skin, how points of it move. Never here: contacts, other bodies.
 
+pub(crate) mod found_places;
 pub(crate) mod guarded;
 pub(crate) mod memory;
 pub(crate) mod participant;
