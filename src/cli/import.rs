@@ -86,7 +86,7 @@ fn write_meshes(files: &[MeshFile], folder: &Path, check: impl Fn(&Path) -> anyh
     files.iter().try_for_each(|file| write(&folder.join(&file.path), &file.bytes))
 }
 
-/// What a scene of this text and these files is.
+/// The scene of an imported text and its meshes.
 fn scene_of(imported: &Imported, name: &str, folder: &Path) -> Result<Scene, SceneError> {
     let files = imported.files.iter().map(|file| (file.path.clone(), file.bytes.clone()));
     load(&Source::recorded(name, &imported.toml, Some(folder))?.with_files(files.collect()), &[])
@@ -176,7 +176,7 @@ fn entry(LeftOut { file, line, element, what, .. }: &LeftOut) -> serde_json::Val
     json!({ "file": file, "line": line, "element": element, "what": what })
 }
 
-/// What an element is, without the names in it.
+/// The kind of an element: its text without the names in it.
 fn kind(element: &str) -> String {
     element.split('`').step_by(2).collect()
 }

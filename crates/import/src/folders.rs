@@ -40,7 +40,7 @@ impl<'a> From<&'a Path> for Folders<'a> {
     }
 }
 
-/// What a file's name ends with, after its last point, in small letters.
+/// The ending of a file's name, after its last point, in small letters.
 pub(crate) fn extension(name: &str) -> String {
     Path::new(name).extension().and_then(|e| e.to_str()).map(str::to_lowercase).unwrap_or_default()
 }

@@ -102,7 +102,7 @@ fn weight(link: &Link) -> Option<Weight> {
     }
 }
 
-/// What a body weighs; `None` where the scene alone knows a volume.
+/// The weight of a body; `None` where the scene alone knows a volume.
 pub(crate) fn kilograms(mass: &Mass, parts: &[Part]) -> Option<f64> {
     match mass {
         Mass::None => Some(0.0),

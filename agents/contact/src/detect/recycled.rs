@@ -21,7 +21,7 @@ pub(super) struct SolidPair<'a> {
     pub member: usize,
     pub partner: Partner,
     pub solids: TwoSolids,
-    /// What it remembers of places found.
+    /// The places found of it before, as that participant remembers them.
     pub known: Option<&'a FoundPlaces>,
     pub reach_m: f64,
 }

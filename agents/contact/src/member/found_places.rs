@@ -8,6 +8,7 @@ use metachron_geometry::{Place, ShapePose, Touch};
 
 /// How far a point of one solid may have gone against the other since their places were found, metres: less than what has met is apart by.
 pub(crate) const MOVED_M: f64 = 1e-6;
+
 /// Where a solid is.
 #[derive(Debug, Clone, Copy, PartialEq, Default, serde::Serialize, serde::Deserialize)]
 pub(crate) struct Pose {

@@ -29,7 +29,7 @@ pub(super) struct BodyReader<'a> {
     pub(super) sites: BTreeMap<String, Site<'a>>,
     /// `None` for a start where the file has its bodies.
     pub(super) keyframe: Option<Keyframe<'a>>,
-    /// What bodies weigh that never move; `None` where that is not known.
+    /// The weights of bodies that never move; `None` where that is not known.
     pub(super) static_kg: Option<f64>,
     names: BTreeSet<String>,
 }

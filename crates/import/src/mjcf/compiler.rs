@@ -22,7 +22,7 @@ pub(super) struct Compiler {
     pub(super) mesh_folder: String,
     /// Whether geoms give masses even where a body says its own.
     pub(super) mass_from_geoms: bool,
-    /// What all bodies together weigh; `None` for what they say.
+    /// The mass of all bodies together; `None` for what they say.
     pub(super) total_kg: Option<f64>,
 }
 

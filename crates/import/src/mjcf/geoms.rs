@@ -153,7 +153,7 @@ impl BodyReader<'_> {
         Ok(hull)
     }
 
-    /// What a geom weighs in the axes of its body; `None` where its mesh cannot be read.
+    /// The weight of a geom in the axes of its body; `None` where its mesh cannot be read.
     pub(super) fn weight(&self, geom: &Geom) -> Option<Weight> {
         let density_kg_m3 = geom.density_kg_m3.unwrap_or(DENSITY_DEFAULT_KG_M3);
         let own = match &geom.part.shape {
