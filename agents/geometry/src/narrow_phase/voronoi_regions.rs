@@ -13,9 +13,9 @@ pub(super) const LEAN_SHARE: f64 = 1e-3;
 /// By how much two features may lean over what is next to them, where their own directions make the normal: about what a body turns by in
 /// a step, radians.
 pub(super) const LEAN: f64 = 0.1;
-/// The least by which the slopes on both sides of an edge that stands out differ: the middle of an edge of a centimetre across it then stands out
-/// by 0.008 mm, less than contacts give way.
-const RIDGE: f64 = 3e-3;
+/// By how much an edge that stands out is above a line between the far corners of its triangles, metres: less than contacts give way, so that
+/// no place that bears much is gone where a skin gets flatter.
+const RIDGE_M: f64 = 8e-6;
 /// A vector is no way out when removing its parts along the skin leaves less than this share of it.
 const OUT_SHARE: f64 = 0.5;
 
@@ -106,16 +106,16 @@ impl Feature {
     /// crosses that edge changes evenly: it is least beside the edge, at a place of its own. Vertices and borders stand out.
     pub fn stands_out(self, surface: &Surface<'_>, out: DVec3) -> bool {
         let Self::Edge(number, [a, b]) = self else { return true };
-        let fans = &surface.form.fans;
+        let corners = surface.form.fans.opposite[number as usize];
+        if corners.contains(&NONE) {
+            return true;
+        }
         let along = (b - a).normalize_or_zero();
-        let slope = |corner: u32| {
-            let across = (surface.positions[corner as usize] - a).reject_from_normalized(along);
-            across.dot(out) / across.length()
-        };
-        let corners = fans.opposite[number as usize];
-        // so does an edge of a triangle without a width, whose slope is no number
-        let is_flat = || -corners.map(slope).iter().sum::<f64>() <= RIDGE;
-        corners.contains(&NONE) || !is_flat()
+        let across = corners.map(|corner| (surface.positions[corner as usize] - a).reject_from_normalized(along));
+        let [[low_a, wide_a], [low_b, wide_b]] = across.map(|across| [-across.dot(out), across.length()]);
+        let above_m = (low_a * wide_b + low_b * wide_a) / (wide_a + wide_b);
+        // so does an edge between triangles without a width, whose height is no number
+        above_m.is_nan() || above_m > RIDGE_M
     }
 
     /// The unit vector out of the skin that is close to `way`: its parts along the skin are removed. `None` if they were most of it.
