@@ -55,7 +55,7 @@ pub struct ContactState {
     pub since: SimTime,
     /// Places that bore something in the last step, counted in each of its parts.
     pub places: u32,
-    /// The place that bore most in it, metres; not a number where that is not known, as in heaps that rapier3d steps.
+    /// The place that bore most in it, metres; not a number where that is not known.
     pub point_m: DVec3,
     /// The normal there, towards the agent, of length 1.
     pub normal: DVec3,

@@ -53,7 +53,7 @@ pub struct Snapshot {
     /// What it touches in the cluster that it is stepped in, but for agents of lower numbers: these publish it.
     pub contacts: Vec<ContactState>,
     /// What all that it touches in that cluster gave it, in the mean of the last step, about its centre of mass; zero of a body that bends. Of
-    /// heaps that rapier3d steps it has what acts along normals, without torque.
+    /// heaps that rapier3d steps it has what acts along normals.
     pub contact_wrench: Wrench,
     /// What its hinges and slides gave in the mean of the last step, of those whose first body it is.
     pub efforts: Vec<JointEffort>,

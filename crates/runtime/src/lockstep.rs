@@ -184,7 +184,7 @@ impl Lockstep {
                     join(&mut self.jobs, self.machine.cores);
                     // one thread factors for all members
                     if let (Some(solved), Some(longest)) = (actor.solved(), self.jobs.iter_mut().max()) {
-                        *longest += price(FACTOR, f64::from(solved.contacts)) * solved.factors;
+                        *longest += price(FACTOR, f64::from(solved.of_problem())) * solved.factors;
                     }
                 } else {
                     self.jobs.push(price(actor.shared.model(), work) * steps);

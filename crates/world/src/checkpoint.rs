@@ -15,7 +15,7 @@ use std::path::{Path, PathBuf};
 /// The first bytes of every file.
 const MAGIC: [u8; 8] = *b"METACHRN";
 /// The version of the format: it changes with what the bytes mean.
-const FORMAT: u32 = 9;
+const FORMAT: u32 = 10;
 /// Bytes before those that the checksum is of.
 const HEAD: usize = MAGIC.len() + 4 + 8 + 8;
 /// The program that can read what it has written: states are saved field by field as this version has them.

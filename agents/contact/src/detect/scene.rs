@@ -89,6 +89,16 @@ pub enum SolveBudget {
     },
 }
 
+impl SolveBudget {
+    /// How many steps each solve may make in any case; of an exact one, which has none to bound it, zero.
+    pub(crate) const fn least_steps(self) -> u32 {
+        match self {
+            Self::Exact => 0,
+            Self::Timed { least_steps } => least_steps,
+        }
+    }
+}
+
 /// How many steps a solve may be granted in any case. No solve makes more than the most of them.
 pub const LEAST_STEPS_RANGE: RangeInclusive<u32> = 1..=400;
 

@@ -89,11 +89,11 @@ impl ClusterStepper {
         self.pile.archive(archive)
     }
 
-    /// The most steps of each solve from now on, each a factor or what serves gradients for one; `None` for as many as the laws take. Momentum is
-    /// exact and no answer makes energy at any number.
+    /// How many steps each solve of the next macro steps has time for, each a factor or what serves gradients for one; `None` for as many as the
+    /// laws take. It makes as many as the scene grants in any case ([`SolveBudget`](crate::detect::SolveBudget)); with time for fewer than three,
+    /// rigid bodies that nothing else touches are stepped by rapier3d. Momentum is exact and no answer makes energy at any number.
     pub fn set_factors_max(&mut self, most: Option<u32>) {
-        self.solver.settings.factors_max = most;
-        self.impacts.factors_max = most;
+        self.pile.factors_max = most;
     }
 
     /// The macro step that was made last, seconds.
@@ -140,6 +140,8 @@ impl ClusterStepper {
         self.macro_s = dt.as_secs_f64();
         self.depth_m = scene.depth_m();
         self.solver.settings.depth_m = self.depth_m;
+        let factors_max = self.pile.factors_max.map(|most| most.max(scene.budget().least_steps()));
+        (self.solver.settings.factors_max, self.impacts.factors_max) = (factors_max, factors_max);
         self.joints.missed_m = f64::INFINITY;
         all.iter_mut().for_each(Participant::let_go);
         self.plan(all, self.macro_s, threads)?;

@@ -148,7 +148,7 @@ impl ClusterStepper {
 }
 
 /// Adds an impulse at a point to what contacts gave a body, if that moves as a whole.
-fn give(wrench: &mut Wrench, member: &dyn ClusterMember, impulse_n_s: DVec3, point_m: DVec3) {
+pub(super) fn give(wrench: &mut Wrench, member: &dyn ClusterMember, impulse_n_s: DVec3, point_m: DVec3) {
     if let Some(pose) = member.pose(&[], 0.0) {
         wrench.add(impulse_n_s, point_m - pose.centre_m);
     }

@@ -49,11 +49,11 @@ pub struct PairTotal {
     pub contacts: u32,
     /// The deepest overlap, metres, ≥ 0.
     pub depth_m: f64,
-    /// The most that one contact gave, N·s; zero for links and in rigid piles.
+    /// The most that one contact gave, N·s; zero for links.
     pub most_n_s: f64,
-    /// Where that contact is, metres; not a number for links and in rigid piles.
+    /// Where that contact is, metres; not a number for links.
     pub point_m: DVec3,
-    /// Its normal, towards the participant, of length 1; zero for links and in rigid piles.
+    /// Its normal, towards the participant, of length 1; zero for links.
     pub normal: DVec3,
     /// How easily the participant and its partner give way at that contact along its normal, 1/kg, ≥ 0 (coupling.md, eq. 7h).
     pub inverse_mass_per_kg: [f64; 2],

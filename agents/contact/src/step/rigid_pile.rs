@@ -1,4 +1,4 @@
-//! A rigid pile: rigid bodies that touch in more places than one problem is solved for in time, stepped by rapier3d.
+//! A rigid pile: rigid bodies for whose problem there is no time, stepped by rapier3d: the coarsest level of a solve.
 //!
 //! In: members with the velocities that they would have without contact. Out: those that they have with it, where they are then, what each
 //! pair gave. Bodies lie in each other as deep as rapier3d lets them (some tenths of a millimetre), in single precision.
@@ -10,6 +10,7 @@ use crate::detect::{ClusterScene, Search};
 use crate::member::memory::Partner;
 use crate::member::participant::{Progress, place_of};
 use crate::member::{ClusterMember, Locked, Participant};
+use crate::step::record::give;
 use crate::step::report::{ClusterReport, Sums, total_of};
 use glam::{DMat3, DQuat, DVec3};
 use metachron_core::{AgentId, Archive, ArchiveError, StepError, archive_values};
@@ -25,9 +26,11 @@ use rapier3d::geometry::{
 use rapier3d::parry::math::{Pose, Rotation, Vec3};
 use rapier3d::pipeline::PhysicsWorld;
 
-/// Rigid bodies become a rigid pile above so many contacts, and are one until they have fewer than the second.
-const CONTACTS_MIN: usize = 1000;
-const CONTACTS_LEFT: usize = 500;
+/// Rigid bodies are a rigid pile from where each solve has time for fewer factors than these: after so many from interior points contacts lie as
+/// deep as in rapier3d.
+const FACTORS_LEFT: u32 = 3;
+/// They are one until there is time for so many.
+const FACTORS_AGAIN: u32 = 6;
 /// No step of rapier3d is longer than this, seconds: what lands sinks by a part of its way in one.
 const LONGEST_S: f64 = 1.0 / 240.0;
 /// The most steps of rapier3d in a fine step: no body goes farther in one than half its radius, as far as that takes no more.
@@ -45,6 +48,8 @@ pub(super) struct RigidPile {
     world: Option<Box<World>>,
     /// Of each member; without meaning where there is no heap.
     domains: Vec<Domain>,
+    /// How many factors each solve of the macro step has time for; `None` for as many as it takes.
+    pub factors_max: Option<u32>,
 }
 
 /// Counts and figures of a step of a rigid pile.
@@ -61,7 +66,6 @@ struct World {
     origin_m: DVec3,
     /// By rising numbers.
     bodies: Vec<Known>,
-    contacts: usize,
     /// Storage: members that something touches, and what contacts give.
     touched: Vec<usize>,
     given: Vec<Given>,
@@ -72,6 +76,7 @@ struct Given {
     member: usize,
     partner: Partner,
     impulse_n_s: DVec3,
+    point_m: DVec3,
     depth_m: f64,
     counts: bool,
 }
@@ -113,7 +118,7 @@ impl RigidPile {
         archive.option(
             &mut self.world,
             || Box::new(World::empty(DVec3::ZERO)),
-            |world, archive| archive_values!(archive, world.physics, world.origin_m, world.bodies, world.contacts),
+            |world, archive| archive_values!(archive, world.physics, world.origin_m, world.bodies),
         )
     }
 
@@ -127,15 +132,15 @@ impl RigidPile {
         &self.domains
     }
 
-    /// Makes a rigid pile of the members that can be one, if they touch in so many places and nothing else touches them.
+    /// Makes a rigid pile of the members that can be one, if there is no time for their problem, they are most of it and nothing else touches them.
     pub fn begin(&mut self, scene: &ClusterScene, all: &[Participant<'_>], search: &Search) {
-        if search.owners.len() <= CONTACTS_MIN {
+        if self.factors_max.is_none_or(|most| most >= FACTORS_LEFT) {
             return;
         }
         assign(scene, all, &mut self.domains);
         let is_pile = |member: usize| self.domains[member] == Domain::RigidPile;
         let within = search.owners.iter().filter(|owner| owner.both().all(is_pile)).count();
-        if within > CONTACTS_MIN && !self.is_touched(search) {
+        if 2 * within > search.owners.len() && !self.is_touched(search) {
             let centres = || all.iter().filter_map(placed).map(|body| body.centre_m);
             let middle_m = centres().sum::<DVec3>() / centres().count() as f64;
             self.world = Some(Box::new(World::new(scene, middle_m)));
@@ -144,7 +149,8 @@ impl RigidPile {
 
     /// Goes on with the rigid pile where it still is one; whether it goes on.
     pub fn go_on(&mut self, scene: &ClusterScene, all: &[Participant<'_>]) -> bool {
-        self.world = self.world.take().filter(|world| world.contacts > CONTACTS_LEFT);
+        let is_short = self.factors_max.is_some_and(|most| most < FACTORS_AGAIN);
+        self.world = self.world.take().filter(|_| is_short);
         if self.is_on() {
             assign(scene, all, &mut self.domains);
             self.world = self.world.take().filter(|_| self.domains.contains(&Domain::RigidPile));
@@ -177,7 +183,7 @@ impl RigidPile {
         h_s: f64,
         into: &mut Sums,
     ) -> Result<PileReport, StepError> {
-        let Self { world: Some(world), domains } = self else { return Ok(PileReport::default()) };
+        let Self { world: Some(world), domains, .. } = self else { return Ok(PileReport::default()) };
         let Sums { totals, wrenches, .. } = into;
         world.take(all, domains, progress, h_s);
         // spans are whole nanoseconds
@@ -201,16 +207,19 @@ impl RigidPile {
             state.v_before.copy_from_slice(&[body.linvel().as_dvec3(), body.angvel().as_dvec3()]);
             state.hold();
         }
-        world.contacts = report.contacts;
         world.given.sort_by_key(|given| (given.member, given.partner));
-        for Given { member, partner, impulse_n_s, depth_m, counts } in world.given.drain(..) {
+        for Given { member, partner, impulse_n_s, point_m, depth_m, counts } in world.given.drain(..) {
             let total = total_of(totals, member, partner);
             total.add(impulse_n_s, depth_m);
-            wrenches[member].force_n += impulse_n_s;
+            if impulse_n_s.length() > total.most_n_s {
+                (total.most_n_s, total.point_m) = (impulse_n_s.length(), point_m);
+                total.normal = impulse_n_s.normalize_or_zero();
+            }
+            give(&mut wrenches[member], &all[member].member, impulse_n_s, point_m);
             if let Partner::Agent(id) = partner
                 && let Some(other) = place_of(all, id)
             {
-                wrenches[other].force_n -= impulse_n_s;
+                give(&mut wrenches[other], &all[other].member, -impulse_n_s, point_m);
             }
             // a place is counted once, not in every step of rapier3d
             total.contacts -= u32::from(!counts);
@@ -257,7 +266,7 @@ impl World {
 
     fn empty(origin_m: DVec3) -> Self {
         let physics = PhysicsWorld::default();
-        Self { physics, origin_m, bodies: Vec::new(), contacts: usize::MAX, touched: Vec::new(), given: Vec::new() }
+        Self { physics, origin_m, bodies: Vec::new(), touched: Vec::new(), given: Vec::new() }
     }
 
     /// Takes up the members of the rigid pile as they are, and what changes their velocities in the step.
@@ -344,7 +353,11 @@ impl World {
                 (Side::Body(id), Some(_)) => Partner::Agent(id),
                 (Side::Body(_), None) => continue,
             };
+            let Some(first_at) = self.physics.colliders.get(pair.collider1).map(|collider| *collider.position()) else {
+                continue;
+            };
             for manifold in pair.solver_manifolds() {
+                let part_at = manifold.subshape_pos1().map_or(first_at, |part| first_at * *part);
                 let towards_member = manifold.data.normal.as_dvec3() * sign;
                 for point in &manifold.points {
                     report.contacts += 1;
@@ -352,7 +365,8 @@ impl World {
                     report.depth_m = report.depth_m.max(depth_m);
                     if point.data.impulse > 0.0 {
                         let impulse_n_s = towards_member * f64::from(point.data.impulse);
-                        given.push(Given { member: first, partner, impulse_n_s, depth_m, counts });
+                        let point_m = self.origin_m + (part_at * point.local_p1).as_dvec3();
+                        given.push(Given { member: first, partner, impulse_n_s, point_m, depth_m, counts });
                     }
                 }
             }

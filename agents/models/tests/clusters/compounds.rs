@@ -90,7 +90,7 @@ fn a_heap_of_tables_stands_as_one_does() {
         RigidSpec { friction: 0.5, ..rigid(five_boxes(), DVec3::new(x, y, HEIGHT_M + 1e-4), 1.5) }
     };
     let tables = (0..81).map(|k| placed(RigidBody::new(spec(k)).unwrap(), false));
-    let mut heap = Table::among(tables.collect(), &[plane(DQuat::IDENTITY, 0.5)]);
+    let mut heap = Table::among(tables.collect(), &[plane(DQuat::IDENTITY, 0.5)]).hurried();
     let mut last = heap.step().0;
     while heap.time.as_secs_f64() < 0.5 {
         last = heap.step().0;

@@ -1,4 +1,4 @@
-//! Heaps of more contacts than one problem is solved for: rapier3d steps them.
+//! Heaps for whose solves there is no time: rapier3d steps them.
 
 use crate::bodies::{block, cube, rigid, solid};
 use crate::table::{GRAVITY, Table, placed, plane};
@@ -18,7 +18,7 @@ fn columns(wide: usize, high: usize) -> Table {
         let [x, y, layer] = [k % wide, k / wide % wide, k / wide / wide].map(|v| v as f64);
         block(DVec3::new(0.0605 * x, 0.0605 * y, 0.0302 + 0.0604 * layer), DVec3::splat(HALF_M), 0.2, 0.0)
     });
-    Table::among(boxes.collect(), &[plane(DQuat::IDENTITY, 0.5)])
+    Table::among(boxes.collect(), &[plane(DQuat::IDENTITY, 0.5)]).hurried()
 }
 
 #[test]
@@ -100,7 +100,7 @@ fn what_lies_beside_a_heap_is_solved_as_if_it_lay_alone_and_the_heap_too() {
     let (wide, high) = (10, 3);
     // beyond the heap, and far less than a step's look ahead away from it
     let soft = || cube(DVec3::new(0.3, -0.065, 0.0302), 0.06);
-    let mut alone = Table::among(vec![soft()], &[plane(DQuat::IDENTITY, 0.5)]);
+    let mut alone = Table::among(vec![soft()], &[plane(DQuat::IDENTITY, 0.5)]).hurried();
     let mut heap = columns(wide, high);
     heap.bodies.push(soft());
     let last = heap.bodies.len() - 1;
@@ -134,7 +134,7 @@ fn what_flies_into_a_heap_keeps_the_momentum_of_all() {
     let spec = solid(DVec3::new(0.2, 0.2, 0.16), DVec3::splat(0.06), [3; 3], 1e5);
     let thrown = SoftSpec { gravity: DVec3::ZERO, velocity: DVec3::new(0.3, 0.2, -1.0), ..spec };
     bodies.push(placed(SoftBody::new(thrown).unwrap(), false));
-    let mut all = Table::among(bodies, &[]);
+    let mut all = Table::among(bodies, &[]).hurried();
     let momentum = |all: &Table| {
         let each = all.bodies.iter().map(|body| body.agent.momentum());
         each.fold([DVec3::ZERO; 2], |[p, l], (linear, angular)| [p + linear, l + angular])

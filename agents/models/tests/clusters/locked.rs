@@ -19,7 +19,7 @@ fn boxes_of_a_heap_that_cannot_turn_or_leave_their_plane_do_not() {
         let spec = rigid(Solid::Box { half_extents_m: DVec3::splat(0.03) }, place, 0.2);
         placed(RigidBody::new(RigidSpec { restraint, velocity: DVec3::new(0.1, 0.1, 0.0), ..spec }).unwrap(), false)
     });
-    let mut heap = Table::among(boxes.collect(), &[plane(DQuat::IDENTITY, 0.5)]);
+    let mut heap = Table::among(boxes.collect(), &[plane(DQuat::IDENTITY, 0.5)]).hurried();
     let mut last = heap.step().0;
     while heap.time.as_secs_f64() < 0.2 {
         last = heap.step().0;

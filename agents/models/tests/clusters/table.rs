@@ -2,7 +2,7 @@
 
 use glam::{DQuat, DVec3};
 use metachron_contact::constraint::FailedAttachment;
-use metachron_contact::detect::ClusterScene;
+use metachron_contact::detect::{ClusterScene, LEAST_STEPS_RANGE, SolveBudget};
 use metachron_contact::joint::Joint;
 use metachron_contact::member::{ContactMemory, Participant, Partner};
 use metachron_contact::step::{ClusterReport, ClusterStepper, PairTotal, Plan, StepDoubling};
@@ -115,6 +115,13 @@ impl Table {
     /// The same with contacts that rest so deep, metres.
     pub fn resting_at(self, depth_m: f64) -> Self {
         Self { scene: self.scene.resting_at(depth_m).unwrap(), ..self }
+    }
+
+    /// The same without time for solves, which are exact all the same: rapier3d steps the rigid bodies that nothing else touches.
+    pub fn hurried(mut self) -> Self {
+        self.stepper.set_factors_max(Some(0));
+        let exact = SolveBudget::Timed { least_steps: *LEAST_STEPS_RANGE.end() };
+        Self { scene: self.scene.within(exact).unwrap(), ..self }
     }
 
     /// Links two bodies by a spring, as both of them see it.

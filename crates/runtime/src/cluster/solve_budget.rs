@@ -12,6 +12,9 @@ const TURNS_KEPT: u32 = 16;
 /// By how much of their mean the factors of turns must differ for what they say of the price to count as much as that mean.
 const TELLING_SPREAD: f64 = 0.1;
 
+/// An answer after so many factors is as good as the coarsest level's.
+const FACTORS_SAFE: u32 = 3;
+
 /// At least this share of a turn is the price of its factors: turns whose time hardly follows their factors do not make these free.
 const FACTORS_SHARE_MIN: f64 = 0.1;
 
@@ -31,14 +34,25 @@ pub(in super::super) struct Solved {
     pub factors: u32,
     /// Products of conjugate gradients, of solves that make no factors.
     pub products: u32,
-    /// Contacts of its last fine step.
+    /// Contacts of its last fine step, those of a rigid pile with the others.
     pub contacts: u32,
+    /// Those of the rigid pile, of which no solve knows.
+    pub pile_contacts: u32,
+}
+
+impl Solved {
+    /// Contacts of the problem.
+    pub const fn of_problem(&self) -> u32 {
+        self.contacts.saturating_sub(self.pile_contacts)
+    }
 }
 
 /// The price of a factor: time = rest + price · factors over the last turns, by least squares whose weights decay.
 ///
 /// Turns that all make the same number of factors do not say what these cost; then the whole turn counts as theirs. That is too dear for
 /// more factors and right for as many, so that a number that rises slowly finds the true price.
+///
+/// What a rigid pile would cost as a problem again follows from the price of the last factors, its contacts and theirs.
 #[derive(Debug, Clone, Copy, PartialEq, Default, serde::Serialize, serde::Deserialize)]
 pub(in super::super) struct FactorPrice {
     turns: u32,
@@ -48,11 +62,23 @@ pub(in super::super) struct FactorPrice {
     /// The variance of the factors, and their covariance with the time.
     variance: f64,
     covariance_s: f64,
+    /// Contacts of the problems of these turns.
+    contacts: f64,
+    /// How many times as many the last turn had where some were a rigid pile's; 1 where there is none.
+    more_contacts: f64,
 }
 
 impl FactorPrice {
     /// Takes a turn of `turn_s` seconds; one without a factor says nothing of its price.
-    pub fn note(&mut self, Solved { solves, factors, .. }: Solved, turn_s: f64) {
+    pub fn note(&mut self, solved: Solved, turn_s: f64) {
+        let Solved { solves, factors, contacts, pile_contacts, .. } = solved;
+        self.more_contacts = 1.0;
+        if pile_contacts > 0 && self.turns > 0 {
+            self.more_contacts = f64::from(contacts) / self.contacts.max(1.0);
+            // what has come to rest would be solved once
+            self.solves += (1.0 - self.solves) / f64::from(TURNS_KEPT);
+            return;
+        }
         if factors == 0 || !turn_s.is_finite() {
             return;
         }
@@ -60,6 +86,7 @@ impl FactorPrice {
         let weight = 1.0 / f64::from(self.turns);
         let (more, longer_s) = (f64::from(factors) - self.factors, turn_s - self.turn_s);
         self.solves += weight * (f64::from(solves) - self.solves);
+        self.contacts += weight * (f64::from(contacts) - self.contacts);
         self.factors += weight * more;
         self.turn_s += weight * longer_s;
         self.variance = (1.0 - weight) * (self.variance + weight * more * more);
@@ -74,15 +101,22 @@ impl FactorPrice {
         Some(found_s.clamp(FACTORS_SHARE_MIN * mean_s, mean_s))
     }
 
-    /// How many factors each solve of a turn of `turn_s` seconds may make: at least `least`, and that where no price is known yet; `None` where
-    /// there is time for as many as any solve makes.
-    pub fn factors_max(&self, turn_s: f64, least: u32) -> Option<u32> {
+    /// How many factors each solve has time for in a turn that takes `turn_s` seconds and is `late_s` seconds behind; `None` where there is time for
+    /// as many as any solve makes, `least` where no price is known yet.
+    ///
+    /// Fewer than [`FACTORS_SAFE`] only where so many are the greater part of a turn that is not late: neither lateness nor what else a turn does gets
+    /// less by solving less.
+    pub fn factors_max(&self, turn_s: f64, late_s: f64, least: u32) -> Option<u32> {
         let Some(factor_s) = self.factor_s() else { return Some(least) };
         let rest_s = self.turn_s - factor_s * self.factors;
-        let each = (turn_s - rest_s) / (factor_s * self.solves);
+        let solves_s = factor_s * self.solves * self.more_contacts;
         // a turn that takes no time leaves time for all
-        let each = if each.is_nan() { f64::INFINITY } else { each };
-        (each < f64::from(*LEAST_STEPS_RANGE.end())).then_some((each.max(0.0) as u32).max(least))
+        let within =
+            |turn_s: f64| Some((turn_s - rest_s) / solves_s).filter(|each| !each.is_nan()).unwrap_or(f64::INFINITY);
+        let safe = f64::from(FACTORS_SAFE);
+        let floor = if safe * solves_s > rest_s { within(turn_s).clamp(0.0, safe) } else { safe };
+        let each = within(turn_s - late_s).max(floor);
+        (each < f64::from(*LEAST_STEPS_RANGE.end())).then_some(each as u32)
     }
 }
 
@@ -92,7 +126,8 @@ impl From<&ClusterReport> for Solved {
             solves: report.solves,
             factors: report.factors,
             products: report.products,
-            contacts: report.contacts.saturating_sub(report.pile_contacts),
+            contacts: report.contacts,
+            pile_contacts: report.pile_contacts,
         }
     }
 }
@@ -105,7 +140,10 @@ mod tests {
     fn after(factors: impl IntoIterator<Item = u32>) -> FactorPrice {
         let mut price = FactorPrice::default();
         for factors in factors {
-            price.note(Solved { solves: 1, factors, products: 0, contacts: 8 }, 1e-3 + 20e-6 * f64::from(factors));
+            price.note(
+                Solved { solves: 1, factors, products: 0, contacts: 8, pile_contacts: 0 },
+                1e-3 + 20e-6 * f64::from(factors),
+            );
         }
         price
     }
@@ -116,7 +154,7 @@ mod tests {
         let found_s = price.factor_s().unwrap();
         // the mean of a turn per factor is 79 µs: what is left of that
         assert!((found_s / 20e-6 - 1.0).abs() < 0.3, "{found_s}");
-        let most = price.factors_max(3e-3, 5).unwrap();
+        let most = price.factors_max(3e-3, 0.0, 5).unwrap();
         assert!((75..=100).contains(&most), "{most} of 100 factors in 2 ms");
     }
 
@@ -125,7 +163,10 @@ mod tests {
         let mut price = after((0..64).map(|k| 4 + 13 * (k % 3)));
         for k in 0..64 {
             let factors = 4 + 13 * (k % 3);
-            price.note(Solved { solves: 1, factors, products: 0, contacts: 80 }, 1e-3 + 200e-6 * f64::from(factors));
+            price.note(
+                Solved { solves: 1, factors, products: 0, contacts: 80, pile_contacts: 0 },
+                1e-3 + 200e-6 * f64::from(factors),
+            );
         }
         let found_s = price.factor_s().unwrap();
         assert!((found_s / 200e-6 - 1.0).abs() < 0.15, "{found_s}");
@@ -135,37 +176,63 @@ mod tests {
     fn a_number_that_is_used_up_settles_where_the_turn_is_full() {
         let (turn_s, mut price, mut most) = (3e-3, FactorPrice::default(), 5);
         for _ in 0..200 {
-            price.note(Solved { solves: 1, factors: most, products: 0, contacts: 8 }, 1e-3 + 20e-6 * f64::from(most));
-            most = price.factors_max(turn_s, 5).unwrap();
+            price.note(
+                Solved { solves: 1, factors: most, products: 0, contacts: 8, pile_contacts: 0 },
+                1e-3 + 20e-6 * f64::from(most),
+            );
+            most = price.factors_max(turn_s, 0.0, 5).unwrap();
         }
         assert!((95..=100).contains(&most), "{most}: 100 fill the turn, and never more");
     }
 
     #[test]
-    fn each_of_several_solves_gets_its_share_and_the_least_in_any_case() {
+    fn each_of_several_solves_gets_its_share_of_the_time_there_is() {
         let mut price = FactorPrice::default();
-        assert_eq!(price.factors_max(1.0, 5), Some(5), "nothing is known");
-        price.note(Solved { solves: 4, factors: 40, products: 0, contacts: 8 }, 0.4e-3);
-        assert_eq!(price.factors_max(0.801e-3, 5), Some(20));
-        assert_eq!(price.factors_max(0.01e-3, 5), Some(5));
-        assert_eq!(price.factors_max(-1.0, 7), Some(7), "late");
-        assert_eq!(price.factors_max(0.1, 5), None, "there is time for all");
-        price.note(Solved { solves: 4, factors: 0, products: 90, contacts: 8 }, 5e-3);
-        price.note(Solved { solves: 0, factors: 0, products: 0, contacts: 0 }, 1e-4);
-        assert_eq!(price.factors_max(0.801e-3, 5), Some(20), "gradients say nothing of the price of a factor");
+        assert_eq!(price.factors_max(1.0, 0.0, 5), Some(5), "nothing is known");
+        price.note(Solved { solves: 4, factors: 40, products: 0, contacts: 8, pile_contacts: 0 }, 0.4e-3);
+        assert_eq!(price.factors_max(0.801e-3, 0.0, 5), Some(20));
+        assert_eq!(price.factors_max(0.041e-3, 0.0, 5), Some(1), "a factor of each takes all the time there is");
+        assert_eq!(price.factors_max(0.1, 0.0, 5), None, "there is time for all");
+        price.note(Solved { solves: 4, factors: 0, products: 90, contacts: 8, pile_contacts: 0 }, 5e-3);
+        price.note(Solved { solves: 0, factors: 0, products: 0, contacts: 0, pile_contacts: 0 }, 1e-4);
+        assert_eq!(price.factors_max(0.801e-3, 0.0, 5), Some(20), "gradients say nothing of the price of a factor");
+    }
+
+    #[test]
+    fn neither_lateness_nor_what_else_a_turn_does_leaves_fewer_factors_than_are_safe() {
+        let price = after((0..64).map(|k| 4 + 13 * (k % 3)));
+        assert_eq!(price.factors_max(3e-3, 1.0, 5), Some(FACTORS_SAFE), "late");
+        // a millisecond of it is no factor's
+        assert_eq!(price.factors_max(0.5e-3, 0.0, 5), Some(FACTORS_SAFE));
+    }
+
+    #[test]
+    fn a_rigid_pile_is_priced_by_its_contacts_as_a_problem_solved_once() {
+        let mut price = FactorPrice::default();
+        let solved = Solved { solves: 4, factors: 40, products: 0, contacts: 100, pile_contacts: 0 };
+        price.note(solved, 0.4e-3);
+        assert_eq!(price.factors_max(0.081e-3, 0.0, 5), Some(2));
+        for _ in 0..1000 {
+            price.note(Solved { solves: 0, factors: 0, contacts: 50, pile_contacts: 50, ..solved }, 0.02e-3);
+        }
+        // a quarter of the solves, and each factor of half the contacts
+        assert_eq!(price.factors_max(0.081e-3, 0.0, 5), Some(16));
     }
 
     #[test]
     fn turns_whose_time_does_not_follow_their_factors_do_not_make_these_free() {
         let mut price = FactorPrice::default();
         for k in 0..64 {
-            price.note(Solved { solves: 1, factors: 5 + 40 * (k % 2), products: 0, contacts: 8 }, 1e-3);
+            price.note(
+                Solved { solves: 1, factors: 5 + 40 * (k % 2), products: 0, contacts: 8, pile_contacts: 0 },
+                1e-3,
+            );
         }
         let (found_s, mean_s) = (price.factor_s().unwrap(), 1e-3 / 25.0);
         assert!(found_s >= 0.09 * mean_s, "{found_s}");
-        price.note(Solved { solves: 0, factors: 0, products: 0, contacts: 0 }, 1e-4);
+        price.note(Solved { solves: 0, factors: 0, products: 0, contacts: 0, pile_contacts: 0 }, 1e-4);
         assert_eq!(price.factor_s(), Some(found_s), "no factor");
-        price.note(Solved { solves: 1, factors: 5, products: 0, contacts: 8 }, f64::NAN);
+        price.note(Solved { solves: 1, factors: 5, products: 0, contacts: 8, pile_contacts: 0 }, f64::NAN);
         assert_eq!(price.factor_s(), Some(found_s));
     }
 }

@@ -177,11 +177,11 @@ fn portion(left: SimSpan, dt: SimSpan, none_longer: bool) -> SimSpan {
 }
 
 impl AgentRunner {
-    /// The most steps of each solve in a macro step of `dt` that begins `late`; `None` for as many as the laws take.
+    /// How many steps each solve has time for in a macro step of `dt` that begins `late`; `None` for as many as the laws take.
     pub fn factors_within(&self, timeline: &Timeline, late: Duration, dt: SimSpan) -> Option<u32> {
         let least = self.least_factors(timeline)?;
-        let turn_s = TURN_SHARE * timeline.wall_span(dt).as_secs_f64() - late.as_secs_f64();
-        self.cluster.as_ref()?.price.factors_max(turn_s, least)
+        let turn_s = TURN_SHARE * timeline.wall_span(dt).as_secs_f64();
+        self.cluster.as_ref()?.price.factors_max(turn_s, late.as_secs_f64(), least)
     }
 
     /// The steps that each solve may make in any case: all that one may that is behind its leader. `None` where nothing bounds them: at the free

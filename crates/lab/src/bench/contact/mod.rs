@@ -73,6 +73,13 @@ struct Case {
     variant: String,
     seconds: f64,
     stage: Box<dyn Fn() -> anyhow::Result<Stage>>,
+    levels: &'static [Level],
+}
+
+/// How far solves go.
+struct Level {
+    engine: &'static str,
+    factors_max: Option<u32>,
 }
 
 impl Case {
@@ -82,18 +89,23 @@ impl Case {
         seconds: f64,
         stage: impl Fn() -> anyhow::Result<Stage> + 'static,
     ) -> Self {
-        Self { scene, variant: variant.into(), seconds, stage: Box::new(stage) }
+        Self { scene, variant: variant.into(), seconds, stage: Box::new(stage), levels: &LEVELS }
+    }
+
+    /// The same without time for a solve: rapier3d steps what it can.
+    fn hurried(self) -> Self {
+        Self { levels: &HURRIED, ..self }
     }
 
     fn name(&self) -> String {
         if self.variant.is_empty() { self.scene.to_owned() } else { format!("{}, {}", self.scene, self.variant) }
     }
 
-    /// The rows of our engine, exact and within a budget, and of rapier3d, where it takes the scene.
+    /// The rows of our engine at each level, and of rapier3d, where it takes the scene.
     fn measure(&self) -> anyhow::Result<Vec<Row>> {
         let stage = (self.stage)()?;
         let mut rows = Vec::new();
-        for (engine, factors_max) in [("metachron", None), (BUDGETED, Some(BUDGET_FACTORS))] {
+        for &Level { engine, factors_max } in self.levels {
             let course = Course::of_cluster(&mut stage.play()?.within(factors_max), self.seconds)?;
             rows.push(row(self.name(), engine, &course));
         }
@@ -110,6 +122,9 @@ impl Case {
 /// Our engine where no solve makes more factors than these: the least of a scene's budget, and a few more.
 const BUDGETED: &str = "metachron, 8 factors";
 const BUDGET_FACTORS: u32 = 8;
+const LEVELS: [Level; 2] =
+    [Level { engine: "metachron", factors_max: None }, Level { engine: BUDGETED, factors_max: Some(BUDGET_FACTORS) }];
+const HURRIED: [Level; 1] = [Level { engine: "metachron", factors_max: Some(0) }];
 
 /// The boxes of towers are aside by up to so much, millimetres, and rebound by so much.
 const TOWERS_MM: [f64; 3] = [12.0, 25.0, 35.0];
@@ -128,13 +143,12 @@ fn cases(quick: bool) -> Vec<Case> {
     }
     let pendulum_s = if quick { 2.0 } else { 20.0 };
     all.push(Case::new("pendulum", "", pendulum_s, || Ok(rigid_scenes::pendulum())));
-    for (heap, restitution) in [(false, 0.0), (false, 0.1), (true, 0.0)] {
-        let together = if heap { "a heap" } else { "one problem" };
+    let pile = |variant: String, restitution| {
         let seconds = if quick { 0.4 } else { 1.5 };
-        all.push(Case::new("pile", format!("{together}, e {restitution}"), seconds, move || {
-            Ok(rigid_scenes::pile("pile", heap)?.rebounding(restitution))
-        }));
-    }
+        Case::new("pile", variant, seconds, move || Ok(rigid_scenes::pile()?.rebounding(restitution)))
+    };
+    all.extend([0.0, 0.1].map(|restitution| pile(format!("one problem, e {restitution}"), restitution)));
+    all.push(pile("a heap, e 0".to_owned(), 0.0).hurried());
     for seed in 1..=if quick { 2 } else { 20 } {
         all.push(Case::new("bin", format!("seed {seed}"), 2.0, move || Ok(soft_scenes::bin(seed))));
     }

@@ -7,7 +7,7 @@ use anyhow::{Context, bail};
 use glam::{DQuat, DVec3};
 use metachron_contact::joint::{Joint, JointKind};
 use metachron_core::AgentId;
-use metachron_geometry::{CombineRule, Solid};
+use metachron_geometry::Solid;
 use metachron_models::rigid::RigidSpec;
 use metachron_scene::{Source, load};
 use metachron_world::Spec;
@@ -46,17 +46,13 @@ fn hinge_about(axis: DVec3) -> JointKind {
     JointKind::Revolute { axis, range_rad: None, motor: None }
 }
 
-/// The scene `pile`, by its name or path; as one problem where `heap` is off, because a rule of its own keeps a body out of rapier3d's heap.
-pub(super) fn pile(source: &str, heap: bool) -> anyhow::Result<Stage> {
-    let scene = load(&Source::open(source)?, &[])?;
+/// The scene `pile`.
+pub(super) fn pile() -> anyhow::Result<Stage> {
+    let scene = load(&Source::open("pile")?, &[])?;
     let mut bodies = Vec::with_capacity(scene.agents.len());
     for member in &scene.agents {
         let Spec::Rigid(spec) = &member.spec else { bail!("`{}` is not a rigid body", member.name) };
-        let mut spec = spec.clone();
-        if !heap {
-            spec.traits.friction_rule = Some(CombineRule::GeometricMean);
-        }
-        bodies.push(Body::Rigid(spec));
+        bodies.push(Body::Rigid(spec.clone()));
     }
     let mut obstacles = scene.obstacles.to_vec();
     obstacles.iter_mut().for_each(|solid| solid.restitution = 0.0);

@@ -22,18 +22,6 @@ fn a_low_tower_stands_in_both_engines_and_a_pendulum_keeps_its_energy() {
 }
 
 #[test]
-fn a_pile_is_a_heap_only_where_nothing_has_a_rule_of_its_own() {
-    for (heap, rules) in [(true, 0), (false, 1000)] {
-        let stage = rigid_scenes::pile(concat!(env!("CARGO_MANIFEST_DIR"), "/../../scenes/pile.toml"), heap).unwrap();
-        let own = stage
-            .bodies
-            .iter()
-            .filter(|(body, _)| matches!(body, stage::Body::Rigid(spec) if spec.traits.friction_rule.is_some()));
-        assert_eq!((stage.bodies.len(), own.count()), (1000, rules));
-    }
-}
-
-#[test]
 fn every_scene_is_built_and_names_are_unique() {
     for quick in [false, true] {
         let all = cases(quick);
