@@ -91,7 +91,12 @@ impl Simulation for Empty {
 }
 
 fn options() -> WindowOptions {
-    WindowOptions { size: Some([800.0, 500.0]), screenshots: std::env::temp_dir(), lose_device_after: Some(LOST_AFTER) }
+    WindowOptions {
+        size: Some([800.0, 500.0]),
+        reset: true,
+        screenshots: std::env::temp_dir(),
+        lose_device_after: Some(LOST_AFTER),
+    }
 }
 
 fn a_lost_device_is_replaced_and_the_show_goes_on() {
@@ -121,7 +126,15 @@ fn the_tube_plays_in_a_window() {
     let session = Session::open(metachron_scene::load(&source, &[]).unwrap()).unwrap();
     let screenshots = std::env::temp_dir();
     let size = Some([800.0, 500.0]);
-    let plan = WindowPlan { source, overrides: Vec::new(), size, screenshots, seconds: None, frames: Some(FRAMES) };
+    let plan = WindowPlan {
+        source,
+        overrides: Vec::new(),
+        size,
+        reset: true,
+        screenshots,
+        seconds: None,
+        frames: Some(FRAMES),
+    };
     let begin = Instant::now();
     let Ok(outcome) = play_in_window(session, plan, &mut |_, _| begin.elapsed() < STUCK) else { panic!("no window") };
     assert!(!outcome.interrupted, "the window was stuck");
@@ -139,8 +152,15 @@ fn a_display_that_goes_away_ends_the_run_with_its_outcome() {
     let source = Source::open("pendulum").unwrap();
     let session = Session::open(metachron_scene::load(&source, &[]).unwrap()).unwrap();
     let screenshots = std::env::temp_dir();
-    let plan =
-        WindowPlan { source, overrides: Vec::new(), size: None, screenshots, seconds: None, frames: Some(10_000) };
+    let plan = WindowPlan {
+        source,
+        overrides: Vec::new(),
+        size: None,
+        reset: true,
+        screenshots,
+        seconds: None,
+        frames: Some(10_000),
+    };
     let mut told = false;
     let played = play_in_window(session, plan, &mut |frame, _| {
         if frame.frame >= FRAMES && !told {

@@ -265,6 +265,10 @@ pub struct RunArgs {
     /// Open no window
     #[arg(long, env = "METACHRON_HEADLESS", value_parser = clap::builder::FalseyValueParser::new())]
     pub headless: bool,
+    /// Show panels and colours of the window as at first, and not as they were left
+    #[cfg(feature = "viewer")]
+    #[arg(long, conflicts_with = "headless")]
+    pub reset_window: bool,
     /// End after this many frames
     #[arg(long, value_name = "N", conflicts_with = "seconds", value_parser = clap::value_parser!(u64).range(1..))]
     pub frames: Option<u64>,

@@ -107,6 +107,7 @@ fn window_plan(request: &Request) -> WindowPlan {
         source: request.source.clone(),
         overrides: request.overrides.clone(),
         size: request.size.map(|[width, height]| [width as f32, height as f32]),
+        reset: request.reset_window,
         screenshots: PathBuf::from("."),
         seconds,
         frames,

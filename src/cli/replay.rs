@@ -40,6 +40,8 @@ pub(super) fn command(args: &ReplayArgs) -> anyhow::Result<Exit> {
         // the recording says how time passed
         pace: Pace::RealTime,
         window: false,
+        #[cfg(feature = "viewer")]
+        reset_window: false,
         end: Some(RunLength::Recording),
         size: args.size,
         style: style(&args.output.style),

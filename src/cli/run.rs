@@ -43,6 +43,9 @@ pub struct Request {
     pub pace: Pace,
     /// Whether a window is requested; where none can be opened the run goes headless.
     pub window: bool,
+    /// Whether it looks as at first, and not as it was left.
+    #[cfg(feature = "viewer")]
+    pub reset_window: bool,
     /// When the run ends by itself; `None`: a window stays open, a headless run takes 10 s.
     pub end: Option<RunLength>,
     /// Width and height of the picture in pixels, or of the window in points, each 1 … 8192; `None`: 1280 × 720, or the
@@ -192,6 +195,8 @@ fn request(args: &RunArgs, matches: Option<&ArgMatches>) -> anyhow::Result<Reque
             PaceWord::Free => Pace::Free,
         },
         window: !args.headless,
+        #[cfg(feature = "viewer")]
+        reset_window: args.reset_window,
         end,
         size: args.size,
         style: style(&args.output.style),

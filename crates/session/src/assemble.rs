@@ -12,8 +12,8 @@ use metachron_core::{AgentId, N_MAX, ResolutionRange};
 use metachron_geometry::{Model, PieceKind};
 use metachron_lod::control;
 use metachron_lod::control::{
-    ErrorControl, ErrorLimits, GivenSliders, Kind, Law, LevelDemand, ObjectView, PictureControl, Pieces, Policy,
-    Prices, RateControl, RateDemand, RateGains, RateLimits, Stages, Stroke, Value,
+    ErrorControl, ErrorLimits, GivenSliders, Kind, Law, LevelDemand, ObjectView, PRIMITIVE_LEVELS, PictureControl,
+    Pieces, Policy, Prices, RateControl, RateDemand, RateGains, RateLimits, Stages, Stroke, Value,
 };
 use metachron_render::{
     Actor, Appearance, Camera, Environment, Form, Level, Material, SceneView, StaticObject, Visibility,
@@ -180,17 +180,28 @@ pub fn members(scene: &Scene) -> Vec<Vec<usize>> {
     scene.groups.iter().map(of).collect()
 }
 
-/// For every actor the actor of the innermost group that it is in.
-pub fn parents(scene: &Scene) -> Vec<Option<usize>> {
+/// What control knows of an actor for as long as none joins.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct Lasting {
+    /// The actor of the innermost group that it is in.
+    pub group: Option<usize>,
+    /// Triangles at every level, of an agent that is one mesh per level.
+    pub triangles: [u32; PRIMITIVE_LEVELS],
+}
+
+/// That of every actor: agents, then scenery, then groups.
+pub fn lasting(scene: &Scene) -> Vec<Lasting> {
     let first = scene.agents.len() + scene.scenery.len();
-    let mut parents = vec![None; first + scene.groups.len()];
+    let agents = scene.agents.iter().map(|member| Lasting { group: None, triangles: triangles(&member.spec) });
+    let mut all: Vec<Lasting> = agents.collect();
+    all.resize(first + scene.groups.len(), Lasting::default());
     // inner groups come first
     for (at, (group, members)) in scene.groups.iter().zip(members(scene)).enumerate() {
         for member in members.into_iter().chain(group.groups.clone().map(|inner| first + inner)) {
-            parents[member] = parents[member].or(Some(first + at));
+            all[member].group = all[member].group.or(Some(first + at));
         }
     }
-    parents
+    all
 }
 
 /// All scenery in the order of its actors.
@@ -281,17 +292,19 @@ pub fn law(target: &metachron_world::Target) -> Law {
     }
 }
 
-/// A scene and for every actor of it the group that it is in ([`parents`]).
+/// A scene and what lasts of every actor of it.
 #[derive(Clone, Copy)]
-pub struct Grouped<'a> {
+pub struct Actors<'a> {
     pub scene: &'a Scene,
-    pub parents: &'a [Option<usize>],
+    pub lasting: &'a [Lasting],
 }
 
 /// Updates `views`, control's description of every object of the scene view in the order of its actors, for the objects in `updated`.
-pub fn update_views(views: &mut Vec<ObjectView>, seen: &[Visibility], updated: &[usize], of: Grouped<'_>) {
-    let view =
-        |at: usize| ObjectView { group: of.parents.get(at).copied().flatten(), ..view_at(at, &seen[at], of.scene) };
+pub fn update_views(views: &mut Vec<ObjectView>, seen: &[Visibility], updated: &[usize], of: Actors<'_>) {
+    let view = |at: usize| {
+        let lasting = of.lasting.get(at).copied().unwrap_or_default();
+        ObjectView { group: lasting.group, ..view_at(at, &seen[at], of.scene, lasting.triangles) }
+    };
     if views.len() != seen.len() {
         views.clear();
         views.extend((0..seen.len()).map(view));
@@ -303,8 +316,8 @@ pub fn update_views(views: &mut Vec<ObjectView>, seen: &[Visibility], updated: &
 }
 
 /// Actors are agents, then scenery, then groups.
-fn view_at(at: usize, seen: &Visibility, scene: &Scene) -> ObjectView {
-    let (view, appearance) = view_and_appearance(at, seen, scene);
+fn view_at(at: usize, seen: &Visibility, scene: &Scene, triangles: [u32; PRIMITIVE_LEVELS]) -> ObjectView {
+    let (view, appearance) = view_and_appearance(at, seen, scene, triangles);
     ObjectView { may_vanish: appearance.may_vanish.unwrap_or(scene.target.may_vanish), ..view }
 }
 
@@ -312,10 +325,11 @@ fn view_and_appearance<'a>(
     at: usize,
     seen: &Visibility,
     scene: &'a Scene,
+    triangles: [u32; PRIMITIVE_LEVELS],
 ) -> (ObjectView, &'a metachron_world::Appearance) {
     let (agents, members) = (scene.agents.len(), scene.scenery.len());
     if let Some(member) = scene.agents.get(at) {
-        return (view(seen, member), &member.appearance);
+        return (view(seen, member, triangles), &member.appearance);
     }
     if let Some(it) = scene.scenery.get(at - agents) {
         let (least, most) = it.model.range();
@@ -365,10 +379,10 @@ fn shading(appearance: &metachron_world::Appearance) -> (control::Shading, contr
     }
 }
 
-fn view(seen: &Visibility, member: &Member) -> ObjectView {
+fn view(seen: &Visibility, member: &Member, triangles: [u32; PRIMITIVE_LEVELS]) -> ObjectView {
     let kind = match seen.tube_m {
         Some((length_m, radius_m)) => Kind::Tube { length_m, radius_m },
-        None => Kind::Primitive { radius_m: seen.radius_m, triangles: triangles(&member.spec) },
+        None => Kind::Primitive { radius_m: seen.radius_m, triangles },
     };
     view_of(seen, kind, member.picture, &member.appearance)
 }

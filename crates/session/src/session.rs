@@ -59,8 +59,8 @@ pub struct Session {
     visible_resolution: VisibleResolution,
     reader: Reader,
     views: Vec<ObjectView>,
-    /// For every actor the group that it is in.
-    parents: Vec<Option<usize>>,
+    /// What lasts of every actor.
+    lasting: Vec<assemble::Lasting>,
     levels: Vec<Level>,
     couplings: Couplings,
     trace: Option<Trace>,
@@ -174,7 +174,7 @@ impl Session {
             machine,
             world,
             views: Vec::new(),
-            parents: assemble::parents(&scene),
+            lasting: assemble::lasting(&scene),
             levels: Vec::new(),
             couplings: Couplings::default(),
             trace: None,

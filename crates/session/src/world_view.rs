@@ -21,8 +21,8 @@ pub struct WorldView {
     scene_view: SceneView,
     control: PictureControl,
     views: Vec<ObjectView>,
-    /// For every actor the group that it is in.
-    parents: Vec<Option<usize>>,
+    /// What lasts of every actor.
+    lasting: Vec<assemble::Lasting>,
 }
 
 impl WorldView {
@@ -36,7 +36,7 @@ impl WorldView {
             scene_view: assemble::scene_view(scene),
             control,
             views: Vec::new(),
-            parents: assemble::parents(scene),
+            lasting: assemble::lasting(scene),
             scene: scene.clone(),
         }
     }
@@ -61,7 +61,7 @@ impl WorldView {
     pub fn compose(&mut self, camera: &Camera, size: Size) -> &Picture {
         self.gather();
         self.scene_view.survey(camera, size);
-        let of = assemble::Grouped { scene: &self.scene, parents: &self.parents };
+        let of = assemble::Actors { scene: &self.scene, lasting: &self.lasting };
         assemble::update_views(&mut self.views, self.scene_view.seen(), self.scene_view.updated(), of);
         let plan = self.control.plan(&self.views);
         let levels: Vec<Level> =
@@ -77,7 +77,7 @@ impl WorldView {
             world.joined(agent.id()).into_iter().for_each(|member| assemble::join(scene, scene_view, member));
         }
         if scene.agents.len() > before {
-            self.parents = assemble::parents(scene);
+            self.lasting = assemble::lasting(scene);
         }
         let agents = || world.agents().iter().take(scene.agents.len());
         // no state before the newest: what was shown last may be long ago

@@ -201,6 +201,9 @@ impl Viewer {
             self.panels(ui, simulation, &mut commands, &mut actions);
         }
         self.overlays(ui, simulation, &mut commands);
+        if !self.layout.panels {
+            commands.extend(overlays::panels_button(ui));
+        }
         let mut requests = WindowRequests::default();
         for command in commands {
             self.execute(command, simulation, &mut actions, &mut requests);
@@ -374,6 +377,7 @@ impl Viewer {
             Command::Ages => *looks = looks.plain_or(DrawingOptions { ages: !looks.ages, ..*looks }),
             Command::HideUi => self.layout.panels = !self.layout.panels,
             Command::Timeline => self.layout.timeline = !self.layout.timeline,
+            Command::ResetWindow => self.layout = Layout::default(),
             Command::Theme => requests.theme = true,
             Command::Screenshot => requests.screenshot = true,
             Command::Help => self.help = !self.help,

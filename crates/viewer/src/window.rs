@@ -35,6 +35,8 @@ pub struct WindowPlan {
     pub overrides: Vec<(String, String)>,
     /// Width and height of the window, points; `None` restores the size at its last closing.
     pub size: Option<[f32; 2]>,
+    /// Whether panels and picture look as in a first window, and not as they were left.
+    pub reset: bool,
     /// Folder for screenshots.
     pub screenshots: PathBuf,
     /// Simulated seconds after which the window closes by itself.
@@ -60,7 +62,8 @@ pub enum WindowFailure {
 /// # Errors
 /// [`WindowFailure::NoWindow`] returns the session with its time paused, [`WindowFailure::Gone`] the outcome.
 pub fn play_in_window(session: Session, plan: WindowPlan, go_on: GoOn<'_>) -> Result<Outcome, WindowFailure> {
-    let options = WindowOptions { size: plan.size, screenshots: plan.screenshots.clone(), lose_device_after: None };
+    let (size, reset, screenshots) = (plan.size, plan.reset, plan.screenshots.clone());
+    let options = WindowOptions { size, reset, screenshots, lose_device_after: None };
     let mut simulation = WindowSimulation::new(session, plan, go_on);
     match run_window(&mut simulation, &options) {
         Ok(_) => Ok(simulation.session.end(simulation.adapter, simulation.stopped)),

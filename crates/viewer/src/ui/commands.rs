@@ -50,6 +50,8 @@ pub enum Command {
     HideUi,
     /// Show or hide the timeline.
     Timeline,
+    /// Show panels and picture as in a first window.
+    ResetWindow,
     /// Switch between light and dark.
     Theme,
     /// Write the picture to a file.
@@ -105,7 +107,7 @@ const fn row(command: Command, keys: &'static [KeyboardShortcut], does: &'static
 }
 
 /// Every key binding of the window.
-pub const SHORTCUTS: [Shortcut; 29] = [
+pub const SHORTCUTS: [Shortcut; 30] = [
     row(Command::PauseOrRun, &[key(Key::Space)], "Pause or run", Group::Time),
     row(Command::Step, &[key(Key::ArrowRight)], "Step one frame, or to the next moment", Group::Time),
     row(Command::Back, &[key(Key::ArrowLeft)], "Step back", Group::Time),
@@ -128,6 +130,7 @@ pub const SHORTCUTS: [Shortcut; 29] = [
     row(Command::Lanes, &[key(Key::L)], "Lanes of turns", Group::Picture),
     row(Command::HideUi, &[key(Key::H)], "Hide the panels", Group::Picture),
     row(Command::Timeline, &[key(Key::F5)], "Timeline", Group::Picture),
+    row(Command::ResetWindow, &[ctrl(Key::H)], "Panels and colours as at first", Group::Picture),
     row(Command::Theme, &[ctrl(Key::T)], "Light or dark", Group::Picture),
     row(Command::Screenshot, &[key(Key::F12)], "Screenshot", Group::Picture),
     row(Command::Help, &[key(Key::F1), key(Key::Questionmark)], "Help", Group::Picture),

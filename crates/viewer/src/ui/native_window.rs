@@ -23,6 +23,8 @@ use std::time::{Duration, Instant};
 pub struct WindowOptions {
     /// Initial width and height, points; `None` restores the size at which the window was last closed.
     pub size: Option<[f32; 2]>,
+    /// Whether panels and picture look as in a first window, and not as they were left.
+    pub reset: bool,
     /// Folder for screenshots; it exists.
     pub screenshots: PathBuf,
     /// Destroys the device after this many pictures, once: tests that the window comes back. Never set by users.
@@ -139,7 +141,9 @@ fn open(
     let native = native_options(&simulation.status().scene, options.size);
     let creator = move |cc: &CreationContext<'_>| -> Result<Box<dyn eframe::App + '_>, _> {
         Viewer::install(&cc.egui_ctx);
-        if let Some(layout) = cc.storage.filter(|_| first).and_then(|s| eframe::get_value::<Layout>(s, LAYOUT)) {
+        if let Some(layout) =
+            cc.storage.filter(|_| first && !options.reset).and_then(|s| eframe::get_value::<Layout>(s, LAYOUT))
+        {
             viewer.layout = layout;
         }
         let state = cc.wgpu_render_state.as_ref().ok_or("eframe was built without wgpu")?;

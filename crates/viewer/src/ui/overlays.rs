@@ -5,6 +5,7 @@
 use super::commands;
 use super::commands::{Command, Group, MOUSE, SHORTCUTS};
 use super::history::FrameSummary;
+use super::icons::{Icon, icon_button};
 use super::protocol::{Message, Severity, Status};
 use super::text;
 use super::theme::{Palette, palette};
@@ -135,6 +136,20 @@ pub fn messages(ui: &Ui, over: Rect, messages: &[Message]) {
             card(&palette).show(ui, |ui| ui.label(RichText::new(&message.text).color(color)));
         }
     });
+}
+
+/// The button that brings the panels back where they are hidden: whoever finds the window so knows no key for it.
+pub fn panels_button(ui: &Ui) -> Option<Command> {
+    let keys = |command| commands::keys_text(ui.ctx(), command);
+    let hover = format!(
+        "Show the panels   {}\n{} also takes colours and styles back",
+        keys(Command::HideUi),
+        keys(Command::ResetWindow)
+    );
+    let area = Area::new(Id::unique("panels button")).pivot(Align2::RIGHT_TOP);
+    let corner = ui.ctx().content_rect().right_top() + vec2(-12.0, 12.0);
+    let button = area.fixed_pos(corner).show(ui.ctx(), |ui| icon_button(ui, Icon::Panels, "Show panels", &hover));
+    button.inner.clicked().then_some(Command::HideUi)
 }
 
 /// Every command by name, filtered by the typed text. Returns the chosen command, and whether the palette stays open.

@@ -12,7 +12,15 @@ fn plan(scene: &str) -> WindowPlan {
     let overrides = vec![("executor".to_owned(), "\"lockstep\"".to_owned())];
     let file = format!("{}/../../scenes/{scene}.toml", env!("CARGO_MANIFEST_DIR"));
     let source = Source::open(&file).unwrap();
-    WindowPlan { source, overrides, size: None, screenshots: PathBuf::from("."), seconds: None, frames: None }
+    WindowPlan {
+        source,
+        overrides,
+        size: None,
+        reset: false,
+        screenshots: PathBuf::from("."),
+        seconds: None,
+        frames: None,
+    }
 }
 
 fn with_simulation(check: impl FnOnce(&mut WindowSimulation<'_>)) {

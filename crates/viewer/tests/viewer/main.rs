@@ -249,6 +249,21 @@ fn hiding_the_panels_gives_the_picture_the_whole_window() {
 }
 
 #[test]
+fn hidden_panels_come_back_by_a_button_and_colours_by_a_key() {
+    let mut harness = window();
+    assert!(harness.query_by_label("Show panels").is_none());
+    press(&mut harness, Key::H);
+    press(&mut harness, Key::C);
+    harness.get_by_label("Show panels").click();
+    asked(&mut harness);
+    assert!(harness.query_by_label("Pause").is_some() && harness.query_by_label("Show panels").is_none());
+    assert_ne!(harness.state().viewer.layout, metachron_viewer::ui::Layout::default(), "it is coloured by resolution");
+    harness.key_press_modifiers(Modifiers::COMMAND, Key::H);
+    asked(&mut harness);
+    assert_eq!(harness.state().viewer.layout, metachron_viewer::ui::Layout::default());
+}
+
+#[test]
 fn overlays_open_by_their_keys() {
     let mut harness = window();
     press(&mut harness, Key::F2);
