@@ -19,7 +19,7 @@ use crate::member::{ClusterMember, Role};
 use crate::solve::Contact;
 use glam::DVec3;
 use metachron_geometry::narrow_phase::{NarrowPhaseScratch, TouchKey, self_touches, touches};
-use metachron_geometry::{CollisionShape, Place, Touch};
+use metachron_geometry::{CollisionShape, Place, ShapeKind, Touch};
 use pair::{Against, LOOK_M, Pair, Reaching, closes, taken_up};
 pub(crate) use pair::{Judge, Owner, Round};
 use reach::{Boxes, FAR_M, Meeting, Sought, Sweep, Sweeping};
@@ -190,14 +190,15 @@ impl Search {
         let Round { all, h_s, .. } = *round;
         let Pair { member, against } = pair;
         let (Some(skin), Some(reach)) = (all[member].member.skin(), self.boxes.of(member)) else { return };
-        let (partner, form, bounds, their_m_s) = match against {
-            Against::Own => (Partner::Own, skin.form, reach.skin, reach.speed_m_s),
-            Against::Static { number, solid } => (Partner::Static(number), &solid.form, solid.bounds(), 0.0),
+        let (form, bounds, their_m_s) = match against {
+            Against::Own => (skin.form, reach.skin, reach.speed_m_s),
+            Against::Static { solid, .. } => (&solid.form, solid.bounds(), 0.0),
             Against::Member(other) => {
                 let (Some(skin), Some(there)) = (all[other].member.skin(), self.boxes.of(other)) else { return };
-                (Partner::Agent(all[other].id), skin.form, there.skin, there.speed_m_s)
+                (skin.form, there.skin, there.speed_m_s)
             }
         };
+        let partner = pair.partner(all);
         if skin.form.senses(form) {
             return;
         }
@@ -232,7 +233,7 @@ impl Search {
     /// Finds the places of a pair that may come within reach, and when: at their first meeting, of a pair that is apart now and goes far.
     fn touch(&mut self, round: &Round<'_, '_>, pair: Pair<'_>, reaching: Reaching) -> Meeting {
         let Reaching { reach_m, swept_m } = reaching;
-        let Self { touches: into, scratch, sweep, recycled, boxes, .. } = self;
+        let Self { touches: into, scratch, sweep, recycled, .. } = self;
         let body = &round.all[pair.member].member;
         let (now, end) = (Meeting::default(), Meeting { after_s: round.h_s, ..Meeting::default() });
         let Some(skin) = body.skin() else { return now };
@@ -251,8 +252,7 @@ impl Search {
             Against::Static { solid, .. } => solid.touches(&skin, reach_m, scratch, into),
             Against::Member(_) => there.iter().for_each(|there| touches(&skin, there, reach_m, scratch, into)),
         };
-        // no point is farther from the middle than the corners of its box are from each other, whatever way it is turned
-        let radius_m = boxes.of(pair.member).map_or(f64::INFINITY, |reach| reach.skin.low.distance(reach.skin.high));
+        let radius_m = if let ShapeKind::Solid(solid) = &skin.form.kind { solid.radius_m } else { f64::INFINITY };
         let solids = TwoSolids::of(skin.view, there.map(|there| there.view), radius_m);
         match solids.filter(|_| round.predicts()) {
             Some(solids) => {
