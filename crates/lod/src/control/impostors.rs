@@ -6,6 +6,9 @@
 //! At a price λ of a second every part of a tree can be decided by itself: a group is closed if the best of its impostors leaves more net
 //! benefit (benefit minus cost at λ) than its members at their best. If even the least of all open groups does not fit, those are closed
 //! that lose least. A group that was opened too soon waits longer the next time.
+//!
+//! A closed group closes the groups inside it, so that opening it is charged with its cheapest cut, their impostors: these open afterwards, each
+//! for what it costs.
 
 use super::groups::{Groups, Impostors};
 use super::ladder::Rung;
@@ -67,10 +70,11 @@ impl ImpostorChoice {
                 continue;
             }
             let (open, closed) = (self.totals[group], self.closed(query, group, price));
-            let state =
-                self.states[group].get_or_insert(GroupState { closed: false, still: u32::MAX, patience: PATIENCE.0 });
+            let hidden = self.is_hidden(groups, group);
+            let state = self.states[group].get_or_insert(GroupState::OPEN);
             state.still = state.still.saturating_add(1);
             let taken = match closed {
+                Some(closed) if hidden => closed,
                 Some(closed) => state.update(open, closed, MIN_GAIN * price * open.least, &mut spare),
                 None => {
                     // the members cost less than any impostor
@@ -85,13 +89,23 @@ impl ImpostorChoice {
             }
         }
         self.make_room(query, groups, slowness);
+        for &group in groups.all() {
+            if self.is_hidden(groups, group) {
+                self.states[group].get_or_insert(GroupState::OPEN).closed = true;
+            }
+        }
+    }
+
+    /// Whether a group above this object is closed.
+    fn is_hidden(&self, groups: &Groups, at: usize) -> bool {
+        groups.is_within(at, |group| self.is_closed(group))
     }
 
     /// Closes groups until the least of what is open fits, those first that lose least for the time they save.
     fn make_room(&mut self, query: &FrameQuery<'_>, groups: &Groups, slowness: f64) {
         let mut spare = self.spare(query, groups, slowness);
         while spare < 0.0 {
-            let hidden = |at: usize| self.is_closed(at) || groups.is_within(at, |group| self.is_closed(group));
+            let hidden = |at: usize| self.is_closed(at) || self.is_hidden(groups, at);
             let open = groups.all().iter().filter(|group| !hidden(**group));
             let saves = |&group: &usize| {
                 let coarsest = self.impostors.rungs(query, group).first()?;
@@ -140,7 +154,7 @@ impl ImpostorChoice {
     /// Least cost of everything at the present open and closed groups, ticks.
     fn least(&self, query: &FrameQuery<'_>, groups: &Groups) -> f64 {
         let cost = |at: usize| {
-            let hidden = groups.parent(at).is_some() && groups.is_within(at, |group| self.is_closed(group));
+            let hidden = self.is_hidden(groups, at);
             match () {
                 () if hidden => 0.0,
                 () if !query.views[at].view.is_group() => self.totals[at].least,
@@ -172,6 +186,9 @@ impl Totals {
 }
 
 impl GroupState {
+    /// A group in view for the first time.
+    const OPEN: Self = Self { closed: false, still: u32::MAX, patience: PATIENCE.0 };
+
     /// Closes or opens the group if that gains more than `bar` and `spare` ticks allow it; gives the resulting totals.
     fn update(&mut self, open: Totals, closed: Totals, bar: f64, spare: &mut f64) -> Totals {
         let more = open.least - closed.least;

@@ -138,3 +138,35 @@ fn the_detail_of_a_group_is_its_level_over_its_number_of_levels() {
     };
     assert_eq!([of(0), of(1), of(2), of(3)], [0.0, 1.0 / 3.0, 2.0 / 3.0, 1.0]);
 }
+
+/// Two groups of eight meshes, and, where it is `nested`, a third around both.
+fn two_groups(nested: bool) -> Vec<ObjectView> {
+    let meshes = (0..16).map(|i| ObjectView { group: Some(16 + i / 8), ..mesh(i as u32, 4000.0, 2000) });
+    let group = |number: u32, around: Option<usize>| {
+        let kind = Kind::Group { radius_m: 3.0, impostors: [80, 0, 0, 0, 0, 0, 0, 0] };
+        let range = ResolutionRange { eps_m: (1.0, 1.0), n: (0, 10) };
+        ObjectView { pixels: 40_000.0, group: around, ..object(number, kind, range) }
+    };
+    let inner = (16..18).map(|number| group(number, nested.then_some(18)));
+    let outer = nested.then(|| group(18, None));
+    meshes.chain(inner).chain(outer).collect()
+}
+
+#[test]
+fn a_group_around_others_costs_no_triangles_at_the_same_target() {
+    let drawn = |views: &[ObjectView], control: &PictureControl| {
+        let levels = &control.last_plan().levels;
+        assert_eq!(levels.len(), views.len());
+        levels.iter().map(|level| level.polygons).sum::<f64>()
+    };
+    let [flat, nested] = [two_groups(false), two_groups(true)];
+    // from enough for both impostors to enough for all meshes
+    for target_ms in (0..28).map(|k| 0.1 * 1.15_f64.powi(k)) {
+        let [of_flat, of_nested] = [&flat, &nested].map(|views| {
+            let mut control = bare(Policy::Adaptive, target_ms);
+            (0..300).for_each(|_| frame(&mut control, views, 1.0));
+            drawn(views, &control)
+        });
+        assert!(of_nested >= 0.95 * of_flat, "{target_ms} ms: {of_nested} triangles, without the group {of_flat}");
+    }
+}
