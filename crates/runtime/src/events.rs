@@ -57,7 +57,7 @@ pub enum EventKind {
 pub struct ContactEvent {
     /// What it touches.
     pub with: ContactPartner,
-    /// The place that bore most, metres; where it is not known, as in heaps that rapier3d steps, not a number.
+    /// The place that bore most, metres; where it is not known, not a number.
     pub point_m: DVec3,
     /// The normal there, towards the agent that tells of it, of length 1.
     pub normal: DVec3,

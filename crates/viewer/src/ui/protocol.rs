@@ -133,7 +133,7 @@ pub enum Law {
     },
     /// The law on the logarithm of the measured time, whose gain does not depend on the machine.
     Corrected {
-        /// κ, 0.01 … 0.99: the fraction of an error that one frame removes.
+        /// κ, 0.001 … 1.99: the fraction of an error that one frame removes.
         kappa: f64,
         /// λ, 0 … 0.99: the fraction of an error's change that one frame adds; above 0 it is a PI law without wind-up.
         lead: f64,
