@@ -98,7 +98,7 @@ fn a_reset_arm_is_where_it_began_and_at_rest() {
 #[test]
 fn a_slide_carries_what_is_welded_to_it_along_its_own_axis() {
     let (turn, way_m, speed) = (DQuat::from_rotation_z(0.5), 0.2, 0.3);
-    let slide = JointKind::Prismatic { axis: DVec3::X, range_m: Some([-0.1, 0.5]), motor: None };
+    let slide = JointKind::Prismatic { axis: turn * DVec3::X, range_m: Some([-0.1, 0.5]), motor: None };
     let base = Rigid::cuboid([0.05; 3]).kinematic().turned(turn).at([1.0, 2.0, 3.0]).rate_hz(1000.0);
     let cart = Rigid::cuboid([0.05; 3]).turned(turn).at([1.0, 2.0, 3.2]).rate_hz(1000.0);
     let load = Rigid::ball(0.02).at([1.0, 2.0, 3.4]).rate_hz(1000.0);
