@@ -31,7 +31,7 @@ pub struct Joint {
 }
 
 /// The degrees of freedom that a joint locks and leaves free. Axes of a [`Joint`] are in a's shape, of any length above zero.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
 pub enum JointKind {
     /// All locked.
     Fixed,

@@ -103,8 +103,8 @@ pub enum SceneBuildError {
     },
 }
 
-/// A scene in the making.
-#[derive(Debug, Clone)]
+/// A scene in the making. It can be serialized where no part is [`Custom`].
+#[derive(Debug, Clone, serde::Serialize, serde::Deserialize)]
 pub struct SceneBuilder {
     gravity: DVec3,
     contact_depth_m: f64,
@@ -116,7 +116,7 @@ pub struct SceneBuilder {
 }
 
 /// A joint by the names of its bodies; no second one is the world.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, serde::Serialize, serde::Deserialize)]
 struct Joined {
     name: String,
     a: String,
@@ -286,6 +286,11 @@ impl SceneBuilder {
     pub fn add(mut self, name: impl Into<String>, part: impl Into<Part>) -> Self {
         self.parts.push((name.into(), part.into()));
         self
+    }
+
+    /// The names of what was added so far and moves, in its order.
+    pub fn names(&self) -> impl Iterator<Item = &str> {
+        self.parts.iter().map(|(name, _)| &**name)
     }
 
     /// The scene; agents that start inside each other are moved apart where that strains nothing.

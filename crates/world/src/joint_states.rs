@@ -5,16 +5,18 @@
 
 use super::error::WorldError;
 use super::kinds::ExecutorKind;
-use super::sensors::JointRef;
+use super::sensors::{JointRef, centre_of_mass};
 use super::world::World;
 use glam::{DQuat, DVec3};
 use metachron_contact::joint::{JOINT_GAP_MAX_M, Joint, JointKind};
 use metachron_contact::member::Pose;
 use metachron_contact::{Input, SetMotion};
 use metachron_core::{AgentId, AttachmentEventKind, AttachmentId, Body, shortest_turn};
-use metachron_geometry::ShapeKind;
-use metachron_runtime::{AgentHandle, AwaitedMotion, Command};
+use metachron_runtime::{AwaitedMotion, Command};
 use std::collections::{BTreeMap, BTreeSet, VecDeque};
+
+/// The largest turn by which coordinates may leave a loop open, radians: as far as [`JOINT_GAP_MAX_M`] at a metre.
+const JOINT_GAP_MAX_RAD: f64 = JOINT_GAP_MAX_M;
 
 /// How far a hinge or a slide has moved, and how fast it does.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -141,8 +143,8 @@ impl World {
 
     /// Puts joints to coordinates before the next step, and with them all bodies that they carry. What holds a tree of joints stays: the world, a
     /// kinematic body, or of a tree that nothing holds its body of the lowest number. Joints that are not named keep their places and rates, also
-    /// spherical and fixed ones; torn ones, springs and ropes carry nothing. Joints of a loop are set together, to what closes it within 1 mm and
-    /// 1 mrad.
+    /// spherical and fixed ones; torn ones, springs and ropes carry nothing. Joints of a loop are set together, all but one, to what closes it within
+    /// 1 mm and 1 mrad; the next step brings their rates together.
     ///
     /// # Errors
     /// [`WorldError::BadCoordinate`] for what is outside the joint's range or not finite, [`WorldError::NoCoordinate`], [`WorldError::OpenLoop`];
@@ -203,7 +205,11 @@ impl World {
         let tree = self.joint_tree()?;
         let walk = tree.walk(set);
         for number in &walk.closing {
-            self.check_closed(*number, &tree, &walk, set)?;
+            let joint = tree.joints[number];
+            let ends = [Some(joint.a), joint.b].map(|end| walk.reached[&end]);
+            if set.contains_key(number) || ends.iter().any(|end| end.is_moved) {
+                self.check_closed(*number, joint, ends.map(|end| end.frame), set.get(number))?;
+            }
         }
         let moves: Vec<_> = walk
             .reached
@@ -223,20 +229,22 @@ impl World {
         WorldError::Refused { name, reason: reason.to_owned() }
     }
 
-    /// Checks that a joint which closes a loop holds where its two bodies have come to.
+    /// Checks that a joint which closes a loop holds where its two bodies have come to; one that is not set follows them.
     fn check_closed(
         &self,
         number: u32,
-        tree: &JointTree<'_>,
-        walk: &Walk,
-        set: &BTreeMap<u32, Coordinate>,
+        joint: &Joint,
+        ends: [Frame; 2],
+        set: Option<&Coordinate>,
     ) -> Result<(), WorldError> {
-        let joint = tree.joints[&number];
-        let [a, b] = [Some(joint.a), joint.b].map(|id| walk.reached[&id].frame);
-        let (found, wanted) = (b.beside(a), tree.beside(number, set));
-        let apart_m = found.origin_m.distance(wanted.origin_m);
-        let apart_rad = shortest_turn(found.rotation, wanted.rotation).length();
-        if apart_m <= JOINT_GAP_MAX_M && apart_rad <= JOINT_GAP_MAX_M {
+        let [a, b] = ends;
+        let position = set.map_or_else(|| joint.travel(&a.pose(), &b.pose()), |set| set.position);
+        let (found, wanted) = (b.beside(a), b_beside_a(joint, Coordinate { position, velocity: 0.0 }));
+        let anchor_m = |frame: Frame| frame.origin_m + frame.rotation * joint.anchor_b_m;
+        let apart_m = anchor_m(found).distance(anchor_m(wanted));
+        let turns = matches!(joint.kind, JointKind::Spherical);
+        let apart_rad = if turns { 0.0 } else { shortest_turn(found.rotation, wanted.rotation).length() };
+        if apart_m <= JOINT_GAP_MAX_M && apart_rad <= JOINT_GAP_MAX_RAD {
             return Ok(());
         }
         Err(WorldError::OpenLoop { joint: self.joint_name(number), apart: format!("{apart_m} m and {apart_rad} rad") })
@@ -291,13 +299,6 @@ impl World {
             spin_rad_s,
         };
         Ok(TreeBody { frame, com_m, is_led: agent.inputs().has(Input::Pose) })
-    }
-}
-
-fn centre_of_mass(agent: &AgentHandle) -> DVec3 {
-    match agent.form().as_ref().map(|shape| &shape.kind) {
-        Some(ShapeKind::Solid(solid)) => solid.com_local,
-        _ => DVec3::ZERO,
     }
 }
 

@@ -11,7 +11,7 @@ use metachron_contact::joint::{Joint, JointKind, Motor};
 use metachron_contact::member::Pose;
 use metachron_core::{AgentId, Anchor, Body, ContactPartner, RigidState, SimTime, Snapshot};
 use metachron_geometry::ShapeKind;
-use metachron_runtime::Command;
+use metachron_runtime::{AgentHandle, Command};
 use std::sync::Arc;
 
 /// A sensor of a scene.
@@ -61,7 +61,7 @@ pub enum SensorKind {
 }
 
 /// Where on a rigid body a sensor sits, and how it is turned there: by default in the centre of mass, in the axes of the shape.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
+#[derive(Debug, Clone, Copy, PartialEq, Default, serde::Serialize, serde::Deserialize)]
 pub struct Site {
     /// Its place, metres in the axes of the body's shape; `None` for the centre of mass.
     pub at_m: Option<DVec3>,
@@ -285,11 +285,7 @@ impl World {
     fn placed(&self, id: AgentId) -> Result<Placed, WorldError> {
         let object = self.object_of(id)?;
         let (agent, state) = (self.agent(object)?, self.latest(object)?);
-        let shape = agent.form();
-        let com = match shape.as_ref().map(|shape| &shape.kind) {
-            Some(ShapeKind::Solid(solid)) => solid.com_local,
-            _ => DVec3::ZERO,
-        };
+        let com = centre_of_mass(agent);
         let RigidState { position, rotation, velocity, spin } = rigid(&state.body);
         let origin_m = position - rotation * com;
         let pose = Pose { centre_m: position, origin_m, rotation, ..Pose::WORLD };
@@ -306,6 +302,14 @@ impl Placed {
     /// The velocity of its matter at a point of space, m/s.
     fn at(&self, point_m: DVec3) -> DVec3 {
         self.velocity + self.spin.cross(point_m - self.pose.centre_m)
+    }
+}
+
+/// The centre of mass of a rigid body in the axes of its shape, metres; zero of all else.
+pub(super) fn centre_of_mass(agent: &AgentHandle) -> DVec3 {
+    match agent.form().as_ref().map(|shape| &shape.kind) {
+        Some(ShapeKind::Solid(solid)) => solid.com_local,
+        _ => DVec3::ZERO,
     }
 }
 

@@ -169,8 +169,12 @@ fn joints_of_a_loop_are_set_together_or_not_at_all() {
     assert_eq!(world.hash(), before);
     // both cranks turn by as much and the coupler does not
     let set = ["a", "b"].map(|name| state(&world, name, 0.4, 0.0));
-    let back = ["c", "d"].map(|name| state(&world, name, -0.4, 0.0));
-    world.set_joint_states(&[set, back].concat()).unwrap();
+    let [c, d] = ["c", "d"].map(|name| state(&world, name, -0.4, 0.0));
+    let wrong = JointState { position: -0.3, ..d };
+    assert!(matches!(world.set_joint_states(&[set[0], set[1], c, wrong]), Err(WorldError::OpenLoop { .. })));
+    // what closes the loop follows
+    world.set_joint_states(&[set[0], set[1], c]).unwrap();
+    assert!((world.joint_state(d.joint).unwrap().position + 0.4).abs() < 1e-12);
     world.advance(SimSpan::from_millis(1));
     let coupler = rigid(&world, "coupler");
     close(coupler.position, DVec3::X * 0.25 + DQuat::from_rotation_y(-0.4) * (DVec3::Z * 0.2), 1e-9);

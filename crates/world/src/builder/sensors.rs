@@ -9,14 +9,14 @@ use metachron_core::{ContactPartner, unit_rotation};
 use metachron_geometry::Obstacle;
 
 /// A sensor by the names of what it is on.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, serde::Serialize, serde::Deserialize)]
 pub(super) struct Mounted {
     pub name: String,
     pub on: SensorOn,
 }
 
 /// What a sensor is on, by name.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, serde::Serialize, serde::Deserialize)]
 #[non_exhaustive]
 pub enum SensorOn {
     /// How far a hinge or a slide has moved: [`SensorKind::JointPosition`].
