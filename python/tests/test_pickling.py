@@ -72,7 +72,7 @@ def test_what_is_printed_names_what_it_is_of() -> None:
     world.advance(0.5)
     began = events.drain()[0]
     assert began.force is not None
-    assert str(began) == f'{began.time} s: "ball" begins to touch "floor", by {np.linalg.norm(began.force):.3f} N'
+    assert str(began) == f'{began.time} s: "ball" begins to touch "floor" with {np.linalg.norm(began.force):.3f} N'
     assert repr(events) == "<Events, 0 lost>"
     assert repr(world.checkpoint()) == "<Checkpoint at 0.5 s>"
     rollout = mc.rollout(scenes.floating(), "ball", np.zeros((3, 1, 3)), step=0.01)

@@ -85,10 +85,10 @@ impl fmt::Display for Event {
         let other = self.other.as_deref().unwrap_or_default();
         match self.what {
             Happening::Contact(Contact { begins: true, force_n, .. }) => {
-                write!(f, "begins to touch \"{other}\", by {:.3} N", force_n.length())
+                write!(f, "begins to touch \"{other}\" with {:.3} N", force_n.length())
             }
             Happening::Contact(Contact { force_n, .. }) => {
-                write!(f, "touches \"{other}\" no more, by {:.3} N at most", force_n.length())
+                write!(f, "no longer touches \"{other}\", at most with {:.3} N", force_n.length())
             }
             Happening::Rests => f.write_str("comes to rest"),
             Happening::Wakes => f.write_str("moves again"),

@@ -91,6 +91,6 @@ fn an_event_is_a_sentence_with_the_names_of_both() {
     assert_eq!(names, [("ball", "contact_began", Some("floor")), ("ball", "rests", None)]);
     let Happening::Contact(contact) = all[0].what else { panic!("{all:?}") };
     let (at_s, force_n) = (all[0].at.as_secs_f64(), contact.force_n.length());
-    assert_eq!(all[0].to_string(), format!("{at_s} s: \"ball\" begins to touch \"floor\", by {force_n:.3} N"));
+    assert_eq!(all[0].to_string(), format!("{at_s} s: \"ball\" begins to touch \"floor\" with {force_n:.3} N"));
     assert_eq!(all[1].to_string(), format!("{} s: \"ball\" comes to rest", all[1].at.as_secs_f64()));
 }
