@@ -17,13 +17,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     world.command(carton, Command::force(Anchor::Local(DVec3::ZERO), DVec3::X * 20.0).for_ms(600))?;
     for frame in world.frames(10.0).take(20) {
         for event in events.drain() {
-            let name = &world.agents()[event.object.id().0 as usize].name().to_owned();
-            match event.what {
-                Happening::Contact(Contact { with, begins: true, force_n, .. }) => {
-                    println!("{:.3} s: {name} meets {with:?} with {:.1} N", event.at.as_secs_f64(), force_n.length());
-                }
-                other => println!("{:.3} s: {name}: {other:?}", event.at.as_secs_f64()),
-            }
+            println!("{event}");
         }
         let [carton, ball] = [carton, ball].map(|object| frame.point(object, Anchor::Local(DVec3::ZERO)));
         println!("{:.1} s: carton at {:.3} m, ball at {:.3} m", frame.time().as_secs_f64(), carton?.x, ball?.x);

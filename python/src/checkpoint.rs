@@ -27,6 +27,10 @@ impl Checkpoint {
         self.inner.write(path).map_err(raised::checkpoint)
     }
 
+    fn __repr__(&self) -> String {
+        format!("<Checkpoint at {} s>", self.time())
+    }
+
     /// Simulated time of the state, s.
     #[getter]
     fn time(&self) -> f64 {

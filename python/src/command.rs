@@ -49,8 +49,9 @@ impl<'a, 'py> Keywords<'a, 'py> {
         }
     }
 
-    /// The command under its key and for its time.
-    pub fn timed(&self, command: Command) -> PyResult<Command> {
+    /// The command under its key and for its time; what its key has is taken back where nothing `is_given`.
+    pub fn timed(&self, command: Command, is_given: bool) -> PyResult<Command> {
+        let command = if is_given { command } else { command.taken_back() };
         let command = command.key(self.get("key")?.unwrap_or(0));
         let expires: Option<f64> = self.get("expires")?;
         Ok(match expires {

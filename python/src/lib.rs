@@ -10,8 +10,10 @@ mod command;
 mod events;
 mod export;
 mod home;
+mod joints;
 mod numbers;
 mod object;
+mod pickled;
 mod queries;
 mod raised;
 mod recording;
@@ -21,6 +23,7 @@ mod sensor;
 mod soft;
 mod start;
 mod state;
+mod states;
 #[cfg_attr(not(feature = "view"), path = "no_view.rs")]
 mod view;
 mod world;
@@ -35,6 +38,8 @@ mod _metachron {
     #[pymodule_export]
     use crate::export::Export;
     #[pymodule_export]
+    use crate::joints::{Joint, Joints};
+    #[pymodule_export]
     use crate::object::Object;
     #[pymodule_export]
     use crate::queries::{Contact, Hit};
@@ -47,11 +52,14 @@ mod _metachron {
     #[pymodule_export]
     use crate::state::State;
     #[pymodule_export]
+    use crate::states::States;
+    #[pymodule_export]
     use crate::world::World;
 
     #[pymodule_init]
-    fn init(_module: &pyo3::Bound<'_, pyo3::types::PyModule>) -> pyo3::PyResult<()> {
+    fn init(module: &pyo3::Bound<'_, pyo3::types::PyModule>) -> pyo3::PyResult<()> {
+        use pyo3::types::PyModuleMethods as _;
         metachron::scenes::provide();
-        Ok(())
+        module.add("__version__", crate::pickled::VERSION)
     }
 }

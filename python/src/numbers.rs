@@ -3,7 +3,7 @@
 //! In: any sequence of numbers, numpy arrays among them. Out: numpy arrays of `float64`. Never here: their meaning.
 
 use glam::{DQuat, DVec3};
-use metachron::core::SimSpan;
+use metachron::core::{SimSpan, unit_rotation};
 use numpy::ndarray::{Array, Dimension};
 use numpy::{Element, PyArray, PyArray1, PyArray2, PyArrayMethods};
 use pyo3::exceptions::{PyTypeError, PyValueError};
@@ -13,7 +13,7 @@ use pyo3::prelude::*;
 #[derive(Debug, Clone, Copy)]
 pub struct Vector(pub DVec3);
 
-/// A unit quaternion: x, y, z, w, as scipy has them.
+/// A rotation: a quaternion x, y, z, w of any length, as scipy takes them.
 #[derive(Debug, Clone, Copy)]
 pub struct Rotation(pub DQuat);
 
@@ -31,15 +31,13 @@ impl<'py> FromPyObject<'_, 'py> for Rotation {
 
     fn extract(given: Borrowed<'_, 'py, PyAny>) -> PyResult<Self> {
         let four: PyResult<[f64; 4]> = given.extract();
-        let four = four.map_err(|_| PyTypeError::new_err("expected a unit quaternion: [x, y, z, w]"))?;
-        let rotation = DQuat::from_array(four);
-        // one that was rounded to single precision is one
-        if (rotation.length() - 1.0).abs() < 1e-3 {
-            Ok(Self(rotation.normalize()))
-        } else {
-            let what = format!("the quaternion {four:?} has a length of {}; expected 1", rotation.length());
-            Err(PyValueError::new_err(what))
-        }
+        let four = four.map_err(|_| PyTypeError::new_err("expected a quaternion: [x, y, z, w]"))?;
+        let none = || {
+            PyValueError::new_err(format!(
+                "the quaternion {four:?} is no rotation; expected one that is finite and not zero"
+            ))
+        };
+        unit_rotation(DQuat::from_array(four)).map(Self).ok_or_else(none)
     }
 }
 

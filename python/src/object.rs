@@ -1,4 +1,4 @@
-//! Objects of a world, by name or by handle; joints by name or number.
+//! Objects of a world, by name or by handle.
 //!
 //! In: a name, or an [`Object`] that a world gave. Out: the engine's object. Never here: its state.
 
@@ -44,22 +44,6 @@ impl<'py> FromPyObject<'_, 'py> for Named<'py> {
     }
 }
 
-/// An argument that names a joint.
-pub enum NamedJoint {
-    Name(String),
-    Number(u32),
-}
-
-impl<'py> FromPyObject<'_, 'py> for NamedJoint {
-    type Error = PyErr;
-
-    fn extract(given: Borrowed<'_, 'py, PyAny>) -> PyResult<Self> {
-        let name = given.extract().map(Self::Name);
-        let wanted = |_| PyTypeError::new_err("expected the name of a joint, or its number in the scene");
-        name.or_else(|_| given.extract().map(Self::Number)).map_err(wanted)
-    }
-}
-
 impl Named<'_> {
     /// The object in this world.
     pub fn of(&self, world: &World) -> PyResult<world::Object> {
@@ -89,15 +73,7 @@ impl Object {
     }
 }
 
-/// The name of an object, also of one that was removed.
-pub fn name(world: &World, object: world::Object) -> &str {
-    world.agents().of(object.id()).map_or("", |agent| agent.name())
-}
-
-/// The name of an object, or of a static solid.
-pub fn name_of_touched(world: &World, fixed: &[String], what: Touched) -> String {
-    match what {
-        Touched::Object(object) => name(world, object).to_owned(),
-        Touched::Fixed(number) => fixed.get(number as usize).cloned().unwrap_or_default(),
-    }
+/// The name of an object, also of one that was removed, or of a static solid.
+pub fn name(world: &World, what: impl Into<Touched>) -> &str {
+    world.name(what).unwrap_or_default()
 }

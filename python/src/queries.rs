@@ -3,7 +3,7 @@
 //! In: the engine's answers. Out: names, numbers and vectors. Never here: the search.
 
 use crate::numbers::row;
-use crate::object::name_of_touched;
+use crate::object::name;
 use metachron::world::{self, World};
 use numpy::PyArray1;
 use pyo3::prelude::*;
@@ -37,19 +37,19 @@ pub struct Contact {
 }
 
 impl Hit {
-    /// A hit in a world whose static solids have these names.
-    pub fn new(py: Python<'_>, world: &World, fixed: &[String], hit: &world::Hit) -> Self {
+    /// A hit in a world.
+    pub fn new(py: Python<'_>, world: &World, hit: &world::Hit) -> Self {
         let [point, normal] = [hit.point_m, hit.normal].map(|v| row(py, v.to_array()).unbind());
-        Self { name: name_of_touched(world, fixed, hit.what), point, normal, distance: hit.distance_m }
+        Self { name: name(world, hit.what).to_owned(), point, normal, distance: hit.distance_m }
     }
 }
 
 impl Contact {
-    /// A contact in a world whose static solids have these names.
-    pub fn new(py: Python<'_>, world: &World, fixed: &[String], contact: &world::ContactNow) -> Self {
+    /// A contact in a world.
+    pub fn new(py: Python<'_>, world: &World, contact: &world::ContactNow) -> Self {
         let vectors = [contact.point_m, contact.normal, contact.force_n];
         let [point, normal, force] = vectors.map(|v| row(py, v.to_array()).unbind());
-        let (other, since) = (name_of_touched(world, fixed, contact.with), contact.since.as_secs_f64());
+        let (other, since) = (name(world, contact.with).to_owned(), contact.since.as_secs_f64());
         Self { other, since, point, normal, force, depth: contact.depth_m }
     }
 }

@@ -8,11 +8,10 @@ use crate::raised;
 use crate::scene::Scene;
 use crate::world::World;
 use metachron::core::SimTime;
-use metachron::scene::{Source, load};
-use metachron::world::{self, Recording, SceneText};
+use metachron::world::{self, Recording};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 /// A world on one thread that does again what a recording says, as far as time is let pass, and no further than `until`, s; it takes no commands.
 ///
@@ -25,18 +24,12 @@ pub fn replay(py: Python<'_>, path: PathBuf, scene: Option<PyRef<'_, Scene>>, un
     let until = until.map(|seconds| span("until", seconds)).transpose()?.map(|span| SimTime::ZERO + span);
     let scene = match (scene, recording.scene()) {
         (Some(scene), _) => scene.resolved()?,
-        (None, Some(text)) => read(text)?,
+        (None, Some(text)) => Scene::of_text(text.clone())?.resolved()?,
         (None, None) => {
             let why = "it has no scene, because that was built of parts; give the same one to replay";
             return Err(PyValueError::new_err(format!("{}: {why}", path.display())));
         }
     };
     let inner = py.detach(|| world::World::replay(&scene, recording, until)).map_err(raised::checkpoint)?;
-    World::of(inner, &scene, None)
-}
-
-/// The scene of a recording.
-fn read(scene: &SceneText) -> PyResult<world::Scene> {
-    let source = Source::recorded(&scene.name, &scene.text, scene.folder.as_deref().map(Path::new));
-    source.and_then(|source| load(&source, &scene.overrides)).map_err(|error| raised::scene(&error))
+    Ok(World::of(inner, &scene, None))
 }

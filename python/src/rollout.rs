@@ -36,6 +36,13 @@ pub struct Rollout {
     hashes: Py<PyArray1<u64>>,
 }
 
+#[pymethods]
+impl Rollout {
+    fn __repr__(&self, py: Python<'_>) -> PyResult<String> {
+        Ok(format!("<Rollout of {} worlds>", self.hashes.bind(py).len()?))
+    }
+}
+
 /// What every world does.
 struct Plan {
     scene: world::Scene,
@@ -72,7 +79,10 @@ struct Motion {
 ///
 /// `step` is required. A world is the same, bit for bit, on any number of threads.
 #[pyfunction]
-#[pyo3(signature = (scene, on, actions, **keywords))]
+#[pyo3(
+    signature = (scene, on, actions, **keywords),
+    text_signature = "(scene, on, actions, *, step, observe=None, threads=2, arc=None, local=None, vertex=None)"
+)]
 pub fn rollout(
     py: Python<'_>,
     scene: PyRef<'_, Scene>,

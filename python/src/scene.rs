@@ -5,6 +5,7 @@
 
 use crate::numbers::{Rotation, Vector};
 use crate::object::Names;
+use crate::pickled;
 use crate::raised;
 use crate::sensor::mount;
 use crate::soft::soft;
@@ -17,14 +18,14 @@ use metachron::world::{self, Part, Rigid, SceneBuilder, SceneText, SolveBudget, 
 use pyo3::conversion::FromPyObjectOwned;
 use pyo3::exceptions::{PyTypeError, PyValueError};
 use pyo3::prelude::*;
-use std::path::PathBuf;
+use pyo3::types::PyBytes;
+use serde::{Deserialize, Serialize};
+use std::path::{Path, PathBuf};
 
 /// A scene, complete or in the making.
 #[pyclass(module = "metachron")]
 pub struct Scene {
     inner: Inner,
-    /// The names of the joints that were added to it.
-    joints: Vec<String>,
 }
 
 /// The ends of a tube, as its part names them.
@@ -34,6 +35,13 @@ enum Inner {
     Built(SceneBuilder),
     /// As it was read, and its text.
     Read(Box<world::Scene>, Box<SceneText>),
+}
+
+/// The same in a pickle.
+#[derive(Serialize, Deserialize)]
+enum Saved {
+    Built(SceneBuilder),
+    Read(SceneText),
 }
 
 /// What every solid says of itself; `None` where the engine's default stands.
@@ -91,7 +99,7 @@ impl Scene {
         };
         let builder = world::Scene::builder().contact_budget(budget);
         let builder = gravity.into_iter().fold(builder, |builder, Vector(g)| builder.gravity(g.to_array()));
-        Ok(Self { inner: Inner::Built(builder), joints: Vec::new() })
+        Ok(Self { inner: Inner::Built(builder) })
     }
 
     /// Reads a text that has a line break as the scene itself, any other as a path, or as the name of a built-in scene.
@@ -108,14 +116,39 @@ impl Scene {
             }
         };
         let source = source.map_err(|error| raised::scene(&error))?;
-        let scene = load(&source, &[]).map_err(|error| raised::scene(&error))?;
         let text = SceneText {
             name: source.name().to_owned(),
             text: source.text().to_owned(),
             folder: source.folder().map(|folder| folder.to_string_lossy().into_owned()),
             overrides: Vec::new(),
         };
-        Ok(Self { inner: Inner::Read(Box::new(scene), Box::new(text)), joints: Vec::new() })
+        Self::read(&source, text)
+    }
+
+    fn __getstate__<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyBytes>> {
+        let saved = match &self.inner {
+            Inner::Built(builder) => Saved::Built(builder.clone()),
+            Inner::Read(_, text) => Saved::Read((**text).clone()),
+        };
+        Ok(PyBytes::new(py, &pickled::bytes(saved)?))
+    }
+
+    fn __setstate__(&mut self, pickled: &[u8]) -> PyResult<()> {
+        let mut saved = Saved::Read(SceneText::default());
+        pickled::read(pickled, &mut saved)?;
+        *self = match saved {
+            Saved::Built(builder) => Self { inner: Inner::Built(builder) },
+            Saved::Read(text) => Self::of_text(text)?,
+        };
+        Ok(())
+    }
+
+    fn __repr__(&self) -> String {
+        let names: Vec<_> = match &self.inner {
+            Inner::Built(builder) => builder.names().collect(),
+            Inner::Read(scene, _) => scene.agents.iter().map(|member| &*member.name).collect(),
+        };
+        format!("<Scene of [{}]>", names.join(", "))
     }
 
     /// Adds a solid that never moves.
@@ -150,7 +183,7 @@ impl Scene {
         Ok(slf)
     }
 
-    /// Joins the rigid bodies `a` and `b`, or `a` and the world.
+    /// Joins the rigid bodies `a` and `b`, or `a` and the world. Place and axis of `kind` are in the world's axes, as the bodies are at the start.
     #[pyo3(signature = (name, kind, a, b = None))]
     fn joint<'py>(
         mut slf: PyRefMut<'py, Self>,
@@ -159,12 +192,8 @@ impl Scene {
         a: &str,
         b: Option<&str>,
     ) -> PyResult<PyRefMut<'py, Self>> {
-        if slf.joints.contains(&name) {
-            return Err(PyValueError::new_err(format!("the scene has a joint \"{name}\" already")));
-        }
         let (kind, Vector(at)) = (joint_kind(kind)?, field(kind, "at")?);
-        slf.build(|builder| builder.joint(a, b, kind, at.to_array()).joint_name(&name))?;
-        slf.joints.push(name);
+        slf.build(|builder| builder.joint(a, b, kind, at.to_array()).joint_name(name))?;
         Ok(slf)
     }
 
@@ -191,11 +220,22 @@ impl Scene {
             Inner::Read(_, text) => Some((**text).clone()),
         };
         let scene = self.resolved()?;
-        World::of(started(py, &scene, executor, pace)?, &scene, text)
+        Ok(World::of(started(py, &scene, executor, pace)?, &scene, text))
     }
 }
 
 impl Scene {
+    fn read(source: &Source, text: SceneText) -> PyResult<Self> {
+        let scene = load(source, &text.overrides).map_err(|error| raised::scene(&error))?;
+        Ok(Self { inner: Inner::Read(Box::new(scene), Box::new(text)) })
+    }
+
+    /// The scene of a text that was read before; files next to it are read again.
+    pub fn of_text(text: SceneText) -> PyResult<Self> {
+        let source = Source::recorded(&text.name, &text.text, text.folder.as_deref().map(Path::new));
+        Self::read(&source.map_err(|error| raised::scene(&error))?, text)
+    }
+
     /// The engine's scene.
     pub fn resolved(&self) -> PyResult<world::Scene> {
         match &self.inner {

@@ -5,7 +5,7 @@
 use crate::raised;
 use metachron::world::kinds::ExecutorKind;
 use metachron::world::{Pace, Scene, World, WorldError};
-use pyo3::exceptions::PyValueError;
+use pyo3::exceptions::{PyTypeError, PyValueError};
 use pyo3::prelude::*;
 
 /// The executors, as Python names them.
@@ -20,24 +20,49 @@ pub const fn pace(is_free: bool) -> &'static str {
     PACES[is_free as usize]
 }
 
+/// The pace of this name.
+fn pace_of(name: &str) -> PyResult<Pace> {
+    match PACES.iter().position(|known| *known == name) {
+        Some(0) => Ok(Pace::RealTime),
+        Some(_) => Ok(Pace::Free),
+        None => {
+            let known = PACES.join(", ");
+            Err(PyValueError::new_err(format!("there is no pace {name:?}; expected one of {known}")))
+        }
+    }
+}
+
+/// A pace as an argument: by its name, or as a factor.
+pub struct WantedPace(pub Pace);
+
+impl<'py> FromPyObject<'_, 'py> for WantedPace {
+    type Error = PyErr;
+
+    fn extract(given: Borrowed<'_, 'py, PyAny>) -> PyResult<Self> {
+        if let Ok(factor) = given.extract() {
+            return Ok(Self(Pace::Factor(factor)));
+        }
+        let name: String =
+            given.extract().map_err(|_| PyTypeError::new_err("expected \"real-time\", \"free\" or a number"))?;
+        pace_of(&name).map(Self)
+    }
+}
+
 /// Starts a scene; at the free pace in lockstep where none is given.
 pub fn started(py: Python<'_>, scene: &Scene, executor: &str, pace: Option<&str>) -> PyResult<World> {
     let Some(kind) = EXECUTORS.into_iter().find(|kind| kind.name() == executor) else {
         let known = EXECUTORS.map(ExecutorKind::name).join(", ");
         return Err(PyValueError::new_err(format!("there is no executor {executor:?}; expected one of {known}")));
     };
-    let is_free = match pace.map(|pace| PACES.iter().position(|known| *known == pace)) {
-        None => kind == ExecutorKind::Lockstep,
-        Some(Some(place)) => place == 1,
-        Some(None) => {
-            let (given, known) = (pace.unwrap_or_default(), PACES.join(", "));
-            return Err(PyValueError::new_err(format!("there is no pace {given:?}; expected one of {known}")));
-        }
+    let pace = match pace {
+        None if kind == ExecutorKind::Lockstep => Pace::Free,
+        None => Pace::RealTime,
+        Some(name) => pace_of(name)?,
     };
     let start = || -> Result<World, WorldError> {
         let world = World::start(scene, kind)?;
-        if is_free {
-            world.set_pace(Pace::Free)?;
+        if pace == Pace::Free {
+            world.set_pace(pace)?;
         }
         Ok(world)
     };

@@ -4,12 +4,13 @@
 
 use crate::command::Keywords;
 use crate::numbers::{row, rows};
+use crate::pickled;
 use glam::{DQuat, DVec3};
 use metachron::core::{Body, CurveState, Snapshot, SoftState};
 use numpy::{PyArray1, PyArray2};
 use pyo3::exceptions::{PyAttributeError, PyValueError};
 use pyo3::prelude::*;
-use pyo3::types::PyDict;
+use pyo3::types::{PyBytes, PyDict};
 use std::slice::from_ref;
 use std::sync::Arc;
 
@@ -74,6 +75,17 @@ impl State {
 
 #[pymethods]
 impl State {
+    #[new]
+    fn new(pickled: &[u8]) -> PyResult<Self> {
+        let mut state = Snapshot::default();
+        pickled::read(pickled, &mut state)?;
+        Ok(Self(Arc::new(state)))
+    }
+
+    fn __getnewargs__<'py>(&self, py: Python<'py>) -> PyResult<(Bound<'py, PyBytes>,)> {
+        Ok((PyBytes::new(py, &pickled::bytes(Snapshot::clone(&self.0))?),))
+    }
+
     #[getter]
     fn body(&self) -> &'static str {
         match &self.0.body {
@@ -179,7 +191,7 @@ impl State {
     }
 
     /// Position, m, and velocity, m/s, of a material point, (3,) each.
-    #[pyo3(signature = (**keywords))]
+    #[pyo3(signature = (**keywords), text_signature = "($self, *, arc=None, local=None, vertex=None)")]
     fn point<'py>(
         &self,
         py: Python<'py>,

@@ -9,13 +9,15 @@ use crate::command::Keywords;
 use crate::events::Events;
 use crate::export::{Export, Paths};
 use crate::home::Home;
+use crate::joints::{Joints, NamedJoint};
 use crate::numbers::{Rotation, Vector, span};
-use crate::object::{Named, NamedJoint, Object};
+use crate::object::{Named, Object};
 use crate::queries::{Contact, Hit};
 use crate::raised;
 use crate::scene::{Scene, part};
-use crate::start;
+use crate::start::{self, WantedPace};
 use crate::state::State;
+use crate::states::States;
 use crate::view::Pictures;
 use glam::{DQuat, DVec3};
 use metachron::contact::joint::{Motor, MotorGoal};
@@ -25,23 +27,19 @@ use metachron::runtime::{AgentState, TimelineCommand};
 use metachron::world::kinds::ExecutorKind;
 use metachron::world::{self, Command, EventFilter, Pace, SceneText};
 use numpy::{PyArray1, PyArray2, PyArray3};
-use pyo3::exceptions::{PyKeyError, PyRuntimeError, PyValueError};
+use pyo3::exceptions::{PyRuntimeError, PyValueError};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use std::path::PathBuf;
-use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 /// A world that runs; any thread may read and command it. In a `with` block it stops at the end.
 #[pyclass(frozen, module = "metachron")]
 pub struct World {
     inner: world::World,
-    /// The names of its static solids, by their numbers.
-    fixed: Arc<[String]>,
-    /// Their surface.
+    /// The surface of its static solids.
     fixed_surface: Surface,
     pictures: Pictures,
-    joints: Vec<Joint>,
     /// The text of its scene; `None` of one that was built of parts.
     text: Option<SceneText>,
     home: Home,
@@ -54,13 +52,6 @@ impl Drop for World {
             std::mem::forget(self.inner.clone());
         }
     }
-}
-
-/// A joint that a motor may drive.
-struct Joint {
-    name: Option<String>,
-    /// The object that takes commands for it.
-    body: world::Object,
 }
 
 /// Where on an object, under which key, for how long.
@@ -79,15 +70,9 @@ fn apart<T: Send>(work: impl FnOnce() -> T + Send) -> T {
 
 impl World {
     /// A world that was started of this scene.
-    pub fn of(inner: world::World, scene: &world::Scene, text: Option<SceneText>) -> PyResult<Self> {
-        let joints = scene.joints.iter().zip(&scene.joint_names).map(|(joint, name)| {
-            let body = inner.object_of(joint.a).map_err(raised::world)?;
-            Ok(Joint { name: Some(name.clone()).filter(|name| !name.is_empty()), body })
-        });
-        let joints = joints.collect::<PyResult<_>>()?;
-        let fixed = scene.obstacles.iter().map(|solid| solid.name.clone()).collect();
+    pub fn of(inner: world::World, scene: &world::Scene, text: Option<SceneText>) -> Self {
         let (fixed_surface, pictures) = (Surface::fixed(scene), Pictures::of(scene));
-        Ok(Self { inner, fixed, fixed_surface, pictures, joints, text, home: Home::here() })
+        Self { inner, fixed_surface, pictures, text, home: Home::here() }
     }
 
     /// Whether the threads that step it are in this process.
@@ -103,24 +88,6 @@ impl World {
     fn send(&self, object: &Named<'_>, command: Command) -> PyResult<()> {
         let object = object.of(&self.inner)?;
         apart(|| self.inner.command(object, command)).map_err(raised::world)
-    }
-
-    /// The joint's number, and the object that takes commands for it.
-    fn joint(&self, joint: &NamedJoint) -> PyResult<(u32, world::Object)> {
-        let at = match joint {
-            NamedJoint::Number(number) => Some(*number as usize),
-            NamedJoint::Name(name) => self.joints.iter().position(|joint| joint.name.as_ref() == Some(name)),
-        };
-        let found = at.and_then(|at| Some((at as u32, self.joints.get(at)?.body)));
-        found.ok_or_else(|| {
-            let names: Vec<_> = self.joints.iter().filter_map(|joint| joint.name.as_deref()).collect();
-            let asked = match joint {
-                NamedJoint::Name(name) => format!("{name:?}"),
-                NamedJoint::Number(number) => number.to_string(),
-            };
-            let (count, names) = (self.joints.len(), names.join(", "));
-            PyKeyError::new_err(format!("the world has no joint {asked}; it has {count}, with the names [{names}]"))
-        })
     }
 }
 
@@ -142,6 +109,29 @@ impl World {
     fn object(&self, name: &str) -> PyResult<Object> {
         let object = self.inner.object(name).map_err(raised::world)?;
         Ok(Object::new(&self.inner, object))
+    }
+
+    /// All objects that are there, those of the scene first.
+    #[getter]
+    fn objects(&self) -> Vec<Object> {
+        self.inner.all_objects().map(|object| Object::new(&self.inner, object)).collect()
+    }
+
+    /// The joints of its scene, and their coordinates.
+    #[getter]
+    fn joints(&self) -> Joints {
+        Joints::new(&self.inner)
+    }
+
+    /// The names of the sensors of its scene.
+    #[getter]
+    fn sensors(&self) -> Vec<&str> {
+        self.inner.sensors().iter().map(|sensor| &*sensor.name).collect()
+    }
+
+    /// The newest states of all objects, as arrays.
+    fn states(&self, py: Python<'_>) -> States {
+        States::of(py, &self.inner)
     }
 
     /// The newest state of an object; it waits for nothing.
@@ -175,6 +165,11 @@ impl World {
     #[getter]
     fn pace(&self, py: Python<'_>) -> &'static str {
         start::pace(py.detach(|| self.inner.is_free()))
+    }
+
+    /// How time passes from now on: `"free"`, `"real-time"`, or so many simulated seconds a second, 0.001 ... 100.
+    fn set_pace(&self, py: Python<'_>, pace: WantedPace) -> PyResult<()> {
+        py.detach(|| self.inner.set_pace(pace.0)).map_err(raised::world)
     }
 
     /// The most simulated time that one of its objects has not lived, s: what it dropped, and what it is behind now. 0 at the pace `"free"`.
@@ -256,34 +251,44 @@ impl World {
     }
 
     /// A force in world axes; `None` takes back that of the key.
-    #[pyo3(signature = (object, newtons, **keywords))]
+    #[pyo3(
+        signature = (object, newtons, **keywords),
+        text_signature = "($self, object, newtons, *, arc=None, local=None, vertex=None, key=0, expires=None)"
+    )]
     fn force(&self, object: Named<'_>, newtons: Option<Vector>, keywords: Option<&Given<'_>>) -> PyResult<()> {
         let keywords = Keywords::new("force", keywords, &ANCHORED)?;
         let (anchor, force) = (keywords.anchor()?, newtons.map(|Vector(force)| force));
         let command = Command::force(anchor, force.unwrap_or_default());
-        let command = if force.is_none() { command.taken_back() } else { command };
-        self.send(&object, keywords.timed(command)?)
+        self.send(&object, keywords.timed(command, force.is_some())?)
     }
 
     /// A torque in world axes; `None` takes back that of the key.
-    #[pyo3(signature = (object, newton_metres, **keywords))]
+    #[pyo3(
+        signature = (object, newton_metres, **keywords),
+        text_signature = "($self, object, newton_metres, *, arc=None, local=None, vertex=None, key=0, expires=None)"
+    )]
     fn torque(&self, object: Named<'_>, newton_metres: Option<Vector>, keywords: Option<&Given<'_>>) -> PyResult<()> {
         let keywords = Keywords::new("torque", keywords, &ANCHORED)?;
         let (anchor, torque) = (keywords.anchor()?, newton_metres.map(|Vector(torque)| torque));
         let command = Command::torque(anchor, torque.unwrap_or_default());
-        let command = if torque.is_none() { command.taken_back() } else { command };
-        self.send(&object, keywords.timed(command)?)
+        self.send(&object, keywords.timed(command, torque.is_some())?)
     }
 
     /// An impulse in world axes, once.
-    #[pyo3(signature = (object, newton_seconds, **keywords))]
+    #[pyo3(
+        signature = (object, newton_seconds, **keywords),
+        text_signature = "($self, object, newton_seconds, *, arc=None, local=None, vertex=None)"
+    )]
     fn impulse(&self, object: Named<'_>, newton_seconds: Vector, keywords: Option<&Given<'_>>) -> PyResult<()> {
         let anchor = Keywords::new("impulse", keywords, &["arc", "local", "vertex"])?.anchor()?;
         self.send(&object, Command::impulse(anchor, newton_seconds.0))
     }
 
     /// A spring to a place in space, m; `None` takes back that of the key.
-    #[pyo3(signature = (object, target, **keywords))]
+    #[pyo3(
+        signature = (object, target, **keywords),
+        text_signature = "($self, object, target, *, stiffness=None, damping=0.0, arc=None, local=None, vertex=None, key=0, expires=None)"
+    )]
     fn spring(&self, object: Named<'_>, target: Option<Vector>, keywords: Option<&Given<'_>>) -> PyResult<()> {
         let known = [&["stiffness", "damping"][..], &ANCHORED].concat();
         let keywords = Keywords::new("spring", keywords, &known)?;
@@ -294,12 +299,14 @@ impl World {
             return Err(PyValueError::new_err("a spring needs a stiffness, N/m"));
         };
         let command = Command::spring(anchor, target.unwrap_or_default(), stiffness, damping);
-        let command = if target.is_none() { command.taken_back() } else { command };
-        self.send(&object, keywords.timed(command)?)
+        self.send(&object, keywords.timed(command, target.is_some())?)
     }
 
     /// Leads a kinematic body to a pose within its next step, and along by a velocity, m/s, and a spin, rad/s; `None` lets it go.
-    #[pyo3(signature = (object, position, rotation = Rotation(DQuat::IDENTITY), **keywords))]
+    #[pyo3(
+        signature = (object, position, rotation = Rotation(DQuat::IDENTITY), **keywords),
+        text_signature = "($self, object, position, rotation=(0.0, 0.0, 0.0, 1.0), *, velocity=(0.0, 0.0, 0.0), spin=(0.0, 0.0, 0.0), expires=None)"
+    )]
     fn pose(
         &self,
         object: Named<'_>,
@@ -311,8 +318,7 @@ impl World {
         let [velocity, spin] = ["velocity", "spin"].map(|name| keywords.get::<Vector>(name));
         let (velocity, spin) = (velocity?.map_or(DVec3::ZERO, |v| v.0), spin?.map_or(DVec3::ZERO, |v| v.0));
         let command = Command::pose(position.map_or(DVec3::ZERO, |v| v.0), rotation.0).moving(velocity, spin);
-        let command = if position.is_none() { command.taken_back() } else { command };
-        self.send(&object, keywords.timed(command)?)
+        self.send(&object, keywords.timed(command, position.is_some())?)
     }
 
     /// Puts an object into a state that it had, or another one of as many nodes.
@@ -364,18 +370,18 @@ impl World {
     }
 
     /// Drives a joint, by name or by its number in the scene; without a goal, no longer.
-    #[pyo3(signature = (joint, **keywords))]
+    #[pyo3(
+        signature = (joint, **keywords),
+        text_signature = "($self, joint, *, velocity=None, position=None, stiffness=None, damping=None, max_effort=None, expires=None)"
+    )]
     fn motor(&self, joint: NamedJoint, keywords: Option<&Given<'_>>) -> PyResult<()> {
         let known = ["velocity", "position", "stiffness", "damping", "max_effort", "expires"];
         let keywords = Keywords::new("motor", keywords, &known)?;
-        let (number, body) = self.joint(&joint)?;
+        let joint = joint.of(&self.inner)?;
         let idle = Motor { goal: MotorGoal::Velocity(0.0), max_effort: f64::INFINITY };
-        let command = match keywords.motor()? {
-            Some(motor) => Command::motor(number, motor),
-            None => Command::motor(number, idle).taken_back(),
-        };
-        let command = keywords.timed(command)?;
-        apart(|| self.inner.command(body, command)).map_err(raised::world)
+        let motor = keywords.motor()?;
+        let command = keywords.timed(joint.motor(motor.unwrap_or(idle)), motor.is_some())?;
+        apart(|| self.inner.command(joint.body(), command)).map_err(raised::world)
     }
 
     /// Takes up another object, which lives from its first step on.
@@ -465,30 +471,27 @@ impl World {
         if above.is_nan() || above < 0.0 {
             return Err(PyValueError::new_err(format!("above is {above:?} N; expected 0 or more")));
         }
-        let filter = filter.above_n(above);
-        let filter = match of {
-            Some(object) => filter.of(object.of(&self.inner)?),
-            None => filter,
-        };
-        Ok(apart(|| Events::new(&self.inner, &self.fixed, filter)))
+        let of = of.map(|object| object.of(&self.inner)).transpose()?;
+        let filter = of.into_iter().fold(filter.above_n(above), EventFilter::of);
+        Ok(apart(|| Events::new(&self.inner, filter)))
     }
 
     /// What an object touches now.
     fn contacts(&self, py: Python<'_>, object: Named<'_>) -> PyResult<Vec<Contact>> {
         let all = self.inner.contacts(object.of(&self.inner)?).map_err(raised::world)?;
-        Ok(all.iter().map(|contact| Contact::new(py, &self.inner, &self.fixed, contact)).collect())
+        Ok(all.iter().map(|contact| Contact::new(py, &self.inner, contact)).collect())
     }
 
     /// The first surface that a ray meets within `reach` metres.
     fn cast_ray(&self, py: Python<'_>, origin: Vector, direction: Vector, reach: f64) -> PyResult<Option<Hit>> {
         let hit = py.detach(|| self.inner.cast_ray(origin.0, direction.0, reach)).map_err(raised::world)?;
-        Ok(hit.map(|hit| Hit::new(py, &self.inner, &self.fixed, &hit)))
+        Ok(hit.map(|hit| Hit::new(py, &self.inner, &hit)))
     }
 
     /// The nearest point of any surface within `reach` metres.
     fn nearest(&self, py: Python<'_>, point: Vector, reach: f64) -> PyResult<Option<Hit>> {
         let hit = py.detach(|| self.inner.nearest(point.0, reach)).map_err(raised::world)?;
-        Ok(hit.map(|hit| Hit::new(py, &self.inner, &self.fixed, &hit)))
+        Ok(hit.map(|hit| Hit::new(py, &self.inner, &hit)))
     }
 
     fn __repr__(&self, py: Python<'_>) -> String {

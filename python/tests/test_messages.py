@@ -47,7 +47,7 @@ def test_parts_that_cannot_be_are_named() -> None:
     wrong(lambda: scene().fixed("a", mc.Plane(friction=-3.0)), '"a": the friction is -3; it must be between 0 and 1000')
     wrong(lambda: scene().add("a", mc.Tube([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0]], segments=-3)), "field 'segments'")
     wrong(lambda: scene().joint("j", mc.Weld(at=[0.0, 0.0, 0.0]), "a"), '"a"')
-    wrong(lambda: scene().add("a", mc.Ball(0.1, rotation=[1.0, 1.0, 0.0, 0.0])), "length")
+    wrong(lambda: scene().add("a", mc.Ball(0.1, rotation=[0.0, 0.0, 0.0, 0.0])), "is no rotation")
     wrong(lambda: mc.Scene.from_toml(TOML).add("b", mc.Ball(0.1)), "complete")
     with pytest.raises(ValueError, match="expected one of lockstep, threads, pool, auto"):
         scenes.floating().start("gpu")  # type: ignore[arg-type]

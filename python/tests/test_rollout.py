@@ -34,7 +34,7 @@ def test_a_rollout_pushes_as_mechanics_says_and_observes_what_it_is_asked_for() 
 def test_wrong_rollouts_say_what_is_wrong_and_in_which_world() -> None:
     actions = np.zeros((3, 4, 3))
     with pytest.raises(TypeError, match="step"):
-        mc.rollout(scenes.floating(), "ball", actions)
+        mc.rollout(scenes.floating(), "ball", actions)  # type: ignore[call-arg]
     with pytest.raises(ValueError, match=r"\(worlds, steps, 3\)"):
         mc.rollout(scenes.floating(), "ball", np.zeros((3, 4, 2)), step=0.1)
     with pytest.raises(ValueError, match="threads is 0"):

@@ -97,7 +97,7 @@ fn who_rests_takes_no_step_and_no_time_of_any_thread_until_it_is_woken() {
         let before = spent(&*run);
         play_until(&mut *run, |run| steps(run) >= then + 50);
         assert_eq!(spent(&*run), before, "no step, no work, no time");
-        run.send(AgentId(AWAKE as u32), Command::Wake).unwrap();
+        run.send(AgentId(AWAKE as u32), Command::wake()).unwrap();
         play_until(&mut *run, |run| spent(run)[0].0 > before[0].0);
         assert_eq!(spent(&*run)[1..], before[1..], "the others sleep on");
     }

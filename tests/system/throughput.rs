@@ -78,6 +78,6 @@ fn a_hundred_thousand_agents_start_and_a_pause_stops_them_all() {
     let before = steps(&*run);
     run.wait_until(run.now() + Duration::from_millis(100));
     assert_eq!(steps(&*run), before);
-    run.agents()[99_999].send(Command::Wake).unwrap();
+    run.agents()[99_999].send(Command::wake()).unwrap();
     assert!(run.shutdown().iter().all(|stats| stats.steps >= 1));
 }

@@ -9,7 +9,7 @@ use crate::member::ClusterMember;
 use glam::{DQuat, DVec3};
 use metachron_core::{
     AgentId, Anchor, Archive, ArchiveError, Body, Removed, Resolution, SimSpan, SimTime, Snapshot, StepError,
-    StepReport,
+    StepReport, unit_rotation,
 };
 use metachron_geometry::CollisionShape;
 use std::sync::Arc;
@@ -276,8 +276,8 @@ fn check_motion(vectors: [Option<DVec3>; 3], rotation: Option<DQuat>) -> Result<
     if let Some((_, problem)) = vectors.into_iter().zip(problems).find(|(v, _)| v.is_some_and(is_out)) {
         return Err(problem);
     }
-    let turns = |q: DQuat| q.is_finite() && q.length_squared() > 0.25;
-    if rotation.is_none_or(turns) { Ok(()) } else { Err("a rotation must be a quaternion of length 1") }
+    let turns = |q: DQuat| unit_rotation(q).is_some();
+    if rotation.is_none_or(turns) { Ok(()) } else { Err("a rotation must be a quaternion that is finite and not zero") }
 }
 
 /// A region of space, world axes: all that is within a radius of a line. A ball where both its ends are one point.

@@ -30,8 +30,8 @@ pub struct Joint {
     pub yields_above_n: f64,
 }
 
-/// The degrees of freedom that a joint locks and leaves free. Axes are in a's shape, of any length above zero.
-#[derive(Debug, Clone, Copy, PartialEq)]
+/// The degrees of freedom that a joint locks and leaves free. Axes of a [`Joint`] are in a's shape, of any length above zero.
+#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
 pub enum JointKind {
     /// All locked.
     Fixed,

@@ -62,7 +62,7 @@ pub use parallel::{ParallelFor, PlainLoop};
 pub use recycle::recycled;
 pub use removed::Removed;
 pub use resolution::{N_MAX, Resolution, ResolutionRange};
-pub use rotation::shortest_turn;
+pub use rotation::{shortest_turn, unit_rotation};
 pub use sensor::SensorTouch;
 pub use snapshot::{HASH_START, Inertia, Snapshot};
 pub use step::{DT_MAX_S, StepError, StepReport, check_span};

@@ -1,6 +1,14 @@
-//! The shortest turn between two rotations.
+//! Rotations as users give them, and the shortest turn between two.
 
 use glam::{DQuat, DVec3};
+
+/// The rotation that a quaternion of any length stands for, of length 1; `None` of one that is not finite or has no length. All rotations that
+/// users give are read so.
+#[must_use]
+pub fn unit_rotation(given: DQuat) -> Option<DQuat> {
+    let scale = given.length_recip();
+    (given.is_finite() && scale.is_normal()).then(|| given * scale)
+}
 
 /// The shortest turn that leads `from` one rotation `to` another, as a rotation vector in world axes, radians, of length at most π; exactly
 /// zero between equal ones.
@@ -14,6 +22,17 @@ pub fn shortest_turn(from: DQuat, to: DQuat) -> DVec3 {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_quaternion_of_any_length_is_a_rotation_unless_it_has_none() {
+        let turn = DQuat::from_rotation_x(0.7);
+        for length in [1e-6, 0.4, 1.0, 3.0, 1e6] {
+            assert!(unit_rotation(turn * length).unwrap().abs_diff_eq(turn, 1e-15), "{length}"); // a few roundings
+        }
+        for bad in [DQuat::from_array([0.0; 4]), turn * f64::NAN, turn * f64::INFINITY, turn * 1e-200, turn * 1e200] {
+            assert_eq!(unit_rotation(bad), None, "{bad}");
+        }
+    }
 
     #[test]
     fn the_turn_leads_from_one_to_the_other_and_never_the_long_way() {

@@ -54,6 +54,12 @@ impl SimSpan {
     /// The zero span. A step refuses it.
     pub const ZERO: Self = Self(0);
 
+    /// So many seconds; the longest span that there is where they are more.
+    #[must_use]
+    pub const fn from_secs(seconds: u64) -> Self {
+        Self(seconds.saturating_mul(1_000_000_000))
+    }
+
     /// So many milliseconds; the longest span that there is where they are more.
     #[must_use]
     pub const fn from_millis(millis: u64) -> Self {
@@ -135,6 +141,12 @@ mod tests {
         let step = SimSpan::from_secs_f64(0.001).unwrap();
         let end = (0..1000).fold(SimTime::ZERO, |t, _| t + step);
         assert_eq!(end, SimTime::from_nanos(1_000_000_000));
+    }
+
+    #[test]
+    fn whole_seconds_are_as_long_as_their_milliseconds() {
+        assert_eq!(SimSpan::from_secs(3), SimSpan::from_millis(3000));
+        assert_eq!(SimSpan::from_secs(u64::MAX), SimSpan::from_nanos(u64::MAX));
     }
 
     #[test]

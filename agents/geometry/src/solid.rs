@@ -116,7 +116,7 @@ impl Solid {
 }
 
 /// A static solid: every agent may touch it, no agent owns it.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, serde::Serialize, serde::Deserialize)]
 pub struct Obstacle {
     /// The object's name in the scene.
     pub name: String,

@@ -164,7 +164,7 @@ fn probe() -> Custom {
         starts_off_m: DVec3::ZERO,
         traits: ContactTraits::default(),
     };
-    Custom::new(move |_| Box::new(Tool::new(spec.clone()).unwrap()))
+    Custom::made_by(move |_| Box::new(Tool::new(spec.clone()).unwrap()))
 }
 
 /// An object `led` in a scene, and how it is led to a depth.

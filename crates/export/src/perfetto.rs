@@ -7,7 +7,7 @@
 use super::ExportError;
 use metachron_core::{AgentId, SimSpan, SimTime};
 use metachron_runtime::{AgentHandle, Heard, Turn};
-use metachron_world::{Event, EventFilter, Events, Happening, Object, Touched, World};
+use metachron_world::{Event, EventFilter, Events, Happening, World};
 use serde_json::{Map, Value, json};
 use std::fs::File;
 use std::io::{BufWriter, Write};
@@ -193,41 +193,14 @@ impl PerfettoFile {
         let ended = self.lanes.get(id.0 as usize).map_or(&[][..], |lane| &lane.ended);
         let of_its_step = ended.iter().find(|(time, _)| *time >= event.at).or(ended.last());
         let at = of_its_step.map_or_else(|| self.world.now(), |(_, wall)| *wall);
-        let (name, with) = self.said(event.what);
         let mut args = json!({ "time_s": event.at.as_secs_f64() });
-        if let Some(with) = with {
-            args["with"] = with.into();
+        if let Some(with) = &event.other {
+            args["with"] = json!(**with);
         }
         if let Happening::Contact(contact) = event.what {
             args["force_n"] = json!(contact.force_n.length());
         }
-        self.put(&json!({ "ph": "i", "s": "t", "name": name, "pid": OBJECTS, "tid": lane_of(id), "ts": micros(at), "args": args }))
-    }
-
-    /// What an event is called, and what else takes part in it.
-    fn said(&self, what: Happening) -> (&'static str, Option<String>) {
-        let of = |object: Object| Some(self.name_of(object.id()));
-        match what {
-            Happening::Contact(contact) => {
-                let with = match contact.with {
-                    Touched::Object(object) => of(object),
-                    Touched::Fixed(number) => Some(format!("fixed solid {number}")),
-                };
-                (if contact.begins { "contact begins" } else { "contact ends" }, with)
-            }
-            Happening::Rests => ("rests", None),
-            Happening::Wakes => ("wakes", None),
-            Happening::Stalled => ("stalled", None),
-            Happening::Failed => ("failed", None),
-            Happening::Gone => ("gone", None),
-            Happening::Joined(leader) => ("joins the cluster", of(leader)),
-            Happening::Left => ("leaves the cluster", None),
-            Happening::AttachmentGave => ("attachment gave", None),
-            Happening::RateMissed => ("rate missed", None),
-            Happening::Carved(_) => ("carved", None),
-            Happening::Rewound => ("rewound", None),
-            _ => ("event", None),
-        }
+        self.put(&json!({ "ph": "i", "s": "t", "name": event.what.name(), "pid": OBJECTS, "tid": lane_of(id), "ts": micros(at), "args": args }))
     }
 
     fn name_of(&self, id: AgentId) -> String {

@@ -13,7 +13,7 @@ use super::mailbox::{Command, Keyed};
 use glam::{DQuat, DVec3};
 use metachron_contact::joint::Motor;
 use metachron_contact::{AnchorForce, AnchorSpring, Carving, PoseGoal, SetMotion, SetMotor};
-use metachron_core::{Anchor, SimSpan};
+use metachron_core::{Anchor, Resolution, SimSpan};
 
 impl Command {
     /// A force of `force_n`, N, world axes, at a material point, under key 0, until it is taken back.
@@ -86,6 +86,30 @@ impl Command {
             spin_rad_s: Some(spin_rad_s),
             ..SetMotion::default()
         })
+    }
+
+    /// The pressure of what fills it, inside minus outside, Pa; one that refuses this pressure stays as it is.
+    #[must_use]
+    pub const fn pressure(pressure_pa: f64) -> Self {
+        Self::SetPressure(pressure_pa)
+    }
+
+    /// Another resolution, clamped to its range.
+    #[must_use]
+    pub const fn resolution(wanted: Resolution) -> Self {
+        Self::Retune(wanted)
+    }
+
+    /// Another length of its steps, clamped to its range.
+    #[must_use]
+    pub const fn step(dt: SimSpan) -> Self {
+        Self::SetDt(dt)
+    }
+
+    /// Wakes it up from rest.
+    #[must_use]
+    pub const fn wake() -> Self {
+        Self::Wake
     }
 
     /// Removes the cells of a solid or a sheet whose middles are within `radius_m`, m, of the line from `from_m` to `to_m`, m, where they are at

@@ -8,7 +8,7 @@ use super::cluster::Handover;
 use super::events::{AgentEvent, EventKind};
 use super::form_slot::FormSlot;
 use super::histogram::Histogram;
-use super::mailbox::{Command, Keyed, Mailbox, SendError};
+use super::mailbox::{AwaitedMotion, Command, Keyed, Mailbox, SendError};
 use super::metrics::{AgentState, AgentStats, Metrics, Spread};
 use super::model::Traits;
 use super::probe::{Sample, Trace};
@@ -361,6 +361,12 @@ impl AgentHandle {
         shared.mail.set_state(state);
         shared.sleep.wake(self.id());
         Ok(())
+    }
+
+    /// The state, place and motion that it takes before its next step.
+    #[must_use]
+    pub fn awaited_motion(&self) -> AwaitedMotion {
+        self.live().map_or_else(AwaitedMotion::default, |shared| shared.mail.awaited_motion())
     }
 
     /// The agent, unless it has left.

@@ -93,7 +93,7 @@ pub use governor::{Demand, Governor, TurnMeasure};
 pub use handle::{AgentHandle, state_hash};
 pub use lockstep::Lockstep;
 pub use machine::{DrawPrice, FACTOR, Machine, OTHER_STEP_US, ObjectPrice, PRESETS, StepPrice};
-pub use mailbox::{Command, KEYS, Keyed, SendError};
+pub use mailbox::{AwaitedMotion, Command, KEYS, Keyed, SendError};
 pub use metrics::{AgentState, AgentStats, STALLED_FOR_GOOD, Spread};
 pub use pool::Pool;
 pub use priority::{Priority, PriorityRefused};

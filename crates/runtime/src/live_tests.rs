@@ -45,12 +45,12 @@ fn an_agent_at_rest_wakes_for_a_command_and_for_a_touch() {
         let agent = run.agents()[0].clone();
         eventually("both at rest", || run.agents().iter().all(|a| a.state() == AgentState::Resting));
         let steps = agent.stats().steps;
-        agent.send(Command::Retune(Resolution { eps_m: 0.07, n: 3 })).unwrap();
+        agent.send(Command::resolution(Resolution { eps_m: 0.07, n: 3 })).unwrap();
         eventually("the command", || agent.latest().resolution.is_some_and(|r| r.eps_m == 0.07));
         assert!(agent.stats().steps > steps);
         eventually("rest again", || agent.state() == AgentState::Resting);
         let steps = agent.stats().steps;
-        run.agents()[1].send(Command::Wake).unwrap();
+        run.agents()[1].send(Command::wake()).unwrap();
         eventually("the touch", || agent.stats().steps > steps);
         run.shutdown();
     });

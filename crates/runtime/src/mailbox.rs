@@ -136,6 +136,15 @@ pub(super) struct Mailbox {
     pending: OnceLock<Box<Mutex<PendingCommands>>>,
 }
 
+/// The state, and then the place and motion, that an agent takes before its next step.
+#[derive(Debug, Clone, Default)]
+pub struct AwaitedMotion {
+    /// Another whole state.
+    pub state: Option<Body>,
+    /// Another place or velocity; what it leaves open stays.
+    pub motion: SetMotion,
+}
+
 /// Contents of a mailbox.
 #[derive(Debug, Clone, Default, serde::Serialize, serde::Deserialize)]
 pub(super) struct PendingCommands {
@@ -207,6 +216,12 @@ impl Mailbox {
     pub fn waiting(&self) -> Option<PendingCommands> {
         let pending = self.pending.get().filter(|_| self.has_pending())?;
         Some(pending.lock().unwrap_or_else(PoisonError::into_inner).clone())
+    }
+
+    /// The state, place and motion that wait.
+    pub fn awaited_motion(&self) -> AwaitedMotion {
+        let pending = self.waiting().unwrap_or_default();
+        AwaitedMotion { state: pending.state.map(|state| *state), motion: pending.motion.unwrap_or_default() }
     }
 
     /// Lets `commands` wait in place of all that waits now.

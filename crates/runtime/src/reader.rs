@@ -138,7 +138,7 @@ mod tests {
             ours.wait_until(wall);
             plain.wait_until(wall);
             if frame == 300 {
-                [&ours, &plain].iter().for_each(|run| run.send(AgentId(4), Command::Wake).unwrap());
+                [&ours, &plain].iter().for_each(|run| run.send(AgentId(4), Command::wake()).unwrap());
             }
             let now = ours.sim_now();
             reader.read(ours.agents(), now, |agent, _, awake| {

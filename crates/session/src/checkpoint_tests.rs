@@ -94,7 +94,7 @@ fn what_was_divided_anew_goes_on_divided() {
     let finer = |world: &World| {
         for agent in world.agents() {
             let Some(Resolution { eps_m, n }) = agent.latest().resolution else { continue };
-            agent.send(Command::Retune(Resolution { eps_m: 0.6 * eps_m, n })).unwrap();
+            agent.send(Command::resolution(Resolution { eps_m: 0.6 * eps_m, n })).unwrap();
         }
     };
     for name in ["crossing", "mesentery", "tube"] {

@@ -348,7 +348,7 @@ impl Session {
     /// Sets the pressure of what fills an agent, inside minus outside, Pa. An agent that nothing fills or that does not exist and a number that is
     /// not finite give an error.
     pub fn set_pressure(&self, of: AgentId, pressure_pa: f64) -> Result<(), WorldError> {
-        self.world.command(self.world.object_of(of)?, Command::SetPressure(pressure_pa))
+        self.world.command(self.world.object_of(of)?, Command::pressure(pressure_pa))
     }
 
     /// Ends the frame that began at `started`.

@@ -17,7 +17,7 @@ use glam::{DQuat, DVec3};
 use metachron_contact::Agent;
 use metachron_contact::detect::SolveBudget;
 use metachron_contact::solve::DEPTH_DEFAULT_M;
-use metachron_core::{AgentId, N_MAX, Resolution, ResolutionRange, SimSpan};
+use metachron_core::{AgentId, N_MAX, Resolution, ResolutionRange, SimSpan, unit_rotation};
 use metachron_geometry::{Cells, Obstacle, Solid};
 use metachron_models::rigid::{Joint, JointError, JointKind, RigidSpec};
 pub use rigid::Rigid;
@@ -69,6 +69,14 @@ pub enum SceneBuildError {
         /// What it can be on.
         what: &'static str,
     },
+    /// A rotation that is none.
+    #[error("\"{name}\" is turned by {found}; expected a quaternion that is finite and not zero")]
+    BadRotation {
+        /// The object.
+        name: String,
+        /// The rotation as given.
+        found: String,
+    },
     /// A sensor sits where nothing can.
     #[error("the sensor \"{sensor}\" is at {found}; expected finite numbers and a quaternion of a length above 0")]
     BadSite {
@@ -95,8 +103,8 @@ pub enum SceneBuildError {
     },
 }
 
-/// A scene in the making.
-#[derive(Debug, Clone)]
+/// A scene in the making. It can be serialized where no part is [`Custom`].
+#[derive(Debug, Clone, serde::Serialize, serde::Deserialize)]
 pub struct SceneBuilder {
     gravity: DVec3,
     contact_depth_m: f64,
@@ -108,7 +116,7 @@ pub struct SceneBuilder {
 }
 
 /// A joint by the names of its bodies; no second one is the world.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, serde::Serialize, serde::Deserialize)]
 struct Joined {
     name: String,
     a: String,
@@ -140,9 +148,15 @@ pub struct Custom {
 }
 
 impl Custom {
-    /// The agent that `make` makes: a new one for each world that the scene is started as.
+    /// This agent: a clone of it for each world that the scene is started as.
     #[must_use]
-    pub fn new(make: impl Fn(AgentId) -> Box<dyn Agent> + Send + Sync + 'static) -> Self {
+    pub fn new(agent: impl Agent + Clone + Sync + 'static) -> Self {
+        Self::made_by(move |_| Box::new(agent.clone()))
+    }
+
+    /// The agent that `make` makes, by its number: a new one for each world that the scene is started as.
+    #[must_use]
+    pub fn made_by(make: impl Fn(AgentId) -> Box<dyn Agent> + Send + Sync + 'static) -> Self {
         Self { make: Arc::new(make), rate_hz: RATE_DEFAULT_HZ }
     }
 
@@ -243,17 +257,11 @@ impl SceneBuilder {
         self
     }
 
-    /// Joins the rigid bodies `a` and `b`, or `a` and the world, at a place where both are at the start, metres. The joint's axis is in
-    /// the axes of a's shape. Springs and ropes, which have two ends, are not for this.
+    /// Joins the rigid bodies `a` and `b`, or `a` and the world, at a place where both are at the start, metres. The place and the axis of `kind`
+    /// are in the axes of the world, as the bodies are at the start. Springs and ropes, which have two ends, are not for this.
     #[must_use]
-    pub fn joint(mut self, a: &str, b: Option<&str>, kind: JointKind, at_m: [f64; 3]) -> Self {
-        self.joints.push(Joined {
-            name: String::new(),
-            a: a.to_owned(),
-            b: b.map(str::to_owned),
-            kind,
-            at_m: at_m.into(),
-        });
+    pub fn joint(mut self, a: impl Into<String>, b: Option<&str>, kind: JointKind, at_m: [f64; 3]) -> Self {
+        self.joints.push(Joined { name: String::new(), a: a.into(), b: b.map(str::to_owned), kind, at_m: at_m.into() });
         self
     }
 
@@ -280,6 +288,11 @@ impl SceneBuilder {
         self
     }
 
+    /// The names of what was added so far and moves, in its order.
+    pub fn names(&self) -> impl Iterator<Item = &str> {
+        self.parts.iter().map(|(name, _)| &**name)
+    }
+
     /// The scene; agents that start inside each other are moved apart where that strains nothing.
     ///
     /// # Errors
@@ -287,7 +300,8 @@ impl SceneBuilder {
     pub fn build(self) -> Result<Scene, SceneBuildError> {
         self.check_names()?;
         let Self { gravity, contact_depth_m, contact_budget, fixed, parts, joints, sensors } = self;
-        let obstacles: Arc<[Obstacle]> = fixed.into();
+        let unit = |solid: Obstacle| Ok(Obstacle { rotation: checked_rotation(&solid.name, solid.rotation)?, ..solid });
+        let obstacles: Arc<[Obstacle]> = fixed.into_iter().map(unit).collect::<Result<_, _>>()?;
         let ids = (0..).map(AgentId);
         let agents: Result<Vec<_>, _> =
             ids.zip(parts).map(|(id, (name, part))| member(id, name, part, gravity)).collect();
@@ -374,16 +388,26 @@ impl Joined {
         let (id, a) = body(&self.a)?;
         let b = self.b.as_ref().map(body).transpose()?;
         let local = |spec: &RigidSpec| spec.rotation.conjugate() * (self.at_m - spec.position);
+        let mut kind = self.kind;
+        if let JointKind::Revolute { axis, .. } | JointKind::Prismatic { axis, .. } = &mut kind {
+            *axis = a.rotation.conjugate() * *axis;
+        }
         let joint = Joint {
             anchor_a_m: local(a),
             anchor_b_m: b.map_or(self.at_m, |(_, spec)| local(spec)),
-            ..Joint::new(id, b.map(|(id, _)| id), self.kind)
+            ..Joint::new(id, b.map(|(id, _)| id), kind)
         };
         let joint = joint.at_rest_in(a.rotation, b.map_or(DQuat::IDENTITY, |(_, spec)| spec.rotation));
         let bad = |error: JointError| SceneBuildError::BadJoint { name: self.a.clone(), reason: error.to_string() };
         joint.check().map_err(bad)?;
         Ok(joint)
     }
+}
+
+/// The rotation of an object, of length 1.
+fn checked_rotation(name: &str, given: DQuat) -> Result<DQuat, SceneBuildError> {
+    let bad = || SceneBuildError::BadRotation { name: name.to_owned(), found: given.to_string() };
+    unit_rotation(given).ok_or_else(bad)
 }
 
 /// A solid that never moves, with its axes at the origin, as rough and elastic as one that says nothing of it.
@@ -405,7 +429,7 @@ const DEFAULT_APPEARANCE: Appearance = Appearance {
 /// The agent of a part.
 ///
 /// # Errors
-/// [`SceneBuildError::BadRate`].
+/// [`SceneBuildError::BadRate`], [`SceneBuildError::BadRotation`] and [`SceneBuildError::TooFine`].
 pub(super) fn member(id: AgentId, name: String, part: Part, gravity: DVec3) -> Result<Member, SceneBuildError> {
     let rate_hz = match &part {
         Part::Rigid(rigid) => rigid.rate_hz,
@@ -418,7 +442,8 @@ pub(super) fn member(id: AgentId, name: String, part: Part, gravity: DVec3) -> R
     let mut eps_m = None;
     let (spec, start) = match part {
         Part::Rigid(rigid) => {
-            let spec = RigidSpec { gravity: gravity * rigid.gravity_scale, ..rigid.spec };
+            let rotation = checked_rotation(&name, rigid.spec.rotation)?;
+            let spec = RigidSpec { rotation, gravity: gravity * rigid.gravity_scale, ..rigid.spec };
             (Spec::Rigid(spec), Resolution { eps_m: 1.0, n: N_MAX })
         }
         Part::Tube(tube) => {
@@ -426,7 +451,8 @@ pub(super) fn member(id: AgentId, name: String, part: Part, gravity: DVec3) -> R
             let start = spec.resolution;
             (Spec::Tube(spec), start)
         }
-        Part::Soft(soft) => {
+        Part::Soft(mut soft) => {
+            soft.spec.rotation = checked_rotation(&name, soft.spec.rotation)?;
             let Some((spec, range_m)) = soft.spec(gravity) else { return Err(SceneBuildError::TooFine { name }) };
             eps_m = range_m;
             (Spec::Soft(spec), Resolution { eps_m: range_m.map_or(1.0, |range| range.0), n: N_MAX })

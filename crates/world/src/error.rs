@@ -100,6 +100,37 @@ pub enum WorldError {
         /// The names that there are.
         known: String,
     },
+    /// A joint without a coordinate.
+    #[error("joint {joint} has no coordinate: only hinges and slides have one")]
+    NoCoordinate {
+        /// The joint's name, or its number where it has none.
+        joint: String,
+    },
+    /// A coordinate of a joint that it cannot have.
+    #[error("the {what} of joint {joint} is {value}; expected {wanted}")]
+    BadCoordinate {
+        /// The joint's name, or its number where it has none.
+        joint: String,
+        /// Its position or its velocity.
+        what: &'static str,
+        /// The value.
+        value: f64,
+        /// The range that it must be in.
+        wanted: String,
+    },
+    /// Coordinates that do not close a loop of joints.
+    #[error(
+        "joint {joint} closes a loop of joints, and would be open by {apart}: the coordinates of a loop depend on each other, and are set together"
+    )]
+    OpenLoop {
+        /// The joint's name, or its number where it has none.
+        joint: String,
+        /// By how much, in metres and radians.
+        apart: String,
+    },
+    /// Coordinates of joints were set while time passes.
+    #[error("coordinates of joints are set while time stands: pause the world first")]
+    TimePasses,
     /// The world has no sensor of that name.
     #[error("the world has no sensor \"{name}\"; its sensors are [{known}]")]
     NoSensor {

@@ -7,12 +7,18 @@ use super::world::World;
 use glam::DVec3;
 use metachron_core::{ContactPartner, Removed, SimTime};
 use metachron_runtime::{AgentEvent, AgentHandle, AgentState, ContactEvent, EventKind, Heard};
+use std::fmt;
+use std::sync::Arc;
 
-/// Something that happened.
-#[derive(Debug, Clone, Copy, PartialEq)]
+/// Something that happened; written as a sentence with the names of what took part.
+#[derive(Debug, Clone, PartialEq)]
 pub struct Event {
     /// The object that it happened to; of a contact between two the one with the lower number.
     pub object: Object,
+    /// The object's name.
+    pub name: Arc<str>,
+    /// The name of what it touches, or of the leader of the cluster that it joined.
+    pub other: Option<Arc<str>>,
     /// When, in its own time: the end of the step in which it happened.
     pub at: SimTime,
     /// What.
@@ -49,6 +55,54 @@ pub enum Happening {
     /// The world went back to a checkpoint ([`World::restore`]), in which the object is: what follows happens from its time there on. Whatever the
     /// filter, this comes before all that follows; what the object touches there begins then, as if it had not touched it before.
     Rewound,
+}
+
+impl Happening {
+    /// As programs write it, such as `contact_began`.
+    #[must_use]
+    pub const fn name(&self) -> &'static str {
+        match self {
+            Self::Contact(contact) if contact.begins => "contact_began",
+            Self::Contact(_) => "contact_ended",
+            Self::Rests => "rests",
+            Self::Wakes => "wakes",
+            Self::Stalled => "stalled",
+            Self::Failed => "failed",
+            Self::Gone => "gone",
+            Self::Joined(_) => "joined",
+            Self::Left => "left",
+            Self::AttachmentGave => "attachment_gave",
+            Self::RateMissed => "rate_missed",
+            Self::Carved(_) => "carved",
+            Self::Rewound => "rewound",
+        }
+    }
+}
+
+impl fmt::Display for Event {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{} s: \"{}\" ", self.at.as_secs_f64(), self.name)?;
+        let other = self.other.as_deref().unwrap_or_default();
+        match self.what {
+            Happening::Contact(Contact { begins: true, force_n, .. }) => {
+                write!(f, "begins to touch \"{other}\" with {:.3} N", force_n.length())
+            }
+            Happening::Contact(Contact { force_n, .. }) => {
+                write!(f, "no longer touches \"{other}\", at most with {:.3} N", force_n.length())
+            }
+            Happening::Rests => f.write_str("comes to rest"),
+            Happening::Wakes => f.write_str("moves again"),
+            Happening::Stalled => f.write_str("is in a step that lasts too long"),
+            Happening::Failed => f.write_str("has failed"),
+            Happening::Gone => f.write_str("was removed"),
+            Happening::Joined(_) => write!(f, "joins the cluster of \"{other}\""),
+            Happening::Left => f.write_str("leaves its cluster"),
+            Happening::AttachmentGave => f.write_str("has an attachment that gave"),
+            Happening::RateMissed => f.write_str("misses its rate"),
+            Happening::Carved(removed) => write!(f, "has lost {} cells, {:.3} kg", removed.cells, removed.mass_kg),
+            Happening::Rewound => f.write_str("is back at a checkpoint"),
+        }
+    }
 }
 
 /// A contact that begins or ends.
@@ -113,15 +167,16 @@ impl EventFilter {
         Self { object: Some(object), ..self }
     }
 
-    fn takes(&self, event: &Event) -> bool {
+    /// Whether what happened to `object` is wanted.
+    fn takes(&self, whose: Object, what: &Happening) -> bool {
         let concerns = |object: Object| self.object.is_none_or(|wanted| wanted == object);
-        match event.what {
+        match what {
             Happening::Contact(contact) => {
                 let of_it = matches!(contact.with, Touched::Object(other) if self.object == Some(other));
-                self.contacts && (concerns(event.object) || of_it)
+                self.contacts && (concerns(whose) || of_it)
             }
-            Happening::Rewound => concerns(event.object),
-            _ => self.states && concerns(event.object),
+            Happening::Rewound => concerns(whose),
+            _ => self.states && concerns(whose),
         }
     }
 }
@@ -148,7 +203,7 @@ struct HeardObject {
 }
 
 /// An event, and how often the world had gone back when it happened: what happened before a world went back comes first, whatever the time.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone)]
 struct Found {
     rewinds: u64,
     event: Event,
@@ -185,10 +240,10 @@ impl Events {
         let (tag, first) = (world.tag(), found.len());
         let object = tag.object(agent.id());
         let overwritten = agent.hear_events(heard, |event| {
-            let event = event_of(tag, object, &event);
-            *own += u64::from(event.what == Happening::Rewound);
-            if is_news(begun, &event, filter) {
-                found.push(Found { rewinds: *own, event });
+            let what = happening(tag, &event);
+            *own += u64::from(what == Happening::Rewound);
+            if is_news(begun, object, &what, filter) {
+                found.push(Found { rewinds: *own, event: named(world, object, event.at, what) });
             }
         });
         *lost += overwritten;
@@ -201,11 +256,11 @@ impl Events {
             return;
         }
         // that event was overwritten before all that was heard now, or the object has left before and came back with the world
-        let event = Event { object, at: agent.latest().moment(), what: Happening::Rewound };
         let before = if overwritten > 0 { first } else { found.len() };
         found[before..].iter_mut().for_each(|found| found.rewinds += missed);
         begun.retain(|(whose, _)| *whose != object);
-        if filter.takes(&event) {
+        if filter.takes(object, &Happening::Rewound) {
+            let event = named(world, object, agent.latest().moment(), Happening::Rewound);
             found.push(Found { rewinds, event });
         }
     }
@@ -218,15 +273,15 @@ impl Events {
 }
 
 /// Whether an event is news under a filter: contacts begin and end as one that sees only those above some newtons sees them.
-fn is_news(begun: &mut Vec<(Object, Touched)>, event: &Event, filter: &EventFilter) -> bool {
-    if matches!(event.what, Happening::Rewound | Happening::Gone) {
-        begun.retain(|(whose, _)| *whose != event.object);
+fn is_news(begun: &mut Vec<(Object, Touched)>, object: Object, what: &Happening, filter: &EventFilter) -> bool {
+    if matches!(what, Happening::Rewound | Happening::Gone) {
+        begun.retain(|(whose, _)| *whose != object);
     }
-    if !filter.takes(event) {
+    if !filter.takes(object, what) {
         return false;
     }
-    let Happening::Contact(contact) = event.what else { return true };
-    let name = (event.object, contact.with);
+    let Happening::Contact(contact) = what else { return true };
+    let name = (object, contact.with);
     let known = begun.iter().position(|begun| *begun == name);
     let loud = contact.force_n.length() >= filter.above_n;
     match (known, contact.begins) {
@@ -245,12 +300,23 @@ fn is_news(begun: &mut Vec<(Object, Touched)>, event: &Event, filter: &EventFilt
     }
 }
 
-fn event_of(tag: WorldTag, object: Object, event: &AgentEvent) -> Event {
+/// What happened, with the names of what took part.
+fn named(world: &World, object: Object, at: SimTime, what: Happening) -> Event {
+    let name = |of: Touched| Arc::from(world.name(of).unwrap_or_default());
+    let other = match what {
+        Happening::Contact(contact) => Some(name(contact.with)),
+        Happening::Joined(leader) => Some(name(leader.into())),
+        _ => None,
+    };
+    Event { object, name: name(object.into()), other, at, what }
+}
+
+fn happening(tag: WorldTag, event: &AgentEvent) -> Happening {
     let contact = |begins: bool, contact: ContactEvent| {
         let ContactEvent { with, point_m, normal, force_n } = contact;
         Happening::Contact(Contact { with: touched(tag, with), begins, point_m, normal, force_n })
     };
-    let what = match event.kind {
+    match event.kind {
         EventKind::ContactBegan(began) | EventKind::ContactGrew(began) => contact(true, began),
         EventKind::ContactEnded(ended) => contact(false, ended),
         EventKind::Wakes => Happening::Wakes,
@@ -264,8 +330,7 @@ fn event_of(tag: WorldTag, object: Object, event: &AgentEvent) -> Event {
         EventKind::Carved(removed) => Happening::Carved(removed),
         EventKind::Rewound => Happening::Rewound,
         _ => Happening::Rests,
-    };
-    Event { object, at: event.at, what }
+    }
 }
 
 pub(super) fn touched(tag: WorldTag, with: ContactPartner) -> Touched {

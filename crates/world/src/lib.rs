@@ -37,6 +37,7 @@ mod frames;
 mod initial_overlap;
 mod initial_shape;
 mod joined;
+mod joint_states;
 pub mod kinds;
 mod log;
 mod membership;
@@ -63,6 +64,7 @@ pub use error::WorldError;
 pub use events::{Contact, Event, EventFilter, Events, Happening};
 pub use frames::{Frame, Frames};
 pub use initial_overlap::Moved;
+pub use joint_states::JointState;
 pub use metachron_contact::detect::SolveBudget;
 pub use metachron_runtime::{Command, FACTOR};
 pub use object::{Object, Touched};
@@ -75,6 +77,6 @@ pub use scene::{
     Appearance, Camera, Factors, GROUP_LEVELS_MAX, Gains, Group, Machine, Member, NamedCamera, ObjectCost, PaceWish,
     Probe, RENDER_SCALE, Scene, Scenery, Spec, Target, View,
 };
-pub use sensors::{JointRef, Reading, Sensor, SensorKind, Site};
+pub use sensors::{JointRef, ListedJoint, Reading, Sensor, SensorKind, Site};
 pub use spec::Division;
 pub use world::World;

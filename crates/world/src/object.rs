@@ -48,3 +48,9 @@ pub enum Touched {
     /// A solid that never moves, by its place among those of the scene.
     Fixed(u32),
 }
+
+impl From<Object> for Touched {
+    fn from(object: Object) -> Self {
+        Self::Object(object)
+    }
+}

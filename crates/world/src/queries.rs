@@ -9,7 +9,7 @@ use super::object::{Object, Touched};
 use super::world::World;
 use glam::{DQuat, DVec3};
 use metachron_contact::remote::PublishedShape;
-use metachron_core::{ContactPartner, ContactState, SimTime};
+use metachron_core::{ContactPartner, ContactState, SimTime, unit_rotation};
 use metachron_geometry::narrow_phase::{NarrowPhaseScratch, touches};
 use metachron_geometry::{
     Aabb, CollisionShape, PlacedShape, ShapeError, ShapeKind, ShapePose, Solid, SolidShape, Touch,
@@ -199,14 +199,16 @@ struct Probe {
 impl Probe {
     fn new(solid: &Solid, rotation: DQuat) -> Result<Self, WorldError> {
         let bad = |error: ShapeError| WorldError::bad_query(&error.to_string());
-        if matches!(solid, Solid::Plane) || !(rotation.is_finite() && rotation.length_squared() > 0.25) {
-            return Err(WorldError::bad_query("a query needs a solid with a size and a rotation that is one"));
-        }
+        let Some(rotation) = unit_rotation(rotation).filter(|_| !matches!(solid, Solid::Plane)) else {
+            return Err(WorldError::bad_query(
+                "a query needs a solid with a size and a rotation that is finite and not zero",
+            ));
+        };
         let shape = SolidShape::new(solid.clone(), DVec3::ZERO).map_err(bad)?;
         let radius_m = shape.radius_m;
         let form = CollisionShape::new(ShapeKind::Solid(shape), 0.0);
         let (scratch, found) = (NarrowPhaseScratch::default(), Vec::new());
-        Ok(Self { form, rotation: rotation.normalize(), radius_m, scratch, found })
+        Ok(Self { form, rotation, radius_m, scratch, found })
     }
 
     /// The nearest of what is near, within `reach_m`.

@@ -4,13 +4,14 @@
 
 use super::error::WorldError;
 use super::object::Object;
+use super::scene::{Scene, Spec};
 use super::world::World;
 use glam::{DQuat, DVec3};
 use metachron_contact::joint::{Joint, JointKind, Motor};
 use metachron_contact::member::Pose;
 use metachron_core::{AgentId, Anchor, Body, ContactPartner, RigidState, SimTime, Snapshot};
 use metachron_geometry::ShapeKind;
-use metachron_runtime::Command;
+use metachron_runtime::{AgentHandle, Command};
 use std::sync::Arc;
 
 /// A sensor of a scene.
@@ -60,7 +61,7 @@ pub enum SensorKind {
 }
 
 /// Where on a rigid body a sensor sits, and how it is turned there: by default in the centre of mass, in the axes of the shape.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
+#[derive(Debug, Clone, Copy, PartialEq, Default, serde::Serialize, serde::Deserialize)]
 pub struct Site {
     /// Its place, metres in the axes of the body's shape; `None` for the centre of mass.
     pub at_m: Option<DVec3>,
@@ -119,12 +120,48 @@ impl JointRef {
     }
 }
 
-/// Joints and sensors of a world, by name.
+/// A joint as a world lists it.
+#[derive(Debug, Clone, Copy)]
+pub struct ListedJoint<'a> {
+    /// What commands and coordinates name it by.
+    pub at: JointRef,
+    /// Its name; `None` where it has none.
+    pub name: Option<&'a str>,
+    /// Its bodies, kind, range and anchors, as the scene has them.
+    pub joint: &'a Joint,
+}
+
+/// Joints, sensors and fixed solids of a world, by name.
 #[derive(Debug, Default)]
 pub(super) struct Instruments {
     pub joint_names: Vec<String>,
     pub joints: Arc<[Joint]>,
     pub sensors: Vec<Sensor>,
+    pub fixed_names: Vec<Arc<str>>,
+    /// How far the joints have moved from their zeros at the start, rad or m.
+    pub starts: Vec<f64>,
+}
+
+impl Instruments {
+    pub fn of(scene: &Scene) -> Self {
+        let pose = |id: AgentId| match &scene.agents.get(id.0 as usize)?.spec {
+            Spec::Rigid(body) => {
+                Some(Pose { origin_m: body.position, rotation: body.rotation.normalize(), ..Pose::WORLD })
+            }
+            _ => None,
+        };
+        let start = |joint: &Joint| {
+            let (a, b) = (pose(joint.a)?, joint.b.map_or(Some(Pose::WORLD), pose)?);
+            Some(joint.travel(&a, &b))
+        };
+        Self {
+            joint_names: scene.joint_names.clone(),
+            joints: Arc::clone(&scene.joints),
+            sensors: scene.sensors.clone(),
+            fixed_names: scene.obstacles.iter().map(|solid| solid.name.as_str().into()).collect(),
+            starts: scene.joints.iter().map(|joint| start(joint).unwrap_or_default()).collect(),
+        }
+    }
 }
 
 /// A rigid body as joints see it.
@@ -136,11 +173,21 @@ struct Placed {
 }
 
 impl World {
+    /// All joints of the scene, in its order.
+    pub fn joints(&self) -> impl Iterator<Item = ListedJoint<'_>> {
+        let Instruments { joint_names, joints, .. } = self.instruments();
+        (0..).zip(joints.iter()).zip(joint_names).map(|((number, joint), name)| {
+            let at = JointRef { body: self.tag().object(joint.a), number };
+            ListedJoint { at, name: Some(&**name).filter(|name| !name.is_empty()), joint }
+        })
+    }
+
     /// The joint of that name.
     ///
     /// # Errors
     /// [`WorldError::NoJoint`].
-    pub fn joint(&self, name: &str) -> Result<JointRef, WorldError> {
+    pub fn joint(&self, name: impl AsRef<str>) -> Result<JointRef, WorldError> {
+        let name = name.as_ref();
         let Instruments { joint_names, joints, .. } = self.instruments();
         let at = joint_names.iter().position(|joint| joint == name && !name.is_empty());
         let found = at.and_then(|at| Some((at as u32, joints.get(at)?.a)));
@@ -167,7 +214,8 @@ impl World {
     ///
     /// # Errors
     /// [`WorldError::NoSensor`], and [`WorldError::Gone`] where what it is on has been removed.
-    pub fn sensor(&self, name: &str) -> Result<Reading, WorldError> {
+    pub fn sensor(&self, name: impl AsRef<str>) -> Result<Reading, WorldError> {
+        let name = name.as_ref();
         let sensors = self.sensors();
         let Some(sensor) = sensors.iter().find(|sensor| sensor.name == name) else {
             let known = sensors.iter().take(20).map(|sensor| sensor.name.as_str()).collect::<Vec<_>>().join(", ");
@@ -220,7 +268,7 @@ impl World {
         Ok(Reading { time: state.time, values })
     }
 
-    fn joint_at(&self, number: u32) -> Result<&Joint, WorldError> {
+    pub(super) fn joint_at(&self, number: u32) -> Result<&Joint, WorldError> {
         let joints = &self.instruments().joints;
         joints
             .get(number as usize)
@@ -237,11 +285,7 @@ impl World {
     fn placed(&self, id: AgentId) -> Result<Placed, WorldError> {
         let object = self.object_of(id)?;
         let (agent, state) = (self.agent(object)?, self.latest(object)?);
-        let shape = agent.form();
-        let com = match shape.as_ref().map(|shape| &shape.kind) {
-            Some(ShapeKind::Solid(solid)) => solid.com_local,
-            _ => DVec3::ZERO,
-        };
+        let com = centre_of_mass(agent);
         let RigidState { position, rotation, velocity, spin } = rigid(&state.body);
         let origin_m = position - rotation * com;
         let pose = Pose { centre_m: position, origin_m, rotation, ..Pose::WORLD };
@@ -258,6 +302,14 @@ impl Placed {
     /// The velocity of its matter at a point of space, m/s.
     fn at(&self, point_m: DVec3) -> DVec3 {
         self.velocity + self.spin.cross(point_m - self.pose.centre_m)
+    }
+}
+
+/// The centre of mass of a rigid body in the axes of its shape, metres; zero of all else.
+pub(super) fn centre_of_mass(agent: &AgentHandle) -> DVec3 {
+    match agent.form().as_ref().map(|shape| &shape.kind) {
+        Some(ShapeKind::Solid(solid)) => solid.com_local,
+        _ => DVec3::ZERO,
     }
 }
 

@@ -14,7 +14,7 @@ use super::frames::{Frame, Frames};
 use super::joined::JoinedTable;
 use super::kinds::ExecutorKind;
 use super::log::{Log, Mode, logged};
-use super::object::{Object, WorldTag};
+use super::object::{Object, Touched, WorldTag};
 use super::recording::{Entry, RecordError};
 use super::sensors::Instruments;
 use glam::DVec3;
@@ -155,8 +155,7 @@ impl World {
         let (agents, gravity, identity) = (run.agents().clone(), scene.gravity, SceneIdentity::of(scene));
         let seen = Mutex::new(Present::of(&*run));
         let (tag, state) = (WorldTag::new(), CallLock::new(State::Running(run)));
-        let (joint_names, joints) = (scene.joint_names.clone(), Arc::clone(&scene.joints));
-        let instruments = Instruments { joint_names, joints, sensors: scene.sensors.clone() };
+        let instruments = Instruments::of(scene);
         let shared = Shared {
             tag,
             state,
@@ -181,7 +180,8 @@ impl World {
     ///
     /// # Errors
     /// [`WorldError::NoObject`].
-    pub fn object(&self, name: &str) -> Result<Object, WorldError> {
+    pub fn object(&self, name: impl AsRef<str>) -> Result<Object, WorldError> {
+        let name = name.as_ref();
         let living = |agent: &&AgentHandle| agent.name() == name && agent.state() != AgentState::Gone;
         let found = self.shared.agents.iter().find(living);
         found
@@ -205,9 +205,29 @@ impl World {
     ///
     /// # Errors
     /// [`WorldError::NoObject`] for the first that there is not.
-    pub fn objects<const N: usize>(&self, names: [&str; N]) -> Result<[Object; N], WorldError> {
+    pub fn objects<const N: usize>(&self, names: [impl AsRef<str>; N]) -> Result<[Object; N], WorldError> {
         let all: Vec<_> = names.iter().map(|name| self.object(name)).collect::<Result<_, _>>()?;
         all.try_into().map_err(|_| WorldError::Foreign)
+    }
+
+    /// All objects that are there, those of the scene first, in the order in which they joined.
+    pub fn all_objects(&self) -> impl Iterator<Item = Object> {
+        let present = self.shared.agents.iter().filter(|agent| agent.state() != AgentState::Gone);
+        present.map(|agent| self.shared.tag.object(agent.id()))
+    }
+
+    /// The name of an object, also of one that was removed, or of a fixed solid.
+    ///
+    /// # Errors
+    /// [`WorldError::Foreign`].
+    pub fn name(&self, of: impl Into<Touched>) -> Result<&str, WorldError> {
+        match of.into() {
+            Touched::Object(object) => self.known(object).map(AgentHandle::name),
+            Touched::Fixed(number) => {
+                let name = self.instruments().fixed_names.get(number as usize);
+                name.map(|name| &**name).ok_or(WorldError::Foreign)
+            }
+        }
     }
 
     /// The object whose agent has this number: its place in the scene.

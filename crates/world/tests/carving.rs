@@ -43,7 +43,7 @@ fn slab(at: DVec3) -> SoftSpec {
 
 /// A slab held by its sides with a ball on it, one that flies, and a rope.
 fn scene() -> Scene {
-    let soft = |spec: SoftSpec| Custom::new(move |_| Box::new(SoftBody::new(spec.clone()).unwrap())).rate_hz(60.0);
+    let soft = |spec: SoftSpec| Custom::made_by(move |_| Box::new(SoftBody::new(spec.clone()).unwrap())).rate_hz(60.0);
     let held = vec![Side::Left, Side::Right, Side::Near, Side::Far];
     let lies = SoftSpec { held, gravity: DVec3::Z * -9.81, ..slab(DVec3::ZERO) };
     let shape = SoftShape::Rope { path_m: vec![DVec3::ZERO, DVec3::X], radius_m: 0.005, segments: 4 };

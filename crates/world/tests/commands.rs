@@ -199,6 +199,7 @@ fn a_motor_for_a_joint_that_an_object_does_not_drive_names_the_joints() {
 }
 
 /// An agent of a model that takes nothing.
+#[derive(Clone)]
 struct Idle;
 
 impl Agent for Idle {
@@ -271,7 +272,7 @@ fn takers(executor: ExecutorKind) -> World {
         .add("hose", tube(0.0))
         .add("held", tube(0.5).clamp([true, false]))
         .add("block", Soft::cuboid([0.1; 3], [2; 3]).young_pa(1e4).at([2.0, 0.0, 0.0]))
-        .add("idle", Custom::new(|_| Box::new(Idle)))
+        .add("idle", Custom::new(Idle))
         .build()
         .unwrap();
     World::start(&scene, executor).unwrap()
@@ -292,9 +293,9 @@ fn a_command_that_its_object_does_not_take_names_it_its_model_and_what_it_takes(
             ("poses", Command::pose(DVec3::X, DQuat::IDENTITY)),
             ("other places", Command::teleport(DVec3::X * 3.0, DQuat::IDENTITY)),
             ("other velocities", Command::velocity(DVec3::X, DVec3::ZERO)),
-            ("pressures", Command::SetPressure(10.0)),
+            ("pressures", Command::pressure(10.0)),
             ("carving", Command::carve(DVec3::X * 9.0, DVec3::X * 9.0, 0.01)),
-            ("other resolutions", Command::Retune(finer)),
+            ("other resolutions", Command::resolution(finer)),
         ];
         for (needs, command) in commands {
             let sent = world.command(object, command);
@@ -310,8 +311,8 @@ fn a_command_that_its_object_does_not_take_names_it_its_model_and_what_it_takes(
             assert!(said.starts_with(&begins) && takes.iter().all(|word| said.contains(word)), "{said}");
         }
         // what all take
-        world.command(object, Command::SetDt(SimSpan::from_millis(2))).unwrap();
-        world.command(object, Command::Wake).unwrap();
+        world.command(object, Command::step(SimSpan::from_millis(2))).unwrap();
+        world.command(object, Command::wake()).unwrap();
         let state = world.latest(object).unwrap().body.clone();
         let set = world.set_state(object, &state);
         assert_eq!(set.is_ok(), takes.contains(&"other states"), "{name}: {set:?}");
@@ -333,12 +334,12 @@ fn a_world_that_was_stopped_takes_no_commands() {
         let hash = world.hash();
         for sent in [
             world.command(ball, Command::force(CENTRE, DVec3::X)),
-            world.command(ball, Command::Wake),
+            world.command(ball, Command::wake()),
             world.set_state(ball, &state),
         ] {
             assert!(matches!(sent, Err(WorldError::Stopped)), "{executor:?}: {sent:?}");
         }
-        let sent = world.agents()[0].send(Command::Wake).unwrap_err();
+        let sent = world.agents()[0].send(Command::wake()).unwrap_err();
         assert_eq!(sent.to_string(), "the run of \"ball\" has ended: it takes no command any more");
         assert_eq!(world.hash(), hash, "{executor:?}");
     }

@@ -80,3 +80,17 @@ fn two_that_meet_are_told_of_once() {
     assert!((began.force_n - DVec3::X * -200.0).length() < 1.0, "{}", began.force_n);
     assert!(began.normal.x < -0.999);
 }
+
+#[test]
+fn an_event_is_a_sentence_with_the_names_of_both() {
+    let world = bouncing(0.0);
+    let mut events = world.events(EventFilter::all());
+    world.advance(SimSpan::from_millis(3000));
+    let all: Vec<_> = events.drain().collect();
+    let names: Vec<_> = all.iter().map(|event| (&*event.name, event.what.name(), event.other.as_deref())).collect();
+    assert_eq!(names, [("ball", "contact_began", Some("floor")), ("ball", "rests", None)]);
+    let Happening::Contact(contact) = all[0].what else { panic!("{all:?}") };
+    let (at_s, force_n) = (all[0].at.as_secs_f64(), contact.force_n.length());
+    assert_eq!(all[0].to_string(), format!("{at_s} s: \"ball\" begins to touch \"floor\" with {force_n:.3} N"));
+    assert_eq!(all[1].to_string(), format!("{} s: \"ball\" comes to rest", all[1].at.as_secs_f64()));
+}

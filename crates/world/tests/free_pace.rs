@@ -31,7 +31,7 @@ fn chain(links: usize, rate_hz: impl Fn(usize) -> f64) -> Scene {
     for link in 0..links {
         let before = link.checked_sub(1).map(name);
         let hinge = JointKind::Revolute { axis: DVec3::Y, range_rad: None, motor: None };
-        scene = scene.joint(&name(link), before.as_deref(), hinge, [link as f64 * LINK_M, 0.0, 0.0]);
+        scene = scene.joint(name(link), before.as_deref(), hinge, [link as f64 * LINK_M, 0.0, 0.0]);
     }
     scene.build().unwrap()
 }

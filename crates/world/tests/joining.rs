@@ -308,7 +308,7 @@ fn an_agent_of_ones_own_comes_back_from_memory_and_from_no_file() {
         Box::new(RigidBody::new(spec).unwrap()) as Box<dyn metachron_contact::Agent>
     };
     let world = floor(ExecutorKind::Lockstep);
-    let mill = world.add("mill", metachron_world::Custom::new(own)).unwrap();
+    let mill = world.add("mill", metachron_world::Custom::made_by(own)).unwrap();
     world.advance(ms(50));
     let (mark, hash) = (world.checkpoint().unwrap(), world.hash());
     let path = std::env::temp_dir().join(format!("metachron-own-{}.mark", std::process::id()));
@@ -353,12 +353,12 @@ fn a_checkpoint_of_another_world_whose_numbers_are_taken_is_refused() {
 fn one_that_has_failed_can_be_removed() {
     use metachron_world::{Command, Custom};
     for executor in EXECUTORS {
-        let scene = Scene::builder().add("broken", Custom::new(|_| Box::new(Broken))).build().unwrap();
+        let scene = Scene::builder().add("broken", Custom::made_by(|_| Box::new(Broken))).build().unwrap();
         let world = World::start(&scene, executor).unwrap();
         world.advance(SimSpan::from_millis(100));
         let broken = world.object("broken").unwrap();
         assert!(matches!(world.agents()[0].state(), metachron_runtime::AgentState::Parked(_)), "{executor:?}");
-        world.command(broken, Command::Wake).unwrap();
+        world.command(broken, Command::wake()).unwrap();
         world.remove(broken).unwrap();
         assert!(matches!(world.latest(broken), Err(WorldError::Gone { .. })), "{executor:?}");
         world.add("broken", Rigid::ball(0.1)).unwrap();

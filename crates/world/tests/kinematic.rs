@@ -104,7 +104,10 @@ fn a_pose_out_of_range_is_refused_with_what_is_wrong() {
         (Command::pose(DVec3::X * 2e6, turn), "a position must be finite and within 1e6 m"),
         (Command::pose(place, turn).moving(DVec3::X * f64::INFINITY, DVec3::ZERO), "a velocity must be finite"),
         (Command::pose(place, turn).moving(DVec3::ZERO, DVec3::X * 1e200), "a spin must be finite, at most 1e6 rad/s"),
-        (Command::pose(place, DQuat::from_xyzw(0.0, 0.0, 0.0, 0.0)), "a rotation must be a quaternion of length 1"),
+        (
+            Command::pose(place, DQuat::from_xyzw(0.0, 0.0, 0.0, 0.0)),
+            "a rotation must be a quaternion that is finite and not zero",
+        ),
     ] {
         let said = world.command(plate, pose).expect_err(wanted).to_string();
         assert!(said.contains(wanted), "{said}");

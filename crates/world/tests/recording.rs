@@ -65,7 +65,7 @@ fn a_replay_ends_with_the_same_bits_and_takes_no_commands() {
     let again = replayed(recording);
     assert_eq!((again.hash(), again.now(), again.time()), (world.hash(), world.now(), world.time()));
     let hose = again.object("hose").unwrap();
-    let refused = again.command(hose, Command::SetPressure(1.0));
+    let refused = again.command(hose, Command::pressure(1.0));
     assert!(matches!(&refused, Err(WorldError::Refused { reason, .. }) if reason.contains("recording")), "{refused:?}");
     assert!(matches!(again.record("x"), Err(RecordError::Stopped)));
 }
@@ -219,7 +219,7 @@ fn another_format_another_scene_and_other_worlds_are_named() {
 fn an_agent_of_ones_own_joins_no_recording() {
     let world = start();
     let _kept = recorded(&world);
-    let refused = world.add("own", Custom::new(|_| unreachable!("it is refused before")));
+    let refused = world.add("own", Custom::made_by(|_| unreachable!("it is refused before")));
     assert!(matches!(&refused, Err(WorldError::Refused { reason, .. }) if reason.contains("agent of your own")));
 }
 

@@ -226,7 +226,7 @@ fn a_recording_that_ends_with_its_world_has_the_steps_that_were_in_progress() {
     for executor in EXECUTORS {
         let gate = Arc::<Gate>::default();
         let gated = Arc::clone(&gate);
-        let custom = Custom::new(move |_| Box::new(Gated { gate: Arc::clone(&gated), steps: 0 })).rate_hz(10.0);
+        let custom = Custom::made_by(move |_| Box::new(Gated { gate: Arc::clone(&gated), steps: 0 })).rate_hz(10.0);
         let scene = Scene::builder().add("gated", custom).build().unwrap();
         let world = World::start(&scene, executor).unwrap();
         let kept = recorded(&world);

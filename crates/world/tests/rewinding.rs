@@ -92,7 +92,7 @@ impl Agent for Clerk {
 /// A clerk, a jelly of so many cells along x, and a ball that fell onto the floor; the jelly and the ball are about to meet.
 fn office(mood: &Arc<AtomicU8>, cells: u32) -> Scene {
     let mood = Arc::clone(mood);
-    let clerk = Custom::new(move |_| Box::new(Clerk { steps: 0, half_s: 0.0, mood: Arc::clone(&mood) }));
+    let clerk = Custom::made_by(move |_| Box::new(Clerk { steps: 0, half_s: 0.0, mood: Arc::clone(&mood) }));
     Scene::builder()
         .fixed("floor", Solid::Plane)
         .add("ball", Rigid::ball(0.05).mass_kg(0.2).at([0.0, 0.0, 0.1]))

@@ -130,13 +130,13 @@ fn a_pressure_that_a_program_sets_widens_a_tube_on_every_executor() {
         world.advance(span(0.1));
         assert_eq!(radius(), radius_m);
         let pressure_pa = 5000.0;
-        world.command(hose, Command::SetPressure(pressure_pa)).unwrap();
+        world.command(hose, Command::pressure(pressure_pa)).unwrap();
         world.advance(span(0.2));
         // of a prescribed wall: p r² (1 − ν/2)/(E t)
         let poisson = 0.45;
         let wanted_m = pressure_pa * radius_m * radius_m * (1.0 - 0.5 * poisson) / (young_pa * wall_m);
         assert!(((radius() - radius_m) / wanted_m - 1.0).abs() < 1e-9, "{executor:?}: {} m", radius() - radius_m);
-        assert!(world.command(hose, Command::SetPressure(f64::NAN)).is_err());
+        assert!(world.command(hose, Command::pressure(f64::NAN)).is_err());
     }
 }
 

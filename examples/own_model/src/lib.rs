@@ -48,6 +48,7 @@ struct State {
 }
 
 /// The pontoon.
+#[derive(Clone)]
 pub struct Pontoon {
     hull: Hull,
     form: Arc<CollisionShape>,

@@ -36,7 +36,7 @@ fn a_pontoon_lies_as_deep_as_archimedes_says_under_a_load_of_any_rate() {
         (Threads, 1000.0, 50.0),
     ] {
         let load = Rigid::cuboid([0.1; 3]).mass_kg(LOAD_KG).at([0.0, 0.0, deck_m() + 0.1]).rate_hz(load_hz);
-        let stage = Custom::new(|_| pontoon()).rate_hz(pontoon_hz);
+        let stage = Custom::new(Pontoon::new(HULL).unwrap()).rate_hz(pontoon_hz);
         let scene = Scene::builder().add("pontoon", stage).add("load", load).build().unwrap();
         let world = World::start(&scene, executor).unwrap();
         world.set_pace(Pace::Free).unwrap();

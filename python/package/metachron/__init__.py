@@ -1,10 +1,28 @@
 """A real-time physics engine in which every object keeps its own time.
 
 A scene is built of parts, or read from TOML; started, it is a world whose objects live on threads, in a pool or in lockstep.
-Units are SI: metres, seconds, kilograms, newtons, radians. Rotations are unit quaternions (x, y, z, w).
+Units are SI: metres, seconds, kilograms, newtons, radians. Rotations are quaternions (x, y, z, w) of any length above zero.
 """
 
-from ._metachron import Checkpoint, Contact, Event, Events, Export, Hit, Object, Rollout, Scene, State, World, replay, rollout
+from ._metachron import (
+    Checkpoint,
+    Contact,
+    Event,
+    Events,
+    Export,
+    Hit,
+    Joint,
+    Joints,
+    Object,
+    Rollout,
+    Scene,
+    State,
+    States,
+    World,
+    __version__,
+    replay,
+    rollout,
+)
 from .parts import (
     Ball,
     Box,
@@ -44,9 +62,11 @@ __all__ = [
     "Export",
     "Hit",
     "Imu",
+    "Joint",
     "JointEffort",
     "JointPosition",
     "JointVelocity",
+    "Joints",
     "Object",
     "Plane",
     "Pose",
@@ -61,9 +81,11 @@ __all__ = [
     "SoftMesh",
     "Spherical",
     "State",
+    "States",
     "Tube",
     "Weld",
     "World",
+    "__version__",
     "replay",
     "rollout",
 ]

@@ -1,20 +1,26 @@
 """The native part: scenes, worlds, states, events. Errors are exceptions with the engine's own sentences."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from os import PathLike
-from typing import Any, Literal, TypedDict, final
+from typing import Any, Final, Literal, TypedDict, final
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from typing_extensions import Self, Unpack
+from typing_extensions import Required, Self, Unpack
 
 from .parts import Camera, JointKind, Part, Sensor, Solid
 from .typing import Array, Numbers
 
-__all__ = ["Checkpoint", "Contact", "Event", "Events", "Export", "Hit", "Object", "Rollout", "Scene", "State", "World", "replay", "rollout"]
+__all__ = [
+    "Checkpoint", "Contact", "Event", "Events", "Export", "Hit", "Joint", "Joints", "Object", "Rollout", "Scene", "State", "States", "World",
+    "__version__", "replay", "rollout",
+]
+
+__version__: Final[str]
 
 _Executor = Literal["lockstep", "threads", "pool", "auto"]
 _Pace = Literal["real-time", "free"]
+_Coordinates = Mapping[str | int, float] | Sequence[float] | NDArray[np.floating[Any]]
 
 class _Point(TypedDict, total=False):
     """A material point: one of three, or none for the centre of mass of a rigid body."""
@@ -33,8 +39,8 @@ class _Lasting(_Point, total=False):
     """For how many seconds of the object's time it acts; `None` until it is replaced or taken back."""
 
 class _Spring(_Lasting, total=False):
-    stiffness: float
-    """N/m, >= 0."""
+    stiffness: float | None
+    """N/m, >= 0; required but to take a spring back."""
     damping: float
     """N s/m, >= 0; default 0."""
 
@@ -61,9 +67,9 @@ class _Led(TypedDict, total=False):
     """For how many seconds of the object's time it leads; `None` until it is replaced or taken back."""
 
 class _Rollout(_Point, total=False):
-    step: float
+    step: Required[float]
     """Seconds that each action acts for."""
-    observe: Sequence[str]
+    observe: Sequence[str] | None
     """Objects whose motion is recorded; default that on which the actions act."""
     threads: int
     """Worlds that are played at once; default 2."""
@@ -75,6 +81,55 @@ class Object:
     @property
     def name(self) -> str: ...
     def __hash__(self) -> int: ...
+
+@final
+class Joint:
+    """A joint of a world."""
+
+    @property
+    def number(self) -> int:
+        """Its place in the scene, from 0."""
+
+    @property
+    def name(self) -> str | None: ...
+    @property
+    def kind(self) -> Literal["revolute", "prismatic", "spherical", "weld", "spring", "rope"]: ...
+    @property
+    def a(self) -> str:
+        """Its first body."""
+
+    @property
+    def b(self) -> str | None:
+        """Its second body, which its coordinate moves against the first; `None` for the world."""
+
+    @property
+    def range(self) -> tuple[float, float] | None:
+        """Of a hinge or a slide, rad or m; `None` where it has none."""
+
+@final
+class Joints:
+    """The joints of a world, in the order of its scene; the arrays have a number for each hinge and slide of them."""
+
+    def __len__(self) -> int: ...
+    def __iter__(self) -> Iterator[Joint]: ...
+    def __getitem__(self, joint: str | int, /) -> Joint: ...
+    @property
+    def positions(self) -> Array:
+        """(n,), rad and m: how far each hinge and slide has moved from its zero, of the newest states, or as it was set since."""
+
+    @property
+    def velocities(self) -> Array:
+        """(n,), rad/s and m/s: how fast they do."""
+
+    def set(self, positions: _Coordinates | None = None, velocities: _Coordinates | None = None) -> None:
+        """Puts hinges and slides to coordinates before the next step, and all bodies that they carry: a number for each of them, or a dictionary of
+        some by name. The others, and what is `None`, keep theirs. What holds a tree of joints stays: the world, a kinematic body, or else its first.
+
+        Raises `ValueError`, and moves nothing, outside a joint's range, where a loop of joints would be open, and while time passes.
+        """
+
+    def reset(self) -> None:
+        """Puts all joints back to where the scene has them at the start, at rest; what holds a tree of joints stays where it is."""
 
 @final
 class Scene:
@@ -103,7 +158,7 @@ class Scene:
         """Adds what moves: a rigid body, a tube, a sheet, a solid or a rope."""
 
     def joint(self, name: str, kind: JointKind, a: str, b: str | None = None) -> Self:
-        """Joins the rigid bodies `a` and `b`, or `a` and the world."""
+        """Joins the rigid bodies `a` and `b`, or `a` and the world. Place and axis of `kind` are in the world's axes, as the bodies are at the start."""
 
     def sensor(self, name: str, on: Sensor) -> Self:
         """Adds a sensor, which `World.sensor` reads."""
@@ -142,6 +197,21 @@ class World:
     def object(self, name: str) -> Object:
         """The object of this name. Raises `KeyError`."""
 
+    @property
+    def objects(self) -> list[Object]:
+        """All objects that are there, those of the scene first."""
+
+    @property
+    def joints(self) -> Joints:
+        """The joints of its scene, and their coordinates."""
+
+    @property
+    def sensors(self) -> list[str]:
+        """The names of the sensors of its scene."""
+
+    def states(self) -> States:
+        """The newest states of all objects, as arrays."""
+
     def state(self, object: str | Object) -> State:
         """The newest state of an object; it waits for nothing."""
 
@@ -159,6 +229,9 @@ class World:
     @property
     def pace(self) -> str:
         """How time passes: `"free"` where it waits for objects, else `"real-time"`, whatever its speed."""
+
+    def set_pace(self, pace: _Pace | float) -> None:
+        """How time passes from now on: `"free"`, `"real-time"`, or so many simulated seconds a second, 0.001 ... 100."""
 
     @property
     def dropped(self) -> float:
@@ -293,6 +366,7 @@ class World:
 class State:
     """What an object was like at one moment. It never changes; its arrays are copies that nobody can write to."""
 
+    def __new__(cls, pickled: bytes) -> Self: ...
     @property
     def body(self) -> Literal["rigid", "curve", "soft", "tool", "nothing"]: ...
     @property
@@ -356,6 +430,38 @@ class State:
 
     def point(self, **keywords: Unpack[_Point]) -> tuple[Array, Array]:
         """Position, m, and velocity, m/s, of a material point, (3,) each."""
+
+@final
+class States:
+    """The newest states of all objects, in one call. It never changes; nobody can write to its arrays."""
+
+    @property
+    def names(self) -> list[str]:
+        """Of the n objects."""
+
+    @property
+    def times(self) -> Array:
+        """(n,), s: the moment of each."""
+
+    @property
+    def starts(self) -> NDArray[np.int64]:
+        """(n + 1,): `positions[starts[i]:starts[i + 1]]` are those of object i, one point of what does not bend."""
+
+    @property
+    def positions(self) -> Array:
+        """(m, 3), m: the nodes of what bends, the centre of mass or the tip of what does not."""
+
+    @property
+    def velocities(self) -> Array:
+        """(m, 3), m/s, of the same points."""
+
+    @property
+    def rotations(self) -> Array:
+        """(n, 4): from the axes of each rigid body or tool to the world's; not numbers for what bends."""
+
+    @property
+    def spins(self) -> Array:
+        """(n, 3), rad/s, world axes, likewise."""
 
 @final
 class Events:

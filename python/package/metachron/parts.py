@@ -1,6 +1,6 @@
 """Parts of a scene: solids, bodies, tubes, soft bodies, kinds of joints, sensors; and cameras. They hold numbers and nothing else.
 
-What is `None` is as the engine has it by default. Units are SI; a rotation is a unit quaternion (x, y, z, w).
+What is `None` is as the engine has it by default. Units are SI; a rotation is a quaternion (x, y, z, w) of any length above zero.
 """
 
 from __future__ import annotations
@@ -219,19 +219,19 @@ class SoftMesh(_Soft):
 
 @dataclass(frozen=True, kw_only=True)
 class _Joint:
-    """A joint between two bodies, or of one with the world."""
+    """A joint between two bodies, or of one with the world. Its place and its axis are in the world's axes, as the bodies are at the start."""
 
     at: Numbers
-    """Where both are at the start, m."""
+    """Where both bodies are joined at the start, m, world axes."""
 
 
 @final
 @dataclass(frozen=True)
 class Revolute(_Joint):
-    """A hinge."""
+    """A hinge at a place and about an axis of the world at the start."""
 
     axis: Numbers
-    """In the axes of the first body's shape, of any length above zero."""
+    """In the world's axes at the start, of any length above zero; it turns with the first body."""
     range: tuple[float, float] | None = None
     """How far the second body turns relative to the first about the axis, rad, within -pi ... pi."""
 
@@ -239,10 +239,10 @@ class Revolute(_Joint):
 @final
 @dataclass(frozen=True)
 class Prismatic(_Joint):
-    """A slide."""
+    """A slide along an axis of the world at the start."""
 
     axis: Numbers
-    """In the axes of the first body's shape, of any length above zero."""
+    """In the world's axes at the start, of any length above zero; it turns with the first body."""
     range: tuple[float, float] | None = None
     """How far the second body slides relative to the first along the axis, m."""
 
@@ -250,13 +250,13 @@ class Prismatic(_Joint):
 @final
 @dataclass(frozen=True)
 class Spherical(_Joint):
-    """A ball in its socket."""
+    """A ball in its socket at a place of the world at the start."""
 
 
 @final
 @dataclass(frozen=True)
 class Weld(_Joint):
-    """Nothing moves."""
+    """Nothing moves; its place is one of the world at the start."""
 
 
 @final

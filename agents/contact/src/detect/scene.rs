@@ -78,7 +78,7 @@ pub struct Passage {
 pub const DEPTH_RANGE_M: RangeInclusive<f64> = 1e-6..=1e-3;
 
 /// How far the solves of a scene's contacts go.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 pub enum SolveBudget {
     /// Until all laws hold, whatever that takes.
     Exact,

@@ -17,6 +17,7 @@ use crate::{
 };
 use crate::{Touch, is_closed, mesh_triangles};
 use glam::{DMat3, DQuat, DVec3, Vec3};
+use metachron_core::unit_rotation;
 use rapier3d::parry::shape::Cuboid;
 
 /// Half the size of a plane's slab, in radii of the body: it reaches past the body on all sides, and as deep.
@@ -69,10 +70,9 @@ impl StaticSolid {
     /// [`StaticSolidError`] for an invalid shape or place.
     pub fn new(obstacle: &Obstacle) -> Result<Self, StaticSolidError> {
         let Obstacle { name, solid, position, friction, restitution, traits, .. } = obstacle;
-        let rotation = obstacle.rotation.normalize();
-        if !position.is_finite() || !rotation.is_finite() {
+        let Some(rotation) = unit_rotation(obstacle.rotation).filter(|_| position.is_finite()) else {
             return Err(StaticSolidError::Place { name: name.clone() });
-        }
+        };
         let bad = |source| StaticSolidError::Shape { name: name.clone(), source };
         let kind = ShapeKind::Solid(SolidShape::new(solid.clone(), DVec3::ZERO).map_err(bad)?);
         let form = CollisionShape { kind, friction: *friction, restitution: *restitution, traits: *traits };

@@ -4,6 +4,7 @@ use super::mass_properties::MassDistribution;
 use crate::symmetric::principal_axes;
 use crate::trajectory::Keyframe;
 use glam::{DMat3, DQuat, DVec3};
+use metachron_core::unit_rotation;
 use metachron_geometry::{ContactTraits, ShapeError, Solid};
 
 /// A rigid body before it is built.
@@ -256,6 +257,5 @@ fn vector(what: &'static str, value: DVec3) -> Result<(), RigidError> {
 }
 
 fn rotation(what: &'static str, value: DQuat) -> Result<(), RigidError> {
-    let good = value.is_finite() && value.length_squared() > 0.0;
-    if good { Ok(()) } else { Err(RigidError::BadRotation { what }) }
+    unit_rotation(value).map(drop).ok_or(RigidError::BadRotation { what })
 }

@@ -7,7 +7,7 @@ use super::state::RodState;
 use super::tube::Tube;
 use crate::set_motion::check_nodes;
 use glam::DVec3;
-use metachron_core::{Bounds, CurveState, Snapshot};
+use metachron_core::{Bounds, CurveState, Snapshot, unit_rotation};
 
 /// The bounding box of a tube in this state that is nowhere wider than `radius_m`.
 pub fn bounds(state: &RodState, radius_m: f64) -> Bounds {
@@ -47,7 +47,7 @@ impl Tube {
             let (found, parts) = (curve.frames.len(), self.now.q.len());
             return Err(format!("the state has {found} frames; the tube has {parts} segments"));
         }
-        if let Some(at) = curve.frames.iter().position(|q| !(q.is_finite() && q.length_squared() > 0.25)) {
+        if let Some(at) = curve.frames.iter().position(|q| unit_rotation(*q).is_none()) {
             return Err(format!("frame {at} of the state is no rotation"));
         }
         let Self { now, matter, division, .. } = self;

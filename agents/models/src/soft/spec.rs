@@ -3,7 +3,7 @@
 use super::grid::Side;
 use super::material::Lame;
 use glam::{DQuat, DVec3};
-use metachron_core::ResolutionRange;
+use metachron_core::{ResolutionRange, unit_rotation};
 use metachron_geometry::{
     ContactTraits, Tetrahedra, TetrahedraFault, Triangles, branch, cage_counts, is_closed, opposed,
 };
@@ -348,7 +348,7 @@ impl SoftSpec {
             SoftShape::Embedded { .. } | SoftShape::Tetrahedra { .. } | SoftShape::Shell { .. } => return Some(self),
         };
         let half_m = if let SoftShape::Box { size_m, .. } = lattice { 0.5 * size_m } else { DVec3::ZERO };
-        let position = self.position + self.rotation * half_m;
+        let position = self.position + self.rotation.normalize() * half_m;
         Some(Self { shape: lattice.embedded(range_m)?, position, ..self })
     }
 }
@@ -476,9 +476,7 @@ impl SoftSpec {
         vector("the position", self.position)?;
         vector("the velocity", self.velocity)?;
         vector("the gravity", self.gravity)?;
-        if !(self.rotation.is_finite() && self.rotation.length_squared() > 0.0) {
-            return Err(SoftError::BadVector { what: "the rotation" });
-        }
+        unit_rotation(self.rotation).ok_or(SoftError::BadVector { what: "the rotation" })?;
         let model = self.shape.model();
         self.held.iter().try_for_each(|side| match side.of(&self.shape) {
             true => Ok(()),

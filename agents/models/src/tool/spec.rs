@@ -2,7 +2,7 @@
 
 use crate::trajectory::Keyframe;
 use glam::DVec3;
-use metachron_core::AgentId;
+use metachron_core::{AgentId, unit_rotation};
 use metachron_geometry::ContactTraits;
 
 /// A tool before it is built.
@@ -150,7 +150,8 @@ impl Keyframe {
         for value in self.tip_m.to_array() {
             check("the tip", value, (-REACH_MAX_M, REACH_MAX_M), "finite, within 1e6 m")?;
         }
-        let length = self.rotation.length_squared();
-        check("the rotation's squared length", length, (1e-12, 1e12), "above zero and finite")
+        let (what, wanted) = ("the rotation's length", "above zero and finite");
+        let bad = || ToolError::BadKeyframe { index, what, value: self.rotation.length(), wanted };
+        unit_rotation(self.rotation).map(drop).ok_or_else(bad)
     }
 }

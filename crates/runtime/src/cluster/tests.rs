@@ -163,7 +163,7 @@ fn a_cluster_rests_as_one_and_wakes_as_one() {
     let steps = |run: &Lockstep| run.agents().iter().map(|a| a.stats().steps).collect::<Vec<_>>();
     let before = steps(&run);
     // the one that is led last gets a command: its leader wakes for it
-    run.send(AgentId(2), Command::Retune(Resolution { eps_m: 0.05, n: 1 })).unwrap();
+    run.send(AgentId(2), Command::resolution(Resolution { eps_m: 0.05, n: 1 })).unwrap();
     run.wait_until(ms(1200));
     let after = steps(&run);
     assert!(before.iter().zip(&after).all(|(b, a)| a > b && a - b <= 2), "{before:?} {after:?}");
@@ -245,7 +245,7 @@ fn a_run_that_ends_while_agents_are_led_ends_all_of_them() {
             let kept = run.agents().to_vec();
             eventually("all are led by the first", || kept[1..].iter().all(|a| a.led_by() == Some(AgentId(0))));
             let steps = kept[5].stats().steps;
-            kept[5].send(Command::Retune(Resolution { eps_m: 0.07, n: 3 })).unwrap();
+            kept[5].send(Command::resolution(Resolution { eps_m: 0.07, n: 3 })).unwrap();
             eventually("a command reaches a led agent", || {
                 kept[5].latest().resolution.is_some_and(|r| r.eps_m == 0.07)
             });
@@ -289,7 +289,7 @@ fn a_cluster_rests_and_wakes_as_one_in_real_time() {
             eventually("all rest", all_rest);
             let steps = run.agents()[0].stats().steps;
             let eps_m = f64::from(round) * 1e-3;
-            run.send(AgentId(2), Command::Retune(Resolution { eps_m, n: 1 })).unwrap();
+            run.send(AgentId(2), Command::resolution(Resolution { eps_m, n: 1 })).unwrap();
             eventually("the one led last obeys", || {
                 run.agents()[2].latest().resolution.is_some_and(|r| r.eps_m == eps_m)
             });

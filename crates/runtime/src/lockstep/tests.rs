@@ -89,7 +89,7 @@ fn eventful_run(seed: u64) -> (u64, Vec<u64>) {
         run.wait_until(Duration::from_nanos(frame * 16_666_667));
         run.spend(run.machine().frame_time(4e-3, frame, Duration::ZERO));
         if frame == 60 {
-            run.send(AgentId(1), Command::Retune(Resolution { eps_m: 0.02, n: 2 })).unwrap();
+            run.send(AgentId(1), Command::resolution(Resolution { eps_m: 0.02, n: 2 })).unwrap();
         }
     }
     let hash = state_hash(run.agents());
@@ -159,7 +159,7 @@ fn rest_stops_the_steps_and_a_command_wakes() {
     let agent = run.agents()[0].clone();
     assert_eq!((agent.state(), agent.stats().steps), (AgentState::Resting, 10));
     assert_eq!(agent.age_s(&agent.latest(), run.sim_now()), 0.0, "a state at rest still holds");
-    agent.send(Command::Retune(Resolution { eps_m: 0.05, n: 1 })).unwrap();
+    agent.send(Command::resolution(Resolution { eps_m: 0.05, n: 1 })).unwrap();
     run.wait_until(ms(2000));
     let stats = agent.stats();
     assert_eq!((stats.steps, stats.state), (11, AgentState::Resting), "it obeyed and rests again");
@@ -210,7 +210,7 @@ fn a_user_spring_pulls_until_its_release_and_keeps_the_agent_awake() {
 #[test]
 fn a_command_to_an_unknown_agent_is_an_error() {
     let run = lockstep(vec![Dummy::new(1.0).at(60.0)]);
-    assert_eq!(run.send(AgentId(9), Command::Wake), Err(SendError::NoAgent(AgentId(9))));
+    assert_eq!(run.send(AgentId(9), Command::wake()), Err(SendError::NoAgent(AgentId(9))));
 }
 
 #[test]

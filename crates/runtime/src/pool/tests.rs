@@ -87,7 +87,7 @@ fn thousands_of_sleepers_wake_at_once_and_sleep_again() {
     };
     all_rest(2);
     for round in 1..=3 {
-        run.agents().iter().for_each(|agent| agent.send(Command::Wake).unwrap());
+        run.agents().iter().for_each(|agent| agent.send(Command::wake()).unwrap());
         all_rest(2 + round);
     }
     // a wake may find an agent ahead of the present, which has no rest behind it

@@ -5,18 +5,18 @@
 use super::SceneBuildError;
 use crate::scene::{Member, Spec};
 use crate::sensors::{Sensor, SensorKind, Site};
-use metachron_core::ContactPartner;
+use metachron_core::{ContactPartner, unit_rotation};
 use metachron_geometry::Obstacle;
 
 /// A sensor by the names of what it is on.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, serde::Serialize, serde::Deserialize)]
 pub(super) struct Mounted {
     pub name: String,
     pub on: SensorOn,
 }
 
 /// What a sensor is on, by name.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, serde::Serialize, serde::Deserialize)]
 #[non_exhaustive]
 pub enum SensorOn {
     /// How far a hinge or a slide has moved: [`SensorKind::JointPosition`].
@@ -83,11 +83,9 @@ impl Mounts<'_> {
     }
 }
 
-/// The same site by a quaternion of length 1.
+/// The same site by a rotation of length 1.
 fn checked(sensor: &str, site: &Site) -> Result<Site, SceneBuildError> {
-    let length = site.rotation.length();
-    if site.at_m.is_none_or(|at_m| at_m.is_finite()) && length.is_finite() && length > 0.0 {
-        return Ok(Site { rotation: site.rotation.normalize(), ..*site });
-    }
-    Err(SceneBuildError::BadSite { sensor: sensor.to_owned(), found: format!("{site:?}") })
+    let rotation = unit_rotation(site.rotation).filter(|_| site.at_m.is_none_or(|at_m| at_m.is_finite()));
+    let bad = || SceneBuildError::BadSite { sensor: sensor.to_owned(), found: format!("{site:?}") };
+    Ok(Site { rotation: rotation.ok_or_else(bad)?, ..*site })
 }

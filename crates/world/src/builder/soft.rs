@@ -18,7 +18,7 @@ const YOUNG_PA: f64 = 1e5;
 /// A sheet, solid or rope before it is added.
 #[derive(Debug, Clone, serde::Serialize, serde::Deserialize)]
 pub struct Soft {
-    spec: SoftSpec,
+    pub(super) spec: SoftSpec,
     /// From the first corner of its shape to its middle, in its own axes, metres.
     half_m: DVec3,
     eps_m: Option<(f64, f64)>,

@@ -17,7 +17,7 @@ const MASS_KG: f64 = 0.5;
 fn scene(switch: &Arc<Switch>, leads: bool) -> Scene {
     let mine = Arc::clone(switch);
     let beside = DVec3::new(-0.08, 0.05 + HALF_M, 0.0);
-    let rogue = Custom::new(move |_| Box::new(Rogue::floating(&mine, beside))).rate_hz(250.0);
+    let rogue = Custom::made_by(move |_| Box::new(Rogue::floating(&mine, beside))).rate_hz(250.0);
     let ball = |x: f64, v: f64| Rigid::ball(0.05).mass_kg(MASS_KG).at([x, 0.0, 0.0]).velocity_m_s([v, 0.0, 0.0]);
     let mut scene = Scene::builder().gravity([0.0; 3]);
     if leads {

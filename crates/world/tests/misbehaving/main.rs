@@ -34,7 +34,7 @@ const fn ms(count: u64) -> SimSpan {
 /// leads its cluster, or is led in it.
 fn scene(switch: &Arc<Switch>, leads: bool) -> Scene {
     let mine = Arc::clone(switch);
-    let rogue = Custom::new(move |_| Box::new(Rogue::new(&mine, DVec3::Z * HALF_M))).rate_hz(250.0);
+    let rogue = Custom::made_by(move |_| Box::new(Rogue::new(&mine, DVec3::Z * HALF_M))).rate_hz(250.0);
     let rider = Rigid::ball(0.05).mass_kg(0.2).at([0.0, 0.0, 0.25]).rate_hz(250.0);
     let beside = Rigid::cuboid([0.1; 3]).mass_kg(1.0).at([0.2005, 0.0, 0.1]).rate_hz(500.0);
     let mut scene = Scene::builder().fixed("floor", Solid::Plane);
