@@ -223,9 +223,10 @@ pub(crate) fn read_objects(
         entry.copies = copies(c, &entry.place, &entry.common, entry.model.repeats(), most);
         let count = counts.entry(what).or_insert(0);
         *count += entry.copies.len() * entry.model.parts();
-        // the copies of what comes after it are not made
+        // none of its copies and of those after it are made
         if *count > most {
             too_many(c, &entry.place.path, &format!("{count} {what}"), most);
+            entry.copies = Copies::single();
             break;
         }
     }
