@@ -6,7 +6,7 @@
 use super::bounds::{self, OutOfBounds};
 use glam::DVec3;
 use metachron_contact::{AnchorForce, AnchorSpring, Carving, Input, Inputs, PoseGoal, SetMotion, SetMotor};
-use metachron_core::{AgentId, Anchor, Body, Resolution, SimSpan};
+use metachron_core::{AgentId, Body, Resolution, SimSpan};
 use std::sync::atomic::{
     AtomicBool,
     Ordering::{Acquire, Release},
@@ -357,7 +357,7 @@ fn check(command: &Command) -> Result<(), SendError> {
 mod tests {
     use super::*;
     use glam::DQuat;
-    use metachron_core::RigidState;
+    use metachron_core::{Anchor, RigidState};
 
     fn pull(target: DVec3) -> AnchorSpring {
         let anchor = Anchor::Local(DVec3::ZERO);

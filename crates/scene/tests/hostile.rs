@@ -19,6 +19,7 @@ fn memory_mib(which: &str) -> f64 {
     line.trim_matches([':', ' ', '\t', 'k', 'B']).parse::<f64>().unwrap() / 1024.0
 }
 
+#[derive(Clone)]
 struct Hostile {
     text: String,
     /// A word of the first problem.
@@ -33,103 +34,83 @@ fn object(name: &str, keys: &str) -> String {
     format!("[[object]]\nname = \"{name}\"\n{keys}\n")
 }
 
-/// Scenes of numbers that are too large, one at a time or together.
-fn of_numbers() -> Vec<Hostile> {
-    let (triangles, huge) = ("a number from 4 to 1000000", 4_000_000_000_u32);
-    let mesh = |kind: &str, more: &str| object("m", &format!("model = \"mesh\"\ngenerate = \"{kind}\"\n{more}"));
-    let rigid = |shape: &str| {
-        object("m", &format!("model = \"rigid\"\nshape = \"{shape}\"\ngenerate = \"terrain\"\ntriangles = {huge}"))
+/// More triangles than any mesh may have, and the copies of most grids.
+const HUGE: &str = "triangles = 4000000000";
+const MANY: &str = "grid = [100, 100, 1]\nspacing_m = [1, 1, 1]";
+
+fn mesh(name: &str, kind: &str, keys: &str) -> String {
+    object(name, &format!("model = \"mesh\"\ngenerate = \"{kind}\"\n{keys}"))
+}
+
+/// Scenes of meshes that are too large, one at a time or together.
+fn of_meshes() -> Vec<Hostile> {
+    let (seen, touched) = ("a number from 4 to 1000000", "a number from 4 to 100000");
+    let rigid = |shape: &str, keys: &str| object("m", &format!("model = \"rigid\"\nshape = \"{shape}\"\n{keys}"));
+    let liver = |keys: &str| {
+        object("m", &format!("model = \"solid\"\nshape = \"mesh\"\ngenerate = \"liver\"\nyoung_pa = 1e4\n{keys}"))
     };
-    let liver = |more: &str| {
-        object("m", &format!("model = \"solid\"\nshape = \"mesh\"\ngenerate = \"liver\"\nyoung_pa = 1e4\n{more}"))
-    };
-    let balls = |name: &str, grid: &str| {
-        object(
-            name,
-            &format!("model = \"rigid\"\nshape = \"ball\"\nradius_m = 0.1\nspacing_m = [1, 1, 1]\ngrid = {grid}"),
-        )
-    };
-    let tube = |path: &str, more: &str| {
-        object(
-            "t",
-            &format!(
-                "model = \"tube\"\npath_m = [{path}]\nradius_m = 0.01\nyoung_pa = 1e6\ndensity_kg_m3 = 1e3\n{more}"
-            ),
-        )
-    };
+    let cavity = |seed| mesh(&format!("m{seed}"), "cavity", &format!("triangles = 1000000\nseed = {seed}"));
     let tree = |seed: u32, leaves: u32| {
-        object(
-            &format!("t{seed}"),
-            &format!("model = \"tree\"\nheight_m = 5\nseed = {seed}\nbranches = 100000\nleaves = {leaves}"),
-        )
+        let keys = format!("model = \"tree\"\nheight_m = 5\nseed = {seed}\nbranches = 100000\nleaves = {leaves}");
+        object(&format!("t{seed}"), &keys)
     };
-    let solid = |more: &str| object("s", &format!("model = \"solid\"\nyoung_pa = 1e4\n{more}"));
-    let sheet = |more: &str| object("s", &format!("model = \"sheet\"\nthickness_m = 1e-3\nyoung_pa = 1e4\n{more}"));
-    let many = "grid = [100, 100, 1]\nspacing_m = [1, 1, 1]";
-    let long_path = (0..20_000).map(|i| format!("[{i}, 0, 0]")).collect::<Vec<_>>().join(",");
-    let part = format!("[[object.part]]\nshape = \"mesh\"\ngenerate = \"blob\"\ntriangles = {huge}\n");
+    let part = format!("[[object.part]]\nshape = \"mesh\"\ngenerate = \"blob\"\n{HUGE}\n");
+    let group = "[[group]]\nname = \"g\"\nmembers = [\"m\"]\n[group.proxy]\ngenerate = \"blob\"";
     vec![
-        hostile(triangles, mesh("terrain", &format!("triangles = {huge}"))),
-        hostile(triangles, mesh("sphere", "triangles = 4294967295")),
-        hostile(triangles, mesh("liver", "triangles = 1000001")),
-        hostile(
-            "memory",
-            (0..10)
-                .map(|i| {
-                    mesh("cavity", &format!("triangles = 1000000\nseed = {i}")).replace("\"m\"", &format!("\"m{i}\""))
-                })
-                .collect(),
-        ),
-        hostile("4 to 100000", rigid("mesh")),
-        hostile("4 to 100000", rigid("hull")),
-        hostile("4 to 100000", object("c", &format!("model = \"rigid\"\nshape = \"compound\"\n{}", part.repeat(16)))),
-        hostile(
-            "memory",
-            object(
-                "m",
-                &format!(
-                    "model = \"rigid\"\nshape = \"mesh\"\nfixed = true\ngenerate = \"torus\"\ntriangles = 100000\n{many}"
-                ),
-            ),
-        ),
-        hostile("4 to 100000", liver(&format!("scale = 0.1\neps_m = 0.02\ntriangles = {huge}"))),
+        hostile(seen, mesh("m", "terrain", HUGE)),
+        hostile(seen, mesh("m", "sphere", "triangles = 4294967295")),
+        hostile(seen, mesh("m", "liver", "triangles = 1000001")),
+        hostile("memory", (0..10).map(cavity).collect()),
+        hostile("at most 10000", mesh("m", "strut", &format!("dome_m = 1\n{MANY}"))),
+        hostile(seen, format!("{}{group}\n{HUGE}\n", mesh("m", "sphere", ""))),
+        hostile(touched, rigid("mesh", &format!("generate = \"terrain\"\n{HUGE}"))),
+        hostile(touched, rigid("hull", &format!("generate = \"terrain\"\n{HUGE}"))),
+        hostile(touched, rigid("compound", &part.repeat(16))),
+        hostile("memory", rigid("mesh", &format!("fixed = true\ngenerate = \"torus\"\ntriangles = 100000\n{MANY}"))),
+        hostile(touched, liver(&format!("scale = 0.1\neps_m = 0.02\n{HUGE}"))),
         hostile("too fine", liver("eps_m = 1e-6\ntriangles = 100000")),
-        hostile("memory", liver(&format!("scale = 0.1\neps_m = 0.01\ntriangles = 100000\n{many}"))),
-        hostile(
-            triangles,
-            format!(
-                "{}[[group]]\nname = \"g\"\nmembers = [\"m\"]\nproxy = {{ generate = \"blob\", triangles = {huge} }}\n",
-                mesh("sphere", "")
-            ),
-        ),
+        hostile("memory", liver(&format!("scale = 0.1\neps_m = 0.01\ntriangles = 100000\n{MANY}"))),
+        hostile("1 to 100000", tree(1, 4_000_000_000)),
+        hostile("memory", (0..20).map(|seed| tree(seed, 100_000)).collect()),
+    ]
+}
+
+/// Scenes of too many bodies, and of bodies that are divided too finely.
+fn of_bodies() -> Vec<Hostile> {
+    let balls = |name: &str, grid: &str| {
+        let keys = "model = \"rigid\"\nshape = \"ball\"\nradius_m = 0.1\nspacing_m = [1, 1, 1]";
+        object(name, &format!("{keys}\ngrid = {grid}"))
+    };
+    let tube = |path: &str, keys: &str| {
+        let matter = "radius_m = 0.01\nyoung_pa = 1e6\ndensity_kg_m3 = 1e3";
+        object("t", &format!("model = \"tube\"\npath_m = [{path}]\n{matter}\n{keys}"))
+    };
+    let soft = |model: &str, keys: &str| object("s", &format!("model = \"{model}\"\nyoung_pa = 1e4\n{keys}"));
+    let line = "[0, 0, 0], [1, 0, 0]";
+    let long_path = (0..20_000).map(|i| format!("[{i}, 0, 0]")).collect::<Vec<_>>().join(",");
+    vec![
         hostile("at most 10000", balls("b", "[1000, 1000, 1000]")),
         hostile("at most 10000", balls("b", "[4294967295, 4294967295, 4294967295]")),
         hostile("at most 10000", (0..500).map(|i| balls(&format!("b{i}"), "[100, 100, 1]")).collect()),
-        hostile("at most 10000", mesh("strut", &format!("dome_m = 1\n{many}"))),
-        hostile("memory", tube("[0, 0, 0], [1, 0, 0]", &format!("segments = 4096\n{many}"))),
-        hostile("memory", tube(&long_path, &format!("segments = 10\n{many}"))),
-        hostile("2 to 4096", tube("[0, 0, 0], [1, 0, 0]", &format!("segments = {huge}"))),
-        hostile("1 to 100000", tree(1, huge)),
-        hostile("memory", (0..20).map(|seed| tree(seed, 100_000)).collect()),
-        hostile("memory", solid("shape = \"box\"\nsize_m = [1, 1, 1]\nsegments = [2047, 2047, 2047]")),
-        hostile("too fine", solid("shape = \"box\"\nsize_m = [1e4, 1e4, 1e4]\neps_m = 1e-6")),
-        hostile("too fine", solid("shape = \"ball\"\nradius_m = 1\neps_m = 1e-5")),
-        hostile("memory", sheet("size_m = [1, 1]\nsegments = [2047, 2047]")),
-        hostile("memory", sheet(&format!("size_m = [1, 1]\nsegments = [90, 90]\n{many}"))),
-        hostile(
-            "too fine",
-            object(
-                "r",
-                "model = \"rope\"\npath_m = [[0, 0, 0], [1, 0, 0]]\nradius_m = 0.01\nyoung_pa = 1e6\neps_m = 1e-6",
-            ),
-        ),
+        hostile("memory", tube(line, &format!("segments = 4096\n{MANY}"))),
+        hostile("memory", tube(&long_path, &format!("segments = 10\n{MANY}"))),
+        hostile("2 to 4096", tube(line, "segments = 4000000000")),
+        hostile("memory", soft("solid", "shape = \"box\"\nsize_m = [1, 1, 1]\nsegments = [2047, 2047, 2047]")),
+        hostile("too fine", soft("solid", "shape = \"box\"\nsize_m = [1e4, 1e4, 1e4]\neps_m = 1e-6")),
+        hostile("too fine", soft("solid", "shape = \"ball\"\nradius_m = 1\neps_m = 1e-5")),
+        hostile("memory", soft("sheet", "size_m = [1, 1]\nthickness_m = 1e-3\nsegments = [2047, 2047]")),
+        hostile("memory", soft("sheet", &format!("size_m = [1, 1]\nthickness_m = 1e-3\nsegments = [90, 90]\n{MANY}"))),
+        hostile("too fine", soft("rope", &format!("path_m = [{line}]\nradius_m = 0.01\neps_m = 1e-6"))),
+    ]
+}
+
+/// Scenes of long lists, long words and deep nesting.
+fn of_text() -> Vec<Hostile> {
+    vec![
         hostile("at most 100", "[[camera]]\neye_m = [1, 0, 0]\n".repeat(5000)),
         hostile("at most 1000", "[[probe]]\nobject = \"x\"\n".repeat(20_000)),
         hostile("recurs", format!("x = {}\n", "[".repeat(100_000))),
-        hostile(
-            "printable",
-            object(&"n".repeat(1_000_000), "model = \"mesh\"\ngenerate = \"sphere\"\ntriangles = 1000000"),
-        ),
+        hostile("printable", mesh(&"n".repeat(1_000_000), "sphere", "triangles = 1000000")),
         hostile("does not exist", (0..20_000).map(|i| object(&format!("o{i}"), "model = \"x\"")).collect()),
     ]
 }
@@ -175,10 +156,10 @@ fn refusal(source: Source) -> SceneError {
 #[test]
 fn hostile_scenes_are_refused_at_their_lines_before_anything_is_made() {
     let folder = tempfile::tempdir().unwrap();
-    let (numbers, files) = (of_numbers(), of_files(folder.path()));
-    assert!(numbers.len() + files.len() >= 40);
+    let all = [of_meshes(), of_bodies(), of_text(), of_files(folder.path())].concat();
+    assert!(all.len() >= 40);
     let path = folder.path().join("scene/s.toml");
-    for Hostile { text, says } in numbers.iter().chain(&files) {
+    for Hostile { text, says } in &all {
         write(&path, text).unwrap();
         write("/proc/self/clear_refs", "5").unwrap(); // the peak begins anew
         let (held_mib, begun) = (memory_mib("VmRSS"), Instant::now());
