@@ -3,11 +3,10 @@
 //! In: values and the dotted path of their key. Out: the value, or a valid one in its place together with a problem.
 //! Never here: the rule of each key.
 
-use super::demand::{Cost, Demands};
+use super::demand::{Cost, Demands, FileHead};
 use super::diagnostic::{Problem, did_you_mean};
 use super::document::Document;
 use super::format::{OneOrRange, Point};
-use super::source::FileHead;
 use glam::DVec3;
 use serde::de::DeserializeOwned;
 use std::fmt::Display;

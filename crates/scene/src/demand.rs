@@ -4,10 +4,15 @@
 //! Bytes a piece are measured on 64-bit Linux, of a scene whose world has started; `tests/memory.rs` holds them to a fifth.
 
 use super::diagnostic::Problem;
-use super::source::FileHead;
 use metachron_models::soft::{SoftShape, VERTICES_MAX};
 use metachron_world::Spec;
 use std::ops::Range;
+
+/// The beginning of a file, which says what is in it, and its whole length.
+pub(super) struct FileHead {
+    pub(super) start: Vec<u8>,
+    pub(super) bytes: u64,
+}
 
 /// Memory that one thing takes, bytes.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]

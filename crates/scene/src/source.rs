@@ -4,6 +4,7 @@
 
 use super::build::triangles;
 use super::builtin;
+use super::demand::FileHead;
 use super::diagnostic::{SceneError, did_you_mean};
 use metachron_geometry::Triangles;
 use std::collections::BTreeMap;
@@ -97,12 +98,6 @@ enum SiblingFiles {
 enum SiblingFile<'a> {
     InMemory(&'a [u8]),
     OnDisk(PathBuf),
-}
-
-/// The beginning of a file, which says what is in it, and its whole length.
-pub(super) struct FileHead {
-    pub(super) start: Vec<u8>,
-    pub(super) bytes: u64,
 }
 
 impl Source {

@@ -229,11 +229,12 @@ fn solid_shape(
     };
     let Some(range) = eps_m else { return Some(lattice) };
     // the cage of a box has the nodes of its lattice, that of a ball half of them
-    if lattice.vertices() > 2 * VERTICES_MAX {
+    let fits = lattice.vertices() <= 2 * VERTICES_MAX;
+    let embedded = fits.then(|| lattice.embedded(range)).flatten();
+    if embedded.is_none() {
         c.wrong(place, "eps_m", "is too fine for its size", TOO_FINE);
-        return None;
     }
-    lattice.embedded(range)
+    embedded
 }
 
 /// The closed surface of a file or a generator, metres; `None` where there is none, which is reported.
@@ -254,7 +255,7 @@ fn closed_surface(c: &mut Checker<'_, '_>, file: &SolidFile, context: &ModelCont
                 draft_cage(c, place, &coarse, &WantedCage { scale, triangles, eps_m: file.eps_m?.ends().0 });
                 return None;
             }
-            let made = generate_surface(generator(kind), u64::from(file.seed.unwrap_or(0)), triangles);
+            let made = generate_surface(generator(kind), seed, triangles);
             ("generate", Ok(Mesh { points: made.points, uvs: vec![], triangles: made.triangles }))
         }
     };

@@ -6,9 +6,9 @@ use super::glb;
 use super::object::Entry;
 use super::scenery::Parts;
 use crate::check::{Checker, allowed};
-use crate::demand::Cost;
+use crate::demand::{Cost, FileHead};
 use crate::format::MeshFile;
-use crate::source::{FileHead, Source};
+use crate::source::Source;
 use glam::Vec2;
 #[cfg(feature = "images")]
 use image::{ImageFormat, ImageReader, Limits};
