@@ -9,7 +9,7 @@ use metachron_core::{Anchor, Body};
 
 /// A number of a command or a state that is beyond its bound; the agent stays as it is.
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
-#[error("the {} is {value:e} {}; expected {:e} to {:e} {}", .bound.what, .bound.unit, .bound.least, .bound.most, .bound.unit)]
+#[error("the {} is {value:e} {}; expected a finite number from {:e} to {:e} {}", .bound.what, .bound.unit, .bound.least, .bound.most, .bound.unit)]
 pub struct OutOfBounds {
     /// The number.
     pub value: f64,
