@@ -4,7 +4,7 @@ use super::devices::DeviceWish;
 use super::exports::ExportPaths;
 use clap::builder::PossibleValuesParser;
 use clap::{Args, Parser, Subcommand, ValueHint};
-use metachron_console::values::{CommonArgs, assignment, seconds, size, target_fps};
+use metachron_console::values::{CommonArgs, LimitArgs, assignment, seconds, size, target_fps};
 #[cfg(feature = "lab")]
 use metachron_lab::args::{
     BENCH_EXAMPLES, BenchArgs, CHART_EXAMPLES, ChartArgs, FIT_EXAMPLES, FitArgs, TUNE_EXAMPLES, TuneArgs,
@@ -315,6 +315,9 @@ pub struct RunArgs {
     /// Write down what is done to the run, so that `metachron replay` repeats it to the bit
     #[arg(long, value_name = "FILE", value_hint = ValueHint::FilePath)]
     pub record: Option<PathBuf>,
+    /// How far the scene may go.
+    #[command(flatten)]
+    pub limits: LimitArgs,
     /// What is written and printed.
     #[command(flatten)]
     pub output: OutputArgs,
@@ -380,6 +383,9 @@ pub struct ReplayArgs {
     /// Size of the picture in pixels, each 1 to 8192; 1280x720 where no size is given
     #[arg(long, value_name = "WxH", value_parser = size)]
     pub size: Option<[u32; 2]>,
+    /// How far the scene may go.
+    #[command(flatten)]
+    pub limits: LimitArgs,
     /// What is written and printed.
     #[command(flatten)]
     pub output: OutputArgs,

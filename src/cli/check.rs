@@ -41,11 +41,8 @@ struct ProblemRow<'a> {
 
 /// Checks every scene; the command ends with code 2 if one of them is bad.
 pub(super) fn command(args: &CheckArgs) -> anyhow::Result<Exit> {
-    let results: Vec<(&str, Result<Scene, SceneError>)> = args
-        .scenes
-        .iter()
-        .map(|name| (name.as_str(), Source::open(name).and_then(|source| load(&source, &args.common.set))))
-        .collect();
+    let results: Vec<(&str, Result<Scene, SceneError>)> =
+        args.scenes.iter().map(|name| (name.as_str(), open(name, args))).collect();
     if args.common.json {
         let rows: Vec<_> = results.iter().map(|(name, result)| row(name, result)).collect();
         data(&format!("{}\n", serde_json::to_string_pretty(&rows)?))?;
@@ -55,6 +52,10 @@ pub(super) fn command(args: &CheckArgs) -> anyhow::Result<Exit> {
         }
     }
     Ok(if results.iter().all(|(_, result)| result.is_ok()) { Exit::Ok } else { Exit::BadInput })
+}
+
+fn open(name: &str, args: &CheckArgs) -> Result<Scene, SceneError> {
+    load(&Source::open(name)?.within(args.common.limits.limits()), &args.common.set)
 }
 
 fn print_result(name: &str, result: &Result<Scene, SceneError>, quiet: bool) -> anyhow::Result<()> {

@@ -8,7 +8,7 @@ use metachron_console::exit::Exit;
 use metachron_console::gains::check_output_path;
 use metachron_console::output::{BadInput, data, message, print_overlaps, rendered};
 use metachron_import::{Folders, Imported, LeftOut, MeshFile, Options, Overlap};
-use metachron_scene::{SCENE_BYTES_MAX, SceneError, Source, load, read_surface};
+use metachron_scene::{Limits, SCENE_BYTES_MAX, SceneError, Source, load, read_surface};
 use metachron_world::Scene;
 use serde_json::json;
 use std::cell::RefCell;
@@ -37,7 +37,7 @@ pub(super) fn command(args: &ImportArgs) -> anyhow::Result<Exit> {
     let text = read(&args.model).map_err(|why| BadInput(format!("{model} cannot be read: {why}")))?;
     let name = args.out.as_ref().map_or_else(|| format!("of {model}"), |path| path.display().to_string());
     let scene = |imported: &Imported| scene_of(imported, &name, &scene_folder);
-    let overlaps = |draft: &Imported| scene(draft).map_or_else(|_| Vec::new(), |scene| overlaps(&scene));
+    let overlaps = |draft: &Imported| scene(draft).map_or_else(|_| Vec::new(), |checked| overlaps(&checked.scene));
     let srdf = srdf(args)?;
     let stem = out.file_stem().map_or("scene".into(), |stem| stem.to_string_lossy());
     let meshes = format!("{stem}-meshes");
@@ -55,7 +55,13 @@ pub(super) fn command(args: &ImportArgs) -> anyhow::Result<Exit> {
     let checked = scene(&imported);
     print_list(args, &imported)?;
     match checked {
-        Ok(scene) => print_overlaps(&scene),
+        Ok(Checked { scene, files_outside }) => {
+            print_overlaps(&scene);
+            if files_outside > 0 {
+                let hint = "run the scene with --allow-outside, or import it with --copy-meshes";
+                message(&format!("note: {model}: meshes outside of the scene's folder: {files_outside}; {hint}"));
+            }
+        }
         Err(error) => {
             message(&rendered(&error));
             return Ok(Exit::BadInput);
@@ -86,10 +92,19 @@ fn write_meshes(files: &[MeshFile], folder: &Path, check: impl Fn(&Path) -> anyh
     files.iter().try_for_each(|file| write(&folder.join(&file.path), &file.bytes))
 }
 
+/// A scene that was imported, and how many of its meshes are outside of its folder.
+struct Checked {
+    scene: Scene,
+    files_outside: usize,
+}
+
 /// The scene of an imported text and its meshes.
-fn scene_of(imported: &Imported, name: &str, folder: &Path) -> Result<Scene, SceneError> {
+fn scene_of(imported: &Imported, name: &str, folder: &Path) -> Result<Checked, SceneError> {
     let files = imported.files.iter().map(|file| (file.path.clone(), file.bytes.clone()));
-    load(&Source::recorded(name, &imported.toml, Some(folder))?.with_files(files.collect()), &[])
+    let source = Source::recorded(name, &imported.toml, Some(folder))?.with_files(files.collect());
+    // the model's meshes are where its author has put them
+    let source = source.within(Limits { allow_outside: true, ..Limits::default() });
+    Ok(Checked { scene: load(&source, &[])?, files_outside: source.files_outside().len() })
 }
 
 /// Refuses to write over a file that the model was read from.

@@ -24,6 +24,7 @@ pub(super) fn command(args: &ReplayArgs) -> anyhow::Result<Exit> {
         BadInput(format!("{path}: {why} (World::replay)"))
     })?;
     let source = Source::recorded(&scene.name, &scene.text, scene.folder.as_deref().map(Path::new))?;
+    let source = source.within(args.limits.limits());
     let overrides = scene.overrides.clone();
     if !recording.is_complete() {
         let what = if recording.is_damaged() { "is damaged" } else { "was cut short" };

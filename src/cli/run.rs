@@ -181,7 +181,7 @@ fn request(args: &RunArgs, matches: Option<&ArgMatches>) -> anyhow::Result<Reque
     };
     let gains = args.gains.as_deref().map(metachron_console::gains::overrides).transpose()?.unwrap_or_default();
     let overrides: Vec<_> = given(true).chain(gains).chain(args.set.iter().cloned()).chain(given(false)).collect();
-    let source = Source::open(&args.scene)?;
+    let source = Source::open(&args.scene)?.within(args.limits.limits());
     let scene = load(&source, &overrides)?;
     let end = args.frames.map(RunLength::Frames).or(args.seconds.map(RunLength::Seconds));
     let png_without_window = format!("metachron-{}.png", stem(&scene.name)).into();

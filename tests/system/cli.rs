@@ -30,7 +30,7 @@ fn help_teaches_by_examples_and_exit_codes() {
     }
     let help = out(&metachron(&["run", "--help"]));
     let flags = "--headless --frames --seconds --target-fps --policy --law --executor --pace --size --png --report --frames-csv --seed --oracle \
-                 --fail-on --set --json --quiet METACHRON_TARGET_FPS";
+                 --fail-on --set --json --quiet --memory-limit --allow-outside METACHRON_TARGET_FPS";
     for flag in flags.split_whitespace() {
         assert!(help.contains(flag), "{flag}");
     }
@@ -141,6 +141,46 @@ fn import_writes_the_meshes_that_scenes_do_not_read_and_its_list_as_json() {
         refused("other.toml", &["--force"], "other-meshes is a link");
     }
     assert!(!std::path::Path::new(&path("scene.toml")).exists());
+}
+
+#[test]
+fn a_scene_that_takes_more_memory_than_it_may_is_refused_at_its_line() {
+    let folder = tempfile::tempdir().unwrap();
+    let scene = folder.path().join("hill.toml");
+    let hill = "[[object]]\nname = \"hill\"\nmodel = \"mesh\"\ngenerate = \"terrain\"\ntriangles = 40000\n";
+    std::fs::write(&scene, format!("format = 1\n{hill}")).unwrap();
+    let scene = scene.to_str().unwrap();
+    assert_eq!(code(&metachron(&["check", scene])), 0);
+    for command in [&["check"][..], &["run", "--headless", "--frames", "1"], &["tune"], &["fit", "--tolerance", "1"]] {
+        let refused = metachron(&[command, &[scene, "--memory-limit", "20MiB"]].concat());
+        let said = err(&refused);
+        assert_eq!(code(&refused), 2, "{command:?}: {said}");
+        assert!(said.contains("hill.toml:6") && said.contains("20.0 MiB in all"), "{command:?}: {said}");
+    }
+    let unit = metachron(&["check", scene, "--memory-limit", "20"]);
+    assert!(code(&unit) == 2 && err(&unit).contains("such as 512MiB"), "{}", err(&unit));
+}
+
+#[test]
+fn meshes_outside_of_a_scenes_folder_need_a_flag_and_the_import_says_so() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = |name: &str| folder.path().join(name).to_str().unwrap().to_owned();
+    std::fs::create_dir(path("scenes")).unwrap();
+    std::fs::write(path("t.obj"), "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 2 3 4\nf 3 1 4\n").unwrap();
+    let link = "<link name=\"a\"><inertial><mass value=\"1\"/><inertia ixx=\"1\" iyy=\"1\" izz=\"1\"/></inertial>\
+                <collision><geometry><mesh filename=\"t.obj\"/></geometry></collision></link>";
+    std::fs::write(path("r.urdf"), format!("<robot name=\"r\">{link}</robot>")).unwrap();
+    let (robot, scene) = (path("r.urdf"), path("scenes/r.toml"));
+    let import = |more: &[&str]| metachron(&[&["import", &robot, "--out", &scene], more].concat());
+    let outside = import(&[]);
+    assert_eq!(code(&outside), 0, "{}", err(&outside));
+    assert!(err(&outside).contains("meshes outside of the scene's folder: 1; run the scene with --allow-outside"));
+    let refused = metachron(&["check", &scene]);
+    assert!(code(&refused) == 2 && err(&refused).contains("../t.obj: it is outside"), "{}", err(&refused));
+    assert_eq!(code(&metachron(&["check", &scene, "--allow-outside"])), 0);
+    let copied = import(&["--copy-meshes", "--force"]);
+    assert!(code(&copied) == 0 && !err(&copied).contains("outside"), "{}", err(&copied));
+    assert_eq!(code(&metachron(&["check", &scene])), 0);
 }
 
 #[test]

@@ -262,7 +262,7 @@ impl SetMotion {
 }
 
 /// The largest coordinate of a place that a body is moved or led to, metres, and of its velocity and spin, m/s and rad/s.
-const MOTION_MAX: f64 = 1e6;
+pub const MOTION_MAX: f64 = 1e6;
 
 /// Whether these are a place, a velocity and a spin within their range, and a rotation.
 fn check_motion(vectors: [Option<DVec3>; 3], rotation: Option<DQuat>) -> Result<(), &'static str> {

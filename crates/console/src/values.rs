@@ -3,6 +3,27 @@
 //! In: text. Out: numbers, sizes, keys and values. Never here: whether a scene has such a key.
 
 use clap::Args;
+use metachron_scene::Limits;
+
+/// How far a scene may go, as arguments of every command that reads one.
+#[derive(Debug, Clone, Copy, Args)]
+pub struct LimitArgs {
+    /// Refuse a scene that is estimated to take more memory, such as 512MiB or 2GiB; half of the machine's where not given
+    #[arg(long, value_name = "SIZE", value_parser = memory)]
+    pub memory_limit: Option<u64>,
+    /// Read files that the scene names outside of its folder, by `..` or behind links
+    #[arg(long)]
+    pub allow_outside: bool,
+}
+
+impl LimitArgs {
+    /// The limits that they ask for.
+    #[must_use]
+    pub fn limits(&self) -> Limits {
+        let default = Limits::default();
+        Limits { memory_bytes: self.memory_limit.unwrap_or(default.memory_bytes), allow_outside: self.allow_outside }
+    }
+}
 
 /// The arguments common to the commands that judge scenes: `check`, `tune`, `fit`.
 #[derive(Debug, Args)]
@@ -16,6 +37,9 @@ pub struct CommonArgs {
     /// No progress
     #[arg(short, long)]
     pub quiet: bool,
+    /// How far the scene may go.
+    #[command(flatten)]
+    pub limits: LimitArgs,
 }
 
 /// Splits KEY=VALUE; white space around key and value is dropped.
@@ -58,6 +82,19 @@ pub fn seconds(text: &str) -> Result<f64, String> {
 /// A sentence that says what was expected.
 pub fn target_fps(text: &str) -> Result<f64, String> {
     bounded(text, 1.0, 1000.0, "frames a second")
+}
+
+/// Parses an amount of memory in MiB or GiB; its value is in bytes.
+///
+/// # Errors
+/// A sentence that says what was expected.
+pub fn memory(text: &str) -> Result<u64, String> {
+    let expected = || "expected 1MiB to 1048576GiB, such as 512MiB or 1.5GiB".to_owned();
+    let units = [("MiB", 20_u32), ("GiB", 30)];
+    let split = |(unit, shift)| Some((text.strip_suffix(unit)?.trim().parse::<f64>().ok()?, shift));
+    let (amount, shift) = units.into_iter().find_map(split).ok_or_else(expected)?;
+    let bytes = amount * f64::from(1_u32 << shift);
+    (1_048_576.0..=1.125_899_906_842_624e15).contains(&bytes).then_some(bytes as u64).ok_or_else(expected)
 }
 
 /// Parses a number from `least` to `greatest`.
@@ -105,6 +142,15 @@ mod tests {
         assert_eq!(size("640x360"), Ok([640, 360]));
         for bad in ["640", "0x360", "640x", "640x9000", "-1x2", "axb", "1x2x3"] {
             assert!(size(bad).is_err(), "{bad}");
+        }
+    }
+
+    #[test]
+    fn amounts_of_memory_have_a_unit() {
+        assert_eq!(memory("512MiB"), Ok(512 << 20));
+        assert_eq!(memory("1.5 GiB"), Ok(3 << 29));
+        for bad in ["512", "0MiB", "-1GiB", "nanGiB", "2GB", "1e9GiB", "MiB"] {
+            assert!(memory(bad).is_err(), "{bad}");
         }
     }
 

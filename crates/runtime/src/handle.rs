@@ -358,7 +358,7 @@ impl AgentHandle {
     pub fn set_state(&self, state: Body) -> Result<(), SendError> {
         let shared = self.present()?;
         shared.check_takes(Inputs::of(&[Input::State]))?;
-        shared.mail.set_state(state);
+        shared.mail.set_state(state)?;
         shared.sleep.wake(self.id());
         Ok(())
     }

@@ -3,9 +3,10 @@
 //! In: [`Command`]s from any thread. Out: the newest of each kind, once. Storage is bounded: one place per kind, which a newer command
 //! overwrites. Never here: the execution of commands ([`crate::agent_runner`] does).
 
+use super::bounds::{self, OutOfBounds};
 use glam::DVec3;
 use metachron_contact::{AnchorForce, AnchorSpring, Carving, Input, Inputs, PoseGoal, SetMotion, SetMotor};
-use metachron_core::{AgentId, Anchor, Body, Resolution, SimSpan};
+use metachron_core::{AgentId, Body, Resolution, SimSpan};
 use std::sync::atomic::{
     AtomicBool,
     Ordering::{Acquire, Release},
@@ -93,6 +94,9 @@ pub enum SendError {
     /// The command holds a number that is not finite or outside its range: what it must be.
     #[error("{0}")]
     BadNumber(&'static str),
+    /// The command, or the state, holds a number that is beyond the bound of its kind.
+    #[error(transparent)]
+    OutOfBounds(#[from] OutOfBounds),
     /// A key that is too large, or impulses at too many points or too many regions before the agent has taken a step.
     #[error(
         "an agent takes {KEYS} springs, {KEYS} forces, and impulses at {KEYS} points and {KEYS} carved regions a step; keys are 0 to 7"
@@ -175,9 +179,9 @@ impl Mailbox {
     /// Stores `command` in the place of its kind.
     ///
     /// # Errors
-    /// [`SendError::BadNumber`] and [`SendError::TooMany`]; nothing is delivered then.
+    /// [`SendError::BadNumber`], [`SendError::OutOfBounds`] and [`SendError::TooMany`]; nothing is delivered then.
     pub fn send(&self, command: Command) -> Result<(), SendError> {
-        check(&command).map_err(SendError::BadNumber)?;
+        check(&command)?;
         if key(&command).is_some_and(|key| key >= KEYS) {
             return Err(SendError::TooMany);
         }
@@ -188,11 +192,15 @@ impl Mailbox {
     }
 
     /// The agent is to take this state before its next step.
-    pub fn set_state(&self, state: Body) {
-        let _ = self.put(|pending| {
+    ///
+    /// # Errors
+    /// [`SendError::OutOfBounds`]; nothing is delivered then.
+    pub fn set_state(&self, state: Body) -> Result<(), SendError> {
+        bounds::check_state(&state)?;
+        self.put(|pending| {
             pending.state = Some(Box::new(state));
             Ok(())
-        });
+        })
     }
 
     /// The agent is to leave the run for good: nothing of it is left but its number.
@@ -335,52 +343,36 @@ fn key(command: &Command) -> Option<u32> {
 ///
 /// # Errors
 /// What they must be.
-fn check(command: &Command) -> Result<(), &'static str> {
-    let force =
-        |force: &AnchorForce| is_finite(force.anchor) && force.force_n.is_finite() && force.torque_n_m.is_finite();
-    let spring = |pull: &AnchorSpring| {
-        let springs = [pull.stiffness_n_m, pull.damping_n_s_m];
-        let vectors = pull.target.is_finite() && pull.target_velocity.is_finite();
-        vectors && is_finite(pull.anchor) && springs.iter().all(|k| k.is_finite() && *k >= 0.0)
-    };
-    let forces = "a force, an impulse, a torque and their point must be finite";
-    let (is_good, wanted) = match command {
-        Command::Pose(Keyed { what, .. }) => return what.as_ref().map_or(Ok(()), PoseGoal::check),
-        Command::SetMotion(motion) => return motion.check(),
-        Command::SetDt(_) | Command::Wake => return Ok(()),
-        Command::Retune(wanted) => (wanted.eps_m.is_finite(), "a resolution must be finite"),
-        Command::SetPressure(pressure_pa) => (pressure_pa.is_finite(), "a pressure must be finite"),
-        Command::Spring(Keyed { what, .. }) => {
-            let wanted =
-                "a spring's point and target must be finite, its stiffness and damping finite and not negative";
-            (what.as_ref().is_none_or(spring), wanted)
+fn check(command: &Command) -> Result<(), SendError> {
+    let wanted = |is_good: bool, wanted| if is_good { Ok(()) } else { Err(SendError::BadNumber(wanted)) };
+    match command {
+        Command::Pose(Keyed { what, .. }) => {
+            what.as_ref().map_or(Ok(()), PoseGoal::check).map_err(SendError::BadNumber)
         }
-        Command::Force(Keyed { what, .. }) => (what.as_ref().is_none_or(force), forces),
-        Command::Impulse(impulse) => (force(impulse), forces),
+        Command::SetMotion(motion) => motion.check().map_err(SendError::BadNumber),
+        Command::SetDt(_) | Command::Wake => Ok(()),
+        Command::Retune(resolution) => wanted(resolution.eps_m.is_finite(), "a resolution must be finite"),
+        Command::SetPressure(pressure_pa) => Ok(bounds::check_pressure(*pressure_pa)?),
+        Command::Spring(Keyed { what, .. }) => Ok(what.as_ref().map_or(Ok(()), bounds::check_spring)?),
+        Command::Force(Keyed { what, .. }) => Ok(what.as_ref().map_or(Ok(()), bounds::check_force)?),
+        Command::Impulse(impulse) => Ok(bounds::check_impulse(impulse)?),
         Command::Motor(Keyed { what, .. }) => {
             let motor = what.as_ref().and_then(|set| set.motor);
-            let wanted = "a motor's goal must be at most 1e9 in magnitude, its stiffness and damping not negative, its effort above zero";
-            (motor.is_none_or(|motor| motor.check().is_ok()), wanted)
+            let sound = "a motor's goal must be at most 1e9 in magnitude, its stiffness and damping not negative, its effort above zero";
+            wanted(motor.is_none_or(|motor| motor.check().is_ok()), sound)
         }
         Command::Carve(carving) => {
-            (carving.is_sound(), "the ends of a carved region must be finite, its radius finite and above zero")
+            wanted(carving.radius_m > 0.0, "the radius of a carved region must be above zero")?;
+            Ok(bounds::check_carving(carving)?)
         }
-    };
-    if is_good { Ok(()) } else { Err(wanted) }
-}
-
-fn is_finite(anchor: Anchor) -> bool {
-    match anchor {
-        Anchor::Arc(arc_m) => arc_m.is_finite(),
-        Anchor::Local(point) => point.is_finite(),
-        Anchor::Vertex(_) => true,
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use glam::DVec3;
+    use glam::DQuat;
+    use metachron_core::{Anchor, RigidState};
 
     fn pull(target: DVec3) -> AnchorSpring {
         let anchor = Anchor::Local(DVec3::ZERO);
@@ -426,11 +418,46 @@ mod tests {
     fn a_spring_that_is_not_finite_is_refused_when_sent() {
         let mail = Mailbox::default();
         let bad = Command::Spring(Keyed::first(Some(pull(DVec3::NAN))));
-        assert!(matches!(mail.send(bad), Err(SendError::BadNumber(_))));
+        assert!(matches!(mail.send(bad), Err(SendError::OutOfBounds(_))));
         let negative = AnchorSpring { stiffness_n_m: -1.0, ..pull(DVec3::X) };
         assert!(mail.send(Command::Spring(Keyed::first(Some(negative)))).is_err());
         assert!(mail.send(Command::Retune(Resolution { eps_m: f64::NAN, n: 0 })).is_err());
         assert!(mail.take().springs.is_empty());
+    }
+
+    #[test]
+    fn a_number_beyond_its_bound_is_refused_with_the_bound() {
+        let (mail, point, far) = (Mailbox::default(), Anchor::Local(DVec3::ZERO), DVec3::X * 1e154);
+        let body = RigidState { position: far, rotation: DQuat::IDENTITY, velocity: DVec3::ZERO, spin: DVec3::ZERO };
+        for (refused, said) in [
+            (
+                mail.send(Command::force(point, far)),
+                "the force is 1e154 N; expected a finite number from -1e10 to 1e10 N",
+            ),
+            (mail.send(Command::torque(point, far)), "the torque is 1e154 N·m"),
+            (
+                mail.send(Command::impulse(point, far)),
+                "the impulse is 1e154 N·s; expected a finite number from -1e10 to 1e10 N·s",
+            ),
+            (
+                mail.send(Command::force(Anchor::Arc(1e7), DVec3::X)),
+                "the position is 1e7 m; expected a finite number from -1e6 to 1e6 m",
+            ),
+            (mail.send(Command::spring(point, far, 1.0, 0.0)), "the position is 1e154 m"),
+            (
+                mail.send(Command::spring(point, DVec3::X, 2e12, 0.0)),
+                "the stiffness is 2e12 N/m; expected a finite number from 0e0 to 1e12",
+            ),
+            (mail.send(Command::spring(point, DVec3::X, 1.0, 1e13)), "the damping is 1e13 N·s/m"),
+            (mail.send(Command::carve(far, DVec3::X, 1.0)), "the position is 1e154 m"),
+            (mail.send(Command::SetPressure(1e9)), "the pressure is 1e9 Pa"),
+            (mail.set_state(Body::Rigid(body)), "the position is 1e154 m"),
+        ] {
+            let error = refused.unwrap_err().to_string();
+            assert!(error.contains(said), "{error}");
+        }
+        assert!(!mail.has_pending());
+        mail.send(Command::impulse(point, DVec3::X * 1e10)).unwrap();
     }
 
     #[test]

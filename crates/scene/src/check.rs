@@ -3,6 +3,7 @@
 //! In: values and the dotted path of their key. Out: the value, or a valid one in its place together with a problem.
 //! Never here: the rule of each key.
 
+use super::demand::{Cost, Demands, FileHead};
 use super::diagnostic::{Problem, did_you_mean};
 use super::document::Document;
 use super::format::{OneOrRange, Point};
@@ -47,6 +48,8 @@ pub(super) struct Checker<'d, 't> {
     problems: Vec<Problem>,
     /// Names of objects that could not be read.
     unread: Vec<String>,
+    /// In a draft, which makes nothing that takes memory or time: the memory that a scene would take.
+    draft: Option<Demands>,
 }
 
 /// The dotted path of a table, and its name for messages.
@@ -110,7 +113,45 @@ impl Display for Allowed {
 
 impl<'d, 't> Checker<'d, 't> {
     pub(super) fn new(document: &'d Document<'t>) -> Self {
-        Self { document, problems: Vec::new(), unread: Vec::new() }
+        Self { document, problems: Vec::new(), unread: Vec::new(), draft: None }
+    }
+
+    /// A checker of a scene of which nothing is made.
+    pub(super) fn draft(document: &'d Document<'t>) -> Self {
+        Self { draft: Some(Demands::default()), ..Self::new(document) }
+    }
+
+    /// Whether nothing of the scene is made.
+    pub(super) const fn is_draft(&self) -> bool {
+        self.draft.is_some()
+    }
+
+    /// Whether what takes this much, by the number under `key`, may be made now: not in a draft, which adds it up instead.
+    pub(super) fn may_make(&mut self, place: &Place, key: &str, cost: Cost) -> bool {
+        let Some(demands) = &mut self.draft else { return true };
+        demands.add(self.document.locate(&place.key(key)), place.named(key), cost);
+        false
+    }
+
+    /// The same of what is made from a file; the reader of one that cannot be read says why.
+    pub(super) fn may_read(
+        &mut self,
+        place: &Place,
+        key: &str,
+        head: Result<FileHead, String>,
+        cost: impl Fn(&FileHead) -> Cost,
+    ) -> bool {
+        head.map_or(true, |head| self.may_make(place, key, cost(&head)))
+    }
+
+    /// An object of so many copies is read, all of which take what it takes.
+    pub(super) fn begin_object(&mut self, copies: usize) {
+        self.draft.iter_mut().for_each(|demands| demands.begin(copies as u64));
+    }
+
+    /// Reports a scene that asks for more than `limit_bytes`.
+    pub(super) fn check_memory(&mut self, limit_bytes: u64) {
+        self.problems.extend(self.draft.as_ref().and_then(|demands| demands.beyond(limit_bytes)));
     }
 
     pub(super) fn document(&self) -> &'d Document<'t> {

@@ -22,6 +22,7 @@
 mod build;
 pub mod builtin;
 mod check;
+mod demand;
 mod diagnostic;
 mod document;
 pub mod format;
@@ -33,7 +34,7 @@ mod source;
 pub use build::surface as read_surface;
 pub use diagnostic::{SceneError, SceneProblem};
 pub use schema::json_schema;
-pub use source::{FileVersion, SCENE_BYTES_MAX, Source, SourceFile};
+pub use source::{FileVersion, Limits, SCENE_BYTES_MAX, Source, SourceFile};
 
 use build::{Objects, SceneContext};
 use check::{Checker, Place, allowed};
@@ -70,26 +71,38 @@ pub fn load(source: &Source, overrides: &[(String, String)]) -> Result<Scene, Sc
     read(source, &text).map_err(|problems| SceneError::new(source.name(), &text, problems))
 }
 
+/// Reads a scene twice: what is wrong with it, or takes too much memory, is found in a draft, before anything is made.
 fn read(source: &Source, text: &str) -> Result<Scene, Vec<Problem>> {
     let document = Document::parse(text).map_err(|problem| vec![problem])?;
-    let mut c = Checker::new(&document);
-    let file = read_stage(&mut c);
-    let world = file.as_ref().and_then(|f| f.world.as_ref());
-    let gravity = gravity(&mut c, world);
-    let faults = world.and_then(|w| w.faults.as_ref());
-    if let Some(faults) = faults {
-        build::world_faults(&mut c, faults);
+    let mut draft = Checker::draft(&document);
+    resolve(&mut draft, source);
+    draft.check_memory(source.limits().memory_bytes);
+    let problems = draft.finish();
+    if !problems.is_empty() {
+        return Err(problems);
     }
-    let context = SceneContext { source, gravity, faults };
-    let objects = build::read_objects(&mut c, document.root().get("object"), &context);
-    let scene = file.map(|file| assemble(&mut c, source, file, gravity, objects));
-    match (scene, c.finish()) {
+    let mut c = Checker::new(&document);
+    match (resolve(&mut c, source), c.finish()) {
         (Some(mut scene), problems) if problems.is_empty() => {
             scene.resolve_initial_overlaps();
             Ok(scene)
         }
         (_, problems) => Err(problems),
     }
+}
+
+fn resolve(c: &mut Checker<'_, '_>, source: &Source) -> Option<Scene> {
+    let file = read_stage(c);
+    let world = file.as_ref().and_then(|f| f.world.as_ref());
+    let gravity = gravity(c, world);
+    let faults = world.and_then(|w| w.faults.as_ref());
+    if let Some(faults) = faults {
+        build::world_faults(c, faults);
+    }
+    let context = SceneContext { source, gravity, faults };
+    let objects = c.document().root().get("object");
+    let objects = build::read_objects(c, objects, &context);
+    file.map(|file| assemble(c, source, file, gravity, objects))
 }
 
 /// Reads everything but the objects.
@@ -126,14 +139,15 @@ fn assemble(c: &mut Checker<'_, '_>, source: &Source, file: SceneFile, gravity: 
         let what = format!("is {}, which this version does not support", file.format);
         c.wrong(&Place::new("", ""), "format", what, format!("expected {FORMAT}"));
     }
-    check_executor(c, file.executor, objects.agents.len());
+    check_executor(c, file.executor, objects.names.agents().count());
     let probes = build::probes(c, &file.probe, &objects.names);
-    // ties between objects that are wrong themselves would give spurious problems
+    // ties between objects that are wrong themselves, or not made yet, would give spurious problems
     let sound = c.count() == 0;
-    let joints = if sound { build::joints(c, &file.joint, &objects) } else { Vec::new() };
+    let made = sound && !c.is_draft();
+    let joints = if made { build::joints(c, &file.joint, &objects) } else { Vec::new() };
     let joint_names = build::joint_names(c, &file.joint);
-    let sensors = if sound { build::sensors(c, &file.sensor, &objects, &joint_names) } else { Vec::new() };
-    let couplings = if sound { build::couplings(c, &file.coupling, &objects) } else { Vec::new() };
+    let sensors = if made { build::sensors(c, &file.sensor, &objects, &joint_names) } else { Vec::new() };
+    let couplings = if made { build::couplings(c, &file.coupling, &objects) } else { Vec::new() };
     let groups = if sound { build::groups(c, &file.group, &mut objects, source) } else { Vec::new() };
     let fixed = objects.obstacles.len();
     let cells = build::cells(c, &file.cell, &file.portal, &mut objects);

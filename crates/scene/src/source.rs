@@ -1,9 +1,10 @@
 //! Sources of scenes: built in, or a file; and the files next to it.
 //!
-//! In: a name or a path. Out: text and bytes. Never here: their meaning. No other module of this crate reads files.
+//! In: a name or a path, and limits. Out: text and bytes. Never here: their meaning. No other module of this crate reads files.
 
 use super::build::triangles;
 use super::builtin;
+use super::demand::FileHead;
 use super::diagnostic::{SceneError, did_you_mean};
 use metachron_geometry::Triangles;
 use std::collections::BTreeMap;
@@ -18,11 +19,39 @@ pub const SCENE_BYTES_MAX: u64 = 16 << 20;
 /// Longest file next to a scene, bytes.
 const SIBLING_BYTES_MAX: u64 = 64 << 20;
 
+/// How much of a file's beginning says what is in it, bytes.
+const HEAD_BYTES: u64 = 64 << 10;
+/// Most memory of a scene where the system does not say how much there is: half of 8 GiB.
+const MEMORY_DEFAULT_BYTES: u64 = 4 << 30;
+
+/// How far a scene may go on the machine that reads it.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Limits {
+    /// Most memory that the scene may ask for, bytes, by the estimate that is made before anything of it is. Default: half of the machine's.
+    pub memory_bytes: u64,
+    /// Whether files that the scene names may lie outside of its folder, by their path or behind links. Default: no.
+    pub allow_outside: bool,
+}
+
+impl Default for Limits {
+    fn default() -> Self {
+        Self { memory_bytes: machine_bytes().map_or(MEMORY_DEFAULT_BYTES, |all| all / 2), allow_outside: false }
+    }
+}
+
+/// The memory of this machine, bytes, where the system says it.
+fn machine_bytes() -> Option<u64> {
+    let text = std::fs::read_to_string("/proc/meminfo").ok()?;
+    let total = text.lines().find_map(|line| line.strip_prefix("MemTotal:"))?;
+    Some(total.trim().strip_suffix("kB")?.trim().parse::<u64>().ok()? << 10)
+}
+
 /// A scene's text and where it comes from.
 #[derive(Debug, Clone)]
 pub struct Source {
     name: String,
     text: String,
+    limits: Limits,
     siblings: SiblingFiles,
     /// Files beside it that are not on the disk, by their names.
     made: Arc<BTreeMap<String, Vec<u8>>>,
@@ -65,6 +94,12 @@ enum SiblingFiles {
     Unavailable,
 }
 
+/// One file next to a scene.
+enum SiblingFile<'a> {
+    InMemory(&'a [u8]),
+    OnDisk(PathBuf),
+}
+
 impl Source {
     /// The built-in scene called `name_or_path`, or else the file at this path.
     ///
@@ -73,8 +108,8 @@ impl Source {
     pub fn open(name_or_path: &str) -> Result<Self, SceneError> {
         if let Some(scene) = builtin::find(name_or_path) {
             let (name, text) = (scene.name.to_owned(), scene.text.to_owned());
-            let siblings = SiblingFiles::BuiltIn;
-            return Ok(Self { name, text, siblings, made: Arc::default(), files: Arc::default() });
+            let (siblings, limits) = (SiblingFiles::BuiltIn, Limits::default());
+            return Ok(Self { name, text, limits, siblings, made: Arc::default(), files: Arc::default() });
         }
         let path = Path::new(name_or_path);
         let version = FileVersion::of(path);
@@ -113,9 +148,24 @@ impl Source {
         Self { made: Arc::new(files), ..self }
     }
 
+    /// The same within other limits than the default ones.
+    #[must_use]
+    pub fn within(self, limits: Limits) -> Self {
+        Self { limits, ..self }
+    }
+
+    /// How far it may go.
+    #[must_use]
+    pub const fn limits(&self) -> Limits {
+        self.limits
+    }
+
     fn from_bytes(name: &str, bytes: Vec<u8>, siblings: SiblingFiles) -> Result<Self, SceneError> {
         match String::from_utf8(bytes) {
-            Ok(text) => Ok(Self { name: name.to_owned(), text, siblings, made: Arc::default(), files: Arc::default() }),
+            Ok(text) => {
+                let (name, limits) = (name.to_owned(), Limits::default());
+                Ok(Self { name, text, limits, siblings, made: Arc::default(), files: Arc::default() })
+            }
             Err(error) => {
                 let valid = error.utf8_error().valid_up_to();
                 let before = &error.as_bytes()[..valid];
@@ -148,6 +198,14 @@ impl Source {
         files.iter().map(|(path, version)| SourceFile { path: path.clone(), version: *version }).collect()
     }
 
+    /// Of those files the ones outside of its folder: only a source whose limits allow it is read from them.
+    #[must_use]
+    pub fn files_outside(&self) -> Vec<PathBuf> {
+        let SiblingFiles::Folder(folder) = &self.siblings else { return Vec::new() };
+        let is_outside = |path: &PathBuf| path.strip_prefix(folder).is_ok_and(|name| is_outside(folder, name));
+        self.files().into_iter().map(|file| file.path).filter(is_outside).collect()
+    }
+
     fn note_file(&self, path: &Path, version: Option<FileVersion>) {
         let mut files = self.files.lock().unwrap_or_else(PoisonError::into_inner);
         files.entry(path.to_path_buf()).or_insert(version);
@@ -173,35 +231,96 @@ impl Source {
 
     /// The bytes of a file next to the scene, or why there are none.
     pub(super) fn sibling(&self, name: &str) -> Result<Vec<u8>, String> {
+        match self.find(name)? {
+            SiblingFile::InMemory(bytes) => Ok(bytes.to_vec()),
+            SiblingFile::OnDisk(path) => read_plain(&path, SIBLING_BYTES_MAX),
+        }
+    }
+
+    /// How such a file begins, or why there is none.
+    pub(super) fn head(&self, name: &str) -> Result<FileHead, String> {
+        match self.find(name)? {
+            SiblingFile::InMemory(bytes) => {
+                let start = bytes[..bytes.len().min(HEAD_BYTES as usize)].to_vec();
+                Ok(FileHead { start, bytes: bytes.len() as u64 })
+            }
+            SiblingFile::OnDisk(path) => {
+                let PlainFile { file, bytes } = open_plain(&path, SIBLING_BYTES_MAX)?;
+                let mut start = Vec::new();
+                file.take(HEAD_BYTES).read_to_end(&mut start).map_err(|e| e.to_string())?;
+                Ok(FileHead { start, bytes })
+            }
+        }
+    }
+
+    fn find(&self, name: &str) -> Result<SiblingFile<'_>, String> {
         let path = Path::new(name);
         if name.is_empty() || path.components().any(|c| matches!(c, Component::Prefix(_) | Component::RootDir)) {
             return Err("expected a path relative to the scene".to_owned());
         }
         if let Some(bytes) = self.made.get(name) {
-            return Ok(bytes.clone());
+            return Ok(SiblingFile::InMemory(bytes));
         }
         match &self.siblings {
             SiblingFiles::BuiltIn => {
-                builtin::sibling(name).map(<[u8]>::to_vec).ok_or_else(|| "no such built-in file".to_owned())
+                builtin::sibling(name).map(SiblingFile::InMemory).ok_or_else(|| "no such built-in file".to_owned())
+            }
+            SiblingFiles::Folder(folder) if !self.limits.allow_outside && is_outside(folder, path) => {
+                Err("it is outside of the scene's folder; expected a file within, or --allow-outside".to_owned())
             }
             SiblingFiles::Folder(folder) => {
                 let path = folder.join(path);
                 self.note_file(&path, FileVersion::of(&path));
-                read_plain(&path, SIBLING_BYTES_MAX)
+                Ok(SiblingFile::OnDisk(path))
             }
             SiblingFiles::Unavailable => Err("a scene from memory has no files beside it".to_owned()),
         }
     }
 }
 
-/// Reads a file that a scene names, which must not be a stream: only the caller of the program may make it wait for one.
-fn read_plain(path: &Path, most: u64) -> Result<Vec<u8>, String> {
+/// Whether the file called `name` in a folder lies outside of it: by its path, so that nobody learns what is there, or behind links.
+fn is_outside(folder: &Path, name: &Path) -> bool {
+    let mut depth = 0;
+    for part in name.components() {
+        match part {
+            Component::ParentDir if depth == 0 => return true,
+            Component::ParentDir => depth -= 1,
+            Component::Normal(_) => depth += 1,
+            _ => {}
+        }
+    }
+    let folder = if folder.as_os_str().is_empty() { Path::new(".") } else { folder };
+    match (folder.canonicalize(), folder.join(name).canonicalize()) {
+        (Ok(folder), Ok(file)) => !file.starts_with(folder),
+        // nothing is read where there is no such file
+        _ => false,
+    }
+}
+
+/// An open file and its length.
+struct PlainFile {
+    file: File,
+    bytes: u64,
+}
+
+/// Opens a file of at most `most` bytes that a scene names, which must not be a stream: only the caller of the program may make it wait for one.
+fn open_plain(path: &Path, most: u64) -> Result<PlainFile, String> {
     // checked before opening: opening a pipe waits for a writer
-    let kind = std::fs::metadata(path).map_err(|e| e.to_string())?;
-    if !(kind.is_file() || kind.is_dir()) {
+    let about = std::fs::metadata(path).map_err(|e| e.to_string())?;
+    if about.is_dir() {
+        return Err("it is a folder".to_owned());
+    }
+    if !about.is_file() {
         return Err("it is a pipe, a device or a socket; expected a plain file".to_owned());
     }
-    read_bounded(path, most)
+    if about.len() > most {
+        return Err(format!("it has more than {most} bytes"));
+    }
+    Ok(PlainFile { file: File::open(path).map_err(|e| e.to_string())?, bytes: about.len() })
+}
+
+fn read_plain(path: &Path, most: u64) -> Result<Vec<u8>, String> {
+    read_opened(open_plain(path, most)?.file, most)
 }
 
 fn read_bounded(path: &Path, most: u64) -> Result<Vec<u8>, String> {
@@ -209,6 +328,10 @@ fn read_bounded(path: &Path, most: u64) -> Result<Vec<u8>, String> {
         return Err("it is a folder".to_owned());
     }
     let file = File::open(path).map_err(|e| e.to_string())?;
+    read_opened(file, most)
+}
+
+fn read_opened(file: File, most: u64) -> Result<Vec<u8>, String> {
     let mut bytes = Vec::new();
     file.take(most + 1).read_to_end(&mut bytes).map_err(|e| e.to_string())?;
     if bytes.len() as u64 > most {

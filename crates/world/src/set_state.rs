@@ -31,7 +31,7 @@ impl World {
     ///
     /// # Errors
     /// [`WorldError::NotTaken`] for an object that takes no state; [`WorldError::Refused`] for a state of another kind or length, with what was
-    /// expected, and for numbers that are not finite; [`WorldError::Foreign`], [`WorldError::Gone`] and [`WorldError::Stopped`]. The object stays
+    /// expected, and for numbers that are not finite or beyond their bounds ([`metachron_runtime::OutOfBounds`]); [`WorldError::Foreign`], [`WorldError::Gone`] and [`WorldError::Stopped`]. The object stays
     /// as it is then, and where it has divided itself otherwise before it takes the state up.
     pub fn set_state(&self, object: Object, state: &Body) -> Result<(), WorldError> {
         let agent = self.agent(object)?;

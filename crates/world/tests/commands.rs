@@ -355,7 +355,8 @@ fn commands_that_cannot_be_say_why_and_do_nothing() {
     assert!(message(body, Command::force(CENTRE, DVec3::NAN)).contains("finite"));
     assert!(message(body, push.key(8)).contains("keys are 0 to 7"));
     assert!(message(body, Command::force(Anchor::Arc(0.1), DVec3::X)).contains("Local"));
-    assert!(message(body, Command::spring(CENTRE, DVec3::ZERO, -1.0, 0.0)).contains("negative"));
+    assert!(message(body, Command::spring(CENTRE, DVec3::ZERO, -1.0, 0.0)).contains("from 0e0 to 1e12 N/m"));
+    assert!(message(body, Command::impulse(CENTRE, DVec3::X * 1e154)).contains("the impulse is 1e154 N·s"));
     assert!(message(body, Command::teleport(DVec3::INFINITY, DQuat::IDENTITY)).contains("finite"));
     world.advance(SimSpan::from_millis(100));
     assert_eq!(state(&world, body).velocity, DVec3::ZERO);

@@ -58,7 +58,7 @@ pub fn command(args: &FitArgs) -> anyhow::Result<Exit> {
     if args.write {
         refuse_built_in(&args.scene)?;
     }
-    let source = Source::open(&args.scene)?;
+    let source = Source::open(&args.scene)?.within(args.common.limits.limits());
     let scene = load(&source, &args.common.set)?;
     let objects = objects::of(&scene, source.text());
     let stopped = Arc::new(AtomicBool::new(false));
@@ -79,7 +79,8 @@ pub fn command(args: &FitArgs) -> anyhow::Result<Exit> {
             return Ok(Exit::Interrupted);
         }
     };
-    let written = if args.write { Some(write_back::write(Path::new(&args.scene), &task, &fitted)?) } else { None };
+    let write = || write_back::write(Path::new(&args.scene), &task, &fitted, source.limits());
+    let written = args.write.then(write).transpose()?;
     data(&if args.common.json {
         report::json(args, &task, &fitted, written.is_some())?
     } else {

@@ -8,19 +8,20 @@ use super::{Fitted, to_rope};
 use anyhow::Context;
 use metachron_console::output::BadInput;
 use metachron_models::rod::Integrator;
-use metachron_scene::{Source, load};
+use metachron_scene::{Limits, Source, load};
 use metachron_session::fit::Setting;
 use metachron_world::{Member, Spec};
 use std::path::Path;
 use toml_edit::{Array, DocumentMut, Item, Table, Value};
 
 /// Writes the needed settings into the file; returns the number of changed keys.
-pub(super) fn write(path: &Path, task: &Task<'_>, fitted: &Fitted) -> anyhow::Result<usize> {
+pub(super) fn write(path: &Path, task: &Task<'_>, fitted: &Fitted, limits: Limits) -> anyhow::Result<usize> {
     let shown = path.display();
     let before = std::fs::read_to_string(path).with_context(|| format!("{shown} cannot be read"))?;
     let (text, changes) = changed(&before, task, fitted).map_err(|what| BadInput(format!("{shown}: {what}")))?;
     std::fs::write(path, &text).with_context(|| format!("{shown} cannot be written"))?;
-    let again = Source::open(&path.to_string_lossy()).and_then(|source| load(&source, &[]));
+    let source = Source::open(&path.to_string_lossy());
+    let again = source.and_then(|source| load(&source.within(limits), &[]));
     if let Err(error) = again {
         std::fs::write(path, &before).with_context(|| format!("{shown} cannot be written"))?;
         return Err(anyhow::Error::from(error).context(format!("{shown} is unchanged")));

@@ -100,7 +100,7 @@ fn scene(args: &TuneArgs) -> anyhow::Result<Scene> {
     ];
     let flags = flags.into_iter().filter_map(|(key, value)| Some((key.to_owned(), value?)));
     let overrides: Vec<_> = args.common.set.iter().cloned().chain(flags).collect();
-    Ok(load(&Source::open(&args.scene)?, &overrides)?)
+    Ok(load(&Source::open(&args.scene)?.within(args.common.limits.limits()), &overrides)?)
 }
 
 fn live(size: Size) -> anyhow::Result<Drawing> {

@@ -228,7 +228,8 @@ fn build_walls(c: &mut Checker<'_, '_>, files: &[CellFile], cells: &Cells, objec
         }
     }
     if obstacles.len() > OBSTACLES_MAX {
-        too_many(c, "fixed objects, walls of cells among them", obstacles.len(), OBSTACLES_MAX);
+        let found = format!("{} fixed objects, walls of cells among them", obstacles.len());
+        too_many(c, "cell", &found, OBSTACLES_MAX);
     }
     objects.obstacles = obstacles.into();
 }

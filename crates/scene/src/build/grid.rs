@@ -135,7 +135,7 @@ pub(super) fn copies(
         );
         return Copies::single();
     }
-    let count = grid.iter().map(|n| u64::from(*n)).product::<u64>();
+    let count = grid.iter().fold(1_u64, |count, n| count.saturating_mul(u64::from(*n)));
     if grid.iter().any(|n| !(1..=SIDE_MAX).contains(n)) || count > most as u64 {
         let expected = format!("expected at most {most} in all, 1 … {SIDE_MAX} along each axis");
         c.wrong(place, "grid", format_args!("makes {count} objects"), expected);

@@ -6,6 +6,7 @@
 
 use super::impostors::{GroupMembers, impostors};
 use super::object::{NamedObject, Objects};
+use super::scenery::mesh_model;
 use crate::check::{Checker, Place};
 use crate::format::GroupFile;
 use crate::source::Source;
@@ -25,6 +26,13 @@ pub(crate) fn groups(
     if files.len() > GROUPS_MAX {
         let expected = format!("expected at most {GROUPS_MAX}");
         c.wrong(&Place::new("", ""), "group", format_args!("has {} entries", files.len()), expected);
+        return Vec::new();
+    }
+    if c.is_draft() {
+        let proxies = files.iter().enumerate().filter_map(|(number, file)| Some((number, file, file.proxy.as_ref()?)));
+        proxies.for_each(|(number, file, proxy)| {
+            mesh_model(c, &group_place(number, file).table("proxy"), proxy, source);
+        });
         return Vec::new();
     }
     let mut owners = Owners {

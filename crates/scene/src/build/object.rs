@@ -6,6 +6,7 @@ use super::grid::{Copies, Repeats, copies};
 use super::joint::WORLD;
 use super::{rigid, scenery, soft, synthetic, tool, tube};
 use crate::check::{Checker, Place};
+use crate::demand::Cost;
 use crate::diagnostic::{Problem, did_you_mean};
 use crate::format::{
     COMMON_KEYS, CommonFile, FaultsFile, MODELS, MeshFile, RigidFile, RopeFile, SheetFile, SolidFile, SyntheticFile,
@@ -14,7 +15,7 @@ use crate::format::{
 use crate::source::Source;
 use glam::DVec3;
 use metachron_core::{AgentId, Resolution, ResolutionRange};
-use metachron_geometry::{ContactTraits, Obstacle};
+use metachron_geometry::{ContactTraits, Obstacle, geodesic_edges};
 use metachron_models::rigid::{KinematicBody, RigidBody};
 use metachron_models::rod::Tube;
 use metachron_models::rod::TubeError;
@@ -160,6 +161,15 @@ impl ModelFile {
         matches!(self, Self::Mesh(_) | Self::Tree(_))
     }
 
+    /// How many objects of the picture one of it is.
+    fn parts(&self) -> usize {
+        match self {
+            Self::Mesh(MeshFile { dome_m: Some(_), .. }) => geodesic_edges().len(),
+            Self::Tree(_) => 2,
+            _ => 1,
+        }
+    }
+
     /// What a grid can do with it.
     const fn repeats(&self) -> Repeats {
         match self {
@@ -199,13 +209,26 @@ pub(crate) fn read_objects(
         entry
     };
     let mut entries: Vec<Entry> = items.iter().enumerate().filter_map(&mut read).collect();
+    let mut counts: BTreeMap<&str, usize> = BTreeMap::new();
     for entry in &mut entries {
         if let ModelFile::Rigid(file) = &entry.model {
             entry.fixed = rigid::is_fixed(c, &entry.place, file);
         }
         entry.fixed |= entry.model.is_scenery();
-        let most = if entry.fixed { OBSTACLES_MAX } else { AGENTS_MAX };
+        let (what, most) = match (entry.model.is_scenery(), entry.fixed) {
+            (true, _) => ("meshes and trees", OBSTACLES_MAX),
+            (_, true) => ("fixed objects", OBSTACLES_MAX),
+            _ => ("agents", AGENTS_MAX),
+        };
         entry.copies = copies(c, &entry.place, &entry.common, entry.model.repeats(), most);
+        let count = counts.entry(what).or_insert(0);
+        *count += entry.copies.len() * entry.model.parts();
+        // none of its copies and of those after it are made
+        if *count > most {
+            too_many(c, &entry.place.path, &format!("{count} {what}"), most);
+            entry.copies = Copies::single();
+            break;
+        }
     }
     let names = assign_names(c, &entries);
     let groups = GroupNames::of(c, entries.iter().filter_map(|e| Some((&e.place, e.common.contact.as_ref()?))));
@@ -323,6 +346,7 @@ fn fixed_objects(
     let mut found = (Vec::new(), Vec::new());
     for entry in entries.iter().filter(|e| e.fixed) {
         let ModelFile::Rigid(file) = &entry.model else { continue };
+        c.begin_object(entry.copies.len());
         // checked although not used: a fixed object has no steps, but a wrong rate is still wrong
         pace(c, &entry.place, &entry.common);
         refuse_tolerance(c, &entry.place, &entry.common);
@@ -338,37 +362,34 @@ fn fixed_objects(
             }
         }
     }
-    if found.0.len() > OBSTACLES_MAX {
-        too_many(c, "fixed objects", found.0.len(), OBSTACLES_MAX);
-    }
     found
 }
 
-pub(super) fn too_many(c: &mut Checker<'_, '_>, what: &str, count: usize, most: usize) {
-    let message = format!("the scene has {count} {what}");
-    let span = c.document().locate(&format!("object.{}", most));
-    c.push(Problem::new(span, message).expecting(format!("expected at most {most}")));
+/// Reports that the scene has `found` up to the table at `path`, which is more than `most`.
+pub(super) fn too_many(c: &mut Checker<'_, '_>, path: &str, found: &str, most: usize) {
+    let span = c.document().locate(path);
+    c.push(Problem::new(span, format!("the scene has {found}")).expecting(format!("expected at most {most}")));
 }
 
 fn agents(c: &mut Checker<'_, '_>, entries: &[Entry], known: &Known<'_>, context: &SceneContext<'_>) -> Vec<Member> {
     let moving: Vec<&Entry> = entries.iter().filter(|e| !e.fixed).collect();
     let count = moving.iter().map(|entry| entry.copies.len()).sum();
-    if count > AGENTS_MAX {
-        too_many(c, "agents", count, AGENTS_MAX);
-        return Vec::new();
-    }
     let mut members = Vec::with_capacity(count);
     let mut firsts = Vec::with_capacity(moving.len());
     let mut next = 0;
     for entry in moving {
+        c.begin_object(entry.copies.len());
+        c.may_make(&entry.place, "grid", Cost::AGENT);
         if let Some(member) = member(c, entry, AgentId(next), known, context) {
             firsts.push((entry, members.len()));
-            members.extend(entry.copies.members(&member));
+            if c.may_make(&entry.place, "grid", Cost::division(&member.spec)) {
+                members.extend(entry.copies.members(&member));
+            }
         }
         next += entry.copies.len() as u32;
     }
     link(&mut members);
-    if c.count() == 0 {
+    if c.count() == 0 && !c.is_draft() {
         firsts.iter().for_each(|(entry, at)| check_buildable(c, &entry.place, &members[*at]));
     }
     members

@@ -7,6 +7,7 @@ use super::object::ModelContext;
 use super::scenery::{SurfaceSource, generator, surface_source};
 use super::{FRICTION, KEYFRAMES_MAX, LENGTH, POSITION_MAX_M, ROTATION_MAX_DEG, SCALE, SPEED_MAX, TIME};
 use crate::check::{Allowed, Checker, Place, allowed};
+use crate::demand::Cost;
 use crate::format::{Axis, GeneratorKind, PartFile, Point, RigidFile, Shape};
 use crate::source::Source;
 use glam::{DQuat, DVec3, EulerRot};
@@ -68,7 +69,7 @@ pub(super) fn obstacle(c: &mut Checker<'_, '_>, place: &Place, file: &RigidFile,
         c.wrong(place, key, "moves an object that is fixed", "expected no motion, or `fixed = false`");
     }
     refuse_restraint(c, place, file, "an object that is fixed");
-    let solid = solid(c, place, file, PartContext { source, density_kg_m3: DENSITY_DEFAULT_KG_M3 })?;
+    let solid = solid(c, place, file, PartContext { source, density_kg_m3: DENSITY_DEFAULT_KG_M3, is_fixed: true })?;
     let (position, rotation) = pose(c, place, file);
     let (restitution, friction) = surface(c, place, file);
     Some(Obstacle {
@@ -87,7 +88,7 @@ pub(super) fn build(c: &mut Checker<'_, '_>, file: &RigidFile, context: &ModelCo
     let place = context.place;
     let before = c.count();
     let density = c.optional(place, "density_kg_m3", file.density_kg_m3, &DENSITY).unwrap_or(DENSITY_DEFAULT_KG_M3);
-    let solid = solid(c, place, file, PartContext { source: context.source, density_kg_m3: density })?;
+    let solid = solid(c, place, file, PartContext { source: context.source, density_kg_m3: density, is_fixed: false })?;
     // a wrong shape or density gives a wrong mass: one problem is reported, not two
     let mass_kg = if c.count() == before { mass(c, place, file, &solid, density) } else { 1.0 };
     let inertia = inertia(c, place, file);
@@ -292,7 +293,7 @@ impl ShapeKeys<'_> {
     }
 
     /// The solid; of a compound nothing, as that has others.
-    fn solid(&self, c: &mut Checker<'_, '_>, place: &Place, source: &Source) -> Option<Solid> {
+    fn solid(&self, c: &mut Checker<'_, '_>, place: &Place, among: PartContext<'_>) -> Option<Solid> {
         let mut length = |key: &str, value: Option<f64>| c.number(place, key, value.unwrap_or_default(), &LENGTH);
         Some(match self.shape {
             Shape::Ball => Solid::Ball { radius_m: length("radius_m", self.radius_m) },
@@ -311,7 +312,7 @@ impl ShapeKeys<'_> {
             }
             Shape::Plane => Solid::Plane,
             Shape::Hull => {
-                let points_m = self.points(c, place, source)?;
+                let points_m = self.points(c, place, among)?;
                 let given_m = c.optional(place, "hull_within_m", self.hull_within_m, &HULL_WITHIN);
                 let Aabb { low, high } = Aabb::of(&points_m);
                 let tolerance_m = given_m.unwrap_or(HULL_WITHIN_M.min(HULL_SHARE * low.distance(high)));
@@ -319,7 +320,7 @@ impl ShapeKeys<'_> {
                 sound(c, place, Solid::Hull { points_m })?
             }
             Shape::Mesh => {
-                let (points_m, triangles) = self.surface(c, place, source)?;
+                let (points_m, triangles) = self.surface(c, place, among)?;
                 sound(c, place, Solid::Mesh { points_m, triangles })?
             }
             Shape::Compound => return None,
@@ -327,27 +328,36 @@ impl ShapeKeys<'_> {
     }
 
     /// The points of a hull.
-    fn points(&self, c: &mut Checker<'_, '_>, place: &Place, source: &Source) -> Option<Arc<[DVec3]>> {
+    fn points(&self, c: &mut Checker<'_, '_>, place: &Place, among: PartContext<'_>) -> Option<Arc<[DVec3]>> {
         let Some(name) = self.file.filter(|_| self.generate.is_none()) else {
-            return Some(self.surface(c, place, source)?.0);
+            return Some(self.surface(c, place, among)?.0);
         };
         let scale = c.optional(place, "scale", self.scale, &SCALE).unwrap_or(1.0);
-        let read = source.sibling(name).and_then(|bytes| mesh::hull_points(&bytes, scale));
+        if !c.may_read(place, "file", among.source.head(name), |head| Cost::solid_of_file(head, among.is_fixed)) {
+            return None;
+        }
+        let read = among.source.sibling(name).and_then(|bytes| mesh::hull_points(&bytes, scale));
         let points = read.map_err(|why| refuse_file(c, place, name, &why)).ok()?;
         Some(points.iter().map(|p| *p * scale).collect())
     }
 
-    fn surface(&self, c: &mut Checker<'_, '_>, place: &Place, source: &Source) -> Option<Surface> {
+    fn surface(&self, c: &mut Checker<'_, '_>, place: &Place, among: PartContext<'_>) -> Option<Surface> {
         let scale = c.optional(place, "scale", self.scale, &SCALE).unwrap_or(1.0);
         let wanted = c.optional(place, "triangles", self.triangles.map(f64::from), &TRIANGLES).unwrap_or(4000.0);
         let name = match surface_source(c, place, self.file, self.generate)? {
             SurfaceSource::File(name) => name,
             SurfaceSource::Generated(kind) => {
+                if !c.may_make(place, "triangles", Cost::solid(wanted as u64, among.is_fixed)) {
+                    return None;
+                }
                 let made = generate_surface(generator(kind), u64::from(self.seed.unwrap_or(0)), wanted as u32);
                 return Some((made.points.iter().map(|p| *p * scale).collect(), made.triangles.into()));
             }
         };
-        let read = source.sibling(name).and_then(|bytes| mesh::read(&bytes, scale));
+        if !c.may_read(place, "file", among.source.head(name), |head| Cost::solid_of_file(head, among.is_fixed)) {
+            return None;
+        }
+        let read = among.source.sibling(name).and_then(|bytes| mesh::read(&bytes, scale));
         match read {
             Ok(Mesh { points, triangles, .. }) => Some((points.iter().map(|p| *p * scale).collect(), triangles.into())),
             Err(why) => {
@@ -369,7 +379,7 @@ fn solid(c: &mut Checker<'_, '_>, place: &Place, file: &RigidFile, among: PartCo
         return None;
     }
     let Some(parts) = file.part.as_ref().filter(|_| file.shape == Shape::Compound) else {
-        return keys.solid(c, place, among.source);
+        return keys.solid(c, place, among);
     };
     if !(1..=COMPOUND_PARTS_MAX).contains(&parts.len()) {
         let expected = format!("expected 1 … {COMPOUND_PARTS_MAX}");
@@ -386,6 +396,7 @@ struct PartContext<'a> {
     source: &'a Source,
     /// Of parts that have none of their own.
     density_kg_m3: f64,
+    is_fixed: bool,
 }
 
 /// A part of a compound, with its density against that of others.
@@ -398,8 +409,8 @@ fn part(c: &mut Checker<'_, '_>, place: &Place, file: &PartFile, among: PartCont
     if !keys.check(c, place) {
         return None;
     }
-    let PartContext { source, density_kg_m3: default } = among;
-    let solid = keys.solid(c, place, source)?;
+    let default = among.density_kg_m3;
+    let solid = keys.solid(c, place, among)?;
     let position_m = point_or_zero(c, place, "position_m", file.position_m, POSITION_MAX_M);
     let rotation = rotation(point_or_zero(c, place, "rotation_deg", file.rotation_deg, ROTATION_MAX_DEG));
     let density = c.optional(place, "density_kg_m3", file.density_kg_m3, &DENSITY).unwrap_or(default) / default;

@@ -4,12 +4,13 @@
 
 use super::common::{appearance, levels, pace, painted_appearance, parse_colour};
 use super::contact;
-use super::object::{Entry, ModelFile, OBSTACLES_MAX, too_many};
+use super::object::{Entry, ModelFile};
 use super::rigid::{point_or_zero, rotation};
 use super::texture;
 use super::texture::Textures;
 use super::{POSITION_MAX_M, ROTATION_MAX_DEG, SCALE, SPEED_MAX, mesh};
 use crate::check::{Checker, Place, allowed};
+use crate::demand::Cost;
 use crate::format::{GeneratorKind, MeshFile, MotionFile, Point, TreeFile, TreeLod};
 use crate::source::Source;
 use glam::{DQuat, DVec3};
@@ -40,7 +41,8 @@ struct Meshes<'s> {
     /// Where their files are.
     source: &'s Source,
     /// Each with its greatest coordinate in its own unit.
-    made: BTreeMap<MeshKey, (Arc<ProgressiveMesh>, f64)>,
+    /// `None` in a draft.
+    made: BTreeMap<MeshKey, Option<(Arc<ProgressiveMesh>, f64)>>,
 }
 
 /// What a mesh is made from: a file or generator, a seed, and the greatest and least number of triangles.
@@ -57,6 +59,7 @@ pub(super) fn read(c: &mut Checker<'_, '_>, entries: &[Entry], source: &Source) 
     let (mut scenery, mut meshes, mut textures) = (Vec::new(), Meshes::new(source), Textures::new(source));
     for entry in entries {
         let before = c.count();
+        c.begin_object(entry.copies.len());
         if matches!(entry.model, ModelFile::Mesh(_) | ModelFile::Tree(_)) {
             contact::refuse(c, &entry.place, entry.common.contact.as_ref());
         }
@@ -79,9 +82,6 @@ pub(super) fn read(c: &mut Checker<'_, '_>, entries: &[Entry], source: &Source) 
                 ..part.clone()
             }));
         }
-    }
-    if scenery.len() > OBSTACLES_MAX {
-        too_many(c, "meshes and trees", scenery.len(), OBSTACLES_MAX);
     }
     scenery
 }
@@ -122,8 +122,17 @@ fn mesh_of(
         SurfaceSource::Generated(kind) => format!("{kind:?}"),
     };
     let key = (made_from, file.seed.unwrap_or(0), [triangles, least]);
-    if let Some((mesh, reach)) = meshes.made.get(&key) {
+    if let Some(known) = meshes.made.get(&key) {
+        let (mesh, reach) = known.as_ref()?;
         return in_bounds(c, place, "scale", scale, *reach).then(|| (Arc::clone(mesh), at));
+    }
+    let may_make = match &file.file {
+        Some(name) => c.may_read(place, "file", meshes.source.head(name), Cost::mesh_of_file),
+        None => c.may_make(place, "triangles", Cost::mesh(u64::from(triangles.unwrap_or(TRIANGLES_DEFAULT)))),
+    };
+    if !may_make {
+        meshes.made.insert(key, None);
+        return None;
     }
     let built = match (&file.file, file.generate) {
         (Some(name), _) => from_file(name, meshes.source, scale),
@@ -141,7 +150,7 @@ fn mesh_of(
             };
             let mesh = Arc::new(mesh.no_coarser(least.unwrap_or(0)));
             let reach = reach(&mesh);
-            meshes.made.insert(key, (Arc::clone(&mesh), reach));
+            meshes.made.insert(key, Some((Arc::clone(&mesh), reach)));
             in_bounds(c, place, "scale", scale, reach).then_some((mesh, at))
         }
         Err(why) => {
@@ -240,8 +249,9 @@ fn mesh_parts(c: &mut Checker<'_, '_>, entry: &Entry, file: &MeshFile, meshes: &
         c.wrong(&entry.place, "scale", "contradicts `dome_m`", "expected one of them");
     }
     let dome = file.dome_m.map(|radius| c.number(&entry.place, "dome_m", radius, &allowed(1e-3..=1e4, "m")));
+    let motion = file.motion.as_ref().map(|file| motion(c, &entry.place.table("motion"), file));
     let Some((mesh, at)) = mesh_of(c, &entry.place, file, meshes) else { return Parts::new() };
-    let motion = file.motion.as_ref().map(|file| motion(c, &entry.place.table("motion"), file, at.position));
+    let motion = motion.map(|motion| Motion { about_m: at.position, ..motion });
     let model = Model::Mesh(Arc::clone(&mesh));
     let part = |at| Scenery { name: String::new(), model: model.clone(), at, appearance, texture: None, motion };
     match dome {
@@ -255,13 +265,13 @@ fn mesh_parts(c: &mut Checker<'_, '_>, entry: &Entry, file: &MeshFile, meshes: &
     }
 }
 
-/// The motion of a mesh about the origin of its axes.
-fn motion(c: &mut Checker<'_, '_>, place: &Place, file: &MotionFile, about_m: DVec3) -> Motion {
+/// The motion of a mesh at the world's origin.
+fn motion(c: &mut Checker<'_, '_>, place: &Place, file: &MotionFile) -> Motion {
     if file.swing_hz.is_some() && file.swing_m.is_none() {
         c.wrong(place, "swing_hz", "has no effect alone", "expected `swing_m` beside it");
     }
     Motion {
-        about_m,
+        about_m: DVec3::ZERO,
         spin_rad_s: point_or_zero(c, place, "spin_rad_s", file.spin_rad_s, SPEED_MAX),
         swing_m: point_or_zero(c, place, "swing_m", file.swing_m, POSITION_MAX_M),
         swing_hz: c.optional(place, "swing_hz", file.swing_hz, &allowed(1e-4..=100.0, "Hz")).unwrap_or(SWING_HZ),
@@ -294,6 +304,9 @@ fn tree_parts(c: &mut Checker<'_, '_>, entry: &Entry, file: &TreeFile) -> Parts 
     let leaf = Appearance { colour, importance: bark.importance * share, ..bark };
     let bark = Appearance { colour: if entry.common.colour.is_some() { bark.colour } else { BARK }, ..bark };
     let at = placement(c, place, file.position_m, file.rotation_deg);
+    if !c.may_make(place, "leaves", Cost::tree(u64::from(branches), u64::from(leaves))) {
+        return Parts::new();
+    }
     let [trunk, crown] = tree(&spec).map(|foliage| Model::Foliage(Arc::new(foliage)));
     let part = |model, appearance| Scenery { name: String::new(), model, at, appearance, texture: None, motion: None };
     vec![(String::new(), part(trunk, bark)), (".leaves".to_owned(), part(crown, leaf))]

@@ -7,10 +7,11 @@ use super::scenery::{SurfaceSource, generator, surface_source};
 use super::soft_mesh;
 use super::{FRICTION, LENGTH, POSITION_MAX_M, ROTATION_MAX_DEG, SCALE, SPEED_MAX};
 use crate::check::{Allowed, Checker, Place, allowed};
+use crate::demand::Cost;
 use crate::format::{OneOrRange, Point, RopeEnd, RopeFile, SheetFile, SheetSide, SoftShapeKind, SolidFile, SolidSide};
 use glam::{DQuat, DVec3};
 use metachron_core::{Anchor, Body};
-use metachron_geometry::{Aabb, Triangles, generate_surface, open_edge, subdivided};
+use metachron_geometry::{Aabb, Cage, Triangles, generate_surface, open_edge, subdivided};
 use metachron_models::soft::Side;
 use metachron_models::soft::SoftBody;
 use metachron_models::soft::{MaterialLaw, SoftMatter, SoftShape, SoftSpec, VERTICES_MAX};
@@ -25,6 +26,9 @@ const DAMPING_RATE: Allowed = allowed(0.0..=1e4, "1/s");
 const SKIN_TRIANGLES_MAX: usize = 200_000;
 /// The diagonal of a cell, in its edges: no edge of a surface from a file is longer.
 const CELL_DIAGONAL: f64 = 1.732_050_807_568_877_2;
+/// Triangles of a generated surface that stands for a finer one of its shape.
+const COARSE_TRIANGLES: u32 = 500;
+const TOO_FINE: &str = "expected a larger finest ε";
 /// A soft solid from a file is hardly longer than this, metres: a file with no scale that is was drawn in millimetres.
 const LARGE_M: f64 = 10.0;
 const SEGMENTS: Allowed = allowed(1.0..=2047.0, "");
@@ -224,9 +228,11 @@ fn solid_shape(
         SoftShape::Ball { radius_m, segments: cells[0] }
     };
     let Some(range) = eps_m else { return Some(lattice) };
-    let embedded = lattice.embedded(range);
+    // the cage of a box has the nodes of its lattice, that of a ball half of them
+    let fits = lattice.vertices() <= 2 * VERTICES_MAX;
+    let embedded = fits.then(|| lattice.embedded(range)).flatten();
     if embedded.is_none() {
-        c.wrong(place, "eps_m", "is too fine for its size", "expected a larger finest ε");
+        c.wrong(place, "eps_m", "is too fine for its size", TOO_FINE);
     }
     embedded
 }
@@ -237,9 +243,19 @@ fn closed_surface(c: &mut Checker<'_, '_>, file: &SolidFile, context: &ModelCont
     let scale = c.optional(place, "scale", file.scale, &SCALE).unwrap_or(1.0);
     let count = file.triangles.map(|n| c.number(place, "triangles", f64::from(n), &allowed(4.0..=1e5, "")) as u32);
     let (key, read) = match surface_source(c, place, file.file.as_deref(), file.generate)? {
+        SurfaceSource::File(name) if !c.may_read(place, "file", context.source.head(name), Cost::soft_of_file) => {
+            return None;
+        }
         SurfaceSource::File(name) => ("file", context.source.sibling(name).and_then(|bytes| mesh::read(&bytes, scale))),
         SurfaceSource::Generated(kind) => {
-            let made = generate_surface(generator(kind), u64::from(file.seed.unwrap_or(0)), count.unwrap_or(4000));
+            let triangles = count.unwrap_or(4000);
+            let seed = u64::from(file.seed.unwrap_or(0));
+            if c.is_draft() {
+                let coarse = generate_surface(generator(kind), seed, triangles.min(COARSE_TRIANGLES));
+                draft_cage(c, place, &coarse, &WantedCage { scale, triangles, eps_m: file.eps_m?.ends().0 });
+                return None;
+            }
+            let made = generate_surface(generator(kind), seed, triangles);
             ("generate", Ok(Mesh { points: made.points, uvs: vec![], triangles: made.triangles }))
         }
     };
@@ -251,6 +267,22 @@ fn closed_surface(c: &mut Checker<'_, '_>, file: &SolidFile, context: &ModelCont
             c.wrong(place, key, format_args!("cannot be used: {name}: {why}"), expected);
         })
         .ok()
+}
+
+/// The skin and the cage that a table asks for.
+struct WantedCage {
+    scale: f64,
+    triangles: u32,
+    /// The finest.
+    eps_m: f64,
+}
+
+/// Notes in a draft what a generated surface takes with its cage, whose nodes a `coarse` surface of the same shape tells.
+fn draft_cage(c: &mut Checker<'_, '_>, place: &Place, coarse: &Triangles, wanted: &WantedCage) {
+    // the cage of the coarse surface may have a few more
+    let cage = Cage::new(coarse, wanted.eps_m / wanted.scale, 2 * VERTICES_MAX as usize);
+    let Some(cage) = cage else { return c.wrong(place, "eps_m", "is too fine for its size", TOO_FINE) };
+    c.may_make(place, "triangles", Cost::skin(u64::from(wanted.triangles), cage.nodes_m().len() as u64));
 }
 
 /// The surface of a mesh in metres, where it encloses a solid of one piece; what is wrong with it else.

@@ -7,6 +7,7 @@ use super::object::ModelContext;
 use super::soft::{DENSITY, POISSON, YOUNG, too_large};
 use super::{LENGTH, SCALE, tetrahedra};
 use crate::check::{Checker, Place, allowed};
+use crate::demand::Cost;
 use crate::format::{LawKind, RegionFile, SheetFile, SolidFile};
 use metachron_geometry::{Aabb, Tetrahedra, Triangles, branch, opposed, pieces, welded};
 use metachron_models::soft::{MaterialLaw, RegionMatter, SoftMatter, SoftShape, VERTICES_MAX};
@@ -51,14 +52,14 @@ pub(super) fn tetrahedra_of(
     context: &ModelContext<'_>,
 ) -> Option<Option<SoftShape>> {
     let (place, name) = (context.place, file.file.as_deref()?);
-    let bytes = match context.source.sibling(name) {
-        Ok(bytes) => bytes,
+    let head = match context.source.head(name) {
+        Ok(head) => head,
         Err(why) => {
             c.wrong(place, "file", format!("cannot be used: {name}: {why}"), "expected a mesh beside the scene");
             return Some(None);
         }
     };
-    if !tetrahedra::is_volume(name, &bytes) {
+    if !tetrahedra::is_volume(name, &head.start) {
         return None;
     }
     for (key, is_given) in [
@@ -73,7 +74,11 @@ pub(super) fn tetrahedra_of(
         }
     }
     let scale = c.optional(place, "scale", file.scale, &SCALE).unwrap_or(1.0);
-    let read = tetrahedra::read(&bytes).and_then(|mesh| solid(mesh, scale, file.scale.is_none()));
+    if !c.may_make(place, "file", Cost::soft_of_file(&head)) {
+        return Some(None);
+    }
+    let read = context.source.sibling(name).and_then(|bytes| tetrahedra::read(&bytes));
+    let read = read.and_then(|mesh| solid(mesh, scale, file.scale.is_none()));
     Some(match read {
         Ok(mesh) => Some(SoftShape::Tetrahedra { mesh: Arc::new(mesh), regions: Vec::new() }),
         Err(why) => {
@@ -150,6 +155,9 @@ pub(super) fn shell(c: &mut Checker<'_, '_>, file: &SheetFile, context: &ModelCo
     }
     let scale = c.optional(place, "scale", file.scale, &SCALE).unwrap_or(1.0);
     let thickness_m = c.number(place, "thickness_m", file.thickness_m, &LENGTH);
+    if !c.may_read(place, "file", context.source.head(name), Cost::sheet_of_file) {
+        return None;
+    }
     let read = context.source.sibling(name).and_then(|bytes| mesh::read(&bytes, scale));
     match read.and_then(|mesh| sheet(&mesh, scale, file.scale.is_none())) {
         Ok(surface) => Some(SoftShape::Shell { surface: Arc::new(surface), thickness_m }),

@@ -6,6 +6,7 @@ use super::glb;
 use super::object::Entry;
 use super::scenery::Parts;
 use crate::check::{Checker, allowed};
+use crate::demand::{Cost, FileHead};
 use crate::format::MeshFile;
 use crate::source::Source;
 use glam::Vec2;
@@ -95,6 +96,11 @@ fn texture_of(
         return known.clone();
     }
     let source = textures.source;
+    let is_pattern = key == "texture" && Pattern::ALL.iter().any(|pattern| pattern.name() == name);
+    if !is_pattern && !c.may_read(place, key, source.head(name), image_cost) {
+        textures.made.insert(made_from, None);
+        return None;
+    }
     let made = if key == "file" {
         embedded_image(name, source)
     } else {
@@ -131,6 +137,26 @@ fn embedded_image(name: &str, source: &Source) -> Result<Option<Texture>, String
         return Ok(None);
     }
     glb::image(&bytes)?.map(|image| decode(image, Wrap::Corners)).transpose()
+}
+
+/// What an image takes; one whose head does not say its size takes nothing, and is refused when it is read.
+fn image_cost(head: &FileHead) -> Cost {
+    let pixels = size_of(&head.start).map_or(0, |[width, height]| u64::from(width) * u64::from(height));
+    Cost::image(pixels)
+}
+
+/// This build reads no image.
+#[cfg(not(feature = "images"))]
+fn size_of(_: &[u8]) -> Option<[u32; 2]> {
+    None
+}
+
+/// Width and height of a PNG or JPEG image that begins so, pixels.
+#[cfg(feature = "images")]
+fn size_of(start: &[u8]) -> Option<[u32; 2]> {
+    let reader = ImageReader::new(Cursor::new(start)).with_guessed_format().ok()?;
+    let (width, height) = reader.into_dimensions().ok()?;
+    (width.max(height) <= SIDE_MAX).then_some([width, height])
 }
 
 /// Refuses every image: this build has no decoder.

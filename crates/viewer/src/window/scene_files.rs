@@ -61,7 +61,7 @@ impl WindowSimulation<'_> {
     /// Reads the scene again; while a file of it is wrong the message stays, and the old scene runs on.
     pub(super) fn reload(&mut self) {
         let source = match Source::open(self.plan.source.name()) {
-            Ok(source) => source,
+            Ok(source) => source.within(self.plan.source.limits()),
             Err(error) => return self.not_reloaded(&error),
         };
         match self.load(source.clone()) {
@@ -81,7 +81,8 @@ impl WindowSimulation<'_> {
 
     pub(super) fn open(&mut self, path: &Path) {
         let overrides = std::mem::take(&mut self.plan.overrides);
-        match Source::open(&path.to_string_lossy()).and_then(|source| self.load(source)) {
+        let limits = self.plan.source.limits();
+        match Source::open(&path.to_string_lossy()).and_then(|source| self.load(source.within(limits))) {
             Ok(scene) => self.restart(scene),
             Err(error) => {
                 self.plan.overrides = overrides;
