@@ -12,9 +12,9 @@ use crate::member::participant::{place_of, relative};
 use crate::member::{ClusterMember, Drive, Participant, Role};
 use crate::solve::Side;
 use crate::step::ClusterStepper;
-use crate::step::report::{PairTotal, total_of};
+use crate::step::report::{PairTotal, give, total_of};
 use glam::DVec3;
-use metachron_core::{SimSpan, SimTime, Wrench};
+use metachron_core::{SimSpan, SimTime};
 
 /// Bodies that meet deeper inside each other than this many times the depth of contacts began so: a load in motion goes less deep.
 const OVERLAP_SHARE: f64 = 2.0;
@@ -144,13 +144,6 @@ impl ClusterStepper {
             owner.spin.torque_n_m = impulse.dot(normal) / h_s;
             external.note(all, owner.member, &row.sides[1], -impulse);
         }
-    }
-}
-
-/// Adds an impulse at a point to what contacts gave a body, if that moves as a whole.
-pub(super) fn give(wrench: &mut Wrench, member: &dyn ClusterMember, impulse_n_s: DVec3, point_m: DVec3) {
-    if let Some(pose) = member.pose(&[], 0.0) {
-        wrench.add(impulse_n_s, point_m - pose.centre_m);
     }
 }
 

@@ -4,6 +4,7 @@
 
 use crate::constraint::JointTotal;
 use crate::lists::{entry, reset};
+use crate::member::ClusterMember;
 use crate::member::memory::Partner;
 use crate::solve::Report;
 use glam::DVec3;
@@ -68,6 +69,13 @@ impl PairTotal {
         self.impulse_n_s += impulse_n_s;
         self.depth_m = self.depth_m.max(depth_m);
         self.contacts += 1;
+    }
+}
+
+/// Adds an impulse at a point to what contacts gave a body, if that moves as a whole.
+pub(super) fn give(wrench: &mut Wrench, member: &dyn ClusterMember, impulse_n_s: DVec3, point_m: DVec3) {
+    if let Some(pose) = member.pose(&[], 0.0) {
+        wrench.add(impulse_n_s, point_m - pose.centre_m);
     }
 }
 
