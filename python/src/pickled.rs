@@ -1,4 +1,4 @@
-//! What `pickle` keeps of scenes and states: bytes that the same version of the engine reads.
+//! Pickles of scenes and states: bytes that the same version of the engine reads.
 //!
 //! In: a value. Out: its bytes, and back; or why they are not read. Never here: what is in them.
 

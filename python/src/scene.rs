@@ -13,7 +13,7 @@ use crate::start::started;
 use crate::world::World;
 use metachron::contact::joint::JointKind;
 use metachron::geometry::Solid;
-use metachron::scene::{Source, load};
+use metachron::scene::{Limits, Source, load};
 use metachron::world::{self, Part, Rigid, SceneBuilder, SceneText, SolveBudget, Tube};
 use pyo3::conversion::FromPyObjectOwned;
 use pyo3::exceptions::{PyTypeError, PyValueError};
@@ -104,9 +104,17 @@ impl Scene {
 
     /// Reads a text that has a line break as the scene itself, any other as a path, or as the name of a built-in scene.
     ///
+    /// Files outside of the scene's folder are read with `allow_outside` alone, and what may take more memory than `memory_limit` bytes is refused;
+    /// `None` is half of the machine's.
+    ///
     /// Raises `ValueError` with every problem, a line each, with its line and column.
     #[staticmethod]
-    pub fn from_toml(text_or_path: &Bound<'_, PyAny>) -> PyResult<Self> {
+    #[pyo3(signature = (text_or_path, *, allow_outside = false, memory_limit = None))]
+    pub fn from_toml(
+        text_or_path: &Bound<'_, PyAny>,
+        allow_outside: bool,
+        memory_limit: Option<u64>,
+    ) -> PyResult<Self> {
         let text: Option<String> = text_or_path.extract().ok().filter(|text: &String| text.contains('\n'));
         let source = match text {
             Some(text) => Source::memory("given as text", text.as_bytes()),
@@ -115,7 +123,8 @@ impl Scene {
                 Source::open(&path.to_string_lossy())
             }
         };
-        let source = source.map_err(|error| raised::scene(&error))?;
+        let memory_bytes = memory_limit.unwrap_or(Limits::default().memory_bytes);
+        let source = source.map_err(|error| raised::scene(&error))?.within(Limits { memory_bytes, allow_outside });
         let text = SceneText {
             name: source.name().to_owned(),
             text: source.text().to_owned(),
@@ -230,10 +239,11 @@ impl Scene {
         Ok(Self { inner: Inner::Read(Box::new(scene), Box::new(text)) })
     }
 
-    /// The scene of a text that was read before; files next to it are read again.
+    /// The scene of a text that was read before, whatever its limits were then; files next to it are read again.
     pub fn of_text(text: SceneText) -> PyResult<Self> {
         let source = Source::recorded(&text.name, &text.text, text.folder.as_deref().map(Path::new));
-        Self::read(&source.map_err(|error| raised::scene(&error))?, text)
+        let unlimited = Limits { memory_bytes: u64::MAX, allow_outside: true };
+        Self::read(&source.map_err(|error| raised::scene(&error))?.within(unlimited), text)
     }
 
     /// The engine's scene.

@@ -102,7 +102,7 @@ impl World {
         executor: &str,
         pace: Option<&str>,
     ) -> PyResult<Self> {
-        Scene::from_toml(text_or_path)?.start(py, executor, pace)
+        Scene::from_toml(text_or_path, false, None)?.start(py, executor, pace)
     }
 
     /// The object of this name. Raises `KeyError`.

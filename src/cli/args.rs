@@ -267,7 +267,7 @@ pub struct RunArgs {
     pub headless: bool,
     /// Show panels and colours of the window as at first, and not as they were left
     #[cfg(feature = "viewer")]
-    #[arg(long, conflicts_with = "headless")]
+    #[arg(long)]
     pub reset_window: bool,
     /// End after this many frames
     #[arg(long, value_name = "N", conflicts_with = "seconds", value_parser = clap::value_parser!(u64).range(1..))]

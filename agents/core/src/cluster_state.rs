@@ -15,7 +15,7 @@ pub struct ClusterState {
     pub solves: Option<ClusterSolves>,
 }
 
-/// How far a solve of contacts went, the dearest last. All laws hold to the tolerance but at [`SolveLevel::Interior`].
+/// How far a solve of contacts went, the dearest last. All laws hold to the tolerance but at the last two.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Default, serde::Serialize, serde::Deserialize)]
 pub enum SolveLevel {
     /// The impulses of the last step still hold.
@@ -28,6 +28,8 @@ pub enum SolveLevel {
     /// Interior points, ended before all laws held, by the budget or after as many steps as any solve makes: inside all bounds, with momentum and
     /// passivity as everywhere; the miss says how far off.
     Interior,
+    /// Rigid bodies for whose solve there was no time were stepped by rapier3d, as deep in each other as that leaves them; others as far as above.
+    RigidPile,
 }
 
 impl SolveLevel {
@@ -39,6 +41,7 @@ impl SolveLevel {
             Self::Near => "near",
             Self::Polished => "polished",
             Self::Interior => "interior",
+            Self::RigidPile => "rigid-pile",
         }
     }
 }

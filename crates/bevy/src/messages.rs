@@ -25,7 +25,7 @@ pub struct ContactMessage {
     pub with_entity: Option<Entity>,
     /// When, in the object's time: the end of the step in which it happened.
     pub at: SimTime,
-    /// The place that bore most, metres; not a number where that is not known, as in heaps of a thousand contacts.
+    /// The place that bore most, metres; not a number where that is not known.
     pub point: Vec3,
     /// The normal there, towards the object, of length 1.
     pub normal: Vec3,

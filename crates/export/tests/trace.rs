@@ -76,7 +76,7 @@ fn a_trace_has_a_lane_of_every_step_an_object_made_and_the_frames() {
 fn a_trace_has_events_as_instants_and_frames_that_hold_their_parts() {
     let (_, events) = trace();
     let instants: Vec<_> = events.iter().filter(|one| one["ph"] == "i").collect();
-    let touch = instants.iter().find(|one| one["name"] == "contact begins" && one["tid"] == 1).unwrap();
+    let touch = instants.iter().find(|one| one["name"] == "contact_began" && one["tid"] == 1).unwrap();
     assert_eq!(touch["args"]["with"], "tube");
     // ½·g·t² = 0.12 m, to a step or two
     assert!((number(touch, "ts") * 1e-6 - 0.156).abs() < 0.01, "{touch}");

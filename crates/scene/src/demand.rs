@@ -84,10 +84,10 @@ impl Cost {
         Self { kept_bytes: 0, copy_bytes: copy * vertices, making_bytes: making * vertices }
     }
 
-    /// What every object that moves takes, whatever it is: its clock, its snapshots, its place in the broad phase.
+    /// The memory of every object that moves, whatever it is: its clock, its snapshots, its place in the broad phase.
     pub(super) const AGENT: Self = Self { kept_bytes: 0, copy_bytes: 23_000, making_bytes: 0 };
 
-    /// What an object takes beyond that because of its division.
+    /// The memory that an object takes beyond that for its division.
     pub(super) fn division(spec: &Spec) -> Self {
         match spec {
             Spec::Tube(tube) => {
@@ -110,7 +110,7 @@ impl Cost {
     }
 }
 
-/// What a program takes with a scene of nothing, bytes.
+/// The memory of a program with a scene of nothing, bytes.
 const PROGRAM_BYTES: u64 = 9 << 20;
 
 /// Bytes of the header of a binary STL file, and of each triangle of it.

@@ -180,7 +180,7 @@ pub fn members(scene: &Scene) -> Vec<Vec<usize>> {
     scene.groups.iter().map(of).collect()
 }
 
-/// What control knows of an actor for as long as none joins.
+/// The part of control's description of an actor that is the same in every frame, until one joins.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct Lasting {
     /// The actor of the innermost group that it is in.
@@ -292,7 +292,7 @@ pub fn law(target: &metachron_world::Target) -> Law {
     }
 }
 
-/// A scene and what lasts of every actor of it.
+/// A scene and the lasting part of every actor's description.
 #[derive(Clone, Copy)]
 pub struct Actors<'a> {
     pub scene: &'a Scene,

@@ -59,7 +59,7 @@ pub struct Session {
     visible_resolution: VisibleResolution,
     reader: Reader,
     views: Vec<ObjectView>,
-    /// What lasts of every actor.
+    /// The lasting part of every actor's description.
     lasting: Vec<assemble::Lasting>,
     levels: Vec<Level>,
     couplings: Couplings,

@@ -21,7 +21,7 @@ pub struct WorldView {
     scene_view: SceneView,
     control: PictureControl,
     views: Vec<ObjectView>,
-    /// What lasts of every actor.
+    /// The lasting part of every actor's description.
     lasting: Vec<assemble::Lasting>,
 }
 

@@ -112,7 +112,7 @@ pub struct Contact {
     pub with: Touched,
     /// Whether it begins.
     pub begins: bool,
-    /// The place that bore most, metres; not a number where that is not known, as in heaps of a thousand contacts.
+    /// The place that bore most, metres; not a number where that is not known.
     pub point_m: DVec3,
     /// The normal there, towards the object, of length 1.
     pub normal: DVec3,

@@ -132,12 +132,15 @@ impl World {
         Ok(JointState { joint, position: spec.travel(&a.pose(), &b.pose()), velocity })
     }
 
-    /// The coordinates of all hinges and slides, in the order of the scene.
+    /// The coordinates of all hinges and slides whose bodies are there, in the order of the scene.
     ///
     /// # Errors
-    /// [`WorldError::Gone`] where a body of one was removed.
+    /// Those of [`Self::joint_state`].
     pub fn joint_states(&self) -> Result<Vec<JointState>, WorldError> {
         let all = self.joints().filter(|listed| listed.joint.takes_motor());
+        // a joint of a body that was removed holds nothing
+        let is_there = |id: AgentId| self.agent(self.tag().object(id)).is_ok();
+        let all = all.filter(|listed| is_there(listed.joint.a) && listed.joint.b.is_none_or(is_there));
         all.map(|listed| self.joint_state(listed.at)).collect()
     }
 
@@ -147,7 +150,7 @@ impl World {
     /// 1 mm and 1 mrad; the next step brings their rates together.
     ///
     /// # Errors
-    /// [`WorldError::BadCoordinate`] for what is outside the joint's range or not finite, [`WorldError::NoCoordinate`], [`WorldError::OpenLoop`];
+    /// [`WorldError::BadCoordinate`] for what is outside the joint's range by more than 1 mm or 1 mrad, or not finite, [`WorldError::NoCoordinate`], [`WorldError::OpenLoop`];
     /// [`WorldError::TimePasses`] on threads and in a pool while time is not paused; those of [`World::command`]. Nothing was done then.
     pub fn set_joint_states(&self, states: &[JointState]) -> Result<(), WorldError> {
         let mut set = BTreeMap::new();
@@ -180,16 +183,17 @@ impl World {
         let bad = |what, value, wanted: String| {
             Err(WorldError::BadCoordinate { joint: self.joint_name(joint.number()), what, value, wanted })
         };
-        let (range, unit) = match spec.kind {
-            JointKind::Revolute { range_rad, .. } => (range_rad, "rad"),
-            JointKind::Prismatic { range_m, .. } => (range_m, "m"),
-            _ => (None, ""),
+        let (range, unit, gap) = match spec.kind {
+            JointKind::Revolute { range_rad, .. } => (range_rad, "rad", JOINT_GAP_MAX_RAD),
+            JointKind::Prismatic { range_m, .. } => (range_m, "m", JOINT_GAP_MAX_M),
+            _ => (None, "", 0.0),
         };
         if !velocity.is_finite() {
             return bad("velocity", velocity, "a finite number".to_owned());
         }
         match range {
-            Some([low, high]) if !(low..=high).contains(&position) => {
+            // a body that leans on a stop is a little beyond it
+            Some([low, high]) if !(low - gap..=high + gap).contains(&position) => {
                 bad("position", position, format!("{low} to {high} {unit}"))
             }
             None if !position.is_finite() => bad("position", position, "a finite number".to_owned()),

@@ -42,7 +42,7 @@ pub struct ContactNow {
     pub with: Touched,
     /// When it began.
     pub since: SimTime,
-    /// The place that bears most, metres; not a number in heaps of a thousand contacts.
+    /// The place that bears most, metres.
     pub point_m: DVec3,
     /// The normal there, towards the object, of length 1.
     pub normal: DVec3,

@@ -1,6 +1,6 @@
 //! How far solves of contact go by a declared machine: as far as there is time, to their end where nothing bounds them, the same on every run.
 
-use metachron_core::{ClusterSolves, SimSpan};
+use metachron_core::{ClusterSolves, SimSpan, SolveLevel};
 use metachron_geometry::Solid;
 use metachron_runtime::FACTOR;
 use metachron_world::kinds::ExecutorKind;
@@ -53,7 +53,8 @@ fn where_the_budget_ends_solves_steps_are_as_long_as_asked_for() {
     // where boxes land an exact solve takes two factors and more, and a step lasts for one
     let [exact, budget] = budgets.map(|budget| played(&pile(budget, 1900.0), Pace::RealTime));
     assert_eq!(exact.solves.unfinished, 0);
-    assert!(budget.solves.unfinished > 20, "{:?}", budget.solves);
+    // no solve has time for three: the boxes are rapier3d's
+    assert_eq!(budget.solves.level, SolveLevel::RigidPile, "{:?}", budget.solves);
     assert!(exact.lengthened > 4 * budget.lengthened, "{} of {} steps", budget.lengthened, exact.lengthened);
 }
 

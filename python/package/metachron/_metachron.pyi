@@ -145,8 +145,13 @@ class Scene:
         """
 
     @staticmethod
-    def from_toml(text_or_path: str | PathLike[str]) -> Scene:
+    def from_toml(
+        text_or_path: str | PathLike[str], *, allow_outside: bool = False, memory_limit: int | None = None
+    ) -> Scene:
         """Reads a text that has a line break as the scene itself, any other as a path, or as the name of a built-in scene.
+
+        Files outside of the scene's folder are read with `allow_outside` alone, and what may take more memory than `memory_limit` bytes is refused;
+        `None` is half of the machine's.
 
         Raises `ValueError` with every problem, a line each, with its line and column.
         """

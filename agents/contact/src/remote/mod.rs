@@ -266,9 +266,7 @@ impl Pairs {
             {
                 (state.contacts, state.penetration_m) = (total.contacts, total.depth_m);
                 state.force_n = total.impulse_n_s.length() / dt_s;
-                if total.most_n_s > 0.0 {
-                    state.inverse_mass_per_kg = Some(total.inverse_mass_per_kg);
-                }
+                state.inverse_mass_per_kg = total.inverse_mass_per_kg.or(state.inverse_mass_per_kg);
             }
         }
         for state in states.iter_mut().filter(|state| state.kind == PairKind::Ledger) {

@@ -42,6 +42,7 @@ use metachron_core::{Archive, ArchiveError, ParallelFor, SimSpan, StepError, Wre
 use metachron_geometry::narrow_phase::TouchKey;
 pub use plan::Plan;
 pub use report::{ClusterReport, PairTotal};
+pub use rigid_pile::FACTORS_SAFE;
 use rigid_pile::RigidPile;
 
 /// The surroundings of a macro step, and the threads that make it.

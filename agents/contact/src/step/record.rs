@@ -99,7 +99,7 @@ impl ClusterStepper {
                 }
                 if impulse.length() > total.most_n_s {
                     (total.most_n_s, total.point_m, total.normal) = (impulse.length(), point_m, contact.normal);
-                    total.inverse_mass_per_kg = solver.inverse_masses(k, self.progress[owner.member].place);
+                    total.inverse_mass_per_kg = Some(solver.inverse_masses(k, self.progress[owner.member].place));
                 }
             } else if contact.gap_m < self.depth_m {
                 // no nearer than what bears something lies deep: the two touch, though nothing presses them together now

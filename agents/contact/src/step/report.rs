@@ -50,14 +50,15 @@ pub struct PairTotal {
     pub contacts: u32,
     /// The deepest overlap, metres, ≥ 0.
     pub depth_m: f64,
-    /// The most that one contact gave, N·s; zero for links.
+    /// The most that one contact gave in a fine step, in a rigid pile in a step of rapier3d, N·s; zero for links.
     pub most_n_s: f64,
     /// Where that contact is, metres; not a number for links.
     pub point_m: DVec3,
     /// Its normal, towards the participant, of length 1; zero for links.
     pub normal: DVec3,
-    /// How easily the participant and its partner give way at that contact along its normal, 1/kg, ≥ 0 (coupling.md, eq. 7h).
-    pub inverse_mass_per_kg: [f64; 2],
+    /// How easily the participant and its partner give way at that contact along its normal, 1/kg, ≥ 0 (coupling.md, eq. 7h); `None` for links
+    /// and in rigid piles.
+    pub inverse_mass_per_kg: Option<[f64; 2]>,
     /// How much more the pair bears along that normal for each metre that a side which a user leads is led on towards the other, N/m, ≥ 0
     /// (coupling.md, eq. 7s). 0 where a user leads neither, in rigid piles, and where neither gives way.
     pub stiffness_n_m: f64,
@@ -91,7 +92,7 @@ pub(super) fn total_of(totals: &mut Vec<PairTotal>, member: usize, partner: Part
         most_n_s: 0.0,
         point_m: DVec3::NAN,
         normal: DVec3::ZERO,
-        inverse_mass_per_kg: [0.0; 2],
+        inverse_mass_per_kg: None,
         stiffness_n_m: 0.0,
     })
 }

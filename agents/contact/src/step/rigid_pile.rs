@@ -12,7 +12,7 @@ use crate::member::participant::{Progress, place_of};
 use crate::member::{ClusterMember, Locked, Participant};
 use crate::step::report::{ClusterReport, Sums, give, total_of};
 use glam::{DMat3, DQuat, DVec3};
-use metachron_core::{AgentId, Archive, ArchiveError, StepError, archive_values};
+use metachron_core::{AgentId, Archive, ArchiveError, SolveLevel, StepError, archive_values};
 use metachron_geometry::narrow_phase::StaticSolid;
 use metachron_geometry::{CollisionShape, ShapeKind, ShapePose, Solid, SolidShape};
 use rapier3d::dynamics::{
@@ -25,11 +25,11 @@ use rapier3d::geometry::{
 use rapier3d::parry::math::{Pose, Rotation, Vec3};
 use rapier3d::pipeline::PhysicsWorld;
 
-/// Rigid bodies are a rigid pile from where each solve has time for fewer factors than these: after so many from interior points contacts lie as
-/// deep as in rapier3d.
-const FACTORS_LEFT: u32 = 3;
+/// Rigid bodies are a rigid pile where each solve has time for fewer factors than these: three of interior points leave contacts about as deep as
+/// rapier3d does.
+pub const FACTORS_SAFE: u32 = 3;
 /// They are one until there is time for so many.
-const FACTORS_AGAIN: u32 = 6;
+const FACTORS_AGAIN: u32 = 2 * FACTORS_SAFE;
 /// No step of rapier3d is longer than this, seconds: what lands sinks by a part of its way in one.
 const LONGEST_S: f64 = 1.0 / 240.0;
 /// The most steps of rapier3d in a fine step: no body goes farther in one than half its radius, as far as that takes no more.
@@ -54,6 +54,7 @@ pub(super) struct RigidPile {
 /// Counts and figures of a step of a rigid pile.
 #[derive(Debug, Clone, Copy, Default)]
 pub(super) struct PileReport {
+    pub is_on: bool,
     pub contacts: usize,
     pub depth_m: f64,
 }
@@ -107,6 +108,9 @@ impl PileReport {
     pub fn add_to(self, report: &mut ClusterReport) {
         report.pile_contacts = self.contacts as u32;
         report.contacts += report.pile_contacts;
+        if self.is_on {
+            report.level = SolveLevel::RigidPile;
+        }
         report.depth_m = report.depth_m.max(self.depth_m);
     }
 }
@@ -133,7 +137,7 @@ impl RigidPile {
 
     /// Makes a rigid pile of the members that can be one, if there is no time for their problem, they are most of it and nothing else touches them.
     pub fn begin(&mut self, scene: &ClusterScene, all: &[Participant<'_>], search: &Search) {
-        if self.factors_max.is_none_or(|most| most >= FACTORS_LEFT) {
+        if self.factors_max.is_none_or(|most| most >= FACTORS_SAFE) {
             return;
         }
         assign(scene, all, &mut self.domains);
@@ -194,6 +198,7 @@ impl RigidPile {
             let deepest_m = report.depth_m;
             report = world.read(all, left == 0);
             report.depth_m = report.depth_m.max(deepest_m);
+            report.is_on = true;
         }
         if !world.is_sound() {
             self.world = None;

@@ -13,8 +13,8 @@ pub(super) const LEAN_SHARE: f64 = 1e-3;
 /// By how much two features may lean over what is next to them, where their own directions make the normal: about what a body turns by in
 /// a step, radians.
 pub(super) const LEAN: f64 = 0.1;
-/// By how much an edge that stands out is above a line between the far corners of its triangles, metres: less than contacts give way, so that
-/// no place that bears much is gone where a skin gets flatter.
+/// By how much an edge that stands out is above a line between the far corners of its triangles, metres: less than contacts give way at their usual
+/// depth, so that no place that bears much is gone where a skin gets flatter.
 const RIDGE_M: f64 = 8e-6;
 /// A vector is no way out when removing its parts along the skin leaves less than this share of it.
 const OUT_SHARE: f64 = 0.5;
@@ -113,9 +113,8 @@ impl Feature {
         let along = (b - a).normalize_or_zero();
         let across = corners.map(|corner| (surface.positions[corner as usize] - a).reject_from_normalized(along));
         let [[low_a, wide_a], [low_b, wide_b]] = across.map(|across| [-across.dot(out), across.length()]);
-        let above_m = (low_a * wide_b + low_b * wide_a) / (wide_a + wide_b);
-        // so does an edge between triangles without a width, whose height is no number
-        above_m.is_nan() || above_m > RIDGE_M
+        // a triangle without a width says nothing of its side
+        wide_a == 0.0 || wide_b == 0.0 || low_a * wide_b + low_b * wide_a > RIDGE_M * (wide_a + wide_b)
     }
 
     /// The unit vector out of the skin that is close to `way`: its parts along the skin are removed. `None` if they were most of it.

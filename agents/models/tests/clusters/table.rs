@@ -264,7 +264,7 @@ impl Table {
     /// How easily a body, the lower number of two, and its partner give way where they press most, 1/kg.
     pub fn inverse_mass_per_kg(&self, body: usize, partner: Partner) -> [f64; 2] {
         let of_pair = |total: &&PairTotal| total.member == body && total.partner == partner;
-        self.stepper.totals().iter().find(of_pair).map_or([f64::NAN; 2], |total| total.inverse_mass_per_kg)
+        self.stepper.totals().iter().find(of_pair).and_then(|total| total.inverse_mass_per_kg).unwrap_or([f64::NAN; 2])
     }
 
     /// Where the points are that a body publishes.

@@ -23,9 +23,7 @@ impl ClusterSeat {
         pair.force_n += impulse_n_s / dt_s;
         pair.penetration_m = pair.penetration_m.max(total.depth_m);
         pair.impulse_n_s += impulse_n_s;
-        if total.most_n_s > 0.0 {
-            pair.inverse_mass_per_kg = Some(total.inverse_mass_per_kg);
-        }
+        pair.inverse_mass_per_kg = total.inverse_mass_per_kg.or(pair.inverse_mass_per_kg);
     }
 }
 

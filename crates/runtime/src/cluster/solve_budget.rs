@@ -4,16 +4,13 @@
 //! Never here: a clock, what a turn takes ([`super::super::turns::Took`] is measured on threads and in pools and declared in lockstep), the solve.
 
 use metachron_contact::detect::LEAST_STEPS_RANGE;
-use metachron_contact::step::ClusterReport;
+use metachron_contact::step::{ClusterReport, FACTORS_SAFE};
 
 /// A turn counts as much as the mean of so many before it.
 const TURNS_KEPT: u32 = 16;
 
 /// By how much of their mean the factors of turns must differ for what they say of the price to count as much as that mean.
 const TELLING_SPREAD: f64 = 0.1;
-
-/// An answer after so many factors is as good as the coarsest level's.
-const FACTORS_SAFE: u32 = 3;
 
 /// At least this share of a turn is the price of its factors: turns whose time hardly follows their factors do not make these free.
 const FACTORS_SHARE_MIN: f64 = 0.1;
@@ -52,7 +49,7 @@ impl Solved {
 /// Turns that all make the same number of factors do not say what these cost; then the whole turn counts as theirs. That is too dear for
 /// more factors and right for as many, so that a number that rises slowly finds the true price.
 ///
-/// What a rigid pile would cost as a problem again follows from the price of the last factors, its contacts and theirs.
+/// A rigid pile would cost as a problem again as much as the last factors did, for as many contacts as it has now.
 #[derive(Debug, Clone, Copy, PartialEq, Default, serde::Serialize, serde::Deserialize)]
 pub(in super::super) struct FactorPrice {
     turns: u32,
@@ -95,27 +92,48 @@ impl FactorPrice {
 
     /// How long a factor takes, seconds; `None` before the first.
     pub fn factor_s(&self) -> Option<f64> {
-        let mean_s = (self.turns > 0).then(|| self.turn_s / self.factors)?;
+        let mean_s = self.mean_s()?;
+        Some(self.found_s(mean_s).clamp(FACTORS_SHARE_MIN * mean_s, mean_s))
+    }
+
+    /// The part of it that turns of different numbers of factors have shown: what a guess adds is left out.
+    fn shown_s(&self) -> Option<f64> {
+        let mean_s = self.mean_s()?;
+        Some(self.found_s(0.0).clamp(FACTORS_SHARE_MIN * mean_s, mean_s))
+    }
+
+    /// The time of a turn for each of its factors.
+    fn mean_s(&self) -> Option<f64> {
+        (self.turns > 0).then(|| self.turn_s / self.factors)
+    }
+
+    /// The slope of the time over the factors, drawn to `guess_s` where turns hardly differ.
+    fn found_s(&self, guess_s: f64) -> f64 {
         let trust = (TELLING_SPREAD * self.factors) * (TELLING_SPREAD * self.factors);
-        let found_s = (self.covariance_s + trust * mean_s) / (self.variance + trust);
-        Some(found_s.clamp(FACTORS_SHARE_MIN * mean_s, mean_s))
+        (self.covariance_s + trust * guess_s) / (self.variance + trust)
     }
 
     /// How many factors each solve has time for in a turn that takes `turn_s` seconds and is `late_s` seconds behind; `None` where there is time for
-    /// as many as any solve makes, `least` where no price is known yet.
+    /// as many as any solve makes. Where no price is known yet `least`, or [`FACTORS_SAFE`] where that is more.
     ///
-    /// Fewer than [`FACTORS_SAFE`] only where so many are the greater part of a turn that is not late: neither lateness nor what else a turn does gets
-    /// less by solving less.
+    /// Fewer than [`FACTORS_SAFE`] are given where these alone are known to fill a turn, and to be the greater part of it. A turn that is late, or
+    /// that other work fills, gets no shorter by solving less.
     pub fn factors_max(&self, turn_s: f64, late_s: f64, least: u32) -> Option<u32> {
-        let Some(factor_s) = self.factor_s() else { return Some(least) };
-        let rest_s = self.turn_s - factor_s * self.factors;
-        let solves_s = factor_s * self.solves * self.more_contacts;
-        // a turn that takes no time leaves time for all
-        let within =
-            |turn_s: f64| Some((turn_s - rest_s) / solves_s).filter(|each| !each.is_nan()).unwrap_or(f64::INFINITY);
         let safe = f64::from(FACTORS_SAFE);
-        let floor = if safe * solves_s > rest_s { within(turn_s).clamp(0.0, safe) } else { safe };
-        let each = within(turn_s - late_s).max(floor);
+        let (Some(factor_s), Some(shown_s)) = (self.factor_s(), self.shown_s()) else {
+            return Some(least.max(FACTORS_SAFE));
+        };
+        let within = |factor_s: f64, turn_s: f64| {
+            let rest_s = self.turn_s - factor_s * self.factors;
+            let solves_s = factor_s * self.solves * self.more_contacts;
+            let each = (turn_s - rest_s) / solves_s;
+            // a turn that takes no time leaves time for all
+            let each = if each.is_nan() { f64::INFINITY } else { each };
+            (each, safe * solves_s > rest_s)
+        };
+        let (shown, is_greater_part) = within(shown_s, turn_s);
+        let floor = if is_greater_part { shown.clamp(0.0, safe) } else { safe };
+        let each = within(factor_s, turn_s - late_s).0.max(floor);
         (each < f64::from(*LEAST_STEPS_RANGE.end())).then_some(each as u32)
     }
 }
@@ -189,9 +207,10 @@ mod tests {
     fn each_of_several_solves_gets_its_share_of_the_time_there_is() {
         let mut price = FactorPrice::default();
         assert_eq!(price.factors_max(1.0, 0.0, 5), Some(5), "nothing is known");
+        assert_eq!(price.factors_max(1.0, 0.0, 1), Some(FACTORS_SAFE), "nothing is known of safe ones either");
         price.note(Solved { solves: 4, factors: 40, products: 0, contacts: 8, pile_contacts: 0 }, 0.4e-3);
         assert_eq!(price.factors_max(0.801e-3, 0.0, 5), Some(20));
-        assert_eq!(price.factors_max(0.041e-3, 0.0, 5), Some(1), "a factor of each takes all the time there is");
+        assert_eq!(price.factors_max(0.041e-3, 0.0, 5), Some(FACTORS_SAFE), "one turn may be anything's");
         assert_eq!(price.factors_max(0.1, 0.0, 5), None, "there is time for all");
         price.note(Solved { solves: 4, factors: 0, products: 90, contacts: 8, pile_contacts: 0 }, 5e-3);
         price.note(Solved { solves: 0, factors: 0, products: 0, contacts: 0, pile_contacts: 0 }, 1e-4);
@@ -209,14 +228,16 @@ mod tests {
     #[test]
     fn a_rigid_pile_is_priced_by_its_contacts_as_a_problem_solved_once() {
         let mut price = FactorPrice::default();
-        let solved = Solved { solves: 4, factors: 40, products: 0, contacts: 100, pile_contacts: 0 };
-        price.note(solved, 0.4e-3);
-        assert_eq!(price.factors_max(0.081e-3, 0.0, 5), Some(2));
+        // 10 µs a factor, and nothing else
+        let solved = |factors: u32| Solved { solves: 4, factors, products: 0, contacts: 100, pile_contacts: 0 };
+        (0..64).map(|k| 4 + 72 * (k % 2)).for_each(|factors| price.note(solved(factors), 10e-6 * f64::from(factors)));
+        let left = price.factors_max(0.085e-3, 0.0, 5);
+        assert_eq!(left, Some(2), "each of four solves has 20 µs");
         for _ in 0..1000 {
-            price.note(Solved { solves: 0, factors: 0, contacts: 50, pile_contacts: 50, ..solved }, 0.02e-3);
+            price.note(Solved { solves: 0, factors: 0, contacts: 50, pile_contacts: 50, ..solved(0) }, 0.02e-3);
         }
         // a quarter of the solves, and each factor of half the contacts
-        assert_eq!(price.factors_max(0.081e-3, 0.0, 5), Some(16));
+        assert_eq!(price.factors_max(0.0825e-3, 0.0, 5), Some(16));
     }
 
     #[test]

@@ -379,10 +379,11 @@ fn agents(c: &mut Checker<'_, '_>, entries: &[Entry], known: &Known<'_>, context
     let mut next = 0;
     for entry in moving {
         c.begin_object(entry.copies.len());
-        c.may_make(&entry.place, "grid", Cost::AGENT);
+        let asks = if entry.copies.len() > 1 { "grid" } else { "model" };
+        c.may_make(&entry.place, asks, Cost::AGENT);
         if let Some(member) = member(c, entry, AgentId(next), known, context) {
             firsts.push((entry, members.len()));
-            if c.may_make(&entry.place, "grid", Cost::division(&member.spec)) {
+            if c.may_make(&entry.place, asks, Cost::division(&member.spec)) {
                 members.extend(entry.copies.members(&member));
             }
         }

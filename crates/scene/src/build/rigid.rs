@@ -317,14 +317,27 @@ impl ShapeKeys<'_> {
                 let Aabb { low, high } = Aabb::of(&points_m);
                 let tolerance_m = given_m.unwrap_or(HULL_WITHIN_M.min(HULL_SHARE * low.distance(high)));
                 let points_m = if tolerance_m > 0.0 { hull_corners(&points_m, tolerance_m).into() } else { points_m };
-                sound(c, place, Solid::Hull { points_m })?
+                self.sound(c, place, Solid::Hull { points_m })?
             }
             Shape::Mesh => {
                 let (points_m, triangles) = self.surface(c, place, among)?;
-                sound(c, place, Solid::Mesh { points_m, triangles })?
+                self.sound(c, place, Solid::Mesh { points_m, triangles })?
             }
             Shape::Compound => return None,
         })
+    }
+
+    /// The solid, if the physics can make a shape of it.
+    fn sound(&self, c: &mut Checker<'_, '_>, place: &Place, solid: Solid) -> Option<Solid> {
+        match solid.to_shared_shape() {
+            Ok(_) => Some(solid),
+            Err(why) => {
+                let file = self.file.map_or_else(String::new, |file| format!("`{file}` "));
+                let what = format_args!("{file}has no usable shape: {why}");
+                c.wrong(place, "file", what, "expected the points of a solid");
+                None
+            }
+        }
     }
 
     /// The points of a hull.
@@ -419,17 +432,6 @@ fn part(c: &mut Checker<'_, '_>, place: &Place, file: &PartFile, among: PartCont
 
 /// Points of a mesh, metres, and its triangles.
 type Surface = (Arc<[DVec3]>, Arc<[[u32; 3]]>);
-
-/// The solid, if the physics can make a shape of it.
-fn sound(c: &mut Checker<'_, '_>, place: &Place, solid: Solid) -> Option<Solid> {
-    match solid.to_shared_shape() {
-        Ok(_) => Some(solid),
-        Err(why) => {
-            c.wrong(place, "file", format_args!("has no usable shape: {why}"), "expected the points of a solid");
-            None
-        }
-    }
-}
 
 /// Its mass: that of the file, or that of `solid` of `density`, kg/m³.
 fn mass(c: &mut Checker<'_, '_>, place: &Place, file: &RigidFile, solid: &Solid, density: f64) -> f64 {

@@ -139,7 +139,7 @@ fn embedded_image(name: &str, source: &Source) -> Result<Option<Texture>, String
     glb::image(&bytes)?.map(|image| decode(image, Wrap::Corners)).transpose()
 }
 
-/// What an image takes; one whose head does not say its size takes nothing, and is refused when it is read.
+/// The memory of an image; one whose head does not say its size takes nothing, and is refused when it is read.
 fn image_cost(head: &FileHead) -> Cost {
     let pixels = size_of(&head.start).map_or(0, |[width, height]| u64::from(width) * u64::from(height));
     Cost::image(pixels)

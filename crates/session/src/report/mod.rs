@@ -179,7 +179,7 @@ pub struct ClusterRow {
     pub products: f64,
     /// Problems whose solve ended before all laws of contact held to the tolerance.
     pub unfinished: u64,
-    /// How far the solves of the last step went: `kept`, `near`, `polished` or, where one ended before all laws held, `interior`.
+    /// How far the solves of the last step went: `kept`, `near`, `polished` or, where one ended before all laws held, `interior`; `rigid-pile` where rapier3d stepped a heap.
     pub level: &'static str,
     /// What laws and momentum miss at most by their answers, m/s.
     pub miss_m_s: f64,
