@@ -57,10 +57,7 @@ pub(super) fn command(args: &ImportArgs) -> anyhow::Result<Exit> {
     match checked {
         Ok(Checked { scene, files_outside }) => {
             print_overlaps(&scene);
-            if files_outside > 0 {
-                let hint = "run the scene with --allow-outside, or import it with --copy-meshes";
-                message(&format!("note: {model}: meshes outside of the scene's folder: {files_outside}; {hint}"));
-            }
+            print_outside(args, files_outside);
         }
         Err(error) => {
             message(&rendered(&error));
@@ -84,6 +81,15 @@ pub(super) fn command(args: &ImportArgs) -> anyhow::Result<Exit> {
         }
     }
     Ok(Exit::Ok)
+}
+
+/// Says how many meshes are outside of the scene's folder, if any are.
+fn print_outside(args: &ImportArgs, files: usize) {
+    if files > 0 {
+        let (model, hint) =
+            (args.model.display(), "run the scene with --allow-outside, or import it with --copy-meshes");
+        message(&format!("note: {model}: meshes outside of the scene's folder: {files}; {hint}"));
+    }
 }
 
 /// Writes the meshes of a scene into its folder, if each of them may be.
