@@ -271,7 +271,7 @@ fn a_replay_takes_from_the_recording_how_far_solves_went() {
         assert!(solves.unfinished > 0 && solves.contacts > 50, "the budget ends some: {solves:?}");
         let recording = kept.read().unwrap();
         let hash = recording.hash();
-        // by itself it would go on to the end
-        assert_eq!(Some(replayed(&pile(400), recording).hash()), hash, "{executor:?}");
+        // a replay takes other times than the run: by these its solves would end elsewhere
+        assert_eq!(Some(replayed(&pile(1), recording).hash()), hash, "{executor:?}");
     }
 }
