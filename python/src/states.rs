@@ -1,6 +1,6 @@
 //! The newest states of all objects as arrays.
 //!
-//! In: a world. Out: arrays that nobody can write to. Never here: a lock, what only some objects have ([`crate::state`]).
+//! In: a world. Out: read-only arrays. Never here: a lock, what only some objects have ([`crate::state`]).
 
 use crate::numbers::{array, rows};
 use crate::state::Points;
@@ -10,7 +10,7 @@ use metachron::world::World;
 use numpy::{PyArray1, PyArray2};
 use pyo3::prelude::*;
 
-/// The newest states of all objects, in one call. It never changes; nobody can write to its arrays.
+/// The newest states of all objects, in one call. It never changes; its arrays are read-only.
 #[pyclass(frozen, get_all, module = "metachron")]
 pub struct States {
     /// Of the n objects.

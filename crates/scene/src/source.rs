@@ -278,7 +278,7 @@ impl Source {
     }
 }
 
-/// Whether the file called `name` in a folder lies outside of it: by its path, so that nobody learns what is there, or behind links.
+/// Whether the file called `name` in a folder lies outside of it: by its path, which is not looked up, or behind links.
 fn is_outside(folder: &Path, name: &Path) -> bool {
     let mut depth = 0;
     for part in name.components() {

@@ -300,7 +300,7 @@ fn is_news(begun: &mut Vec<(Object, Touched)>, object: Object, what: &Happening,
     }
 }
 
-/// What happened, with the names of what took part.
+/// An event, with the names of the objects that took part.
 fn named(world: &World, object: Object, at: SimTime, what: Happening) -> Event {
     let name = |of: Touched| Arc::from(world.name(of).unwrap_or_default());
     let other = match what {

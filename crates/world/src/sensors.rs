@@ -123,7 +123,7 @@ impl JointRef {
 /// A joint as a world lists it.
 #[derive(Debug, Clone, Copy)]
 pub struct ListedJoint<'a> {
-    /// What commands and coordinates name it by.
+    /// The reference by which commands and coordinates name it.
     pub at: JointRef,
     /// Its name; `None` where it has none.
     pub name: Option<&'a str>,

@@ -29,7 +29,7 @@ fn turned(rotation: DQuat) -> SceneBuilder {
         .sensor("imu", SensorOn::ImuAt("free".into(), Site { at_m: None, rotation }))
 }
 
-/// What is seen of a world in which all is turned by `rotation`, at its start and by commands.
+/// The visible part of a world in which all is turned by `rotation`, at its start and by commands.
 fn seen(rotation: DQuat) -> Vec<f64> {
     let world = World::start(&turned(rotation).build().unwrap(), ExecutorKind::Lockstep).unwrap();
     let [free, led] = world.objects(["free", "led"]).unwrap();

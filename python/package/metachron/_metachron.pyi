@@ -438,7 +438,7 @@ class State:
 
 @final
 class States:
-    """The newest states of all objects, in one call. It never changes; nobody can write to its arrays."""
+    """The newest states of all objects, in one call. It never changes; its arrays are read-only."""
 
     @property
     def names(self) -> list[str]:

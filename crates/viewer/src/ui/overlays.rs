@@ -138,7 +138,7 @@ pub fn messages(ui: &Ui, over: Rect, messages: &[Message]) {
     });
 }
 
-/// The button that brings the panels back where they are hidden: whoever finds the window so knows no key for it.
+/// The button that brings the panels back where they are hidden: a user who finds the window so knows no key for it.
 pub fn panels_button(ui: &Ui) -> Option<Command> {
     let keys = |command| commands::keys_text(ui.ctx(), command);
     let hover = format!(
