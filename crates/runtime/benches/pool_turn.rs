@@ -1,4 +1,4 @@
-//! What does a turn cost in a pool whose agents are always due, as they grow in number? Wall time, all workers busy.
+//! Cost of a turn in a pool whose agents are always due, against their number. Wall time, all workers busy.
 
 use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
 use metachron_core::{N_MAX, Resolution, ResolutionRange};

@@ -1,4 +1,4 @@
-//! What do publishing a state and reading the newest one cost, by the size of the state?
+//! Cost of publishing a state and of reading the newest one, against the size of the state.
 
 use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
 use metachron_runtime::SlotWriter;

@@ -35,8 +35,8 @@ const NO_LIMIT: u32 = u32::MAX;
 /// Longest stretched step of an agent that is behind.
 const STRETCHED_MAX: SimSpan = SimSpan::from_nanos(50_000_000);
 
-/// Near peers a stretched step is at most this multiple of the requested one, as a quotient: a sheet of 240 Hz that merges three of its
-/// steps into one throws off what rests on it.
+/// Near peers a stretched step is at most this multiple of the requested one, as a quotient: a sheet of 240 Hz that
+/// merges three of its steps into one throws off a body that rests on it.
 const STRETCHED_NEAR: (u64, u64) = (5, 2);
 
 /// And at most this long: the longest macro step of a cluster that is behind (docs/theory/clusters.md, section 9).

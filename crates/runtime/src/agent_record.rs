@@ -1,7 +1,9 @@
-//! What is known of a number as long as its run lives: its name, its newest state, and the agent, until that has left.
+//! The record of an agent's number for as long as its run lives: its name, its newest state, and the agent, until it
+//! has left.
 //!
-//! In: an agent, once it has begun, and again where it comes back. Out: the same, from any thread, without waiting, or that it has left.
-//! Numbers are never used again: of one whose agent has left this is all that there is. Never here: what an agent shows ([`super::handle`]).
+//! In: an agent, once it has begun, and again where it comes back. Out: the same, from any thread, without waiting, or
+//! that it has left. Numbers are never used again; of an agent that has left, the record is all that there is. Never
+//! here: what an agent shows ([`super::handle`]).
 
 use super::handle::Shared;
 use super::removed_agent::nothing;

@@ -44,7 +44,7 @@ pub(super) struct AgentRunner {
     pub carved: bool,
     pub observer: Observer,
     pub links: Vec<Link>,
-    /// What users do to it; `None` of an agent to which nothing was ever done.
+    /// The users' commands that act on it; `None` of an agent that was never sent any.
     pub loads: Option<Box<Loads>>,
     /// Its place in a contact cluster; `None` of an agent that is no member of any.
     pub cluster: Option<Box<ClusterSeat>>,
@@ -174,7 +174,7 @@ impl AgentRunner {
         self.note_price(timeline, took);
         let work_s = self.share_work(work_s);
         self.metrics.time_turn(&self.shared.gauges, turn_s);
-        // its own state comes last: where that is to be seen, those of all it leads are too
+        // its own state comes last: a reader that sees it also sees the states of all agents that it leads
         let mut published = self.conclude_led(timeline, took);
         published &= self.record_step(&open, timeline, wall, work_s);
         self.tell_turn(&open, self.id(), took);
@@ -229,7 +229,7 @@ impl AgentRunner {
             helped.cpu += cpu;
         };
         take(self.cluster.as_mut());
-        // those that caught up with it have made turns of their own within its turn
+        // agents that caught up with it have made turns of their own within its turn
         self.led.each(|actor| take(actor.cluster.as_mut()));
         let Helped { waited, cpu } = helped;
         let members = 1 + self.led.len() as u32;
@@ -298,7 +298,7 @@ impl AgentRunner {
     /// Obeys the commands that came in.
     ///
     /// # Errors
-    /// Where it leaves the run, or was moved to what is no state.
+    /// Where it leaves the run, or was moved to a state that is none.
     pub fn take_commands(&mut self) -> Result<(), String> {
         let mut pending = self.shared.mail.take();
         if pending.leaves {

@@ -27,7 +27,7 @@ impl Agents {
         self.all.push(agent);
     }
 
-    /// How many there are, those that have left included.
+    /// The number of agents, including agents that have left.
     #[must_use]
     pub fn len(&self) -> usize {
         self.all.count()
@@ -69,8 +69,9 @@ impl Agents {
         self.sleep.callers_turn.judge()
     }
 
-    /// Ends such a run from another thread, as its own thread does not return: the agent and those of its cluster are parked, commands are
-    /// refused, and no further turn begins where this one ends after all. Whether there was such a turn; nothing is done else.
+    /// Ends such a run from another thread, as its own thread does not return: the agent and the members of its cluster
+    /// are parked, commands are refused, and no further turn begins where this one ends after all. Whether there was
+    /// such a turn; nothing is done else.
     #[must_use]
     pub fn end_stalled(&self) -> bool {
         let is_stalled = self.sleep.callers_turn.park();

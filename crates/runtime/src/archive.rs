@@ -20,7 +20,8 @@ use std::collections::BTreeMap;
 use std::sync::Arc;
 use std::time::Duration;
 
-/// Makes an agent that joined the run of a state which is read, and that is not in the run which reads it: what it joined as, by its number.
+/// Makes an agent that joined the run of a state which is read, and that is not in the run which reads it: its spawn,
+/// by its number.
 pub type Absent<'a> = &'a mut dyn FnMut(AgentId) -> Result<AgentSpawn, ArchiveError>;
 
 /// A run in real time, which is saved and recorded between turns.
@@ -77,10 +78,11 @@ impl Cut {
         Self { all, run_agents, timeline, now, most: usize::MAX }
     }
 
-    /// Writes or reads agents, places, time and what executors in virtual time have besides: `events`; out come those of a state that was read.
+    /// Writes or reads agents, places, time and what executors in virtual time have besides: `events`; returns the
+    /// events of a state that was read.
     ///
     /// # Errors
-    /// Those of [`super::Run::archive`]; all is as it was then.
+    /// The errors of [`super::Run::archive`]; all is as it was then.
     pub fn archive(
         &mut self,
         archive: &mut Archive<'_>,
@@ -104,8 +106,8 @@ impl Cut {
         Ok(None)
     }
 
-    /// Reads and checks a state whole, and only then shows anything of it. What agents keep to themselves is read in place: where the state is
-    /// refused they take back what they had.
+    /// Reads and checks a state whole, and only then shows anything of it. The internal states of agents are read in
+    /// place: where the state is refused the agents take their former ones back.
     fn read(&mut self, archive: &mut Archive<'_>, absent: Absent<'_>) -> Result<Option<VirtualEvents>, ArchiveError> {
         let mut present = Vec::new();
         archive.value(&mut present)?;
@@ -130,7 +132,7 @@ impl Cut {
         Ok(state.events)
     }
 
-    /// Makes those that are `present` in a state and not in the run.
+    /// Makes the agents that are `present` in a state and not in the run.
     fn make(&self, present: &[bool], absent: Absent<'_>) -> Result<Made, ArchiveError> {
         let Self { all, run_agents, most, .. } = self;
         let mismatch = |what, found, expected| ArchiveError::Mismatch { what, found, expected };
@@ -154,10 +156,10 @@ impl Cut {
         Ok(made)
     }
 
-    /// Takes out of those what they keep to themselves that a state is read into.
+    /// Takes the internal states out of the agents that a state is read into.
     ///
     /// # Errors
-    /// Those of agents that do not save it; all have it then.
+    /// The errors of agents that do not save it; all have it then.
     fn take_own(&mut self, present: &[bool]) -> Result<OwnStates, ArchiveError> {
         let mut own = OwnStates::new();
         for at in (0..self.all.len()).filter(|at| present.get(*at) == Some(&true)) {
@@ -177,7 +179,8 @@ impl Cut {
         Ok(own)
     }
 
-    /// Makes agents as they were when that was taken. One whose model does not read what it has written itself is parked.
+    /// Puts the internal states back that were taken. An agent whose model does not read what it has written itself is
+    /// parked.
     fn take_back(&mut self, own: OwnStates) {
         for (at, own) in own {
             if let Some(Err(error)) = self.all[at].as_mut().map(|placed| placed.runner.take_back(own)) {
@@ -186,7 +189,7 @@ impl Cut {
         }
     }
 
-    /// Parks an agent: it makes its own turns then, none, and so do those that it led.
+    /// Parks an agent: it makes its own turns then, none, and so do the agents that it led.
     pub fn park(&mut self, at: usize, reason: &str) {
         let (id, sleep) = (AgentId(at as u32), &self.run_agents.sleep);
         if self.all.get(at).is_none_or(Option::is_none) {
@@ -231,7 +234,8 @@ impl Cut {
         }
     }
 
-    /// Shows what was read, of agents that are all there. Commands come after who sleeps: one that is sent meanwhile wakes who is to obey it.
+    /// Shows the state that was read, once all agents are there. Commands come after the sleep states: one that is sent
+    /// meanwhile wakes the agent that is to obey it.
     fn show(&mut self, state: &mut RunState) {
         let Self { all, run_agents: RunAgents { peers, sleep, .. }, .. } = self;
         for (one, present) in all.iter_mut().zip(&state.present) {
@@ -285,7 +289,7 @@ impl Cut {
     }
 }
 
-/// Says that no agent is absent: of what is written, and of runs of the same agents.
+/// Says that no agent is absent: for writing, and for runs of the same agents.
 ///
 /// # Errors
 /// [`ArchiveError::Mismatch`].
@@ -294,7 +298,8 @@ pub(super) fn refuse_absent(id: AgentId) -> Result<AgentSpawn, ArchiveError> {
     Err(ArchiveError::Mismatch { what: "an agent that joined", found, expected })
 }
 
-/// The runners of those that are `present` in a state, for each number: those of the run, and those that were made for it.
+/// The runners of the agents that are `present` in a state, for each number: the run's own, and runners made for the
+/// state.
 fn runners_of<'a>(
     all: &'a mut [Option<Placed>],
     made: &'a mut Made,
@@ -311,7 +316,7 @@ fn runners_of<'a>(
 }
 
 impl AgentRunner {
-    /// Tells readers of its events that it went back, and what it touches where it went back to.
+    /// Tells readers of its events that it went back, and its contacts in the state that it went back to.
     fn tell_rewound(&self) {
         self.tell(EventKind::Rewound);
         self.cluster.iter().for_each(|seat| seat.tell_contacts(self.pace.time(), &self.shared.streams));

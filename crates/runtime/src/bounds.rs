@@ -52,7 +52,7 @@ impl Bound {
     }
 
     fn check(self, value: f64) -> Result<(), OutOfBounds> {
-        // no comparison holds for what is no number
+        // NaN fails every comparison
         if (self.least..=self.most).contains(&value) { Ok(()) } else { Err(OutOfBounds { value, bound: self }) }
     }
 

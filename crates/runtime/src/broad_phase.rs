@@ -1,7 +1,8 @@
 //! Broad phase between agents: which agents may touch each other.
 //!
-//! In: the box that each agent publishes, and a bound of its speed. Out: for every agent a list of the peers near enough to touch within
-//! its next turns, and of those that have given impulses to it ([`NeighbourList`]). Agents exchange atomic words only: no agent waits for another.
+//! In: the box that each agent publishes, and a bound of its speed. Out: for every agent a list of the peers near
+//! enough to touch within its next turns, and of the peers that have given impulses to it ([`NeighbourList`]). Agents
+//! exchange atomic words only: no agent waits for another.
 //! A distant peer is not checked before the time at which it could be near (an appointment); an agent that becomes faster than its
 //! published speed enters itself in a common log, and is checked again.
 //! Never here: shapes, contacts, snapshots. A run in which no two agents could touch has no broad phase.
@@ -39,7 +40,7 @@ pub(super) struct BroadPhase {
     calls: Table<Calls>,
 }
 
-/// What a [`BroadPhase`] knows between turns.
+/// The state of a [`BroadPhase`] between turns.
 #[derive(Debug, Clone, serde::Serialize, serde::Deserialize)]
 pub(super) struct BroadPhaseState {
     bounds: Vec<Option<BoxWords>>,
@@ -127,7 +128,7 @@ impl BroadPhase {
         }
     }
 
-    /// Publishes that `id`, which has left, is so far away that nothing comes near it, and frees what has called it.
+    /// Publishes that `id`, which has left, is so far away that nothing comes near it, and frees its list of callers.
     pub fn publish_nowhere(&self, id: AgentId, time: SimTime) {
         let Some(published) = self.bounds.get(id.0 as usize) else { return };
         let nowhere = DVec3::splat(NOWHERE_M);
@@ -185,7 +186,7 @@ impl BroadPhase {
         (0..self.calls.len() as u32).for_each(|to| self.take_callers(AgentId(to), |_| {}));
     }
 
-    /// What agents have published of where they are, and whom they have called; called between turns.
+    /// The bounds that agents have published, and their calls of each other; called between turns.
     pub fn state(&self) -> BroadPhaseState {
         let callers = |to: u32| {
             let mut callers = Vec::new();

@@ -48,7 +48,7 @@ use std::sync::Arc;
 /// No overload stretches a macro step beyond this, unless it is longer anyway, seconds.
 const STRETCHED_MAX_S: f64 = 1.0 / 60.0;
 
-/// What an agent brings into the cluster that it is stepped in.
+/// The cluster side of an agent: its contacts, joints and bonds, and the solvers of the steps that it leads.
 pub(super) struct ClusterSeat {
     scene: Arc<ClusterScene>,
     /// Joints that hold it to other agents, the torn ones too.
@@ -59,11 +59,11 @@ pub(super) struct ClusterSeat {
     grips: Vec<Grip>,
     pairs: Vec<PairState>,
     contacts: Vec<ContactState>,
-    /// What contacts gave it in the last step, N and N·m.
+    /// The impulse of all contacts on it in the last step, N and N·m.
     wrench: Wrench,
-    /// What its joints gave in the last step.
+    /// The efforts of its joints in the last step.
     efforts: Vec<JointEffort>,
-    /// What happened to attachments, of those that it tells of.
+    /// The events of the attachments that it reports.
     events: Vec<AttachmentEvent>,
     /// Agents that belong into the same cluster, as it sees them.
     bonds: Vec<AgentId>,
@@ -72,7 +72,7 @@ pub(super) struct ClusterSeat {
     /// Work of its own steps in the last turn, in the unit of its model, and its share of the time of that turn, seconds.
     work: f64,
     work_s: f64,
-    /// What the turns that it leads took on helpers, as far as it is not accounted for.
+    /// The time that the turns that it leads took on helpers, as far as it is not accounted for.
     helped: Helped,
     /// Which of the steps that it leads are repeated in halves, and by what.
     schedule: DoublingSchedule,
@@ -99,7 +99,7 @@ pub(super) struct ClusterSeat {
     ids: Vec<AgentId>,
 }
 
-/// The solvers of the steps that a seat leads, and those that repeat them.
+/// The solvers of the steps that a seat leads, and of the steps that repeat them.
 pub(super) struct Steppers {
     stepper: Option<Box<ClusterStepper>>,
     doubling: Option<Box<StepDoubling>>,
@@ -112,7 +112,7 @@ struct Wish {
     step_s: f64,
 }
 
-/// What the steps of a member cost in a turn.
+/// The cost of a member's steps in a turn.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct MemberCost {
     pub model: &'static str,
@@ -123,7 +123,7 @@ pub(super) struct MemberCost {
 /// How long a step may be.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) enum Span {
-    /// What the agent that makes it wants; a cluster's is stretched as its leader's is longer than usual.
+    /// As long as the agent that makes it wants; a cluster's is stretched as its leader's is longer than usual.
     Wanted(SimSpan),
     /// No longer than this, to come to a given time.
     AtMost(SimSpan),
@@ -259,7 +259,7 @@ impl ClusterSeat {
         (self.stepper, self.doubling) = (stepper, doubling);
     }
 
-    /// What the turns that it leads took on helpers, as far as it is not accounted for.
+    /// The time that the turns that it leads took on helpers, as far as it is not accounted for.
     pub const fn helped(&self) -> Helped {
         self.helped
     }
@@ -269,7 +269,7 @@ impl ClusterSeat {
         std::mem::take(&mut self.helped)
     }
 
-    /// What repeats the step that it leads next, its `steps`-th, in halves where that is due.
+    /// The doubling that repeats the step that it leads next, its `steps`-th, in halves; `None` where doubling is off.
     fn repeats(&mut self, steps: u64, me: AgentId) -> Option<Box<StepDoubling>> {
         let begins = self.schedule.begins(steps, me);
         self.schedule.is_on().then(|| {
@@ -303,7 +303,7 @@ fn holds(neighbour: &Neighbour, me: AgentId) -> Option<AgentId> {
     tool.grasp.filter(|grasp| grasp.target == me).map(|_| neighbour.id)
 }
 
-/// What users do to an agent in a step of `dt` from `time`.
+/// The users' commands that act on an agent in a step of `dt` from `time`.
 fn prepared(loads: &mut Option<Box<Loads>>, time: SimTime, dt: SimSpan) -> &Acting {
     static NOTHING: Acting = Acting::NOTHING;
     let Some(loads) = loads else { return &NOTHING };
@@ -391,7 +391,7 @@ impl AgentRunner {
             return Err(broken.to_owned());
         }
         let dt = SimSpan::from_secs_f64(macro_s).filter(|dt| *dt > SimSpan::ZERO);
-        // what is left to a given time is taken whole, not as seconds
+        // the rest up to a given time is taken whole, not as seconds
         let dt = match span {
             Span::AtMost(most) if plan.macro_s >= most.as_secs_f64() => Some(most),
             _ => dt,
@@ -447,7 +447,7 @@ impl AgentRunner {
         }
     }
 
-    /// What the last turn cost of its own body and of each that it leads.
+    /// The cost of the last turn, for its own body and each that it leads.
     pub fn member_costs(&self) -> impl Iterator<Item = MemberCost> + '_ {
         std::iter::once(self)
             .chain(self.led.all())

@@ -72,7 +72,8 @@ impl Command {
         self
     }
 
-    /// To another place: the origin of a rigid body's axes, or the centre of mass of what bends, metres, and by how much it turns.
+    /// To another place: the origin of a rigid body's axes, or the centre of mass of a deformable, metres, and by how
+    /// much it turns.
     #[must_use]
     pub fn teleport(position_m: DVec3, rotation: DQuat) -> Self {
         Self::SetMotion(SetMotion { position_m: Some(position_m), rotation: Some(rotation), ..SetMotion::default() })

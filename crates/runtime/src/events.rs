@@ -1,4 +1,4 @@
-//! What happens to an agent, for those who ask.
+//! Events of an agent, for readers that ask for them.
 //!
 //! In: events, from the thread that steps the agent. Out: the same to each reader ([`super::ring`]). Never here: which events a reader wants.
 
@@ -14,15 +14,15 @@ pub const EVENTS_KEPT: usize = 128;
 pub struct AgentEvent {
     /// When: the end of the step in which it happened.
     pub at: SimTime,
-    /// What.
+    /// The event.
     pub kind: EventKind,
 }
 
-/// What can happen to an agent.
+/// The kinds of events of an agent.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[non_exhaustive]
 pub enum EventKind {
-    /// It began to touch something. Of two agents the one of the lower number tells of it.
+    /// It began to touch something. Of two agents the one of the lower number reports it.
     ContactBegan(ContactEvent),
     /// It presses by a quarter more than was told of it so far, in the mean of a step.
     ContactGrew(ContactEvent),
@@ -42,7 +42,7 @@ pub enum EventKind {
     Joined(AgentId),
     /// It makes its own turns again.
     Left,
-    /// One of its attachments slipped for the first time, or tore: those of its snapshots say which.
+    /// One of its attachments slipped for the first time, or tore: its snapshots say which.
     AttachmentGave,
     /// It could not keep its rate, and gave up time.
     RateMissed,
@@ -55,7 +55,7 @@ pub enum EventKind {
 /// A contact when it began, in its first step, when it grew, or when it ended.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ContactEvent {
-    /// What it touches.
+    /// The object or solid that it touches.
     pub with: ContactPartner,
     /// The place that bore most, metres; where it is not known, not a number.
     pub point_m: DVec3,

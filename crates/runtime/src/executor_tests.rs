@@ -24,7 +24,7 @@ use std::time::{Duration, Instant};
 
 const GRAVITY: DVec3 = DVec3::new(0.0, 0.0, -9.81);
 
-/// What makes the turns of a run.
+/// The executors that make the turns of a run.
 #[derive(Debug, Clone, Copy, PartialEq)]
 enum Executor {
     Lockstep,

@@ -1,7 +1,8 @@
 //! A run on one thread that makes the turns of a run in real time again, to the bit.
 //!
-//! In: agents, the parts of their turns in the order in which they were made ([`super::turn_order`]), what was done to them in between. Out:
-//! the states that they had. Time is what the readings of the clock say. Never here: when a turn is due, how what was done is read.
+//! In: agents, the parts of their turns in the order in which they were made ([`super::turn_order`]), the calls in
+//! between. Out: the states that they had. Time is what the readings of the clock say. Never here: when a turn is due,
+//! how the calls are read.
 
 use super::Run;
 use super::agent_clock::{Timeline, TimelineCommand};
@@ -95,7 +96,7 @@ impl Follower {
     /// Puts all into the state in `archive`, as a run in real time did whose clock read `wall`.
     ///
     /// # Errors
-    /// Those of [`Run::archive`].
+    /// The errors of [`Run::archive`].
     pub fn restore(
         &mut self,
         archive: &mut Archive<'_>,
@@ -109,7 +110,7 @@ impl Follower {
     /// Takes up an agent as [`Run::add`] does, which begins at `at`.
     ///
     /// # Errors
-    /// Those of [`Run::add`].
+    /// The errors of [`Run::add`].
     pub fn add_at(&mut self, spawn: AgentSpawn, at: SimTime) -> Result<AgentHandle, RunError> {
         let actor = self.all.join(spawn, at)?;
         let handle = self.all.handles[actor.id().0 as usize].clone();

@@ -1,4 +1,5 @@
-//! An agent's contact shape, for those who touch, draw and ask: the newest, which is another one where matter was taken out of the agent.
+//! An agent's contact shape, for contact, pictures and queries: the newest, which is another one where matter was taken
+//! out of the agent.
 //!
 //! In: the shape at the start, and each one after. Out: the newest, without waiting. A shape never changes; a reader knows a new one by its
 //! address. Whatever state of the agent it is read with, its vertices are those of the state. Never here: when an agent has another shape.

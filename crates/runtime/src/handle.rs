@@ -58,7 +58,7 @@ pub(super) struct Identity {
     pub wanted_hz: f64,
     /// Where its joints are, if there is one whose first body it is and that can have a motor.
     pub motored: Option<Arc<ClusterScene>>,
-    /// What it takes of what users do to it ([`metachron_contact::Agent::inputs`]).
+    /// The kinds of users' inputs that it takes ([`metachron_contact::Agent::inputs`]).
     pub inputs: Inputs,
     /// Whether the run began with it. Nothing outside can make such an agent again as it was, with its governor and its ties: where it leaves it
     /// keeps them and its model, and comes back with a state that is read.
@@ -218,7 +218,7 @@ impl AgentHandle {
         self.live().map_or(REMOVED, |shared| shared.model())
     }
 
-    /// What it takes of what users do to it; nothing once it has left.
+    /// The kinds of users' inputs that it takes; nothing once it has left.
     #[must_use]
     pub fn inputs(&self) -> Inputs {
         self.live().map_or(Inputs::NONE, |shared| shared.inputs())
@@ -237,7 +237,8 @@ impl AgentHandle {
         self.latest().moment().max(SimTime::from_nanos(woken_at))
     }
 
-    /// The simulated time that it has not lived, where time is at `now`: what it dropped, and what it is behind. Zero of one that has failed or
+    /// The simulated time that it has not lived, where time is at `now`: its dropped time and its lag. Zero of one that
+    /// has failed or
     /// left.
     #[must_use]
     pub fn given_up(&self, now: SimTime) -> SimSpan {
@@ -354,7 +355,7 @@ impl AgentHandle {
     /// Lets it take another state before its next step, and wakes it; a state that does not fit changes nothing.
     ///
     /// # Errors
-    /// Those of [`Self::send`].
+    /// The errors of [`Self::send`].
     pub fn set_state(&self, state: Body) -> Result<(), SendError> {
         let shared = self.present()?;
         shared.check_takes(Inputs::of(&[Input::State]))?;
@@ -420,7 +421,7 @@ impl AgentHandle {
     }
 
     fn hear<E: RingEntry>(&self, heard: &mut Heard, of: fn(&Rings) -> &Ring<E>, take: impl FnMut(E)) -> u64 {
-        // looked up first: what has left by then has pushed all it had to tell before
+        // looked up first: an agent that has left by then has pushed all its events before
         let live = self.live();
         heard.hear(live.as_ref().map(|shared| &shared.streams), of, take)
     }

@@ -1,7 +1,8 @@
 //! Threads that help with turns: the members of a large cluster are stepped by several of them at the same time.
 //!
-//! In: the turn of a cluster. Out: what it returns, and what it took on threads other than the caller's. The bits do not depend on who makes
-//! what ([`metachron_core::parallel`]). Never here: which turns are worth it, what is done side by side.
+//! In: the turn of a cluster. Out: its return value, and its time on threads other than the caller's. The bits do not
+//! depend on who makes what ([`metachron_core::parallel`]). Never here: which turns are worth it, what is done side by
+//! side.
 
 use super::cpu::thread_time;
 use super::priority::Priority;
@@ -22,7 +23,7 @@ pub(super) struct Helpers {
     priority: Priority,
 }
 
-/// What turns took while others made them.
+/// The time of turns while other threads made them.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub(super) struct Helped {
     /// Wall time for which the caller waited.

@@ -6,7 +6,7 @@
 //! Every executor makes the same turns of an agent behind the same interface, [`Run`], so that there is one frame loop: [`Threads`]
 //! gives each agent its own thread and real time; [`Pool`] shares a few threads among thousands; [`Lockstep`] runs all in virtual time
 //! on a declared [`Machine`], bit-identical from run to run. Agents near enough to touch see each other without being linked (`broad_phase`),
-//! and those that may touch or are tied step as one problem, a cluster, in the turns of one of them (`cluster`).
+//! and agents that may touch or are tied step as one problem, a cluster, in the turns of one of them (`cluster`).
 //!
 //! ```
 //! use glam::DVec3;
@@ -161,7 +161,8 @@ pub trait Run: Send {
     fn shutdown(self: Box<Self>) -> Vec<AgentStats>;
 
     /// Writes the state of the run and of all its agents to an archive, or reads it from one into a run of the same first agents, which then
-    /// goes on as that run did; in lockstep to the bit. Agents that joined since are taken out, those that left since are put back: an agent
+    /// goes on as that run did; in lockstep to the bit. Agents that joined since are taken out, agents that left since
+    /// are put back: an agent
     /// that joined the run of the state and is not in this one is made by `absent`. In real time all turns in progress end first, each agent at
     /// a time of its own, and the clock goes on from where it is. Watched points keep their samples. A state that one executor has written
     /// another can read.
@@ -175,7 +176,7 @@ pub trait Run: Send {
     /// Writes the state of the run ([`Run::archive`]).
     ///
     /// # Errors
-    /// Those of [`Run::archive`].
+    /// The errors of [`Run::archive`].
     fn save(&mut self, archive: &mut Archive<'_>) -> Result<(), ArchiveError> {
         self.archive(archive, &mut refuse_absent)
     }
@@ -185,7 +186,7 @@ pub trait Run: Send {
     /// not keep this from returning.
     ///
     /// # Errors
-    /// Those of [`Run::archive`]; the order is not noted then.
+    /// The errors of [`Run::archive`]; the order is not noted then.
     fn record(&mut self, order: Arc<TurnOrder>, begun: Option<&mut Archive<'_>>) -> Result<(), ArchiveError> {
         drop(order);
         begun.map_or(Ok(()), |archive| self.save(archive))

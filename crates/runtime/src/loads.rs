@@ -1,6 +1,7 @@
-//! What users do to an agent: springs, forces, impulses, motors and poses, each for as long as it was sent for.
+//! Users' commands that act on an agent: springs, forces, impulses, motors and poses, each for as long as it was sent
+//! for.
 //!
-//! In: commands as the mailbox hands them over. Out: what acts in a step. Never here: what a step makes of it.
+//! In: commands as the mailbox hands them over. Out: the loads of a step. Never here: their effect in the step.
 
 use super::mailbox::{Keyed, PendingCommands};
 use metachron_contact::{AnchorForce, AnchorSpring, PoseGoal, SetMotor};
@@ -15,12 +16,12 @@ pub(super) struct Loads {
     /// At most one, as it is when the agent takes it.
     poses: Vec<Lasting<Led>>,
     impulses: Vec<Blow>,
-    /// What acts in the step that was prepared last.
+    /// The loads of the step that was prepared last.
     #[serde(skip)]
     acting: Acting,
 }
 
-/// What acts in a step.
+/// The loads of a step.
 #[derive(Debug, Default)]
 pub(super) struct Acting {
     pub springs: Vec<AnchorSpring>,
@@ -32,7 +33,7 @@ pub(super) struct Acting {
 }
 
 impl Acting {
-    /// What acts on an agent to which nothing is done.
+    /// No loads.
     pub const NOTHING: Self = Self { springs: Vec::new(), forces: Vec::new(), motors: Vec::new(), pose: None };
 }
 
@@ -94,7 +95,7 @@ impl Loads {
         acting.forces.extend(impulses.iter().map(|blow| scaled(blow.impulse, dt_s.recip())));
     }
 
-    /// What acts in the step prepared last.
+    /// The loads of the step prepared last.
     pub const fn acting(&self) -> &Acting {
         &self.acting
     }
@@ -112,7 +113,7 @@ impl<T> Lasting<T> {
     }
 }
 
-/// Puts what was sent in the place of what had the same key.
+/// Replaces each entry by the one that was sent with the same key.
 fn update<T, U>(mine: &mut Vec<Lasting<U>>, sent: &mut Vec<Keyed<T>>, now: SimTime, taken: impl Fn(T) -> U) {
     for Keyed { key, what, lasts } in sent.drain(..) {
         mine.retain(|old| old.key != key);

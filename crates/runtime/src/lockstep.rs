@@ -36,7 +36,7 @@ pub struct Lockstep {
     timeline: Timeline,
     now: Duration,
     entries: Vec<AgentEntry>,
-    /// Due times of the turns of waiting agents, without those that the timeline never reaches.
+    /// Due times of the turns of waiting agents, without turns that the timeline never reaches.
     due: BinaryHeap<Reverse<(Duration, u32)>>,
     cores: Cores,
     all: RunAgents,

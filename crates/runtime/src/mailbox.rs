@@ -46,14 +46,14 @@ pub enum Command {
 pub struct Keyed<T> {
     /// Its name: the newest of a key takes the place of the older. Below [`KEYS`], but for motors.
     pub key: u32,
-    /// What it is; `None` takes it back.
+    /// The command; `None` takes the one of this key back.
     pub what: Option<T>,
     /// For how long it acts, in the agent's time, from when the agent takes it; `None` until it is taken back.
     pub lasts: Option<SimSpan>,
 }
 
 impl Command {
-    /// What an agent must take that takes this.
+    /// The inputs that an agent must take to obey it.
     #[must_use]
     pub fn needs(&self) -> Inputs {
         let acts =
@@ -91,7 +91,7 @@ pub enum SendError {
     /// There is no such agent.
     #[error("there is no agent {} in this run", .0.0)]
     NoAgent(AgentId),
-    /// The command holds a number that is not finite or outside its range: what it must be.
+    /// The command holds a number that is not finite or outside its range; the text says the range.
     #[error("{0}")]
     BadNumber(&'static str),
     /// The command, or the state, holds a number that is beyond the bound of its kind.
@@ -109,9 +109,9 @@ pub enum SendError {
         name: Arc<str>,
         /// Its model.
         model: &'static str,
-        /// What the command needs.
+        /// The input that the command needs.
         lacks: Input,
-        /// What the agent takes.
+        /// The inputs that the agent takes.
         takes: Inputs,
     },
     /// There is no joint of that number that can have a motor and whose first agent this is.
@@ -145,7 +145,7 @@ pub(super) struct Mailbox {
 pub struct AwaitedMotion {
     /// Another whole state.
     pub state: Option<Body>,
-    /// Another place or velocity; what it leaves open stays.
+    /// Another place or velocity; fields that it leaves open stay.
     pub motion: SetMotion,
 }
 
@@ -220,7 +220,7 @@ impl Mailbox {
         Ok(())
     }
 
-    /// What waits, if anything does.
+    /// The waiting commands, if there are any.
     pub fn waiting(&self) -> Option<PendingCommands> {
         let pending = self.pending.get().filter(|_| self.has_pending())?;
         Some(pending.lock().unwrap_or_else(PoisonError::into_inner).clone())
@@ -322,7 +322,7 @@ impl PendingCommands {
     }
 }
 
-/// Puts `new` in the place of what has its key.
+/// Puts `new` in the place of the entry with its key.
 fn renew<T>(all: &mut Vec<Keyed<T>>, new: Keyed<T>) {
     match all.iter_mut().find(|old| old.key == new.key) {
         Some(old) => *old = new,
@@ -342,7 +342,7 @@ fn key(command: &Command) -> Option<u32> {
 /// Whether the numbers of a command are in their ranges.
 ///
 /// # Errors
-/// What they must be.
+/// The range that was missed.
 fn check(command: &Command) -> Result<(), SendError> {
     let wanted = |is_good: bool, wanted| if is_good { Ok(()) } else { Err(SendError::BadNumber(wanted)) };
     match command {

@@ -97,7 +97,7 @@ pub struct AgentStats {
 }
 
 impl AgentStats {
-    /// Those of an agent that has left and of which nothing is kept.
+    /// The figures of an agent that has left and of which nothing is kept.
     pub(super) fn of_removed(id: AgentId, name: &str) -> Self {
         let (none, times) = (SimSpan::ZERO, Spread::default());
         Self {

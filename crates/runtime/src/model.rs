@@ -14,7 +14,7 @@ use std::hint::black_box;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::Arc;
 
-/// A model, with what is known of its code.
+/// A model with the state of its calls.
 pub(super) struct Model {
     agent: Box<dyn Agent>,
     /// Has the mark of its calls.
@@ -69,7 +69,7 @@ impl Model {
 
     /// Reads a word of it ([`super::prefetch`]).
     pub fn fetch(&mut self) {
-        // its turn finds what is wrong with it
+        // a fault of the model shows in its turn
         drop(self.call(|agent| black_box(agent.resolution())));
     }
 

@@ -26,7 +26,7 @@ use std::sync::{Arc, OnceLock};
 pub(super) struct Peers {
     pub all: Agents,
     pub broad_phase: BroadPhaseSlot,
-    /// Who helps with the turns of large clusters.
+    /// The helpers with the turns of large clusters.
     pub helpers: Helpers,
     /// Whether the order of turns is noted, or followed: what a turn publishes is seen by the next.
     pub is_ordered: AtomicBool,
@@ -62,7 +62,7 @@ impl BroadPhaseSlot {
         self.made.get().inspect(|broad_phase| broad_phase.clear());
     }
 
-    /// What agents have published in it; `None` where it is not in use. Called between turns.
+    /// The bounds that agents have published in it; `None` where it is not in use. Called between turns.
     pub fn state(&self) -> Option<BroadPhaseState> {
         self.get().map(BroadPhase::state)
     }
@@ -119,7 +119,8 @@ impl Source {
 }
 
 impl Shared {
-    /// By which it is settled who computes its asynchronous pairs: never what moves as it is led, which nothing that it is given moves.
+    /// By this it is settled which side computes its asynchronous pairs: never a kinematic body, which no impulse
+    /// moves.
     fn clock(&self) -> PairClock {
         let step_s = if self.inputs().has(Input::Pose) { f64::INFINITY } else { self.wanted_hz().recip() };
         PairClock { id: self.id, step_s }
@@ -217,8 +218,8 @@ impl Observer {
         &mut self.neighbour_list
     }
 
-    /// Whom it sees, each as it was seen last: those that it is linked to, and of the others those that are `present`. One that has left is seen
-    /// until the next turn.
+    /// The agents that it sees, each as it was seen last: its linked peers, and of the others those `present`. An agent
+    /// that has left is seen until the next turn.
     pub fn seen(&self, present: &[bool]) -> Vec<Seen> {
         let links = self.links as usize;
         let is_present = |id: AgentId| present.get(id.0 as usize).is_some_and(|present| *present);
@@ -232,7 +233,7 @@ impl Observer {
         .collect()
     }
 
-    /// Checks that it can see those in a run of those that are `present`.
+    /// Checks that it can see those agents in a run of the `present` ones.
     ///
     /// # Errors
     /// [`ArchiveError::Mismatch`].
@@ -265,7 +266,7 @@ impl Observer {
         }
     }
 
-    /// Sees but those that it is linked to: it has left.
+    /// Sees only the peers that it is linked to: it has left.
     pub fn forget(&mut self) {
         let links = self.links as usize;
         self.neighbours.truncate(links);
@@ -404,7 +405,7 @@ const fn is_led(form: &CollisionShape) -> bool {
 /// Treats `neighbour` as a member of the same cluster, or again as a peer outside it.
 fn set_member(neighbour: &mut Neighbour, peers: &Peers, me: AgentId, is_member: bool) {
     if is_member {
-        // a tool needs the form of what it may grasp, whoever steps both
+        // a tool needs the shape of a body that it may grasp, whichever agent steps both
         let is_tool = peers.get(me).is_some_and(|shared| shared.is_tool());
         let form = neighbour.form.take().filter(|_| is_tool);
         (neighbour.form, neighbour.law) = (form, Law::Off);

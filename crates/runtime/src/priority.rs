@@ -29,7 +29,8 @@ pub struct PriorityRefused {
 }
 
 impl Priority {
-    /// Sets the priority of this thread: for threads of a caller that have to be as steady as those of agents. After a refusal it has its
+    /// Sets the priority of this thread: for threads of a caller that have to be as steady as agents' threads. After a
+    /// refusal it has its
     /// previous one.
     ///
     /// # Errors

@@ -51,7 +51,7 @@ impl Reader {
     }
 
     /// Reads the states for a frame at `now`; visits the agents whose state or condition has changed since the last frame, in their order,
-    /// with the newest state and whether they are running. Those that joined since are visited first.
+    /// with the newest state and whether they are running. Agents that joined since are visited first.
     pub fn read(&mut self, agents: &Agents, now: SimTime, mut visit: impl FnMut(&AgentHandle, &Arc<Snapshot>, bool)) {
         self.join(agents, &mut visit);
         agents.sleep.changed.take(|id| {

@@ -1,7 +1,7 @@
-//! What is left of an agent that has left: its number, its name, and that it has left.
+//! The remains of an agent that has left: its number, its name, and that it has left.
 //!
-//! In: its runner, which makes no more turns. Out: the same where the run began with it, else nothing: what joined the run is made again
-//! from what it joined as ([`super::archive`]). Never here: when an agent leaves.
+//! In: its runner, which makes no more turns. Out: the same where the run began with it, else nothing: an agent that
+//! joined the run is made again from its spawn ([`super::archive`]). Never here: when an agent leaves.
 
 use super::agent_record::AgentRecord;
 use super::agent_runner::AgentRunner;
@@ -79,7 +79,7 @@ impl AgentRunner {
         self.forget();
     }
 
-    /// Frees what it made turns with: an agent that has left makes none.
+    /// Frees the data of its turns: an agent that has left makes none.
     pub fn forget(&mut self) {
         (self.loads, self.announced) = (None, Vec::new());
         self.led = Led::default();

@@ -22,7 +22,7 @@ pub(super) trait RingEntry: Sized {
     /// It as words.
     fn words(&self) -> [u64; WORDS];
 
-    /// What these words are; `None` for words that none has.
+    /// The entry of these words; `None` for words that are no entry.
     fn of_words(words: &[u64; WORDS]) -> Option<Self>;
 }
 
@@ -30,7 +30,7 @@ pub(super) trait RingEntry: Sized {
 #[derive(Debug)]
 pub(super) struct Ring<E>(OnceLock<Box<Places>>, PhantomData<fn() -> E>);
 
-/// What the first reader makes.
+/// The storage of entries, made for the first reader.
 #[derive(Debug)]
 struct Places {
     /// How many were written. Only the agent writes.

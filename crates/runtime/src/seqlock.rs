@@ -9,7 +9,8 @@ use super::sync::atomic::{AtomicU64, Ordering, fence};
 /// `N` words and their version.
 #[derive(Debug)]
 pub(super) struct Seqlock<const N: usize> {
-    /// The writer's copy of its version: so it never loads what it stores, and loom explores every order (it misses those in which a store
+    /// The writer's copy of its version: so it never loads a word that it stores, and loom explores every order (it
+    /// misses those in which a store
     /// comes right after a load by the same thread).
     reached: AtomicU64,
     /// Odd while the words are being written; zero before the first write.
@@ -50,7 +51,7 @@ impl<const N: usize> Seqlock<N> {
         self.version.store(version.wrapping_add(2), Ordering::Release);
     }
 
-    /// Forgets what was written; from the writer, while nobody reads.
+    /// Forgets the words written; from the writer, while nobody reads.
     pub fn clear(&self) {
         self.reached.store(0, Ordering::Relaxed);
         self.version.store(0, Ordering::Release);

@@ -95,7 +95,7 @@ pub(super) struct SleepRegistry {
     pub changed: DirtySet,
 }
 
-/// What a [`SleepRegistry`] knows of its agents between turns.
+/// The state of a [`SleepRegistry`] between turns.
 #[derive(Debug, Clone, Default, PartialEq, serde::Serialize, serde::Deserialize)]
 pub(super) struct SleepState {
     pub signals: Vec<SignalState>,
@@ -317,7 +317,7 @@ impl SleepRegistry {
         noted > 0 && SimTime::from_nanos(noted - 1) + FAR_BEHIND_HOLD > now
     }
 
-    /// Who rests, is woken, was touched, and who leads whom.
+    /// The agents that rest, are woken or were touched, and their leaders.
     pub fn state(&self) -> SleepState {
         let (notified, far_behind) = (self.notified.load(Acquire), self.far_behind.load(Acquire));
         SleepState { signals: self.signals.iter().map(Signal::state).collect(), notified, far_behind }
@@ -340,7 +340,7 @@ impl SleepRegistry {
         self.unpark_all();
     }
 
-    /// Takes that back: the run goes on, with others for those that have ended.
+    /// Takes that back: the run goes on, with other threads in the place of ended ones.
     pub fn go_on(&self) {
         let _gate = self.gate.lock().unwrap_or_else(PoisonError::into_inner);
         self.stop.store(false, Release);

@@ -160,7 +160,7 @@ pub(super) struct AssembledRun {
     pub all: RunAgents,
 }
 
-/// What all agents of a run share, and those that join it.
+/// The data that all agents of a run share, and agents that join it.
 #[derive(Debug, Clone)]
 pub(super) struct RunAgents {
     pub handles: Agents,
@@ -218,7 +218,8 @@ impl RunAgents {
         Ok(Box::new(actor))
     }
 
-    /// Adds numbers of agents until there are `count`: those of agents that were `made`, and others of which nothing is known but that they have left.
+    /// Adds numbers of agents until there are `count`: numbers of agents that were `made`, and others of which nothing
+    /// is known but that they have left.
     pub fn reach<'a>(&self, count: usize, made: impl Fn(usize) -> Option<&'a Arc<Shared>>) {
         for number in self.handles.len()..count {
             let id = AgentId(number as u32);
@@ -382,7 +383,7 @@ fn shared(
     }
 }
 
-/// What an agent is assembled from.
+/// The parts of an agent that is assembled.
 struct Seated {
     spawn: AgentSpawn,
     /// The joints that hold it to others.

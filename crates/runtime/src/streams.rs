@@ -1,14 +1,14 @@
-//! What an agent tells readers: its events and its turns, and how far each reader has heard them.
+//! An agent's reports to readers: its events and its turns, and how far each reader has heard them.
 //!
-//! In: events and turns, from the thread that makes the agent's turns. Out: the same to each reader ([`super::ring`]), which keeps what an
-//! agent that has left has pushed until it has read it. Never here: what they mean.
+//! In: events and turns, from the thread that makes the agent's turns. Out: the same to each reader ([`super::ring`]),
+//! which keeps the entries of an agent that has left until it has read them. Never here: what they mean.
 
 use super::events::AgentEvent;
 use super::ring::{Ring, RingEntry};
 use super::turns::Turn;
 use std::sync::{Arc, OnceLock};
 
-/// What an agent tells; there is nothing of it before the first reader.
+/// An agent's events and turns; nothing is kept before the first reader.
 #[derive(Debug, Default)]
 pub(super) struct EventStreams(OnceLock<Arc<Rings>>);
 
@@ -48,8 +48,8 @@ impl EventStreams {
 }
 
 impl Heard {
-    /// Passes what it has not read on to `take`; returns how much was lost. `now` are the agent's streams, looked up before that; `None` where it has
-    /// left.
+    /// Passes the entries that it has not read on to `take`; returns how many were lost. `now` are the agent's streams,
+    /// looked up before that; `None` where it has left.
     pub(super) fn hear<E: RingEntry>(
         &mut self,
         now: Option<&EventStreams>,

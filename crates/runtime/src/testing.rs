@@ -143,13 +143,13 @@ pub(super) struct Dummy {
     /// Position of its matter along z.
     pub z: f64,
     pub form: Option<Arc<CollisionShape>>,
-    /// What its steps as a member look like, and those of the macro step until it is written.
+    /// The record of its steps as a member, and of the macro step until it is written.
     pub next: Option<RecordedStep>,
     pub made: Mutex<Vec<RecordedStep>>,
     pub kept: Kept,
 }
 
-/// What a macro step of a member may begin again from.
+/// The state from which a macro step of a member may begin again.
 #[derive(Debug, Clone, Copy, Default)]
 pub(super) struct Kept {
     /// Into the macro step, seconds.

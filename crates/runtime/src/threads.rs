@@ -208,7 +208,7 @@ impl Threads {
     /// Lets all go on again, of which some have not ended.
     fn resume_all(&mut self) {
         self.all.sleep.go_on();
-        // those that end nevertheless have said so before
+        // threads that end nevertheless have said so before
         while self.threads.values().any(|ended| ended.word.has_ended()) {
             let Ok(id) = self.ended.recv() else { break };
             self.join(id);

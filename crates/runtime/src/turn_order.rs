@@ -1,10 +1,11 @@
 //! The order in which a run in real time makes the parts of its turns: all that a run on one thread needs to make the same turns.
 //!
 //! In: parts of turns, each made while no other is ([`super::turn_parts`]), with the reading of the clock that it used. Out: their list, in
-//! that order, to a log. Whatever a turn reads of others, or others of it, changes in such a part: how many threads there are and how fast
-//! they are makes no other difference. A run that is not recorded has no order, and nothing here costs it anything.
-//! Never here: how parts are made again ([`super::follower`]), a file, what is done to the run from outside; who does something to it takes
-//! hold of the order ([`TurnOrder::between`]) and writes that down himself.
+//! that order, to a log. Whatever a turn reads of others, or others of it, changes in such a part: how many threads
+//! there are and how fast they are makes no other difference. A run that is not recorded has no order, and nothing here
+//! costs it anything.
+//! Never here: how parts are made again ([`super::follower`]), a file, calls from outside; a caller that changes the
+//! run holds the order ([`TurnOrder::between`]) and writes the change down itself.
 
 use metachron_core::AgentId;
 use std::sync::atomic::{
@@ -20,7 +21,7 @@ const PARTS_AT_ONCE: usize = 1024;
 /// No part waits longer for that, wall time.
 const PARTS_WAIT: Duration = Duration::from_millis(250);
 
-/// What a part of a turn does.
+/// The phases of a turn that are ordered.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 pub enum PartKind {
     /// The agent reads of others all that its step depends on. Where it makes none this is the whole turn.
@@ -38,14 +39,14 @@ pub enum PartKind {
 /// A part of a turn.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct TurnPart {
-    /// What it does.
+    /// The phase of the turn.
     pub kind: PartKind,
     /// Whose turn it is.
     pub agent: AgentId,
     /// The reading of the run's clock that it uses. In a pool, readings of two workers may be in another order than their parts.
     pub wall: Duration,
-    /// The most steps of each solve of the step that it prepares, which what was measured has decided; `None` for as many as the laws take, and of
-    /// other parts.
+    /// The most steps of each solve of the step that it prepares, as measured times have decided; `None` for as many as
+    /// the laws take, and of other parts.
     pub factors_max: Option<u32>,
 }
 

@@ -1,10 +1,11 @@
-//! The parts of a turn that begins: what it reads of others, the step itself, what it writes for others to see.
+//! The parts of a turn that begins: reading from others, the step itself, writing for others.
 //!
 //! prepare   take commands, drop lag, gather those it leads, look around
 //! step      reads and writes nothing that others have a share in: it can be made at any moment before the next part
 //! complete  write the states, of those it leads too
 //!
-//! [`AgentRunner::begin`] makes all three. A run that is recorded makes the outer two in one order with those of all others
+//! [`AgentRunner::begin`] makes all three. A run that is recorded makes the outer two in one order with the parts of
+//! all other turns
 //! ([`super::turn_order`]), and the steps side by side. Never here: the end of a turn ([`super::agent_runner`]).
 
 use super::agent_clock::{LAG_CAP, Start, Timeline};
@@ -15,7 +16,7 @@ use super::turn_order::Held;
 use metachron_core::{Resolution, SimSpan};
 use std::time::Duration;
 
-/// What has come of the first part of a turn.
+/// The outcome of the first part of a turn.
 pub(super) enum Prepared {
     /// It failed, and is parked.
     Parked,

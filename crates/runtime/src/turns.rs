@@ -1,4 +1,4 @@
-//! The turns of an agent, for those who ask: when it stepped, how far, and what it waited for.
+//! The turns of an agent, for readers: when it stepped, how far, and when it waited.
 //!
 //! In: turns, from the thread that makes them. Out: the same to each reader ([`super::ring`]). Never here: statistics ([`super::metrics`]).
 

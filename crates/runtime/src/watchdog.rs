@@ -1,4 +1,4 @@
-//! Turns in progress, and those that last too long.
+//! Turns in progress, and turns that last too long.
 //!
 //! In: turns, from the threads that make them. Out: the turn in progress of each, and which agents' turns have lasted longer than they may: these
 //! are stalled until their turn ends, and readers of their events hear of it. A thread that ends a turn and the watchdog that finds it late
@@ -263,7 +263,7 @@ pub(super) struct UnwatchedTurns {
 }
 
 impl UnwatchedTurns {
-    /// Those of the run of `handles`, judged for as long as they are kept.
+    /// The turns of the run of `handles`, judged for as long as they are kept.
     pub fn new(handles: &Agents) -> Arc<Self> {
         let (word, began_ns, epoch) = (WatchdogWord::default(), AtomicU64::new(0), Instant::now());
         let watchdog = Watchdog::new(handles, StallLimit::default());

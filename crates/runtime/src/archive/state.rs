@@ -22,7 +22,7 @@ use std::time::Duration;
 pub(super) struct RunState {
     /// For each number whether its agent is there.
     pub present: Vec<bool>,
-    /// Of those that are there, by rising numbers.
+    /// Of the agents that are there, by rising numbers.
     pub shown: Vec<ShownState>,
     pub sleep: SleepState,
     /// `None` where no broad phase is in use.
@@ -84,10 +84,10 @@ impl RunState {
         Self { present, shown, sleep, broad_phase, places, timeline, now, events }
     }
 
-    /// Writes or reads it, with what the agents that are there keep to themselves; it fits together then.
+    /// Writes or reads it, with the internal states of the agents that are there; all of it fits together then.
     ///
     /// # Errors
-    /// Those of agents; [`ArchiveError::Mismatch`].
+    /// The errors of agents; [`ArchiveError::Mismatch`].
     pub fn archive(
         &mut self,
         runners: &mut [Option<&mut AgentRunner>],
@@ -157,10 +157,10 @@ impl ShownState {
 }
 
 impl AgentRunner {
-    /// Writes or reads what it keeps to itself, in place, without the agents that it leads.
+    /// Writes or reads its internal state, in place, without the agents that it leads.
     ///
     /// # Errors
-    /// Those of its model and its governor, also where one of them panics.
+    /// The errors of its model and its governor, also where one of them panics.
     pub(super) fn archive_own(&mut self, archive: &mut Archive<'_>) -> Result<(), ArchiveError> {
         let shared = Arc::clone(&self.shared);
         archive.within(format_args!("agent \"{}\"", shared.name()), |archive| caught(|| self.archive_parts(archive)))
@@ -180,10 +180,10 @@ impl AgentRunner {
         self.observer.archive(archive)
     }
 
-    /// Takes out of it what a state is read into, by which [`Self::take_back`] makes it as it is now.
+    /// Takes the parts out of it that a state is read into; [`Self::take_back`] makes it from them as it is now.
     ///
     /// # Errors
-    /// Those of [`Self::archive_own`]; it is as it was then.
+    /// The errors of [`Self::archive_own`]; it is as it was then.
     pub(super) fn take_own(&mut self) -> Result<OwnState, ArchiveError> {
         let (parts, mut archive) = (self.take_parts(), Archive::writer());
         match self.archive_own(&mut archive) {
@@ -205,7 +205,7 @@ impl AgentRunner {
         read
     }
 
-    /// Puts back what was taken, where nothing was read since.
+    /// Puts back the parts that were taken, where nothing was read since.
     pub(super) fn keep_own(&mut self, own: OwnState) {
         self.put_parts(own.parts);
     }

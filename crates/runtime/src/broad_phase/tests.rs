@@ -15,7 +15,7 @@ struct Flyer {
     /// How it flew through the step that led here.
     came_with: DVec3,
     radius_m: f64,
-    /// What it does at its next turns: keeps on (`None`), or flies with this velocity from there on.
+    /// Its motion at its next turns: as before (`None`), or with this velocity from there on.
     plan: Vec<Option<[f64; 3]>>,
 }
 
@@ -197,7 +197,7 @@ fn ten_moving_agents_seldom_check_a_thousand_resting_ones() {
     let broad_phase = BroadPhase::new(count);
     let mut lists: Vec<_> = (0..count as u32).map(AgentId).map(NeighbourList::new).collect();
     let half = DVec3::splat(0.25);
-    // a floor of them, half a metre apart, a metre below those that swing
+    // a floor of flyers, half a metre apart, a metre below the swinging ones
     for (k, list) in lists.iter_mut().enumerate().skip(10) {
         let at = DVec3::new(0.5 * (k % 40) as f64, 0.5 * (k / 40) as f64, -1.5) - half;
         list.publish(&broad_phase, Some(&Bounds { low: at, high: at + 0.1, speed_m_s: 0.0 }), SimTime::ZERO);

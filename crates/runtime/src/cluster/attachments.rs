@@ -1,7 +1,8 @@
-//! Joints and links as what keeps agents in one cluster, until they tear.
+//! Joints and links as the attachments that keep agents in one cluster, until they tear.
 //!
-//! In: an agent's joints and links, its memory of what has torn, what yielded and tore in a step. Out: agents that belong together, entries in the states
-//! of those that tell of it. Never here: forces, when something yields or tears ([`metachron_contact::step`]).
+//! In: an agent's joints and links, its memory of torn ones, the attachments that yielded and tore in a step. Out:
+//! agents that belong together, entries in the states of the agents that report them. Never here: forces, when
+//! something yields or tears ([`metachron_contact::step`]).
 
 use super::super::events::{AgentEvent, EventKind};
 use super::AgentRunner;

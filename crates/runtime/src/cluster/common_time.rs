@@ -1,7 +1,8 @@
 //! How agents that may touch come to one time, so that they can step as one.
 //!
-//! In: which agents are near, and how far behind each of them is. Out: whether an agent waits for others, and what it calls its own time:
-//! a newcomer takes the time of those it comes near for its own, and an agent that is alone again that of the scene.
+//! In: which agents are near, and how far behind each of them is. Out: whether an agent waits for others, and the time
+//! that it takes for its own: a newcomer takes the time of the agents that it comes near, and an agent that is alone
+//! again that of the scene.
 //! Never here: how late an agent is ([`super::super::agent_clock`]), steps. Theory: docs/theory/clusters.md, section 9.
 
 use super::super::agent_runner::AgentRunner;
@@ -23,7 +24,7 @@ const AHEAD_S: f64 = 0.02;
 impl AgentRunner {
     /// Whether it waits for others that are behind, with all it leads.
     pub fn waits(&mut self, wall: Duration) -> bool {
-        // what it saw last was behind by more than it is now: what was not is not
+        // the states that it saw last are older than the newest: an agent that was not behind in them is not behind now
         let news = self.awaited().and_then(|_| {
             self.observer.refresh();
             self.led.each(|actor| actor.observer.refresh());
@@ -38,7 +39,7 @@ impl AgentRunner {
         waits
     }
 
-    /// The newest states of those that it, or one it leads, would leave behind: the sum of their times.
+    /// The newest states of the agents that it, or one it leads, would leave behind: the sum of their times.
     fn awaited(&self) -> Option<u64> {
         let time = self.pace.time();
         let is_behind = |n: &&Neighbour| time.secs_after(n.snapshot.time) > AHEAD_S + self.step_of(n.id);
@@ -69,8 +70,8 @@ impl AgentRunner {
         is_near || !self.led.is_empty()
     }
 
-    /// A newcomer takes the time of those it comes near for its own, and an agent that is alone again that of the scene. One that was near
-    /// them before it was asked, or leads others, keeps its own: it has a share in what they do.
+    /// A newcomer takes the time of the agents that it comes near, and an agent that is alone again that of the scene.
+    /// One that was near them before it was asked, or leads others, keeps its own: it has a share in what they do.
     fn agree_on_time(&mut self, was_near: Option<bool>, is_near: bool) {
         let clock_offset = match (was_near, is_near) {
             (Some(false), true) => self.offset_of_last(),
@@ -133,7 +134,7 @@ impl AgentRunner {
         all.filter(|n| self.led.is_empty() || self.shared.sleep.leader(n.id) != self.id())
     }
 
-    /// Those that may soon touch it, and those that it is linked with or held by.
+    /// Peers that may soon touch it, and peers that it is linked with or held by.
     fn near_or_tied(&self) -> impl Iterator<Item = &Neighbour> {
         let Self { observer, links, .. } = self;
         observer.neighbours().iter().filter(move |n| {

@@ -1,7 +1,7 @@
-//! What a member of a cluster touches, and the events of it: contacts that begin and end.
+//! The contacts of a member of a cluster, and their events: contacts that begin and end.
 //!
-//! In: what pairs gave each other in a step. Out: the member's contacts, events. A contact that lasts less than a step begins at its end, and ends
-//! with the next. Never here: contacts that only sense.
+//! In: the impulses of each pair in a step. Out: the member's contacts, events. A contact that lasts less than a step
+//! begins at its end, and ends with the next. Never here: contacts that only sense.
 
 use super::ClusterSeat;
 use crate::events::{AgentEvent, ContactEvent, EventKind};
@@ -17,7 +17,7 @@ impl ClusterSeat {
     /// Takes in what pairs gave in a step of `dt` that ends `now`.
     pub(super) fn note_contacts(&mut self, totals: &[PairTotal], dt: SimSpan, now: SimTime, streams: &EventStreams) {
         let dt_s = dt.as_secs_f64();
-        // those that nothing is said of any more have ended
+        // contacts without a total in this step have ended
         self.contacts.iter_mut().for_each(|contact| contact.depth_m = f64::NAN);
         for total in totals {
             let with = match total.partner {

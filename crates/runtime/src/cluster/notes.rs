@@ -11,7 +11,8 @@ use metachron_core::step_doubling::drift_m;
 use metachron_core::{AgentId, ClusterState, JointEffort, PairKind, PairState, SimSpan, SimTime};
 
 impl ClusterSeat {
-    /// Notes what it and `with` gave each other in a step of `dt_s` seconds: by contact, or by one of the links between them.
+    /// Notes the impulses between it and `with` in a step of `dt_s` seconds: by contact, or by one of the links between
+    /// them.
     fn note_pair(&mut self, total: &PairTotal, with: AgentId, kind: PairKind, dt_s: f64) {
         let at = self.pairs.iter().position(|pair| pair.with == with && pair.kind == kind).unwrap_or_else(|| {
             self.pairs.push(PairState::new(with, kind));
@@ -45,7 +46,7 @@ impl AgentRunner {
         let mut solves = Some(*solves);
         self.each_member(|actor| {
             if let Some(seat) = &mut actor.cluster {
-                // those of the leader, which is the first
+                // the solves of the leader, which is the first
                 seat.state = Some(ClusterState { leader, parts: seat.parts, step_s, solves: solves.take() });
             }
         });
@@ -68,7 +69,7 @@ impl AgentRunner {
         });
     }
 
-    /// Hands every pair what it gave each other, and every member its work.
+    /// Hands every pair its impulses, and every member its work.
     pub(super) fn note_pairs(&mut self, stepper: &ClusterStepper, dt: SimSpan) {
         let (dt_s, now) = (dt.as_secs_f64(), self.pace.time() + dt);
         let mut place = 0;
@@ -104,7 +105,7 @@ impl AgentRunner {
         });
     }
 
-    /// Notes which of those that it leads still belong together at the end of a step, `now`.
+    /// Notes which of the agents that it leads still belong together at the end of a step, `now`.
     pub(super) fn note_groups(&mut self, now: SimTime) {
         let Some(seat) = &mut self.cluster else { return };
         let (mut groups, mut ids) = (std::mem::take(&mut seat.groups), std::mem::take(&mut seat.ids));

@@ -23,14 +23,14 @@ pub(in super::super) enum Place {
     Home,
     /// With its leader; in which group it leaves, zero for none.
     Led { leader: AgentId, group: usize },
-    /// Among those that wait to be led by this agent; so many are before it.
+    /// Among the agents that wait to be led by this one; so many are before it.
     Waiting { leader: AgentId, before: usize },
     /// On its way home.
     Returning,
 }
 
-/// Takes all runners from their places, for each number its own; `None` of one that has left and is not kept. `home` are those that make turns of
-/// their own.
+/// Takes all runners from their places, for each number its own; `None` of an agent that has left and is not kept.
+/// `home` are the runners that make turns of their own.
 pub(in super::super) fn take_apart(
     home: impl Iterator<Item = Option<Box<AgentRunner>>>,
     handles: &Agents,
@@ -58,7 +58,7 @@ fn take(mut runner: Box<AgentRunner>, place: Place, all: &mut [Option<Placed>]) 
     }
 }
 
-/// Checks that places are such as the runners of those that are there can have.
+/// Checks that places are such as the runners of the agents that are there can have.
 ///
 /// # Errors
 /// [`ArchiveError::Mismatch`].

@@ -46,7 +46,7 @@ pub(in super::super) struct Led {
 /// One that is led.
 pub(super) struct Seat {
     pub actor: Box<AgentRunner>,
-    /// Zero while it stays; else it leaves, with those of the same number.
+    /// Zero while it stays; else it leaves, together with the seats of the same number.
     pub group: usize,
 }
 
@@ -131,7 +131,7 @@ impl Led {
         members.zip(1..).for_each(|(seat, place)| seat.group = sets.lowest(place));
     }
 
-    /// Lets those that are parked return.
+    /// Lets parked agents return.
     pub fn release_parked(&mut self) {
         self.seats.extract_if(.., |seat| seat.actor.is_parked()).for_each(|mut seat| {
             if seat.actor.shared.gauges.has_left() {
@@ -159,7 +159,7 @@ impl Led {
 }
 
 impl AgentRunner {
-    /// Leads its arrivals and those of the agents that it leads.
+    /// Leads its arrivals and the arrivals of the agents that it leads.
     pub fn admit_arrivals(&mut self) {
         let mut at = 0;
         while let Some(actor) = self.next_arrival() {
@@ -208,7 +208,7 @@ impl AgentRunner {
         }
     }
 
-    /// Lets all it leads return, each by itself: those that belong together find together again.
+    /// Lets all it leads return, each by itself: agents that belong together find together again.
     pub fn release_all(&mut self) {
         self.led.seats.drain(..).for_each(|seat| seat.actor.return_turns());
     }
@@ -226,7 +226,7 @@ impl AgentRunner {
         return_arrivals(&self.shared);
     }
 
-    /// Makes its own turns again, and those of all it leads.
+    /// Makes its own turns again, and lets all it leads make theirs.
     fn return_turns(mut self: Box<Self>) {
         let (id, shared) = (self.id(), Arc::clone(&self.shared));
         self.led.ids().for_each(|led| shared.sleep.follow(led, Some(id)));
@@ -240,8 +240,8 @@ impl AgentRunner {
         shared.sleep.notify(id);
     }
 
-    /// The agent that should lead it: of the leaders of those that it, or one it leads, is bonded with, the lowest number. An agent at
-    /// another time would make up for that alone, and is not led before the two have come together.
+    /// The agent that should lead it: of the leaders of the agents that it, or one it leads, is bonded with, the lowest
+    /// number. An agent at another time would make up for that alone, and is not led before the two have come together.
     pub fn seek_leader(&self) -> Option<AgentId> {
         self.shared.handover()?;
         let led = self.led.seats.iter().map(|seat| &*seat.actor);
@@ -282,7 +282,7 @@ pub(in super::super) fn hand_over(actor: Box<AgentRunner>, leader: AgentId) -> R
         sleep.follow(id, None);
         return Err(actor);
     }
-    // the leader may have been closed just before: one of the two sides sees what is left among its arrivals
+    // the leader may have been closed just before: one of the two sides sees the runners left among its arrivals
     if sleep.is_closed(leader) {
         handover.clear().into_iter().for_each(AgentRunner::return_turns);
     }
@@ -290,8 +290,8 @@ pub(in super::super) fn hand_over(actor: Box<AgentRunner>, leader: AgentId) -> R
     Ok(())
 }
 
-/// Seats agents that belong together before the first step: those that may touch in it, and those that links or joints connect. For each place
-/// in the list, the agent that makes turns of its own.
+/// Seats agents that belong together before the first step: agents that may touch in it, and agents that links or
+/// joints connect. For each place in the list, the agent that makes turns of its own.
 pub(in super::super) fn assign_leaders(mut actors: Vec<AgentRunner>) -> Vec<Option<Box<AgentRunner>>> {
     let mut sets = DisjointSets::default();
     sets.reset(actors.len());
@@ -319,7 +319,7 @@ pub(in super::super) fn return_arrivals(shared: &Shared) {
     shared.handover().into_iter().flat_map(Handover::clear).for_each(AgentRunner::return_turns);
 }
 
-/// Completes the metrics of those that are among arrivals or have returned when nobody looks any more.
+/// Completes the metrics of the agents that are among arrivals or have returned when nobody looks any more.
 pub(in super::super) fn close_remaining(handles: &Agents, timeline: &Timeline, now: Duration) {
     for shared in handles.iter().filter_map(AgentHandle::live) {
         let Some(handover) = shared.handover() else { continue };

@@ -9,7 +9,8 @@ use metachron_contact::step::{ClusterReport, FACTORS_SAFE};
 /// A turn counts as much as the mean of so many before it.
 const TURNS_KEPT: u32 = 16;
 
-/// By how much of their mean the factors of turns must differ for what they say of the price to count as much as that mean.
+/// By how much of their mean the factors of turns must differ for their slope to count as much in the price as that
+/// mean.
 const TELLING_SPREAD: f64 = 0.1;
 
 /// At least this share of a turn is the price of its factors: turns whose time hardly follows their factors do not make these free.
@@ -31,9 +32,9 @@ pub(in super::super) struct Solved {
     pub factors: u32,
     /// Products of conjugate gradients, of solves that make no factors.
     pub products: u32,
-    /// Contacts of its last fine step, those of a rigid pile with the others.
+    /// Contacts of its last fine step, including the contacts of a rigid pile.
     pub contacts: u32,
-    /// Those of the rigid pile, of which no solve knows.
+    /// Contacts of the rigid pile, of which no solve knows.
     pub pile_contacts: u32,
 }
 
@@ -72,7 +73,7 @@ impl FactorPrice {
         self.more_contacts = 1.0;
         if pile_contacts > 0 && self.turns > 0 {
             self.more_contacts = f64::from(contacts) / self.contacts.max(1.0);
-            // what has come to rest would be solved once
+            // a pile that has come to rest would be solved once
             self.solves += (1.0 - self.solves) / f64::from(TURNS_KEPT);
             return;
         }
@@ -170,7 +171,7 @@ mod tests {
     fn a_price_is_found_from_turns_of_different_numbers_of_factors() {
         let price = after((0..64).map(|k| 4 + 13 * (k % 3)));
         let found_s = price.factor_s().unwrap();
-        // the mean of a turn per factor is 79 µs: what is left of that
+        // the mean of a turn per factor is 79 µs, the factor's own share of it 20 µs
         assert!((found_s / 20e-6 - 1.0).abs() < 0.3, "{found_s}");
         let most = price.factors_max(3e-3, 0.0, 5).unwrap();
         assert!((75..=100).contains(&most), "{most} of 100 factors in 2 ms");

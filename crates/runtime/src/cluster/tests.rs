@@ -42,7 +42,8 @@ fn steps_of(log: &Log, id: u32) -> Vec<RecordedStep> {
     log.lock().unwrap_or_else(PoisonError::into_inner).iter().filter(|made| made.id == AgentId(id)).cloned().collect()
 }
 
-/// Every step of every agent begins where the one before ended, or later by what was dropped or rested; none is missing.
+/// Every step of every agent begins where the one before ended, or later by the time that was dropped or rested; none
+/// is missing.
 fn assert_whole(log: &Log, stats: &[AgentStats], handles: &[AgentHandle]) {
     for (agent, handle) in stats.iter().zip(handles) {
         let steps = steps_of(log, agent.id.0);
@@ -293,7 +294,7 @@ fn a_cluster_rests_and_wakes_as_one_in_real_time() {
             eventually("the one led last obeys", || {
                 run.agents()[2].latest().resolution.is_some_and(|r| r.eps_m == eps_m)
             });
-            // a leader shows its own state, and counts its step, after those of all it leads
+            // a leader shows its own state, and counts its step, after the states of all it leads
             eventually("its leader woke for it", || run.agents()[0].stats().steps > steps);
         }
         let handles = run.agents().to_vec();

@@ -4,9 +4,11 @@
 //!
 //! admit      agents that want to be led
 //! gather     each to the leader's time: one that is behind steps alone, one that is ahead waits
-//! step       all that are at one time as one problem ([`super::macro_step`]); where that fails, without those who are to blame ([`super::exclusion`])
+//! step       all that are at one time as one problem ([`super::macro_step`]); where that fails, without the members to
+//! blame ([`super::exclusion`])
 //! write, conclude    the state of each by its own writer
-//! part       those that have lost touch make their own turns again; several that still belong together are led by the lowest number
+//! part       members that have lost touch make their own turns again; several that still belong together are led by
+//! the lowest number
 //!
 //! The leader has the lowest number. Never here: which agents touch, threads, events.
 
@@ -20,7 +22,7 @@ use metachron_contact::detect::SolveBudget;
 use metachron_core::{DT_MAX_S, SimSpan, SimTime};
 use std::time::Duration;
 
-/// The share of a macro step that its turn may take: the rest is for what turns take longer now and then.
+/// The share of a macro step that its turn may take; the rest is a margin for turns that take longer now and then.
 const TURN_SHARE: f64 = 0.8;
 
 /// How the time of a leader went on without a step when its turn began.
@@ -92,7 +94,7 @@ impl AgentRunner {
             steps += 1;
         }
         if steps > 0 {
-            // what it has given on the way is settled before the first common step
+            // the impulses that it has given on the way are settled before the first common step
             self.publish(timeline.sim_at(wall));
         }
         Ok(steps)
@@ -104,7 +106,7 @@ impl AgentRunner {
         self.is_undisturbed(now) && self.led.all().all(|actor| actor.pace.time() == time && actor.is_undisturbed(now))
     }
 
-    /// Writes the states of those that have just stepped with it. One that is broken is parked alone.
+    /// Writes the states of the members that have just stepped with it. A broken member is parked alone.
     pub fn write_led(&mut self, open: &PendingTurn) {
         if self.led.is_empty() {
             return;
@@ -132,8 +134,8 @@ impl AgentRunner {
         self.cluster.as_ref().and_then(|seat| seat.state).map_or(1, |state| state.parts)
     }
 
-    /// Shares the time of a turn out among itself and those that stepped with it, by their work; its own share. Each governor answers for
-    /// its agent alone: of what bends in one cluster the one that is too fine gives way.
+    /// Shares the time of a turn out among itself and the members that stepped with it, by their work; its own share.
+    /// Each governor answers for its agent alone: of the deformables in one cluster the one that is too fine gives way.
     pub fn share_work(&mut self, work_s: f64) -> f64 {
         let work = |actor: &Self| actor.cluster.as_ref().map_or(0.0, |seat| seat.work);
         let own = work(self);
@@ -148,7 +150,8 @@ impl AgentRunner {
         share_s(own)
     }
 
-    /// Accounts for the steps of those that stepped with it, lets their governors answer and shows their states; whether all can be seen.
+    /// Accounts for the steps of the members that stepped with it, lets their governors answer and shows their states;
+    /// whether all can be seen.
     pub fn conclude_led(&mut self, timeline: &Timeline, took: Took) -> bool {
         let (mut published, leader) = (true, self.id());
         self.led.each(|actor| {
@@ -165,8 +168,8 @@ impl AgentRunner {
     }
 }
 
-/// How much of what is `left` to catch up one step takes, where steps are `dt` long: no step is a sliver. Where `none_longer` is, the last two
-/// are half of it each.
+/// How much of the time `left` to catch up one step takes, where steps are `dt` long: no step is a sliver. Where
+/// `none_longer` is, the last two are half of it each.
 fn portion(left: SimSpan, dt: SimSpan, none_longer: bool) -> SimSpan {
     let half_more = SimSpan::from_nanos(dt.as_nanos() / 2);
     if none_longer && left > dt && left <= dt + half_more {
@@ -193,7 +196,7 @@ impl AgentRunner {
         }
     }
 
-    /// What the solves of the turn in progress took; `None` where it has made no macro step.
+    /// The solves of the turn in progress; `None` where it has made no macro step.
     pub fn solved(&self) -> Option<Solved> {
         self.cluster.as_ref()?.solved
     }

@@ -254,7 +254,7 @@ fn the_frame_shares_the_cores_with_the_agents() {
     assert_eq!(crowded.now(), ms(21));
 }
 
-/// Demands once what is beyond its agent's range, and counts its questions.
+/// Demands once a resolution beyond its agent's range, and counts its questions.
 struct Greedy {
     asked: u32,
 }

@@ -40,7 +40,7 @@ pub(super) struct PoolState {
     resting: Table<AtomicCell<Option<Box<AgentRunner>>>>,
     /// Where the parts of turns are noted; `None` of a run that is not recorded. It changes where no worker works.
     pub order: Mutex<Option<Arc<TurnOrder>>>,
-    /// Those that make no more turns.
+    /// Agents that make no more turns.
     parked: Mutex<BTreeMap<AgentId, Box<AgentRunner>>>,
 }
 
