@@ -1,4 +1,4 @@
-//! What do calls cost: a read of a state, an object that joins a thousand others, events with and without a reader?
+//! Costs of calls: a read of a state, an object that joins a thousand others, events with and without a reader.
 //!
 //! `cargo run --release -p metachron-world --example call_cost`. Times are of the wall clock: nothing else should run meanwhile.
 
@@ -86,7 +86,7 @@ fn reads_ns(world: &World, ball: Object) -> Result<f64, WorldError> {
     Ok(1e9 * begun.elapsed().as_secs_f64() / f64::from(READS))
 }
 
-/// What it took to join, and the steps that were missed a second.
+/// Times to join, and the steps that were missed a second.
 struct Joins {
     median: Duration,
     most: Duration,

@@ -18,7 +18,7 @@ use metachron_runtime::{AUTO_THREADS_MAX, AgentSpawn, Governor, Machine, Priorit
 use std::borrow::Cow;
 use std::sync::Arc;
 
-/// Chooses the governor of an agent's step and resolution; `None` for an agent that keeps what it has.
+/// Chooses the governor of an agent's step and resolution; `None` for an agent that keeps its own.
 pub type Govern<'a> = &'a mut dyn FnMut(&Member) -> Option<Box<dyn Governor>>;
 
 /// The agents of `scene`, ready to run.
@@ -56,7 +56,7 @@ pub(super) fn lone(
     Ok(AgentSpawn { dt, dt_range, range: Some(member.simulation), scene: Arc::clone(surroundings), ..alone })
 }
 
-/// What all contact clusters of a scene share: its static solids and joints.
+/// The data that all contact clusters of a scene share: its static solids and joints.
 ///
 /// # Errors
 /// [`WorldError::Build`] for a solid or a joint that cannot be.
@@ -71,7 +71,7 @@ pub(super) fn surroundings(scene: &Scene) -> Result<Arc<ClusterScene>, WorldErro
     among.jointed(Arc::clone(&scene.joints)).map(Arc::new).map_err(|error| failed(error.to_string()))
 }
 
-/// A static solid's friction and restitution have the ranges that those of bodies have.
+/// A static solid's friction and restitution have the same ranges as a body's.
 fn check_surface(solid: &Obstacle) -> Result<(), WorldError> {
     let wrong = |what: &str, value: f64, most: f64| {
         let reason = format!("the {what} is {value}; it must be between 0 and {most}");

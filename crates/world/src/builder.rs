@@ -47,7 +47,7 @@ pub enum SceneBuildError {
     /// An object without a name: nothing could ask for it.
     #[error("an object has an empty name; expected at least one character")]
     NoName,
-    /// A joint names what is no rigid body.
+    /// A joint names an object that is no rigid body.
     #[error("a joint names \"{name}\", which is no rigid body of the scene")]
     NoBody {
         /// The name.
@@ -64,9 +64,9 @@ pub enum SceneBuildError {
     NoMount {
         /// The sensor.
         sensor: String,
-        /// What it names.
+        /// The name that it gives.
         on: String,
-        /// What it can be on.
+        /// The kind of thing that it can be on.
         what: &'static str,
     },
     /// A rotation that is none.
@@ -125,7 +125,8 @@ struct Joined {
     at_m: DVec3,
 }
 
-/// What can be added to a scene: a [`Rigid`] body, a [`Tube`], a [`Soft`] body, or an agent of your own ([`Custom`]), which no file can have.
+/// The parts that can be added to a scene: a [`Rigid`] body, a [`Tube`], a [`Soft`] body, or an agent of your own
+/// ([`Custom`]), which no file can have.
 #[derive(Debug, Clone, serde::Serialize, serde::Deserialize)]
 pub enum Part {
     /// A rigid body.
@@ -223,7 +224,8 @@ impl SceneBuilder {
         self
     }
 
-    /// How deep what lies on each other rests, metres, 1e-6 … 1e-3; default 2e-5. A ten-thousandth of the smallest body is not seen.
+    /// The depth of a resting contact, metres, 1e-6 … 1e-3; default 2e-5. A ten-thousandth of the smallest body is not
+    /// seen.
     #[must_use]
     pub fn contact_depth_m(mut self, contact_depth_m: f64) -> Self {
         self.contact_depth_m = contact_depth_m;
@@ -288,7 +290,7 @@ impl SceneBuilder {
         self
     }
 
-    /// The names of what was added so far and moves, in its order.
+    /// The names of the moving objects added so far, in their order.
     pub fn names(&self) -> impl Iterator<Item = &str> {
         self.parts.iter().map(|(name, _)| &**name)
     }

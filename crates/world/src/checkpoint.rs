@@ -16,9 +16,10 @@ use std::path::{Path, PathBuf};
 const MAGIC: [u8; 8] = *b"METACHRN";
 /// The version of the format: it changes with what the bytes mean.
 const FORMAT: u32 = 10;
-/// Bytes before those that the checksum is of.
+/// Bytes before the checksummed ones.
 const HEAD: usize = MAGIC.len() + 4 + 8 + 8;
-/// The program that can read what it has written: states are saved field by field as this version has them.
+/// The version of the program, which reads its own checkpoints alone: states are saved field by field as this version
+/// has them.
 const PROGRAM: &str = env!("CARGO_PKG_VERSION");
 
 /// A world's state at one moment ([`super::World::checkpoint`]).
@@ -27,7 +28,7 @@ pub struct Checkpoint {
     pub(super) of: SceneIdentity,
     pub(super) time: SimTime,
     pub(super) times: Vec<SimTime>,
-    /// What those were given as that have joined since the start and are there.
+    /// The parts of the objects that joined after the start and are still there.
     pub(super) joined: JoinedParts,
     pub(super) state: Vec<u8>,
 }
@@ -64,7 +65,7 @@ pub enum CheckpointError {
     /// The checkpoint, or the recording, is of another scene. The world goes on as it was.
     #[error("what was saved is of another scene: {what} is {found}; expected {expected}")]
     OtherScene {
-        /// What differs.
+        /// The property that differs.
         what: String,
         /// As the checkpoint has it.
         found: String,
@@ -102,12 +103,12 @@ pub enum CheckpointError {
     BadFile {
         /// Its path.
         path: PathBuf,
-        /// What is wrong with it.
+        /// The fault of the bytes.
         reason: BadCheckpoint,
     },
 }
 
-/// What is wrong with the bytes of a checkpoint.
+/// A fault of the bytes of a checkpoint.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum BadCheckpoint {
@@ -128,7 +129,7 @@ pub enum BadCheckpoint {
         /// Bytes that there should be.
         expected: u64,
     },
-    /// Its bytes are not those that were written.
+    /// Its bytes are not the ones that were written.
     #[error("its checksum is {found:016x}; its bytes make {expected:016x}: it is damaged")]
     Damaged {
         /// The checksum that it gives.
@@ -340,7 +341,7 @@ mod tests {
         World::start(&scene(), ExecutorKind::Lockstep).unwrap()
     }
 
-    /// The file says whether its bytes are those written; this is what is left if it says so of others.
+    /// A checksum finds changed bytes; this is the case that it misses them.
     #[test]
     fn a_state_with_any_byte_changed_is_read_or_refused() {
         let world = start();

@@ -1,7 +1,7 @@
-//! What is done to an object of a world: commands, and states that are set.
+//! Changes of an object of a world: commands, and states that are set.
 //!
-//! In: a command, or a state. Out: the same in the object's mailbox, and in a recording; or why the object does not take it. Never here: what
-//! an object makes of it.
+//! In: a command, or a state. Out: the same in the object's mailbox, and in a recording; or why the object does not
+//! take it. Never here: the effect in the object.
 
 use super::error::WorldError;
 use super::log::Mode;
@@ -11,16 +11,17 @@ use super::world::World;
 use metachron_core::{Anchor, Body, Snapshot};
 use metachron_runtime::{AgentHandle, Command, Keyed, SendError};
 
-/// Why a replay refuses what is asked of it.
+/// Why a replay refuses commands.
 pub(super) const REPLAYED: &str = "a replay does what its recording says, and nothing else";
 
 impl World {
     /// Sends a command to an object, which obeys at its next step.
     ///
     /// # Errors
-    /// [`WorldError::NotTaken`] and [`WorldError::NoMotor`] for what the object does not take, with what it takes; [`WorldError::NoPoint`] for a
-    /// material point that it does not have; [`WorldError::Refused`] for numbers outside their range; [`WorldError::Foreign`],
-    /// [`WorldError::Gone`] and [`WorldError::Stopped`]; [`WorldError::Stalled`] of a world in lockstep that is recorded. Nothing was done then.
+    /// [`WorldError::NotTaken`] and [`WorldError::NoMotor`] for a command that the object does not take, with the
+    /// inputs that it takes; [`WorldError::NoPoint`] for a material point that it does not have;
+    /// [`WorldError::Refused`] for numbers outside their range; [`WorldError::Foreign`], [`WorldError::Gone`] and
+    /// [`WorldError::Stopped`]; [`WorldError::Stalled`] of a world in lockstep that is recorded. Nothing was done then.
     pub fn command(&self, object: Object, command: Command) -> Result<(), WorldError> {
         let agent = self.agent(object)?;
         let point = match command {

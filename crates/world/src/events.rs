@@ -1,6 +1,6 @@
-//! What happens in a world, in the order of the objects' times.
+//! Events of a world, in the order of the objects' times.
 //!
-//! In: the objects' own events. Out: those that were asked for, once each. Never here: waiting.
+//! In: the objects' own events. Out: the events that were asked for, once each. Never here: waiting.
 
 use super::object::{Object, Touched, WorldTag};
 use super::world::World;
@@ -17,15 +17,15 @@ pub struct Event {
     pub object: Object,
     /// The object's name.
     pub name: Arc<str>,
-    /// The name of what it touches, or of the leader of the cluster that it joined.
+    /// The name of the object or solid that it touches, or of the leader of the cluster that it joined.
     pub other: Option<Arc<str>>,
     /// When, in its own time: the end of the step in which it happened.
     pub at: SimTime,
-    /// What.
+    /// The event.
     pub what: Happening,
 }
 
-/// What can happen.
+/// The kinds of events.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[non_exhaustive]
 pub enum Happening {
@@ -108,7 +108,7 @@ impl fmt::Display for Event {
 /// A contact that begins or ends.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Contact {
-    /// What the object touches.
+    /// The object or solid that it touches.
     pub with: Touched,
     /// Whether it begins.
     pub begins: bool,
@@ -154,8 +154,8 @@ impl EventFilter {
         Self { states: true, ..self }
     }
 
-    /// Of contacts only those of at least so many newtons in the mean of a step. They begin when they press so much: to a quarter more, or at
-    /// their end where they never press a quarter more than that.
+    /// Of contacts only the ones of at least so many newtons in the mean of a step. They begin when they press so much:
+    /// to a quarter more, or at their end where they never press a quarter more than that.
     #[must_use]
     pub const fn above_n(self, above_n: f64) -> Self {
         Self { above_n, ..self }

@@ -11,7 +11,7 @@ use metachron_runtime::TimelineCommand;
 use std::sync::Arc;
 use std::time::Duration;
 
-/// A state is led on by its velocities for at most so long, seconds: what has stopped must not fly apart.
+/// A state is led on by its velocities for at most so long, seconds: a body that has stopped must not fly apart.
 const AHEAD_MAX_S: f64 = 0.1;
 
 /// All objects at one moment: each one's newest state, led on to it by its velocities.
@@ -53,7 +53,7 @@ impl Frame {
     /// A material point of an object at the frame's moment, metres.
     ///
     /// # Errors
-    /// Those of [`Frame::state`], and [`WorldError::NoPoint`] for a point that the object does not have.
+    /// The errors of [`Frame::state`], and [`WorldError::NoPoint`] for a point that the object does not have.
     pub fn point(&self, object: Object, anchor: Anchor) -> Result<DVec3, WorldError> {
         let state = self.state(object)?;
         let (position, velocity) = state.body.point(anchor).ok_or_else(|| self.world.no_point(object, anchor))?;
@@ -63,7 +63,7 @@ impl Frame {
     /// The matter of an object at the frame's moment.
     ///
     /// # Errors
-    /// Those of [`Frame::state`].
+    /// The errors of [`Frame::state`].
     pub fn body(&self, object: Object) -> Result<Body, WorldError> {
         let state = self.state(object)?;
         let mut body = state.body.clone();

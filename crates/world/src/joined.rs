@@ -1,7 +1,8 @@
-//! What joined a world after its start, as it was given: from that an agent is made, when it joins and when a checkpoint brings it back.
+//! The parts that joined a world after its start, as they were given: an agent is made from its part when it joins and
+//! when a checkpoint brings it back.
 //!
-//! In: parts, by the numbers of their agents. Out: members and spawns of them, from any thread; bytes for checkpoints. A world keeps the parts
-//! of those that are there, a checkpoint those of its own. Never here: the states of agents.
+//! In: parts, by the numbers of their agents. Out: members and spawns of them, from any thread; bytes for checkpoints.
+//! A world keeps the parts of the agents that are there, a checkpoint its own. Never here: the states of agents.
 
 use super::assemble;
 use super::builder::{Part, Rigid, SceneBuildError, member};
@@ -16,7 +17,7 @@ use metachron_runtime::{AgentSpawn, AgentState, Agents};
 use std::collections::BTreeMap;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
-/// What joined, by the numbers of the agents.
+/// Parts that joined, by the numbers of their agents.
 pub(super) type JoinedParts = BTreeMap<AgentId, JoinedPart>;
 
 /// One that joined.
@@ -63,7 +64,7 @@ impl PartialEq for JoinedPart {
 /// Writes or reads parts; of agents of somebody's own the names.
 ///
 /// # Errors
-/// Those of the archive.
+/// The errors of the archive.
 pub(super) fn archive_parts(parts: &mut JoinedParts, archive: &mut Archive<'_>) -> Result<(), ArchiveError> {
     let saved = |(id, joined): (&AgentId, &JoinedPart)| {
         let part = joined.saved().map(|part| Part::clone(part));
@@ -87,7 +88,7 @@ pub(super) struct Joining {
 }
 
 impl Joining {
-    /// What an agent is built from.
+    /// The member that an agent is built from.
     ///
     /// # Errors
     /// [`SceneBuildError`].
@@ -122,7 +123,7 @@ impl Member {
     /// One that nothing touches and nobody sees.
     ///
     /// # Errors
-    /// Those of parts.
+    /// The errors of parts.
     pub(super) fn without_matter(id: AgentId, name: &str) -> Result<Self, SceneBuildError> {
         let nothing = SyntheticSpec { cost_us: 0.0, cost_order: 0.0, error_m: 0.0, error_order: 0.0 };
         let shaped = member(id, name.to_owned(), Rigid::ball(1.0).into(), DVec3::ZERO)?;
@@ -146,7 +147,7 @@ struct Table {
 const SLACK: usize = 16;
 
 impl JoinedTable {
-    /// Adds one, and sweeps out those of agents that have left where there may be many of them.
+    /// Adds one, and sweeps out the parts of agents that have left where there may be many of them.
     pub fn add(&self, id: AgentId, joined: JoinedPart, agents: &Agents) {
         let mut table = self.lock();
         if table.parts.len() >= 2 * table.swept + SLACK {
@@ -165,14 +166,14 @@ impl JoinedTable {
         self.lock().parts.get(&id).cloned()
     }
 
-    /// Those of agents that have not left; the others are swept out.
+    /// The parts of agents that have not left; the others are swept out.
     pub fn present(&self, agents: &Agents) -> JoinedParts {
         let mut table = self.lock();
         table.sweep(agents);
         table.parts.clone()
     }
 
-    /// Adds those of a checkpoint that is about to be read: a reader that sees an agent can ask for its part.
+    /// Adds the parts of a checkpoint that is about to be read: a reader that sees an agent can ask for its part.
     pub fn expect(&self, parts: &JoinedParts) {
         let mut table = self.lock();
         for (id, joined) in parts.iter().filter(|(_, joined)| joined.part.is_some()) {
@@ -180,7 +181,7 @@ impl JoinedTable {
         }
     }
 
-    /// Keeps those of agents that are there.
+    /// Keeps the parts of agents that are there.
     pub fn sweep(&self, agents: &Agents) {
         self.lock().sweep(agents);
     }

@@ -1,7 +1,8 @@
 //! Coordinates of joints: how far and how fast hinges and slides have moved, read, set and reset (`qpos` and `qvel` of MuJoCo).
 //!
-//! In: the newest states, and coordinates. Out: commands that move all bodies that the joints carry along, by forward kinematics from what holds
-//! a tree of joints: the world, a kinematic body, or else its body of the lowest number. Never here: forces, and how a joint is held in a step.
+//! In: the newest states, and coordinates. Out: commands that move all bodies that the joints carry along, by forward
+//! kinematics from the root of a tree of joints: the world, a kinematic body, or else its body of the lowest number.
+//! Never here: forces, and how a joint is held in a step.
 
 use super::error::WorldError;
 use super::kinds::ExecutorKind;
@@ -102,7 +103,7 @@ struct Reached {
     is_moved: bool,
 }
 
-/// Bodies that were reached from what holds them, and joints that closed a loop on the way. `None` is the world.
+/// Bodies that were reached from the roots, and joints that closed a loop on the way. `None` is the world.
 #[derive(Default)]
 struct Walk {
     reached: BTreeMap<Option<AgentId>, Reached>,
@@ -135,7 +136,7 @@ impl World {
     /// The coordinates of all hinges and slides whose bodies are there, in the order of the scene.
     ///
     /// # Errors
-    /// Those of [`Self::joint_state`].
+    /// The errors of [`Self::joint_state`].
     pub fn joint_states(&self) -> Result<Vec<JointState>, WorldError> {
         let all = self.joints().filter(|listed| listed.joint.takes_motor());
         // a joint of a body that was removed holds nothing
@@ -150,8 +151,9 @@ impl World {
     /// 1 mm and 1 mrad; the next step brings their rates together.
     ///
     /// # Errors
-    /// [`WorldError::BadCoordinate`] for what is outside the joint's range by more than 1 mm or 1 mrad, or not finite, [`WorldError::NoCoordinate`], [`WorldError::OpenLoop`];
-    /// [`WorldError::TimePasses`] on threads and in a pool while time is not paused; those of [`World::command`]. Nothing was done then.
+    /// [`WorldError::BadCoordinate`] for a coordinate that is outside the joint's range by more than 1 mm or 1 mrad, or
+    /// not finite, [`WorldError::NoCoordinate`], [`WorldError::OpenLoop`]; [`WorldError::TimePasses`] on threads and in
+    /// a pool while time is not paused; the errors of [`World::command`]. Nothing was done then.
     pub fn set_joint_states(&self, states: &[JointState]) -> Result<(), WorldError> {
         let mut set = BTreeMap::new();
         for JointState { joint, position, velocity } in states.iter().copied() {
@@ -161,11 +163,11 @@ impl World {
         self.put_joints(&set)
     }
 
-    /// Puts all joints back to where the scene has them at the start, at rest: hinges, slides, spherical and fixed ones. What holds a tree of
-    /// joints stays where it is.
+    /// Puts all joints back to where the scene has them at the start, at rest: hinges, slides, spherical and fixed
+    /// ones. The root of a tree of joints stays where it is.
     ///
     /// # Errors
-    /// [`WorldError::TimePasses`], and those of [`World::command`].
+    /// [`WorldError::TimePasses`], and the errors of [`World::command`].
     pub fn reset_joints(&self) -> Result<(), WorldError> {
         let starts = (0..).zip(&self.instruments().starts);
         self.put_joints(&starts.map(|(joint, start)| (joint, Coordinate { position: *start, velocity: 0.0 })).collect())
@@ -320,7 +322,7 @@ impl TreeBody {
 }
 
 impl JointTree<'_> {
-    /// Goes from what holds each tree to its ends.
+    /// Goes from the root of each tree to its ends.
     fn walk(&self, set: &BTreeMap<u32, Coordinate>) -> Walk {
         let mut walk = Walk::default();
         let led = self.bodies.iter().filter(|(_, body)| body.is_led).map(|(id, _)| Some(*id));

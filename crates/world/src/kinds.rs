@@ -191,7 +191,7 @@ impl StatesKind {
     }
 }
 
-/// What lights a scene, and what is seen behind it.
+/// The light of a scene from all around, and its background.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 #[cfg_attr(feature = "serde", derive(serde::Deserialize, schemars::JsonSchema), serde(rename_all = "kebab-case"))]
 pub enum EnvironmentKind {

@@ -1,7 +1,7 @@
 //! A scene as a world that runs: the resolved scene, its start, its agents and their latest states.
 //!
 //! In: a [`Scene`] built in code, or read by another crate. Out: a [`World`].
-//! Never here: TOML, a file but those of checkpoints and recordings, the GPU, a law of control.
+//! Never here: TOML, a file other than checkpoints and recordings, the GPU, a law of control.
 //!
 //! ```
 //! use metachron_core::SimSpan;

@@ -58,16 +58,17 @@ impl Log {
         Self { mode: Mutex::new(Mode::Replayed(script)), is_heard: AtomicBool::new(true) }
     }
 
-    /// Writes down what is about to be done.
+    /// Writes down a call that is about to be made.
     pub fn note(&self, entry: impl FnOnce() -> Entry) {
         self.mode().note(entry);
     }
 
-    /// Does something to the world and writes it down: no part of a turn is made between the two, and no recording begins or ends. `wait` is for
-    /// those who do not have the run: it keeps calls in lockstep from letting time pass, which is written down before it is done.
+    /// Does something to the world and writes it down: no part of a turn is made between the two, and no recording
+    /// begins or ends. `wait` is for callers that do not have the run: it keeps calls in lockstep from letting time
+    /// pass, which is written down before it is done.
     ///
     /// # Errors
-    /// Those of `wait`; nothing is done then.
+    /// The errors of `wait`; nothing is done then.
     pub fn in_order<T, G, E>(
         &self,
         wait: impl Fn() -> Result<G, E>,
@@ -99,7 +100,7 @@ impl Log {
     /// Puts all into the state of `checkpoint` by `act`, and writes down that they were: of a state that is refused nothing.
     ///
     /// # Errors
-    /// Those of `act`.
+    /// The errors of `act`.
     pub fn restore<E>(&self, checkpoint: &Checkpoint, act: impl FnOnce() -> Result<(), E>) -> Result<(), E> {
         if let Mode::Recorded(recorder, _) = &mut *self.mode() {
             recorder.set_restoring(Some(checkpoint.to_bytes()));
@@ -133,7 +134,7 @@ impl Log {
     /// since its start. Nothing is done to it meanwhile.
     ///
     /// # Errors
-    /// [`RecordError::Recorded`]; those of `begin`.
+    /// [`RecordError::Recorded`]; the errors of `begin`.
     pub fn record(
         &self,
         begin: impl FnOnce(bool) -> Result<(Recorder, Option<Arc<TurnOrder>>), RecordError>,
@@ -231,7 +232,7 @@ impl Mode {
         if let Self::Recorded(_, order) = self { order.as_ref() } else { None }
     }
 
-    /// Writes down what is done.
+    /// Writes down a call.
     pub fn note(&mut self, entry: impl FnOnce() -> Entry) {
         match self {
             Self::Recorded(recorder, _) => recorder.note(entry()),

@@ -18,7 +18,8 @@ use metachron_runtime::{AgentHandle, RunError};
 use std::sync::Arc;
 
 impl World {
-    /// Takes up another object: it lives from its first step on, and touches what it meets. No other object waits for it.
+    /// Takes up another object: it lives from its first step on, and collides with objects that are there. No other
+    /// object waits for it.
     ///
     /// # Errors
     /// [`WorldError::SameName`], [`WorldError::Part`], [`WorldError::Build`], [`WorldError::Run`], [`WorldError::Stopped`] and
@@ -82,14 +83,15 @@ impl World {
         self.in_order(|| run.remove(object.id()).map_err(|error| error.to_string()), note).map_err(refused)
     }
 
-    /// How many agents its scene has; those of higher numbers joined it since ([`World::joined`]).
+    /// How many agents its scene has; agents of higher numbers joined it since ([`World::joined`]).
     #[must_use]
     pub fn agents_of_scene(&self) -> usize {
         self.shared.of_scene
     }
 
-    /// What an agent that joined since the start was built from, as a scene has it of its own; of one that has left a member without matter, once
-    /// it is forgotten. `None` of agents of the scene and of numbers without an agent.
+    /// The member that an agent which joined since the start was built from, as a scene has it of its own; of one that
+    /// has left a member without matter, once it is forgotten. `None` of agents of the scene and of numbers without an
+    /// agent.
     #[must_use]
     pub fn joined(&self, id: AgentId) -> Option<Member> {
         let agent = self.agents().of(id).filter(|_| id.0 as usize >= self.shared.of_scene);
@@ -100,7 +102,7 @@ impl World {
         }
     }
 
-    /// What agents that join it are made with.
+    /// The settings that agents which join it are made with.
     pub(super) fn joining(&self) -> Joining {
         let Shared { gravity, surroundings, .. } = &*self.shared;
         Joining { gravity: *gravity, surroundings: Arc::clone(surroundings), executor: self.executor() }

@@ -10,7 +10,7 @@ pub struct Object {
     id: AgentId,
 }
 
-/// What tells one world of a process from all others.
+/// The tag by which one world of a process differs from all others.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub(super) struct WorldTag(u32);
 
@@ -40,12 +40,12 @@ impl Object {
     }
 }
 
-/// What an object touches, or what a query finds.
+/// The other side of a contact, or a thing that a query finds.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub enum Touched {
     /// Another object.
     Object(Object),
-    /// A solid that never moves, by its place among those of the scene.
+    /// A static solid, by its place among the scene's.
     Fixed(u32),
 }
 

@@ -86,7 +86,7 @@ impl Scene {
         }
     }
 
-    /// What bends and is held through a static solid, with the solid's index: it passes through as if the solid were bored.
+    /// Deformables held through a static solid, with the solid's index: they pass through as if the solid were bored.
     pub(super) fn held_through(&self) -> impl Iterator<Item = (AgentId, usize)> + '_ {
         let mut pairs = Vec::new();
         self.overlaps_with_static(&mut pairs);
@@ -122,7 +122,8 @@ impl Scene {
         }
     }
 
-    /// Pairs whose contact differs from the scene's `contacts`: where that is true those that do not collide, else those that do.
+    /// Pairs whose contact differs from the scene's `contacts`: where that is true the pairs that do not collide, else
+    /// the pairs that do.
     pub(super) fn pairs_apart(&self) -> BTreeSet<(AgentId, AgentId)> {
         let contact =
             |c: &&super::couplings::Coupling| c.kind == CouplingKind::Contact && (c.law == Law::Off) == self.contacts;

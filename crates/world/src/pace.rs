@@ -29,7 +29,8 @@ const POLL_INTERVAL: Duration = Duration::from_micros(500);
 /// The same where nothing else is waited for.
 const POLL_FREE: Duration = Duration::from_micros(50);
 
-/// By how much objects may be apart in time at [`Pace::Free`]: half as much as those that come near each other would wait for.
+/// By how much objects may be apart in time at [`Pace::Free`]: half as much as objects that come near each other would
+/// wait for.
 const FREE_SLICE: SimSpan = SimSpan::from_millis(10);
 
 /// So much virtual time passes between two questions whether to go on.
@@ -60,7 +61,8 @@ impl World {
         self.timeline().has_free_pace()
     }
 
-    /// The most simulated time that one of its objects has not lived, though time has passed: what it dropped, and what it is behind now. Zero as
+    /// The most simulated time that one of its objects has not lived, though time has passed: its dropped time and its
+    /// lag now. Zero as
     /// long as the declared machine of lockstep, or this one, is fast enough; at [`Pace::Free`] it does not grow.
     #[must_use]
     pub fn given_up(&self) -> SimSpan {
@@ -71,12 +73,12 @@ impl World {
     /// Lets the world live for `span`, whatever its pace, then stops its time: it stands still.
     ///
     /// In lockstep every step that is due by then, at [`Pace::Free`] before then, has been made; its clock counts whole nanoseconds, so that at a
-    /// factor that does not divide `span` it lives longer by less than so many nanoseconds. On threads and in the pool each object that neither
-    /// rests nor has failed, nor has been in one step for five seconds, has lived to the end at least; one whose step is longer than what was left
-    /// is ahead by less than that step.
-    /// A world that was stopped stays as it is; one that another thread pauses waits until it runs again, and one that another thread puts back
-    /// ([`World::restore`]) lives from there what was left of the span. In lockstep, where another thread is in a step that lasts for five seconds,
-    /// nothing is done: that object is [`AgentState::Stalled`].
+    /// factor that does not divide `span` it lives longer by less than so many nanoseconds. On threads and in the pool
+    /// each object that neither rests nor has failed, nor has been in one step for five seconds, has lived to the end
+    /// at least; one whose step is longer than the rest of the span is ahead by less than that step.
+    /// A world that was stopped stays as it is; one that another thread pauses waits until it runs again, and one that
+    /// another thread puts back ([`World::restore`]) lives from there the rest of the span. In lockstep, where another
+    /// thread is in a step that lasts for five seconds, nothing is done: that object is [`AgentState::Stalled`].
     pub fn advance(&self, span: SimSpan) {
         if self.executor() == ExecutorKind::Lockstep {
             return self.advance_virtual(span);
@@ -117,13 +119,13 @@ impl World {
             }
             left = SimSpan::from_nanos(left.as_nanos() - slice.as_nanos());
         }
-        // the leap is over: what is woken from now on goes on from here
+        // the leap is over: agents that are woken from now on go on from here
         self.drive(TimelineCommand::Step(SimSpan::ZERO));
         true
     }
 
     /// Lets virtual time pass, which does so in calls alone: where it was stopped, it is let go so far. One call: no other thread puts the world
-    /// back between what it looks at and what it does.
+    /// back between its look and its act.
     fn advance_virtual(&self, span: SimSpan) {
         let Some(mut state) = self.state_for_good() else { return };
         let State::Running(run) = &mut *state else { return };

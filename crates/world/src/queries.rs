@@ -1,7 +1,8 @@
-//! What is where in a running world: rays, shapes that are cast, the nearest point, overlaps, contacts.
+//! Spatial queries of a running world: rays, shapes that are cast, the nearest point, overlaps, contacts.
 //!
-//! In: the newest states. Out: hits. A ray or a shape goes on by what is certainly free until it is within a hundredth of a millimetre of
-//! something: exact for every kind of object, and no faster where it grazes one. Never here: forces, steps.
+//! In: the newest states. Out: hits. A ray or a shape goes on by the distance that is certainly free until it is within
+//! a hundredth of a millimetre of something: exact for every kind of object, and no faster where it grazes one. Never
+//! here: forces, steps.
 
 use super::error::WorldError;
 use super::events::touched;
@@ -15,17 +16,17 @@ use metachron_geometry::{
     Aabb, CollisionShape, PlacedShape, ShapeError, ShapeKind, ShapePose, Solid, SolidShape, Touch,
 };
 
-/// What is nearer than this is met, metres.
+/// A surface nearer than this is met, metres.
 const MET_M: f64 = 1e-5;
 /// The radius of a ray and of a point, metres: below what single precision tells apart.
 const POINT_M: f64 = 1e-6;
 /// A ray that has made so many steps grazes something for long: it meets it there.
 const STEPS_MAX: u32 = 256;
 
-/// What a query found.
+/// A hit of a query.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Hit {
-    /// What was found.
+    /// The object or solid that was found.
     pub what: Touched,
     /// The point of its surface, metres.
     pub point_m: DVec3,
@@ -125,7 +126,7 @@ impl World {
         Ok(hits)
     }
 
-    /// What an object touches now.
+    /// The contacts of an object now.
     ///
     /// # Errors
     /// [`WorldError::Foreign`].
@@ -146,7 +147,7 @@ impl World {
         ContactNow { with, since, point_m, normal: normal * sign, force_n: force_n * sign, depth_m, stiffness_n_m }
     }
 
-    /// What has matter in a box.
+    /// The objects and solids with matter in a box.
     fn near(&self, within: &Aabb) -> Vec<Near> {
         let mut near = Vec::new();
         for (number, solid) in (0..).zip(self.surroundings().statics()) {
@@ -211,7 +212,7 @@ impl Probe {
         Ok(Self { form, rotation, radius_m, scratch, found })
     }
 
-    /// The nearest of what is near, within `reach_m`.
+    /// The nearest place of the near objects and solids, within `reach_m`.
     fn nearest(&mut self, world: &World, near: &[Near], at_m: DVec3, reach_m: f64) -> Option<Hit> {
         let hits = near.iter().filter_map(|one| self.against(world, one, at_m, reach_m));
         hits.min_by(|a, b| a.distance_m.total_cmp(&b.distance_m))

@@ -1,7 +1,7 @@
 //! A world that is recorded, and one that repeats a recording.
 //!
-//! In: a world, a place to write to; a recording. Out: a recording; a world that does what it says.
-//! Never here: the file ([`super::recording`]), what is written down where ([`super::world`]).
+//! In: a world, a place to write to; a recording. Out: a recording; a world that repeats it.
+//! Never here: the file ([`super::recording`]), which call is written down where ([`super::world`]).
 
 use super::assemble;
 use super::assemble::Govern;
@@ -32,7 +32,8 @@ impl Governor for Silent {
 }
 
 impl World {
-    /// Writes down from now on, to the file at `path`, what is done to the world, so that [`World::replay`] can do it again, to the bit: of a
+    /// Writes down from now on, to the file at `path`, all calls that change the world, so that [`World::replay`] can
+    /// repeat them, to the bit: of a
     /// world on threads or in a pool also the order of its turns. A world that has run before begins with a checkpoint, whatever joined it and left
     /// it; one with an agent of your own that joined does not begin. In lockstep commands of other threads wait for
     /// the call in progress from now on.
@@ -46,7 +47,7 @@ impl World {
     /// As [`World::record`], with the text of the scene, from which a replay can start it.
     ///
     /// # Errors
-    /// Those of [`World::record`].
+    /// The errors of [`World::record`].
     pub fn record_scene(&self, path: impl AsRef<Path>, scene: SceneText) -> Result<(), RecordError> {
         self.begin_recording(|| Ok(Box::new(RecordingFile::create(path.as_ref())?)), Some(scene))
     }
@@ -59,7 +60,8 @@ impl World {
         self.begin_recording(|| Ok(out), scene)
     }
 
-    /// Begins a recording to what `open` gives. Time and commands wait: what is done is in the state with which it begins, or written down.
+    /// Begins a recording to the file that `open` gives. Time and commands wait: each call is in the state with which
+    /// it begins, or written down.
     fn begin_recording(
         &self,
         open: impl FnOnce() -> Result<Box<dyn Write + Send>, RecordError>,
@@ -93,7 +95,7 @@ impl World {
         let (Shared { identity, log, joined, .. }, agents) = (&*self.shared, self.agents());
         let turns = TurnsToLog { log: Arc::downgrade(log), agents: agents.clone() };
         let order = Arc::new(TurnOrder::new(Box::new(turns)));
-        // no turn is made in this order before the log has what it begins with
+        // no turn is made in this order before the log has its beginning
         let _held = order.between();
         log.record(|is_fresh| {
             let (joined, mut archive) = (joined.present(agents), Archive::writer());
@@ -114,7 +116,7 @@ impl World {
     /// # Errors
     /// [`RecordError::Write`] if not all of it could be written; [`RecordError::Stalled`], where it goes on.
     pub fn end_recording(&self) -> Result<bool, RecordError> {
-        // what is done after it is in neither
+        // calls after it are in neither
         let mut calls = self.state().map_err(|Waited { name, lasts }| RecordError::Stalled { name, lasts })?;
         let ended = if let State::Stopped(stopped) = &mut *calls { stopped.recorded.take() } else { None };
         ended.unwrap_or_else(|| self.close_recording())
@@ -138,7 +140,7 @@ impl World {
     /// same bits. As in lockstep its clock is virtual, and reads what the recorded one did. It takes no commands. A call that let time pass is repeated whole: time may pass further than it was let, until the last.
     ///
     /// # Errors
-    /// [`CheckpointError::OtherScene`] where the recording is of another scene; those of [`World::start`].
+    /// [`CheckpointError::OtherScene`] where the recording is of another scene; the errors of [`World::start`].
     pub fn replay(scene: &Scene, recording: Recording, until: Option<SimTime>) -> Result<Self, CheckpointError> {
         let answered = recording.governed();
         let govern =
@@ -147,10 +149,10 @@ impl World {
     }
 
     /// As [`World::replay`], with the governors of the world that was recorded, where a checkpoint within the recording has their state too; the
-    /// recording has what they answered.
+    /// recording has their answers.
     ///
     /// # Errors
-    /// Those of [`World::replay`].
+    /// The errors of [`World::replay`].
     pub fn replay_governed(
         scene: &Scene,
         govern: Govern<'_>,

@@ -30,7 +30,7 @@ const CHUNK_PARTS: usize = 1000;
 const WRITE_INTERVAL: Duration = Duration::from_millis(200);
 /// How often a recording in real time says what all states are, so that a replay that goes another way says so early.
 const CHECK_INTERVAL: Duration = Duration::from_secs(1);
-/// The program that can repeat what it has recorded, to the bit.
+/// The version of the program, which repeats its own recordings alone, to the bit.
 const PROGRAM: &str = env!("CARGO_PKG_VERSION");
 
 /// The scene that a recording is of, as it was given.
@@ -46,7 +46,7 @@ pub struct SceneText {
     pub overrides: Vec<(String, String)>,
 }
 
-/// What a file begins with.
+/// The beginning of a file.
 #[derive(Debug, Clone, PartialEq, Default, serde::Serialize, serde::Deserialize)]
 struct Head {
     of: SceneIdentity,
@@ -96,7 +96,7 @@ pub(super) struct PackedTurns {
 struct PackedPart {
     kind: PartKind,
     agent: AgentId,
-    /// Readings of two clocks of a pool may be in another order than what was made with them.
+    /// Readings of two clocks of a pool may be in another order than the parts that were made with them.
     after_ns: i64,
     factors_max: Option<u32>,
 }
@@ -157,7 +157,7 @@ pub enum RecordError {
         /// For how long, wall time.
         lasts: Duration,
     },
-    /// What it was written to took no more: it is complete up to there.
+    /// The writer took no more: the recording is complete up to there.
     #[error("the recording could not be written on: {0}")]
     Write(std::io::Error),
     /// A file is no recording that this program repeats.
@@ -165,12 +165,12 @@ pub enum RecordError {
     BadFile {
         /// Its path.
         path: PathBuf,
-        /// What is wrong with it.
+        /// The fault of its bytes.
         reason: BadRecording,
     },
 }
 
-/// What is wrong with the bytes of a recording.
+/// A fault of the bytes of a recording.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum BadRecording {
@@ -200,12 +200,12 @@ pub enum BadRecording {
     Malformed {
         /// The chunk, counted from zero.
         chunk: usize,
-        /// What is wrong with it.
+        /// Its fault.
         reason: ArchiveError,
     },
 }
 
-/// What was done to a world, read from a file ([`super::World::replay`] does it again).
+/// The calls that changed a world, read from a file ([`super::World::replay`] repeats them).
 #[derive(Debug, Clone)]
 pub struct Recording {
     head: Head,
@@ -316,7 +316,7 @@ impl Recording {
     }
 }
 
-/// What the next bytes of a file are.
+/// The kind of the next bytes of a file.
 enum Chunk<'a> {
     /// The contents of a chunk.
     Whole(&'a [u8]),
@@ -346,7 +346,7 @@ fn take_chunk<'a>(rest: &mut &'a [u8]) -> Chunk<'a> {
 /// Writes a recording.
 pub(super) struct Recorder {
     out: Box<dyn Write + Send>,
-    /// Those that are not written yet.
+    /// Entries that are not written yet.
     entries: Vec<Entry>,
     /// For each agent, how often its governor asked for nothing since it last asked for something.
     silent_turns: BTreeMap<AgentId, u32>,
@@ -363,7 +363,7 @@ impl Recorder {
     /// Begins a recording of the world that is known by `of`.
     ///
     /// # Errors
-    /// Those of `out`.
+    /// The errors of `out`.
     pub fn begin(
         mut out: Box<dyn Write + Send>,
         of: SceneIdentity,
@@ -379,7 +379,8 @@ impl Recorder {
         Ok(Self { out, entries, silent_turns, written, hashed, restoring: None, failed: None })
     }
 
-    /// Writes down what is about to be done. What came before it is complete, and leaves the process if it is much.
+    /// Writes down a call that is about to be made. The entries before it are complete, and leave the process if they
+    /// are many.
     pub fn note(&mut self, entry: Entry) {
         if self.entries.len() >= CHUNK_ENTRIES {
             self.flush();

@@ -1,6 +1,6 @@
 //! The file of a recording, whose errors name it.
 //!
-//! In: a path, bytes. Out: a file with them. Never here: what they mean ([`super::recording`]).
+//! In: a path, bytes. Out: a file with them. Never here: their meaning ([`super::recording`]).
 
 use super::recording::RecordError;
 use std::fs::File;

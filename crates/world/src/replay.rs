@@ -1,4 +1,4 @@
-//! A run that does again what a recording says, instead of what it is asked for.
+//! A run that repeats a recording, and takes no other commands.
 //!
 //! In: a run from the recorded scene, in lockstep or one that follows turns in real time, a [`Recording`]. Out: the same bits, as far as its reader lets time pass.
 //! Never here: the file, what governors answer ([`super::log`]).
@@ -37,7 +37,7 @@ pub(super) struct Player {
     pub joined: Arc<JoinedTable>,
 }
 
-/// What does again what was done.
+/// The run that repeats the calls.
 pub(super) enum Followed {
     Lockstep(Box<Lockstep>),
     RealTime(Box<Follower>),
@@ -146,7 +146,7 @@ impl Player {
         Ok(())
     }
 
-    /// Whether all states are those that were recorded.
+    /// Whether all states are the recorded ones.
     fn check(&self, expected: u64, what: &str) -> Result<(), String> {
         let run = self.run.run();
         let (found, at_s) = (state_hash(run.agents()), run.sim_now().as_secs_f64());

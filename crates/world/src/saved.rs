@@ -14,12 +14,13 @@ use metachron_runtime::{AgentHandle, AgentState, Run};
 use std::sync::atomic::Ordering::Release;
 
 impl World {
-    /// Starts `scene` and puts it into the state of `checkpoint`: it goes on as the world did that was saved, to the bit. The scene is known by
-    /// the names, models and rates of its objects and the numbers of its fixed solids, joints and couplings; with other masses, stiffnesses or
-    /// sizes than the world had that was saved, its state goes on under those.
+    /// Starts `scene` and puts it into the state of `checkpoint`: it goes on as the world did that was saved, to the
+    /// bit. The scene is known by the names, models and rates of its objects and the numbers of its fixed solids,
+    /// joints and couplings; with other masses, stiffnesses or sizes than the saved world's, its state goes on under
+    /// the new ones.
     ///
     /// # Errors
-    /// Those of [`World::start`] and [`World::restore`].
+    /// The errors of [`World::start`] and [`World::restore`].
     pub fn open(scene: &Scene, executor: ExecutorKind, checkpoint: &Checkpoint) -> Result<Self, CheckpointError> {
         Self::open_governed(scene, executor, &mut |_| None, checkpoint)
     }
@@ -27,7 +28,7 @@ impl World {
     /// As [`World::open`], with the governors of the world that was saved.
     ///
     /// # Errors
-    /// Those of [`World::start_governed`] and [`World::restore`].
+    /// The errors of [`World::start_governed`] and [`World::restore`].
     pub fn open_governed(
         scene: &Scene,
         executor: ExecutorKind,
@@ -61,10 +62,11 @@ impl World {
         Ok(Checkpoint::of_run(self.shared.identity.clone(), run, joined, archive.into_bytes()))
     }
 
-    /// Puts the world back into the state of `checkpoint`, of this world or of another of the same scene: what it would have done after, it does
-    /// again, in lockstep to the bit. Objects that joined since are taken out, with the event [`Gone`](super::Happening::Gone); those that left since
-    /// are there again. An [`Object`](super::Object) is valid where what it names is there: of one that came back again. Readers of
-    /// events are told [`Rewound`](super::Happening::Rewound) of each object that is there.
+    /// Puts the world back into the state of `checkpoint`, of this world or of another of the same scene; from there it
+    /// repeats its steps, in lockstep to the bit. Objects that joined since are taken out, with the event
+    /// [`Gone`](super::Happening::Gone); objects that left since are there again. An [`Object`](super::Object) is valid
+    /// where its object is there: of one that came back again. Readers of events are told
+    /// [`Rewound`](super::Happening::Rewound) of each object that is there.
     ///
     /// # Errors
     /// [`CheckpointError::OtherScene`], also where an object of this world has the number of another that joined the checkpoint's,

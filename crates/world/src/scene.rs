@@ -44,7 +44,7 @@ pub struct Scene {
     pub stall_limit: Option<Duration>,
     /// Time at which states are drawn.
     pub states: StatesKind,
-    /// What lights it in pictures.
+    /// Its environment light in pictures.
     pub environment: EnvironmentKind,
     /// Gravity, m/s².
     pub gravity: DVec3,
@@ -70,7 +70,7 @@ pub struct Scene {
     pub walls: Range<usize>,
     /// Whether agents collide with each other where no coupling says otherwise.
     pub contacts: bool,
-    /// How deep what lies on each other rests, metres ([`DEPTH_RANGE_M`]).
+    /// The depth of resting contacts, metres ([`DEPTH_RANGE_M`]).
     pub contact_depth_m: f64,
     /// How far the solves of contacts go.
     pub contact_budget: SolveBudget,
@@ -78,7 +78,7 @@ pub struct Scene {
     pub joints: Arc<[Joint]>,
     /// Their names, in their order; empty where a joint has none.
     pub joint_names: Vec<String>,
-    /// What programs read by name.
+    /// The sensors, which programs read by name.
     pub sensors: Vec<Sensor>,
     /// Pairs that interact otherwise than by the default contact.
     pub couplings: Vec<Coupling>,

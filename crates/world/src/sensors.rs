@@ -17,13 +17,13 @@ use std::sync::Arc;
 /// A sensor of a scene.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Sensor {
-    /// Its name, unique among those of sensors.
+    /// Its name, unique among the names of sensors.
     pub name: String,
-    /// What it reads.
+    /// Its kind, with its mount.
     pub kind: SensorKind,
 }
 
-/// What a sensor reads.
+/// The kinds of sensors.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[non_exhaustive]
 pub enum SensorKind {
@@ -32,16 +32,18 @@ pub enum SensorKind {
     JointPosition(u32),
     /// How fast, rad/s or m/s. One number.
     JointVelocity(u32),
-    /// What its motor and its stops give the second body together, N·m of a hinge, N of a slide: the mean of the last step. One number.
+    /// The effort of its motor and its stops together on the second body, N·m of a hinge, N of a slide: the mean of the
+    /// last step. One number.
     JointEffort(u32),
-    /// What touches an object gives it, world axes, N: the mean of the last step. Three numbers.
+    /// The force of all contacts on an object, world axes, N: the mean of the last step. Three numbers.
     ContactForce {
         /// The object.
         object: AgentId,
         /// Whose contacts count; `None` for all.
         with: Option<ContactPartner>,
     },
-    /// What an accelerometer on a rigid body reads, the acceleration of the matter there less that of gravity, m/s², then a gyroscope, rad/s, both
+    /// The reading of an accelerometer on a rigid body, the acceleration of the matter there less that of gravity,
+    /// m/s², then of a gyroscope, rad/s, both
     /// in the axes of its site. Accelerations are the mean of the last step, spins those at its end. Six numbers.
     Imu {
         /// The body.
@@ -65,12 +67,12 @@ pub enum SensorKind {
 pub struct Site {
     /// Its place, metres in the axes of the body's shape; `None` for the centre of mass.
     pub at_m: Option<DVec3>,
-    /// The rotation from its own axes to those of the shape, of length 1.
+    /// The rotation from its own axes to the shape's, of length 1.
     pub rotation: DQuat,
 }
 
 impl SensorKind {
-    /// What it is called in scene files and reports.
+    /// Its name in scene files and reports.
     #[must_use]
     pub const fn name(&self) -> &'static str {
         match self {
@@ -84,7 +86,7 @@ impl SensorKind {
     }
 }
 
-/// What a sensor read.
+/// A reading of a sensor.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Reading {
     /// When: the time of the state that it is of.
@@ -210,10 +212,10 @@ impl World {
         &self.instruments().sensors
     }
 
-    /// What a sensor reads now, of the newest states.
+    /// A sensor's reading now, of the newest states.
     ///
     /// # Errors
-    /// [`WorldError::NoSensor`], and [`WorldError::Gone`] where what it is on has been removed.
+    /// [`WorldError::NoSensor`], and [`WorldError::Gone`] where its object has been removed.
     pub fn sensor(&self, name: impl AsRef<str>) -> Result<Reading, WorldError> {
         let name = name.as_ref();
         let sensors = self.sensors();
@@ -224,7 +226,7 @@ impl World {
         self.read(&sensor.kind)
     }
 
-    /// What a sensor of this kind reads now.
+    /// The reading now of a sensor of this kind.
     ///
     /// # Errors
     /// [`WorldError::NoAgent`] and [`WorldError::Gone`].
@@ -262,7 +264,7 @@ impl World {
         let arm_m = site.at_m.map_or(DVec3::ZERO, |at_m| pose.place(at_m) - pose.centre_m);
         let about_centre_m_s2 = state.angular_acceleration.cross(arm_m) + spin.cross(spin.cross(arm_m));
         let to_site = (pose.rotation * site.rotation).conjugate();
-        // what rests is held: gravity alone is missing
+        // a body at rest is held: gravity alone is missing
         let specific_force_m_s2 = state.acceleration + about_centre_m_s2 - gravity_m_s2;
         let values = [specific_force_m_s2, spin].map(|v| (to_site * v).to_array()).concat();
         Ok(Reading { time: state.time, values })
@@ -294,7 +296,7 @@ impl World {
 }
 
 impl Placed {
-    /// What never moves.
+    /// The fixed world.
     fn world() -> Self {
         Self { pose: Pose::WORLD, velocity: DVec3::ZERO, spin: DVec3::ZERO, state: Arc::default() }
     }

@@ -55,7 +55,7 @@ impl World {
 /// Checks that an object whose state is `now` can take the state `new`.
 ///
 /// # Errors
-/// What does not fit, and what was expected.
+/// The mismatch, and the expected value.
 fn check_fits(new: &Body, now: &Body) -> Result<(), String> {
     if std::mem::discriminant(new) != std::mem::discriminant(now) {
         return Err(format!("the state is that of {}; expected that of {}", kind(new), kind(now)));
@@ -86,7 +86,7 @@ fn list_lengths(body: &Body, is_carried: bool) -> Vec<ListLength> {
     }
 }
 
-/// What a state is of.
+/// The kind of object that a state is of.
 const fn kind(body: &Body) -> &'static str {
     match body {
         Body::Nothing => "nothing that has matter",

@@ -1,4 +1,4 @@
-//! What code above the models asks of an agent, answered by its spec: mass, momentum, division into elements.
+//! Properties of an agent for code above the models, by its spec: mass, momentum, division into elements.
 //!
 //! In: a [`Spec`] or a [`Member`]. Out: numbers, or the same member divided otherwise. Never here: steps, pictures.
 //! A new model is added to these functions. Above this crate only scene files and pictures know models one by one: `docs/ARCHITECTURE.md`,
@@ -33,8 +33,8 @@ impl Spec {
         }
     }
 
-    /// The power of 1/ε as which the work of a step falls: 1 of what is divided along its length, 2.5 of a sheet, between 2 of its elements
-    /// and 3 of its factor, 3 of a solid's cage.
+    /// The power of 1/ε as which the work of a step grows: 1 of an object that is divided along its length, 2.5 of a
+    /// sheet, between 2 of its elements and 3 of its factor, 3 of a solid's cage.
     #[must_use]
     pub const fn work_power(&self) -> f64 {
         match self {
@@ -63,7 +63,7 @@ impl Spec {
         matches!(self, Self::Tube(_) | Self::Soft(_))
     }
 
-    /// What the object says about its contacts.
+    /// The object's contact traits.
     #[must_use]
     pub const fn traits(&self) -> ContactTraits {
         match self {

@@ -44,10 +44,10 @@ pub(super) struct Shared {
     tag: WorldTag,
     state: CallLock<State>,
     agents: Agents,
-    /// How many agents the scene has, and those that joined since, in the order of their numbers.
+    /// How many agents the scene has, and the parts that joined since, in the order of their numbers.
     pub of_scene: usize,
     pub joined: Arc<JoinedTable>,
-    /// Gravity, m/s²: that of objects that join it.
+    /// Gravity, m/s²: also of objects that join it.
     pub gravity: DVec3,
     /// The static solids and joints.
     pub surroundings: Arc<ClusterScene>,
@@ -210,7 +210,7 @@ impl World {
         all.try_into().map_err(|_| WorldError::Foreign)
     }
 
-    /// All objects that are there, those of the scene first, in the order in which they joined.
+    /// All objects that are there, the scene's first, in the order in which they joined.
     pub fn all_objects(&self) -> impl Iterator<Item = Object> {
         let present = self.shared.agents.iter().filter(|agent| agent.state() != AgentState::Gone);
         present.map(|agent| self.shared.tag.object(agent.id()))
@@ -437,7 +437,7 @@ impl World {
         self.see(run);
     }
 
-    /// Notes the time for those that ask while it passes.
+    /// Notes the time for callers that ask while it passes.
     pub(super) fn see(&self, run: &dyn Run) {
         *self.seen() = Present::of(run);
     }

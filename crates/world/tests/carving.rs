@@ -1,4 +1,5 @@
-//! Cells that are removed from a body of a running world: what is touched, asked and saved after is the body without them.
+//! Cells that are removed from a body of a running world: contacts, queries and checkpoints after see the body without
+//! them.
 
 use glam::{DQuat, DVec3};
 use metachron_core::{Body, SimSpan};

@@ -216,7 +216,7 @@ impl Agent for Idle {
     }
 }
 
-/// An object, and what it takes as its documentation says it.
+/// An object, and the inputs that its documentation lists.
 struct Taker {
     name: &'static str,
     model: &'static str,

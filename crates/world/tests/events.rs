@@ -1,4 +1,4 @@
-//! What happens between two looks at a world is told all the same.
+//! Events between two looks at a world are reported all the same.
 
 use glam::DVec3;
 use metachron_core::SimSpan;

@@ -1,4 +1,5 @@
-//! Objects join a world that runs and leave it: on every executor they meet what is there, and what lay on them falls.
+//! Objects join a world that runs and leave it: on every executor they collide with the objects there, and bodies that
+//! lay on them fall.
 
 use glam::DVec3;
 use metachron_core::{Body, SimSpan, SimTime};
@@ -141,7 +142,7 @@ fn hundreds_come_and_go() {
         assert_eq!(world.agents().len(), 201);
         let left = world.agents().iter().filter(|agent| agent.state() != metachron_runtime::AgentState::Gone).count();
         assert_eq!(left, 1, "{executor:?}");
-        // a checkpoint looks for what those that have left were made of, and nobody keeps it
+        // a checkpoint looks for the parts of agents that have left, and nobody keeps them
         world.checkpoint().unwrap();
         assert_eq!(world.joined(metachron_core::AgentId(7)).unwrap().spec.model(), "synthetic", "{executor:?}");
     }
@@ -166,7 +167,7 @@ fn kept_bytes(count: u32, join: impl Fn(&World, u32) -> Object) -> i64 {
         });
         measured.bytes_current
     };
-    // what is made once
+    // allocations that are made once
     kept(0..200);
     kept(200..count) / i64::from(count - 200)
 }
@@ -248,7 +249,7 @@ fn hung() -> Scene {
         .unwrap()
 }
 
-/// What joins, leaves and happens from a checkpoint on.
+/// A newcomer joins after a checkpoint, and the world goes on: its hash and time.
 fn go_on(world: &World, newcomer: &str) -> (u64, SimTime) {
     world.advance(ms(60));
     world.add(newcomer, Rigid::ball(0.03).at([0.05, 0.0, 0.6])).unwrap();

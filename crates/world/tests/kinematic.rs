@@ -1,4 +1,4 @@
-//! Kinematic bodies move as poses and keyframes say, and feel what they carry.
+//! Kinematic bodies move as poses and keyframes say, and feel the bodies that they carry.
 
 use glam::{DQuat, DVec3};
 use metachron_core::{Body, RigidState, SimSpan};
@@ -147,7 +147,7 @@ fn a_checkpoint_has_the_pose_that_leads_a_body() {
 }
 #[test]
 fn what_is_led_at_any_speed_meets_what_is_in_its_way_from_its_second_step_on() {
-    // in its first step nobody has heard of its speed; what is a foot away is seen anyway
+    // in its first step nobody has heard of its speed; a ball a foot away is seen anyway
     for (far_m, speed_m_s) in [(0.3, 3000.0), (10.0, 1000.0)] {
         let plate = Rigid::cuboid([0.02, 0.3, 0.3]).kinematic().at([-far_m, 0.0, 0.0]);
         let scene = Scene::builder().gravity([0.0; 3]).add("plate", plate).add("ball", Rigid::ball(0.05));

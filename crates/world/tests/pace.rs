@@ -84,7 +84,7 @@ fn an_advance_ends_when_told_to_and_goes_on_where_the_world_is_put_back() {
             assert!(stands > begun + ms(20) && stands < begun + ms(500_000_000));
             world.wait_until(world.now() + std::time::Duration::from_millis(10));
             assert_eq!(world.time(), stands, "it stands still");
-            // who puts it back does so while another waits, which lives what was left
+            // one thread puts it back while another waits, which lives the rest of its span
             let span = ms(if pace == Pace::Free { 4000 } else { 100 });
             std::thread::scope(|scope| {
                 scope.spawn(|| world.advance(span));

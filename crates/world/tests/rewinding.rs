@@ -1,5 +1,6 @@
-//! Worlds that go back: however often, whatever joins, leaves and jumps meanwhile and whoever calls, no world is lost and no object parked; what
-//! is refused changes nothing; readers of events learn that the world went back.
+//! Worlds that go back: however often, with objects that join, leave and jump meanwhile and calls of other threads, no
+//! world is lost and no object parked; a refused state changes nothing; readers of events learn that the world went
+//! back.
 
 #[path = "../examples/rewinds/driver.rs"]
 mod driver;
@@ -48,7 +49,7 @@ const fn ms(count: u64) -> SimSpan {
     SimSpan::from_millis(count)
 }
 
-/// What a [`Clerk`] does when it reads.
+/// Modes of a [`Clerk`] that reads its state.
 const READS: u8 = 0;
 const ERRS_ONCE: u8 = 1;
 const PANICS_ONCE: u8 = 2;
@@ -212,7 +213,7 @@ fn falling(executor: ExecutorKind) -> World {
     World::start(&scene.unwrap(), executor).unwrap()
 }
 
-/// What the ball tells: each time that the world went back, and what its contact with the floor does first after that.
+/// The ball's events: each time that the world went back, and the first event of its contact with the floor after that.
 fn told(world: &World, events: Vec<Event>) -> Vec<&'static str> {
     let ball = world.object("ball").unwrap();
     let of_it = events.into_iter().filter(|event| event.object == ball);
@@ -249,7 +250,7 @@ fn a_contact_that_begins_again_after_a_way_back_begins() {
             assert_eq!(told(&world, events.drain().collect()), ["rewound"], "{executor:?}");
             world.advance(ms(300));
             assert_eq!(told(&world, events.drain().collect()), ["begins"], "{executor:?}");
-            // what it touches where the world goes back to begins there
+            // contacts of the state that the world goes back to begin there
             world.restore(&on_the_floor).unwrap();
             assert_eq!(told(&world, events.drain().collect()), ["rewound", "begins"], "{executor:?}");
             // read at once, in the order in which it happened, whatever the times

@@ -1,4 +1,4 @@
-//! Quaternions of any length are one rotation wherever they are given, and what is none is refused.
+//! Quaternions of any length are one rotation wherever they are given, and a quaternion of no rotation is refused.
 
 use glam::{DQuat, DVec3};
 use metachron_core::{Anchor, Body, SimSpan};

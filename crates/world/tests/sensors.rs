@@ -1,4 +1,4 @@
-//! What sensors read is what mechanics says.
+//! Readings of sensors against closed forms of mechanics.
 
 use glam::{DMat3, DQuat, DVec3};
 use metachron_contact::joint::{JointKind, Motor, MotorGoal};
@@ -106,7 +106,7 @@ struct Floating {
     arm_m: DVec3,
 }
 
-/// What an IMU reads, in the axes of its site.
+/// The reading of an IMU, in the axes of its site.
 struct Imu {
     specific_force_m_s2: DVec3,
     spin: DVec3,
@@ -131,7 +131,7 @@ impl Floating {
         Imu { specific_force_m_s2: DVec3::from_slice(&read[..3]), spin: DVec3::from_slice(&read[3..]) }
     }
 
-    /// What a body has at the site that turns about its own z, rad/s and rad/s².
+    /// The reading at the site of a body that turns about its own z, rad/s and rad/s².
     fn closed_form(&self, spin: f64, angular_acceleration: f64) -> Imu {
         let (spin, angular, to_site) =
             (DVec3::Z * spin, DVec3::Z * angular_acceleration, self.site.rotation.conjugate());
@@ -163,7 +163,7 @@ fn a_site_on_a_body_that_spins_up_feels_the_tangential_acceleration_too() {
     let torque = Command::torque(Anchor::Local(DVec3::ZERO), DVec3::Z * 0.05);
     world.command(body, torque).unwrap();
     world.advance(SimSpan::from_millis(500));
-    // α = τ / I, and the spin is what it has made by then
+    // α = τ / I, and the spin is its integral
     let Body::Rigid(state) = world.latest(body).unwrap().body else { panic!("rigid") };
     assert!((state.spin.z - 1.0).abs() < 5e-3, "{}", state.spin);
     check_imu(&floating.read(), &floating.closed_form(state.spin.z, 0.05 / 0.025), 1e-6);

@@ -1,4 +1,4 @@
-//! Soft bodies built in code behave as those of scene files.
+//! Soft bodies built in code behave as soft bodies of scene files.
 
 use glam::{DQuat, DVec3};
 use metachron_core::{Body, SimSpan};

@@ -1,4 +1,4 @@
-//! Worlds built in code: what they give against closed forms, on every executor.
+//! Worlds built in code against closed forms, on every executor.
 
 use glam::{DQuat, DVec3};
 use metachron_core::{Body, ContactPartner, SimSpan, Snapshot};
@@ -157,7 +157,7 @@ fn a_sensor_a_motor_and_groups_are_said_in_code_as_in_scenes() {
         .obstacle(still("gate", gate, 0.3, sensor))
         .add("ghost", Rigid::ball(0.05).at([0.0, 0.0, 0.6]).contact(ghost))
         .add("wheel", Rigid::ball(0.05).at([2.0, 0.0, 1.0]));
-    // the world turns by −2 rad/s against what is a
+    // the motor turns the world by 2 rad/s against the wheel, body `a`: the wheel turns by −2 rad/s
     let scene = builder.clone().joint("wheel", None, hinge, [2.0, 0.0, 1.0]).build().unwrap();
     let world = World::start(&scene, ExecutorKind::Lockstep).unwrap();
     world.advance(span(1.0));

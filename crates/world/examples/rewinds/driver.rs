@@ -1,7 +1,7 @@
 //! Worlds that are saved and put back while objects join, leave and jump, and worlds that many threads call at once.
 //!
-//! In: an executor, how much of it, a seed. Out: how much was done, what was refused that should not have been, which objects failed. Never
-//! here: how much of it is enough.
+//! In: an executor, the amount of work, a seed. Out: the number of calls made, calls that were refused wrongly, objects
+//! that failed. Never here: how much of it is enough.
 
 use glam::{DQuat, DVec3};
 use metachron_core::{AgentId, Anchor, SimSpan};
@@ -32,7 +32,7 @@ pub struct Amount {
     pub change_every: u64,
 }
 
-/// What was done, and what went wrong.
+/// The number of calls made, and their failures.
 #[derive(Debug, Default)]
 pub struct Tally {
     pub checkpoints: u64,

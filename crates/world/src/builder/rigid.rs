@@ -30,7 +30,8 @@ impl Rigid {
         Self::new(Solid::Ball { radius_m })
     }
 
-    /// Several solids as one body: each with where its axes are in those of the body, metres, and turned. All are equally dense; see
+    /// Several solids as one body, each with the origin and the rotation of its axes in the body's, metres. All are
+    /// equally dense; see
     /// [`CompoundPart::density`].
     #[must_use]
     pub fn compound(parts: impl IntoIterator<Item = CompoundPart>) -> Self {
@@ -127,15 +128,16 @@ impl Rigid {
         self
     }
 
-    /// What it says about its contacts: what it collides with, rules of pairs, whether it only senses.
+    /// Its contact traits: the groups that it collides with, rules of pairs, whether it only senses.
     #[must_use]
     pub const fn contact(mut self, traits: ContactTraits) -> Self {
         self.spec.traits = traits;
         self
     }
 
-    /// Kinematic: it moves as [`metachron_runtime::Command::pose`] and its keyframes lead it, and gives way to nothing. What touches it pushes
-    /// back, which [`metachron_core::Snapshot::contact_wrench`] has. Its mass and velocity have no meaning.
+    /// Kinematic: it moves as [`metachron_runtime::Command::pose`] and its keyframes lead it, and gives way to nothing.
+    /// Bodies that touch it push back; [`metachron_core::Snapshot::contact_wrench`] has their wrench. Its mass and
+    /// velocity have no meaning.
     #[must_use]
     pub fn kinematic(mut self) -> Self {
         self.spec.led.get_or_insert_default();

@@ -8,14 +8,14 @@ use crate::sensors::{Sensor, SensorKind, Site};
 use metachron_core::{ContactPartner, unit_rotation};
 use metachron_geometry::Obstacle;
 
-/// A sensor by the names of what it is on.
+/// A sensor, with its mount by name.
 #[derive(Debug, Clone, serde::Serialize, serde::Deserialize)]
 pub(super) struct Mounted {
     pub name: String,
     pub on: SensorOn,
 }
 
-/// What a sensor is on, by name.
+/// The mount of a sensor, by name.
 #[derive(Debug, Clone, PartialEq, serde::Serialize, serde::Deserialize)]
 #[non_exhaustive]
 pub enum SensorOn {
@@ -25,9 +25,9 @@ pub enum SensorOn {
     JointVelocity(String),
     /// By how much it is driven: [`SensorKind::JointEffort`].
     JointEffort(String),
-    /// What touches an object: [`SensorKind::ContactForce`].
+    /// All contacts of an object: [`SensorKind::ContactForce`].
     ContactForce(String),
-    /// What one object or fixed solid, the second, gives the first.
+    /// The force that one object or fixed solid, the second, gives the first.
     ContactBetween(String, String),
     /// An accelerometer and a gyroscope in a rigid body that is not kinematic: [`SensorKind::Imu`].
     Imu(String),
@@ -37,7 +37,7 @@ pub enum SensorOn {
     Pose(String, [f64; 3]),
 }
 
-/// What sensors may be on.
+/// Everything that sensors may be on.
 pub(super) struct Mounts<'a> {
     pub agents: &'a [Member],
     pub fixed: &'a [Obstacle],

@@ -78,8 +78,8 @@ impl Soft {
         Self::new(SoftShape::Ball { radius_m, segments })
     }
 
-    /// What a closed surface encloses, in a cage of cells of at most the first of these lengths at the start, which later stay between both,
-    /// metres.
+    /// The volume within a closed surface, in a cage of cells of at most the first of these lengths at the start, which
+    /// later stay between both, metres.
     #[must_use]
     pub fn mesh(surface: Arc<Triangles>, range_m: (f64, f64)) -> Self {
         Self::new(SoftShape::Embedded { surface, eps_m: range_m.0, range_m })
@@ -169,7 +169,7 @@ impl Soft {
         self
     }
 
-    /// What it says about its contacts.
+    /// Its contact traits.
     #[must_use]
     pub const fn contact(mut self, traits: ContactTraits) -> Self {
         self.spec.traits = traits;

@@ -1,4 +1,4 @@
-//! What a test records of a world: the bytes, while they are written, and the recording that they are.
+//! The recording that a test makes of a world: the bytes, while they are written, and the recording read from them.
 
 use metachron_world::{BadRecording, Recording, World};
 use std::io::Write;

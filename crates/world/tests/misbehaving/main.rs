@@ -1,5 +1,5 @@
-//! What a model of somebody's own does wrong, wherever it does: it is parked and an event says so, all others step on as they would have, and
-//! the world takes checkpoints, goes back, and lets objects join and leave.
+//! Faults of a user's own model, in each of its calls: it is parked and an event says so, all others step on as they
+//! would have, and the world takes checkpoints, goes back, and lets objects join and leave.
 
 mod coupled;
 mod lockstep_stalls;
@@ -63,12 +63,12 @@ struct Seen {
     hash: u64,
 }
 
-/// What a case leaves.
+/// The outcome of a case.
 #[derive(Debug, PartialEq, Default)]
 struct Left {
-    /// The states of those that touch nothing that touches the rogue.
+    /// The states of bodies that touch nothing that touches the rogue.
     far: Vec<Seen>,
-    /// The same of those that touch it.
+    /// The states of bodies that touch it.
     near: Vec<Seen>,
     is_parked: bool,
     times: u64,
@@ -90,7 +90,7 @@ fn advance(world: &World, span_ms: u64) -> bool {
     world.advance_while(ms(span_ms), || begun.elapsed() < Duration::from_secs(10))
 }
 
-/// What all objects do, and where they are in time.
+/// The state, time and leader of each object.
 fn lived(world: &World) -> String {
     let agents = world.agents().iter();
     let of = |agent: &metachron_runtime::AgentHandle| {
@@ -111,7 +111,7 @@ fn far_paths() -> Vec<Vec<Seen>> {
 
 const FAR: [&str; 3] = ["far box", "far ball", "flying"];
 
-/// A world with a rogue in it, and what was not as promised.
+/// A world with a rogue in it, and the promises broken in it.
 struct Case<'a> {
     world: World,
     switch: Arc<Switch>,
@@ -201,7 +201,7 @@ impl Case<'_> {
     }
 }
 
-/// Lets the rogue misbehave after 100 ms; what is not as promised is added to `faults`.
+/// Lets the rogue misbehave after 100 ms; broken promises are added to `faults`.
 fn case(executor: ExecutorKind, kind: Kind, leads: bool, faults: &mut Vec<String>) -> Left {
     let switch = Arc::<Switch>::default();
     let world = World::start(&scene(&switch, leads), executor).unwrap();
@@ -247,7 +247,8 @@ fn one_that_misbehaves_is_parked_and_all_others_step_as_without_it() {
                     if !holds_all {
                         faults.push(format!("{name}: far away {:?}, on no path of theirs", left.far));
                     }
-                    // in virtual time those that touch it step as if it had refused the step at its start, but where it fails at its end
+                    // in virtual time bodies that touch it step as if it had refused the step at its start, but where
+                    // it fails at its end
                     // or later
                     let wanted = if left.is_parked { &refuses.near } else { &clean.near };
                     let at_end = matches!(

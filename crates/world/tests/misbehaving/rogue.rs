@@ -51,7 +51,7 @@ pub enum Kind {
     WrongUnanswered,
     WrongBlock,
     WrongSide,
-    /// What is no number.
+    /// Values that are no number.
     NanFree,
     NanVelocities,
     NanBlocks,
@@ -117,7 +117,7 @@ impl Kind {
     ];
 }
 
-/// What it is told, and how often it did so.
+/// The fault that it is to make, and how often it made it.
 #[derive(Debug, Default)]
 pub struct Switch {
     kind: AtomicU8,

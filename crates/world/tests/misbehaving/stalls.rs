@@ -41,7 +41,7 @@ fn a_step_that_does_not_end_is_told_of_and_the_world_goes_on() {
             told |= events.drain().any(|event| event.object == rogue && event.what == Happening::Stalled);
             told
         });
-        // a checkpoint gives up, twice, and names it; whoever asks meanwhile is answered
+        // a checkpoint gives up, twice, and names it; all callers are answered meanwhile
         for _ in 0..2 {
             let (asked, answer) = channel();
             let other = world.clone();
