@@ -1,7 +1,7 @@
 //! The one place where axes change: Bevy has y up, metachron z.
 //!
-//! In: positions, directions and rotations of one of the two. Out: those of the other, a quarter turn about x away. Both are right-handed and
-//! in metres. Never here: anything that moves.
+//! In: positions, directions and rotations in one of the two. Out: the same in the other, a quarter turn about x away.
+//! Both are right-handed and in metres. Never here: anything that moves.
 
 use bevy_math::{Quat, Vec3};
 use glam::{DQuat, DVec3};

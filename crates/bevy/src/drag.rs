@@ -14,7 +14,7 @@ use bevy_shape::Ray3d;
 use metachron_core::Anchor;
 use metachron_world::{Command, Touched, WorldError};
 
-/// The key of the springs of drags: those of a program's own commands have the others, 0 … 6.
+/// The key of the springs of drags: springs of a program's own commands have the others, 0 … 6.
 const KEY: u32 = 7;
 /// How far a pointer reaches, metres.
 const REACH_M: f64 = 1e4;
@@ -41,7 +41,8 @@ pub struct Drag {
     pub spring: Spring,
 }
 
-/// A pointer that drags what it is pressed on: the nearest object that its ray meets gets a [`Drag`], if an entity follows it.
+/// A pointer that drags the nearest object that its ray meets, where it is pressed: the object gets a [`Drag`] if an
+/// entity follows it.
 #[derive(Debug, Clone, Copy, PartialEq, Message)]
 pub enum PointerDrag {
     /// The pointer was pressed.
@@ -51,7 +52,8 @@ pub enum PointerDrag {
         /// How strongly it pulls.
         spring: Spring,
     },
-    /// It has moved: what it holds is pulled to the ray, as far from the ray's origin as it was where it was pressed.
+    /// It has moved: the object that it holds is pulled to the ray, as far from the ray's origin as it was where it was
+    /// pressed.
     Move {
         /// The ray now.
         ray: Ray3d,
@@ -60,7 +62,7 @@ pub enum PointerDrag {
     Release,
 }
 
-/// What the pointer holds.
+/// The object that the pointer holds.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Held {
     entity: Entity,
@@ -124,7 +126,7 @@ fn release(held: &mut Option<Held>, commands: &mut Commands<'_, '_>) {
     }
 }
 
-/// What the pointer is on, held where the ray meets it.
+/// The object under the pointer, held where the ray meets it.
 fn seize(world: &MetachronWorld, followers: &Followers, ray: Ray3d, spring: Spring) -> Option<Held> {
     // a ray of Bevy is finite and has a direction, which is all that a cast asks for
     let hit = world.cast_ray(to_metachron(ray.origin), to_metachron(*ray.direction), REACH_M).ok()??;

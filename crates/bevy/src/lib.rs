@@ -41,7 +41,7 @@ impl MetachronPlugin {
     /// Starts a scene; its time stands until the app's first frame.
     ///
     /// # Errors
-    /// Those of [`World::start`].
+    /// The errors of [`World::start`].
     pub fn start(scene: &Scene, executor: ExecutorKind) -> Result<Self, WorldError> {
         World::start(scene, executor).map(Self::new)
     }
@@ -65,7 +65,7 @@ impl Deref for MetachronWorld {
     }
 }
 
-/// What the plugin does in `PostUpdate`, in this order.
+/// The stages of the plugin in `PostUpdate`, in this order.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, SystemSet)]
 pub enum MetachronSystems {
     /// Objects of new entities join; springs are passed on.

@@ -1,6 +1,7 @@
-//! What happens in the world, as messages of Bevy.
+//! Events of the world, as messages of Bevy.
 //!
-//! In: events of the objects. Out: messages in Bevy's axes, with the entities that follow the objects. Never here: what is done about them.
+//! In: events of the objects. Out: messages in Bevy's axes, with the entities that follow the objects. Never here:
+//! reactions to them.
 
 use super::axes::to_bevy;
 use super::objects::Followers;
@@ -19,7 +20,7 @@ pub struct ContactMessage {
     pub object: Object,
     /// The entity that follows it.
     pub entity: Option<Entity>,
-    /// What it touches.
+    /// The object or solid that it touches.
     pub with: Touched,
     /// The entity that follows that.
     pub with_entity: Option<Entity>,
@@ -42,7 +43,7 @@ pub struct StateMessage {
     pub entity: Option<Entity>,
     /// When, in the object's time: the end of the step in which it happened.
     pub at: SimTime,
-    /// What; never [`Happening::Contact`].
+    /// The event; never [`Happening::Contact`].
     pub what: Happening,
 }
 

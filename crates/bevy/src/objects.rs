@@ -118,7 +118,7 @@ pub(super) fn show(
 ) {
     let frame = world.frame();
     for (entity, follows, mut transform, mesh) in &mut followers {
-        // what has left stays where it was
+        // an object that has left stays where it was
         let Ok(place) = place_of(&frame, follows.0) else { continue };
         transform.set_if_neq(place.with_scale(transform.scale));
         if let (Some(mut mesh), Some(meshes)) = (mesh, &mut meshes)

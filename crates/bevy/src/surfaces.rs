@@ -12,8 +12,9 @@ use metachron_core::{Body, RigidState, SimTime, ToolState};
 use metachron_export::Surface;
 use metachron_world::{Frame, Object, Scene};
 
-/// Gives an entity that [`super::Follows`] an object a [`Mesh3d`] of the object's surface: that of a rigid body in its own axes, made once; those of
-/// tubes, ropes, sheets and solids in the world's axes and those of tools in their own, written again whenever they move.
+/// Gives an entity that [`super::Follows`] an object a [`Mesh3d`] of the object's surface: of a rigid body in its own
+/// axes, made once; of tubes, ropes, sheets and solids in the world's axes and of tools in their own, written again
+/// whenever they move.
 ///
 /// Where cells are removed or a body divides itself otherwise the triangles are new too. Bevy finds the box of a changed mesh anew by itself.
 /// Without `Assets<Mesh>` in the app nothing is made.
@@ -23,7 +24,7 @@ pub struct SurfaceMesh {
     drawn: Option<Drawn>,
 }
 
-/// What a mesh shows.
+/// The state that a mesh shows.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 struct Drawn {
     object: Object,
@@ -71,7 +72,7 @@ impl SurfaceMesh {
     }
 }
 
-/// The surface of an object in the axes in which it is drawn; `None` for what has no shape.
+/// The surface of an object in the axes in which it is drawn; `None` for an object without a shape.
 fn surface(frame: &Frame, object: Object) -> Option<Surface> {
     let shape = frame.world().agents().of(object.id())?.form()?;
     let body = match frame.body(object).ok()? {

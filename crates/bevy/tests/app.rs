@@ -1,4 +1,5 @@
-//! An app without a window whose entities follow a world in lockstep: where they are, what they are told, what they pull.
+//! An app without a window whose entities follow a world in lockstep: their places, the messages that they get, the
+//! springs by which they pull.
 
 use bevy_app::{App, TaskPoolPlugin};
 use bevy_asset::Assets;

@@ -1,16 +1,18 @@
-//! The local model of an object's contacts: what it would feel elsewhere than where its newest state has it, until the next state comes.
+//! The local model of an object's contacts: the wrench on it elsewhere than where its newest state has it, until the
+//! next state comes.
 //!
 //! In: the newest states of a world. Out: a wrench for any pose near that. Never here: where the object is led, how old a state may be.
 //!
-//! Each contact is a plane through the point that bears most: along its normal it gives the published force and, for what the object is off the
-//! published pose, the published stiffness (docs/theory/coupling.md, eq. 7s, 7t); never a pull. Friction follows the normal force.
+//! Each contact is a plane through the point that bears most: along its normal it gives the published force and, for
+//! the way of the object off the published pose, the published stiffness (docs/theory/coupling.md, eq. 7s, 7t); never a
+//! pull. Friction follows the normal force.
 
 use glam::{DQuat, DVec3};
 use metachron_core::{Body, SimTime, Snapshot, Wrench};
 use metachron_geometry::ShapeKind;
 use metachron_world::{ContactNow, Object, World, WorldError};
 
-/// What an object feels near a state of it.
+/// The contacts of an object near a state of it.
 #[derive(Debug, Clone, Default)]
 pub struct ContactModel {
     /// The scene's time of the state.
@@ -23,7 +25,7 @@ pub struct ContactModel {
     position_m: DVec3,
     rotation: DQuat,
     contacts: Vec<Bearing>,
-    /// What jaws hold pulls with, N.
+    /// The pull of the bodies that its jaws hold, N.
     held_n: DVec3,
 }
 
@@ -44,7 +46,7 @@ impl ContactModel {
     /// Takes in the newest state of `object`; whether it is another one than before.
     ///
     /// # Errors
-    /// Those of [`World::latest`].
+    /// The errors of [`World::latest`].
     pub fn refresh(&mut self, world: &World, object: Object) -> Result<bool, WorldError> {
         let state = world.latest(object)?;
         let moment = state.moment();
@@ -79,7 +81,7 @@ impl ContactModel {
         self.rotation
     }
 
-    /// What the object feels at a pose, about that place, world axes.
+    /// The wrench on the object at a pose, about that place, world axes.
     #[must_use]
     pub fn wrench(&self, position_m: DVec3, rotation: DQuat) -> Wrench {
         let (way_m, turn) = (position_m - self.position_m, rotation * self.rotation.conjugate());

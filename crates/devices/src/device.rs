@@ -1,6 +1,7 @@
-//! What a device is: a pose and buttons in, a wrench out.
+//! The interface of a device: a pose and buttons in, a wrench out.
 //!
-//! In: the time that has passed. Out: where the handle is. Never here: a vendor's driver, what leads what.
+//! In: the time that has passed. Out: where the handle is. Never here: a vendor's driver, which device leads which
+//! object.
 
 use glam::{DQuat, DVec3};
 use metachron_core::Wrench;
@@ -16,17 +17,17 @@ pub trait Device: Send {
     /// [`DeviceError`] where there is none: it is reported, nothing is led meanwhile, and the next call follows as if nothing had happened.
     fn read(&mut self, elapsed_s: f64) -> Result<DeviceState, DeviceError>;
 
-    /// What the hand is to feel from now on, world axes, about the position of the newest state.
+    /// Gives the hand this wrench from now on, world axes, about the position of the newest state.
     ///
     /// # Errors
     /// [`DeviceError`] where it cannot be given: it is reported, and the next call follows.
     fn write(&mut self, wrench: &Wrench) -> Result<(), DeviceError>;
 
-    /// What it can give, and with what mass it answers: it is asked for no more.
+    /// The most that it can give, and the mass of its handle: it is asked for no more.
     fn limits(&self) -> Limits;
 }
 
-/// What a device gives at most, and its handle's mass.
+/// The greatest force and torque that a device gives, and its handle's mass.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Limits {
     /// N, ≥ 0.
@@ -64,8 +65,8 @@ pub struct DeviceState {
     pub spin_rad_s: DVec3,
     /// Buttons held down, a bit each.
     pub buttons: u32,
-    /// How many of the wrenches written so far have come to act on the handle: what is on its way may still give energy. A device without a link of
-    /// its own counts its calls of [`Device::write`].
+    /// How many of the wrenches written so far have come to act on the handle: wrenches on their way may still give
+    /// energy. A device without a link of its own counts its calls of [`Device::write`].
     pub applied: u64,
     /// The work of the wrenches on the handle so far, J: each one's product with the way that the handle went under it, summed where the handle
     /// is, so that no delay of a link falsifies it.

@@ -1,12 +1,12 @@
-//! The loop between a device and a world: what happens in one tick.
+//! The loop between a device and a world: the phases of one tick.
 //!
 //! read     the handle's state; a failure is reported, and nothing is led
-//! settle   what it was given, from the tank
+//! settle   the energy that it was given, from the tank
 //! lead     the object to it
 //! feel     the local model of the object's contacts, where the handle is
 //! admit    as much of it as device and tank give
 //!
-//! In: ticks, whoever makes them. Out: a report. Never here: threads, waiting.
+//! In: ticks, from any thread. Out: a report. Never here: threads, waiting.
 
 use super::contact_model::ContactModel;
 use super::device::{Device, DeviceState};
@@ -25,7 +25,7 @@ const WHOLE_STEPS: f64 = 2.0;
 /// An object whose device has gone is led for so long, of its own time; a hand whose world has gone feels the contacts fade in as long.
 const LEADS: SimSpan = SimSpan::from_millis(100);
 
-/// What a loop is to do.
+/// Settings of a loop.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct LoopOptions {
     /// Ticks a second, 1 … 10 000. Beyond 4000 a thread that sleeps does not keep them.
@@ -126,7 +126,7 @@ impl DeviceLoop {
         }
     }
 
-    /// What happened so far.
+    /// The report so far.
     #[must_use]
     pub fn report(&self) -> DeviceReport {
         DeviceReport {
@@ -178,7 +178,7 @@ impl DeviceLoop {
         self.world.command(self.object, command.lasting(LEADS))
     }
 
-    /// What the object would feel where the handle is, by the newest state; it fades where no other state comes.
+    /// The wrench on the object where the handle is, by the newest state; it fades where no other state comes.
     fn feel(&mut self, state: &DeviceState) -> Result<Wrench, WorldError> {
         let now = self.world.time();
         if self.model.refresh(&self.world, self.object)? {
@@ -186,7 +186,7 @@ impl DeviceLoop {
         }
         // where a machine is loaded an object's clock is behind the scene's, and its state answers the newest pose all the same: the age is by arrival
         let age_s = now.secs_after(self.received_at).max(0.0);
-        // before the first step nothing has been felt, and what rests is as it was
+        // before the first step nothing has been felt, and a resting object is as it was
         let age_steps = if self.model.step_s > 0.0 && !self.model.at_rest { age_s / self.model.step_s } else { 0.0 };
         self.age_steps.record(age_steps);
         self.report.stale += u64::from(age_steps > WHOLE_STEPS);

@@ -8,7 +8,7 @@ use gilrs::{Axis, Button, Gilrs};
 use glam::{DQuat, DVec3};
 use metachron_core::Wrench;
 
-/// What a bit of [`DeviceState::buttons`] is, from the lowest.
+/// The buttons of the bits of [`DeviceState::buttons`], from the lowest.
 const BUTTONS: [Button; 6] =
     [Button::South, Button::East, Button::West, Button::North, Button::LeftTrigger, Button::RightTrigger];
 

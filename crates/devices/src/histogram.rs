@@ -1,12 +1,12 @@
 //! Quantiles of a number that is taken a thousand times a second, in bounded storage.
 //!
-//! In: numbers ≥ 0. Out: quantiles to half a bin. Never here: what they mean.
+//! In: numbers ≥ 0. Out: quantiles to half a bin. Never here: their meaning.
 
 use super::report::Quantiles;
 
 const BINS: usize = 2048;
 
-/// How often a number was in each of equal bins; what is beyond them counts in the last one.
+/// How often a number was in each of equal bins; numbers beyond them count in the last one.
 #[derive(Debug, Clone)]
 pub struct Histogram {
     width: f64,

@@ -1,4 +1,4 @@
-//! Devices in hands: they lead an object of a running world, and feel what it touches, a thousand times a second.
+//! Devices in hands: they lead an object of a running world, and feel its contacts, a thousand times a second.
 //!
 //! In: a [`World`], an object that is led (a kinematic body or a tool), a [`Device`]. Out: poses for the object, wrenches for the device, a
 //! [`DeviceReport`]. Between two states that the world publishes the force follows the device by the local model of the object's contacts

@@ -1,4 +1,4 @@
-//! What a device has lived through.
+//! The record of a device over a run.
 
 use serde::Serialize;
 
@@ -23,13 +23,13 @@ pub struct DeviceReport {
     pub force_mean_n: f64,
     /// The greatest of them, N.
     pub force_max_n: f64,
-    /// Energy that the hand was given from any moment on, beyond what it put in, J.
+    /// Energy that the hand was given from any moment on, beyond the energy that it put in, J.
     pub energy_out_j: f64,
     /// The capacity of the energy tank, J: `energy_out_j` is no more.
     pub tank_j: f64,
     /// How often a button was pressed.
     pub presses: u64,
-    /// How often the device or the object failed, and what the first of these failures was.
+    /// How often the device or the object failed, and the first of these failures.
     pub failures: u64,
     /// The first failure.
     #[serde(skip_serializing_if = "Option::is_none")]

@@ -35,7 +35,7 @@ impl Served {
         Ok(Self { stop, report, thread: Some(thread) })
     }
 
-    /// What happened so far; at most a tenth of a second old.
+    /// The report so far; at most a tenth of a second old.
     #[must_use]
     pub fn report(&self) -> DeviceReport {
         self.report.lock().unwrap_or_else(PoisonError::into_inner).clone()

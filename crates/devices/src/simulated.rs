@@ -47,7 +47,8 @@ pub struct HandPath {
 }
 
 impl HandPath {
-    /// Along keyframes as those of tools are, from the first again after the last where it is to `repeat`; none where there are no keyframes.
+    /// Along keyframes like a tool's, from the first again after the last where it is to `repeat`; none where there are
+    /// no keyframes.
     #[must_use]
     pub fn along(keyframes: &[Keyframe], repeat: bool) -> Option<Self> {
         (!keyframes.is_empty()).then(|| Self { keyframes: keyframes.to_vec(), repeat })
@@ -84,7 +85,7 @@ pub struct SimulatedDevice {
     time_s: f64,
     position_m: DVec3,
     velocity_m_s: DVec3,
-    /// What acts, and its number.
+    /// The wrench that acts, and its number.
     acting: Wrench,
     applied: u64,
     written: u64,
@@ -94,7 +95,7 @@ pub struct SimulatedDevice {
     energy: HandleEnergy,
 }
 
-/// What the wrenches have given the handle itself, whatever the link reports of it.
+/// The energy that the wrenches have given the handle itself, whatever the link reports of it.
 #[derive(Debug, Clone, Copy, Default)]
 struct HandleEnergy {
     given_j: f64,
@@ -195,7 +196,7 @@ impl Device for SimulatedDevice {
     }
 }
 
-/// What is on its way along a link.
+/// The values on their way along a link.
 #[derive(Debug, Clone)]
 struct Delayed<T> {
     link: Link,

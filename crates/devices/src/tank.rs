@@ -1,12 +1,12 @@
 //! The energy tank: what a device may give the hand before it has to take something in.
 //!
-//! In: the wrenches that were sent, those of them that have acted, their work. Out: the wrench that may be sent. Never here: where
-//! the force comes from.
+//! In: the wrenches that were sent, the ones of them that have acted, their work. Out: the wrench that may be sent.
+//! Never here: where the force comes from.
 //!
 //! A force that is held between samples, or that comes late, can give more energy than the contact has taken (docs/theory/coupling.md, section 6). The tank
 //! (FSMS11) begins full, is emptied by what the handle gets and filled, up to its capacity, by what the hand puts in: from any
-//! moment on the hand gets no more than the capacity beyond what it puts in. A wrench is admitted as far as the tank covers what it and those on
-//! their way can give at the speed of the handle.
+//! moment on the hand gets no more than the capacity beyond what it puts in. A wrench is admitted as far as the tank
+//! covers the energy that it and the wrenches on their way can give at the speed of the handle.
 
 use super::device::{DeviceState, Limits};
 use metachron_core::Wrench;
@@ -20,12 +20,12 @@ const HASTE: f64 = 1.5;
 /// Most wrenches on their way: of a link that takes longer nothing is known.
 const IN_FLIGHT_MAX: usize = 256;
 
-/// What a wrench acts on: the handle as it is known now.
+/// The handle that a wrench acts on, as it is known now.
 #[derive(Debug, Clone, Copy)]
 pub struct Handle {
     /// Its newest state.
     pub state: DeviceState,
-    /// What the device gives at most, and the handle's mass.
+    /// The limits of the device, and the handle's mass.
     pub limits: Limits,
     /// Time between states, seconds, > 0.
     pub period_s: f64,
@@ -56,7 +56,7 @@ impl EnergyTank {
         Self { capacity_j, level_j, sent, first: 0, before_j, given_j: 0.0, least_given_j: 0.0, out_j: 0.0 }
     }
 
-    /// What it holds, J.
+    /// The energy in it, J.
     #[must_use]
     pub const fn level_j(&self) -> f64 {
         self.level_j
@@ -87,7 +87,7 @@ impl EnergyTank {
     pub fn admit(&mut self, wanted: &Wrench, handle: &Handle) -> Wrench {
         let forces_n = self.sent.iter().map(|wrench| wrench.force_n.length()).sum::<f64>() + wanted.force_n.length();
         let most_j = |wrench: &Wrench| handle.most_work_j(wrench, forces_n);
-        // of the wrenches on their way any one may act in the place of those that come late (coupling.md, eq. 7u)
+        // of the wrenches on their way any one may act in the place of late ones (coupling.md, eq. 7u)
         let periods = self.sent.len() as f64;
         let on_the_way_j = periods * self.sent.iter().map(most_j).fold(0.0, f64::max);
         let free_j = (self.level_j - on_the_way_j).max(0.0).min(self.level_j / (periods + 1.0));

@@ -2,7 +2,7 @@
 //!
 //! In: its name. Out: red, green and blue. Never here: textures, what the renderer of a scene draws with.
 
-/// What never moves: grey.
+/// Static solids: grey.
 pub(super) const OF_FIXED: [f64; 3] = [0.6, 0.6, 0.6];
 
 /// A colour that goes with a name: a hue from its bytes; each part 0.35 … 0.9, as a screen has it (sRGB).

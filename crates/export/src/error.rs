@@ -1,4 +1,4 @@
-//! What can go wrong with an export: the file, and why.
+//! Failures of an export: the file, and why.
 
 use std::path::{Path, PathBuf};
 

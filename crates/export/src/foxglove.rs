@@ -30,8 +30,8 @@ const FIXED: &str = "fixed";
 /// A file in MCAP.
 ///
 /// Times are simulated time since the start of the run.
-/// `/scene`: every object as a list of triangles, its points to a micrometre; a rigid body's once, in a frame of its name, which `/tf` moves, and
-/// those of what bends whenever it has a new state.
+/// `/scene`: every object as a list of triangles, its points to a micrometre; a rigid body's once, in a frame of its
+/// name, which `/tf` moves, and a deformable's whenever it has a new state.
 /// The frame and the entity of an object are called as it is; one called `world` or `fixed`, as ours are, has `_` behind its name there.
 /// `/state`: `{"name", "time", "snapshot"}` for every object that has a new state, the snapshot with all its fields
 /// (`metachron_core::Snapshot`). A file that was cut short opens up to about its last second.
@@ -44,7 +44,7 @@ pub struct McapFile {
     /// Bodies whose triangles the file holds already, and the steps of every object's newest state in it.
     rigid: BTreeSet<AgentId>,
     steps: BTreeMap<AgentId, u64>,
-    /// What was in the scene a moment ago.
+    /// The objects in the scene a moment ago.
     shown: BTreeMap<AgentId, String>,
 }
 
@@ -102,7 +102,7 @@ impl McapFile {
         self.writer.write_to_known_channel(&header, message.to_string().as_bytes()).map_err(failed(&self.path))
     }
 
-    /// The entities of a moment: what bends is sent anew with every new state, a rigid body once.
+    /// The entities of a moment: a deformable is sent anew with every new state, a rigid body once.
     fn scene(&mut self, moment: &Moment) -> Value {
         let mut entities = Vec::new();
         for object in moment.objects.iter().filter(|object| !object.surface.triangles.is_empty()) {
@@ -199,7 +199,7 @@ fn vector(v: DVec3) -> Value {
     json!({ "x": v.x, "y": v.y, "z": v.z })
 }
 
-/// A point as exactly as pictures show it: `/state` has all digits, and those of many points take most of a file.
+/// A point as exactly as pictures show it: `/state` has all digits, and the digits of many points take most of a file.
 fn shown(point: DVec3) -> DVec3 {
     (point * SHOWN_PER_M).round() / SHOWN_PER_M
 }

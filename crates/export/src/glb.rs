@@ -32,7 +32,8 @@ pub fn write_glb(path: &Path, moment: &Moment, fixed: &Surface) -> Result<(), Ex
     std::fs::write(path, bytes).map_err(ExportError::at(path))
 }
 
-/// A moment as the bytes of a file. A rigid body's points are in its own axes, and its node says where it is; those of what bends are in world axes.
+/// A moment as the bytes of a file. A rigid body's points are in its own axes, and its node says where it is; a
+/// deformable's points are in world axes.
 ///
 /// # Errors
 /// More than the 4 GiB that a file may have.
@@ -62,7 +63,7 @@ pub fn glb(moment: &Moment, fixed: &Surface) -> std::io::Result<Vec<u8>> {
     file.bytes(nodes, moment.time.as_secs_f64())
 }
 
-/// What the tables of a file hold so far.
+/// The tables of a file so far.
 #[derive(Default)]
 struct Glb {
     data: Vec<u8>,

@@ -26,7 +26,7 @@ pub use vtk::VtkSeries;
 #[doc = include_str!("../README.md")]
 struct Page;
 
-/// What takes the moments of a run, in rising order of time.
+/// A writer that takes the moments of a run, in rising order of time.
 pub trait MomentWriter {
     /// Takes one moment.
     ///
@@ -34,7 +34,7 @@ pub trait MomentWriter {
     /// [`ExportError`] where a file cannot be written.
     fn write(&mut self, moment: &Moment) -> Result<(), ExportError>;
 
-    /// Completes the files. Without it they hold what was written up to about a second before.
+    /// Completes the files. Without it they hold the moments up to about a second before.
     ///
     /// # Errors
     /// [`ExportError`] where a file cannot be written.

@@ -28,7 +28,7 @@ pub struct ObjectMoment {
     pub id: AgentId,
     /// Its newest state.
     pub state: Arc<Snapshot>,
-    /// Where its surface is; no triangles for what has no shape.
+    /// Its surface at that time; no triangles for an object without a shape.
     pub surface: Surface,
 }
 

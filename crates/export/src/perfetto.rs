@@ -1,4 +1,5 @@
-//! What ran when, as trace events in JSON: opened by Perfetto (ui.perfetto.dev) and by Chrome's tracing page.
+//! The turns and frames of a run on a time axis, as trace events in JSON: opened by Perfetto (ui.perfetto.dev) and by
+//! Chrome's tracing page.
 //!
 //! In: a world's turns and events, the frames of a loop that draws it. Out: a lane for each object and one for frames, on wall time (virtual in
 //! lockstep). Never here: states, surfaces, statistics.
@@ -29,7 +30,7 @@ pub struct Frame {
     pub work: Duration,
     /// Its parts, in their order; they begin one after the other.
     pub parts: Vec<(&'static str, Duration)>,
-    /// What is drawn as curves, by name.
+    /// Values that are drawn as curves, by name.
     pub counters: Vec<(&'static str, f64)>,
 }
 
@@ -48,7 +49,7 @@ pub struct PerfettoFile {
     lost: u64,
 }
 
-/// What is known of an object's turns.
+/// The turns of an object that were read.
 struct Lane {
     heard: Heard,
     /// A wait that may go on.
@@ -132,7 +133,7 @@ impl PerfettoFile {
         self.lost + self.events.lost()
     }
 
-    /// Hears the turns of what has joined.
+    /// Hears the turns of objects that have joined.
     fn listen(&mut self) -> Result<(), ExportError> {
         let world = self.world.clone();
         for agent in world.agents().iter().skip(self.lanes.len()) {

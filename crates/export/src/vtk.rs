@@ -37,7 +37,8 @@ pub struct VtkSeries {
 }
 
 impl VtkSeries {
-    /// Files of every series but those of its moments, which are called by their numbers, [`VtkSeries::MOMENT_DIGITS`] digits or more.
+    /// Files of every series except the files of its moments, which are called by their numbers,
+    /// [`VtkSeries::MOMENT_DIGITS`] digits or more.
     pub const FILES: [&str; 3] = [INDEX, NAMES, FIXED];
     /// Digits of the number of a moment, at least.
     pub const MOMENT_DIGITS: usize = 6;
@@ -45,7 +46,8 @@ impl VtkSeries {
     /// Whether a series may begin in this folder: it does not exist, or holds nothing that would be overwritten. Nothing is made.
     ///
     /// # Errors
-    /// [`ExportError::Taken`] names a file that would be overwritten; [`ExportError::File`] where it or what it is in is no folder.
+    /// [`ExportError::Taken`] names a file that would be overwritten; [`ExportError::File`] where it or its parent is
+    /// no folder.
     pub fn check(folder: &Path) -> Result<(), ExportError> {
         let entries = match std::fs::read_dir(folder) {
             Ok(entries) => entries,
@@ -64,7 +66,7 @@ impl VtkSeries {
     /// Begins a series in a folder, which is made where it does not exist; `fixed` are the solids that never move.
     ///
     /// # Errors
-    /// Those of [`VtkSeries::check`]; [`ExportError::File`] where the folder cannot be made or written.
+    /// The errors of [`VtkSeries::check`]; [`ExportError::File`] where the folder cannot be made or written.
     pub fn create(folder: &Path, fixed: &Surface) -> Result<Self, ExportError> {
         Self::check(folder)?;
         std::fs::create_dir_all(folder).map_err(ExportError::at(folder))?;
@@ -123,7 +125,7 @@ fn is_of_a_series(name: &str) -> bool {
     VtkSeries::FILES.contains(&name) || name.strip_suffix(SURFACES).is_some_and(is_moment)
 }
 
-/// The triangles of one object, and what is said of all of them.
+/// The triangles of one object, and the values that all of them share.
 struct Part<'a> {
     object: i32,
     eps_m: f64,

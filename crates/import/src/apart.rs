@@ -1,14 +1,16 @@
-//! Bodies of one robot that pass through each other: those that the file names, those next to each other, those that start inside each other.
+//! Bodies of one robot that pass through each other: pairs that the file names, neighbours, pairs that start inside
+//! each other.
 //!
 //! In: a settled [`Model`], and which of its bodies overlap. Out: pairs by name. Never here: shapes, TOML.
-//! As in `MuJoCo`'s filter of parents and the collision matrices of `MoveIt`: bodies on two sides of a joint do not collide, wherever fixed joints
-//! have put them, and nor do those that their joints hold inside each other.
+//! As in `MuJoCo`'s filter of parents and the collision matrices of `MoveIt`: bodies on two sides of a joint do not
+//! collide, wherever fixed joints have put them, and nor do bodies that their joints hold inside each other.
 
 use crate::imported::Overlap;
 use crate::model::{Apart, Joint, Kind, Model, Why};
 
 impl Model {
-    /// Adds the pairs of one robot that overlap; those of two, and those with the world's own solids, stay as they are.
+    /// Adds the pairs of one robot that overlap; pairs of two robots, and pairs with the world's own solids, stay as
+    /// they are.
     pub(crate) fn pass_overlaps(&mut self, overlaps: Vec<Overlap>) -> Vec<Overlap> {
         let root = |name: &str| {
             let fixed =
@@ -36,9 +38,9 @@ impl Model {
         }
     }
 
-    /// Adds the pairs that no joint connects itself, and that are on bodies which one does, or on one body: a body is all that fixed joints make of
-    /// links, with those without mass that carry it. Shapes overlap there, as those of connected links do. All of one robot: two that stand on the
-    /// world collide.
+    /// Adds the pairs that no joint connects itself, and that are on bodies which one does, or on one body: a body is
+    /// all links that fixed joints connect, with the links without mass that carry it. Shapes overlap there, as shapes
+    /// of connected links do. All of one robot: two that stand on the world collide.
     pub(crate) fn pass_neighbours(&mut self) {
         let above: Vec<Option<&Joint>> = self.above().into_iter().map(|joint| Some(&self.joints[joint?])).collect();
         let bodies = self.bodies(&above);

@@ -57,7 +57,7 @@ impl<'a, 'i> Reader<'a, 'i> {
         self.named.get(node.attribute(key)?.strip_prefix('#')?).copied()
     }
 
-    /// A node: its motions in their order, then what is in it.
+    /// A node: its motions in their order, then its contents.
     fn node(&mut self, node: Node<'a, 'i>, above: DMat4, depth: usize) -> Result<(), String> {
         self.elements += node.children().count() + 1;
         if depth > DEPTH_MAX || self.elements > ELEMENTS_MAX {
@@ -86,7 +86,7 @@ impl<'a, 'i> Reader<'a, 'i> {
         Ok(())
     }
 
-    /// The points of a geometry: those that its `vertices` name as positions.
+    /// The points of a geometry that its `vertices` name as positions.
     fn geometry(&mut self, geometry: Node<'a, 'i>, place: DMat4) -> Result<(), String> {
         self.elements += geometry.descendants().count();
         if self.elements > ELEMENTS_MAX {

@@ -1,6 +1,7 @@
 //! Where files that a model names are.
 //!
-//! In: a path as a model writes it. Out: the path as the scene writes it, the text of what is included. Never here: what that means, files that
+//! In: a path as a model writes it. Out: the path as the scene writes it, the text of an included file. Never here: its
+//! meaning, files that
 //! are opened (the caller's [`ReadFile`] does).
 
 use crate::imported::ImportError;
@@ -11,7 +12,7 @@ use std::path::{Component, Path, PathBuf};
 /// Gives the bytes of the file at a path, or why there are none: [`std::fs::read`], or one that reads an archive.
 pub type ReadFile<'a> = &'a dyn Fn(&Path) -> std::io::Result<Vec<u8>>;
 
-/// Gives the triangles of an STL, OBJ or .glb file, or what is wrong with it; none of a file of points.
+/// Gives the triangles of an STL, OBJ or .glb file, or the fault of the file; none of a file of points.
 pub type ReadSurface<'a> = &'a dyn Fn(&[u8]) -> Result<Triangles, String>;
 
 /// The folder of a model's file, and that of the scene which it becomes: scenes name meshes relative to their own.

@@ -1,13 +1,13 @@
-//! What an import gives: a scene, its meshes, what the model has otherwise, or why there is none.
+//! The outcome of an import: a scene, its meshes, parts of the model that have no place in one, or why there is none.
 //!
-//! In: what the other modules found. Out: plain data. Never here: how it is found.
+//! In: the results of the other modules. Out: plain data. Never here: how they are found.
 
 /// A model as a scene.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Imported {
     /// The text of the scene file.
     pub toml: String,
-    /// What of the model is not in it: first all that changes the motion, each in the order of the file.
+    /// The parts of the model that are not in it: first all that changes the motion, each in the order of the file.
     pub left_out: Vec<LeftOut>,
     /// The bodies of one robot that start inside each other, and pass through each other for that.
     pub overlaps: Vec<Overlap>,
@@ -20,7 +20,7 @@ pub struct Imported {
 pub struct MeshFile {
     /// Relative to the folder of the scene, with `/` between its parts.
     pub path: String,
-    /// What is in it.
+    /// Its contents.
     pub bytes: Vec<u8>,
 }
 
@@ -44,7 +44,7 @@ pub struct LeftOut {
     pub line: u32,
     /// Which element, such as ``joint `elbow`, dynamics``.
     pub element: String,
-    /// What about it.
+    /// The reason.
     pub what: String,
     /// Whether the scene moves otherwise than the model for that.
     pub changes_motion: bool,
@@ -78,6 +78,6 @@ pub struct ImportError {
     pub line: u32,
     /// Which element, such as ``link `arm`, inertial``.
     pub element: String,
-    /// What is wrong with it, and what was expected.
+    /// The fault, and the expected value.
     pub reason: String,
 }

@@ -4,7 +4,8 @@
 //! Never here: files that are opened (the caller reads what a model includes, [`ReadFile`]), running a scene, checking the
 //! scene that comes out (`metachron-scene` does).
 //!
-//! Links become rigid objects whose axes are those of the link, joints `[[joint]]` tables, collision geometries shapes and parts.
+//! Links become rigid objects whose axes are the link's, joints `[[joint]]` tables, collision geometries shapes and
+//! parts.
 //! Everything in the file that no line of this crate has read is in the list: an element or attribute cannot be dropped unseen.
 
 mod apart;
@@ -46,7 +47,8 @@ pub struct Options<'a> {
     pub key: Option<&'a str>,
     /// The text of the SRDF file of a URDF robot: its `disable_collisions` are pairs that pass through each other. Default: none.
     pub srdf: Option<&'a str>,
-    /// What finds bodies that start inside each other: those of one robot pass through each other then. Default: they collide.
+    /// The function that finds bodies which start inside each other: bodies of one robot pass through each other then.
+    /// Default: they collide.
     pub overlaps: Option<FindOverlaps<'a>>,
     /// The folder of new mesh files, from that of the scene. Default: `meshes`.
     pub meshes: Option<&'a str>,
@@ -131,7 +133,7 @@ fn imported(model: model::Model, options: &Options<'_>, mut notes: Vec<LeftOut>)
     let mut imported = Imported { toml, left_out: notes, overlaps: Vec::new(), files };
     if let Some(find) = options.overlaps {
         imported.overlaps = settled.pass_overlaps(find(&imported));
-        // the text has the pairs now; what it leaves out is what it was
+        // the text has the pairs now; the list of what it leaves out stays
         imported.toml = scene_text::write(&settled, &mut Vec::new());
     }
     Ok(imported)

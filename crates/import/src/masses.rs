@@ -1,7 +1,7 @@
 //! Masses and moments of inertia that bodies can have.
 //!
-//! In: a [`Model`] as the file has it. Out: the same where what moves weighs something, and moments are those of bodies; all that was changed is
-//! noted. Never here: shapes that are touched.
+//! In: a [`Model`] as the file has it. Out: the same where moving links weigh something, and moments are possible for
+//! bodies; every change is noted. Never here: shapes that are touched.
 
 use crate::imported::{ImportError, LeftOut};
 use crate::model::{Kind, Link, Mass, Model, Part, Shape};
@@ -11,7 +11,7 @@ use metachron_geometry::Solid;
 
 /// Radius of what stands in for a body without a shape or moments of its own, metres.
 pub(crate) const STAND_IN_M: f64 = 0.01;
-/// What a link without mass between two joints weighs, of the body that it carries: the solver takes a thousand to one.
+/// The mass of a link without mass between two joints, of the body that it carries: the solver takes a thousand to one.
 const LENT: f64 = 1e-3;
 /// Least mass of a body of a scene, kilograms.
 const MASS_MIN_KG: f64 = 1e-9;
@@ -19,7 +19,7 @@ const MASS_MIN_KG: f64 = 1e-9;
 const LEAST: f64 = 1e-9;
 /// How much of the sum the triangle inequality may be missed by: files write few digits.
 const SLACK: f64 = 2e-4;
-/// How often what is added to moments is doubled: from 1e-4 of the largest to far beyond it.
+/// How often the addition to moments is doubled: from 1e-4 of the largest to far beyond it.
 const DOUBLINGS: i32 = 32;
 
 /// A mass with its mean moment of inertia.
@@ -29,8 +29,8 @@ struct Weight {
     moment_kg_m2: f64,
 }
 
-/// Lends links without mass that move a thousandth of what they carry: files write joints about several axes as joints about one each, with
-/// such links between them.
+/// Lends moving links without mass a thousandth of the mass that they carry: files write joints about several axes as
+/// joints about one each, with such links between them.
 pub(crate) fn lend(model: &mut Model, notes: &mut Vec<LeftOut>) {
     let weights: Vec<Option<Weight>> = model.links.iter().map(weight).collect();
     for (at, above) in model.above().into_iter().enumerate() {
@@ -144,10 +144,10 @@ pub(crate) fn ball(link: &Link, at_m: DVec3, radius_m: f64) -> Part {
     }
 }
 
-/// Adds to all three moments of inertia of a link as little as makes them those of a body.
+/// Adds to all three moments of inertia of a link as little as makes them possible for a body.
 ///
 /// # Errors
-/// For moments that nothing makes those of a body: they or their sum are not finite.
+/// For moments that no addition makes possible: they or their sum are not finite.
 pub(crate) fn repair(link: &mut Link, notes: &mut Vec<LeftOut>) -> Result<(), ImportError> {
     let Mass::Given { mass_kg, inertia_kg_m2: Some(tensor), .. } = &mut link.mass else { return Ok(()) };
     if is_of_a_body(*tensor) {

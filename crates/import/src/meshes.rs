@@ -31,11 +31,11 @@ pub(crate) struct Meshes<'a> {
     files: Vec<MeshFile>,
     /// The files that the model names, from the folder of the scene: no new one is written over them.
     named: BTreeSet<String>,
-    /// The new files by what they were made of.
+    /// The new files by their sources.
     made: BTreeMap<String, String>,
-    /// What new files were made of, by their paths.
+    /// The surfaces of new files, by their paths.
     surfaces: BTreeMap<String, Triangles>,
-    /// What files have, or why it cannot be read: parts that name one file read it once.
+    /// The contents of files, or why they cannot be read: parts that name one file read it once.
     read: RefCell<BTreeMap<PathBuf, Result<Triangles, String>>>,
 }
 
@@ -100,7 +100,7 @@ impl<'a> Meshes<'a> {
         }
     }
 
-    /// What a hull was made of, in metres; `None` where that cannot be read.
+    /// The surface that a hull was made of, in metres; `None` where it cannot be read.
     pub(crate) fn surface(&self, file: &str, scale: f64) -> Option<Triangles> {
         match self.surfaces.get(file) {
             Some(made) => Some(scaled(made.clone(), DVec3::splat(scale))),
@@ -193,7 +193,7 @@ impl<'a> Meshes<'a> {
     }
 }
 
-/// A surface stretched along its axes; what is mirrored is turned inside out again.
+/// A surface stretched along its axes; a mirrored one is turned inside out again.
 fn scaled(mut surface: Triangles, scale: DVec3) -> Triangles {
     surface.points.iter_mut().for_each(|point| *point *= scale);
     if scale.element_product() < 0.0 {

@@ -9,7 +9,7 @@ use glam::{DMat3, DVec3};
 use metachron_geometry::Solid;
 use std::collections::BTreeSet;
 
-/// What a file describes.
+/// The contents of a file.
 #[derive(Debug, Default)]
 pub(crate) struct Model {
     pub(crate) name: String,
@@ -21,11 +21,12 @@ pub(crate) struct Model {
     pub(crate) ties: Vec<Tie>,
     /// Pairs of links that the file lets pass through each other.
     pub(crate) excluded: Vec<[usize; 2]>,
-    /// Whether what is on a fixed body collides with it: as in MuJoCo, not as in URDF.
+    /// Whether links on a fixed body collide with it: as in MuJoCo, not as in URDF.
     pub(crate) collides_with_base: bool,
-    /// Whether what has no mass and carries none is fixed where it starts: as programs that read URDF do, and MuJoCo refuses it.
+    /// Whether a link that has no mass and carries none is fixed where it starts: as programs that read URDF do, and
+    /// MuJoCo refuses it.
     pub(crate) fixes_massless: bool,
-    /// Bodies that pass through each other, with those of `excluded`: `settle` finds them.
+    /// Bodies that pass through each other, including the pairs of `excluded`: `settle` finds them.
     pub(crate) apart: Vec<Apart>,
     /// Solids of the world itself, in its axes.
     pub(crate) fixed: Vec<Fixed>,
@@ -77,7 +78,7 @@ pub(crate) struct Look {
     pub(crate) surface: Option<Surface>,
 }
 
-/// What a file that has contacts of its own says about them.
+/// The contact properties of a part, in files that have such.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Surface {
     pub(crate) friction: f64,
@@ -92,7 +93,7 @@ pub(crate) struct Masks {
 }
 
 impl Masks {
-    /// Those of a file that says none.
+    /// The masks of a file that gives none.
     pub(crate) const USUAL: Self = Self { types: 1, partners: 1 };
 
     pub(crate) const fn collides(self, other: Self) -> bool {
@@ -200,7 +201,7 @@ pub(crate) struct End {
     pub(crate) at_m: DVec3,
 }
 
-/// What is between the ends of a tie.
+/// The constraint between the ends of a tie.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) enum TieKind {
     /// Nothing up to a length that is the greatest.
@@ -223,7 +224,7 @@ pub(crate) enum Kind {
     Prismatic,
 }
 
-/// What drives or brakes a joint, in radians or metres from its position at the start, newtons and newton metres.
+/// The motor or brake of a joint, in radians or metres from its position at the start, newtons and newton metres.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) enum Motor {
     /// A spring to a position, with a damper.
@@ -235,7 +236,8 @@ pub(crate) enum Motor {
 }
 
 impl Model {
-    /// For each link the joint that it hangs on, by number: the first of those that hold it, as others close loops.
+    /// For each link the joint that it hangs on, by number: the first of the joints that hold it, as others close
+    /// loops.
     pub(crate) fn above(&self) -> Vec<Option<usize>> {
         let mut above = vec![None; self.links.len()];
         for (at, joint) in self.joints.iter().enumerate().rev() {

@@ -21,12 +21,12 @@ impl Place {
         self.file.as_deref().map(str::to_owned)
     }
 
-    /// An error about what is here.
+    /// An error about this element.
     pub(crate) fn wrong(&self, reason: impl Into<String>) -> ImportError {
         ImportError { file: self.file(), line: self.line, element: self.label.clone(), reason: reason.into() }
     }
 
-    /// A note about what is here, which changes the motion.
+    /// A note about this element, which changes the motion.
     pub(crate) fn note(&self, what: impl Into<String>) -> LeftOut {
         let (file, line, element, what) = (self.file(), self.line, self.label.clone(), what.into());
         LeftOut { file, line, element, what, changes_motion: true }

@@ -70,7 +70,7 @@ fn quoted(text: &str) -> String {
     toml::Value::String(text.to_owned()).to_string()
 }
 
-/// A length or an angle: what is beyond the twelfth digit after the point is rounding.
+/// A length or an angle: digits beyond the twelfth after the point are rounding.
 fn number(value: f64) -> String {
     let rounded: f64 = format!("{value:.12}").parse().unwrap_or(value);
     // + 0.0 turns -0 into 0
@@ -196,7 +196,8 @@ fn all_masks(model: &Model) -> BTreeSet<Masks> {
     fixed.chain(links).filter_map(|look| Some(look.surface?.masks)).collect()
 }
 
-/// The groups of a surface: each pair of masks is a group, which collides with those that it should. None where all have the usual masks.
+/// The groups of a surface: each pair of masks is a group, which collides with the groups that it should. None where
+/// all have the usual masks.
 fn groups(masks: Masks, all: &BTreeSet<Masks>) -> String {
     if all.iter().all(|masks| *masks == Masks::USUAL) {
         return String::new();
@@ -206,8 +207,8 @@ fn groups(masks: Masks, all: &BTreeSet<Masks>) -> String {
     format!("groups = [{}], collides_with = [{}], ", name(&masks), partners.join(", "))
 }
 
-/// A joint. Its first object is the parent, or the child where the parent is the world, which scenes write second: what moves against
-/// what is the other way around then, and so is the axis.
+/// A joint. Its first object is the parent, or the child where the parent is the world, which scenes write second: the
+/// two change sides then, and so does the axis.
 fn write_joint(out: &mut String, model: &Model, joint: &Joint, notes: &mut Vec<LeftOut>) {
     let child = &model.links[joint.child];
     let (a, b, from, sign) = match joint.parent.map(|parent| &model.links[parent]) {

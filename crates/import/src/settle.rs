@@ -1,4 +1,5 @@
-//! Brings a model to what a scene can have: links without mass become part of what they are on, and nothing is without a shape.
+//! Brings a model to a form that a scene can have: links without mass become part of the links that they are on, and
+//! nothing is without a shape.
 //!
 //! In: a [`Model`] as the file has it. Out: the same where every link has a mass and a part. Never here: XML, TOML.
 
@@ -9,7 +10,7 @@ use crate::pose::Pose;
 use glam::{DMat3, DVec3};
 use metachron_geometry::COMPOUND_PARTS_MAX;
 
-/// What a link becomes.
+/// The outcome for a link.
 #[derive(Debug, Clone, Copy, PartialEq)]
 enum Fate {
     /// Itself.
@@ -82,7 +83,7 @@ fn find_roots(model: &mut Model) {
     }
 }
 
-/// Fixes what moves freely and others hang on, and a robot that is one link.
+/// Fixes links that move freely and that others hang on, and a robot that is one link.
 fn fix_bases(model: &mut Model) {
     let joints = std::mem::take(&mut model.joints);
     let is_base = |at: usize| {
@@ -115,7 +116,7 @@ fn pass_excluded(model: &mut Model, fates: &[Fate]) {
     }
 }
 
-/// What a link becomes, where those before it have their fates.
+/// The fate of a link, where the links before it have theirs.
 fn fate(link: &Link, joint: Option<&Joint>, before: &[Fate], model: &Model) -> Result<Fate, ImportError> {
     if !matches!(link.mass, Mass::None) {
         return Ok(Fate::Itself);
@@ -216,7 +217,7 @@ fn keep(model: &mut Model, fates: &[Fate]) {
     });
 }
 
-/// Leaves a link the parts that are touched, or else those that are seen, or else a ball with its moments of inertia.
+/// Leaves a link the parts that are touched, or else the visual parts, or else a ball with its moments of inertia.
 fn choose_parts(link: &mut Link, notes: &mut Vec<LeftOut>) -> Result<(), ImportError> {
     let touched = link.parts.iter().any(|part| part.touches);
     let mut left_out = |part: &Part, what: String| {

@@ -7,7 +7,7 @@ use crate::imported::{ImportError, LeftOut};
 use crate::model::Model;
 use crate::xml::{self, Harmless};
 
-/// What is for planning.
+/// Elements for planning.
 const HARMLESS: Harmless = Harmless {
     elements: "group group_state end_effector passive_joint joint_property",
     containers: "",

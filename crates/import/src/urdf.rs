@@ -1,7 +1,7 @@
 //! URDF, as of its specification (<http://wiki.ros.org/urdf/XML>): links in their own axes, joints between them.
 //!
 //! In: the tree of a file. Out: a [`Model`]. Never here: TOML, links without mass (`settle` has them).
-//! The axes of a link are those of the joint that it hangs on, so that a joint is at the origin of its child.
+//! The axes of a link are the axes of the joint that it hangs on, so that a joint is at the origin of its child.
 
 use crate::imported::{ImportError, LeftOut};
 use crate::meshes::Meshes;
@@ -166,7 +166,7 @@ fn limits(element: &Element) -> Result<[f64; 2], ImportError> {
     Ok([lower, upper])
 }
 
-/// What brakes a joint: a damper, or dry friction where it has no damper.
+/// The brake of a joint: a damper, or dry friction where it has no damper.
 fn damper(element: &Element) -> Result<Option<Motor>, ImportError> {
     let Some(given) = element.child("dynamics") else { return Ok(None) };
     let brakes = |name: &str| {
@@ -222,7 +222,7 @@ fn link(
     colours: &BTreeMap<&str, [u8; 3]>,
     notes: &mut Vec<LeftOut>,
 ) -> Result<Link, ImportError> {
-    // what is seen stands in where nothing is touched; otherwise it stays unread, and is listed
+    // visual shapes stand in where there is no collision shape; otherwise they stay unread, and are listed
     let touches = element.all().iter().any(|child| child.tag == "collision");
     let (mut parts, first) = (Vec::new(), notes.len());
     for geometry in element.children(if touches { "collision" } else { "visual" }) {

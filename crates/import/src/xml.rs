@@ -27,11 +27,11 @@ struct Attribute {
     is_read: Cell<bool>,
 }
 
-/// What of a kind of files moves nothing; all else that is not read may change the motion.
+/// The words of a kind of files that move nothing; all else that is not read may change the motion.
 pub(crate) struct Harmless {
     /// Words, as all of these.
     pub(crate) elements: &'static str,
-    /// Those that are what is in them.
+    /// Elements that are harmless if all their contents are.
     pub(crate) containers: &'static str,
     pub(crate) attributes: &'static str,
 }
@@ -62,7 +62,7 @@ pub(crate) fn parse(text: &str, file: Option<&str>) -> Result<Element, ImportErr
     Ok(root)
 }
 
-/// What elements are read from.
+/// The text that elements are read from.
 struct Text {
     lines: Lines,
     file: Option<Rc<str>>,
@@ -173,13 +173,13 @@ impl Element {
         self.children(tag).next()
     }
 
-    /// Counts the element as read, though not what is in it.
+    /// Counts the element as read, though not its contents.
     pub(crate) fn read(&self) -> &Self {
         self.is_read.set(true);
         self
     }
 
-    /// Counts the element and all in it as read: what it says has no meaning where it is.
+    /// Counts the element and all in it as read: its values have no meaning where it is.
     pub(crate) fn read_all_within(&self) {
         self.is_read.set(true);
         self.attributes.iter().for_each(|attribute| attribute.is_read.set(true));
@@ -191,7 +191,7 @@ impl Element {
         self.attributes.iter().any(|a| a.name == name)
     }
 
-    /// Gives the element the attributes of `other` for which it has none, but for those that `skip` names.
+    /// Gives the element the attributes of `other` for which it has none, except the ones that `skip` names.
     pub(crate) fn inherit(&mut self, other: &Element, skip: impl Fn(&str) -> bool) {
         for attribute in &other.attributes {
             if !self.has(&attribute.name) && !skip(&attribute.name) {
@@ -217,14 +217,15 @@ impl Element {
         }
     }
 
-    /// Counts an attribute as read where it says what is so without it.
+    /// Counts an attribute as read where its value is the usual one, which is also meant without it.
     pub(crate) fn read_if(&self, name: &str, usual: &str) {
         for attribute in self.attributes.iter().filter(|attribute| attribute.name == name && attribute.value == usual) {
             attribute.is_read.set(true);
         }
     }
 
-    /// Counts those attributes as read that are zero, or several zeros, and mean what they mean where they are missing.
+    /// Counts those of these attributes as read that are zero, or several zeros: they mean the same where they are
+    /// missing.
     pub(crate) fn read_zeros(&self, names: &[&str]) {
         for attribute in self.attributes.iter().filter(|attribute| names.contains(&attribute.name.as_str())) {
             if attribute.value.split_whitespace().all(|word| word.parse() == Ok(0.0)) {

@@ -104,7 +104,7 @@ impl Meter {
 /// Updates the numbers; returns a line for each agent that was parked since the last call.
 pub(super) fn fill(status: &mut Status, session: &mut Session, meter: &mut Meter) -> Vec<String> {
     meter.read(session);
-    // those that have joined
+    // agents that have joined
     let known = status.agents.len();
     status.agents.extend(session.scene().agents.iter().skip(known).map(row));
     status.real_time_factor = meter.real_time;

@@ -31,7 +31,7 @@ use std::time::{Duration, Instant};
 pub struct WindowPlan {
     /// The source of the scene, so that it can be read again.
     pub source: Source,
-    /// Values that override those of the scene.
+    /// Values that override the scene's own.
     pub overrides: Vec<(String, String)>,
     /// Width and height of the window, points; `None` restores the size at its last closing.
     pub size: Option<[f32; 2]>,

@@ -8,7 +8,7 @@ use crate::imported::ImportError;
 use crate::model::{Joint, Kind, Motor};
 use crate::xml::Element;
 
-/// Reads the actuators. Those of forces give none without a command, and programs command joints themselves.
+/// Reads the actuators. Actuators of forces give none without a command, and programs command joints themselves.
 ///
 /// # Errors
 /// For one on a joint that there is none of.
@@ -116,7 +116,8 @@ fn range(element: &Element, flag: &str, name: &str, reader: &BodyReader<'_>) -> 
     Ok(element.numbers::<2>(name)?.filter(|_| limited))
 }
 
-/// What an actuator is commanded at the start: as in `MuJoCo`, its control within its range, which may not have zero in it.
+/// The command of an actuator at the start: as in `MuJoCo`, its control within its range, which may not have zero in
+/// it.
 fn command(element: &Element, number: usize, reader: &mut BodyReader<'_>) -> Result<f64, ImportError> {
     let given = reader.keyframe.as_ref().map_or(0.0, |key| key.control(number));
     let bounds = range(element, "ctrllimited", "ctrlrange", reader)?;

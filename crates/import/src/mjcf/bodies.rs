@@ -1,4 +1,4 @@
-//! Bodies, and what is in them.
+//! Bodies, and their contents.
 //!
 //! In: the `worldbody` of a file. Out: links, joints and solids of the world. Never here: the shapes of geoms, motors.
 
@@ -64,7 +64,7 @@ impl Host {
     }
 }
 
-/// What the elements of one body, those in its frames too, amount to.
+/// The elements of one body by kind, including the ones in its frames.
 #[derive(Default)]
 struct Contents<'e> {
     inertial: Option<&'e Element>,
@@ -236,7 +236,7 @@ impl<'a> BodyReader<'a> {
         self.zeros.push(zero);
     }
 
-    /// Keeps where the sites of a body are; those that nothing names are not read.
+    /// Keeps where the sites of a body are; sites that nothing names are not read.
     fn note_sites(&mut self, contents: &Contents<'a>, host: Host) -> Result<(), ImportError> {
         for Placed { element, frame } in &contents.sites {
             let Some(name) = element.text("name") else { continue };

@@ -1,4 +1,4 @@
-//! What a file says about itself: units of angles, folders of meshes, where masses come from.
+//! The settings of a file: units of angles, folders of meshes, where masses come from.
 //!
 //! In: `compiler` elements. Out: poses and angles as the file means them. Never here: bodies.
 
@@ -13,7 +13,7 @@ use glam::{DMat3, DQuat, DVec3};
 pub(super) struct Compiler {
     /// Radians in the file's unit of angles.
     pub(super) angle_rad: f64,
-    /// The axes of Euler angles; capitals are those of the frame outside.
+    /// The axes of Euler angles; capitals are axes of the frame outside.
     euler_axes: String,
     /// Whether a range alone makes a limit.
     pub(super) auto_limits: bool,
@@ -22,7 +22,7 @@ pub(super) struct Compiler {
     pub(super) mesh_folder: String,
     /// Whether geoms give masses even where a body says its own.
     pub(super) mass_from_geoms: bool,
-    /// The mass of all bodies together; `None` for what they say.
+    /// The mass of all bodies together; `None` to keep their own masses.
     pub(super) total_kg: Option<f64>,
 }
 

@@ -39,7 +39,7 @@ pub(super) fn read(root: &Element, reader: &mut BodyReader<'_>) -> Result<(), Im
         // in the first body
         let anchor_m = element.numbers("anchor")?.map_or(DVec3::ZERO, DVec3::from_array);
         let at_m = first.map_or(anchor_m, |link| reader.model.links[link].pose.point(anchor_m));
-        // the later body is the child, as links follow what they hang on; what never moves is the world
+        // the later body is the child, as a link follows the one that it hangs on; a static body is the world
         let [first, second] = [first, second].map(|link| link.filter(|link| !reader.is_static(*link)));
         let (Some(child), parent) = (first.max(second), first.min(second)) else {
             reader.notes.push(element.note("is left out: neither of its bodies moves").harmless());

@@ -18,7 +18,7 @@ const DENSITY_DEFAULT_KG_M3: f64 = 1000.0;
 /// Friction of a geom that says none.
 const FRICTION_DEFAULT: f64 = 1.0;
 
-/// A solid of a body, and what it says beside its shape.
+/// A solid of a body, with its properties beside its shape.
 #[derive(Debug)]
 pub(super) struct Geom {
     pub(super) part: Part,

@@ -1,4 +1,4 @@
-//! Files that a model includes: what is in their root takes the place of the `include`.
+//! Files that a model includes: the contents of their root take the place of the `include`.
 //!
 //! In: the tree of a model, its folder. Out: the same with all that it includes, each element knowing its file. Never here: what one means.
 
@@ -42,7 +42,7 @@ impl Includes<'_> {
         Ok(())
     }
 
-    /// What an `include` brings.
+    /// The elements that an `include` brings.
     fn of(&mut self, include: &Element) -> Result<Vec<Element>, ImportError> {
         let name = include.needed("file")?;
         let file = self.folders.included(include, name)?;

@@ -1,4 +1,4 @@
-//! Joints: where they are, how far they go, what holds them without a motor.
+//! Joints: where they are, how far they go, the springs, dampers and friction that hold them without a motor.
 //!
 //! In: `joint` and `freejoint` elements. Out: [`Joint`]s. Never here: actuators.
 
@@ -120,7 +120,8 @@ impl BodyReader<'_> {
     }
 }
 
-/// What holds or brakes a joint by itself: a spring to a position, with a damper, a damper, or dry friction where it has neither.
+/// The force that holds or brakes a joint by itself: a spring to a position, with a damper, a damper, or dry friction
+/// where it has neither.
 fn passive(element: &Element, position: f64, notes: &mut Vec<LeftOut>) -> Result<Option<Motor>, ImportError> {
     let at_least_0 = |name: &str| {
         let value = element.number(name)?.unwrap_or(0.0);

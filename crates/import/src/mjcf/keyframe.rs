@@ -18,7 +18,7 @@ impl<'a> Keyframe<'a> {
     /// The one of a name.
     ///
     /// # Errors
-    /// Where there is none, or it has what is no number.
+    /// Where there is none, or a value of it is no number.
     pub(super) fn find(root: &'a Element, name: &str) -> Result<Self, ImportError> {
         let mut all = root.children("keyframe").flat_map(Element::all);
         let Some(element) = all.find(|key| key.tag == "key" && key.text("name") == Some(name)) else {

@@ -74,7 +74,7 @@ fn what_holds_a_body_without_mass_holds_the_one_that_it_is_part_of() {
     );
 }
 
-/// What is left out of a model with one mesh.
+/// The parts that are left out of a model with one mesh.
 fn noted_of(file: &str, bytes: &[u8]) -> String {
     let folder = tempfile::tempdir().unwrap();
     std::fs::write(folder.path().join(file), bytes).unwrap();

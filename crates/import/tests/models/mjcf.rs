@@ -12,7 +12,7 @@ fn at_key(text: &str, key: &str) -> Result<Imported, ImportError> {
     model(text, Path::new("."), &Options { key: Some(key), ..Options::default() })
 }
 
-/// What MuJoCo makes of `arm.xml` (`reference.py`).
+/// MuJoCo's answers for `arm.xml` (`reference.py`).
 #[derive(Debug)]
 struct Reference {
     joints: Vec<String>,
@@ -57,8 +57,8 @@ fn an_arm_with_springs_dampers_and_a_servo_moves_as_in_mujoco() {
         worst
     };
     let (coarse, fine) = (worst(1000.0), worst(2000.0));
-    // joints move by up to a quarter of a radian or metre; steps of first order err by half as much at half the step: at 0.5 ms by 2.1e-4, as
-    // those of MuJoCo do (`reference.py`)
+    // joints move by up to a quarter of a radian or metre; steps of first order err by half as much at half the step:
+    // at 0.5 ms by 2.1e-4, as MuJoCo's do (`reference.py`)
     assert!(fine < 3e-4, "{coarse} {fine}");
     assert!(fine < 0.55 * coarse, "{coarse} {fine}");
 }
@@ -112,7 +112,7 @@ fn a_body_on_two_hinges_has_the_frequencies_of_its_closed_form() {
             advance(&world, (share - at) * period);
             at = share;
             let wrong = (position(&world, joint) - tilt * ((std::f64::consts::TAU * share).cos() - 1.0)).abs();
-            // a step of first order errs by ω h/2 = 1e-3, what is added to the mass by as much, the other angle by its square
+            // a step of first order errs by ω h/2 = 1e-3, the lent mass by as much, the other angle by its square
             assert!(wrong < 3e-3 * tilt.abs(), "{joint} {share}: {wrong}");
         }
     }

@@ -107,7 +107,7 @@ fn an_exclude_with_a_body_that_never_moves_is_in_the_scene() {
     assert!(noted[0].ends_with("exclude: is left out: scenes exclude bodies from each other, not from the world"));
     // a plane is always fixed
     assert!(apart(&import(&text.replace("size=\"0.1\"/>\n", "type=\"plane\" size=\"1 1 1\"/>\n"), None)).is_empty());
-    // without it they collide, as MuJoCo's filter of parents is not for what is part of the world
+    // without it they collide, as MuJoCo's filter of parents is not for parts of the world
     assert!(apart(&import(&text.replace("exclude", "pair"), None)).is_empty());
 }
 

@@ -1,4 +1,4 @@
-//! What contact forces say in words over the picture: the scale of the arrows, and the wrench on every tool.
+//! Contact forces in words over the picture: the scale of the arrows, and the wrench on every tool.
 //!
 //! In: a [`Forces`] and the picture's camera. Out: labels. Never here: the arrows, which are part of the picture.
 

@@ -40,7 +40,7 @@ impl Default for Lanes {
 }
 
 impl Lanes {
-    /// Takes the turns that agents with a lane have made since the last frame, and gives up those of all others.
+    /// Takes the turns that agents with a lane have made since the last frame, and gives up the turns of all others.
     pub fn gather(&mut self, simulation: &mut dyn Simulation) {
         let visible = std::mem::take(&mut self.visible);
         self.lanes.retain(|id, _| visible.contains(id));
@@ -50,7 +50,7 @@ impl Lanes {
         }
     }
 
-    /// Gives up what is kept: the lanes are not shown.
+    /// Gives up all kept turns: the lanes are not shown.
     pub fn clear(&mut self) {
         (self.lanes, self.visible) = (BTreeMap::new(), Vec::new());
     }

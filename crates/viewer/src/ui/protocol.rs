@@ -108,7 +108,7 @@ pub enum Action {
     OpenScene(PathBuf),
 }
 
-/// What of the moments that are kept is looked at.
+/// The kept moment to look at.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Look {
     /// The last one that is not later than this.
@@ -268,7 +268,7 @@ pub struct Status {
     pub cameras: Vec<String>,
     /// The number of the one that is used.
     pub camera: usize,
-    /// What contact forces are drawn with; `None` where they are not.
+    /// The drawing of contact forces; `None` where they are not drawn.
     pub forces: Option<Forces>,
     /// The couplings between agents at present.
     pub couplings: Vec<CouplingRow>,
@@ -281,7 +281,7 @@ pub struct Status {
 pub struct Forces {
     /// Metres that the arrow of one newton has; 0 before any was drawn.
     pub scale_m_per_n: f64,
-    /// What acts on each tool.
+    /// The wrench on each tool.
     pub tools: Vec<ToolForce>,
 }
 
@@ -377,7 +377,7 @@ pub struct AgentRow {
     pub residual_m: f64,
     /// The force that acts on a tool, newtons.
     pub force_n: Option<f64>,
-    /// The pressure of what fills it; `None` of what has no inside.
+    /// The pressure of its filling; `None` of an agent that has no inside.
     pub filled: Option<Filled>,
     /// The agent that steps it as a member of its cluster.
     pub led_by: Option<String>,
@@ -396,7 +396,7 @@ pub struct ContactSolve {
     pub level: SolveLevel,
     /// Factors of all solves.
     pub factors: u32,
-    /// What laws of contact and momentum miss at most, m/s.
+    /// The greatest miss of the laws of contact and momentum, m/s.
     pub miss_m_s: f64,
     /// The deepest overlap, metres.
     pub depth_m: f64,

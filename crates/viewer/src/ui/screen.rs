@@ -31,7 +31,7 @@ pub struct DrawnTimes {
 struct Canvas {
     texture: wgpu::Texture,
     view: wgpu::TextureView,
-    /// Pixels that are drawn, and those that they are shown with.
+    /// Pixels that are drawn, and pixels that they are shown with.
     drawn: Size,
     shown: Size,
     picture: Upscaled,

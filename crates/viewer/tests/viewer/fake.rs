@@ -1,4 +1,4 @@
-//! A window without a device: a simulation and a screen that write down what they are asked for.
+//! A window without a device: a simulation and a screen that write down all requests.
 
 use egui::{Key, Pos2, Rect, Shape};
 use egui_kittest::Harness;
@@ -12,7 +12,7 @@ use metachron_viewer::ui::{
 };
 use std::collections::{BTreeMap, BTreeSet};
 
-/// A show of three agents around the origin that writes down what it is asked for.
+/// A show of three agents around the origin that writes down all requests.
 pub struct Fake {
     pub status: Status,
     pub asked: Vec<Action>,
@@ -113,7 +113,7 @@ impl Simulation for Fake {
     }
 }
 
-/// A screen without a device that keeps what it was asked to draw.
+/// A screen without a device that keeps the requests to draw.
 #[derive(Default)]
 pub struct Blank {
     pub views: Vec<ViewRequest>,
@@ -131,13 +131,13 @@ impl Screen for Blank {
     }
 }
 
-/// The interface, and what it is shown on.
+/// The interface, and the simulation and screen that it is shown on.
 pub struct World {
     pub viewer: Viewer,
     pub simulation: Fake,
     pub screen: Blank,
     pub requests: WindowRequests,
-    /// What the harness gives the interface to draw on: its window without a margin.
+    /// The size of the harness's drawing area for the interface: its window without a margin.
     pub inner: Size,
 }
 
@@ -171,19 +171,19 @@ pub fn window_of(simulation: Fake) -> Harness<'static, World> {
     harness
 }
 
-/// What it asked for since it was asked last.
+/// Its actions since the last call.
 pub fn asked(harness: &mut Harness<'static, World>) -> Vec<Action> {
     harness.run_steps(2);
     std::mem::take(&mut harness.state_mut().simulation.asked)
 }
 
-/// What it asks for when this key is pressed.
+/// Its actions when this key is pressed.
 pub fn press(harness: &mut Harness<'static, World>, key: Key) -> Vec<Action> {
     harness.key_press(key);
     asked(harness)
 }
 
-/// What it wanted to see last.
+/// Its last request for a view.
 pub fn last_view(harness: &Harness<'static, World>) -> ViewRequest {
     harness.state().screen.views.last().unwrap().clone()
 }

@@ -1,4 +1,4 @@
-//! The window's interface driven as a user would: by label, by key, by mouse; what it asks for is what was meant.
+//! The window's interface driven as a user would: by label, by key, by mouse; its requests are the ones meant.
 
 mod fake;
 
@@ -57,7 +57,7 @@ fn panels_give_way_to_the_picture_in_a_small_window() {
         let slider = harness.query_by_role_and_label(egui::Role::Slider, "Target rate");
         assert_eq!(slider.is_some(), side, "{told}");
         assert!(slider.is_none_or(|slider| !slider.rect().intersects(picture)), "{told}");
-        // what is no panel is the picture's
+        // all area outside the panels is the picture's
         assert!(table || picture.height() > height - 80.0, "{told}");
         assert!(picture.height() > 100.0 && picture.width() > 200.0, "{told}");
         // the bar stands above it, and its ends do not meet

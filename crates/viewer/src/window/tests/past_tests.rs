@@ -32,7 +32,7 @@ fn a_run_that_is_put_back_goes_on_to_the_same_bits() {
         assert!(simulation.status().running && simulation.status().rewind.unwrap().shown.is_none());
         let again = (simulation.session.world().hash(), simulation.session.sim_now(), simulation.session.frames());
         assert_eq!(again, end);
-        // what is done there begins another run from there
+        // an action in the past begins another run from there
         simulation.apply(Action::Look(Look::At(times[12])));
         simulation.apply(Action::TargetFps(17.0));
         assert!(simulation.session.rewind().unwrap().shown.is_none());
