@@ -1,4 +1,4 @@
-//! What the default promises: of its choice, of what it learns, and of a picture in which nothing moves.
+//! Promises of the default policy: of its choice, of its estimates, and of a picture in which nothing moves.
 
 use metachron_lod::adaptive::{Adaptive, FilterUpdate, Offer, Plan, Settings, SpeedEstimator, Time, Trim, is_late};
 use metachron_lod::select::Level;
@@ -168,7 +168,8 @@ fn by_default_a_warm_start_keeps_what_a_cold_one_would_not_choose() {
     assert_eq!(chosen(&[[1.0, 0.5], [1.0, 1.3]]), [Some(0), Some(1)]);
 }
 
-/// Two objects, the second of worth `second`: there is time for one, after ten frames for both, and then for one again; what is left.
+/// Two objects, the second of worth `second`: there is time for one, after ten frames for both, and then for one again;
+/// the levels at the end.
 fn after_a_short_rise(second: f64) -> Vec<Level> {
     let mut adaptive = Adaptive::new(Settings { margin: 0.0, late: 1.0, ..Settings::default() });
     (0..2).for_each(|id| adaptive.set(id, 0, false, &offers(&[(1.0, 0.0), (100.0, 1.0)])));
@@ -179,7 +180,8 @@ fn after_a_short_rise(second: f64) -> Vec<Level> {
     levels(&adaptive, 2)
 }
 
-/// What has just risen is not taken back at once: others fall that are worth a little more, but not four times as much.
+/// An object that has just risen does not fall at once: others fall that are worth a little more, but not four times as
+/// much.
 #[test]
 fn object_that_has_just_risen_falls_after_others_unless_they_are_worth_four_times_as_much() {
     assert_eq!(after_a_short_rise(0.9), [Some(0), Some(1)]);
@@ -217,7 +219,7 @@ fn play(adaptive: &mut Adaptive, frames: u64, machine: impl Fn(u64) -> f64) -> (
     (plans, changes)
 }
 
-/// γ as a plan was made with: what it predicts for one tick of the table.
+/// γ as a plan was made with: its prediction for one tick of the table.
 fn slowness(adaptive: &Adaptive) -> f64 {
     adaptive.planned_slowness(0)
 }
@@ -242,7 +244,7 @@ fn camera_that_stands_still_but_for_rounding_is_a_still_picture() {
         adaptive.observe(frame, 0, plan.predicted - 300.0);
     }
     assert_eq!(held, 99);
-    // what has moved is chosen anew
+    // an object that has moved is chosen anew
     adaptive.weigh(3, 1.01 * weights[3]);
     assert!(!adaptive.choose(100, Time { target: T, fixed: 300.0, reserved: 0.0 }).held);
 }

@@ -176,7 +176,7 @@ fn size_slider_counts_from_none_to_every_pixel() {
         benefit(&View { pixels, ..VIEW }, &picture(4.0, Shading::Flat), &sliders)
     };
     assert_eq!([worth(1.0, 100.0), worth(0.5, 100.0), worth(0.0, 100.0)], [100.0, 10.0, 1.0]);
-    // what is smaller than a pixel is worth no more than there is of it, whatever the slider says
+    // an object smaller than a pixel is worth no more than there is of it, whatever the slider says
     assert_eq!([worth(1.0, 0.25), worth(0.0, 0.25), worth(0.0, 0.0)], [0.25, 0.25, 0.0]);
 }
 
@@ -304,7 +304,7 @@ fn joint(seed: u64) -> (Adaptive, Adaptive, Adaptive, f64, f64) {
     let mut random = Random(seed);
     let (mut both, mut simulate, mut draw) = (bare(), bare(), bare());
     let (mut least, mut most) = (0.0, 0.0);
-    // whole scenes lean to one side, in what a step weighs and in what it costs beside a picture
+    // whole scenes lean to one side, in the weight of a step and in its cost beside a picture
     let (lean, heavy) = (random.between(0.1, 10.0), random.between(0.2, 5.0));
     for id in 0..40 {
         let mut ladder = |scale: f64, weight: f64| {

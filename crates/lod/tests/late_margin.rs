@@ -4,7 +4,7 @@ use metachron_lod::adaptive::{Adaptive, LATE, LATE_SHARE, Offer, Settings, Time}
 
 const T: f64 = 100_000.0;
 const FRAMES: usize = 5000;
-/// Frames before the first that counts: the stored frames are those of this machine.
+/// Frames before the first that counts: the stored frames are this machine's by then.
 const SETTLED: usize = 300;
 /// The share of late frames that is promised to users.
 const PROMISED: f64 = 0.02;
@@ -19,7 +19,7 @@ fn normal(seed: u64) -> impl FnMut() -> f64 {
     move || (-2.0 * uniform().ln()).sqrt() * (std::f64::consts::TAU * uniform()).cos()
 }
 
-/// What a machine was given to draw, and what became of it: as parts of T.
+/// The predicted and the measured time of each frame, as parts of T.
 struct Played {
     predicted: Vec<f64>,
     took: Vec<f64>,

@@ -1,4 +1,5 @@
-//! What the laws promise, over declared plants: the printed one against its worked cases, the corrected one against its claims.
+//! Promises of the laws, over declared plants: the printed one against its worked cases, the corrected one against its
+//! claims.
 
 use metachron_lod::Bound;
 use metachron_lod::grisoni;

@@ -1,4 +1,4 @@
-//! What the choices promise, for any levels and budgets: against answers by brute force.
+//! Promises of the choices, for any levels and budgets: against answers by brute force.
 
 use metachron_lod::select::incremental::{Keep, incremental};
 use metachron_lod::select::{Entry, Level, Mode, Problem, Selection, exact, funkhouser, linear, marginal, threshold};

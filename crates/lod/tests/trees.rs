@@ -1,4 +1,4 @@
-//! What the choices in a tree promise, for any tree: against all cuts there are.
+//! Promises of the choices in a tree, for any tree: against all cuts there are.
 
 use metachron_lod::select::half::at_least_half;
 use metachron_lod::select::incremental::Keep;

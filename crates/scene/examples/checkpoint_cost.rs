@@ -1,4 +1,4 @@
-//! What a checkpoint of a scene costs: `checkpoint_cost SCENE.toml [SECONDS]`, built for release.
+//! The cost of a checkpoint of a scene: `checkpoint_cost SCENE.toml [SECONDS]`, built for release.
 //!
 //! Out: how long saving, putting back, writing and reading take (the least of some), how many bytes there are, and whether the world goes on
 //! to the bit. Never here: a limit.

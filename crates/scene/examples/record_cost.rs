@@ -1,4 +1,5 @@
-//! What a recording of a scene in real time costs its agents: `record_cost SCENE.toml [threads|pool [SECONDS [PAIRS]]]`, built for release.
+//! The cost of a recording of a scene in real time for its agents: `record_cost SCENE.toml [threads|pool [SECONDS
+//! [PAIRS]]]`, built for release.
 //!
 //! Out: of pairs of runs with and without one the CPU time of a step in the mean of all, and its ratio; the size of a minute. Never here: a limit.
 
@@ -59,7 +60,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     Ok(())
 }
 
-/// What a run took.
+/// The cost of a run.
 struct Cost {
     /// CPU time of a step in the mean of all.
     step_s: f64,

@@ -133,7 +133,7 @@ impl<'d, 't> Checker<'d, 't> {
         false
     }
 
-    /// The same of what is made from a file; the reader of one that cannot be read says why.
+    /// The same of data made from a file; the reader of one that cannot be read says why.
     pub(super) fn may_read(
         &mut self,
         place: &Place,
@@ -144,7 +144,7 @@ impl<'d, 't> Checker<'d, 't> {
         head.map_or(true, |head| self.may_make(place, key, cost(&head)))
     }
 
-    /// An object of so many copies is read, all of which take what it takes.
+    /// An object of so many copies is read, all of which take the same memory.
     pub(super) fn begin_object(&mut self, copies: usize) {
         self.draft.iter_mut().for_each(|demands| demands.begin(copies as u64));
     }

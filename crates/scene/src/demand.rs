@@ -1,6 +1,7 @@
 //! The memory that a scene asks for, from its numbers alone: added up before anything of it is made.
 //!
-//! In: counts of triangles, nodes and copies, heads of files. Out: bytes, and the line that asks for most of them. Never here: what is made.
+//! In: counts of triangles, nodes and copies, heads of files. Out: bytes, and the line that asks for most of them.
+//! Never here: the data itself.
 //! Bytes a piece are measured on 64-bit Linux, of a scene whose world has started; `tests/memory.rs` holds them to a fifth.
 
 use super::diagnostic::Problem;
@@ -8,7 +9,7 @@ use metachron_models::soft::{SoftShape, VERTICES_MAX};
 use metachron_world::Spec;
 use std::ops::Range;
 
-/// The beginning of a file, which says what is in it, and its whole length.
+/// The beginning of a file, which says its contents, and its whole length.
 pub(super) struct FileHead {
     pub(super) start: Vec<u8>,
     pub(super) bytes: u64,
@@ -78,7 +79,7 @@ impl Cost {
         Self { kept_bytes: 0, copy_bytes: 18_000 * vertices, making_bytes: 5000 * vertices }
     }
 
-    /// A soft body of so many vertices; those of few are factored, which takes as much again while it is done.
+    /// A soft body of so many vertices; bodies of few are factored, which takes as much again while it is done.
     const fn soft(vertices: u64) -> Self {
         let (copy, making) = if vertices <= 3000 { (3300, 3500) } else { (4700, 0) };
         Self { kept_bytes: 0, copy_bytes: copy * vertices, making_bytes: making * vertices }

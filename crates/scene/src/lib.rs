@@ -71,7 +71,7 @@ pub fn load(source: &Source, overrides: &[(String, String)]) -> Result<Scene, Sc
     read(source, &text).map_err(|problems| SceneError::new(source.name(), &text, problems))
 }
 
-/// Reads a scene twice: what is wrong with it, or takes too much memory, is found in a draft, before anything is made.
+/// Reads a scene twice: keys that are wrong, or take too much memory, are found in a draft, before anything is made.
 fn read(source: &Source, text: &str) -> Result<Scene, Vec<Problem>> {
     let document = Document::parse(text).map_err(|problem| vec![problem])?;
     let mut draft = Checker::draft(&document);

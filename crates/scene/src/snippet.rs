@@ -1,7 +1,7 @@
 //! Excerpts of a scene's text around one position, cut to a readable length: a file may be one line of a megabyte.
 //!
 //! In: a text and a position in it. Out: an [`Excerpt`] with its own offsets, and its line and column in the whole text; shortened words
-//! and numbers. Never here: what is wrong there.
+//! and numbers. Never here: the fault there.
 
 use miette::{MietteError, MietteSpanContents, SourceCode, SourceSpan, SpanContents};
 use std::ops::Range;

@@ -19,7 +19,7 @@ pub const SCENE_BYTES_MAX: u64 = 16 << 20;
 /// Longest file next to a scene, bytes.
 const SIBLING_BYTES_MAX: u64 = 64 << 20;
 
-/// How much of a file's beginning says what is in it, bytes.
+/// How much of a file's beginning says its contents, bytes.
 const HEAD_BYTES: u64 = 64 << 10;
 /// Most memory of a scene where the system does not say how much there is: half of 8 GiB.
 const MEMORY_DEFAULT_BYTES: u64 = 4 << 30;
@@ -61,7 +61,7 @@ pub struct Source {
 
 type Files = Arc<Mutex<BTreeMap<PathBuf, Option<FileVersion>>>>;
 
-/// By what it is noticed that a file is another one than before.
+/// The modification time and size of a file, by which a change of it is noticed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct FileVersion {
     modified: SystemTime,
@@ -82,7 +82,8 @@ impl FileVersion {
 pub struct SourceFile {
     /// Where it is.
     pub path: PathBuf,
-    /// What it was before the scene first read it: one that changes while it is read is another one afterwards. `None` where there was none.
+    /// Its version before the scene first read it: a file that changes while it is read has another one afterwards.
+    /// `None` where there was none.
     pub version: Option<FileVersion>,
 }
 

@@ -17,7 +17,7 @@ fn a_scene_has_one_camera_as_before_or_several_by_name() {
     assert_eq!(names(&several).unwrap(), ["above", "camera 2"]);
     let twice = format!("[[camera]]\nname = \"above\"\n{eye}[[camera]]\nname = \"above\"\n{eye}");
     assert!(names(&twice).unwrap_err().contains("twice"));
-    // the place of what is wrong is in the second
+    // the fault is in the second
     let wrong = format!("[[camera]]\n{eye}[[camera]]\n{eye}fov_deg = 400\n");
     assert!(names(&wrong).unwrap_err().contains("400"));
     assert!(names(&format!("[camera]\n{eye}eyes = 3\n")).unwrap_err().contains("eyes"));

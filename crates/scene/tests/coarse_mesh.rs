@@ -1,4 +1,4 @@
-//! A soft solid whose file has few triangles lies on what it touches by its faces, not by its corners alone.
+//! A soft solid whose file has few triangles rests on a body by its faces, not by its corners alone.
 
 use metachron_core::{Body, SimSpan};
 use metachron_scene::{Source, load};
@@ -28,7 +28,7 @@ fn a_soft_cube_of_six_faces_sinks_by_its_weight_and_not_through_the_floor() {
     world.advance(SimSpan::from_millis(1500));
     let state = world.latest(world.object("cube").unwrap()).unwrap();
     let Body::Soft(soft) = &state.body else { panic!("a soft body") };
-    // the points of the file come first, those of the top last among them
+    // the points of the file come first, the top ones last among them
     let top_m = soft.positions[4..8].iter().map(|x| 0.25 * x.z).sum::<f64>();
     // a column of this height sinks by ρ g l²/2E; free sides change that by some tenths
     let (sank, wanted) = (0.1 - top_m, 1000.0 * 9.81 * 0.01 / (2.0 * 3e4));

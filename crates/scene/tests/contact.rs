@@ -1,4 +1,4 @@
-//! What scenes say about contact and motors: what comes of it in a running world, and what a wrong key is told.
+//! Contact and motors in scenes: their effect in a running world, and the messages about wrong keys.
 
 use metachron_core::{Body, ContactPartner, RigidState, SimSpan};
 use metachron_scene::{SceneError, Source, load};

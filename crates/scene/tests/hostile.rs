@@ -1,4 +1,5 @@
-//! Scenes that ask for too much, or for what is not theirs: each is refused at a line of it before anything is made.
+//! Scenes that ask for too much, or for files that are not theirs: each is refused at a line of it before anything is
+//! made.
 #![cfg(target_os = "linux")]
 
 use metachron_scene::{Limits, SceneError, Source, load};
@@ -12,7 +13,7 @@ const REFUSAL_MIB: f64 = 50.0;
 /// Of scenes whose numbers are all within their ranges.
 const LIMIT_BYTES: u64 = 512 << 20;
 
-/// The memory of this process, MiB: what it holds (`VmRSS`), or the most that it has held (`VmHWM`).
+/// The memory of this process, MiB: its present memory (`VmRSS`), or the most that it has held (`VmHWM`).
 fn memory_mib(which: &str) -> f64 {
     let status = read_to_string("/proc/self/status").unwrap();
     let line = status.lines().find_map(|line| line.strip_prefix(which)).unwrap();

@@ -54,7 +54,7 @@ fn the_density_of_a_compound_is_one_with_a_mass_too_and_is_reported_once() {
     }
 }
 
-/// The corners of the hull of a generated ball of half a decimetre, or what is wrong with it.
+/// The corners of the hull of a generated ball of half a decimetre, or its fault.
 fn corners(shape: &str, keys: &str) -> Result<usize, String> {
     let text = format!(
         "format = 1\n[[object]]\nname = \"a\"\nmodel = \"rigid\"\nshape = \"{shape}\"\ngenerate = \"sphere\"\ntriangles = 8000\nscale = 0.05\n{keys}"

@@ -21,7 +21,7 @@ from_m = [4, 1, 0]
 to_m = [4, 2, 2]
 "##;
 
-/// The rooms with a text replaced; or what is wrong with them, and where.
+/// The rooms with a text replaced; or the fault, and its place.
 fn rooms(from: &str, to: &str) -> Result<Scene, String> {
     assert!(ROOMS.contains(from), "{from}");
     let text = ROOMS.replacen(from, to, 1);

@@ -1,5 +1,5 @@
-//! Forces of users on soft bodies, those that know how they answer and those that leave it to the problem of their cluster: both gain what was
-//! given.
+//! Forces of users on soft bodies: bodies that know how they answer, and bodies that leave it to the problem of their
+//! cluster, both gain the impulse that was given.
 
 use glam::{DQuat, DVec3};
 use metachron_core::{Anchor, SimSpan};

@@ -71,7 +71,7 @@ fn without_contacts_only_the_pairs_that_a_coupling_names_collide() {
     );
 }
 
-/// A ball of 1 kg and a post; the tests add what holds the ball, and a tube where they need one.
+/// A ball of 1 kg and a post; the tests add the joint or link that holds the ball, and a tube where they need one.
 const HELD: &str = r#"format = 1
 object = [
     { name = "ball", model = "rigid", shape = "ball", radius_m = 0.1, mass_kg = 1, position_m = [0, 0, 5] },

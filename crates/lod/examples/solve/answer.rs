@@ -68,7 +68,7 @@ fn knapsack(case: &Value) -> Result<Vec<Value>, String> {
     let mode = if case["mode"] == "exactly_one" { Mode::ExactlyOne } else { Mode::AtMostOne };
     let objects: Result<Vec<_>, String> = list(case, "objects")?.iter().map(entries).collect();
     let (objects, budget) = (objects?, integer(case, "budget")?);
-    // the crate draws nothing of what has no level; one level of everything is then more than there is
+    // the crate draws nothing of an object without levels; one level of everything is then more than there is
     let impossible = mode == Mode::ExactlyOne && objects.iter().any(Vec::is_empty);
     let mut problem = Problem::new(mode, if impossible { 0 } else { budget });
     for (id, levels) in (0..).zip(&objects) {

@@ -187,7 +187,7 @@ impl SharedPrice {
             return None;
         }
         let lambda = match self.lambda {
-            // drawing gets what it requests, but at most half of the capacity
+            // drawing gets the capacity that it requests, but at most half of it all
             None => price(workers, (capacity - drawing.wants).max(0.5 * capacity)),
             Some(held) if drawing.lambda > 0.0 => {
                 held * libm::exp(

@@ -69,7 +69,8 @@ impl LateMargin {
         }
     }
 
-    /// Reports that the next frame does not follow the last one: what was stored of frames whose neighbours are missing is dropped.
+    /// Reports that the next frame does not follow the last one: stored frames whose neighbours are missing are
+    /// dropped.
     pub(super) fn interrupt(&mut self) {
         self.known = 0;
     }

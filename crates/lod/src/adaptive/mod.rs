@@ -127,7 +127,7 @@ struct Prediction {
     frame: u64,
     target: f64,
     table: [u64; STAGES],
-    /// Ticks of the whole frame by the table alone, without what is reserved for others.
+    /// Ticks of the whole frame by the table alone, without the time reserved for others.
     whole: f64,
     usable: bool,
 }
@@ -243,7 +243,8 @@ impl Adaptive {
         }
     }
 
-    /// Reports the time that a whole frame took with its fixed part, without what was reserved, ticks: for the margin and the trim.
+    /// Reports the time that a whole frame took with its fixed part, without reserved time, ticks: for the margin and
+    /// the trim.
     pub fn finished(&mut self, frame: u64, took: f64) {
         match self.predictions[frame as usize % IN_FLIGHT] {
             Some(prediction) if prediction.frame == frame && prediction.usable && took.is_finite() => {

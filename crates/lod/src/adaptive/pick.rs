@@ -3,10 +3,10 @@
 //! In: the options, γ of every stage, a budget. Out: steps taken for every object, λ, and a bound.
 //! Never here: where the budget comes from. Theory: `docs/theory/budget.md`, eq. 32 and 33.
 //!
-//! Steps whose gain per time is far above the last price are taken, steps far below it are not; those near it fall into buckets by the
-//! leading bits of their gain per time. Whole buckets are taken from the top while they fit; only the steps of the one bucket that does not
-//! fit whole are sorted, and those that fit are taken. If the price is not near the last one, all steps count as near. So the result equals
-//! that of a full sort, in linear time.
+//! Steps whose gain per time is far above the last price are taken, steps far below it are not; steps near it fall into
+//! buckets by the leading bits of their gain per time. Whole buckets are taken from the top while they fit; only the
+//! steps of the one bucket that does not fit whole are sorted, and taken as far as they fit. If the price is not near
+//! the last one, all steps count as near. So the result equals a full sort's, in linear time.
 
 use alloc::vec::Vec;
 use core::ops::Range;

@@ -138,8 +138,9 @@ impl AdaptiveChoice {
         self.law.planned_slowness(DRAWING)
     }
 
-    /// Gain of one more second that others leave, in the unit of the objects' gains; 0 where everything is at its finest, or where the
-    /// scatter bounds the picture: it leaves more free than what is reserved, so that another reserve would change nothing.
+    /// Gain of one more second that others leave, in the unit of the objects' gains; 0 where everything is at its
+    /// finest, or where the scatter bounds the picture: it leaves more time free than the reserved part, so that
+    /// another reserve would change nothing.
     pub fn lambda(&self) -> f64 {
         if self.margin() > self.settings.margin { 0.0 } else { TICKS * self.plan.lambda }
     }

@@ -90,7 +90,7 @@ pub(super) fn accuracy(kind: &Kind, polygons: f64, shading: Shading, best: Shadi
     shape * light * painted(shading, best)
 }
 
-/// What a shading leaves of the benefit of an object that has a texture.
+/// The part of its benefit that a shading leaves to an object that has a texture.
 fn painted(shading: Shading, best: Shading) -> f64 {
     if best == Shading::Textured && shading < best { 1.0 - UNPAINTED } else { 1.0 }
 }

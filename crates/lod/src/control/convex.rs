@@ -14,7 +14,8 @@ use std::collections::BTreeMap;
 /// Time of a Newton step of the interior point per mesh, seconds.
 const NEWTON_S: f64 = 60e-9;
 
-/// A smaller relative change of r is ignored, as long as there is time for what is kept: the optimum moves with everything in view.
+/// A smaller relative change of r is ignored, as long as there is time for the kept resolutions: the optimum moves with
+/// everything in view.
 const SAME_R: f64 = 0.05;
 
 /// State from frame to frame.
@@ -53,8 +54,8 @@ impl Convex {
     }
 }
 
-/// The resolutions to draw with: those of the frame before where the new ones are near, as long as all fit the time; where not, those that
-/// take most more time than the new ones give way.
+/// The resolutions to draw with: a mesh keeps that of the frame before where the new one is near, as long as all fit
+/// the time; where they do not fit, the kept ones that take most more time than the new ones give way.
 fn kept(last: &[Option<f64>], found: &[f64], meshes: &[Mesh], time_s: f64) -> Vec<f64> {
     let near = |(last, r): (&Option<f64>, &f64)| last.filter(|last| (r / last - 1.0).abs() <= SAME_R);
     let mut kept: Vec<Option<f64>> = last.iter().zip(found).map(near).collect();
@@ -132,7 +133,7 @@ mod tests {
         let last = [Some(0.52); 4];
         assert_eq!(kept(&last, &found, &meshes, new_s), [0.5; 4]);
         assert_eq!(kept(&last, &found, &meshes, new_s + 0.02 * 6.1e-3), [0.52, 0.52, 0.52, 0.5]);
-        // what was coarser leaves room for what was finer
+        // meshes that were coarser leave room for meshes that were finer
         let mixed = [Some(0.52), Some(0.48), Some(0.52), Some(0.48)];
         assert_eq!(kept(&mixed, &found, &meshes, new_s), [0.52, 0.48, 0.52, 0.48]);
     }

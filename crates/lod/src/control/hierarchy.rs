@@ -65,7 +65,7 @@ impl Hierarchy {
         Promise { passes, ..promise(query, &cut) }
     }
 
-    /// A cut by `policy`, and the passes that it took; those of (MB97) are worth half of the best.
+    /// A cut by `policy`, and the passes that it took; cuts of (MB97) are worth half of the best.
     fn cut(&self, policy: Policy, query: &FrameQuery<'_>, tree: &Tree, forest: &Forest) -> (Cut, u32) {
         match policy {
             Policy::HierarchicalFlat => (at_least_half(tree, mason_flat::flat(tree)), 0),
@@ -89,7 +89,8 @@ impl Forest {
     /// Benefits include hysteresis by the cut of the frame before.
     fn of(query: &FrameQuery<'_>, groups: &Groups, impostors: &Impostors, last: &BTreeMap<AgentId, Level>) -> Self {
         let entries = |at: usize, rungs: &[Rung], weight: f64| {
-            // what was open, or in a closed group, was drawn by none of its own; what is new has nothing to stay with
+            // an open group, and an object in a closed one, was drawn by no level of its own; a new object has no level
+            // to stay with
             let before = last.get(&query.views[at].view.id);
             let stays = |level| before.is_none_or(|before| *before == level);
             let entry = |(level, rung): (u32, &Rung)| {

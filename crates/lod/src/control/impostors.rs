@@ -4,11 +4,11 @@
 //! Theory: `docs/theory/control.md`, eq. 24.
 //!
 //! At a price λ of a second every part of a tree can be decided by itself: a group is closed if the best of its impostors leaves more net
-//! benefit (benefit minus cost at λ) than its members at their best. If even the least of all open groups does not fit, those are closed
-//! that lose least. A group that was opened too soon waits longer the next time.
+//! benefit (benefit minus cost at λ) than its members at their best. If even the least of all open groups does not fit,
+//! groups close that lose least. A group that was opened too soon waits longer the next time.
 //!
-//! A closed group closes the groups inside it, so that opening it is charged with its cheapest cut, their impostors: these open afterwards, each
-//! for what it costs.
+//! A closed group closes the groups inside it, so that opening it is charged with its cheapest cut, their impostors:
+//! these open afterwards, each for its own cost.
 
 use super::groups::{Groups, Impostors};
 use super::ladder::Rung;
@@ -101,7 +101,8 @@ impl ImpostorChoice {
         groups.is_within(at, |group| self.is_closed(group))
     }
 
-    /// Closes groups until the least of what is open fits, those first that lose least for the time they save.
+    /// Closes groups until the least levels of the open ones fit, first those groups that lose least for the time they
+    /// save.
     fn make_room(&mut self, query: &FrameQuery<'_>, groups: &Groups, slowness: f64) {
         let mut spare = self.spare(query, groups, slowness);
         while spare < 0.0 {

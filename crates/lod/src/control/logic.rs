@@ -7,7 +7,7 @@
 
 use crate::cost::overlap::{Overlap, OverlapFit};
 
-/// The part of what is known that a new frame replaces: about twenty frames of memory.
+/// The part of the estimate that a new frame replaces: about twenty frames of memory.
 const NEWS: f64 = 0.05;
 
 /// Greatest part of a frame that logic is taken to be: a frame is planned to take no less than its logic (RH05, §5.3).

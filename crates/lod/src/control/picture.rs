@@ -243,7 +243,7 @@ impl PictureControl {
             Policy::Adaptive => (self.adaptive.slowness(), self.adaptive.margin().max(query.margin)),
             _ => (1.0, query.margin),
         };
-        // what is chosen by size or by the last frame's time leaves nothing out for a cost
+        // policies that choose by size or by the last frame's time leave nothing out for a cost
         if self.policy.predicts() {
             self.vanish.update(&FrameQuery { margin, ..query }, &self.groups, slowness);
         } else {

@@ -27,7 +27,7 @@ pub struct Prices {
     pub enlarge_s: f64,
     /// An object by its shading, flat first: setup + max(c₁ polygons + c₂ vertices, c₃ pixels that it covers).
     pub shading: [Stages; 4],
-    /// An object drawn as points, and one drawn as lines; its pixels are those of its strokes.
+    /// An object drawn as points, and one drawn as lines; its pixels are its strokes' pixels.
     pub strokes: [Stages; Stroke::ALL.len()],
     /// An object of each shading by the area of its triangles, if that was measured: then it replaces the stages.
     pub areas: Option<[Areas; 4]>,
@@ -48,7 +48,7 @@ pub struct Measured {
     pub pixels: f64,
     /// How they are shaded.
     pub shading: Shading,
-    /// What they are drawn as instead of shaded triangles.
+    /// The strokes that they are drawn as instead of shaded triangles.
     pub stroke: Option<Stroke>,
     /// Measured time of the picture.
     pub seconds: f64,
@@ -183,7 +183,8 @@ impl Prices {
         self.backdrop_s(backdrop) + picture.objects * object_s
     }
 
-    /// The coefficients of a shading; for [`Shading::Shadowed`] those of textured light with 2.5 times the time per pixel.
+    /// The coefficients of a shading; for [`Shading::Shadowed`] the coefficients of textured light with 2.5 times the
+    /// time per pixel.
     #[must_use]
     pub fn of(&self, shading: Shading) -> Stages {
         match shading {

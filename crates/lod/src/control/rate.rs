@@ -33,7 +33,8 @@ pub struct RateLimits {
     pub dt_max_s: f64,
     /// Finest and coarsest ε of the simulation, metres; equal values fix ε. `None` for a model without ε.
     pub eps_m: Option<(f64, f64)>,
-    /// Work falls as 1/ε to this power, ≥ 1: 1 of what is divided along a line, 3 of what fills a volume.
+    /// Work is proportional to 1/ε to this power, ≥ 1: 1 of a body that is divided along a line, 3 of one that fills a
+    /// volume.
     pub work_power: f64,
     /// The fraction of its period that the agent's work may take, 0.01 … 1. Cores over agents, less some reserve, is fair.
     pub share: f64,

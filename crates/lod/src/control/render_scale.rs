@@ -13,7 +13,7 @@ pub(super) const SCALES: [f64; 14] = [0.35, 0.4, 0.45, 0.5, 0.55, 0.6, 0.65, 0.7
 /// Least fraction with which shadows are drawn: they are missed less than more pixels would be.
 const SHADOWED: f64 = 0.5;
 
-/// What is drawn of a picture.
+/// The scale and shadows of a picture.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct PictureRung {
     /// Fraction of its width and height, one of [`SCALES`].
@@ -47,15 +47,16 @@ const STALL: (f64, f64) = (4.0, 0.1);
 /// Standard errors by which a mean must be past a threshold, and what few frames add to that, over their number less one: near Student's
 /// 0.975 quantile.
 const CERTAIN: (f64, f64) = (2.0, 4.6);
-/// A scale is gone to if it is predicted to need this fraction of the time, or less: what is left, and what is not certain, keeps pixels from
-/// being taken and given in turn.
+/// A scale is gone to if it is predicted to need this fraction of the time, or less: the rest, and the uncertainty,
+/// keep pixels from being taken and given in turn.
 const FIT: f64 = 0.97;
 /// Seconds before pixels that were taken are given back; doubled, up to the second, each time that they have to be taken again within four
 /// times as long.
 const PATIENCE_S: (f64, f64) = (0.5, 16.0);
 /// Seconds from one change upward to the next.
 const STEP_S: f64 = 0.2;
-/// Variance of what is not known of the pixels' part at first, as a square of a factor; and what each change adds to it, because scenes move.
+/// Variance of the pixels' unknown part at first, as a square of a factor; and the addition of each change to it,
+/// because scenes move.
 const DOUBT: (f64, f64) = (0.25, 0.02);
 /// The range of the learnt factor.
 const FACTOR: (f64, f64) = (0.25, 4.0);

@@ -13,12 +13,12 @@ use super::query::{FrameQuery, Promise, demand, left_out};
 use super::view::Kind;
 use crate::select::robin_hood::{Instance, TooLittle, distribute};
 
-/// What an object is drawn with.
+/// The level of an object that is drawn.
 #[derive(Debug, Clone, Copy)]
 struct Share {
     /// Number of its rung.
     rung: usize,
-    /// Triangles: those of the rung, or fewer.
+    /// Triangles: as many as the rung has, or fewer.
     polygons: f64,
     /// Seconds that they take after the setup.
     taken_s: f64,
@@ -47,7 +47,7 @@ pub(super) fn choose(query: &FrameQuery<'_>, levels: &mut [LevelDemand]) -> Prom
     };
     let mut shares: Vec<Option<Share>> = objects.iter().enumerate().map(taken).collect();
     if query.spend_rest {
-        // what is asked for comes before what is better
+        // levels that are asked for come before better ones
         let left_s = spend_rest(query, &objects, found.leftover, &mut shares, |ladder| ladder.asked);
         spend_rest(query, &objects, left_s, &mut shares, |ladder| ladder.rungs.len());
     }
@@ -69,8 +69,9 @@ pub(super) fn choose(query: &FrameQuery<'_>, levels: &mut [LevelDemand]) -> Prom
     promise
 }
 
-/// Shares what is left by the same rule once more, among objects that have better forms than those taken, in their first `rungs`: what the
-/// last objects visited do not need comes too late for the others (RH05, §7.2). Returns what is left then.
+/// Shares the time left by the same rule once more, among objects that have better forms than those taken, in their
+/// first `rungs`: time that the last objects visited do not need comes too late for the others (RH05, §7.2). Returns
+/// the time left then.
 fn spend_rest(
     query: &FrameQuery<'_>,
     objects: &[usize],

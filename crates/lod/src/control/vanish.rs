@@ -6,10 +6,11 @@
 use super::groups::Groups;
 use super::query::FrameQuery;
 
-/// Factor of the benefit per cost of an object that was drawn in the frame before: what is in does not go out for a slight change of size.
+/// Factor of the benefit per cost of an object that was drawn in the frame before: it does not go out for a slight
+/// change of size.
 const STAY_FACTOR: f64 = 1.25;
 
-/// An object comes back where this fraction of the time stays free: what is out does not come in for a slight change of time.
+/// An object comes back where this fraction of the time stays free: it does not come in for a slight change of time.
 const COME_BACK: f64 = 0.05;
 
 /// Which objects are left out.

@@ -44,7 +44,7 @@ impl Stroke {
 /// p = n, past it p − n pieces in full and 2n − p strokes (RH05, §6.2).
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Pieces {
-    /// What a piece is drawn as where it is not drawn in full.
+    /// The stroke as which a piece is drawn where it is not drawn in full.
     pub stroke: Stroke,
     /// How many there are, ≥ 1.
     pub count: u32,
@@ -54,19 +54,19 @@ pub struct Pieces {
     pub full: u32,
 }
 
-/// An object's triangles by what they are drawn as.
+/// An object's triangles by how they are drawn.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Parts {
     /// Triangles of the strokes.
     pub strokes: f64,
-    /// Triangles of what is drawn in full.
+    /// Triangles of the pieces that are drawn in full.
     pub full: f64,
     /// The part of the pieces drawn that are strokes, 0 … 1.
     pub stroked: f64,
 }
 
 impl Pieces {
-    /// What `polygons` triangles are drawn as.
+    /// The parts as which `polygons` triangles are drawn.
     pub(super) fn parts(&self, polygons: f64) -> Parts {
         let [count, least, full] = [self.count.max(1), self.least.max(1), self.full.max(self.least + 1)].map(f64::from);
         let in_full = ((polygons - least * count) / (full - least)).clamp(0.0, count);
@@ -121,7 +121,7 @@ pub struct ObjectView {
     pub kind: Kind,
     /// The number of the group that it is in, among the objects given with it: a group comes after all that is in it.
     pub group: Option<usize>,
-    /// Its pieces, if it is drawn by strokes; `None` for what is drawn by triangles alone.
+    /// Its pieces, if it is drawn by strokes; `None` for an object that is drawn by triangles alone.
     pub pieces: Option<Pieces>,
     /// The pairs (ε, n) allowed for the picture. For a primitive only n counts; for a mesh with a free triangle count or a group, neither.
     pub range: ResolutionRange,

@@ -87,7 +87,7 @@ pub struct GivenSliders {
 }
 
 impl GivenSliders {
-    /// All sliders, those that are not set from `usual`.
+    /// All sliders; sliders that are not set come from `usual`.
     #[must_use]
     pub fn over(self, usual: Sliders) -> Sliders {
         Sliders {
@@ -100,7 +100,7 @@ impl GivenSliders {
         }
     }
 
-    /// The same after sliders that stood at `from` were moved to `to`: those that moved are set as well.
+    /// The same after sliders that stood at `from` were moved to `to`: the moved ones are set as well.
     #[must_use]
     pub fn moved(self, from: Sliders, to: Sliders) -> Self {
         let set = |given: Option<f64>, from: f64, to: f64| if from == to { given } else { Some(to) };

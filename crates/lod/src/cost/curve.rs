@@ -1,4 +1,5 @@
-//! A measured curve between its points: the time of a primitive by its area, the time of logic by what is visible (RH05, §4).
+//! A measured curve between its points: the time of a primitive by its area, the time of logic by the visible objects
+//! (RH05, §4).
 //!
 //! In: measured points, in any order. Out: a time for any abscissa. Never here: a law; the curves are not straight.
 //! Theory: `docs/theory/budget.md`, eq. 44 and 45.

@@ -69,7 +69,7 @@ impl OverlapFit {
         }
     }
 
-    /// Lets earlier frames count this part of what they did, 0 … 1.
+    /// Lets earlier frames count this part of their weight, 0 … 1.
     pub fn fade(&mut self, part: f64) {
         (self.above, self.below) = (part * self.above, part * self.below);
     }

@@ -31,7 +31,8 @@ pub struct Stages {
 }
 
 impl Stages {
-    /// setup + max + serial · min of c₁ polygons + c₂ vertices and c₃ pixels (FS93, §4; the setup and what is not hidden are ours).
+    /// setup + max + serial · min of c₁ polygons + c₂ vertices and c₃ pixels (FS93, §4; the setup and the part that is
+    /// not hidden are ours).
     #[must_use]
     pub fn time(&self, work: Work) -> f64 {
         let (geometry, fill) = (self.geometry(work), self.pixel * work.pixels);

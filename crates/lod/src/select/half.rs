@@ -33,7 +33,8 @@ pub fn at_least_half(tree: &Tree, answer: Cut) -> Cut {
     exact(tree, STATES_MAX).map_or(best.clone(), |cut| better(best, cut))
 }
 
-/// The cut that differs from the cheapest by one impostor and by what has to be open for it, and is worth most of those that fit.
+/// The cut that differs from the cheapest by one impostor and by the groups that have to be open for it; of such cuts
+/// that fit, the one worth most.
 fn best_single(tree: &Tree) -> Option<Vec<Level>> {
     let base = cheapest_below(tree);
     let mut around = alloc::vec![Entry::default(); tree.len()];

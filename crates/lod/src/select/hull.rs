@@ -24,7 +24,7 @@ pub struct Step {
 pub struct Hulls {
     /// The cheapest set.
     pub bases: Vec<Level>,
-    /// Steps in falling gain per cost; those of one object are in the order of its hull.
+    /// Steps in falling gain per cost; the steps of one object are in the order of its hull.
     pub steps: Vec<Step>,
 }
 

@@ -12,8 +12,8 @@ use super::tree_exact::infeasible;
 
 /// Starts from the root's lowest form; the most important node that is drawn goes to its next form, until that no longer fits.
 ///
-/// `importance` has one entry per node; those of groups are ignored, a group is as important as its most important part. NaN or missing
-/// entries count as 0. If the root's lowest form does not fit, the result is the cheapest cut.
+/// `importance` has one entry per node; entries of groups are ignored, a group is as important as its most important
+/// part. NaN or missing entries count as 0. If the root's lowest form does not fit, the result is the cheapest cut.
 #[must_use]
 pub fn choose(tree: &Tree, importance: &[f64]) -> Cut {
     if let Some(cut) = infeasible(tree) {

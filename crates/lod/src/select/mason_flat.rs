@@ -121,7 +121,7 @@ impl<'a> Knapsack<'a> {
     }
 }
 
-/// The leaves of every node, numbered so that those of a group are neighbours.
+/// The leaves of every node, numbered so that leaves of one group are neighbours.
 fn leaves(tree: &Tree) -> Vec<Range<usize>> {
     let mut count = alloc::vec![0; tree.len()];
     for &node in tree.order().iter().rev() {

@@ -17,7 +17,7 @@ pub struct Instance {
     pub value: f64,
     /// Times of the forms, best first; one that is not finite or below 0 is never chosen.
     pub forms: Vec<f64>,
-    /// What happens where its time does not pay for its cheapest form.
+    /// The rule where its time does not pay for its cheapest form.
     pub too_little: TooLittle,
 }
 

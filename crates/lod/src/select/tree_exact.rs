@@ -45,7 +45,7 @@ struct Vertex {
     origin: Origin,
 }
 
-/// What a vertex stands for.
+/// The origin of a vertex.
 #[derive(Clone, Copy)]
 enum Origin {
     /// One of the node's own impostors.

@@ -99,7 +99,7 @@ pub(super) struct AgentTrial {
     pub start_z: f64,
     /// Load at the finest, as a fraction of a core.
     pub full_load: f64,
-    /// What changes the agent's work.
+    /// The changes of the agent's work.
     pub disturbance: Disturbance,
     /// Part of a core that others take from it in the middle third of the trial.
     pub others: f64,

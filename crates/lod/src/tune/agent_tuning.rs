@@ -1,7 +1,8 @@
 //! Finds the gains by which a scene's agents hold their shares of a core.
 //!
-//! In: the agents' plants. Out: a row for every pair of gains that was judged by name, and the best of all that were tried; the rows are
-//! among these, so that none of them is better than what is given. Never here: a scene, a thread of an agent.
+//! In: the agents' plants. Out: a row for every pair of gains that was judged by name, and the best of all that were
+//! tried; the rows are among these, so that none of them is better than the result. Never here: a scene, a thread of an
+//! agent.
 //! Theory: `docs/theory/control.md`, eq. 31a … 31c.
 
 use super::agent_plant::{AgentPlant, AgentTrial, AgentTurn, play_agent};

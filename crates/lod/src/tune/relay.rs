@@ -1,6 +1,6 @@
 //! Gains by a relay experiment (AH84), the classic method for a loop without a model, and Ziegler and Nichols' rule (ZN42).
 //!
-//! In: a plant. Out: the PI gains of the rule, for comparison with those of the search. Never here: a judgement.
+//! In: a plant. Out: the PI gains of the rule, for comparison with the gains of the search. Never here: a judgement.
 
 use super::plant::Plant;
 use crate::control::{FrameWork, Law, PictureControl, Policy};

@@ -171,8 +171,8 @@ impl SearchState<'_, '_> {
     }
 }
 
-/// Searches for the best gains of `family`, and judges `starts` first, of which those of the family are points to start from; `None` if no
-/// candidate was judged.
+/// Searches for the best gains of `family`, and judges `starts` first, of which the family's own are points to start
+/// from; `None` if no candidate was judged.
 #[must_use]
 pub fn search(search: &mut Search<'_>, family: Family, starts: &[Candidate]) -> Option<SearchResult> {
     let count = starts.len() + family.candidates().len();

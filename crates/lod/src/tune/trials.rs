@@ -171,7 +171,7 @@ impl Margins {
         Self { gain: near.gain_margin(), delay: near.delay_margin() }
     }
 
-    /// What is missing of the required margins, each as a part of it.
+    /// The shortfall of the required margins, each as a part of it.
     fn shortfall(self) -> f64 {
         (1.0 - self.gain / GAIN_MARGIN).max(0.0) + (1.0 - self.delay as f64 / DELAY_MARGIN as f64).max(0.0)
     }

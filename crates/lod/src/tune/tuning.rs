@@ -1,7 +1,8 @@
 //! A whole tuning: every family is searched, from the laws that it is compared with.
 //!
 //! In: a plant, a target, a search of one family. Out: a row for every law, and the best of them. The laws for comparison are points that
-//! the searches start from, so that none of them is better than what is given. Never here: the search itself, names, files.
+//! the searches start from, so that none of them is better than the result. Never here: the search itself, names,
+//! files.
 
 use super::candidate::Candidate;
 use super::plant::Plant;
@@ -40,7 +41,7 @@ pub struct Row {
 /// The result of a tuning.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Tuning {
-    /// What was found of every family searched, then the laws for comparison.
+    /// The find of every family searched, then the laws for comparison.
     pub rows: Vec<Row>,
     /// The searches, in their order.
     pub found: Vec<(Family, SearchResult)>,
@@ -95,7 +96,7 @@ pub fn tune(
     Some(Tuning { rows, found, best, law, interrupted })
 }
 
-/// The laws that `family` is compared with, after what was found before.
+/// The laws that `family` is compared with, after the earlier finds.
 fn references(
     plant: &Plant,
     target_hz: f64,
@@ -141,7 +142,7 @@ mod tests {
 
     #[test]
     fn no_law_of_the_table_is_better_than_the_gains_given_and_none_lacks_less() {
-        // early, late, and a frame of which a tenth goes with polygons: there a relay's gains bettered those of a grid alone
+        // early, late, and a frame of which a tenth goes with polygons: there a relay's gains bettered a grid's alone
         for (dead_time, fixed_s, target_hz) in [(0, 5e-3, 30.0), (2, 5e-3, 30.0), (0, 15e-3, 58.0)] {
             let (plant, tuning) = tuned(dead_time, fixed_s, target_hz);
             assert!(tuning.best.is_safe() && !tuning.interrupted, "{:?}", tuning.best);

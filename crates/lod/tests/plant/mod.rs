@@ -35,7 +35,7 @@ impl Random {
     }
 }
 
-/// What is seen of an object.
+/// An object in view.
 #[derive(Clone, Copy)]
 pub struct VisibleObject {
     pub id: u64,
@@ -119,7 +119,7 @@ impl Machine {
         Self { low: 1.25, load: 300..700, spikes: 0.01, ..Self::s1(seed) }
     }
 
-    /// What takes `table` by the table takes now: an error of 5 % that wanders, 1 % that does not.
+    /// The time now of a frame that takes `table` by the table: an error of 5 % that wanders, 1 % that does not.
     pub fn takes(&mut self, frame: usize, table: f64) -> f64 {
         const MEMORY: f64 = 0.9;
         self.wander = MEMORY * self.wander + (1.0_f64 - MEMORY * MEMORY).sqrt() * 0.05 * self.noise.normal();

@@ -18,7 +18,7 @@ const CELLS_MAX: usize = 1000;
 const NAME_MAX: usize = 64;
 /// Most corners of a portal.
 const CORNERS_MAX: usize = 100;
-/// What is in no cell, in `between`.
+/// The region outside all cells, in `between`.
 const OUTSIDE: &str = "outside";
 /// Default colour of walls: a warm white.
 const WALL_COLOUR: [u8; 3] = [0xd8, 0xd2, 0xc4];

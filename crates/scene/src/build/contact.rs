@@ -55,7 +55,7 @@ impl GroupNames {
         bits
     }
 
-    /// What an object says about its contacts.
+    /// An object's contact traits.
     pub(super) fn traits(&self, c: &mut Checker<'_, '_>, place: &Place, file: Option<&ContactFile>) -> ContactTraits {
         let Some(file) = file else { return ContactTraits::default() };
         let place = place.table("contact");

@@ -1,7 +1,8 @@
 //! Reads binary glTF (.glb) as points and triangles.
 //!
-//! In: any bytes. Out: the triangles of every mesh that a node of the scene instantiates, placed as the nodes say, z up, and the image
-//! of their base colour; or what is wrong with the file. Never here: lights, skins, external files, decoding of images. No number in
+//! In: any bytes. Out: the triangles of every mesh that a node of the scene instantiates, placed as the nodes say, z
+//! up, and the image of their base colour; or the fault of the file. Never here: lights, skins, external files,
+//! decoding of images. No number in
 //! the file is trusted, as the file may be hostile (the crate `gltf` panics on an accessor index out of range, so the few tables needed
 //! are read here), and points and primitives that many nodes instantiate are counted before they are read.
 
@@ -36,7 +37,7 @@ struct Reader<'d> {
     /// For each primitive read its first point, its mesh and its index in that mesh.
     primitives: Vec<(u32, [usize; 2])>,
     nodes: usize,
-    /// Number of primitives visited, including those of points and lines.
+    /// Number of primitives visited, including points and lines.
     primitives_visited: usize,
 }
 

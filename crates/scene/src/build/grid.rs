@@ -34,7 +34,7 @@ pub(super) struct CopyPlace {
     pub(super) turn: DQuat,
 }
 
-/// What a grid can do with the objects of a model.
+/// The way in which a grid can repeat the objects of a model.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Repeats {
     /// The model has no position of its own.

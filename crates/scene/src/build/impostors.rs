@@ -29,7 +29,7 @@ pub(super) struct GroupMembers<'a> {
 }
 
 impl GroupMembers<'_> {
-    /// Looks of all of them, each with its part in their mean: its triangles, or those of a ball of a simulated object.
+    /// Looks of all of them, each with its part in their mean: its triangles, or a ball's for a simulated object.
     fn appearances(&self) -> impl Iterator<Item = (&Appearance, f64)> {
         let scenery = self.scenery.iter().map(|it| (&it.appearance, f64::from(it.model.range().1)));
         scenery.chain(self.agents.iter().map(|it| (&it.appearance, AGENT_TRIANGLES)))

@@ -1,4 +1,4 @@
-//! Reads the mass properties that a rigid object is given in place of those of its shape.
+//! Reads the mass properties that a rigid object is given in place of its shape's.
 //!
 //! In: a [`RigidFile`]. Out: a [`GivenInertia`], problems to the [`Checker`]. Never here: the mass, the shape.
 
@@ -9,7 +9,7 @@ use crate::format::RigidFile;
 use glam::{DMat3, DVec3};
 use metachron_models::rigid::GivenInertia;
 
-/// Mass properties that the file gives in place of those of the shape.
+/// Mass properties that the file gives in place of the shape's.
 pub(super) fn inertia(c: &mut Checker<'_, '_>, place: &Place, file: &RigidFile) -> Option<GivenInertia> {
     let before = c.count();
     let com_m = point_or_zero(c, place, "centre_of_mass_m", file.centre_of_mass_m, POSITION_MAX_M);

@@ -1,6 +1,7 @@
 //! Reads files of triangles: OBJ by [`super::obj`], STL by [`super::stl`], and binary glTF by [`super::glb`].
 //!
-//! In: any bytes. Out: a surface with valid indices, within bounds and manifold, or what is wrong with the file. Meshes for drawing and
+//! In: any bytes. Out: a surface with valid indices, within bounds and manifold, or the fault of the file. Meshes for
+//! drawing and
 //! for contact are both read here. Never here: the file system.
 //!
 //! Manifold is judged by positions, not by indices: a seam of points that are doubled for their texture coordinates or normals is no
@@ -51,7 +52,7 @@ pub(super) fn hull_points(bytes: &[u8], scale: f64) -> Result<Vec<DVec3>, String
 /// points alone.
 ///
 /// # Errors
-/// What is wrong with the file.
+/// The fault of the file.
 pub fn surface(bytes: &[u8]) -> Result<Triangles, String> {
     let (points, triangles) = match bytes {
         [] => return Err("it is empty".to_owned()),

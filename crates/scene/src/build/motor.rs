@@ -1,4 +1,4 @@
-//! Reads the motor of a joint: which keys belong to its kind, what it drives the joint to.
+//! Reads the motor of a joint: the keys of its kind, and its goal.
 //!
 //! In: [`MotorFile`]s. Out: [`Motor`]s, in radians; problems to the [`Checker`]. Never here: the joint's other keys.
 
@@ -9,14 +9,14 @@ use metachron_models::rigid::{Motor, MotorGoal};
 
 /// The motors of hinges and slides: their keys, and how far either goes.
 pub(super) struct MotorKeys {
-    /// What the kind is called, with its article.
+    /// The name of the kind, with its article.
     pub(super) joint: &'static str,
     position: &'static str,
     velocity: &'static str,
     effort: &'static str,
     stiffness: &'static str,
     damping: &'static str,
-    /// The largest position either way, as the file writes it, and what it is in the units of the joint.
+    /// The largest position either way, as the file writes it, and its unit in the units of the joint.
     position_max: f64,
     position_unit: f64,
 }
@@ -97,7 +97,7 @@ impl MotorKeys {
         Some(Motor { goal, max_effort })
     }
 
-    /// Reports keys that belong to another kind of joint, and those that another needs.
+    /// Reports keys that belong to another kind of joint, and missing keys.
     fn check_keys(&self, c: &mut Checker<'_, '_>, place: &Place, file: &MotorFile) {
         let own = [self.position, self.velocity, self.effort, self.stiffness, self.damping];
         let list = own.map(|key| format!("`{key}`")).join(", ");

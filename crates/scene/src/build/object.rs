@@ -49,7 +49,7 @@ pub(crate) struct Objects {
     pub(crate) names: Names,
 }
 
-/// What the reader of a model is given beside the model's own table.
+/// The context of the reader of a model, beside the model's own table.
 pub(super) struct ModelContext<'a> {
     pub(super) place: &'a Place,
     pub(super) source: &'a Source,
@@ -59,7 +59,7 @@ pub(super) struct ModelContext<'a> {
     pub(super) traits: ContactTraits,
 }
 
-/// What an object may refer to by name.
+/// Names that an object may refer to.
 struct Known<'a> {
     names: &'a Names,
     groups: &'a GroupNames,
@@ -170,7 +170,7 @@ impl ModelFile {
         }
     }
 
-    /// What a grid can do with it.
+    /// The way in which a grid can repeat it.
     const fn repeats(&self) -> Repeats {
         match self {
             Self::Tool(_) | Self::Synthetic(_) => Repeats::Nothing,

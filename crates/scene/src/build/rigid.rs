@@ -116,7 +116,7 @@ pub(super) fn build(c: &mut Checker<'_, '_>, file: &RigidFile, context: &ModelCo
     })
 }
 
-/// What slows an object down, and where it cannot move.
+/// The damping of an object, and the axes along which it cannot move.
 fn restraint(c: &mut Checker<'_, '_>, place: &Place, file: &RigidFile) -> Restraint {
     let rate = allowed(0.0..=1e6, "1/s");
     let mut damping = |key: &str, given: Option<f64>| c.optional(place, key, given, &rate).unwrap_or(0.0);
@@ -245,7 +245,7 @@ macro_rules! shape_keys {
 }
 
 impl ShapeKeys<'_> {
-    /// The keys that each shape takes, of those that describe shapes.
+    /// Of the keys that describe shapes, the ones that each shape takes.
     const fn takes(&self) -> &'static [&'static str] {
         match self.shape {
             Shape::Ball => &["radius_m"],
@@ -403,7 +403,7 @@ fn solid(c: &mut Checker<'_, '_>, place: &Place, file: &RigidFile, among: PartCo
     Some(Solid::Compound { parts: parts.collect::<Option<Vec<_>>>()?.into() })
 }
 
-/// What the solid of an object, or the parts of a compound, share.
+/// The settings that the solid of an object, or the parts of a compound, share.
 #[derive(Clone, Copy)]
 struct PartContext<'a> {
     source: &'a Source,

@@ -36,7 +36,7 @@ const SWING_HZ: f64 = 0.1;
 const BARK: [u8; 3] = [0x6e, 0x50, 0x3a];
 const LEAF: [u8; 3] = [0x5a, 0x8a, 0x42];
 
-/// Meshes already made, by what they were made from: equal ones are shared.
+/// Meshes already made, by their sources: equal ones are shared.
 struct Meshes<'s> {
     /// Where their files are.
     source: &'s Source,
@@ -45,7 +45,7 @@ struct Meshes<'s> {
     made: BTreeMap<MeshKey, Option<(Arc<ProgressiveMesh>, f64)>>,
 }
 
-/// What a mesh is made from: a file or generator, a seed, and the greatest and least number of triangles.
+/// The source of a mesh: a file or generator, a seed, and the greatest and least number of triangles.
 type MeshKey = (String, u32, [Option<u32>; 2]);
 
 impl<'s> Meshes<'s> {

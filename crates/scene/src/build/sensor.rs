@@ -14,7 +14,7 @@ use metachron_world::{Sensor, SensorKind, Site, Spec};
 /// Most sensors of a scene.
 const SENSORS_MAX: usize = 1000;
 
-/// What sensors may be on.
+/// Everything that sensors may be on.
 struct Mounts<'a> {
     objects: &'a Objects,
     /// By their numbers; empty where they have none.

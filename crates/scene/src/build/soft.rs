@@ -149,7 +149,7 @@ pub(super) fn solid(c: &mut Checker<'_, '_>, file: &SolidFile, context: &ModelCo
     Some(BuiltSoft { spec, eps_m })
 }
 
-/// Reports keys that belong to another shape, and those that are missing.
+/// Reports keys that belong to another shape, and missing keys.
 fn check_solid_keys(c: &mut Checker<'_, '_>, place: &Place, file: &SolidFile) {
     let [is_box, is_ball, is_mesh] =
         [SoftShapeKind::Box, SoftShapeKind::Ball, SoftShapeKind::Mesh].map(|shape| file.shape == shape);
@@ -188,7 +188,7 @@ fn check_solid_keys(c: &mut Checker<'_, '_>, place: &Place, file: &SolidFile) {
     }
 }
 
-/// The shape of a solid; `None` where what it needs is missing, which is reported.
+/// The shape of a solid; `None` where a key that it needs is missing, which is reported.
 fn solid_shape(
     c: &mut Checker<'_, '_>,
     file: &SolidFile,
@@ -205,7 +205,7 @@ fn solid_shape(
             c.wrong(place, "eps_m", "is missing", expected);
         }
         let (surface, range_m) = (closed_surface(c, file, context)?, eps_m?);
-        // what is between its points bends with the cage, and would go through what its points alone touch
+        // a surface between its points bends with the cage, and would go through bodies that its points alone touch
         let surface = subdivided(&surface, CELL_DIAGONAL * range_m.0, SKIN_TRIANGLES_MAX);
         return Some(SoftShape::Embedded { surface: Arc::new(surface), eps_m: range_m.0, range_m });
     }
@@ -285,7 +285,7 @@ fn draft_cage(c: &mut Checker<'_, '_>, place: &Place, coarse: &Triangles, wanted
     c.may_make(place, "triangles", Cost::skin(u64::from(wanted.triangles), cage.nodes_m().len() as u64));
 }
 
-/// The surface of a mesh in metres, where it encloses a solid of one piece; what is wrong with it else.
+/// The surface of a mesh in metres, where it encloses a solid of one piece; otherwise its fault.
 fn solid_inside(mesh: &Mesh, scale: f64, scale_is_missing: bool) -> Result<Triangles, String> {
     let surface = soft_mesh::manifold(mesh, scale)?;
     if let Some(open) = open_edge(&surface) {
@@ -311,7 +311,7 @@ fn solid_inside(mesh: &Mesh, scale: f64, scale_is_missing: bool) -> Result<Trian
     Ok(surface)
 }
 
-/// Refuses what is so long without a scale that it must be in millimetres.
+/// Refuses a surface that is so long without a scale that it must be in millimetres.
 pub(super) fn too_large(size_m: f64, scale_is_missing: bool) -> Result<(), String> {
     if scale_is_missing && size_m > LARGE_M {
         return Err(format!("it is {size_m:.1} m long: if its unit is the millimetre, set `scale = 0.001`"));
@@ -369,7 +369,7 @@ fn one_division(
 /// Gives a sheet or a rope with a range of ε the lattice of its finest as its skin, and nodes that start there.
 fn divided(c: &mut Checker<'_, '_>, place: &Place, spec: SoftSpec, eps_m: Option<(f64, f64)>) -> BuiltSoft {
     let Some(range_m) = eps_m else { return BuiltSoft { spec, eps_m } };
-    // a path without a length has no lattice, and is refused for what it is
+    // a path without a length has no lattice, and is refused for that
     if matches!(&spec.shape, SoftShape::Rope { path_m, .. } if path_m.windows(2).all(|pair| pair[0] == pair[1])) {
         return BuiltSoft { spec, eps_m: None };
     }

@@ -13,7 +13,7 @@ use metachron_geometry::{Aabb, Tetrahedra, Triangles, branch, opposed, pieces, w
 use metachron_models::soft::{MaterialLaw, RegionMatter, SoftMatter, SoftShape, VERTICES_MAX};
 use std::sync::Arc;
 
-/// The law that the keys of a scene name, for this Poisson's ratio; those that do not belong together are reported.
+/// The law that the keys of a scene name, for this Poisson's ratio; keys that do not belong together are reported.
 pub(super) fn law(
     c: &mut Checker<'_, '_>,
     place: &Place,

@@ -1,6 +1,7 @@
 //! Reads the textures of the meshes of a scene: patterns, PNG and JPEG files, and the image inside a .glb file.
 //!
-//! In: `texture` of a mesh, any bytes. Out: a [`Texture`], equal ones shared, or what is wrong with the image. Never here: drawing.
+//! In: `texture` of a mesh, any bytes. Out: a [`Texture`], equal ones shared, or the fault of the image. Never here:
+//! drawing.
 
 use super::glb;
 use super::object::Entry;
@@ -31,7 +32,7 @@ const BYTES_MAX: u64 = 1 << 28;
 pub(super) struct Textures<'s> {
     /// Where their files are.
     source: &'s Source,
-    /// By what they were made from and the bits of their size.
+    /// By their source and the bits of their size.
     made: BTreeMap<(String, u64), Option<Arc<Texture>>>,
 }
 

@@ -91,7 +91,7 @@ const fn integrator(file: Method) -> Integrator {
     }
 }
 
-/// What the sections do; a wall that gives needs steps that take its bend as it is then.
+/// The model of the sections; a wall that gives needs steps that take its bend as it is then.
 fn wall(c: &mut Checker<'_, '_>, place: &Place, file: &TubeFile) -> WallModel {
     if file.wall != Some(Wall::Gives) {
         return WallModel::Prescribed;
@@ -133,7 +133,7 @@ fn pressure_keys(c: &mut Checker<'_, '_>, place: &Place, file: &TubeFile) -> Vec
     keys
 }
 
-/// Whether the tube is closed: what is shut in needs room, and walls that give.
+/// Whether the tube is closed: a gas that is shut in needs room, and walls that give.
 fn sealed(c: &mut Checker<'_, '_>, place: &Place, file: &TubeFile, section: &Section) -> bool {
     let sealed = file.sealed.unwrap_or(false);
     if sealed && (file.wall != Some(Wall::Gives) || section.wall_m >= section.radius_m) {

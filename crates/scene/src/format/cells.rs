@@ -5,7 +5,7 @@ use metachron_world::kinds::Material;
 use schemars::JsonSchema;
 use serde::Deserialize;
 
-/// A room: a box along the axes, whose sides hide what is beyond them but for portals. Cells do not overlap.
+/// A room: a box along the axes, whose sides hide everything beyond them but for portals. Cells do not overlap.
 #[derive(Debug, Clone, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct CellFile {

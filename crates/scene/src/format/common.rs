@@ -69,7 +69,7 @@ pub struct CommonFile {
     pub sleep: Option<bool>,
     /// Faults injected into its clock and its messages; keys that are left out take the values of the world.
     pub faults: Option<FaultsFile>,
-    /// What it says about its contacts: what it collides with, how a pair shares its coefficients, whether it only senses.
+    /// Its contacts: the groups that it collides with, how a pair shares its coefficients, whether it only senses.
     pub contact: Option<ContactFile>,
     /// Repeats an object: number of copies along x, y and z, each 1 … 1000. The first is at the object's own position, the
     /// others are `spacing_m` apart, counted along x, then y, then z; their names are `NAME-0`, `NAME-1`, ….

@@ -1,9 +1,10 @@
-//! `contact` of an object: what it collides with, how a pair shares its coefficients, whether it only senses.
+//! `contact` of an object: the groups that it collides with, how a pair shares its coefficients, whether it only
+//! senses.
 
 use schemars::JsonSchema;
 use serde::Deserialize;
 
-/// What an object says about its contacts.
+/// The contact traits of an object.
 #[derive(Debug, Clone, Default, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct ContactFile {
@@ -12,7 +13,7 @@ pub struct ContactFile {
     /// Names of the collision groups that it collides with. Two objects collide where each collides with a group that the other is in.
     /// Default: all of them; an empty list is none.
     pub collides_with: Option<Vec<String>>,
-    /// Whether it only senses: what touches it is reported under `sensors`, and no force acts. Default false.
+    /// Whether it only senses: objects that touch it are reported under `sensors`, and no force acts. Default false.
     pub sensor: Option<bool>,
     /// How a pair with it shares both frictions. Of two different rules the later one counts: `average`, `min`, `multiply`, `max`,
     /// `geometric-mean`. Default: the other object's rule; where neither has one `geometric-mean`.

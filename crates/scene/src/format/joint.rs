@@ -8,7 +8,7 @@ use serde::Deserialize;
 #[derive(Debug, Clone, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct JointFile {
-    /// Its name, by which programs drive it and sensors read it: unique among those of joints. Default: none.
+    /// Its name, by which programs drive it and sensors read it: unique among the names of joints. Default: none.
     #[schemars(length(min = 1, max = 64))]
     pub name: Option<String>,
     /// Motion that it leaves free. `fixed`: none. `revolute`: rotation about `axis`. `spherical`: any rotation. `prismatic`: sliding
@@ -44,12 +44,12 @@ pub struct JointFile {
     /// Whether the two objects can collide with each other, also once the joint has torn. Default true for a spring or rope, false for
     /// the others.
     pub collide: Option<bool>,
-    /// Force above which it tears, N, 1e-6 … 1e9: the mean over a common step of the two; what it gives against turns does not count. It
+    /// Force above which it tears, N, 1e-6 … 1e9: the mean over a common step of the two; its torques do not count. It
     /// is gone then for good, and the report has it under `events`. Default: never.
     pub tears_above_n: Option<f64>,
-    /// Greatest force that it gives, N, 1e-6 … 1e9 and below `tears_above_n`: what would take more moves the point of `b` that it holds, or
-    /// lengthens a `rope` or `spring`, for good. What it gives against turns is not bounded. The report has the first time under `events`.
-    /// Default: as much as it takes.
+    /// Greatest force that it gives, N, 1e-6 … 1e9 and below `tears_above_n`: a load above it moves the point of `b`
+    /// that it holds, or lengthens a `rope` or `spring`, for good. Its torques are not bounded. The report has the
+    /// first time under `events`. Default: as much as it takes.
     pub yields_above_n: Option<f64>,
 }
 

@@ -51,7 +51,7 @@ pub struct RigidFile {
     /// Centre of mass in the axes of the object, metres; beside `inertia_kg_m2`. Default: the origin of those axes.
     pub centre_of_mass_m: Option<Point>,
     /// Moments and products of inertia about the centre of mass along the axes of the object, kg·m²: `[xx, yy, zz, xy, xz, yz]`, beside
-    /// `mass_kg`. The products are those of the tensor, as in URDF and MJCF. Default: those of the shape, evenly filled.
+    /// `mass_kg`. The products are elements of the tensor, as in URDF and MJCF. Default: the shape's, evenly filled.
     pub inertia_kg_m2: Option<[f64; 6]>,
     /// Coefficient of restitution, 0 … 1; a pair takes the larger one. Default 0.
     #[schemars(range(min = 0.0, max = 1.0))]
@@ -120,7 +120,7 @@ pub struct PartFile {
     /// Default 1e-4, or a thousandth of the diagonal of the box around the points where that is less.
     #[schemars(range(min = 0.0, max = 0.1))]
     pub hull_within_m: Option<f64>,
-    /// Position of the origin of its axes in those of the object, metres. Default: their origin.
+    /// Position of the origin of its axes in the object's axes, metres. Default: their origin.
     pub position_m: Option<Point>,
     /// Rotation by angles about the object's x, then y, then z axis, degrees. Default none.
     pub rotation_deg: Option<Point>,

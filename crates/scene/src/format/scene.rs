@@ -47,7 +47,7 @@ pub struct SceneFile {
     #[serde(default)]
     #[schemars(length(max = 10_000))]
     pub joint: Vec<JointFile>,
-    /// What programs read by name, and the report has at the end; at most 1000.
+    /// Sensors, which programs read by name, and which the report has at the end; at most 1000.
     #[serde(default)]
     #[schemars(length(max = 1000))]
     pub sensor: Vec<SensorFile>,
@@ -79,12 +79,13 @@ pub struct SceneFile {
 pub struct WorldFile {
     /// Gravity, m/s², up to 1e4. Default `[0, 0, -9.81]`.
     pub gravity_m_s2: Option<Point>,
-    /// What lights the scene in pictures, and what is seen behind it. Default `room`.
+    /// The light of the scene in pictures, and its background. Default `room`.
     pub environment: Option<EnvironmentKind>,
     /// Whether moving objects collide with each other. Default true; with false only pairs that a `[[coupling]]` names do.
     pub contacts: Option<ContactsFile>,
     /// How deep objects that lie on each other rest, metres, 1e-6 … 1e-3: the softness of contacts follows from it. Default 2e-5; smaller
-    /// for bodies below a centimetre, at some more factors a step. What weighs too little to be pressed so deep lies less deep.
+    /// for bodies below a centimetre, at some more factors a step. Bodies too light to be pressed so deep lie less
+    /// deep.
     #[schemars(range(min = 1e-6, max = 1e-3))]
     pub contact_depth_m: Option<f64>,
     /// How far the solves of contacts go. Default `exact`; at the free pace they are so in any case.

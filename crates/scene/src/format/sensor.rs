@@ -8,13 +8,14 @@ use serde::Deserialize;
 #[derive(Debug, Clone, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct SensorFile {
-    /// Its name: unique among those of sensors, not empty.
+    /// Its name: unique among the names of sensors, not empty.
     #[schemars(length(min = 1, max = 64))]
     pub name: String,
     /// Its reading. `joint-position`: how far `b` of a joint has moved from `a`, rad within ±π or metres. `joint-velocity`: rad/s or m/s.
-    /// `joint-effort`: what motor and stops give `b`, N·m or N. `contact-force`: what touches an object gives it, world axes, N. `imu`: of a
-    /// rigid object the acceleration of its matter at a site less that of gravity, m/s², and its spin, rad/s, in the axes of the site. `pose`:
-    /// position of a point of a rigid object, metres, and the rotation of its axes as a quaternion x, y, z, w.
+    /// `joint-effort`: effort of motor and stops on `b`, N·m or N. `contact-force`: force of all contacts on an object,
+    /// world axes, N. `imu`: of a rigid object the acceleration of its matter at a site less that of gravity, m/s², and
+    /// its spin, rad/s, in the axes of the site. `pose`: position of a point of a rigid object, metres, and the
+    /// rotation of its axes as a quaternion x, y, z, w.
     pub kind: SensorFileKind,
     /// Name of a joint, for kinds of joints.
     pub joint: Option<String>,
@@ -29,7 +30,7 @@ pub struct SensorFile {
     pub rotation_deg: Option<Point>,
 }
 
-/// What a sensor reads.
+/// The reading of a sensor.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum SensorFileKind {
@@ -37,9 +38,9 @@ pub enum SensorFileKind {
     JointPosition,
     /// How fast it moves.
     JointVelocity,
-    /// What drives it.
+    /// Effort of its motor and stops.
     JointEffort,
-    /// What touches an object gives it.
+    /// Force of all contacts on an object.
     ContactForce,
     /// Acceleration and spin in an object's own axes.
     Imu,

@@ -183,7 +183,7 @@ pub enum SoftShapeKind {
     Box,
     /// A ball.
     Ball,
-    /// What a closed surface encloses, or tetrahedra.
+    /// The volume within a closed surface, or tetrahedra.
     Mesh,
 }
 

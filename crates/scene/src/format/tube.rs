@@ -62,7 +62,7 @@ pub struct TubeFile {
     pub attach: Option<Vec<AttachFile>>,
     /// A travelling wave of the radius; where the wall gives, of the tension that would narrow it so if nothing resisted.
     pub peristalsis: Option<PeristalsisFile>,
-    /// What the sections do. Default `prescribed`.
+    /// The motion of the sections. Default `prescribed`.
     pub wall: Option<Wall>,
     /// Pressure inside relative to outside, Pa, 0 … 1e7: widens the tube. One number, or times in seconds, each above the one before, with
     /// the pressures then: `[[0, 0], [1, 4000]]`; between them it changes evenly. Default 0.
@@ -96,7 +96,7 @@ pub enum End {
     End,
 }
 
-/// What the sections of a tube do.
+/// The motion of a tube's sections.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum Wall {

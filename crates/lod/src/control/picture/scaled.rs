@@ -1,4 +1,4 @@
-//! What the picture's scale is chosen by: the time of a frame without what levels take, and of its pixels.
+//! The inputs of the choice of the picture's scale: the time of a frame without its levels, and of its pixels.
 //!
 //! In: the frame that was measured, its plan, prices. Out: the next picture's scale. Never here: the law ([`super::super::render_scale`]).
 //! Theory: `docs/theory/control.md`, section 11.
@@ -31,7 +31,7 @@ impl PictureControl {
             return;
         }
         if self.frozen {
-            // what is drawn now says nothing of what will be
+            // the frozen picture says nothing of later ones
             return self.scale.disturb();
         }
         let prices = self.policy.prices(&self.prices);

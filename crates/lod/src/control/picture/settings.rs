@@ -49,7 +49,7 @@ impl PictureControl {
         self.margin = margin.is_finite().then(|| margin.clamp(0.0, 0.9));
     }
 
-    /// Changes how much factors count in the benefit of a level; those that are not set follow the policy.
+    /// Changes how much factors count in the benefit of a level; sliders that are not set follow the policy.
     pub fn set_sliders(&mut self, given: impl Into<GivenSliders>) {
         let before = self.sliders();
         self.sliders = given.into();
@@ -131,8 +131,8 @@ impl PictureControl {
         self.scale.bounds()
     }
 
-    /// The fraction of its width and height to draw the next picture with. Views and pixels given to the controller are those of the smaller
-    /// picture.
+    /// The fraction of its width and height to draw the next picture with. Views and pixels given to the controller are
+    /// the smaller picture's.
     #[must_use]
     pub fn render_scale(&self) -> f64 {
         self.rung().scale

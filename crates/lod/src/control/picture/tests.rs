@@ -339,7 +339,7 @@ proptest! {
 
 #[test]
 fn time_unused_by_coarse_levels_of_bodies_goes_to_the_tube() {
-    // two tools whose next level is four times as dear: most of what falls to them they cannot use
+    // two tools whose next level is four times as dear: most of the time that falls to them they cannot use
     let tool = Kind::Primitive { radius_m: 0.1, triangles: std::array::from_fn(|n| 100 << (2 * n)) };
     let mut control = PictureControl::new(Policy::Feedback, Law::CORRECTED, 60.0);
     let range = ResolutionRange { eps_m: (1.0, 1.0), n: (0, 6) };

@@ -295,7 +295,7 @@ fn work_that_falls_as_the_cube_of_spacing_finds_its_spacing_at_once() {
     let mut eps_m = 0.005_f64;
     let mut demands = 0;
     for _ in 0..2000 {
-        // four times what it may take at the finest
+        // four times the time that it may take at the finest
         let work_s = 4.0 * 0.5 * PERIOD_S * (0.005 / eps_m).powi(3);
         let turn =
             TurnMeasure { work_s, wanted_period_s: PERIOD_S, real_period_s: work_s.max(PERIOD_S), dt_s: PERIOD_S };

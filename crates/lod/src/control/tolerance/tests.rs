@@ -8,7 +8,7 @@ struct Plant {
     now: RateDemand,
     space: f64,
     time: (f64, f64),
-    /// What its steps have made so far, metres.
+    /// The drift of its steps so far, metres.
     drift_m: f64,
     clock_s: f64,
     demands: Vec<f64>,

@@ -10,7 +10,7 @@ use std::collections::BTreeMap;
 
 /// Message for data that is not in the file.
 const OUTSIDE: &str = "its data is outside the file: the file is truncated, or the data is in another file";
-/// Prefixes of extensions that change nothing of what is read here: material properties, lights.
+/// Prefixes of extensions that change nothing of the data read here: material properties, lights.
 const UNREAD: [&str; 2] = ["KHR_materials_", "KHR_lights_"];
 
 /// The tables of the file's text, as far as triangles need them.

@@ -5,7 +5,7 @@
 use super::points;
 use metachron_geometry::Tetrahedra;
 
-/// Cells of VTK by name: what has no volume is left out, and any other cell is not computed with.
+/// Cells of VTK by name: cells without a volume are left out, and any other cell is not computed with.
 const TETRAHEDRON: u64 = 10;
 const WITHOUT_VOLUME: [u64; 13] = [0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 21, 22, 23];
 const QUADRATIC_TETRAHEDRON: u64 = 24;

@@ -1,6 +1,7 @@
 //! Reads files of tetrahedra: gmsh (.msh) by [`msh`], legacy VTK by [`vtk`], VTK's XML (.vtu) by [`vtu`].
 //!
-//! In: any bytes. Out: a mesh in the file's own unit with the region of each tetrahedron, or what is wrong with the file and where.
+//! In: any bytes. Out: a mesh in the file's own unit with the region of each tetrahedron, or the fault of the file and
+//! where.
 //! Never here: whether the mesh makes a solid ([`Tetrahedra::check`]), the file system.
 
 mod cells;

@@ -33,7 +33,7 @@ fn no_tetrahedron(words: &Words<'_>, kind: u64) -> String {
     words.wrong(format_args!("an element is {name} ({kind}): expected tetrahedra of first order (4)"))
 }
 
-/// What has been read.
+/// The contents read so far.
 #[derive(Default)]
 struct File {
     coordinates: Vec<f64>,

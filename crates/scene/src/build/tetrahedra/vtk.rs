@@ -88,7 +88,7 @@ impl Reader<'_> {
         while !self.words.rest_of_line().is_empty() {}
     }
 
-    /// The name of an array of a field, before which there may be what is said about the one before.
+    /// The name of an array of a field; metadata of the array before may stand in front of it.
     fn name(&mut self) -> String {
         let name = self.words.word().unwrap_or_default();
         if name != "METADATA" {

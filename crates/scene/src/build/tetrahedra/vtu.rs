@@ -20,7 +20,7 @@ pub(super) fn is_vtu(bytes: &[u8]) -> bool {
 /// Most bytes of an array.
 const BYTES_MAX: usize = 8 * NUMBERS_MAX;
 
-/// What the file says of all its data.
+/// The coding of all data of the file.
 #[derive(Debug, Clone, Copy, Default)]
 struct Coding {
     is_big_endian: bool,
@@ -47,7 +47,7 @@ struct Array {
     width: usize,
 }
 
-/// What has been read.
+/// The contents read so far.
 struct File<'a> {
     coding: Coding,
     appended: Option<Appended<'a>>,
@@ -63,7 +63,7 @@ struct File<'a> {
 }
 
 pub(super) fn read(bytes: &[u8]) -> Result<Tetrahedra, String> {
-    // what is appended is no XML
+    // appended data is no XML
     let end = bytes.windows(13).position(|window| window == b"<AppendedData").unwrap_or(bytes.len());
     let head = str::from_utf8(&bytes[..end]).map_err(|_| "its XML is no text".to_owned())?;
     let mut file = File {
@@ -87,7 +87,7 @@ pub(super) fn read(bytes: &[u8]) -> Result<Tetrahedra, String> {
                 file.begin(&tag)?;
                 file.end()?;
             }
-            // what is said about an array stands in elements within it
+            // information about an array stands in elements within it
             Event::Text(text) if file.open.last().is_some_and(|name| name == "DataArray") => {
                 file.text.push_str(&String::from_utf8_lossy(&text));
             }

@@ -1,6 +1,6 @@
 //! The words of a text, each with its line.
 //!
-//! In: bytes. Out: words and numbers, or the line where another one was expected. Never here: what they mean.
+//! In: bytes. Out: words and numbers, or the line where another one was expected. Never here: their meaning.
 
 use std::fmt::Display;
 use std::str::FromStr;
@@ -29,7 +29,7 @@ impl<'a> Words<'a> {
         (length > 0).then(|| str::from_utf8(&rest[..length]).unwrap_or("\u{fffd}"))
     }
 
-    /// What is left of the line, and its end.
+    /// The rest of the line, and its end.
     pub fn rest_of_line(&mut self) -> &'a str {
         let rest = &self.text[self.at..];
         let length = rest.iter().position(|byte| *byte == b'\n').unwrap_or(rest.len());

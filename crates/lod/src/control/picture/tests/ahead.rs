@@ -10,7 +10,8 @@ fn meshes(first: u32) -> Vec<ObjectView> {
     (0..6).map(|id| ObjectView { shading, visible: id >= first, ..object(id, kind, range) }).collect()
 }
 
-/// What a machine half as fast again as its prices say takes for the plan, whole and of it the objects, seconds.
+/// The time of the plan, seconds, on a machine on which objects take 1.5 times their price and the backdrop takes its
+/// price.
 fn took_s(control: &PictureControl, objects: &[ObjectView]) -> f64 {
     let prices = control.prices();
     1.5 * prices.objects_s(objects.iter(), &control.last_plan().levels) + prices.backdrop_s(Backdrop::default())

@@ -1,4 +1,4 @@
-//! What the papers say of their policies, in the running controller.
+//! Claims of the papers about their policies, in the running controller.
 
 use super::policies::{control, mesh};
 use super::*;
@@ -47,7 +47,8 @@ fn robin_hood_draws_a_part_of_everything_and_holds_its_time() {
 
 #[test]
 fn robin_hood_with_raising_uses_time_that_it_would_leave() {
-    // what is far comes first, with small shares; what is near gives most of its share back when nobody comes after it
+    // distant objects come first, with small shares; near ones give most of their share back when nobody comes after
+    // them
     let mut views: Vec<_> = (0..20).map(|i| ObjectView { distance_m: 50.0, ..mesh(i, 2e4, 1000) }).collect();
     views.extend((20..26).map(|i| ObjectView { distance_m: 0.3, ..mesh(i, 1e5, 1500) }));
     let used = |raise: bool| {

@@ -13,7 +13,7 @@ fn prices() -> Prices {
 
 const PICTURE_PX: f64 = 921_600.0;
 
-/// What chooses by cost and stays inside its budget.
+/// Policies that choose by cost and stay inside their budget.
 const HEEDFUL: [Policy; 12] = [
     Policy::Greedy,
     Policy::GreedyIncremental,
@@ -52,7 +52,7 @@ fn hall() -> Vec<ObjectView> {
     all
 }
 
-/// What the plan takes on a machine with the prices of these tests.
+/// The time of the plan on a machine with the prices of these tests.
 fn truth_s(plan: &Plan, views: &[ObjectView]) -> f64 {
     let prices = prices();
     let of = |(view, level): (&ObjectView, &LevelDemand)| {
@@ -380,8 +380,8 @@ fn near_by(target_hz: f64, raise: bool) -> (PictureControl, Vec<ObjectView>) {
     (control, (0..6).map(|i| mesh(i, 1e5, 2000)).collect())
 }
 
-/// Draws a frame on a machine that is `times` as slow as its prices: its work over the target, objects in soft shadow, and whether all
-/// have at least what they ask for.
+/// Draws a frame on a machine that is `times` as slow as its prices: its work over the target, objects in soft shadow,
+/// and whether all have at least the level that they ask for.
 fn frame_near_by(control: &mut PictureControl, views: &[ObjectView], times: f64) -> (f64, usize, bool) {
     let plan = control.plan(views).clone();
     let prices = *control.prices();

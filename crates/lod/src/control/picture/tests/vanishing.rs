@@ -37,7 +37,7 @@ fn a_frame_that_the_coarsest_do_not_fit_is_feasible_where_objects_may_vanish() {
         let promise = plan.promise;
         assert!(promise.feasible && promise.predicted_s <= 0.01, "{policy:?}: {promise:?}");
         assert!(promise.holes > 100, "{policy:?}: {promise:?}");
-        // what is left out is the least that makes the rest fit: 97 % of the time is spent
+        // the objects left out are the least that makes the rest fit: 97 % of the time is spent
         assert!(promise.predicted_s > 0.97 * 0.0098, "{policy:?}: {promise:?}");
         assert_eq!(holes(&plan, &views), promise.holes as usize, "{policy:?}");
         assert!(plan.levels[1000].polygons > 0.0, "{policy:?}: what may not vanish is drawn");
