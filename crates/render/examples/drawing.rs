@@ -1,4 +1,4 @@
-//! What does a frame cost to draw, over (ε, n)? Fits set-up, price a triangle and price a pixel on this machine's adapter.
+//! The cost of drawing a frame, over (ε, n). Fits set-up, price a triangle and price a pixel on this machine's adapter.
 //!
 //! `cargo run --release -p metachron-render --example drawing [-- FILE.png [EPS_M N [WIDTH HEIGHT [SAMPLES]]]]`; with a file name it draws one picture instead.
 
@@ -41,7 +41,7 @@ fn draw(gpu: Gpu, path: &Path, numbers: &[String]) -> Result<(), Box<dyn std::er
     Ok(())
 }
 
-/// What one frame took.
+/// The cost of one frame.
 #[derive(Clone, Copy)]
 struct Cost {
     /// Wall time of the least of 15 frames, milliseconds: the undisturbed work.

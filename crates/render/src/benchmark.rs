@@ -180,7 +180,7 @@ pub fn benchmark(gpu: &Gpu, options: RendererOptions, areas_px: &[f64], known: u
 /// A picture, and the times that it took.
 #[derive(Debug, Clone)]
 struct Timed {
-    /// What was drawn; its time is not known yet.
+    /// The picture; its time is not known yet.
     drawn: Drawn,
     times_s: Vec<f64>,
 }
@@ -256,7 +256,7 @@ fn seen_pixels(scene_view: &mut SceneView, distance_m: f64) -> f64 {
     scene_view.seen().first().map_or(0.0, |seen| seen.pixels)
 }
 
-/// Times of [`DRAWINGS`] pictures, seconds, after one that makes what they are made of.
+/// Times of [`DRAWINGS`] pictures, seconds, after one that makes their meshes and textures.
 fn times(
     screen: &mut Offscreen,
     scene_view: &mut SceneView,

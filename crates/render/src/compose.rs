@@ -45,7 +45,7 @@ pub struct Hand {
 /// Lists that are refilled every frame.
 #[derive(Debug, Default)]
 pub(super) struct Scratch {
-    /// The actors that the picture needs: visible ones, and those that may throw a shadow on a visible one.
+    /// The actors that the picture needs: visible ones, and actors that may throw a shadow on a visible one.
     pub shown: Vec<usize>,
     pub solids: Solids,
     tubes: Vec<(u8, usize)>,

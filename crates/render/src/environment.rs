@@ -2,7 +2,8 @@
 //!
 //! In: the name of an environment. Out: directions and radiances, linear. Never here: shadows, materials, the GPU.
 //!
-//! What comes from a direction d, a unit vector, is L(d) = m + 3/2 s d_z, with m the mean and s half the difference of the two hemispheres'
+//! The light from a direction d, a unit vector, is L(d) = m + 3/2 s d_z, with m the mean and s half the difference of
+//! the two hemispheres'
 //! light. A surface of normal n then receives, over π, ∫ L(d) max(d·n, 0) dω / π = m + s n_z (RH01): `sky` facing up, `ground` facing down.
 
 use glam::DVec3;
@@ -27,9 +28,9 @@ pub struct EnvironmentLight {
     pub toward: DVec3,
     /// Its colour times its strength.
     pub key: DVec3,
-    /// What a surface facing up receives from all around, over π.
+    /// The light that a surface facing up receives from all around, over π.
     pub sky: DVec3,
-    /// What a surface facing down receives.
+    /// The light that a surface facing down receives.
     pub ground: DVec3,
     /// The lamp as a mirror shows it; zero where there is none.
     pub lamp: DVec3,
@@ -88,13 +89,13 @@ impl Environment {
 }
 
 impl EnvironmentLight {
-    /// What comes from the direction `from`, a unit vector, without the key light.
+    /// The light from the direction `from`, a unit vector, without the key light.
     #[must_use]
     pub fn radiance(&self, from: DVec3) -> DVec3 {
         0.5 * (self.sky + self.ground) + (self.sky - self.ground) * (0.75 * from.z)
     }
 
-    /// What a surface of the unit normal `n` receives of that, over π.
+    /// The part of that light that a surface of the unit normal `n` receives, over π.
     #[must_use]
     pub fn ambient(&self, n: DVec3) -> DVec3 {
         self.ground.lerp(self.sky, 0.5 + 0.5 * n.z)

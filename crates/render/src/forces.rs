@@ -40,19 +40,19 @@ const NORMAL: [u8; 3] = [244, 140, 40];
 const FRICTION: [u8; 3] = [60, 150, 240];
 const TOOL: [u8; 3] = [220, 60, 90];
 
-/// What acts on a tool.
+/// The wrench on a tool.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ToolForce {
     /// The tool.
     pub tool: AgentId,
     /// Its tip, metres.
     pub tip_m: DVec3,
-    /// What it holds and what touches it give it: N, and N·m of what touches it.
+    /// The force of the bodies that it holds and touches, N, and the torque of the bodies that it touches, N·m.
     pub wrench: Wrench,
 }
 
 impl SceneView {
-    /// The force on every tool that is held by something or touches it, by the newest states.
+    /// The wrench on every tool that holds or touches something, by the newest states.
     #[must_use]
     pub fn tool_forces(&self) -> Vec<ToolForce> {
         let tools = self.tracks.iter().filter_map(|track| match (&track.pose, &track.newest) {

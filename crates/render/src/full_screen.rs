@@ -1,6 +1,7 @@
-//! Passes over a whole target: one triangle that covers it, and fragments that read what is bound.
+//! Passes over a whole target: one triangle that covers it, and fragments that read the bound resources.
 //!
-//! In: fragment shaders, what they bind, the format of targets. Out: pipelines with their layout; a draw. Never here: what fragments are.
+//! In: fragment shaders, their bindings, the format of targets. Out: pipelines with their layout; a draw. Never here:
+//! the shaders' code.
 
 use wgpu::{BindGroupLayout, BindingType, Device, RenderPipeline, TextureFormat};
 
@@ -13,14 +14,14 @@ pub struct FullScreen<'a> {
     pub label: &'a str,
     /// WGSL of the fragments; they may take the `Corner` of `full_screen.wgsl`.
     pub fragments: &'a str,
-    /// What they bind in group 0, from binding 0 on.
+    /// Their bindings in group 0, from binding 0 on.
     pub bindings: &'a [BindingType],
     /// The format of targets, of one sample a pixel.
     pub target: TextureFormat,
 }
 
 impl FullScreen<'_> {
-    /// The layout of what is bound.
+    /// The layout of the bindings.
     pub fn layout(&self, device: &Device) -> BindGroupLayout {
         let entry = |(binding, ty): (u32, &BindingType)| wgpu::BindGroupLayoutEntry {
             binding,
@@ -73,7 +74,7 @@ impl FullScreen<'_> {
     }
 }
 
-/// Covers the viewport of `pass` by a pipeline of [`FullScreen`] with what is bound.
+/// Covers the viewport of `pass` by a pipeline of [`FullScreen`] with the bound resources.
 pub fn cover(pass: &mut wgpu::RenderPass<'_>, pipeline: &RenderPipeline, group: &wgpu::BindGroup) {
     pass.set_pipeline(pipeline);
     pass.set_bind_group(0, group, &[]);

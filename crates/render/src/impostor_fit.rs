@@ -13,7 +13,7 @@ use metachron_geometry::Placement;
 const PASSES: usize = 20;
 /// A turn that is too small to go on, radians.
 const STILL_RAD: f64 = 1e-9;
-/// What is added to the stiffness against a turn that no member resists, as a part of all of it.
+/// The addition to the stiffness against a turn that no member resists, as a part of all of it.
 const ROUND_OFF: f64 = 1e-12;
 /// The part of r² that the axes of a ball of radius r count with.
 const AXES: f64 = 1.0 / 3.0;
@@ -21,10 +21,10 @@ const AXES: f64 = 1.0 / 3.0;
 /// The impostor of a group some of whose members move.
 #[derive(Debug)]
 pub(super) struct ImpostorFit {
-    /// Its index among the actors, and those of the members.
+    /// Its index among the actors, and the members' indices.
     track: usize,
     members: Vec<usize>,
-    /// What it and the members were at first; `None` until all of them have a pose.
+    /// The poses of it and of the members at first; `None` until all of them have a pose.
     first: Option<First>,
     /// How far the group has turned.
     turned: DQuat,

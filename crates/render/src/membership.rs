@@ -1,13 +1,13 @@
 //! Agents that join a scene in play and leave it, and states that are shown again.
 //!
-//! In: actors of newcomers, numbers of those that left, histories. Out: a [`SceneView`] of those that are there. Never here: what any of them
-//! looks like.
+//! In: actors of newcomers, numbers of agents that left, histories. Out: a [`SceneView`] of the agents that are there.
+//! Never here: the looks of any of them.
 
 use super::scene_view::{Actor, SceneView, Track};
 use metachron_core::{AgentId, Body, Snapshot};
 use std::sync::Arc;
 
-/// What an agent is posed by: its two newest states.
+/// The states that an agent is posed by: its two newest ones.
 #[derive(Debug, Clone, Default)]
 pub struct History {
     /// The state before the newest, where it has one.
@@ -32,7 +32,7 @@ impl SceneView {
         self.tracks.insert(at, track);
         self.tracks[at + 1..].iter_mut().for_each(|scenery| scenery.actor.id.0 += 1);
         self.fits.iter_mut().for_each(|fit| fit.shift(at));
-        // whoever was found at a place is not there any more
+        // an agent that was found at a place is not there any more
         self.found.clear();
         self.eye = None;
     }
@@ -44,7 +44,7 @@ impl SceneView {
         }
     }
 
-    /// What the first `count` actors, the agents, are posed by.
+    /// The states that the first `count` actors, the agents, are posed by.
     #[must_use]
     pub fn histories(&self, count: usize) -> Vec<History> {
         self.tracks.iter().take(count).map(Track::history).collect()

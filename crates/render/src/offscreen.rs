@@ -193,7 +193,7 @@ pub struct Offscreen {
     upscaler: Upscaler,
     /// The texture of pictures of fewer pixels.
     reduced: Option<Reduced>,
-    /// What draws depths, once they were asked for: those of several samples a pixel cannot be read.
+    /// The target that draws depths, once they were asked for: depths of several samples a pixel cannot be read.
     depth_target: Option<Box<Self>>,
 }
 

@@ -196,7 +196,7 @@ pub struct Picture {
     pub focus_radius_m: f64,
     /// Lower and upper corner of the box around all objects whose shadows are drawn, metres, world axes.
     pub shadowed_m: (DVec3, DVec3),
-    /// What lights it.
+    /// Its light.
     pub environment: Environment,
     /// Drawing options.
     pub style: Style,
@@ -265,7 +265,7 @@ impl Picture {
         self.floor = None;
     }
 
-    /// Triangles of the picture, without those of its shadow map.
+    /// Triangles of the picture, without the shadow map's.
     #[must_use]
     pub fn triangles(&self) -> u64 {
         let tubes =

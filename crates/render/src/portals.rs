@@ -1,8 +1,8 @@
 //! Which regions of a building the eye reaches through its portals, and the part of the view that remains in each.
 //!
 //! In: cells with portals, a view. Out: views clipped by the portals on the way, by which objects are tested. Never here: objects.
-//! Theory: (TS91), (FS93, §2.1): eye-to-cell visibility; what passes the clipped view of its cell is the eye-to-object visibility. All tests
-//! err to the side of what is seen: a wall hides, an object never does.
+//! Theory: (TS91), (FS93, §2.1): eye-to-cell visibility; the part of a cell within its clipped view is the
+//! eye-to-object visibility. All tests err to the side of visible: a wall hides, an object never does.
 
 use super::bounds_tree::BoundingBox;
 use super::view::Frustum;
@@ -12,8 +12,9 @@ use metachron_geometry::{Cells, Exposure, Portal, Region};
 /// An eye nearer than this to the plane of a portal is in it, metres.
 const IN_PLANE_M: f64 = 1e-6;
 
-/// Least sine of the angle under which an edge of an opening is seen, or the opening from an edge, that it bounds a view: rounding turns the
-/// plane through a shorter edge, by up to a billionth at this length, and then hides what is seen.
+/// Least sine of the angle under which an edge of an opening is seen, or the opening from an edge, that it bounds a
+/// view: rounding turns the plane through a shorter edge, by up to a billionth at this length, and then hides visible
+/// objects.
 const EDGE_MIN: f64 = 1e-6;
 
 /// Most clipped views of one eye: the ways through a maze of rooms grow without end. Past it every region is reached with the whole view.
@@ -25,7 +26,7 @@ type Planes = (u32, u32);
 /// The sides of the picture.
 const WHOLE: Planes = (0, 4);
 
-/// What an object is tested by.
+/// The bounds by which an object is tested.
 #[derive(Debug, Clone, Copy)]
 pub struct Bounded {
     /// Its bounding box.
@@ -119,7 +120,8 @@ impl Reach {
         Some(self.planes_through(view))
     }
 
-    /// The planes through the eye and the edges of the clipped opening; those of the view before it where too few are certain.
+    /// The planes through the eye and the edges of the clipped opening; the planes of the view before it where too few
+    /// are certain.
     fn planes_through(&mut self, view: ClippedView) -> Planes {
         let middle: DVec3 = self.polygon.iter().sum();
         let first = self.planes.len();

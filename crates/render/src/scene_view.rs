@@ -162,7 +162,7 @@ pub struct SceneView {
     pub(super) picture: Picture,
     pub(super) scratch: super::compose::Scratch,
     pub(super) survey: Survey,
-    /// How many of the last actors are drawn in place of groups of others, and those of them that move.
+    /// How many of the last actors are drawn in place of groups of others, and the fits of the moving ones.
     pub(super) impostors: usize,
     pub(super) fits: Vec<ImpostorFit>,
     /// Results of the last survey, and the camera and picture size of that survey.
@@ -265,8 +265,8 @@ impl SceneView {
         at.and_then(|at| self.tracks.get_mut(at))
     }
 
-    /// Poses every object at the frame's time by the rule of `states`, except those that rest and are shown at rest; returns the number
-    /// posed.
+    /// Poses every object at the frame's time by the rule of `states`, except objects that rest and are shown at rest;
+    /// returns the number posed.
     pub fn pose(&mut self, time: SimTime, states: States) -> usize {
         let mut posed = 0;
         for track in self.tracks.iter_mut().filter(|track| !track.still) {

@@ -422,7 +422,7 @@ mod tests {
             let [flat, round] = [0, 6].map(|n| at_level(&form, &soft, n));
             assert!(is_without_gaps(&round, 0.0));
             let [before, after] = [&flat, &round].map(|skins| (volume(skins) / exact - 1.0).abs());
-            // corners of a halved octahedron have four neighbours or six: their mean normals are not quite those of the ball
+            // corners of a halved octahedron have four neighbours or six: their mean normals are not quite the ball's
             assert!(after < before / 8.0, "{before} {after}");
             for corner in &round.corners {
                 let [at, normal] = [corner.core, corner.normal].map(|v| glam::Vec3::from(v).as_dvec3());
@@ -450,7 +450,7 @@ mod tests {
         let soft = SoftState { velocities: vec![DVec3::ZERO; positions.len()], positions, nodes: None };
         let skins = at_level(&form, &soft, 4);
         assert!(is_without_gaps(&skins, 0.01));
-        // a chord of 15 degrees sags by 8.6 mm; at the border the normals are those of half a strip
+        // a chord of 15 degrees sags by 8.6 mm; at the border the normals are half a strip's
         let inner = skins.corners.iter().map(|corner| corner.core.map(f64::from));
         let inner = inner.filter(|[x, y, z]| x.min(*y) > 0.3 && (0.3..=0.9).contains(z));
         let worst = inner.map(|[x, y, _]| (x.hypot(y) - 1.0).abs()).fold(0.0, f64::max);

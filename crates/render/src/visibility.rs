@@ -44,7 +44,7 @@ pub struct VisibleCounts {
     pub visible: u64,
 }
 
-/// What is seen of all actors and static solids, and the structures by which it is found.
+/// The visibility of all actors and static solids, and the structures by which it is found.
 #[derive(Debug, Default)]
 pub(super) struct Survey {
     cells: Cells,
@@ -121,7 +121,7 @@ fn is_within(cells: &[Cell], bounds: &BoundingBox) -> bool {
     cells.iter().any(|cell| cell.overlaps(bounds.low, bounds.high))
 }
 
-/// What is tested of an object with these bounds; one without a size is nowhere.
+/// The bounds by which an object is tested; one without a size is nowhere.
 fn bounded(bounds: &Bounds, cells: &Cells) -> Bounded {
     let ball = (bounds.centre, bounds.radius_m);
     let bounds = BoundingBox::around(bounds.centre, bounds.half_m);
@@ -129,14 +129,14 @@ fn bounded(bounds: &Bounds, cells: &Cells) -> Bounded {
 }
 
 impl SceneView {
-    /// Gives the scene its cells and portals: walls then hide what is in cells.
+    /// Gives the scene its cells and portals: walls then hide the objects in cells.
     pub fn set_cells(&mut self, cells: Cells) {
         (self.survey, self.eye) = (Survey { cells, ..Survey::default() }, None);
     }
 
-    /// Updates [`SceneView::seen`]: of the actors that are in view, that came out of it, or that were posed again ([`SceneView::updated`] lists
-    /// the updated ones). The others keep what was found of them last, when they were in view. Stores the visibility for
-    /// [`SceneView::compose`].
+    /// Updates [`SceneView::seen`]: of the actors that are in view, that came out of it, or that were posed again
+    /// ([`SceneView::updated`] lists the updated ones). The others keep their last visibility, of when they were in
+    /// view. Stores the visibility for [`SceneView::compose`].
     pub fn survey(&mut self, camera: &Camera, size: Size) {
         let eye = Some((*camera, size));
         let moved = self.eye != eye;

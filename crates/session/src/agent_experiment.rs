@@ -21,7 +21,7 @@ pub struct AgentExperiment {
     pub interrupted: bool,
 }
 
-/// What an agent's experiment says.
+/// The result of an agent's experiment.
 #[derive(Debug, Clone, PartialEq)]
 pub struct AgentResponse {
     /// The agent's name.
@@ -33,7 +33,7 @@ pub struct AgentResponse {
 /// Positions in the range of z that the agents are led through, in this order: neighbours in time are far apart, so that a drift of the scene is
 /// not taken for a response.
 const LEVELS: [f64; 12] = [0.0, 0.6, 0.2, 0.9, 0.4, 1.0, 0.1, 0.7, 0.3, 0.8, 0.5, 0.05];
-/// Turns after a change of level that are not counted: what was made anew is cold, …
+/// Turns after a change of level that are not counted: data made anew is cold, …
 const SKIPPED: u32 = 4;
 /// … and turns of a window.
 const TURNS: u32 = 12;

@@ -24,7 +24,8 @@ use metachron_world::kinds::{EnvironmentKind, LawKind, PolicyKind, ShadingKind, 
 use metachron_world::{Factors, Member, Scene, Scenery, machine};
 use std::sync::Arc;
 
-/// Adds the governors of rates and errors to the agents of a scene, and keeps what they share with the frame loop.
+/// Adds the governors of rates and errors to the agents of a scene, and keeps the data that they share with the frame
+/// loop.
 pub(super) struct Governors {
     share: f64,
     gains: RateGains,

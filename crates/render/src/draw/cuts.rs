@@ -1,8 +1,9 @@
 //! Cuts of multiresolution meshes on the GPU: the vertices of each mesh once, the triangles of each cut in use.
 //!
 //! In: the cuts that a picture uses. Out: draws. Never here: the choice of a cut.
-//! Triangles of cuts are stored one after another in one buffer, and so are the end vertices of geomorphs from one cut to a coarser one. A
-//! new item is appended; when the buffer is full, all items are dropped and those that the picture uses are written anew.
+//! Triangles of cuts are stored one after another in one buffer, and so are the end vertices of geomorphs from one cut
+//! to a coarser one. A new item is appended; when the buffer is full, all items are dropped and the picture's own are
+//! written anew.
 
 use super::super::picture::{MeshCorner, MeshKey, Picture};
 use metachron_geometry::{Cut, Model, ProgressiveMesh};

@@ -1,6 +1,6 @@
 //! Depths of a drawn picture: as greys in its place, or read back as metres.
 //!
-//! In: the depths that a picture left. Out: a pass into the picture's target; numbers. Never here: what was drawn.
+//! In: the depths that a picture left. Out: a pass into the picture's target; numbers. Never here: the picture.
 
 use super::super::full_screen::{FullScreen, cover};
 use super::super::offscreen::{DeviceLoss, Gpu, GpuError, read_bytes};

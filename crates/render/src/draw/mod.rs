@@ -67,7 +67,7 @@ pub struct Target<'a> {
     pub view: &'a wgpu::TextureView,
     /// The texture's size: pixels that are drawn.
     pub size: Size,
-    /// The size that it is shown with: its proportions are the picture's, those of a smaller texture are rounded.
+    /// The size that it is shown with: its proportions are the picture's, a smaller texture's are rounded.
     pub shown: Size,
 }
 
@@ -78,9 +78,9 @@ pub struct DrawTimes {
     pub cpu: Duration,
     /// GPU time of the newest frame whose time stamps are back; `None` where the adapter has none.
     pub gpu: Option<Duration>,
-    /// Triangles drawn, without those of the shadow map.
+    /// Triangles drawn, without the shadow map's.
     pub triangles: u64,
-    /// Draw calls, with those of the shadow map.
+    /// Draw calls, with the shadow map's.
     pub draws: u32,
 }
 

@@ -178,7 +178,7 @@ impl Renderer {
     }
 }
 
-/// What is drawn of a mesh that is not morphing.
+/// The part of a mesh that is not morphing which is drawn.
 struct StillPart {
     triangles: Range<u32>,
     edges: bool,

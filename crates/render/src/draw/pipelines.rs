@@ -18,7 +18,7 @@ const HIDE: &str = include_str!("shaders/hide.wgsl");
 const STROKE: &str = include_str!("shaders/stroke.wgsl");
 const FLOOR: &str = include_str!("shaders/floor.wgsl");
 
-/// What pipelines are made for.
+/// The settings that pipelines are made for.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Setup {
     /// The format of targets.
@@ -114,7 +114,7 @@ const END: [wgpu::VertexAttribute; 5] = [
     wgpu::VertexAttribute { format: wgpu::VertexFormat::Float32x4, offset: 16, shader_location: 8 },
     wgpu::VertexAttribute { format: wgpu::VertexFormat::Float32x4, offset: 32, shader_location: 9 },
     wgpu::VertexAttribute { format: wgpu::VertexFormat::Float32x2, offset: 48, shader_location: 10 },
-    // past the colours, which are those of the beginning
+    // past the colours, which are the same as at the beginning
     wgpu::VertexAttribute { format: wgpu::VertexFormat::Float32x2, offset: 64, shader_location: 12 },
 ];
 /// A mesh's corner.

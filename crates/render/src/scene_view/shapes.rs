@@ -1,4 +1,4 @@
-//! Bounds and sizes of what is seen: balls and boxes about poses, the meshes of solids, models that copies share.
+//! Bounds and sizes of visible objects: balls and boxes about poses, the meshes of solids, models that copies share.
 //!
 //! In: solids, models, points. Out: bounds, sizes, indices of meshes. Never here: states of agents.
 
@@ -7,7 +7,7 @@ use glam::{DQuat, DVec3};
 use metachron_geometry::{Aabb, Extent, Model, Obstacle, Placement, PrimitiveMesh, Solid};
 use metachron_geometry::{compound_mesh, creased_mesh, hull_mesh};
 
-/// Width added around static solids in tests of what is seen, metres.
+/// Width added around static solids in tests of visibility, metres.
 const RIM_M: f64 = 1e-3;
 
 /// A static solid with its drawing data.
@@ -50,7 +50,7 @@ impl Bounds {
         Self { centre, radius_m, half_m: DVec3::splat(radius_m) }
     }
 
-    /// Bounds of what is in a box; of nothing where that is empty.
+    /// Bounds of a box; of nothing where it is empty.
     pub(super) fn within(Aabb { low, high }: Aabb) -> Self {
         if high.cmplt(low).any() {
             return Self::default();
@@ -75,7 +75,8 @@ impl StaticShape {
         Self { solid, appearance, position, rotation, body, throws_shadow, seen: true }
     }
 
-    /// A bounding ball and box, with a rim: what touches a side of a cell may be that side, and is seen from beyond it too.
+    /// A bounding ball and box, with a rim: a solid that touches a side of a cell may be that side, and is seen from
+    /// beyond it too.
     pub fn bounds(&self) -> Bounds {
         let half_m = self.half_extents() + RIM_M;
         Bounds { centre: self.position, radius_m: self.body.radius_m + 2.0 * RIM_M, half_m }

@@ -102,7 +102,8 @@ fn reach_of(cells: &Cells, eye: DVec3, ray: DVec3) -> f64 {
     }
 }
 
-/// The balls with a part in a region that the eye reaches, one by one; of those that are outside alone the ones in view.
+/// The balls with a part in a region that the eye reaches, one by one; of balls that are outside alone the ones in
+/// view.
 fn in_reach(view: &SceneView) -> u64 {
     let outside = view.survey.reach.is_reached(Region::Outside);
     let is_in_reach = |seen: &&Visibility| {

@@ -1,4 +1,4 @@
-//! Depths of what is drawn.
+//! Depths of drawn objects.
 
 use crate::adapter::gpu;
 use glam::DVec3;

@@ -12,7 +12,7 @@ use metachron_render::{
 use std::sync::Arc;
 
 const SIZE: Size = Size { width: 320, height: 320 };
-/// Ball and slab, sRGB, and what is matt of them.
+/// Colour of ball and slab, sRGB, and their material.
 const LOOK: Appearance = Appearance { colour: [180, 180, 180], material: Material::Skin };
 /// Its wrap: light that went in comes out past the terminator.
 const WRAP: f64 = 0.34;
@@ -77,10 +77,10 @@ fn obstacle(solid: Solid, position: DVec3, rotation: DQuat) -> Obstacle {
 fn a_ball_is_as_bright_as_lambert_s_law_up_to_its_terminator() {
     let Some(gpu) = gpu() else { return };
     let light = Environment::Sky.light().toward;
-    // half of what is seen of it is lit: from across the light
+    // half of the visible part of it is lit: from across the light
     let camera = Camera::looking(light.cross(DVec3::Z).normalize() * 3.0, DVec3::ZERO, 0.4);
     for (options, far_m) in QUALITIES.into_iter().flat_map(|options| [(options, 0.0), (options, 8.0)]) {
-        // what stands far away makes the texels of the shadow map large: 16 across the ball's radius on a processor
+        // a ball far away makes the texels of the shadow map large: 16 across the ball's radius on a processor
         let (solid, position) = (Solid::Ball { radius_m: 0.05 }, camera.forward() * far_m);
         let far = StaticObject {
             obstacle: obstacle(solid, position, DQuat::IDENTITY),

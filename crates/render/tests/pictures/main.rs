@@ -1,4 +1,4 @@
-//! Pictures drawn on the adapter present, compared with what they must show.
+//! Pictures drawn on the adapter present, compared with the pictures that they must be.
 mod adapter;
 mod depth;
 mod light;

@@ -1,4 +1,4 @@
-//! What is painted on meshes: patterns, images beside a scene and inside a .glb file, and what a wrong one is told.
+//! Paint on meshes: patterns, images beside a scene and inside a .glb file, and the errors of wrong ones.
 
 use crate::adapter::gpu;
 use glam::{DQuat, DVec3};

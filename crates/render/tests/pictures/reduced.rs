@@ -1,4 +1,4 @@
-//! Pictures drawn with fewer pixels and enlarged, compared with those of every pixel.
+//! Pictures drawn with fewer pixels and enlarged, compared with pictures of every pixel.
 
 use crate::adapter::gpu;
 use crate::stage;
@@ -19,7 +19,7 @@ fn drawn<const N: usize>(gpu: &Gpu, stage: &mut SceneView, scene: Scene<'_>, sca
     })
 }
 
-/// What is drawn, and how.
+/// A scene, and how it is drawn.
 #[derive(Clone, Copy)]
 struct Scene<'a> {
     camera: &'a Camera,

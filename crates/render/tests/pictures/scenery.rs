@@ -1,4 +1,4 @@
-//! Meshes, trees and groups: what scenes say of them, and what is seen of them against closed forms.
+//! Meshes, trees and groups: their keys in scenes, and their pictures against closed forms.
 
 use crate::adapter::gpu;
 use glam::{DQuat, DVec3};
@@ -213,7 +213,8 @@ fn difference(a: &RgbaImage, b: &RgbaImage) -> f64 {
 fn a_change_of_level_that_glides_is_seen_less_from_frame_to_frame_and_ends_at_the_plain_level() {
     let Some(mut studio) = Studio::new(DVec3::new(0.5, -4.0, 1.0), DVec3::ZERO) else { return };
     let bumps = Model::Mesh(Arc::new(ProgressiveMesh::new(&generate(Generator::Blob, 5, 4000)).expect("a blob")));
-    // a second mesh that stays: a twentieth of both is what the first may be drawn with beyond what was asked for
+    // a second mesh that stays: the first may be drawn with a twentieth of both beyond the triangles that were asked
+    // for
     let crowd = Model::Mesh(Arc::new(ProgressiveMesh::new(&generate(Generator::Terrain, 5, 40_000)).expect("hills")));
     let mut stage = stage(&[bumps, crowd], 0.9);
     let levels = |triangles| [level(triangles, Shading::PerPixel), level(40_000, Shading::PerPixel)];
@@ -284,7 +285,8 @@ fn thick_boughs_and_thin_ones_are_drawn_at_once_each_by_its_width() {
             _ => (full, lines),
         })
     };
-    // (230 - 2 · 62)/8 boughs in full, and near by those of more than 20 pixels, which leave fewer lines to the others
+    // (230 - 2 · 62)/8 boughs in full, and near by the boughs of more than 20 pixels, which leave fewer lines to the
+    // others
     let all = [40.0, 14.0, 12.0, 10.0, 9.0, 8.0, 7.0].map(&mut runs);
     assert_eq!(all[0], (130, 98));
     assert!(all.iter().all(|(full, lines)| full + lines <= 230) && all.is_sorted_by_key(|(full, _)| *full), "{all:?}");

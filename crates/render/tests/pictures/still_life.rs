@@ -46,7 +46,7 @@ fn difference(a: &RgbaImage, b: &RgbaImage) -> f64 {
     sum / a.as_raw().len() as f64
 }
 
-/// The greatest difference of the means of 16 × 16 pixels: what is missing or in the wrong place shows here.
+/// The greatest difference of the means of 16 × 16 pixels: a part that is missing or in the wrong place shows here.
 fn worst_block(a: &RgbaImage, b: &RgbaImage) -> f64 {
     let mean = |image: &RgbaImage, x: u32, y: u32| {
         let texels = (0..256).flat_map(|i| image.get_pixel(x + i % 16, y + i / 16).0);
