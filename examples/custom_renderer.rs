@@ -9,7 +9,7 @@ use std::error::Error;
 
 const COLUMNS: usize = 78;
 const ROWS: usize = 26;
-/// Left and lower edge of what is seen, and the width of a letter, metres.
+/// Left and lower edge of the visible part, and the width of a letter, metres.
 const LEFT_M: f64 = -0.35;
 const LOW_M: f64 = -0.02;
 const LETTER_M: f64 = 0.009;
@@ -31,7 +31,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     Ok(())
 }
 
-/// Letters, and how far away what they show is, metres.
+/// Letters, and how far away the surfaces that they show are, metres.
 struct Picture {
     letters: [[u8; COLUMNS]; ROWS],
     depths: [[f64; COLUMNS]; ROWS],

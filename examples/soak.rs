@@ -1,7 +1,9 @@
-//! Objects join a world and leave it at random, on each executor in turn, for as long as it is let: what must stay as it is, does.
+//! Objects join a world and leave it at random, on each executor in turn, for as long as it is let: quantities that
+//! must stay do stay.
 //!
 //! `cargo run --release --no-default-features --example soak -- --minutes 10`, or `--quick` for a minute of it. While
-//! nothing joins or leaves, momentum stays what it is; memory grows by no more than a stated bound for each; no call waits long. It
+//! nothing joins or leaves, momentum stays as it is; memory grows by no more than a stated bound for each; no call
+//! waits long. It
 //! ends with an error where one of these does not hold.
 //! Bodies float in a space without gravity towards its middle, where they meet.
 
@@ -62,7 +64,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     if failures.is_empty() { Ok(()) } else { Err(failures.join("; ").into()) }
 }
 
-/// What one executor did.
+/// The results of one executor.
 struct Row {
     changes: u64,
     sim_s: f64,
@@ -161,7 +163,7 @@ fn momentum_change(world: &World, crowd: &[Joined]) -> Result<f64, WorldError> {
         }
         Ok((sum, carried))
     };
-    // those that left are gone, and those that joined have begun
+    // objects that left are gone, and objects that joined have begun
     world.advance(SimSpan::from_millis(20));
     let (before, carried) = sums()?;
     world.advance(SimSpan::from_millis(50));

@@ -59,7 +59,7 @@ mod pages {
     struct FromSofa;
 }
 
-/// What a program that builds and runs a scene needs.
+/// The items that a program needs which builds and runs a scene.
 pub mod prelude {
     pub use glam::{DQuat, DVec3};
     pub use metachron_contact::joint::{JointKind, Motor, MotorGoal};

@@ -176,7 +176,7 @@ fn a_display_that_goes_away_ends_the_run_with_its_outcome() {
     assert!(error.to_string().contains("no longer responds"), "{error}");
 }
 
-/// What the process says whose display is to be taken away.
+/// The line of a process whose display is to be taken away.
 const READY: &str = "take the display away";
 
 /// Runs [`DISPLAY_GONE`] in a process of its own on `display`, which ends when that asks for it.

@@ -318,12 +318,12 @@ pub struct RunArgs {
     /// How far the scene may go.
     #[command(flatten)]
     pub limits: LimitArgs,
-    /// What is written and printed.
+    /// The outputs: files and printed text.
     #[command(flatten)]
     pub output: OutputArgs,
 }
 
-/// What `run` and `replay` write and print.
+/// The outputs of `run` and `replay`: files and printed text.
 #[derive(Debug, Args)]
 pub struct OutputArgs {
     /// Write the last frame's picture here (PNG). Not of a window
@@ -386,7 +386,7 @@ pub struct ReplayArgs {
     /// How far the scene may go.
     #[command(flatten)]
     pub limits: LimitArgs,
-    /// What is written and printed.
+    /// The outputs: files and printed text.
     #[command(flatten)]
     pub output: OutputArgs,
 }

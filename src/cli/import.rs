@@ -1,7 +1,8 @@
 //! `import`: a URDF robot or an MJCF model as a scene.
 //!
-//! In: the model's file, those that it names, the SRDF file beside a robot. Out: TOML on standard output or in a file with meshes beside it, on
-//! standard error or as JSON what has no place in it. Never here: what a model means.
+//! In: the model's file, the files that it names, the SRDF file beside a robot. Out: TOML on standard output or in a
+//! file with meshes beside it, on standard error or as JSON the parts that have no place in it. Never here: what a
+//! model means.
 
 use super::args::ImportArgs;
 use metachron_console::exit::Exit;
@@ -51,7 +52,7 @@ pub(super) fn command(args: &ImportArgs) -> anyhow::Result<Exit> {
     };
     let imported = metachron_import::model(&text, folders, &options);
     let imported = imported.map_err(|why| BadInput(format!("{model}: {why}")))?;
-    // a model may have numbers that are beyond those of scenes, and a mesh that is none
+    // a model may have numbers beyond the ranges of scenes, and a mesh that is none
     let checked = scene(&imported);
     print_list(args, &imported)?;
     match checked {

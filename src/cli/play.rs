@@ -30,7 +30,7 @@ use metachron_world::kinds::ExecutorKind;
 use metachron_world::{Pace, Reading, RecordingFile, Scene, SceneText, Sensor};
 use std::path::{Path, PathBuf};
 
-/// Begins to write down what is done to the run.
+/// Begins to write down the commands to the run.
 fn record(session: &Session, path: &Path, request: &Request) -> anyhow::Result<()> {
     let file = RecordingFile::create(path).context("the recording cannot be written")?;
     let scene = SceneText {

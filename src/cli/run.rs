@@ -67,7 +67,7 @@ pub struct Request {
     pub exports: ExportPaths,
     /// The devices that lead objects.
     pub devices: Vec<DeviceWish>,
-    /// Where to write down what is done to the run.
+    /// Where to write down the commands to the run.
     pub record: Option<PathBuf>,
     /// Where to write it when the requested window could not be opened.
     pub png_without_window: PathBuf,
@@ -140,7 +140,7 @@ pub(super) fn command(args: &RunArgs, matches: Option<&ArgMatches>) -> anyhow::R
     finish(&args.output, &|go_on| play(&request, go_on), &request.scene.name)
 }
 
-/// Plays with a bar that shows how far it is, writes what was asked for, and judges.
+/// Plays with a bar that shows how far it is, writes the outputs that were asked for, and judges.
 pub(super) fn finish(
     output: &OutputArgs,
     play: &dyn Fn(GoOn<'_>) -> anyhow::Result<Played>,

@@ -1,6 +1,8 @@
-//! Which files of a crate use which: every path of a crate's code, followed through re-exports to the file that defines what it names.
+//! Which files of a crate use which: every path of a crate's code, followed through re-exports to the file that defines
+//! its item.
 //!
-//! In: the text of a crate's source files. Out: for each file those of the same crate whose items it uses, and the rings that these make.
+//! In: the text of a crate's source files. Out: for each file the files of the same crate whose items it uses, and the
+//! rings that these make.
 //! Never here: arrows between crates, tests.
 
 use super::{files_below, is_test, relative, root};
@@ -27,7 +29,7 @@ struct Module {
 struct Import {
     path: Vec<String>,
     name: String,
-    /// Others reach what it names through this module.
+    /// Others reach its items through this module.
     is_exported: bool,
 }
 
@@ -35,7 +37,7 @@ struct Import {
 const HOPS_MAX: u32 = 8;
 
 impl CrateFiles {
-    /// Those of the crate in `folder`, its tests left out.
+    /// The files of the crate in `folder`, its tests left out.
     pub fn read(folder: &str) -> Self {
         let src = root().join(folder).join("src");
         let files = files_below(&src, "rs").into_iter().filter(|file| !is_test(&relative(file)));
@@ -111,7 +113,7 @@ impl Module {
     }
 }
 
-/// What stands before the `use` in a statement that ends with one, its tree, and whether it is exported.
+/// The text before the `use` in a statement that ends with one, its tree, and whether it is exported.
 fn use_tree(statement: &str) -> Option<(&str, &str, bool)> {
     let is_visibility =
         |word: &str| word.is_empty() || word == "pub" || (word.starts_with("pub(") && word.ends_with(')'));
@@ -144,7 +146,7 @@ fn segments(path: &str) -> Vec<String> {
     path.split("::").map(|part| part.trim().to_owned()).filter(|part| !part.is_empty()).collect()
 }
 
-/// What stands between the commas that are in no braces.
+/// The texts between the commas that are in no braces.
 fn parts(list: &str) -> Vec<&str> {
     let (mut depth, mut start, mut found) = (0_u32, 0, Vec::new());
     for (at, c) in list.char_indices() {

@@ -190,7 +190,7 @@ fn crates_keep_their_promises_of_absence() {
         let of_numbers: &[&str] = if numbers { &["std::", "metachron_core", "glam"] } else { &[] };
         let absent = ABSENT.iter().filter(|(folder, _)| path.starts_with(&format!("{folder}/")));
         let absent: Vec<_> = absent.flat_map(|(_, words)| words.iter()).chain(of_numbers).collect();
-        // tests read reference files and start threads; what they test must not
+        // tests read reference files and start threads; the code that they test must not
         let code = text.split("#[cfg(test)]\nmod tests {").next().unwrap();
         for (number, line) in
             code.lines().enumerate().filter(|(_, l)| !is_test(&path) && !l.trim_start().starts_with("//"))

@@ -1,5 +1,5 @@
-//! Agents that touch others and cannot keep up: steps that take longer than they last grow, and hold what they held; past that all that
-//! touch live on slower.
+//! Agents that touch others and cannot keep up: steps that take longer than they last grow, and hold their loads as
+//! before; past that all that touch live on slower.
 
 use crate::play::{Folder, agent, lockstep, number, point};
 use serde_json::Value;
@@ -320,7 +320,7 @@ half_extents_m = [0.05, 0.1, 0.1]
 position_m = [0.35, 0.0, 0.02]
 "#;
 
-/// What stands there: a box on the stand, and a tool above it.
+/// The waiting objects: a box on the stand, and a tool above it.
 const WAITING: &str = r#"
 [[object]]
 name = "waiting"

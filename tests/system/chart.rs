@@ -1,4 +1,4 @@
-//! `metachron chart`: what it writes, how it is stopped and taken up again, and what it refuses.
+//! `metachron chart`: its files, how it is stopped and taken up again, and the arguments that it refuses.
 
 use crate::play::{metachron, program};
 use serde_json::Value;
@@ -87,7 +87,7 @@ fn the_quick_diagram_of_the_cantilever_converges_with_second_order_and_shows_oth
     }
 }
 
-/// What a chart says as JSON.
+/// A chart's output as JSON.
 fn told(subject: &str, out: &Path, names: &[&str]) -> Value {
     let only: Vec<&str> = names.iter().flat_map(|name| ["--only", name]).collect();
     let done = charted(subject, out, &[&only[..], &["--json", "-q"]].concat());
@@ -181,7 +181,8 @@ fn a_folder_that_cannot_be_made_is_bad_input() {
     assert!(said(&done).contains("cannot be written") && said(&done).contains("below"), "{}", said(&done));
 }
 
-/// A child that is interrupted once its file has two rows more than `kept`; its exit code, what it printed, and what it said.
+/// A child that is interrupted once its file has two rows more than `kept`; its exit code, its standard output, and its
+/// messages.
 #[cfg(unix)]
 fn interrupted(out: &Path, experiment: &str, kept: usize) -> (Option<i32>, String, String) {
     let mut child = program()

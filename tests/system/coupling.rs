@@ -1,4 +1,4 @@
-//! What agents that touch promise at any steps, measured by the program's own charts and held against the limits.
+//! Promises of agents that touch, at any steps, measured by the program's own charts and held against the limits.
 
 use crate::play::metachron;
 use serde_json::Value;

@@ -28,7 +28,7 @@ at = 1.0
 every_ms = 20
 "#;
 
-/// `fit` of a scene with these arguments: exit code, what it says as JSON, and its messages.
+/// `fit` of a scene with these arguments: exit code, its output as JSON, and its messages.
 fn fit(scene: &str, arguments: &[&str]) -> (i32, Value, String) {
     let done = metachron(&[&["fit", scene, "--json", "-q"], arguments].concat());
     let said = serde_json::from_slice(&done.stdout).unwrap_or(Value::Null);
@@ -55,7 +55,7 @@ fn a_tube_that_is_too_fine_is_written_coarser_and_still_holds() {
     assert_eq!(number(&said, "/solves/implicit-euler"), 1.0, "the unit of what was measured");
     assert!(number(&said, "/solves/bdf2") > 0.0);
 
-    // the file: what was written, and nothing else
+    // the file: the fitted values, and no other change
     let text = std::fs::read_to_string(folder.scene()).unwrap();
     for kept in ["# a comment that stays", "young_pa = 1e6 # so soft", "# too many", "# too short", "every_ms = 20"] {
         assert!(text.contains(kept), "{kept} is gone from {text}");
@@ -253,7 +253,7 @@ fn an_error_that_cannot_be_held_is_refused_on_its_line() {
     }
 }
 
-/// What a command said, without the line breaks and the frame of its picture.
+/// The output of a command, without the line breaks and the frame of its picture.
 fn unwrapped(done: &std::process::Output) -> String {
     let said = String::from_utf8_lossy(&done.stderr).into_owned() + &String::from_utf8_lossy(&done.stdout);
     said.split_whitespace().filter(|word| *word != "│").collect::<Vec<_>>().join(" ")

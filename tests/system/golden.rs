@@ -16,7 +16,7 @@ fn file() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/reference/golden.json")
 }
 
-/// The report without what was measured.
+/// The report without measured times.
 fn declared(report: Value) -> Value {
     match report {
         Value::Object(map) => {

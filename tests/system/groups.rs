@@ -39,7 +39,7 @@ struct Wood {
     triangles: f64,
 }
 
-/// What a frame draws each wood with; every ball of it once, by itself or by the impostor of its wood.
+/// The levels that a frame draws each wood with; every ball of it once, by itself or by the impostor of its wood.
 fn drawn(levels: &[LevelDemand]) -> Vec<Wood> {
     let (balls, groups) = levels.split_at(WOODS * BALLS);
     let wood = |(balls, group): (&[LevelDemand], &LevelDemand)| {

@@ -1,5 +1,5 @@
-//! Nothing for nothing: what rests takes no steps and no time, changes nothing for others and is read by no frame; what a scene has not
-//! is not set up.
+//! Nothing for nothing: an object at rest takes no steps and no time, changes nothing for others and is read by no
+//! frame; parts that a scene does not have are not set up.
 
 #[cfg(all(target_os = "linux", target_env = "gnu"))]
 use crate::play::{Folder, program};
@@ -103,7 +103,7 @@ fn who_rests_takes_no_step_and_no_time_of_any_thread_until_it_is_woken() {
     }
 }
 
-/// What the system's loader says of the libraries that are opened by a headless run with these arguments.
+/// The lines of the system's loader about the libraries that are opened by a headless run with these arguments.
 #[cfg(all(target_os = "linux", target_env = "gnu"))]
 fn loaded(scene: &Folder, arguments: &[&str]) -> String {
     let mut child = program();

@@ -1,4 +1,4 @@
-//! What the whole program promises, played from the command line: physics, control, rest, outputs and ends.
+//! Promises of the whole program, played from the command line: physics, control, rest, outputs and ends.
 
 mod budget;
 mod grasp;

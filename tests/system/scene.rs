@@ -26,7 +26,7 @@ fn read(text: &str) -> Result<Scene, SceneError> {
     load(&Source::memory("test.toml", text.as_bytes())?, &[])
 }
 
-/// The only problem of a scene: line, column, text, and message with what was expected and the help.
+/// The only problem of a scene: line, column, text, and message with the expected value and the help.
 fn problem(text: &str) -> (usize, usize, String, String) {
     let error = read(text).expect_err("the scene must be refused");
     assert_eq!(error.problems.len(), 1, "{:#?}", error.problems);
@@ -368,7 +368,7 @@ fn a_mesh_that_no_scene_can_hold_is_refused_by_name_whether_it_is_touched_or_see
             assert!(error.problems.len() == 1 && message.contains("m.obj") && message.contains(why), "{message}");
         }
     }
-    // what is sound in its own unit and huge in the scene's
+    // a mesh that is sound in its own unit and huge in the scene's
     std::fs::write(at("m.obj"), tetrahedron).unwrap();
     std::fs::write(at("s.toml"), format!("{seen}{}", seen[10..].replace("seen\"", "far\"\nscale = 2e5"))).unwrap();
     let error = load(&Source::open(at("s.toml").to_str().unwrap()).unwrap(), &[]).unwrap_err();

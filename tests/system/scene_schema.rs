@@ -1,4 +1,4 @@
-//! The schema of scenes for editors: what it accepts is what loads.
+//! The schema of scenes for editors: it accepts the scenes that load.
 
 use crate::scene::TUBE;
 use metachron_scene::json_schema;

@@ -29,7 +29,7 @@ fn with(ties: &str) -> Scene {
     read(&format!("{YARD}{ties}\n")).unwrap_or_else(|e| panic!("{ties}: {:?}", miette::Report::new(e)))
 }
 
-/// The only problem of the yard with these ties: its line counted from the ties' first, its text, and what is said.
+/// The only problem of the yard with these ties: its line counted from the ties' first, its text, and its messages.
 fn refusal(ties: &str) -> (usize, String, String) {
     let error = read(&format!("{YARD}{ties}\n")).expect_err(ties);
     assert_eq!(error.problems.len(), 1, "{ties}: {:#?}", error.problems);

@@ -1,4 +1,4 @@
-//! Scenes that start agents inside each other: what bends begins elsewhere, and nobody gains energy.
+//! Scenes that start agents inside each other: deformables begin elsewhere, and nobody gains energy.
 
 use crate::play::{Folder, agent, metachron, number, point};
 use serde_json::Value;

@@ -374,7 +374,7 @@ fn nobody_falls_asleep_under_a_tool_that_presses() {
     }
 }
 
-/// In the last of the solves of a step no more contacts are added: what is not solved has no impulse to remember.
+/// In the last of the solves of a step no more contacts are added: an unsolved contact has no impulse to remember.
 #[test]
 fn eight_boxes_in_one_place_come_apart() {
     let floor = "[[object]]\nname = \"floor\"\nmodel = \"rigid\"\nshape = \"plane\"\nfixed = true\n".to_owned();

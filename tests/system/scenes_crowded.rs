@@ -1,6 +1,6 @@
 //! Three bodies that press on each other, or two and the ground, of any clocks, as users write them: they stay where they were put.
 //!
-//! Independent answers: heights of what is stacked, from their sizes.
+//! Independent answers: heights of stacked bodies, from their sizes.
 
 use crate::play::{Folder, number, point};
 use serde_json::Value;
@@ -48,7 +48,8 @@ fn slab(hz: f64) -> String {
     block("low", hz, ([0.25, 0.25, 0.05], [6, 6, 2]), 0.025)
 }
 
-/// Two strips along x on what is `top_m` high, ropes or, of [`RADIUS_M`], tubes; `apart_m` from its middle, `above_m` above it.
+/// Two strips along x on a body that is `top_m` high, ropes or, of [`RADIUS_M`], tubes; `apart_m` from its middle,
+/// `above_m` above it.
 fn strips(hz: f64, radius_m: f64, (top_m, apart_m, above_m): (f64, f64, f64)) -> String {
     let strip = |(name, y): (&str, f64)| {
         let z = top_m + radius_m + above_m;
@@ -94,8 +95,8 @@ fn a_box_stays_on_two_tubes_on_the_floor_whose_clocks_differ() {
     }
 }
 
-/// What the tubes gave the lower one in each step was taken for an approach: it bounced, never pressed, and the upper one sank through it at
-/// 68 mm/s.
+/// The impulses of the tubes on the lower box must not count as an approach: it would bounce, never press, and the
+/// upper one would sink through it at 68 mm/s.
 #[test]
 fn a_stack_with_the_usual_restitution_stands_on_two_tubes() {
     for hz in [60.0, 120.0, 240.0] {
@@ -224,8 +225,8 @@ fn a_slow_cloth_between_two_faster_ones_under_a_block_is_not_shot_off() {
     }
 }
 
-/// Each of the two owned one side of what lay between them, and undid a step late what the other had done: the box sank through tubes on
-/// anything soft, and through ropes on what was held or faster, 10 to 17 mm.
+/// The ropes or tubes lie between two owners. Where each undoes a step late the other's impulses, the box sinks through
+/// tubes on anything soft, and through ropes on a held or faster body, 10 to 17 mm.
 #[test]
 fn what_lies_on_something_soft_bears_a_box_at_any_clocks() {
     const WEIGHT_N: f64 = 0.3 * 9.81;

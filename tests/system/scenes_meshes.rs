@@ -1,4 +1,4 @@
-//! Solids of tetrahedra and sheets of open surfaces as users write them: what loads, what they weigh, what an error shows.
+//! Solids of tetrahedra and sheets of open surfaces as users write them: the files that load, the masses, the errors.
 
 use crate::play::{Folder, number};
 use glam::DVec3;

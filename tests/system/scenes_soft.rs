@@ -15,7 +15,7 @@ const SHEET: &str = "name = \"s\"\nmodel = \"sheet\"\nsize_m = [0.2, 0.1]\nsegme
 const SOLID: &str = "name = \"s\"\nmodel = \"solid\"\nyoung_pa = 1e4\nsegments = [2, 2, 2]\n";
 const ROPE: &str = "name = \"s\"\nmodel = \"rope\"\nyoung_pa = 1e6\nradius_m = 0.002\nsegments = 10\n";
 
-/// The line counted from the object's first, and what is said of the only problem.
+/// The line counted from the object's first, and the message of the only problem.
 fn refusal(object: &str) -> (usize, String) {
     let error = read(&format!("[[object]]\n{object}\n")).expect_err(object);
     assert_eq!(error.problems.len(), 1, "{object}: {:#?}", error.problems);
@@ -121,7 +121,8 @@ fn the_gut_hangs_from_its_mesentery_and_the_grasper_feels_it() {
 fn the_organ_gives_way_under_the_probe_and_keeps_what_is_attached() {
     let report = lockstep("organ", &["--seconds", "2.5"]);
     assert_eq!(agent(&report, "organ")["parked"], false);
-    // the spacing is one of its range, and has the nodes that its surface needs; its error is what it is off by (`organ.rs` of the models)
+    // the spacing is one of its range, and has the nodes that its surface needs; its residual is its true error
+    // (`organ.rs` of the models)
     let (eps_m, nodes) = (number(agent(&report, "organ"), "/eps_m"), number(agent(&report, "organ"), "/nodes"));
     assert!((0.012..=0.03).contains(&eps_m) && nodes >= 200.0, "{eps_m} m, {nodes} nodes");
     let residual_m = number(agent(&report, "organ"), "/residual_m");
@@ -235,7 +236,7 @@ fn in_the_cavity_a_grasper_lifts_the_gut_while_a_probe_presses_the_liver() {
     assert!(force("liver", "probe") > 0.1, "{report}");
 }
 
-/// What sleeps and owns the pair did not see it come: it fell through to the floor.
+/// A sleeping owner of the pair must see a falling deformable come, which else falls through to the floor.
 #[test]
 fn a_soft_body_that_sleeps_wakes_for_what_bends_and_falls_on_it() {
     let soft = "young_pa = 1e5\ndensity_kg_m3 = 1050.0\ndamping_per_s = 3.0\nrate_hz = 240.0\n";

@@ -1,4 +1,4 @@
-//! What the time of a frame is shared among: steps and levels at one price, a bounded lag, quality beyond the finest.
+//! The time of a frame, shared among steps and levels at one price, with a bounded lag and quality beyond the finest.
 
 use crate::play::Folder;
 use metachron_lod::control;
@@ -187,7 +187,7 @@ fn choosing_beside_drawing_shortens_the_lag_by_exactly_what_drawing_hides() {
     assert!(near(cull, 0.9) && near(select, 1.8) && row.draw_ms > 2.0 * (cull + select), "{row:?}");
     assert!(near(row.lag_ms, cull + select + row.draw_ms), "one after the other: {row:?}");
     assert!(near(beside.lag_ms, row.lag_ms - select), "{} of {}", beside.lag_ms, row.lag_ms);
-    // beside drawing it is found out for the next frame's camera what is seen, too
+    // beside drawing, the visible objects of the next frame's camera are found too
     assert!(near(beside.select_ms, cull + select) && near(beside.draw_ms, row.draw_ms), "{beside:?}");
     // drawing hides no more than it takes
     let dear = "cull_object_ns = 100_000.0\nchoose_object_ns = 900_000.0";

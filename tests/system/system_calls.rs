@@ -1,4 +1,4 @@
-//! What threads that make turns ask of the system: to wait for the next one, and next to nothing else.
+//! The system calls of threads that make turns: to wait for the next one, and next to nothing else.
 //!
 //! `strace` writes down every call of the program's threads, which have names. Where it is not installed, or may not trace,
 //! these tests say so and pass, unless `METACHRON_REQUIRE_STRACE=1`.
@@ -36,7 +36,7 @@ fn calls<'t>(trace: &'t str, called: &str) -> Vec<Vec<&'t str>> {
     let mut threads: BTreeMap<&str, (bool, Vec<&str>)> = BTreeMap::new();
     let named = format!("prctl(PR_SET_NAME, \"{called}");
     for (thread, line) in trace.lines().filter_map(|line| line.split_once(' ')) {
-        // what is no call is a call's end, a signal or a thread's end
+        // a line that is no call is a call's end, a signal or a thread's end
         let Some((name, _)) = line.trim_start().split_once('(').filter(|(name, _)| is_name(name)) else { continue };
         let (is_one, calls) = threads.entry(thread).or_default();
         *is_one |= line.trim_start().starts_with(&named);
@@ -64,8 +64,8 @@ fn played(executor: &str, called: &str) -> (f64, Vec<Vec<String>>) {
     (turns, calls(&trace, called).into_iter().map(owned).collect())
 }
 
-/// Of the calls of some threads, those that wait and those that do not; what a thread asks in the first and the last quarter
-/// of its calls is not asked by steady turns.
+/// Of the calls of some threads, the ones that wait and the ones that do not; calls in the first and the last quarter
+/// of a thread's calls do not belong to steady turns.
 fn steady(threads: &[Vec<String>]) -> (usize, BTreeMap<&str, usize>) {
     let (mut waits, mut others) = (0, BTreeMap::new());
     for name in threads.iter().flat_map(|calls| &calls[calls.len() / 4..calls.len() * 3 / 4]) {

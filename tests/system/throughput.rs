@@ -1,4 +1,4 @@
-//! What a pool of workers promises of thousands of agents: counts and ratios, whatever the machine does meanwhile.
+//! Promises of a pool of workers for thousands of agents: counts and ratios, whatever the machine does meanwhile.
 
 use metachron_core::{N_MAX, Resolution, ResolutionRange, SimSpan};
 use metachron_models::synthetic::{Synthetic, SyntheticSpec};
@@ -67,7 +67,7 @@ fn under_overload_everybody_falls_to_the_same_share_of_its_rate() {
 fn a_hundred_thousand_agents_start_and_a_pause_stops_them_all() {
     let mut run = pool((0..100_000).map(|_| agent(0.5, 1.0)).collect());
     run.drive(TimelineCommand::Pause);
-    // those that were due at the start have made their turns
+    // agents that were due at the start have made their turns
     let due = |run: &dyn Run| run.agents().iter().filter(|agent| agent.latest().time <= run.sim_now()).count();
     let end = run.now() + Duration::from_secs(60);
     while due(&*run) > 0 {

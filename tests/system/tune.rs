@@ -1,4 +1,5 @@
-//! Gains that `tune` finds, judged by the frames of real runs under them; what it says, what it refuses, how it is stopped.
+//! Gains that `tune` finds, judged by the frames of real runs under them; its messages, the arguments that it refuses,
+//! how it is stopped.
 //!
 //! A push is a load of the declared machine: on one that was 2.5 times as fast, the picture that took its time then comes at 0.4 of the
 //! rate now, and the other way round.
@@ -20,10 +21,10 @@ const AFTER_S: f64 = 1.6;
 /// A frame is late past this part of its time.
 const LATE: f64 = 1.05;
 
-/// A scene with the gains that were found for it, and what was said of them.
+/// A scene with the gains that were found for it, and the output about them.
 struct Tuned<'a> {
     scene: &'a str,
-    /// What makes its agents cheap to step: the picture is what is tuned.
+    /// The settings that make its agents cheap to step: the picture is tuned.
     set: Vec<String>,
     folder: Folder,
     said: Value,
@@ -94,9 +95,9 @@ impl<'a> Tuned<'a> {
         }
     }
 
-    /// The corners of what is in reach: of the least and of the greatest rate the slowest and the fastest machine, of those between one of
-    /// the two in turn. The loop's gain grows with the speed and the frames of a second with the rate, so what lies between is milder. Gives
-    /// in how many places the target is in reach.
+    /// The corners of the reachable targets: of the least and of the greatest rate the slowest and the fastest machine,
+    /// of the rates between one of the two in turn. The loop's gain grows with the speed and the frames of a second
+    /// with the rate, so targets between are milder. Gives in how many places the target is in reach.
     fn holds_wherever_it_can(&self) -> usize {
         let reached = |hz: f64| SPEEDS.into_iter().filter(|&s| self.reaches(self.set_s(hz), s)).collect::<Vec<_>>();
         let places: Vec<_> = RATES_HZ.into_iter().map(|hz| (hz, reached(hz))).filter(|(_, s)| !s.is_empty()).collect();
@@ -329,8 +330,8 @@ fn the_gains_for_the_overload_hold_its_frames_and_beat_the_others() {
 
 #[test]
 fn the_gains_for_the_auditorium_hold_its_frames_and_beat_the_others() {
-    // seen from where its walk begins: on the way what is in view changes what is in reach; its many objects make each frame of a trial dear,
-    // and gains hold at every rate, so they are found at the fewest frames a second
+    // seen from where its walk begins: on the way the objects in view change the reachable targets; its many objects
+    // make each frame of a trial dear, and gains hold at every rate, so they are found at the fewest frames a second
     let view = "eye_m=[-0.5,-9.0,2.2],look_at_m=[6.859,-2.374,0.808]";
     let stand = [
         format!("camera.keyframe=[{{at_s=0.0,{view}}},{{at_s=100.0,{view}}}]"),
@@ -396,7 +397,7 @@ fn given_gains_are_explained_in_sentences_and_every_law_has_its_analysis() {
     assert!(number(&swings, "/cycle/amplitude") > 0.05 && number(&swings, "/cycle/period_s") > 0.0);
 }
 
-/// Code 2 and what was said.
+/// Code 2 and the message.
 fn refused(arguments: &[&str]) -> String {
     let done = metachron(arguments);
     let said = String::from_utf8(done.stderr).unwrap();

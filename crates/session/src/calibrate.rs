@@ -51,7 +51,7 @@ struct PartialBenchmark {
     pictures: Vec<[f64; 8]>,
 }
 
-/// What drawing costs on an adapter, and how well that is known.
+/// The prices of drawing on an adapter, and how well they are known.
 #[derive(Debug, Clone, PartialEq)]
 pub struct PriceTable {
     /// The adapter, as [`Gpu::describe`] names it.
@@ -94,7 +94,7 @@ pub enum ImportError {
         place: String,
         /// The number there.
         found: f64,
-        /// What may stand there.
+        /// The range that it must be in.
         expected: &'static str,
     },
 }
@@ -123,7 +123,7 @@ pub enum CalibrateError {
     /// The adapter failed.
     #[error(transparent)]
     Draw(#[from] GpuError),
-    /// There was no time for all pictures: what was measured is kept, and the next measurement goes on from it.
+    /// There was no time for all pictures: the measured ones are kept, and the next measurement goes on from them.
     #[error("{0:.0} % of the pictures could not be drawn within three seconds; the next run goes on with them")]
     Unfinished(f64),
     /// No prices fit the pictures; they are forgotten.
@@ -131,7 +131,8 @@ pub enum CalibrateError {
     NoFit,
 }
 
-/// Prices of the adapter of this name: those that are known, else measured on the device that `open` returns; `None` if there is no such
+/// Prices of the adapter of this name: the known ones, else measured on the device that `open` returns; `None` if there
+/// is no such
 /// device or it cannot be measured. `report` receives a line if anything is measured.
 pub(super) fn prices(adapter: &str, open: impl FnOnce() -> Option<Gpu>, report: fn(&str)) -> Option<Prices> {
     if let Some(known) = PriceTable::known(adapter) {
@@ -190,9 +191,10 @@ impl PriceTable {
         store(folder().as_deref(), self)
     }
 
-    /// Forgets what a measurement of the adapter of this name has begun; a table that is known stands until another takes its place.
+    /// Forgets a measurement of the adapter of this name that has begun; a table that is known stands until another
+    /// takes its place.
     pub fn forget_begun(adapter: &str) {
-        // what is not there is forgotten already
+        // a file that is not there is forgotten already
         let _ = folder().map(|folder| std::fs::remove_file(file(&folder, adapter, PARTIAL)));
     }
 

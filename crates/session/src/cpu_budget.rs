@@ -60,7 +60,7 @@ impl AgentBudget {
         self.visible_dt.store(detail.dt_s.to_bits(), Ordering::Relaxed);
     }
 
-    /// What makes a visible difference: all, until it is set.
+    /// The ε and step that make a visible difference: all, until they are set.
     pub fn visible(&self) -> VisibleDetail {
         let of = |bits: &AtomicU64| f64::from_bits(bits.load(Ordering::Relaxed));
         VisibleDetail { eps_m: of(&self.visible_eps), dt_s: of(&self.visible_dt) }
@@ -94,7 +94,7 @@ pub(super) struct FramePeriod {
     pub period_s: f64,
 }
 
-/// What the frame loop has of the cores.
+/// The frame loop's use of the cores.
 #[derive(Debug, Clone, Copy)]
 pub(super) enum FrameLoop {
     /// It draws on them, and pays the agents' price for more than the rest.
@@ -146,7 +146,7 @@ impl CpuBudget {
                 self.market.settle(&self.workers, capacity, drawing).unzip()
             }
             FrameLoop::Takes(taken_s) => {
-                // what is not the agents' room is the frame loop's; if that takes more, they have less
+                // time outside the agents' room is the frame loop's; if that takes more, they have less
                 let capacity = (ROOM * f64::from(cores) * period_s).min(f64::from(cores) * period_s - taken_s);
                 (Some(price(&self.workers, capacity)).filter(|lambda| *lambda > 0.0), None)
             }

@@ -1,20 +1,22 @@
-//! What happened in a run: attachments that yielded or tore, sensors that were touched.
+//! Events of a run: attachments that yielded or tore, sensors that were touched.
 //!
-//! In: the last states of all agents, each of which has all that it tells of. Out: events in the order of time, sensors by agents.
+//! In: the last states of all agents, each of which has all events that the agent reports. Out: events in the order of
+//! time, sensors by agents.
 //! Never here: forces, names.
 
 use metachron_core::{AgentId, AttachmentEvent, SensorTouch, Snapshot};
 
-/// What happened to an attachment in a run.
+/// An event of an attachment in a run.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Event {
-    /// The agent that tells of it: of a joint the first body, of a coupling the one of lower number, of a tube's own attachment the tube.
+    /// The agent that reports it: of a joint the first body, of a coupling the one of lower number, of a tube's own
+    /// attachment the tube.
     pub agent: AgentId,
-    /// What, when, and by which force.
+    /// The event, its time and its force.
     pub what: AttachmentEvent,
 }
 
-/// The events that the agents in `states`, by rising numbers, tell of.
+/// The events that the agents in `states`, by rising numbers, report.
 pub(super) fn events<'a>(states: impl Iterator<Item = &'a Snapshot>) -> Vec<Event> {
     let reported =
         |(agent, state): (AgentId, &'a Snapshot)| state.events.iter().map(move |&what| Event { agent, what });
@@ -23,16 +25,16 @@ pub(super) fn events<'a>(states: impl Iterator<Item = &'a Snapshot>) -> Vec<Even
     events
 }
 
-/// What a sensor was touched by in a run, or what touched a sensor.
+/// A touch of a sensor in a run.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Sensing {
-    /// The agent that tells of it: of two the one of lower number.
+    /// The agent that reports it: of two the one of lower number.
     pub agent: AgentId,
-    /// By what, and how often.
+    /// The other side, and how often it touched.
     pub what: SensorTouch,
 }
 
-/// What the agents in `states`, by rising numbers, tell of sensors.
+/// The touches of sensors that the agents in `states`, by rising numbers, report.
 pub(super) fn sensed<'a>(states: impl Iterator<Item = &'a Snapshot>) -> Vec<Sensing> {
     let told = |(agent, state): (AgentId, &'a Snapshot)| state.sensed.iter().map(move |&what| Sensing { agent, what });
     (0..).map(AgentId).zip(states).flat_map(told).collect()

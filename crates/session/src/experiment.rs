@@ -26,7 +26,7 @@ pub struct Experiment {
 
 /// Result of an experiment.
 pub struct ExperimentResult {
-    /// Its frames, without those of the warm-up.
+    /// Its frames, without the warm-up's.
     pub observed: Vec<Observed>,
     /// The adapter that drew; `None` where costs were declared.
     pub adapter: Option<String>,
@@ -80,7 +80,7 @@ pub struct Design {
     frames: u64,
     frame: u64,
     register: u32,
-    /// The recorded frames so far, without those of the warm-up.
+    /// The recorded frames so far, without the warm-up's.
     pub observed: Vec<Observed>,
 }
 

@@ -1,4 +1,4 @@
-//! The film of a run: what was on the screen at every tick of the target rate, as raw video (YUV4MPEG2).
+//! The film of a run: the picture on the screen at every tick of the target rate, as raw video (YUV4MPEG2).
 //!
 //! In: pictures, each with the time at which it was finished. Out: a file of one frame a tick; a late picture leaves the one before it on the
 //! screen. Never here: drawing, clocks.
@@ -15,7 +15,7 @@ pub(super) struct Film {
     file: BufWriter<File>,
     path: PathBuf,
     period: Duration,
-    /// When the film begins; its first frame is what is on the screen a tick later.
+    /// When the film begins; its first frame is the picture on the screen a tick later.
     begun: Duration,
     shown: Option<PictureFile>,
     written: u32,
@@ -49,7 +49,7 @@ impl Film {
         self.file.flush().map_err(|error| SessionError::Film { path: self.path, error })
     }
 
-    /// Writes what is shown at the ticks that `are_past`, as soon as there is anything to show.
+    /// Writes the picture on the screen at the ticks that `are_past`, as soon as there is one.
     fn run_until(&mut self, are_past: impl Fn(Duration) -> bool) -> Result<(), SessionError> {
         let Some(picture) = &self.shown else { return Ok(()) };
         let planes = planes(picture);

@@ -27,7 +27,7 @@ pub enum End {
     Recording,
 }
 
-/// What draws the frames.
+/// The way in which frames are drawn.
 pub enum Drawing {
     /// Nothing: a frame costs its declared time, or nothing in real time.
     Nothing,

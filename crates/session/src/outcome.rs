@@ -31,15 +31,16 @@ pub struct FrameRecord {
     pub full_ms: f64,
     /// Triangles drawn.
     pub triangles: u64,
-    /// Objects in view: of the potentially visible ones those that what portals leave of the frustum shows.
+    /// Objects in view: of the potentially visible ones the objects that are seen in the part of the frustum that
+    /// portals leave.
     pub objects: u64,
-    /// Objects in cells that the eye reaches through portals, and those in no cell in view.
+    /// Objects in cells that the eye reaches through portals, and objects in no cell in view.
     pub potentially_visible: u64,
     /// Objects in view that are drawn: as themselves, not left out and not replaced by an impostor.
     pub drawn: u64,
     /// Gathering states and finding visible objects, milliseconds; declared in lockstep, as is choosing.
     pub cull_ms: f64,
-    /// Choosing levels, milliseconds; with a bounded lag those of the next frame, during the drawing of this one.
+    /// Choosing levels, milliseconds; with a bounded lag the next frame's, during the drawing of this one.
     pub select_ms: f64,
     /// Making the picture and drawing it, milliseconds.
     pub draw_ms: f64,
@@ -87,7 +88,7 @@ pub struct ProbeOutcome {
 pub struct AgentOutcome {
     /// Its statistics.
     pub stats: AgentStats,
-    /// Simulated time that it has not lived, seconds: what it dropped, and what it was behind at the end.
+    /// Simulated time that it has not lived, seconds: its dropped time, and its lag at the end.
     pub given_up_s: f64,
     /// The resolution it was last drawn at; `None` where it has no picture.
     pub picture: Option<Resolution>,
@@ -132,11 +133,11 @@ pub struct Outcome {
     pub agents: Vec<AgentOutcome>,
     /// All couplings.
     pub couplings: Vec<Coupling>,
-    /// What happened once, in the order of time.
+    /// Events of attachments, in the order of time.
     pub events: Vec<Event>,
-    /// What touched sensors.
+    /// Touches of sensors.
     pub sensors: Vec<Sensing>,
-    /// What each sensor of the scene read at the end; `None` where what it is on has gone.
+    /// The reading of each sensor of the scene at the end; `None` where its object has gone.
     pub readings: Vec<Option<Reading>>,
     /// Each agent's part in the contact cluster that it was stepped in last.
     pub clusters: Vec<Option<ClusterState>>,

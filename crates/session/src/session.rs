@@ -71,7 +71,7 @@ pub struct Session {
     records: Vec<FrameRecord>,
     chosen: Chosen,
     last_start: Option<Duration>,
-    /// When agents' processor time was last read, and what it was, seconds.
+    /// When agents' processor time was last read, and its value then, seconds.
     agents_cpu: (Duration, f64),
     /// Time and position of the camera at its last reading.
     last_camera: Option<(Duration, Camera)>,
@@ -84,7 +84,7 @@ pub struct Session {
     warm_up: usize,
     finished: u64,
     keep: usize,
-    /// Whether default drawing prices replace those of the adapter.
+    /// Whether default drawing prices replace the adapter's.
     unpriced: bool,
     /// Receives a line if start-up takes long.
     report_progress: fn(&str),
@@ -113,7 +113,7 @@ struct Chosen {
     cull: Duration,
     /// Choosing levels before the picture is made.
     select: Duration,
-    /// Choosing those of the next frame during the drawing of this one.
+    /// Choosing the next frame's levels during the drawing of this one.
     select_next: Option<Duration>,
     /// Making the picture at these levels.
     build: Duration,
@@ -369,7 +369,8 @@ impl Session {
         record
     }
 
-    /// Learns what a frame takes of a core: CPU time of this thread where time is real, else what is declared.
+    /// Learns the time of a core that a frame takes: CPU time of this thread where time is real, else the declared
+    /// time.
     fn measure_thread(&mut self) {
         let Chosen { cull, select, select_next, .. } = self.chosen;
         let declared = Some(cull + select + select_next.unwrap_or_default());

@@ -39,7 +39,7 @@ struct AgentGroup {
     side_px: Option<f64>,
 }
 
-/// What a frame shows of all actors.
+/// The visibility of all actors in a frame.
 #[derive(Clone, Copy)]
 pub(super) struct Seen<'a> {
     /// Of every actor.
@@ -97,8 +97,8 @@ impl VisibleResolution {
     }
 }
 
-/// What is seen of an agent that is drawn by itself, or by an impostor with triangles of a side of so many pixels, where a pixel is so many
-/// metres wide.
+/// The finest ε and step that are seen of an agent which is drawn by itself, or by an impostor with triangles of a side
+/// of so many pixels, where a pixel is so many metres wide.
 fn visible_detail(seen: &Visibility, side_px: Option<f64>, pixel_m: f64) -> VisibleDetail {
     match side_px {
         // nothing finer than a triangle is drawn, and no motion shorter than one tells two steps apart

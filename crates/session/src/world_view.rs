@@ -10,10 +10,10 @@ use metachron_render::{Camera, History, Level, Picture, SceneView, Size, States,
 use metachron_runtime::{AgentHandle, AgentState};
 use metachron_world::{Scene, World};
 
-/// What a world looks like now. Reading never waits for what steps.
+/// A view of a world now. Reading never waits for steps.
 ///
-/// A picture has the newest state of each object, as [`World::latest`] gives it, and those that joined or left since the start. Everything is
-/// drawn as the policy `full` draws it: at its finest, whatever it costs.
+/// A picture has the newest state of each object, as [`World::latest`] gives it, with objects that joined and without
+/// objects that left since the start. Everything is drawn as the policy `full` draws it: at its finest, at any cost.
 pub struct WorldView {
     world: World,
     /// The scene, with the objects that joined.
@@ -69,7 +69,7 @@ impl WorldView {
         self.scene_view.compose(camera, &levels, Style::default(), None)
     }
 
-    /// Takes the newest states, and those that joined.
+    /// Takes the newest states, and objects that joined.
     fn gather(&mut self) {
         let Self { world, scene, scene_view, .. } = self;
         let before = scene.agents.len();
@@ -80,7 +80,7 @@ impl WorldView {
             self.lasting = assemble::lasting(scene);
         }
         let agents = || world.agents().iter().take(scene.agents.len());
-        // no state before the newest: what was shown last may be long ago
+        // no state before the newest: the picture shown last may be long ago
         let newest = |agent: &AgentHandle| match agent.state() {
             AgentState::Gone => History::default(),
             state => History { before: None, newest: Some(agent.latest()), awake: state == AgentState::Running },

@@ -1,6 +1,6 @@
 //! A model of one's own: a pontoon that floats between piles, up and down, and carries what others put on it.
 //!
-//! In: its hull, the water's density and drag. Out: an [`Agent`] for `Custom`. Never here: what lies on it.
+//! In: its hull, the water's density and drag. Out: an [`Agent`] for `Custom`. Never here: the bodies that rest on it.
 //!
 //! It is one node on one spring that goes as deep as water carries it (Archimedes): m z'' = B(z) − m g − c z', with the surface at z = 0.
 //! A step is linearly implicit: (m + h c + h² k) v' = m v + h (B − m g), where k = −dB/dz; contact adds its impulses on the right.
@@ -24,7 +24,7 @@ pub struct Hull {
     pub half_m: DVec3,
     /// Its mass, kg, > 0.
     pub mass_kg: f64,
-    /// What the water's drag gives at 1 m/s, N s/m, ≥ 0.
+    /// The water's drag at 1 m/s, N s/m, ≥ 0.
     pub drag_n_s_m: f64,
 }
 
@@ -104,7 +104,7 @@ fn upright() -> Result<Side, ProblemError> {
 }
 
 impl ClusterMember for Pontoon {
-    /// It keeps steps of its own, whatever the rates of what lies on it.
+    /// It keeps steps of its own, whatever the rates of the bodies that rest on it.
     fn role(&self) -> Role {
         Role::Deformable
     }
@@ -143,7 +143,7 @@ impl ClusterMember for Pontoon {
         self.side
     }
 
-    /// It moves as a whole: so the engine sums what touches it in its state's `contact_wrench`.
+    /// It moves as a whole: so the engine sums its contacts in its state's `contact_wrench`.
     fn pose(&self, v: &[DVec3], t_s: f64) -> Option<Pose> {
         // no velocities are given for where it is now
         let way_m = v.first().map_or(0.0, |v| v.z * t_s);

@@ -1,12 +1,13 @@
 //! Every order of steps of threads that meet in the runtime without waiting, and everything they may see of each other.
 //!
 //! In: the runtime's own files, over loom's primitives instead of the standard library's. Out: a line for each claim that
-//! holds; a claim that does not ends the program with the steps that break it. Never here: other copies of what is checked.
+//! holds; a claim that does not ends the program with the steps that break it. Never here: other copies of the checked
+//! files.
 //! With the feature `threads` the same claims are held against real threads, thousands of times, for ThreadSanitizer to watch.
 
 extern crate self as metachron_core;
 
-/// What the files know as the runtime's `sync`.
+/// The primitives that the files know as the runtime's `sync`.
 #[cfg(not(feature = "threads"))]
 mod sync {
     pub use loom::sync::{Arc, Mutex, RwLock, atomic};

@@ -1,4 +1,5 @@
-//! The frame's budget in whole runs: the default policy spends it, says so, and the declared machine costs what it says.
+//! The frame's budget in whole runs: the default policy spends it, says so, and the declared machine costs its declared
+//! prices.
 
 use crate::play::{Folder, lockstep, number};
 
@@ -40,7 +41,7 @@ fn the_default_spends_its_time_from_the_first_frame_on_and_knows_what_it_will_ta
         assert!((0.87..=0.92).contains(&at("/budget/spent_share")), "{target_hz} Hz: {}", report["budget"]);
         assert!(at("/missed_share") == 0.0 && at("/settle_frames") <= 15.0, "{target_hz} Hz: {report}");
         assert!(at("/frame_ms/stddev") <= 0.035 * at("/target_ms"), "{target_hz} Hz: {}", report["frame_ms"]);
-        // a goal of 10 % on a real machine; this one does what it declares, but for the caps of the tube
+        // a goal of 10 % on a real machine; this one takes its declared times, but for the caps of the tube
         assert!(at("/budget/model_error") <= 0.02 && at("/budget/certificate") <= 0.01, "{}", report["budget"]);
         assert!(at("/budget/reversals") <= 0.002 && at("/budget/holes") == 0.0, "{}", report["budget"]);
     }

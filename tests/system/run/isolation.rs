@@ -1,4 +1,4 @@
-//! What one agent's trouble does to the others: nothing.
+//! The effect of one agent's trouble on the others: none.
 
 use crate::play::{Folder, agent, lockstep, metachron, number, report_of};
 use serde_json::Value;
@@ -28,7 +28,7 @@ fn an_agent_of_ten_times_the_cost_leaves_the_others_their_rates_in_lockstep() {
 
 #[test]
 fn an_agent_of_ten_times_the_cost_leaves_the_others_their_rates_on_threads() {
-    // whoever else uses the machine shows in a run: of three the best counts
+    // other programs on the machine show in a run: of three the best counts
     let run = |cost| company(cost).run_on_threads();
     let best = (0..3).map(|_| change(&run(2_000), &run(20_000))).fold(f64::MAX, f64::min);
     assert!(best < 0.05, "{best}");
@@ -80,7 +80,7 @@ fn the_first_line_says_what_an_agent_gave_up_and_at_the_free_pace_none_gives_up_
     }
 }
 
-/// The report without what is measured by a real clock.
+/// The report without times of a real clock.
 fn without_cpu(mut report: Value) -> Value {
     report.as_object_mut().unwrap().remove("cpu_s").unwrap();
     for agent in report["agents"].as_array_mut().unwrap() {

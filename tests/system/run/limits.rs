@@ -73,7 +73,7 @@ fn an_object_that_diverges_is_parked_and_the_others_go_on() {
     assert!(number(agent(&report, "ball"), "/steps") >= 1000.0);
 }
 
-/// What `run` and `check` say of a bad scene; both must end with 2.
+/// The messages of `run` and `check` about a bad scene; both must end with 2.
 fn refusal(text: &str, arguments: &[&str]) -> String {
     let scene = Folder::with(text);
     let run = metachron(&[&["run", scene.scene(), "--headless", "--frames", "1"], arguments].concat());

@@ -1,4 +1,4 @@
-//! What a run writes, and where.
+//! The outputs of a run, and their places.
 
 use crate::play::{Folder, agent, metachron, number, program, report_of};
 use serde_json::Value;

@@ -19,7 +19,7 @@ pub struct ChoiceSummary {
     pub reversals: Option<f64>,
     /// 19 of 20 frames took the predicted time to within this part of it; `None` for a policy without predictions.
     pub model_error: Option<f64>,
-    /// Time for gathering states and finding what is visible.
+    /// Time for gathering states and finding visible objects.
     pub cull_ms: Option<Spread>,
     /// Time for choosing levels.
     pub select_ms: Option<Spread>,
@@ -33,7 +33,7 @@ pub struct ChoiceSummary {
     pub passes: Option<Spread>,
     /// Objects per frame in cells that the eye reached through portals, and those in no cell in view.
     pub potentially_visible: Option<f64>,
-    /// Objects per frame in view: where there are cells, those that portals leave in view.
+    /// Objects per frame in view: where there are cells, the objects that portals leave in view.
     pub visible: Option<f64>,
     /// Objects per frame in view that were drawn: as themselves, not left out and not replaced by an impostor.
     pub drawn: Option<f64>,

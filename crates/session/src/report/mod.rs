@@ -53,16 +53,16 @@ pub struct Report {
     pub agents: Vec<AgentReport>,
     /// The couplings between agents.
     pub couplings: Vec<CouplingReport>,
-    /// What happened once, in the order of time; left out where nothing did.
+    /// Events of attachments, in the order of time; left out where there were none.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub events: Vec<EventReport>,
-    /// What touched sensors, and how often; left out where nothing did.
+    /// Touches of sensors, and how often; left out where there were none.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub sensors: Vec<SensorReport>,
-    /// What the scene's sensors read at the end; left out where it has none.
+    /// The readings of the scene's sensors at the end; left out where it has none.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub readings: Vec<ReadingReport>,
-    /// Devices that led objects, and what they felt; left out where there were none.
+    /// Devices that led objects, and the forces that they felt; left out where there were none.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub devices: Vec<DeviceReport>,
     /// Agents that failed and stepped no more.
@@ -116,10 +116,11 @@ pub struct AgentReport {
     /// Simulated seconds that it has lived, ≥ 0: its steps, longer ones by their length, and its time at rest. It may be more than `sim_s` by
     /// less than a step: a state covers the step that leads to it.
     pub lived_s: f64,
-    /// Simulated seconds since its start that it has not lived, ≥ 0: what it dropped, and what it was behind when the run ended; 0 where it failed.
+    /// Simulated seconds since its start that it has not lived, ≥ 0: its dropped time, and its lag when the run ended;
+    /// 0 where it failed.
     pub given_up_s: f64,
-    /// Steps, of `steps`, that were longer than was asked for then, by its rate or by control within the range that the scene allows: those of
-    /// an agent that is late are, by up to 2.5 times near others.
+    /// Steps, of `steps`, that were longer than was asked for then, by its rate or by control within the range that the
+    /// scene allows: steps of an agent that is late are, by up to 2.5 times near others.
     pub lengthened: u64,
     /// Simulated milliseconds that could not be made up, ≥ 0.
     pub dropped_ms: f64,
@@ -169,7 +170,7 @@ pub struct ClusterRow {
     pub slack: f64,
     /// Steps of each member within it.
     pub steps: Vec<u32>,
-    /// Contacts of the last step, those that bear nothing included.
+    /// Contacts of the last step, including contacts that bear nothing.
     pub contacts: u32,
     /// Problems that its leader has solved in the run.
     pub problems: u64,
@@ -181,7 +182,7 @@ pub struct ClusterRow {
     pub unfinished: u64,
     /// How far the solves of the last step went: `kept`, `near`, `polished` or, where one ended before all laws held, `interior`; `rigid-pile` where rapier3d stepped a heap.
     pub level: &'static str,
-    /// What laws and momentum miss at most by their answers, m/s.
+    /// The greatest miss of the laws and of momentum by their answers, m/s.
     pub miss_m_s: f64,
     /// The deepest overlap of the last step, metres.
     pub depth_m: f64,
@@ -230,7 +231,8 @@ pub struct CouplingReport {
 pub struct EventReport {
     /// Simulated time, seconds: the end of the step in which it happened.
     pub at_s: f64,
-    /// What happened: `yielded`, an attachment for the first time by its `yields_above_n`, or `tore`, by its `tears_above_n`.
+    /// The event: `yielded`, an attachment for the first time by its `yields_above_n`, or `tore`, by its
+    /// `tears_above_n`.
     pub kind: &'static str,
     /// The attachment, as its place in the scene: `joint.0`, `coupling.2`, `attach.1` of the tube `a`.
     pub attachment: String,
@@ -342,7 +344,7 @@ pub struct BudgetReport {
     pub choices: ChoiceSummary,
 }
 
-/// What a sensor read at the end.
+/// A sensor's reading at the end.
 #[derive(Debug, Clone, Default, Serialize)]
 pub struct ReadingReport {
     /// Its name.
@@ -351,7 +353,7 @@ pub struct ReadingReport {
     pub kind: String,
     /// Time of the state that it is of, seconds.
     pub at_s: f64,
-    /// The numbers, in the order that its kind gives; none where what it is on has gone.
+    /// The numbers, in the order that its kind gives; none where its object has gone.
     pub values: Vec<f64>,
 }
 

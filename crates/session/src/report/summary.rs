@@ -138,7 +138,7 @@ fn out_of_reach(out: &mut String, agent: &AgentReport) {
     );
 }
 
-/// What a device has felt, and how steadily it was served.
+/// The forces that a device has felt, and how steadily it was served.
 fn device_line(out: &mut String, report: &DeviceReport) {
     let DeviceReport { device, object, ticks, late_ms, age_steps, force_mean_n, force_max_n, .. } = report;
     let _ = writeln!(

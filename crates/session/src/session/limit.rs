@@ -1,4 +1,4 @@
-//! What the controller rests on, and, where a target is out of reach, what takes the time of its frames.
+//! The bound of the controller, and, where a target is out of reach, the greatest part of the time of its frames.
 //!
 //! In: the controller's status, the newest frames. Out: a sentence for report and window. Never here: a choice.
 
@@ -39,8 +39,9 @@ impl Session {
     }
 }
 
-/// What frames take their time for, in the mean: the drawing, finding what is seen and choosing before it, and the rest, which is panels and
-/// presenting; `None` without a frame. What is found and chosen for the next frame is done while this one is drawn, and not counted again.
+/// The parts of the time of frames, in the mean: drawing, then finding visible objects and choosing before it, then the
+/// rest, which is panels and presenting; `None` without a frame. Finding and choosing for the next frame during the
+/// drawing of this one are not counted again.
 fn parts(frames: &[FrameRecord]) -> Option<String> {
     let mean = |of: fn(&FrameRecord) -> f64| frames.iter().map(of).sum::<f64>() / frames.len() as f64;
     let [all, draw, choose] = [mean(|row| row.frame_ms), mean(|row| row.draw_ms), mean(|row| row.lag_ms - row.draw_ms)];

@@ -18,7 +18,8 @@ impl Session {
         Self::open_as(scene, |scene, govern| Ok(World::replay_governed(scene, govern, recording, until)?))
     }
 
-    /// Writes down from now on what is done to its agents, with the text of the scene, so that [`Session::replay`] can do it again.
+    /// Writes down from now on all commands to its agents, with the text of the scene, so that [`Session::replay`] can
+    /// repeat them.
     ///
     /// # Errors
     /// [`RecordError`]; nothing is recorded then.

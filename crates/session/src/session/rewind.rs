@@ -2,8 +2,9 @@
 //!
 //! In: a session between its frames. Out: a ring of moments within a bound of memory, the oldest given up first. Never here: files, a panel.
 //!
-//! In lockstep a moment is a checkpoint of the world and the state of the frame loop, which takes part in the world by what frames cost: from
-//! there everything happens again, to the bit. In real time it is what was shown, and the world runs on while it is looked at.
+//! In lockstep a moment is a checkpoint of the world and the state of the frame loop, which takes part in the world by
+//! the cost of frames: from there everything happens again, to the bit. In real time it is the picture's states, and
+//! the world runs on while it is looked at.
 
 use super::super::cpu_budget::CpuBudget;
 use super::super::visible_resolution::VisibleResolution;
@@ -22,10 +23,10 @@ use std::time::{Duration, Instant};
 pub const REWIND_BYTES: usize = 128 << 20;
 /// Keeping moments takes at most one part in so many of the time that passes on the wall: where one takes long, fewer are kept.
 const COST_PARTS: u32 = 20;
-/// What control stores of an object, bytes: a view, a level, a demand and its own lists.
+/// The memory of control for an object, bytes: a view, a level, a demand and its own lists.
 const OBJECT_BYTES: usize = 1024;
 
-/// What is kept of a run.
+/// The moments of a run that are kept.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct RewindStatus {
     /// Simulated time of the oldest moment.
@@ -68,7 +69,7 @@ struct Moment {
     bytes: usize,
 }
 
-/// What a run in lockstep goes on from.
+/// The state from which a run in lockstep goes on.
 #[derive(Debug)]
 struct GoingOn {
     world: Checkpoint,
@@ -123,7 +124,7 @@ impl Session {
             Some(Rewind { moments: VecDeque::new(), bytes: 0, bytes_max, shown: None, kept: None, cost_s: 0.0 });
     }
 
-    /// What is kept; `None` before there is anything.
+    /// The kept moments; `None` before there are any.
     #[must_use]
     pub fn rewind(&self) -> Option<RewindStatus> {
         let rewind = self.rewind.as_ref()?;
@@ -192,7 +193,7 @@ impl Session {
     /// Looks at the last moment that is not later than `time`, or at the oldest. In lockstep the run is put back there, and paused.
     ///
     /// # Errors
-    /// Those of [`metachron_world::World::restore`].
+    /// The errors of [`metachron_world::World::restore`].
     pub fn look_at(&mut self, time: SimTime) -> Result<(), CheckpointError> {
         let Some(rewind) = &self.rewind else { return Ok(()) };
         let at = rewind.moments.partition_point(|moment| moment.time <= time).saturating_sub(1);
@@ -240,8 +241,8 @@ impl Session {
         Ok(())
     }
 
-    /// Lets the run go on from the moment that is looked at, as it did then: what was kept after it is given up. Where the world has run on,
-    /// it returns to the present. Whether it was put back.
+    /// Lets the run go on from the moment that is looked at, as it did then: moments kept after it are given up. Where
+    /// the world has run on, it returns to the present. Whether it was put back.
     ///
     /// # Errors
     /// As [`Self::look_at`].
@@ -257,8 +258,8 @@ impl Session {
         Ok(true)
     }
 
-    /// Makes the moment where the run stands the present, so that something can be done there: what was kept after it is given up. Nothing where
-    /// the run does not stand in the past.
+    /// Makes the moment where the run stands the present, so that a command can act there: moments kept after it are
+    /// given up. Nothing where the run does not stand in the past.
     pub fn branch_off(&mut self) {
         let stands = self.is_put_back();
         if let Some(rewind) = self.rewind.as_mut().filter(|_| stands)
@@ -285,7 +286,7 @@ impl Session {
         self.visible_resolution = there.visible_resolution.clone();
         self.views.clone_from(&there.views);
         self.levels.clone_from(&there.levels);
-        // those that joined after it keep their places in the picture, unseen
+        // objects that joined after it keep their places in the picture, unseen
         let later = moment.map_or(0, |moment| self.scene.agents.len().saturating_sub(moment.histories.len()));
         (0..later).for_each(|_| self.visible_resolution.join());
         if later > 0 {
@@ -302,8 +303,8 @@ impl Session {
     }
 }
 
-/// Replaces states by copies of what is shown of them, or by those of the moment before where they are the same: an agent writes its states
-/// again as soon as nobody reads them. Returns the bytes of the new ones.
+/// Replaces states by copies of the parts that a picture shows, or by the copies of the moment before where they are
+/// the same: an agent writes its states again as soon as nobody reads them. Returns the bytes of the new ones.
 fn copy(histories: &mut [History], last: &[History]) -> usize {
     let mut bytes = 0;
     for (at, history) in histories.iter_mut().enumerate() {
@@ -321,7 +322,7 @@ fn copy(histories: &mut [History], last: &[History]) -> usize {
     bytes
 }
 
-/// What a picture takes of a state.
+/// The parts of a state that a picture shows.
 fn shown(state: &Snapshot) -> Snapshot {
     Snapshot {
         time: state.time,
