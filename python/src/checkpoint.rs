@@ -1,6 +1,7 @@
 //! A world's state at one moment, kept in memory or in a file.
 //!
-//! In: a world in lockstep. Out: what it, or a world of the same scene in another process, goes on from. Never here: what is saved.
+//! In: a world in lockstep. Out: the state from which it, or a world of the same scene in another process, goes on.
+//! Never here: its contents.
 
 use crate::raised;
 use metachron::world;

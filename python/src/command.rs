@@ -17,7 +17,7 @@ use pyo3::types::PyDict;
 pub struct Keywords<'a, 'py>(Option<&'a Bound<'py, PyDict>>);
 
 impl<'a, 'py> Keywords<'a, 'py> {
-    /// Those of the method `method`, which takes `known` ones.
+    /// The keyword arguments of the method `method`, which takes `known` ones.
     pub fn new(method: &str, given: Option<&'a Bound<'py, PyDict>>, known: &[&str]) -> PyResult<Self> {
         for (key, _) in given.into_iter().flat_map(|given| given.iter()) {
             let key: String = key.extract()?;
@@ -60,7 +60,7 @@ impl<'a, 'py> Keywords<'a, 'py> {
         })
     }
 
-    /// What a joint's motor drives it to; `None` where there is no goal, which takes the motor back.
+    /// The goal of a joint's motor; `None` where there is no goal, which takes the motor back.
     pub fn motor(&self) -> PyResult<Option<Motor>> {
         let velocity: Option<f64> = self.get("velocity")?;
         let stiffness: Option<f64> = self.get("stiffness")?;

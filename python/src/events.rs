@@ -1,4 +1,4 @@
-//! What happened in a world since it was last asked.
+//! Events of a world since it was last asked.
 //!
 //! In: the world's events. Out: a list of them, oldest first. Never here: waiting.
 
@@ -30,7 +30,7 @@ pub struct Event {
     /// The end of the step in which it happened, s.
     #[pyo3(get)]
     time: f64,
-    /// Of a contact what it touches; of one that joined a cluster its leader.
+    /// Of a contact the object or solid that it touches; of one that joined a cluster its leader.
     #[pyo3(get)]
     other: Option<String>,
     /// Of a contact the place that bore most, m.
@@ -73,7 +73,7 @@ impl Events {
 
 #[pymethods]
 impl Events {
-    /// What happened since the last call, oldest first.
+    /// The events since the last call, oldest first.
     fn drain(&self, py: Python<'_>) -> Vec<Event> {
         let all: Vec<_> = self.events.lock().unwrap_or_else(PoisonError::into_inner).drain().collect();
         all.iter().map(|event| self.event(py, event)).collect()

@@ -1,6 +1,6 @@
 //! Moments of a world, and when its objects stepped, as files that other programs open.
 //!
-//! In: a world, paths. Out: an MCAP file, a VTK series, a Perfetto trace. Never here: what is in them.
+//! In: a world, paths. Out: an MCAP file, a VTK series, a Perfetto trace. Never here: their contents.
 
 use crate::raised;
 use metachron::export::{McapFile, MomentWriter, Moments, PerfettoFile, Surface, VtkSeries};

@@ -158,7 +158,8 @@ impl Joints {
     }
 
     /// Puts hinges and slides to coordinates before the next step, and all bodies that they carry: a number for each of them, or a dictionary of
-    /// some by name. The others, and what is `None`, keep theirs. What holds a tree of joints stays: the world, a kinematic body, or else its first.
+    /// some by name. The others, and joints given `None`, keep theirs. The root of a tree of joints stays: the world,
+    /// a kinematic body, or else its first.
     ///
     /// Raises `ValueError`, and moves nothing, outside a joint's range, where a loop of joints would be open, and while time passes.
     #[pyo3(signature = (positions = None, velocities = None))]
@@ -183,7 +184,7 @@ impl Joints {
         py.detach(|| self.world.set_joint_states(&states)).map_err(raised::world)
     }
 
-    /// Puts all joints back to where the scene has them at the start, at rest; what holds a tree of joints stays where it is.
+    /// Puts all joints back to where the scene has them at the start, at rest; the root of a tree of joints stays where it is.
     fn reset(&self, py: Python<'_>) -> PyResult<()> {
         py.detach(|| self.world.reset_joints()).map_err(raised::world)
     }

@@ -28,7 +28,7 @@ mod states;
 mod view;
 mod world;
 
-/// What the package re-exports; `_metachron.pyi` says what each takes.
+/// The items that the package re-exports; `_metachron.pyi` has their arguments.
 #[pyo3::pymodule]
 mod _metachron {
     #[pymodule_export]

@@ -1,6 +1,6 @@
 //! Pickles of scenes and states: bytes that the same version of the engine reads.
 //!
-//! In: a value. Out: its bytes, and back; or why they are not read. Never here: what is in them.
+//! In: a value. Out: its bytes, and back; or why they are not read. Never here: their contents.
 
 use metachron::core::{Archive, archive_values};
 use pyo3::PyResult;

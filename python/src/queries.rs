@@ -1,4 +1,4 @@
-//! What is where in a world: answers to rays, nearest points and contacts.
+//! Spatial queries of a world: answers to rays, nearest points and contacts.
 //!
 //! In: the engine's answers. Out: names, numbers and vectors. Never here: the search.
 
@@ -8,7 +8,7 @@ use metachron::world::{self, World};
 use numpy::PyArray1;
 use pyo3::prelude::*;
 
-/// What a ray or a search found.
+/// A hit of a ray or a search.
 #[pyclass(frozen, get_all, module = "metachron")]
 pub struct Hit {
     name: String,

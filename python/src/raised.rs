@@ -1,6 +1,6 @@
 //! The engine's errors as Python's exceptions, with the engine's own sentences.
 //!
-//! In: errors of scenes and worlds. Out: `KeyError` for a name that there is not, `ValueError` for what is wrong with what was given,
+//! In: errors of scenes and worlds. Out: `KeyError` for a name that there is not, `ValueError` for wrong arguments,
 //! `RuntimeError` for a world or an object that cannot do it any more. Never here: a sentence about physics.
 
 use metachron::export::ExportError;
@@ -96,7 +96,7 @@ pub fn build(error: &SceneBuildError) -> PyErr {
     PyValueError::new_err(error.to_string())
 }
 
-/// A scene file's problems, a line each: where it is, what it is, what was expected.
+/// A scene file's problems, a line each: the place, the problem, the expected value.
 pub fn scene(error: &SceneError) -> PyErr {
     let hidden = (error.hidden > 0).then(|| format!("and {} more", error.hidden));
     let lines = [error.to_string()].into_iter().chain(error.problems.iter().map(problem)).chain(hidden);

@@ -1,7 +1,7 @@
 //! A world's recording, played again.
 //!
-//! In: a file that `World.record` or `metachron run --record` has written. Out: a world that does what it says, to the bit.
-//! Never here: what is written down.
+//! In: a file that `World.record` or `metachron run --record` has written. Out: a world that repeats it, to the bit.
+//! Never here: the format of the file.
 
 use crate::numbers::span;
 use crate::raised;
@@ -15,7 +15,7 @@ use std::path::PathBuf;
 
 /// A world on one thread that does again what a recording says, as far as time is let pass, and no further than `until`, s; it takes no commands.
 ///
-/// `scene` is what was recorded, unless that was read from TOML: then the recording has it. Raises `OSError`, and `ValueError` for a file
+/// `scene` is the recorded scene, unless that was read from TOML: then the recording has it. Raises `OSError`, and `ValueError` for a file
 /// that is no recording of this version, or is of another scene.
 #[pyfunction]
 #[pyo3(signature = (path, scene = None, *, until = None))]

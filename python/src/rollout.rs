@@ -25,7 +25,7 @@ use std::time::Duration;
 /// So long is waited before Python is asked whether the user has interrupted it.
 const PATIENCE: Duration = Duration::from_millis(20);
 
-/// What became of many worlds.
+/// The results of many worlds.
 #[pyclass(frozen, get_all, module = "metachron")]
 pub struct Rollout {
     /// By observed object (worlds, steps, n, 3), m, after each step.
@@ -43,7 +43,7 @@ impl Rollout {
     }
 }
 
-/// What every world does.
+/// The scene and the actions of all worlds.
 struct Plan {
     scene: world::Scene,
     /// The object that forces act on, and where.
@@ -55,7 +55,7 @@ struct Plan {
     actions: Array3<f64>,
 }
 
-/// What became of one world.
+/// The result of one world.
 struct Played {
     /// By observed object.
     motions: Vec<Motion>,

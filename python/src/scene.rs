@@ -44,7 +44,7 @@ enum Saved {
     Read(SceneText),
 }
 
-/// What every solid says of itself; `None` where the engine's default stands.
+/// The keywords of every solid; `None` where the engine's default stands.
 struct Placed {
     at: Option<Vector>,
     rotation: Option<Rotation>,
@@ -52,7 +52,7 @@ struct Placed {
     restitution: Option<f64>,
 }
 
-/// What a body says that moves.
+/// The keywords of a moving body.
 struct Moving {
     mass: Option<f64>,
     velocity: Option<Vector>,
@@ -185,7 +185,7 @@ impl Scene {
         Ok(slf)
     }
 
-    /// Adds what moves: a rigid body, a tube, a sheet, a solid or a rope.
+    /// Adds a moving object: a rigid body, a tube, a sheet, a solid or a rope.
     fn add<'py>(mut slf: PyRefMut<'py, Self>, name: String, what: &Bound<'py, PyAny>) -> PyResult<PyRefMut<'py, Self>> {
         let part = part(what)?;
         slf.build(|builder| builder.add(name, part))?;
@@ -275,7 +275,7 @@ pub fn class(part: &Bound<'_, PyAny>) -> PyResult<String> {
     Ok(part.get_type().name()?.to_string())
 }
 
-/// What moves: a rigid body, a tube or a soft body.
+/// A moving object: a rigid body, a tube or a soft body.
 pub fn part(part: &Bound<'_, PyAny>) -> PyResult<Part> {
     if class(part)? == "Tube" {
         return Ok(tube(part)?.into());

@@ -1,6 +1,6 @@
-//! What sensors of a scene are on.
+//! Mounts of a scene's sensors.
 //!
-//! In: the dataclasses of `package/metachron/parts.py`. Out: the engine's names of mounts. Never here: what a sensor reads.
+//! In: the dataclasses of `package/metachron/parts.py`. Out: the engine's names of mounts. Never here: readings.
 
 use crate::numbers::{Rotation, Vector};
 use crate::scene::{class, field};
@@ -8,7 +8,7 @@ use metachron::prelude::{DQuat, SensorOn, Site};
 use pyo3::exceptions::PyTypeError;
 use pyo3::prelude::*;
 
-/// What a sensor is on.
+/// The mount of a sensor.
 pub fn mount(on: &Bound<'_, PyAny>) -> PyResult<SensorOn> {
     let joint = || field::<String>(on, "joint");
     let object = || field::<String>(on, "object");

@@ -39,7 +39,7 @@ pub fn soft(part: &Bound<'_, PyAny>) -> PyResult<Option<Soft>> {
     placed(part, eps.into_iter().fold(soft, Soft::eps_m)).map(Some)
 }
 
-/// What all of them say.
+/// Sets the fields that all soft bodies have.
 fn placed(part: &Bound<'_, PyAny>, soft: Soft) -> PyResult<Soft> {
     let vector = |name| field::<Option<Vector>>(part, name).map(Option::into_iter);
     let number = |name| field::<Option<f64>>(part, name).map(Option::into_iter);

@@ -1,6 +1,6 @@
 //! How worlds start: which executor runs them, and how their time passes.
 //!
-//! In: a scene, names. Out: a world whose time stands. Never here: what is done to it.
+//! In: a scene, names. Out: a world whose time stands. Never here: calls to the world.
 
 use crate::raised;
 use metachron::world::kinds::ExecutorKind;

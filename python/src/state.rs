@@ -14,21 +14,21 @@ use pyo3::types::{PyBytes, PyDict};
 use std::slice::from_ref;
 use std::sync::Arc;
 
-/// What an object was like at one moment. It never changes; its arrays are copies that nobody can write to.
+/// The state of an object at one moment. It never changes; its arrays are copies that nobody can write to.
 #[pyclass(frozen, module = "metachron")]
 pub struct State(pub Arc<Snapshot>);
 
 /// An array with a row for each.
 type Rows<'py> = Bound<'py, PyArray2<f64>>;
 
-/// The points of a body: the nodes of what bends, the centre of mass or the tip of what does not.
+/// The points of a body: the nodes of a deformable, the centre of mass of a rigid body or the tip of a tool.
 pub struct Points<'a> {
     pub positions: &'a [DVec3],
     pub velocities: &'a [DVec3],
 }
 
 impl<'a> Points<'a> {
-    /// Those of this body.
+    /// The points of this body.
     pub fn of(body: &'a Body) -> Self {
         let (positions, velocities) = match body {
             Body::Rigid(rigid) => (from_ref(&rigid.position), from_ref(&rigid.velocity)),
@@ -114,8 +114,8 @@ impl State {
         self.0.at_rest
     }
 
-    /// Of the leader of what touches or is joined, how its last step was solved: level, factors, by how much the answers
-    /// miss the laws, m/s, and the deepest overlap, m.
+    /// Of the leader of a cluster, how its last step was solved: level, factors, by how much the answers miss the laws, m/s,
+    /// and the deepest overlap, m.
     #[getter]
     fn contact_solve(&self) -> Option<(&'static str, u32, f64, f64)> {
         let solves = self.0.cluster?.solves?;
@@ -128,7 +128,7 @@ impl State {
         self.0.energy_j
     }
 
-    /// (n, 3), m: the nodes of what bends, the centre of mass or the tip of what does not.
+    /// (n, 3), m: the nodes of a deformable, the centre of mass of a rigid body or the tip of a tool.
     #[getter]
     fn positions<'py>(&self, py: Python<'py>) -> Rows<'py> {
         rows(py, Points::of(&self.0.body).positions.iter().map(|v| v.to_array()))
@@ -164,7 +164,7 @@ impl State {
         Ok(row(py, self.turning("spin")?.1.to_array()))
     }
 
-    /// (6,), N and N m, world axes: what contacts gave a body that does not bend, about its centre of mass, in the mean of its last step.
+    /// (6,), N and N m, world axes: the wrench of contacts on a rigid body or tool, about its centre of mass, in the mean of its last step.
     #[getter]
     fn contact_wrench<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
         let wrench = self.0.contact_wrench;

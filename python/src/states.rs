@@ -17,13 +17,13 @@ pub struct States {
     names: Vec<String>,
     /// (n,), s: the moment of each.
     times: Py<PyArray1<f64>>,
-    /// (n + 1,): `positions[starts[i]:starts[i + 1]]` are those of object i, one point of what does not bend.
+    /// (n + 1,): `positions[starts[i]:starts[i + 1]]` are object i's, one point of a rigid body or tool.
     starts: Py<PyArray1<i64>>,
-    /// (m, 3), m: the nodes of what bends, the centre of mass or the tip of what does not.
+    /// (m, 3), m: the nodes of deformables, the centres of mass of rigid bodies and the tips of tools.
     positions: Py<PyArray2<f64>>,
     /// (m, 3), m/s, of the same points.
     velocities: Py<PyArray2<f64>>,
-    /// (n, 4): from the axes of each rigid body or tool to the world's; not numbers for what bends.
+    /// (n, 4): from the axes of each rigid body or tool to the world's; not numbers for a deformable.
     rotations: Py<PyArray2<f64>>,
     /// (n, 3), rad/s, world axes, likewise.
     spins: Py<PyArray2<f64>>,

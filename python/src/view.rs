@@ -1,6 +1,6 @@
 //! Pictures of a world by the engine's own renderer, without a window.
 //!
-//! In: a world, a camera, a size. Out: the colours or the depths of all pixels. Never here: what is drawn, and how.
+//! In: a world, a camera, a size. Out: the colours or the depths of all pixels. Never here: the scene's drawing.
 
 use crate::camera::{Shot, Viewpoint};
 use crate::home::Home;
@@ -14,7 +14,7 @@ use pyo3::exceptions::PyRuntimeError;
 use pyo3::prelude::*;
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
-/// What draws for all worlds of the process: an adapter is opened once, with the first picture.
+/// The screen of all worlds of the process: an adapter is opened once, with the first picture.
 static SCREEN: Mutex<Option<Screen>> = Mutex::new(None);
 
 /// The adapter's threads are in the process that opened it.
@@ -26,12 +26,12 @@ struct Screen {
 /// The pictures of one world.
 pub struct Pictures {
     scene: Scene,
-    /// What it looks like, once that was asked for.
+    /// The view of the world, once a picture was asked for.
     view: Mutex<Option<WorldView>>,
 }
 
 impl Pictures {
-    /// Those of a world that is started from `scene`.
+    /// The pictures of a world that is started from `scene`.
     pub fn of(scene: &Scene) -> Self {
         Self { scene: scene.clone(), view: Mutex::new(None) }
     }

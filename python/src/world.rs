@@ -111,7 +111,7 @@ impl World {
         Ok(Object::new(&self.inner, object))
     }
 
-    /// All objects that are there, those of the scene first.
+    /// All objects that are there, the scene's first.
     #[getter]
     fn objects(&self) -> Vec<Object> {
         self.inner.all_objects().map(|object| Object::new(&self.inner, object)).collect()
@@ -172,7 +172,7 @@ impl World {
         py.detach(|| self.inner.set_pace(pace.0)).map_err(raised::world)
     }
 
-    /// The most simulated time that one of its objects has not lived, s: what it dropped, and what it is behind now. 0 at the pace `"free"`.
+    /// The most simulated time that one of its objects has not lived, s: its dropped time and its lag now. 0 at the pace `"free"`.
     #[getter]
     fn dropped(&self, py: Python<'_>) -> f64 {
         py.detach(|| self.inner.given_up().as_secs_f64())
@@ -190,8 +190,8 @@ impl World {
         Ok(Checkpoint { inner })
     }
 
-    /// Goes back to a checkpoint of this world, or of another of the same scene: what comes after is the same, in lockstep to the bit. Objects that
-    /// joined since are taken out, those that left since are there again.
+    /// Goes back to a checkpoint of this world, or of another of the same scene: from there it repeats its steps, in
+    /// lockstep to the bit. Objects that joined since are taken out, objects that left since are there again.
     fn restore(&self, py: Python<'_>, checkpoint: &Checkpoint) -> PyResult<()> {
         let world = self.at_home()?;
         py.detach(|| world.restore(&checkpoint.inner)).map_err(raised::checkpoint)
@@ -344,13 +344,13 @@ impl World {
         apart(|| self.inner.set_state(object, &body)).map_err(raised::world)
     }
 
-    /// What a sensor of the scene reads, of the newest states. Raises `KeyError`.
+    /// The reading of a sensor of the scene, of the newest states. Raises `KeyError`.
     fn sensor<'py>(&self, py: Python<'py>, name: &str) -> PyResult<Bound<'py, PyArray1<f64>>> {
         let reading = self.inner.sensor(name).map_err(raised::world)?;
         Ok(crate::numbers::array(py, reading.values.into()))
     }
 
-    /// To another place: a rigid body to this rotation, what bends turned by it.
+    /// To another place: a rigid body to this rotation, a deformable turned by it.
     #[pyo3(signature = (object, position, rotation = Rotation(DQuat::IDENTITY)))]
     fn teleport(&self, object: Named<'_>, position: Vector, rotation: Rotation) -> PyResult<()> {
         self.send(&object, Command::teleport(position.0, rotation.0))
@@ -436,7 +436,7 @@ impl World {
         py.detach(write).map_err(raised::export)
     }
 
-    /// Writes down from now on what is done to it, so that `replay` repeats it to the bit. Raises `OSError`; `RuntimeError` on
+    /// Writes down all calls that change it from now on, so that `replay` repeats them to the bit. Raises `OSError`; `RuntimeError` on
     /// a world that has stopped, is recorded already or repeats a recording.
     fn record(&self, py: Python<'_>, path: PathBuf) -> PyResult<()> {
         let world = self.at_home()?;
@@ -476,7 +476,7 @@ impl World {
         Ok(apart(|| Events::new(&self.inner, filter)))
     }
 
-    /// What an object touches now.
+    /// The contacts of an object now.
     fn contacts(&self, py: Python<'_>, object: Named<'_>) -> PyResult<Vec<Contact>> {
         let all = self.inner.contacts(object.of(&self.inner)?).map_err(raised::world)?;
         Ok(all.iter().map(|contact| Contact::new(py, &self.inner, contact)).collect())

@@ -123,13 +123,14 @@ class Joints:
 
     def set(self, positions: _Coordinates | None = None, velocities: _Coordinates | None = None) -> None:
         """Puts hinges and slides to coordinates before the next step, and all bodies that they carry: a number for each of them, or a dictionary of
-        some by name. The others, and what is `None`, keep theirs. What holds a tree of joints stays: the world, a kinematic body, or else its first.
+        some by name. The others, and joints given `None`, keep theirs. The root of a tree of joints stays: the world,
+        a kinematic body, or else its first.
 
         Raises `ValueError`, and moves nothing, outside a joint's range, where a loop of joints would be open, and while time passes.
         """
 
     def reset(self) -> None:
-        """Puts all joints back to where the scene has them at the start, at rest; what holds a tree of joints stays where it is."""
+        """Puts all joints back to where the scene has them at the start, at rest; the root of a tree of joints stays where it is."""
 
 @final
 class Scene:
@@ -160,7 +161,7 @@ class Scene:
         """Adds a solid that never moves."""
 
     def add(self, name: str, what: Part) -> Self:
-        """Adds what moves: a rigid body, a tube, a sheet, a solid or a rope."""
+        """Adds a moving object: a rigid body, a tube, a sheet, a solid or a rope."""
 
     def joint(self, name: str, kind: JointKind, a: str, b: str | None = None) -> Self:
         """Joins the rigid bodies `a` and `b`, or `a` and the world. Place and axis of `kind` are in the world's axes, as the bodies are at the start."""
@@ -204,7 +205,7 @@ class World:
 
     @property
     def objects(self) -> list[Object]:
-        """All objects that are there, those of the scene first."""
+        """All objects that are there, the scene's first."""
 
     @property
     def joints(self) -> Joints:
@@ -240,7 +241,7 @@ class World:
 
     @property
     def dropped(self) -> float:
-        """The most simulated time that one of its objects has not lived, s: what it dropped, and what it is behind now. 0 at the pace `"free"`."""
+        """The most simulated time that one of its objects has not lived, s: its dropped time and its lag now. 0 at the pace `"free"`."""
 
     def hash(self) -> int:
         """Equal numbers mean the same states of all objects, bit for bit."""
@@ -249,8 +250,8 @@ class World:
         """All that the next bit of it needs, objects that joined it included."""
 
     def restore(self, checkpoint: Checkpoint) -> None:
-        """Goes back to a checkpoint of this world, or of another of the same scene: what comes after is the same, in lockstep to the bit. Objects that
-        joined since are taken out, those that left since are there again."""
+        """Goes back to a checkpoint of this world, or of another of the same scene: from there it repeats its steps, in
+        lockstep to the bit. Objects that joined since are taken out, objects that left since are there again."""
 
     def advance(self, seconds: float) -> None:
         """Lets so much simulated time pass: at once in lockstep, on other executors in real time or, at the pace `"free"`, as fast as objects can
@@ -293,10 +294,10 @@ class World:
         """
 
     def sensor(self, name: str) -> Array:
-        """What a sensor of the scene reads, of the newest states. Raises `KeyError`."""
+        """The reading of a sensor of the scene, of the newest states. Raises `KeyError`."""
 
     def teleport(self, object: str | Object, position: Numbers, rotation: Numbers = ...) -> None:
-        """To another place: a rigid body to this rotation, what bends turned by it."""
+        """To another place: a rigid body to this rotation, a deformable turned by it."""
 
     def velocity(self, object: str | Object, velocity: Numbers, spin: Numbers = ...) -> None:
         """Another velocity, m/s, and spin, rad/s, of all its matter."""
@@ -345,7 +346,7 @@ class World:
         """Writes the surfaces of all objects, as they are now, as binary glTF (.glb). Raises `OSError`."""
 
     def record(self, path: str | PathLike[str]) -> None:
-        """Writes down from now on what is done to it, so that `replay` repeats it to the bit. Raises `OSError`; `RuntimeError` on
+        """Writes down all calls that change it from now on, so that `replay` repeats them to the bit. Raises `OSError`; `RuntimeError` on
         a world that has stopped, is recorded already or repeats a recording.
         """
 
@@ -359,7 +360,7 @@ class World:
         """
 
     def contacts(self, object: str | Object) -> list[Contact]:
-        """What an object touches now."""
+        """The contacts of an object now."""
 
     def cast_ray(self, origin: Numbers, direction: Numbers, reach: float) -> Hit | None:
         """The first surface that a ray meets within `reach` metres."""
@@ -369,7 +370,7 @@ class World:
 
 @final
 class State:
-    """What an object was like at one moment. It never changes; its arrays are copies that nobody can write to."""
+    """The state of an object at one moment. It never changes; its arrays are copies that nobody can write to."""
 
     def __new__(cls, pickled: bytes) -> Self: ...
     @property
@@ -386,8 +387,8 @@ class State:
     def at_rest(self) -> bool: ...
     @property
     def contact_solve(self) -> tuple[Literal["kept", "near", "polished", "interior"], int, float, float] | None:
-        """Of the leader of what touches or is joined, how its last step was solved: level, factors, by how much the answers
-        miss the laws, m/s, and the deepest overlap, m."""
+        """Of the leader of a cluster, how its last step was solved: level, factors, by how much the answers miss the laws, m/s,
+        and the deepest overlap, m."""
 
     @property
     def energy(self) -> float:
@@ -395,7 +396,7 @@ class State:
 
     @property
     def positions(self) -> Array:
-        """(n, 3), m: the nodes of what bends, the centre of mass or the tip of what does not."""
+        """(n, 3), m: the nodes of a deformable, the centre of mass of a rigid body or the tip of a tool."""
 
     @property
     def velocities(self) -> Array:
@@ -427,7 +428,7 @@ class State:
 
     @property
     def contact_wrench(self) -> Array:
-        """(6,), N and N m, world axes: what contacts gave a body that does not bend, about its centre of mass, in the mean of its last step."""
+        """(6,), N and N m, world axes: the wrench of contacts on a rigid body or tool, about its centre of mass, in the mean of its last step."""
 
     @property
     def radii(self) -> Array:
@@ -450,11 +451,11 @@ class States:
 
     @property
     def starts(self) -> NDArray[np.int64]:
-        """(n + 1,): `positions[starts[i]:starts[i + 1]]` are those of object i, one point of what does not bend."""
+        """(n + 1,): `positions[starts[i]:starts[i + 1]]` are object i's, one point of a rigid body or tool."""
 
     @property
     def positions(self) -> Array:
-        """(m, 3), m: the nodes of what bends, the centre of mass or the tip of what does not."""
+        """(m, 3), m: the nodes of deformables, the centres of mass of rigid bodies and the tips of tools."""
 
     @property
     def velocities(self) -> Array:
@@ -462,7 +463,7 @@ class States:
 
     @property
     def rotations(self) -> Array:
-        """(n, 4): from the axes of each rigid body or tool to the world's; not numbers for what bends."""
+        """(n, 4): from the axes of each rigid body or tool to the world's; not numbers for a deformable."""
 
     @property
     def spins(self) -> Array:
@@ -473,7 +474,7 @@ class Events:
     """Listens to a world. An object keeps its newest 128 events until they are drained."""
 
     def drain(self) -> list[Event]:
-        """What happened since the last call, oldest first."""
+        """The events since the last call, oldest first."""
 
     @property
     def lost(self) -> int:
@@ -525,7 +526,7 @@ class Event:
 
     @property
     def other(self) -> str | None:
-        """Of a contact what it touches; of one that joined a cluster its leader."""
+        """Of a contact the object or solid that it touches; of one that joined a cluster its leader."""
 
     @property
     def point(self) -> Array | None:
@@ -567,7 +568,7 @@ class Contact:
 
 @final
 class Hit:
-    """What a ray or a search found."""
+    """A hit of a ray or a search."""
 
     @property
     def name(self) -> str: ...
@@ -585,7 +586,7 @@ class Hit:
 
 @final
 class Rollout:
-    """What became of many worlds."""
+    """The results of many worlds."""
 
     @property
     def positions(self) -> dict[str, Array]:
@@ -602,7 +603,7 @@ class Rollout:
 def replay(path: str | PathLike[str], scene: Scene | None = None, *, until: float | None = None) -> World:
     """A world on one thread that does again what a recording says, as far as time is let pass, and no further than `until`, s; it takes no commands.
 
-    `scene` is what was recorded, unless that was read from TOML: then the recording has it. Raises `OSError`, and `ValueError` for a file
+    `scene` is the recorded scene, unless that was read from TOML: then the recording has it. Raises `OSError`, and `ValueError` for a file
     that is no recording of this version, or is of another scene.
     """
 
