@@ -24,7 +24,7 @@ pub(super) struct AgentRecord {
     /// Unset where nothing more is known than that it has left; a state that is read may tell later ([`super::archive`]).
     name: OnceLock<Arc<str>>,
     has_left: AtomicBool,
-    /// Apart from the agent: who reads it passes nothing that could be taken away meanwhile.
+    /// Apart from the agent, so that a reader never holds anything that could be taken away meanwhile.
     pub slot: Arc<LatestSlot<Snapshot>>,
     live: ArcSwapOption<Shared>,
 }

@@ -158,7 +158,7 @@ impl AgentRunner {
         self.metrics.pace(&self.shared.gauges, &self.pace);
     }
 
-    /// Ends the turn that `took` so long: `turn_s` seconds of the caller, those it leads included.
+    /// Ends the turn that `took` so long: `turn_s` seconds of the caller, turns of the agents that it leads included.
     pub fn finish(&mut self, timeline: &Timeline, took: Took, turn_s: f64) -> Next {
         let wall = took.ended;
         let work_s = self.cluster.as_ref().map_or(turn_s, |seat| seat.helped().core_s(turn_s));

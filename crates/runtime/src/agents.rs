@@ -1,4 +1,4 @@
-//! The agents of a run, those included that joined it after its start.
+//! The agents of a run, with the agents that joined it after its start.
 //!
 //! In: handles, one after the other. Out: the same by their numbers, from any thread, without waiting. Numbers are never used again.
 

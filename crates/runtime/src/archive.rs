@@ -78,8 +78,8 @@ impl Cut {
         Self { all, run_agents, timeline, now, most: usize::MAX }
     }
 
-    /// Writes or reads agents, places, time and what executors in virtual time have besides: `events`; returns the
-    /// events of a state that was read.
+    /// Writes or reads agents, places, time and the pending `events` of executors in virtual time; returns the events
+    /// of a state that was read.
     ///
     /// # Errors
     /// The errors of [`super::Run::archive`]; all is as it was then.
@@ -179,8 +179,7 @@ impl Cut {
         Ok(own)
     }
 
-    /// Puts the internal states back that were taken. An agent whose model does not read what it has written itself is
-    /// parked.
+    /// Puts the internal states back that were taken. An agent whose model fails to read its own state is parked.
     fn take_back(&mut self, own: OwnStates) {
         for (at, own) in own {
             if let Some(Err(error)) = self.all[at].as_mut().map(|placed| placed.runner.take_back(own)) {
@@ -212,7 +211,7 @@ impl Cut {
         }
     }
 
-    /// Lets those be in the run that are `present` in the state which was read, and no others.
+    /// Takes the agents into the run that are `present` in the state which was read, and takes all others out.
     fn admit(&mut self, present: &[bool], made: Made) {
         let Self { all, run_agents, .. } = self;
         run_agents.reach(present.len(), |at| made.get(&at).map(|runner| &runner.shared));

@@ -41,7 +41,7 @@ const ANGULAR_IMPULSE: Bound = Bound::either("angular impulse", 1e10, "N·m·s")
 /// A hand that moves the heaviest body as fast as a light one, at up to 30 rad/s.
 const STIFFNESS: Bound = Bound { what: "stiffness", least: 0.0, most: 1e12, unit: "N/m" };
 const DAMPING: Bound = Bound { what: "damping", least: 0.0, most: 1e12, unit: "N·s/m" };
-/// Ten times what a scene may ask of a tube.
+/// Ten times the pressure that a scene may ask of a tube.
 const PRESSURE: Bound = Bound::either("pressure", 1e8, "Pa");
 const RADIUS: Bound = Bound { what: "radius", least: 0.0, most: MOTION_MAX, unit: "m" };
 

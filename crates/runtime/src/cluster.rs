@@ -1,6 +1,7 @@
 //! The turn of a contact cluster: its leader steps all members as one problem.
 //!
-//! In: the members at the leader's time, what each of them sees. Out: their new states, who each is bonded with, who has lost touch.
+//! In: the members at the leader's time, the peers that each of them sees. Out: their new states, their bonds, members
+//! that have lost touch.
 //! Never here: how members come and go ([`seats`]), what else belongs to a turn ([`turn`]), the problem itself
 //! ([`metachron_contact::step`]).
 
@@ -74,14 +75,14 @@ pub(super) struct ClusterSeat {
     work_s: f64,
     /// The time that the turns that it leads took on helpers, as far as it is not accounted for.
     helped: Helped,
-    /// Which of the steps that it leads are repeated in halves, and by what.
+    /// Which of the steps that it leads are repeated in halves, and the solver that repeats them.
     schedule: DoublingSchedule,
     doubling: Option<Box<StepDoubling>>,
     /// The error of the last row of repeated steps, metres (control.md, eq. 31).
     drift_m: f64,
     /// How many steps of its own the last step had.
     parts: u32,
-    /// Its part in the last step, and how those were solved that it has led.
+    /// Its part in the last step, and the solves of the steps that it has led.
     state: Option<ClusterState>,
     solves: ClusterSolves,
     /// The solves of the turn in progress, and the price of factors in the turns that it leads.
@@ -223,12 +224,12 @@ impl ClusterSeat {
         }
     }
 
-    /// Forgets what contacts on edges and triangles of skins remember of earlier steps.
+    /// Forgets the history of contacts on edges and triangles of skins.
     pub fn forget_features(&mut self) {
         self.memory.forget_features();
     }
 
-    /// Writes or reads what the next turns need of those before.
+    /// Writes or reads the memory of earlier turns that the next turns need.
     pub fn archive(&mut self, archive: &mut Archive<'_>) -> Result<(), ArchiveError> {
         archive_values!(
             archive,
@@ -249,7 +250,7 @@ impl ClusterSeat {
         archive.option(&mut self.remotes, Box::default, |remotes, archive| remotes.archive(archive))
     }
 
-    /// Takes out what solves and repeats its steps: a state that is read makes them anew.
+    /// Takes out the solvers of its steps and of their repetition: a state that is read makes them anew.
     pub fn take_steppers(&mut self) -> Steppers {
         Steppers { stepper: self.stepper.take(), doubling: self.doubling.take() }
     }
@@ -281,7 +282,7 @@ impl ClusterSeat {
         })
     }
 
-    /// Notes with whom it belongs into one cluster: not with partners of asynchronous pairs, which only see each other.
+    /// Notes the agents that belong into its cluster: not partners of asynchronous pairs, which only see each other.
     fn bond(&mut self, observer: &Observer, grasped: Option<AgentId>, links: &[Link], mine: &Shared) {
         let is_apart = |id: AgentId| mine.law(id).is_asynchronous();
         self.bonds.clear();
@@ -376,7 +377,7 @@ impl AgentRunner {
         wishes.extend(self.led.members_at(time).filter_map(Self::wish));
         let plan = Plan::of(wishes.iter().map(|wish| (wish.role, wish.step_s)));
         let macro_s = match span {
-            // who is alone goes as far as its clock lets it
+            // an agent alone goes as far as its clock lets it
             Span::Wanted(span) if wishes.len() == 1 => span.as_secs_f64(),
             Span::Wanted(span) => {
                 let factor = (span.as_secs_f64() / self.pace.wanted().as_secs_f64()).max(1.0);
@@ -430,7 +431,7 @@ impl AgentRunner {
         self.observer.update(&self.peers, &self.writer, step, members);
     }
 
-    /// The same, and notes with whom it belongs into one cluster.
+    /// The same, and notes the agents that belong into its cluster.
     fn look_among(&mut self, step: PlannedStep, members: &Membership) {
         self.observe(step, members);
         let now = self.pace.time();
@@ -438,7 +439,8 @@ impl AgentRunner {
         let Some(seat) = cluster else { return };
         let grasped = newest(writer, |mine| mine.body.tool().and_then(|tool| tool.grasp)).map(|grasp| grasp.target);
         seat.bond(observer, grasped, links, shared);
-        // who joins stays for a while: two that follow each other from cluster to cluster would never meet
+        // a new member stays for at least 0.2 s: two bodies that change clusters in turn would never be stepped
+        // together
         let ClusterSeat { memory, bonds, .. } = &mut **seat;
         bonds.iter().for_each(|id| memory.meet(*id, now));
         // one of shorter steps does not look as far ahead, and has to hear of it before it steps past

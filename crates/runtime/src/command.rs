@@ -89,7 +89,7 @@ impl Command {
         })
     }
 
-    /// The pressure of what fills it, inside minus outside, Pa; one that refuses this pressure stays as it is.
+    /// The pressure of its filling, inside minus outside, Pa; an agent that refuses this pressure stays as it is.
     #[must_use]
     pub const fn pressure(pressure_pa: f64) -> Self {
         Self::SetPressure(pressure_pa)
@@ -131,7 +131,8 @@ impl Command {
         self
     }
 
-    /// The same for this long, in the agent's time, from when the agent takes it; what acts once or for good stays so.
+    /// The same for this long, in the agent's time, from when the agent takes it; a command that acts once or for good
+    /// stays so.
     #[must_use]
     pub const fn lasting(mut self, span: SimSpan) -> Self {
         match &mut self {

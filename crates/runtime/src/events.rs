@@ -48,7 +48,8 @@ pub enum EventKind {
     RateMissed,
     /// Cells of it were removed.
     Carved(Removed),
-    /// The run went back to a state that was saved; what follows happens from the time of that on. What it touches there begins anew.
+    /// The run went back to a state that was saved; later events happen from the time of that on. Its contacts there
+    /// begin anew.
     Rewound,
 }
 

@@ -23,7 +23,7 @@ use metachron_core::{AgentId, Archive, ArchiveError, SimTime};
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
-/// Agents that do what others did.
+/// Agents that repeat the turns of others.
 pub struct Follower {
     timeline: Timeline,
     now: Duration,

@@ -107,7 +107,7 @@ impl Shared {
         self.identity.is_first
     }
 
-    /// Whether it has left and nothing of it is kept: what joined the run is made again where it comes back.
+    /// Whether it has left and nothing of it is kept: an agent that joined the run is made again where it comes back.
     pub fn is_forgotten(&self) -> bool {
         self.gauges.has_left() && !self.is_first()
     }
@@ -118,7 +118,7 @@ impl Shared {
         joints.filter(|(_, joint)| joint.takes_motor()).map(|(number, _)| number)
     }
 
-    /// Checks that it takes what needs these, now.
+    /// Checks that it takes these inputs, now.
     fn check_takes(&self, needs: Inputs) -> Result<(), SendError> {
         let Identity { name, model, inputs, .. } = &self.identity;
         if self.sleep.has_ended() {

@@ -46,8 +46,8 @@ struct Turn {
 }
 
 thread_local! {
-    /// CPU time that jobs which began on this thread have accounted for, nanoseconds: what a thread computes while it waits for a part of
-    /// one turn may be a part of another.
+    /// CPU time that jobs which began on this thread have accounted for, nanoseconds: the work of a thread while it
+    /// waits for a part of one turn may be a part of another.
     static ACCOUNTED_NS: Cell<u64> = const { Cell::new(0) };
 }
 
@@ -112,7 +112,7 @@ impl Turn {
 /// A job that is accounted for when it ends, by a panic too.
 struct Account<'a> {
     turn: &'a Turn,
-    /// On the thread's clock, and what jobs on the thread had accounted for, when it began.
+    /// On the thread's clock, and the time that jobs on the thread had accounted for, when it began.
     from: Option<Duration>,
     before_ns: u64,
 }
@@ -166,7 +166,7 @@ mod tests {
                     let mut helped = Helped::default();
                     helpers.make(1000, &mut helped, |threads| nested(threads, 4));
                     let ms = helped.cpu.as_secs_f64() * 1e3;
-                    // 16 parts of 2 ms; what a thread spends looking for work is not a multiple of it
+                    // 16 parts of 2 ms; the time of a thread that looks for work is not a multiple of it
                     assert!((32.0..64.0).contains(&ms), "{ms}");
                     assert!(helped.waited > Duration::from_millis(4), "32 ms on three threads take more than 4 ms");
                 });
@@ -192,7 +192,7 @@ mod tests {
         Tube::new(TubeSpec { gravity, friction: 0.5, ..spec }).unwrap()
     }
 
-    /// Six tubes fall on six others that lie across, for 60 steps: the hash of their states, and what helpers took.
+    /// Six tubes fall on six others that lie across, for 60 steps: the hash of their states, and the helpers' time.
     fn fall(helpers: &Helpers) -> (u64, Helped) {
         let place = |k: u32| 0.02 * f64::from(k) - 0.05;
         let low = (0..6).map(|k| tube(DVec3::X * place(k), DVec3::Y * 0.1, DVec3::ZERO));

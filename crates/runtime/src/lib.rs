@@ -152,7 +152,8 @@ pub trait Run: Send {
     /// [`SendError::NoAgent`].
     fn remove(&mut self, id: AgentId) -> Result<(), SendError>;
 
-    /// Lets no further turn begin and waits for those in progress (with a timeout): what a recording of the run is to have has happened then. From
+    /// Lets no further turn begin and waits for turns in progress (with a timeout): all that a recording of the run is
+    /// to have has happened then. From
     /// now on commands are refused ([`SendError::Ended`]).
     fn end_turns(&mut self);
 
@@ -182,8 +183,8 @@ pub trait Run: Send {
     }
 
     /// Makes the parts of its turns in `order` from now on, which begins between two turns; before it does, writes its state to `begun` if
-    /// that is given. In lockstep the order follows from the calls, and is not noted. Who holds `order` keeps turns from going on, but does
-    /// not keep this from returning.
+    /// that is given. In lockstep the order follows from the calls, and is not noted. A caller that holds `order` keeps
+    /// turns from going on, but does not keep this from returning.
     ///
     /// # Errors
     /// The errors of [`Run::archive`]; the order is not noted then.

@@ -1,6 +1,6 @@
 //! The declared machine: prices of work where nothing is measured.
 //!
-//! In: work in each model's unit, what a frame draws. Out: seconds, with noise that is the same on every run.
+//! In: work in each model's unit, the objects of a frame. Out: seconds, with noise that is the same on every run.
 //! Never here: a clock. Lockstep charges these prices instead of measuring, so that a run is the same on every computer.
 
 use std::borrow::Cow;
@@ -11,7 +11,8 @@ use std::time::Duration;
 pub struct Machine {
     /// Cores shared by agents and the frame loop; at least 1 is assumed.
     pub cores: u32,
-    /// Price of a step of each model, and of a factor of the contacts of a cluster ([`FACTOR`]). What is not listed costs [`OTHER_STEP_US`].
+    /// Price of a step of each model, and of a factor of the contacts of a cluster ([`FACTOR`]). A model that is not
+    /// listed costs [`OTHER_STEP_US`].
     pub steps: Vec<StepPrice>,
     /// Price of a frame.
     pub draw: DrawPrice,
@@ -217,7 +218,7 @@ const fn price(model: &'static str, base_us: f64, unit_us: f64) -> StepPrice {
     StepPrice { model: Cow::Borrowed(model), base_us, unit_us }
 }
 
-/// Objects, whatever their shading: scenes say what theirs cost where the choice of a shading matters.
+/// Objects, whatever their shading: scenes give prices of their own where the choice of a shading matters.
 const SOFTWARE: [ObjectPrice; 4] = [price_of_objects(0.22, 0.0); 4];
 
 /// Objects drawn as points and as lines there.

@@ -24,7 +24,7 @@ pub enum Command {
     Spring(Keyed<AnchorSpring>),
     /// A force acts on the agent.
     Force(Keyed<AnchorForce>),
-    /// An impulse, N·s and N·m·s: evenly over the agent's next step. Those at one point add up.
+    /// An impulse, N·s and N·m·s: evenly over the agent's next step. Impulses at one point add up.
     Impulse(AnchorForce),
     /// A motor drives the joint whose number is the key, instead of the motor that the scene gives it; `None` is the scene's again.
     /// For the joint's first agent.
@@ -33,7 +33,8 @@ pub enum Command {
     Pose(Keyed<PoseGoal>),
     /// Another place or velocity, before its next step.
     SetMotion(SetMotion),
-    /// The pressure of what fills the agent, inside minus outside, Pa; an agent that refuses this pressure stays as it is.
+    /// The pressure of the agent's filling, inside minus outside, Pa; an agent that refuses this pressure stays as it
+    /// is.
     SetPressure(f64),
     /// Its cells in a region of space are removed before its next step; an agent that has none there, or no others, stays as it is.
     Carve(Carving),
@@ -241,7 +242,7 @@ impl Mailbox {
         });
     }
 
-    /// Forgets what waits; called between turns.
+    /// Forgets waiting commands; called between turns.
     pub fn clear(&self) {
         self.full.store(false, Release);
         let waiting = self.pending.get().map(|pending| pending.lock().unwrap_or_else(PoisonError::into_inner));
@@ -310,7 +311,7 @@ impl PendingCommands {
         (self.carvings.len() < KEYS as usize).then(|| self.carvings.push(carving))
     }
 
-    /// Takes a place and a velocity: what the new one leaves open stays as the older one wants it.
+    /// Takes a place and a velocity: fields that the new one leaves open stay as the older one wants them.
     fn move_by(&mut self, new: SetMotion) {
         let old = self.motion.unwrap_or_default();
         self.motion = Some(SetMotion {

@@ -391,7 +391,7 @@ impl MetricsWriter {
         self.count_rate(gauges, entry.now);
     }
 
-    /// Records the wall time of a turn that the agent made, those it leads included.
+    /// Records the wall time of a turn that the agent made, turns of the agents that it leads included.
     pub fn time_turn(&mut self, gauges: &Metrics, turn_s: f64) {
         gauges.turn_s.set(smoothed(&mut self.turn_s, turn_s));
     }

@@ -1,7 +1,8 @@
 //! The model of an agent: code that may be anybody's, called through here alone.
 //!
-//! In: calls. Out: their answers; from a model that has panicked, in this call or one before, the reason, and no code of it runs any more. What
-//! runs is marked, so that others can see whose code that is ([`CallMark`]). Never here: what becomes of the agent.
+//! In: calls. Out: their answers; from a model that has panicked, in this call or one before, the reason, and no code
+//! of it runs any more. Running code is marked, so that others can see whose it is ([`CallMark`]). Never here: what
+//! becomes of the agent.
 
 use super::agent_runner::contained;
 use super::handle::Shared;

@@ -28,7 +28,7 @@ pub(super) struct Peers {
     pub broad_phase: BroadPhaseSlot,
     /// The helpers with the turns of large clusters.
     pub helpers: Helpers,
-    /// Whether the order of turns is noted, or followed: what a turn publishes is seen by the next.
+    /// Whether the order of turns is noted, or followed: a state that a turn publishes is seen by the next.
     pub is_ordered: AtomicBool,
 }
 
@@ -206,7 +206,7 @@ impl Observer {
         self.me
     }
 
-    /// Writes or reads whom it has found near it.
+    /// Writes or reads the agents that it has found near it.
     pub fn archive(&mut self, archive: &mut Archive<'_>) -> Result<(), ArchiveError> {
         let me = self.me;
         let first = || Box::new(NeighbourList::new(me));
@@ -251,7 +251,7 @@ impl Observer {
         Err(ArchiveError::Mismatch { what: "the number of a neighbour", found, expected })
     }
 
-    /// Sees those from now on, as they were seen then; called between turns, where all of them are there.
+    /// Sees these agents from now on, as they were seen then; called between turns, where all of them are there.
     pub fn see(&mut self, peers: &Peers, seen: &[Seen]) {
         let links = self.links as usize;
         self.neighbours.truncate(links);

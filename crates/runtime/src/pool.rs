@@ -43,7 +43,7 @@ pub struct Pool {
     workers: usize,
     watchdog: Watchdog,
     priority: Priority,
-    /// Those whose turns are stalled, in whose places others work.
+    /// Workers whose turns are stalled, in whose places others work.
     stuck: Vec<WorkerRecord>,
 }
 
@@ -94,7 +94,7 @@ impl Pool {
         Ok((messages, watch))
     }
 
-    /// Ends all workers, between turns, but for those whose turns are stalled.
+    /// Ends all workers, between turns, except workers whose turns are stalled.
     fn halt(&mut self, why: Halt) {
         self.state.sleep.stop();
         // the send fails only if the watchdog has already ended

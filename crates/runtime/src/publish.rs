@@ -112,7 +112,7 @@ impl AgentRunner {
         let newest = self.shared.slot.latest();
         let sleep = &self.shared.sleep;
         let leader = sleep.leader(self.shared.id);
-        // the far end of a line has to answer what comes down it
+        // the far end of a line has to answer the wave that comes down it
         let pushing = newest.pairs.iter().filter(|pair| pair.kind == PairKind::Tlm && pair.force_n > 0.0);
         let touched = newest.touches.iter().copied().chain(pushing.map(|pair| pair.with));
         touched.filter(|id| sleep.leader(*id) != leader).for_each(|id| sleep.touch(id, now));

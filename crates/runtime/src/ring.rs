@@ -1,4 +1,4 @@
-//! The newest of what an agent tells: a bounded ring that the agent writes and any number of readers follow.
+//! The newest entries of an agent: a bounded ring that the agent writes and any number of readers follow.
 //!
 //! In: entries, from the thread that steps the agent. Out: the same in their order to each reader, and how many a reader was too slow for.
 //! The agent never waits and allocates nothing; without a reader it writes nothing. Never here: what the entries mean.

@@ -10,8 +10,7 @@ use super::sync::atomic::{AtomicU64, Ordering, fence};
 #[derive(Debug)]
 pub(super) struct Seqlock<const N: usize> {
     /// The writer's copy of its version: so it never loads a word that it stores, and loom explores every order (it
-    /// misses those in which a store
-    /// comes right after a load by the same thread).
+    /// misses orders in which a store comes right after a load by the same thread).
     reached: AtomicU64,
     /// Odd while the words are being written; zero before the first write.
     version: AtomicU64,

@@ -4,7 +4,7 @@
 //! An agent that is led has no turns of its own: waking it wakes its leader, and the leader rests for all agents it leads.
 //! Never here: when an agent is due ([`crate::agent_clock`]), its commands ([`super::mailbox`]).
 //!
-//! Leaders have lower numbers than those they lead, so that the chain of leaders always ends.
+//! Leaders have lower numbers than the agents they lead, so that the chain of leaders always ends.
 //! No wake is lost: an agent that goes to rest raises `resting` first and reads `woken` and `touched` after; a caller that wakes it writes
 //! these first and reads `resting` after. With a fence (SeqCst) between, at least one of the two sees the other.
 

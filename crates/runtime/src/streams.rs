@@ -40,7 +40,7 @@ impl EventStreams {
         }
     }
 
-    /// Begins to keep what `of` says for a reader.
+    /// Begins to keep the entries of the ring `of` for a reader.
     pub fn listen<E: RingEntry>(&self, of: fn(&Rings) -> &Ring<E>) -> Heard {
         let rings = self.0.get_or_init(Arc::default);
         Heard { next: of(rings).listen(), rings: Some(Arc::clone(rings)), stalls: 0 }

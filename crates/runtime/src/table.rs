@@ -1,6 +1,6 @@
 //! A table with an entry for each agent of a run, which grows as agents join and never moves.
 //!
-//! It is no part of what the model checker explores: an agent joins before any other thread knows its number.
+//! The model checker does not explore it: an agent joins before any other thread knows its number.
 //! In: room for one more. Out: entries by the numbers of agents, from any thread, without waiting. Never here: what an entry is.
 
 use std::sync::atomic::{

@@ -58,7 +58,7 @@ pub(super) fn system() -> Arc<dyn Clock> {
     Arc::new(SystemClock::new())
 }
 
-/// How many hold what an agent shares.
+/// How many hold the data that an agent shares.
 pub(super) fn holders(agent: &AgentHandle) -> usize {
     agent.live().map_or(0, |shared| Arc::strong_count(&shared))
 }

@@ -182,8 +182,8 @@ impl Threads {
         Ok(Ended { thread, word, given })
     }
 
-    /// Ends all threads for a cut and waits for them, but for those whose turns are stalled: then all go on. Gives back the agents that make turns
-    /// of their own.
+    /// Ends all threads for a cut and waits for them, except threads whose turns are stalled: then all go on. Gives
+    /// back the agents that make turns of their own.
     fn pause(&mut self) -> Result<Vec<Option<Box<AgentRunner>>>, ArchiveError> {
         let refused = |what: String| ArchiveError::Refused { what };
         self.watchdog.await_stalled().map_err(refused)?;

@@ -26,7 +26,7 @@ const PARTS_WAIT: Duration = Duration::from_millis(250);
 pub enum PartKind {
     /// The agent reads of others all that its step depends on. Where it makes none this is the whole turn.
     Prepare,
-    /// It shows what its step has made, and the turn ends.
+    /// It shows the state after its step, and the turn ends.
     Show,
     /// It goes on after a rest.
     Wake,
@@ -69,7 +69,7 @@ struct Parts {
     taken: Duration,
 }
 
-/// Nothing but what its holder does happens in the run.
+/// While it is held, nothing but its holder's acts happens in the run.
 pub struct Held<'a> {
     order: &'a TurnOrder,
     parts: MutexGuard<'a, Parts>,
@@ -103,7 +103,7 @@ impl TurnOrder {
         self.closed.store(true, Release);
     }
 
-    /// As [`Self::between`], for a part that is to be noted; the log gets what there is now and then.
+    /// As [`Self::between`], for a part that is to be noted; the log gets the parts so far now and then.
     pub(super) fn hold(&self) -> Held<'_> {
         let mut held = self.lock();
         let Parts { list, taken } = &mut *held.parts;

@@ -1,12 +1,12 @@
 //! The parts of a turn that begins: reading from others, the step itself, writing for others.
 //!
-//! prepare   take commands, drop lag, gather those it leads, look around
+//! prepare   take commands, drop lag, gather the members it leads, look around
 //! step      reads and writes nothing that others have a share in: it can be made at any moment before the next part
-//! complete  write the states, of those it leads too
+//! complete  write the states, its members' too
 //!
 //! [`AgentRunner::begin`] makes all three. A run that is recorded makes the outer two in one order with the parts of
-//! all other turns
-//! ([`super::turn_order`]), and the steps side by side. Never here: the end of a turn ([`super::agent_runner`]).
+//! all other turns ([`super::turn_order`]), and the steps side by side. Never here: the end of a turn
+//! ([`super::agent_runner`]).
 
 use super::agent_clock::{LAG_CAP, Start, Timeline};
 use super::agent_runner::{AgentRunner, Effort, PendingTurn, StepOutcome, contained};
@@ -43,7 +43,8 @@ pub(super) struct PreparedTurn {
     start: Start,
     wanted: SimSpan,
     resolution: Option<Resolution>,
-    /// How many of those it leads step with it, and how many steps others of them have made to come to its time.
+    /// How many of the agents that it leads step with it, and how many steps others of them have made to come to its
+    /// time.
     led: u32,
     alone: u32,
 }
@@ -101,7 +102,8 @@ impl AgentRunner {
         contained(|| self.make_step(turn.step))
     }
 
-    /// The last part of a turn that begins: writes what its step has made; what the turn cost, or `None` if it failed and is parked now.
+    /// The last part of a turn that begins: writes the states after its step; the cost of the turn, or `None` if it
+    /// failed and is parked now.
     pub fn complete(&mut self, turn: &PreparedTurn, made: Result<StepOutcome, String>) -> Option<Effort> {
         match contained(|| self.write_turn(turn, made)) {
             Ok((open, effort)) => {

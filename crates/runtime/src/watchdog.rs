@@ -50,7 +50,7 @@ impl WatchdogWord {
     /// Turn number `turn` begins, of `id`.
     pub fn begin(&self, turn: u32, id: AgentId) -> WatchedTurn {
         let word = (u64::from(turn & 0x3fff_ffff) << 32) | u64::from(id.0.wrapping_add(1));
-        // who sees the turn sees when it began
+        // a reader that sees the turn sees when it began
         self.word.store(word, Release);
         WatchedTurn(word)
     }
@@ -92,7 +92,7 @@ impl WatchdogWord {
     }
 }
 
-/// How long turns may last, shared by who sets it and who watches.
+/// How long turns may last, shared by the caller that sets it and the threads that watch.
 #[derive(Debug)]
 pub(super) struct StallLimit(AtomicU64);
 
@@ -196,7 +196,7 @@ impl Watchdog {
         true
     }
 
-    /// A turn of `id` that was stalled has ended: whom it stalled goes on, led by it still or not.
+    /// A turn of `id` that was stalled has ended: the agents stalled by it go on, led by it still or not.
     pub fn resume(&self, id: AgentId) {
         self.stalled().retain(|stalled| {
             if stalled.turn_of != id {
@@ -252,7 +252,8 @@ impl Watchdog {
     }
 }
 
-/// The turns of a run that makes them on its caller's thread. No thread watches them: who asks from another one judges that in progress.
+/// The turns of a run that makes them on its caller's thread. No thread watches them: a caller on another one judges
+/// the turn in progress.
 #[derive(Debug)]
 pub(super) struct UnwatchedTurns {
     word: WatchdogWord,

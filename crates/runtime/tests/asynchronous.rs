@@ -136,7 +136,7 @@ fn an_asynchronous_link_joins_no_clusters_and_keeps_its_length_in_a_fall() {
             for (at, state) in all.iter().enumerate() {
                 assert_eq!(state.cluster.unwrap().leader, AgentId(at as u32), "{law:?} {rates:?}");
             }
-            // both fall alike, but for what their own steps miss of a fall, g h t/2, until the link takes it
+            // both fall alike, except for the error of their own steps in a fall, g h t/2, until the link takes it
             let length_m = (height_m(&all[0]) - height_m(&all[1])) - 9.81 * 0.3 * time_apart_s(&all);
             assert!((length_m - 0.1).abs() < 2e-3, "{law:?} {rates:?}: {length_m} m");
         }

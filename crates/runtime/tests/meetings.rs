@@ -69,7 +69,7 @@ fn balls_in_a_crowd_keep_momentum_and_energy_and_pass_through_nobody() {
         let states: Vec<_> = run.agents().iter().map(|agent| agent.latest()).collect();
         found = states.iter().filter_map(|state| rigid(state)).collect();
         for (k, a) in states.iter().enumerate() {
-            // of one time, as those are that step together
+            // of one time, as agents are that step together
             for b in states[..k].iter().filter(|b| b.time == a.time) {
                 let apart = rigid(a).zip(rigid(b)).map(|(a, b)| a.position.distance(b.position));
                 nearest_m = apart.map_or(nearest_m, |apart_m| apart_m.min(nearest_m));

@@ -1,4 +1,5 @@
-//! The state of a run between turns, as it is written and read: what its agents keep to themselves in place, all else as values.
+//! The state of a run between turns, as it is written and read: the internal states of its agents in place, all else as
+//! values.
 //!
 //! In: agents that make no turns. Out: the same in an archive; from one, values that were checked, and that nobody has been shown. Never here:
 //! when they are shown ([`super::Cut`]), what models save of themselves ([`metachron_contact::Agent::archive`]).
@@ -60,7 +61,7 @@ struct OwnParts {
 }
 
 impl RunState {
-    /// That of a run without events to come, at no time, but for what its agents keep to themselves.
+    /// The state of a run without events to come, at no time, without the internal states of its agents.
     pub fn of(all: &[Option<Placed>], run_agents: &RunAgents) -> Self {
         let present: Vec<bool> = run_agents.handles.iter().map(|agent| !agent.has_left()).collect();
         let there = all.iter().zip(&present).filter(|(_, present)| **present);
@@ -198,7 +199,7 @@ impl AgentRunner {
     /// Makes it as it was when that was taken.
     ///
     /// # Errors
-    /// Where its model does not read what it has written itself.
+    /// Where its model fails to read its own state.
     pub(super) fn take_back(&mut self, own: OwnState) -> Result<(), ArchiveError> {
         let read = self.archive_own(&mut Archive::reader(&own.rest));
         self.put_parts(own.parts);

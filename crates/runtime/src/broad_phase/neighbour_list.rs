@@ -78,7 +78,7 @@ impl NeighbourList {
         }
     }
 
-    /// Writes or reads who is near, and when others are looked at again.
+    /// Writes or reads the agents near, and when others are looked at again.
     pub fn archive(&mut self, archive: &mut Archive<'_>) -> Result<(), ArchiveError> {
         let Self { me: _, mine, speed_before_m_s, listed, soonest, common_check, dt, unread, near, epoch } = self;
         archive_values!(archive, *mine, *speed_before_m_s, *listed, *soonest, *common_check)?;
@@ -161,7 +161,7 @@ impl NeighbourList {
         checked
     }
 
-    /// Checks all agents, and lists those with the earliest checks.
+    /// Checks all agents, and lists the ones with the earliest checks.
     fn check_all(
         &mut self,
         broad_phase: &BroadPhase,

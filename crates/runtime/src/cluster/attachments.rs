@@ -36,7 +36,7 @@ pub(super) fn held_by_links<'a>(links: &'a [Link], memory: &'a ContactMemory) ->
 }
 
 impl AgentRunner {
-    /// Hands what yielded and tore in the last step, of `dt`, to the members that tell of it.
+    /// Hands the attachments that yielded and tore in the last step, of `dt`, to the members that report them.
     pub(super) fn note_events(&mut self, stepper: &ClusterStepper, dt: SimSpan) {
         if stepper.held_fast() {
             return;

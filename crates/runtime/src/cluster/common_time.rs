@@ -32,7 +32,7 @@ impl AgentRunner {
         });
         let waits = news.is_some_and(|news| self.pace.wait(wall, news));
         if waits {
-            // those it waits for may wait for news of it: a state that was lost is shown again
+            // agents that it waits for may wait for news of it: a state that was lost is shown again
             self.show_withheld();
             self.led.each(Self::show_withheld);
         }
@@ -48,8 +48,8 @@ impl AgentRunner {
         awaited.map(|n| n.snapshot.time.as_nanos()).reduce(u64::wrapping_add)
     }
 
-    /// Whether it keeps one time with others: it leads some, or some are near that do not step with it, or have not taken yet what it
-    /// gave. Not asked where nobody is late.
+    /// Whether it keeps one time with others: it leads some, or some are near that do not step with it, or have not
+    /// taken its impulses yet. Not asked where nobody is late.
     pub fn keeps_common_time(&mut self, now: SimTime, late: bool) -> bool {
         let is_any_behind = self.pace.clock_offset() > SimSpan::ZERO || self.shared.sleep.is_any_far_behind(now);
         let was_near = self.was_near.take();
@@ -84,7 +84,7 @@ impl AgentRunner {
         }
     }
 
-    /// Whether no impulse is in flight between it, or those it leads, and anybody.
+    /// Whether no impulse is in flight between it, or the agents that it leads, and any other.
     fn is_settled(&self) -> bool {
         let settled = |actor: &Self| actor.observer.is_settled(actor.id(), &actor.writer, |id| actor.runs(id));
         settled(self) && self.led.all().all(settled)
@@ -98,7 +98,7 @@ impl AgentRunner {
         theirs.at_rest || self.pace.time().secs_after(theirs.time).abs() <= allowed_s
     }
 
-    /// Its clock offset at the time of the one farthest behind of those near; its present one where nobody is far behind.
+    /// Its clock offset at the time of the neighbour farthest behind; its present one where none is far behind.
     fn offset_of_last(&self) -> SimSpan {
         let moment = self.pace.scene_time();
         let far = |n: &&Neighbour| self.pace.time().secs_after(n.snapshot.time) > FAR_BEHIND_S;
@@ -112,7 +112,7 @@ impl AgentRunner {
         drop(self.model.call(|agent| agent.shift_clock(by_s)));
     }
 
-    /// Looks around for itself and for those it leads.
+    /// Looks around for itself and for the agents that it leads.
     fn look_around(&mut self) {
         let (time, moment, dt) = (self.pace.time(), self.pace.scene_time(), self.pace.dt());
         let step = PlannedStep { start: moment, dt };
@@ -127,7 +127,7 @@ impl AgentRunner {
         self.led = led;
     }
 
-    /// Those near it, or near one it leads of whom `which` is true, that do not step with it.
+    /// The neighbours that do not step with it: its own, and those of the agents it leads of which `which` is true.
     fn others_near(&self, which: impl Fn(&Self) -> bool) -> impl Iterator<Item = &Neighbour> {
         let led = self.led.all().filter(move |actor| which(actor));
         let all = std::iter::once(self).chain(led).flat_map(Self::near_or_tied);

@@ -14,7 +14,7 @@ use metachron_core::{ContactPartner, ContactState, SimSpan, SimTime};
 const GREW_BY: f64 = 1.25;
 
 impl ClusterSeat {
-    /// Takes in what pairs gave in a step of `dt` that ends `now`.
+    /// Takes in the totals of pairs in a step of `dt` that ends `now`.
     pub(super) fn note_contacts(&mut self, totals: &[PairTotal], dt: SimSpan, now: SimTime, streams: &EventStreams) {
         let dt_s = dt.as_secs_f64();
         // contacts without a total in this step have ended
@@ -52,7 +52,7 @@ impl ClusterSeat {
                         streams.event(&AgentEvent { at: now, kind: EventKind::ContactGrew(event(before)) });
                     }
                 }
-                // what only touches has not begun to press
+                // a pair that only touches has not begun to press
                 Err(_) if total.contacts == 0 => {}
                 Err(at) => {
                     self.contacts.insert(at, seen);

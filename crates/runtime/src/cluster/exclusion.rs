@@ -37,8 +37,8 @@ impl AgentRunner {
         Ok(())
     }
 
-    /// Makes a step of the `wanted` length after one that was not made for `reason`, without those who are to blame, each solve by at most so many
-    /// steps; how many step with it.
+    /// Makes a step of the `wanted` length after one that was not made for `reason`, without the members to blame, each
+    /// solve by at most so many steps; how many step with it.
     ///
     /// # Errors
     /// Why it is to be parked itself.

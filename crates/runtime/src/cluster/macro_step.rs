@@ -1,7 +1,8 @@
 //! One macro step of a cluster: all members as one problem, or none of them where one fails.
 //!
-//! In: the members at the leader's time, their plan. Out: the members a macro step later; after a failure they are where they were, and those whose
-//! fault it is are known by their models ([`super::super::model`]). Never here: what becomes of these ([`super::exclusion`]), who is a member.
+//! In: the members at the leader's time, their plan. Out: the members a macro step later; after a failure they are
+//! where they were, and the models of the members to blame know it ([`super::super::model`]). Never here: what becomes
+//! of these ([`super::exclusion`]), who is a member.
 
 use super::super::agent_runner::{AgentRunner, StepOutcome, contained};
 use super::super::helpers::Helped;
@@ -40,7 +41,7 @@ impl Making<'_, '_> {
     fn make(&mut self, threads: &dyn ParallelFor) -> Result<Made, String> {
         let Self { scene, list, sides, stepper, doubling, remotes, step, dt } = self;
         let mut extra = 0.0;
-        // a finer step that diverges says nothing of this one; what partners give is given once
+        // a finer step that diverges says nothing of this one; partners give their impulses once
         if let (Some(doubling), None) = (doubling, &remotes) {
             extra = doubling.foresee(scene, list, *dt, threads).unwrap_or(0.0);
         }
@@ -82,12 +83,13 @@ struct Lent {
 /// The outcome of a macro step.
 struct Attempt {
     made: Result<Made, String>,
-    /// After one that was made whether all may rest; an error is of who has moved with all others, and is parked where its state is written.
+    /// After a step that was made, whether all may rest; an error is a member's that has moved with all others, and is
+    /// parked where its state is written.
     rests: Result<bool, String>,
 }
 
 impl ClusterSeat {
-    /// Lends what the macro step works with that `me` leads as its `steps`-th.
+    /// Lends the solvers and storage of the macro step that `me` leads as its `steps`-th.
     fn lend(&mut self, steps: u64, me: AgentId) -> Lent {
         let schedule = self.schedule;
         Lent {
@@ -103,8 +105,8 @@ impl ClusterSeat {
         }
     }
 
-    /// Takes it back after `attempt`. What a step that was not made has left in its stepper is of no use, and no step is compared by what one of its
-    /// members could not conclude: it is as if that had not been compared.
+    /// Takes it back after `attempt`. A stepper is of no use after a step that was not made, and a step is not compared
+    /// where one of its members could not conclude: it is as if it had not been compared.
     fn take_back(&mut self, lent: Lent, attempt: &Attempt) {
         let is_made = attempt.made.is_ok();
         self.stepper = is_made.then_some(lent.stepper);
@@ -153,7 +155,7 @@ impl AgentRunner {
         }
     }
 
-    /// Makes a macro step with what its seat has lent.
+    /// Makes a macro step with the lent solvers of its seat.
     fn try_macro_step(&mut self, lent: &mut Lent, plan: Plan, dt: SimSpan) -> Attempt {
         let time = self.pace.time();
         let Lent { scene, stepper, doubling, remotes, helped, wishes, participants, sides, .. } = lent;
@@ -191,7 +193,7 @@ impl AgentRunner {
         Attempt { made, rests }
     }
 
-    /// Notes what a macro step was that has been made.
+    /// Notes the figures of a macro step that has been made.
     fn note_made(&mut self, stepper: &ClusterStepper, made: &Made, dt: SimSpan) -> StepReport {
         let Made { report, extra } = made;
         self.note_pairs(stepper, dt);

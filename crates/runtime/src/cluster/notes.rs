@@ -1,6 +1,7 @@
-//! The notes that a macro step leaves with the members of a cluster: how it was solved, its error, what pairs gave, who still belongs together.
+//! The notes that a macro step leaves with the members of a cluster: how it was solved, its error, impulses of pairs,
+//! groups that still belong together.
 //!
-//! In: a stepper after a macro step. Out: what each member's seat publishes. Never here: the step itself.
+//! In: a stepper after a macro step. Out: the published data of each member's seat. Never here: the step itself.
 
 use super::attachments::held_by_links;
 use super::solve_budget::Solved;

@@ -76,7 +76,7 @@ impl Handover {
 }
 
 impl Led {
-    /// Writes or reads who stepped as one when that was last noted; the agents themselves are archived by their own.
+    /// Writes or reads the membership as it was last noted; the agents themselves are archived by their own.
     pub fn archive(&mut self, archive: &mut Archive<'_>) -> Result<(), ArchiveError> {
         archive.value(&mut self.membership)
     }
@@ -102,12 +102,12 @@ impl Led {
         self.seats.iter().map(|seat| &*seat.actor)
     }
 
-    /// Those at `time`, by rising numbers.
+    /// The members at `time`, by rising numbers.
     pub fn members_at(&mut self, time: SimTime) -> impl Iterator<Item = &mut AgentRunner> {
         self.seats.iter_mut().map(|seat| &mut *seat.actor).filter(move |actor| actor.pace.time() == time)
     }
 
-    /// Visits those at `time`, each with all that step as one.
+    /// Visits the members at `time`, each with all that step as one.
     pub fn each_at(&mut self, time: SimTime, mut visit: impl FnMut(&mut AgentRunner, &Membership)) {
         let Self { seats, membership } = self;
         let here = seats.iter_mut().filter(|seat| seat.actor.pace.time() == time);
@@ -125,7 +125,8 @@ impl Led {
         membership.set(leader, seats.iter().filter(|s| s.actor.pace.time() == time).map(|s| s.actor.id()));
     }
 
-    /// Notes which of those at `time` still belong together: the leader is the first of `sets`, they follow by rising numbers.
+    /// Notes which of the members at `time` still belong together: the leader is the first of `sets`, they follow by
+    /// rising numbers.
     pub fn note_groups(&mut self, time: SimTime, sets: &mut DisjointSets) {
         let members = self.seats.iter_mut().filter(|seat| seat.actor.pace.time() == time);
         members.zip(1..).for_each(|(seat, place)| seat.group = sets.lowest(place));
@@ -142,7 +143,7 @@ impl Led {
         });
     }
 
-    /// Lets those return that have refused the step that was made last, each by itself.
+    /// Lets the members return that have refused the step that was made last, each by itself.
     pub(super) fn release_refusing(&mut self) {
         let refusing = self.seats.extract_if(.., |seat| seat.actor.model.take_refused());
         refusing.for_each(|seat| seat.actor.return_turns());
@@ -188,7 +189,7 @@ impl AgentRunner {
         self.led.admit(actor);
     }
 
-    /// Lets those return that have lost touch with it.
+    /// Lets the members return that have lost touch with it.
     pub fn part(&mut self) {
         if self.led.is_empty() {
             return;
@@ -199,7 +200,7 @@ impl AgentRunner {
         return_groups(leaving);
     }
 
-    /// Shows the last states of those it leads and lets them return: it makes no more turns.
+    /// Shows the last states of the agents that it leads and lets them return: it makes no more turns.
     pub fn disband(&mut self, timeline: &Timeline, wall: Duration) {
         self.conclude_led(timeline, Took { begun: wall, ended: wall });
         self.release_together();
@@ -249,7 +250,7 @@ impl AgentRunner {
         leaders.min().filter(|leader| *leader < self.id() && self.is_at_the_time_of(*leader))
     }
 
-    /// The leader with the lowest number of those this agent is bonded with, whichever side says so.
+    /// The leader with the lowest number of the agents that this one is bonded with, whichever side says so.
     fn bonded_leader(&self) -> Option<AgentId> {
         let (me, sleep) = (self.id(), &self.shared.sleep);
         let newest = self.shared.slot.latest();

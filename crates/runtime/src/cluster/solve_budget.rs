@@ -1,7 +1,9 @@
-//! How far the solves of a cluster may go: as many factors as fit into the time of its macro step, by what factors have taken so far.
+//! How far the solves of a cluster may go: as many factors as fit into the time of its macro step, by the measured
+//! price of a factor.
 //!
 //! In: how long its turns took, and how many solves and factors they made. Out: the most factors of each solve of the next one.
-//! Never here: a clock, what a turn takes ([`super::super::turns::Took`] is measured on threads and in pools and declared in lockstep), the solve.
+//! Never here: a clock, the time of a turn ([`super::super::turns::Took`] is measured on threads and in pools and
+//! declared in lockstep), the solve.
 
 use metachron_contact::detect::LEAST_STEPS_RANGE;
 use metachron_contact::step::{ClusterReport, FACTORS_SAFE};
@@ -19,7 +21,7 @@ const FACTORS_SHARE_MIN: f64 = 0.1;
 /// Where the bound of a turn's solves comes from.
 #[derive(Debug, Clone, Copy)]
 pub(in super::super) enum SolveBound {
-    /// It is decided by what there is time for.
+    /// It is decided by the time left.
     Decided,
     /// The run that is followed has decided it.
     Given(Option<u32>),
@@ -47,8 +49,8 @@ impl Solved {
 
 /// The price of a factor: time = rest + price · factors over the last turns, by least squares whose weights decay.
 ///
-/// Turns that all make the same number of factors do not say what these cost; then the whole turn counts as theirs. That is too dear for
-/// more factors and right for as many, so that a number that rises slowly finds the true price.
+/// Turns that all make the same number of factors do not tell their price; then the whole turn counts as theirs. That
+/// is too dear for more factors and right for as many, so that a number that rises slowly finds the true price.
 ///
 /// A rigid pile would cost as a problem again as much as the last factors did, for as many contacts as it has now.
 #[derive(Debug, Clone, Copy, PartialEq, Default, serde::Serialize, serde::Deserialize)]
@@ -97,7 +99,7 @@ impl FactorPrice {
         Some(self.found_s(mean_s).clamp(FACTORS_SHARE_MIN * mean_s, mean_s))
     }
 
-    /// The part of it that turns of different numbers of factors have shown: what a guess adds is left out.
+    /// The part of it that turns of different numbers of factors have shown, without the guess.
     fn shown_s(&self) -> Option<f64> {
         let mean_s = self.mean_s()?;
         Some(self.found_s(0.0).clamp(FACTORS_SHARE_MIN * mean_s, mean_s))

@@ -34,7 +34,8 @@ pub(in super::super) struct Leap<'a> {
 }
 
 impl AgentRunner {
-    /// Brings those it leads to its own time; how many steps that took. A leader that gave up time gave it up for all at that time.
+    /// Brings the agents that it leads to its own time; how many steps that took. A leader that gave up time gave it up
+    /// for all at that time.
     pub fn gather(&mut self, timeline: &Timeline, wall: Duration, leap: Leap<'_>) -> u32 {
         if self.led.is_empty() {
             return 0;
@@ -61,8 +62,8 @@ impl AgentRunner {
         steps
     }
 
-    /// Forgets what contacts of it and of those it leads remember of earlier steps on edges and triangles, where one of them has lost some: others have their
-    /// numbers now.
+    /// Forgets the history of its contacts and of its members' on edges and triangles, where one of them has lost some:
+    /// the remaining ones are numbered anew.
     pub fn forget_features(&mut self) {
         let Self { led, cluster, carved, .. } = self;
         let mut any = std::mem::take(carved);
@@ -100,7 +101,7 @@ impl AgentRunner {
         Ok(steps)
     }
 
-    /// Whether nothing keeps it from resting, nor any of those it leads.
+    /// Whether nothing keeps it from resting, nor any of the agents that it leads.
     pub fn may_rest(&self, now: SimTime) -> bool {
         let time = self.pace.time();
         self.is_undisturbed(now) && self.led.all().all(|actor| actor.pace.time() == time && actor.is_undisturbed(now))
@@ -201,7 +202,7 @@ impl AgentRunner {
         self.cluster.as_ref()?.solved
     }
 
-    /// Learns from the turn that `took` so long what factors cost.
+    /// Learns the price of a factor from the turn that `took` so long.
     pub fn note_price(&mut self, timeline: &Timeline, took: Took) {
         let Some(seat) = &mut self.cluster else { return };
         if let Some(solved) = seat.solved.take()

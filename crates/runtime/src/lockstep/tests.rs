@@ -1,4 +1,4 @@
-//! Claims about runs in virtual time; those about turns hold for every executor, which all make the same.
+//! Claims about runs in virtual time; claims about turns hold for every executor, which all make the same.
 
 use super::super::testing::{Dummy, Fault};
 use super::super::{AgentState, Command, Demand, Governor, Keyed, SendError, TurnMeasure, state_hash};

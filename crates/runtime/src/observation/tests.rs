@@ -1,4 +1,4 @@
-//! Whom agents see, when, and what of it reaches them.
+//! The peers that agents see, when, and which of their states reach them.
 
 use super::super::cluster::Span;
 use super::super::faults::Faults;

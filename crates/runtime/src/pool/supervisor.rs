@@ -91,7 +91,7 @@ impl Supervisor {
         self.sender.clone()
     }
 
-    /// Watches the workers until the run is to end, and ends it; those whose turns do not end are left.
+    /// Watches the workers until the run is to end, and ends it; workers whose turns do not end are left.
     pub fn watch(mut self) -> Vec<WorkerRecord> {
         let why = loop {
             match self.messages.recv_timeout(self.team.watchdog.limit.interval()) {
@@ -179,8 +179,8 @@ impl Supervisor {
         drop(worker.and_then(|worker| worker.thread.take()).map(JoinHandle::join));
     }
 
-    /// Waits for the workers: for a cut until only those are left whose turns are stalled, at the end until a timeout, where a step that takes longer
-    /// counts as hung. The threads of these are left behind.
+    /// Waits for the workers: for a cut until only workers are left whose turns are stalled, at the end until a
+    /// timeout, where a step that takes longer counts as hung. The threads of these are left behind.
     fn join_all(&mut self, why: Halt) {
         let mut patience = Duration::ZERO;
         let watchdog = self.team.watchdog.clone();

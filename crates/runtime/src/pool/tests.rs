@@ -1,4 +1,4 @@
-//! Claims about pools alone; `live_tests.rs` holds what every executor does.
+//! Claims about pools alone; `live_tests.rs` holds the claims about every executor.
 
 use super::super::governor::{Demand, Governor, TurnMeasure};
 use super::super::sleep::SleepRegistry;

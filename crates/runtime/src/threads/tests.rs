@@ -1,4 +1,4 @@
-//! Claims about threads alone; `live_tests.rs` holds what every executor does.
+//! Claims about threads alone; `live_tests.rs` holds the claims about every executor.
 
 use super::super::SystemClock;
 use super::super::agent_runner::Next;

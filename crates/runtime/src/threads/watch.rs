@@ -1,6 +1,7 @@
 //! The thread that looks whether turns of agents' threads last too long.
 //!
-//! In: what each thread does. Out: judgements of the watchdog, four times within the time that a turn may last. Never here: what follows from them.
+//! In: the turn of each thread. Out: judgements of the watchdog, four times within the time that a turn may last. Never
+//! here: their consequences.
 
 use super::super::agent_runner::AgentRunner;
 use super::super::spawn::RunError;
