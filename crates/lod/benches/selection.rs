@@ -20,7 +20,7 @@ fn choose_levels(c: &mut Criterion) {
     let mut group = c.benchmark_group("budget/choose");
     for objects in [100_u64, 1000, 10_000] {
         let mut adaptive = scene(objects);
-        // half of what everything would take at its finest
+        // half of the time of everything at its finest
         let target = objects as f64 * 0.5 * 13.5 * 550.0;
         let mut frame = 0;
         group.throughput(Throughput::Elements(objects));

@@ -20,7 +20,7 @@ fn main() {
             });
             adaptive.set(id, 0, false, &offers);
         }
-        // half of what everything would take at its finest
+        // half of the time of everything at its finest
         let target = count as f64 * 0.5 * 13.5 * 550.0;
         let (mut times, mut gap) = (Vec::new(), 0.0_f64);
         for frame in 0..FRAMES {

@@ -149,7 +149,7 @@ proptest! {
     }
 }
 
-/// Hysteresis is memory: the levels of the frame before are part of what the default chooses by.
+/// Hysteresis is memory: the default also chooses by the levels of the frame before.
 #[test]
 fn by_default_a_warm_start_keeps_what_a_cold_one_would_not_choose() {
     let chosen = |weights: &[[f64; 2]]| {

@@ -46,7 +46,8 @@ fn walk_through_the_auditorium_ranks_the_policies_as_the_paper_does() {
     let feedback = spread_of("feedback", || Box::<Feedback>::default());
     let greedy = spread_of("greedy", || Box::new(Greedy));
     let ours = spread_of("ours", ours);
-    // (FS93, table 1): 3.05 > 0.48, 0.26 > 0.08, over all frames; here over those in which there is something to choose
+    // (FS93, table 1): 3.05 > 0.48, 0.26 > 0.08, over all frames; here over the frames in which there is something to
+    // choose
     assert!(none > by_size && none > feedback, "{none} {by_size} {feedback}");
     assert!(3.0 * greedy < by_size.min(feedback), "{greedy} is not a third of {by_size} and {feedback}");
     assert!(ours < greedy, "{ours} {greedy}");
@@ -106,7 +107,7 @@ fn certificate_is_below_a_hundredth_in_nearly_every_frame() {
     assert!(near * 100 >= policy.gaps.len() * 95, "{near} of {}", policy.gaps.len());
 }
 
-/// n of a tube alone under feedback at 60 Hz over 20 s, on a machine whose speed is what `load` says of the seconds passed.
+/// n of a tube alone under feedback at 60 Hz over 20 s, on a machine whose speed is `load` of the seconds passed.
 fn levels_of_a_tube(start: f64, load: impl Fn(f64, u32) -> f64) -> Vec<u8> {
     let hz = 60.0;
     let mut control = PictureControl::new(metachron_lod::control::Policy::Feedback, Law::CORRECTED, hz);

@@ -34,7 +34,7 @@ proptest! {
         prop_assert!(spent(&meshes, &best.r) <= time * (1.0 + 1e-12) + 1e-12);
         for (m, &r) in meshes.iter().zip(&best.r) {
             prop_assert!(m.least <= r && r <= m.most);
-            // gain of a little more r, against what its time is worth: w/(2 √r) and λ a
+            // gain of a little more r, against the price of its time: w/(2 √r) and λ a
             let (gain, price) = (m.weight / (2.0 * r.sqrt()), best.lambda * m.time);
             prop_assert!(r >= m.most || gain <= price * (1.0 + 1e-9), "{} could be finer", r);
             prop_assert!(r <= m.least || gain >= price * (1.0 - 1e-9), "{} could be coarser", r);

@@ -112,7 +112,7 @@ fn fit_of_too_few_or_invalid_numbers_is_none() {
 
 #[test]
 fn curve_gives_what_was_measured_and_lines_between() {
-    // a curve that bends: half of what a straight line would give in the middle
+    // a curve that bends: half of a straight line's value in the middle
     let bent = |x: f64| 1.0 + x * x / 100.0;
     let points: Vec<_> = (0..=10).rev().map(|i| (10.0 * f64::from(i), bent(10.0 * f64::from(i)))).collect();
     let curve = Curve::through(&points).unwrap();
@@ -366,7 +366,7 @@ fn one_budget_for_simulation_and_drawing_is_better_than_two_halves() {
     assert!(joint >= 0.99 && joint >= halves + 0.03 && even >= 0.99, "{joint} {halves} {even}");
 }
 
-/// Agents of many sizes, and what a picture gains by its logarithm: `worth` / ticks is its price.
+/// Agents of many sizes, and the gain of a picture by its logarithm: `worth` / ticks is its price.
 fn workers(dearer: f64) -> Vec<Worker> {
     (1..=12)
         .map(|k| Worker {

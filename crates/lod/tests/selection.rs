@@ -168,7 +168,7 @@ fn early_stop_lets_one_large_object_block_everything() {
     let problem = problem_of(Mode::AtMostOne, 100, &objects);
     assert_eq!(funkhouser::greedy(&problem, funkhouser::Scan::Stop).value, 0);
     assert_eq!(funkhouser::greedy(&problem, funkhouser::Scan::Skip).value, 21);
-    // what can never fit is left out before the steps are ordered
+    // levels that can never fit are left out before the steps are ordered
     assert_eq!(marginal::marginal(&problem, marginal::Fit::Stop).value, 21);
 }
 

@@ -126,7 +126,7 @@ impl<'d, 't> Checker<'d, 't> {
         self.draft.is_some()
     }
 
-    /// Whether what takes this much, by the number under `key`, may be made now: not in a draft, which adds it up instead.
+    /// Whether data of this cost, by the number under `key`, may be made now: not in a draft, which adds it up instead.
     pub(super) fn may_make(&mut self, place: &Place, key: &str, cost: Cost) -> bool {
         let Some(demands) = &mut self.draft else { return true };
         demands.add(self.document.locate(&place.key(key)), place.named(key), cost);
@@ -206,7 +206,7 @@ impl<'d, 't> Checker<'d, 't> {
         None
     }
 
-    /// Reports that `key` is wrong: its present value, and what was expected.
+    /// Reports that `key` is wrong: its present value, and the expected one.
     pub(super) fn wrong(&mut self, place: &Place, key: &str, what: impl Display, expected: impl Into<String>) {
         let span = self.document.locate(&place.key(key));
         self.problems.push(Problem::new(span, format!("{} {what}", place.named(key))).expecting(expected));

@@ -133,8 +133,8 @@ impl Source {
         Self::from_bytes(name, bytes.to_vec(), SiblingFiles::Unavailable)
     }
 
-    /// The scene `name` with the text that it had when it was recorded; files next to it are read from the `folder` that it was in, or are those
-    /// that are built in.
+    /// The scene `name` with the text that it had when it was recorded; files next to it are read from the `folder`
+    /// that it was in, or are the built-in ones.
     ///
     /// # Errors
     /// [`SceneError`] when the text is too long.
@@ -191,15 +191,15 @@ impl Source {
         std::env::current_dir().map_or_else(|_| Some(folder.clone()), |here| Some(here.join(folder)))
     }
 
-    /// The files that it has been read from, those included that could not be read: its own, and those beside it that a [`crate::load`] of it,
-    /// or of a copy, has asked for. None of a scene that is built in or from memory.
+    /// The files that it has been read from, also files that could not be read: its own, and the files beside it that a
+    /// [`crate::load`] of it, or of a copy, has asked for. None of a scene that is built in or from memory.
     #[must_use]
     pub fn files(&self) -> Vec<SourceFile> {
         let files = self.files.lock().unwrap_or_else(PoisonError::into_inner);
         files.iter().map(|(path, version)| SourceFile { path: path.clone(), version: *version }).collect()
     }
 
-    /// Of those files the ones outside of its folder: only a source whose limits allow it is read from them.
+    /// Of these files the ones outside of its folder: only a source whose limits allow it is read from them.
     #[must_use]
     pub fn files_outside(&self) -> Vec<PathBuf> {
         let SiblingFiles::Folder(folder) = &self.siblings else { return Vec::new() };

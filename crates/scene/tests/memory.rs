@@ -1,4 +1,4 @@
-//! The memory that a scene is estimated to take, against what its world takes, each in a process of its own.
+//! The memory that a scene is estimated to take, against the memory of its world, each in a process of its own.
 #![cfg(target_os = "linux")]
 
 use metachron_core::SimSpan;

@@ -59,7 +59,7 @@ pub enum SceneBuildError {
         /// The part.
         name: String,
     },
-    /// A sensor names what there is not.
+    /// A sensor names an object or joint that does not exist.
     #[error("the sensor \"{sensor}\" is on \"{on}\", which is no {what} of the scene")]
     NoMount {
         /// The sensor.

@@ -3,7 +3,8 @@
 //! In: a world between turns. Out: bytes by which it, or a world started from the same scene, goes on as this one would
 //! have, to the bit. Never here: what the state of an object is (`archive` of each says it), the scene.
 //!
-//! A file: [`MAGIC`], the version of the format, the length and the checksum of what follows, then the program's version, the scene's
+//! A file: [`MAGIC`], the version of the format, the length and the checksum of the rest, then the program's version,
+//! the scene's
 //! identity, the time, the state. All numbers of its head are little-endian.
 
 use super::joined::{JoinedParts, archive_parts};
@@ -14,7 +15,7 @@ use std::path::{Path, PathBuf};
 
 /// The first bytes of every file.
 const MAGIC: [u8; 8] = *b"METACHRN";
-/// The version of the format: it changes with what the bytes mean.
+/// The version of the format: it changes with the meaning of the bytes.
 const FORMAT: u32 = 10;
 /// Bytes before the checksummed ones.
 const HEAD: usize = MAGIC.len() + 4 + 8 + 8;
@@ -33,8 +34,8 @@ pub struct Checkpoint {
     pub(super) state: Vec<u8>,
 }
 
-/// By what a scene is known again: its objects, and how many of everything else there are. Values (masses, stiffnesses, what `--set` changes) are
-/// not compared: a state may go on under other ones.
+/// The identity of a scene: its objects, and how many of everything else there are. Values (masses, stiffnesses,
+/// changes by `--set`) are not compared: a state may go on under other ones.
 #[derive(Debug, Clone, PartialEq, Default, serde::Serialize, serde::Deserialize)]
 pub(super) struct SceneIdentity {
     name: String,
@@ -44,7 +45,7 @@ pub(super) struct SceneIdentity {
     couplings: usize,
 }
 
-/// By what an object is known again.
+/// The identity of an object.
 #[derive(Debug, Clone, PartialEq, serde::Serialize, serde::Deserialize)]
 struct ObjectIdentity {
     name: String,
@@ -76,7 +77,7 @@ pub enum CheckpointError {
     #[error("a replay does what its recording says, and goes back to no checkpoint")]
     Replay,
     /// The checkpoint has an agent of somebody's own that joined its world ([`super::Custom`]) and is not in this one: only a checkpoint that
-    /// is kept in memory has what makes it again. The world goes on as it was.
+    /// is kept in memory has the part that makes it again. The world goes on as it was.
     #[error(
         "\"{name}\" is an agent of your own that joined the world: no file has what makes it again, only a checkpoint that is kept in memory"
     )]
@@ -84,7 +85,7 @@ pub enum CheckpointError {
         /// Its name.
         name: String,
     },
-    /// The state does not fit what the world's objects are, or one of them does not read it. The world goes on as it was.
+    /// The state does not fit the world's objects, or one of them does not read it. The world goes on as it was.
     #[error("the state could not be read: {0}")]
     Unreadable(ArchiveError),
     /// The world could not be started.
@@ -155,8 +156,8 @@ impl Checkpoint {
         self.time
     }
 
-    /// The time of each object's state, by their numbers: in real time they differ, as each is at the end of a step of its own. Zero of those
-    /// that have left.
+    /// The time of each object's state, by their numbers: in real time they differ, as each is at the end of a step of
+    /// its own. Zero of objects that have left.
     #[must_use]
     pub fn times(&self) -> &[SimTime] {
         &self.times

@@ -38,8 +38,8 @@ pub enum CouplingKind {
         rest_m: f64,
         /// The force above which it tears, N, > 0: the mean over a common step of the two. Infinite where it never does.
         tears_above_n: f64,
-        /// The most force that it gives, N, > 0, below that at which it tears: what would take more moves the place at which it holds, or
-        /// lengthens it. Infinite where it never yields.
+        /// The most force that it gives, N, > 0, below that at which it tears: a greater load moves the place at which
+        /// it holds, or lengthens it. Infinite where it never yields.
         yields_above_n: f64,
     },
 }

@@ -10,7 +10,7 @@ use metachron_runtime::{AgentEvent, AgentHandle, AgentState, ContactEvent, Event
 use std::fmt;
 use std::sync::Arc;
 
-/// Something that happened; written as a sentence with the names of what took part.
+/// Something that happened; written as a sentence with the names of the objects that took part.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Event {
     /// The object that it happened to; of a contact between two the one with the lower number.
@@ -52,8 +52,9 @@ pub enum Happening {
     RateMissed,
     /// Cells of it were removed.
     Carved(Removed),
-    /// The world went back to a checkpoint ([`World::restore`]), in which the object is: what follows happens from its time there on. Whatever the
-    /// filter, this comes before all that follows; what the object touches there begins then, as if it had not touched it before.
+    /// The world went back to a checkpoint ([`World::restore`]), in which the object is: later events happen from its
+    /// time there on. Whatever the filter, this comes before all of them; contacts of the object begin there then, as
+    /// if they had not been before.
     Rewound,
 }
 
@@ -161,13 +162,13 @@ impl EventFilter {
         Self { above_n, ..self }
     }
 
-    /// Only what happens to this object.
+    /// Only events of this object.
     #[must_use]
     pub const fn of(self, object: Object) -> Self {
         Self { object: Some(object), ..self }
     }
 
-    /// Whether what happened to `object` is wanted.
+    /// Whether an event of `object` is wanted.
     fn takes(&self, whose: Object, what: &Happening) -> bool {
         let concerns = |object: Object| self.object.is_none_or(|wanted| wanted == object);
         match what {
@@ -202,7 +203,8 @@ struct HeardObject {
     rewinds: u64,
 }
 
-/// An event, and how often the world had gone back when it happened: what happened before a world went back comes first, whatever the time.
+/// An event, and how often the world had gone back when it happened: events before a world went back come first,
+/// whatever the time.
 #[derive(Debug, Clone)]
 struct Found {
     rewinds: u64,
@@ -216,14 +218,14 @@ impl Events {
         Self { world, filter, objects, lost: 0, found: Vec::new(), begun: Vec::new() }
     }
 
-    /// All that happened since the last call, by their times; where the world went back meanwhile, what happened before that comes first, then
-    /// [`Happening::Rewound`] of each object. It never waits.
+    /// All events since the last call, by their times; where the world went back meanwhile, the events before that come
+    /// first, then [`Happening::Rewound`] of each object. It never waits.
     pub fn drain(&mut self) -> impl Iterator<Item = Event> + '_ {
         self.found.clear();
         // looked up first: where it is counted, all objects have been told of it
         let (world, rewinds) = (self.world.clone(), self.world.rewinds());
         let known = self.objects.len();
-        // what joined since is heard from its first drain on
+        // an object that joined since is heard from its first drain on
         let joined = world.agents().iter().skip(known);
         self.objects.extend(joined.map(|agent| HeardObject { heard: agent.listen(), rewinds }));
         let count = self.objects.len();
@@ -233,7 +235,7 @@ impl Events {
         self.found.drain(..).map(|found| found.event)
     }
 
-    /// Takes in what an object tells, in a world that has gone back so often by now.
+    /// Takes in the events of an object, in a world that has gone back so often by now.
     fn hear(&mut self, agent: &AgentHandle, rewinds: u64) {
         let Self { world, filter, objects, lost, found, begun } = self;
         let HeardObject { heard, rewinds: own } = &mut objects[agent.id().0 as usize];
@@ -272,7 +274,7 @@ impl Events {
     }
 }
 
-/// Whether an event is news under a filter: contacts begin and end as one that sees only those above some newtons sees them.
+/// Whether an event is news under a filter: a filter that has a least force sees contacts begin and end at that force.
 fn is_news(begun: &mut Vec<(Object, Touched)>, object: Object, what: &Happening, filter: &EventFilter) -> bool {
     if matches!(what, Happening::Rewound | Happening::Gone) {
         begun.retain(|(whose, _)| *whose != object);

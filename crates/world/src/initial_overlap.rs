@@ -40,7 +40,8 @@ const POSITIONS_MAX: usize = 64;
 const AXES: [DVec3; 6] = [DVec3::Z, DVec3::X, DVec3::NEG_X, DVec3::Y, DVec3::NEG_Y, DVec3::NEG_Z];
 
 impl Scene {
-    /// Finds what starts inside each other and moves apart what can be moved without strain; fills [`Scene::overlaps`] and [`Scene::moved`].
+    /// Finds objects that start inside each other and moves those apart that can be moved without strain; fills
+    /// [`Scene::overlaps`] and [`Scene::moved`].
     pub fn resolve_initial_overlaps(&mut self) {
         let inside = self.find_overlaps();
         self.overlaps = self.overlaps_by_name(&inside);

@@ -37,7 +37,7 @@ struct SavedPart {
 }
 
 impl JoinedPart {
-    /// Whether no file can have what makes it again.
+    /// Whether no file can have the part that makes it again.
     pub fn is_own(&self) -> bool {
         self.saved().is_none()
     }

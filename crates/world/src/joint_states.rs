@@ -145,10 +145,11 @@ impl World {
         all.map(|listed| self.joint_state(listed.at)).collect()
     }
 
-    /// Puts joints to coordinates before the next step, and with them all bodies that they carry. What holds a tree of joints stays: the world, a
-    /// kinematic body, or of a tree that nothing holds its body of the lowest number. Joints that are not named keep their places and rates, also
-    /// spherical and fixed ones; torn ones, springs and ropes carry nothing. Joints of a loop are set together, all but one, to what closes it within
-    /// 1 mm and 1 mrad; the next step brings their rates together.
+    /// Puts joints to coordinates before the next step, and with them all bodies that they carry. The root of a tree of
+    /// joints stays: the world, a kinematic body, or of a tree that nothing holds its body of the lowest number. Joints
+    /// that are not named keep their places and rates, also spherical and fixed ones; torn ones, springs and ropes
+    /// carry nothing. Joints of a loop are set together, all but one, to coordinates that close it within 1 mm and 1
+    /// mrad; the next step brings their rates together.
     ///
     /// # Errors
     /// [`WorldError::BadCoordinate`] for a coordinate that is outside the joint's range by more than 1 mm or 1 mrad, or
@@ -285,7 +286,7 @@ impl World {
         Ok(tree)
     }
 
-    /// A body as its newest state has it, and what waits for it.
+    /// A body as its newest state has it, with its waiting commands.
     fn tree_body(&self, id: AgentId) -> Result<TreeBody, WorldError> {
         let object = self.tag().object(id);
         let agent = self.agent(object)?;

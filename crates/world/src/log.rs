@@ -130,8 +130,8 @@ impl Log {
         matches!(*self.mode(), Mode::Replayed(_))
     }
 
-    /// Begins to write down with what `begin` gives, in real time what happens in its order; it is told whether nothing was done to the world
-    /// since its start. Nothing is done to it meanwhile.
+    /// Begins to write down to the recorder that `begin` gives, in real time with the order of turns; it is told
+    /// whether nothing was done to the world since its start. Nothing is done to it meanwhile.
     ///
     /// # Errors
     /// [`RecordError::Recorded`]; the errors of `begin`.
@@ -188,7 +188,7 @@ impl Log {
         self.mode.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// The demand of the governor of `agent` after a turn: what `answer` says, or what the recording says.
+    /// The demand of the governor of `agent` after a turn: by `answer`, or by the recording.
     fn demand(&self, agent: AgentId, answer: impl FnOnce() -> Demand) -> Demand {
         if !self.is_heard.load(Acquire) {
             return answer();

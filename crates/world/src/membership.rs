@@ -54,14 +54,15 @@ impl World {
             }
             log.note(|| entry);
         };
-        // who sees the agent can ask for its member
+        // a caller that sees the agent can ask for its member
         let kept = &self.shared.joined;
         kept.add(id, JoinedPart { name, part: Some(Arc::new(part)) }, self.agents());
         let joined = self.in_order(|| run.add(spawn), note).inspect_err(|_| kept.take_back(id))?;
         Ok(self.tag().object(joined.id()))
     }
 
-    /// Takes an object out: at its next step nothing of it is left, and what lay on it falls. Its name is free again; it itself is an error
+    /// Takes an object out: at its next step nothing of it is left, and bodies that rested on it fall. Its name is free
+    /// again; it itself is an error
     /// from then on.
     ///
     /// # Errors

@@ -19,8 +19,8 @@ pub enum Pace {
     Factor(f64),
     /// As fast as objects can step, and no faster: none is late, gives up time or makes longer steps than it was asked for, however slow the
     /// machine is, and a rate that control may lower is kept. So time passes in [`World::advance`]; where [`World::drive`] lets it run, it
-    /// passes as beside the clock on the wall, and who is too slow for that is behind until time stops. In lockstep steps take no virtual
-    /// time: what the declared machine says of steps makes no difference to any bit.
+    /// passes as beside the clock on the wall, and an object that is too slow for that is behind until time stops. In
+    /// lockstep steps take no virtual time: declared costs of steps make no difference to any bit.
     Free,
 }
 
@@ -169,7 +169,8 @@ impl World {
             if self.time() >= end && !agents.iter().any(|agent| behind(&agent)) {
                 return true;
             }
-            // a turn shows its leader's state last: who is still behind after that was looked at is not in a turn that is being shown
+            // a turn shows its leader's state last: an agent still behind after that was looked at is not in a turn
+            // that is being shown
             let idle = agents.iter().filter(behind).find_map(|agent| {
                 let leader = agents.of(agent.led_by()?)?;
                 (leader.latest().moment() >= asked && behind(&agent)).then_some(leader)

@@ -18,7 +18,7 @@ use metachron_geometry::{
 
 /// A surface nearer than this is met, metres.
 const MET_M: f64 = 1e-5;
-/// The radius of a ray and of a point, metres: below what single precision tells apart.
+/// The radius of a ray and of a point, metres: below the resolution of single precision.
 const POINT_M: f64 = 1e-6;
 /// A ray that has made so many steps grazes something for long: it meets it there.
 const STEPS_MAX: u32 = 256;

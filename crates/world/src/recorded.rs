@@ -110,8 +110,8 @@ impl World {
         })
     }
 
-    /// Ends the recording, as [`World::stop`] does; returns whether there was one. Of a world that was stopped it says once what became of the
-    /// one that ended with it.
+    /// Ends the recording, as [`World::stop`] does; returns whether there was one. Of a world that was stopped it gives
+    /// once the outcome of the recording that ended with it.
     ///
     /// # Errors
     /// [`RecordError::Write`] if not all of it could be written; [`RecordError::Stalled`], where it goes on.
@@ -122,7 +122,7 @@ impl World {
         ended.unwrap_or_else(|| self.close_recording())
     }
 
-    /// Ends the recording between two parts of turns, for who keeps others from calls.
+    /// Ends the recording between two parts of turns, for a caller that keeps others from calls.
     pub(super) fn close_recording(&self) -> Result<bool, RecordError> {
         let order = self.shared.log.order();
         let _held = order.as_deref().map(TurnOrder::between);

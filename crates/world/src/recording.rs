@@ -19,7 +19,7 @@ use std::time::Duration;
 
 /// The first bytes of every file.
 const MAGIC: [u8; 8] = *b"METACREC";
-/// The version of the format: it changes with what the bytes mean.
+/// The version of the format: it changes with the meaning of the bytes.
 const FORMAT: u32 = 7;
 /// Bytes of a chunk before its contents: length, its complement and checksum.
 const CHUNK_HEAD: usize = 4 + 4 + 8;
@@ -28,7 +28,8 @@ const CHUNK_ENTRIES: usize = 128;
 /// As many parts of turns leave the process at once, and none is kept from it longer than this, of the run's time.
 const CHUNK_PARTS: usize = 1000;
 const WRITE_INTERVAL: Duration = Duration::from_millis(200);
-/// How often a recording in real time says what all states are, so that a replay that goes another way says so early.
+/// How often a recording in real time notes the hash of all states, so that a replay that goes another way says so
+/// early.
 const CHECK_INTERVAL: Duration = Duration::from_secs(1);
 /// The version of the program, which repeats its own recordings alone, to the bit.
 const PROGRAM: &str = env!("CARGO_PKG_VERSION");
@@ -67,7 +68,7 @@ pub(super) enum Entry {
     Begin(Vec<u8>),
     /// In real time: from now on time passes by this timeline.
     Timeline(Timeline),
-    /// In real time: what joins next begins at this moment.
+    /// In real time: the next object that joins begins at this moment.
     Present(SimTime),
     /// In real time: parts of turns, in the order in which they were made.
     Turns(PackedTurns),
@@ -278,7 +279,7 @@ impl Recording {
         self.lost_bytes == 0 && matches!(self.entries.last(), Some(Entry::End(_)))
     }
 
-    /// Whether what follows its last whole chunk has other bytes than were written, and is not just a missing end.
+    /// Whether the bytes after its last whole chunk are other ones than were written, and not just a missing end.
     #[must_use]
     pub const fn is_damaged(&self) -> bool {
         self.is_damaged
@@ -388,7 +389,7 @@ impl Recorder {
         self.entries.push(entry);
     }
 
-    /// Writes down the parts of turns that were made, and now and then what `hash` says that states are then.
+    /// Writes down the parts of turns that were made, and now and then the `hash` of the states then.
     pub fn note_turns(&mut self, parts: &[TurnPart], hash: impl FnOnce() -> u64) {
         let Some(newest) = parts.last().map(|part| part.wall) else { return };
         let restored =

@@ -26,7 +26,7 @@ pub(super) struct Player {
     pub played: usize,
     /// Parts of turns of the entry played last that are to be made.
     pub turns: VecDeque<TurnPart>,
-    /// In real time, when what joins next begins, and into which state all are put next.
+    /// In real time, when the next object that joins begins, and into which state all are put next.
     pub present: Option<SimTime>,
     pub restored: Option<Checkpoint>,
     /// It plays no further than to this time.
@@ -68,7 +68,7 @@ impl Followed {
 
 impl Player {
     /// Plays whole entries until time has come to `until`: a wait in two parts is not always the same to the bit, so that one that waits
-    /// longer ends later. What was done at the same moment belongs to it.
+    /// longer ends later. Calls at the same moment belong to it.
     fn play(&mut self, until: Duration) {
         loop {
             let outcome = match self.turns.pop_front() {
@@ -115,7 +115,7 @@ impl Player {
         restored.map_err(|error| error.to_string())
     }
 
-    /// Does what an entry says.
+    /// Repeats the call of an entry.
     ///
     /// # Errors
     /// Why it cannot be done as it was.

@@ -93,7 +93,8 @@ impl World {
         Ok(())
     }
 
-    /// Checks that what joined the world of a checkpoint is in this one, or can be made, under the numbers that it had.
+    /// Checks that objects that joined the world of a checkpoint are in this one, or can be made, under the numbers
+    /// that they had.
     fn check_joined(&self, checkpoint: &Checkpoint) -> Result<(), CheckpointError> {
         for (id, there) in &checkpoint.joined {
             let here = self.agents().of(*id);

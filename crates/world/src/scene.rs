@@ -32,7 +32,7 @@ use std::time::Duration;
 pub struct Scene {
     /// The built-in scene's name, or the file's.
     pub name: String,
-    /// One line that says what the scene shows; may be empty.
+    /// One line that describes the scene; may be empty.
     pub description: String,
     /// How agents are run.
     pub executor: ExecutorKind,
@@ -103,8 +103,8 @@ pub struct Target {
     pub law: LawKind,
     /// Gains of the laws.
     pub gains: Gains,
-    /// The greatest lag from reading the camera to the finished picture, seconds, and the share that is reserved for choosing levels of
-    /// what culling leaves of it; `None` where the scene sets no bound.
+    /// The greatest lag from reading the camera to the finished picture, seconds, and the share reserved for choosing
+    /// levels of the part that culling leaves of it; `None` where the scene sets no bound.
     pub lag: Option<(f64, f64)>,
     /// Whether time left over when everything is at its finest is spent on still smoother shapes and softer shadows.
     pub raise: bool,
@@ -307,7 +307,7 @@ pub struct Group {
     pub agents: Vec<AgentId>,
     /// All scenery in it and in its groups, a range of [`Scene::scenery`].
     pub members: Range<usize>,
-    /// All groups in it and in those, a range of [`Scene::groups`] that ends before it.
+    /// All groups in it and in them, a range of [`Scene::groups`] that ends before it.
     pub groups: Range<usize>,
 }
 

@@ -1,4 +1,4 @@
-//! Sensors: what programs read of a world by name, and joints by name.
+//! Sensors: readings of a world by name, and joints by name.
 //!
 //! In: the newest states. Out: numbers, with the time that they are of. Never here: noise, delays, stored readings.
 
@@ -43,8 +43,8 @@ pub enum SensorKind {
         with: Option<ContactPartner>,
     },
     /// The reading of an accelerometer on a rigid body, the acceleration of the matter there less that of gravity,
-    /// m/s², then of a gyroscope, rad/s, both
-    /// in the axes of its site. Accelerations are the mean of the last step, spins those at its end. Six numbers.
+    /// m/s², then of a gyroscope, rad/s, both in the axes of its site. Accelerations are the mean of the last step,
+    /// spins are at its end. Six numbers.
     Imu {
         /// The body.
         object: AgentId,

@@ -1,6 +1,7 @@
 //! Objects that are put into another state, as resets in learning and searches do: one that they had, or another of as many nodes.
 //!
-//! In: a [`Body`] as [`World::latest`] gives it. Out: the same to the agent, or why it does not fit. Never here: what a model makes of it.
+//! In: a [`Body`] as [`World::latest`] gives it. Out: the same to the agent, or why it does not fit. Never here: its
+//! use in the model.
 
 use super::commands::REPLAYED;
 use super::error::WorldError;
@@ -22,16 +23,18 @@ struct ListLength {
 impl World {
     /// Puts an object into another state before its next step: one that [`World::latest`] gave before, or of as many nodes. A rigid body takes its
     /// place and motion, a tube its nodes and frames, a soft body its vertices or, where a cage or a lattice carries these, the nodes of that
-    /// (`SoftState::nodes`); its vertices are then where the nodes carry them, whatever the state says. What is held of a soft body stays where it
-    /// is, and what a tube's parts turn with is zero.
+    /// (`SoftState::nodes`); its vertices are then where the nodes carry them, whatever the state says. The held places
+    /// of a soft body stay where they are, and the spin of a tube's parts is zero.
     ///
     /// Nothing that the object did before matters for a soft body or a rigid one after: put into one state twice, alone, it does the same twice to
-    /// the bit, and the same as when it had that state first to rounding. What else a checkpoint has, such as forces that contacts begin their
-    /// next solve with, a state has not.
+    /// the bit, and the same as when it had that state first to rounding. Further parts of a checkpoint, such as the
+    /// forces with which contacts begin their next solve, a state does not have.
     ///
     /// # Errors
-    /// [`WorldError::NotTaken`] for an object that takes no state; [`WorldError::Refused`] for a state of another kind or length, with what was
-    /// expected, and for numbers that are not finite or beyond their bounds ([`metachron_runtime::OutOfBounds`]); [`WorldError::Foreign`], [`WorldError::Gone`] and [`WorldError::Stopped`]. The object stays
+    /// [`WorldError::NotTaken`] for an object that takes no state; [`WorldError::Refused`] for a state of another kind
+    /// or length, with the expected one, and for numbers that are not finite or beyond their bounds
+    /// ([`metachron_runtime::OutOfBounds`]); [`WorldError::Foreign`], [`WorldError::Gone`] and [`WorldError::Stopped`].
+    /// The object stays
     /// as it is then, and where it has divided itself otherwise before it takes the state up.
     pub fn set_state(&self, object: Object, state: &Body) -> Result<(), WorldError> {
         let agent = self.agent(object)?;

@@ -226,7 +226,7 @@ fn velocity_integral(curve: &CurveState) -> DVec3 {
     pairs.map(|(arc, velocity)| 0.5 * (arc[1] - arc[0]) * (velocity[0] + velocity[1])).sum()
 }
 
-/// Cells of a soft body along each of its axes, of one whose ε may change those at the start.
+/// Cells of a soft body along each of its axes; of one whose ε may change, the cells at the start.
 fn cells(soft: &SoftSpec) -> Vec<u32> {
     let divided = soft.nodes.and_then(|nodes| soft.shape.divided_by(nodes.eps_m));
     match divided.as_ref().unwrap_or(&soft.shape) {

@@ -54,8 +54,8 @@ struct PairLaw {
     law: Law,
 }
 
-/// The pairs that are not solved with all that they touch. In a scene without contacts those are all pairs of material objects that no
-/// coupling names.
+/// The pairs that are not solved with all that they touch. In a scene without contacts these are all pairs of material
+/// objects that no coupling names.
 fn contact_laws(scene: &Scene) -> Vec<PairLaw> {
     let contacts = scene.couplings.iter().filter(|c| c.kind == CouplingKind::Contact);
     let mut laws: BTreeMap<_, _> = contacts.map(|c| ((c.a.min(c.b), c.a.max(c.b)), c.law)).collect();

@@ -54,10 +54,10 @@ pub(super) struct Shared {
     instruments: Instruments,
     /// Where its time stood when it was last let pass or had passed.
     seen: Mutex<Present>,
-    /// It was stopped while a step in lockstep did not end: who has it next ends it.
+    /// It was stopped while a step in lockstep did not end: the next caller that has it ends it.
     is_ending: AtomicBool,
     executor: ExecutorKind,
-    /// By what checkpoints of its scene are known again.
+    /// The identity by which checkpoints of its scene are known again.
     pub identity: SceneIdentity,
     /// The clock of executors in real time.
     pub clock: Arc<SystemClock>,
@@ -347,7 +347,8 @@ impl World {
     }
 
     /// Ends the run for all clones: waits for the turns in progress (boundedly) and returns the metrics of every agent. A recording ends with
-    /// these turns, in the states that are final; [`World::end_recording`] says what became of it. Latest states stay readable. An object whose
+    /// these turns, in the states that are final; [`World::end_recording`] gives its outcome. Latest states stay
+    /// readable. An object whose
     /// step does not end is parked; where that keeps another thread in lockstep, the recording ends where its step does.
     pub fn stop(&self) -> Vec<AgentStats> {
         loop {
@@ -409,7 +410,7 @@ impl World {
         self.shared.is_ending.load(Acquire) || self.shared.state.try_lock().is_some_and(is_stopped)
     }
 
-    /// [`Log::in_order`] for who has the run.
+    /// [`Log::in_order`] for a caller that has the run.
     pub(super) fn in_order<T>(&self, act: impl FnOnce() -> T, note: impl FnOnce(&mut Mode, &T)) -> T {
         let Ok(done) = self.shared.log.in_order(|| Ok::<_, Infallible>(()), act, note);
         done
@@ -429,7 +430,7 @@ impl World {
         }
     }
 
-    /// The same for who has the run.
+    /// The same for a caller that has the run.
     pub(super) fn let_pass(&self, run: &mut dyn Run, entry: impl FnOnce() -> Entry, act: impl FnOnce(&mut dyn Run)) {
         self.shared.log.note(entry);
         self.see(run);

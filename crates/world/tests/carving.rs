@@ -9,7 +9,7 @@ use metachron_world::kinds::ExecutorKind;
 use metachron_world::{Command, Custom, EventFilter, Happening, Object, Rigid, Scene, World, WorldError};
 use std::sync::Arc;
 
-/// Length of a cell, metres, and what one weighs, kg.
+/// Length of a cell, metres, and its mass, kg.
 const CELL_M: f64 = 0.05;
 const CELL_KG: f64 = 1000.0 * CELL_M * CELL_M * CELL_M;
 /// How far the body that flies is from the others, and how fast it is.
@@ -48,7 +48,7 @@ fn scene() -> Scene {
     let held = vec![Side::Left, Side::Right, Side::Near, Side::Far];
     let lies = SoftSpec { held, gravity: DVec3::Z * -9.81, ..slab(DVec3::ZERO) };
     let shape = SoftShape::Rope { path_m: vec![DVec3::ZERO, DVec3::X], radius_m: 0.005, segments: 4 };
-    // what damps it would slow it
+    // damping would slow it
     let undamped = SoftMatter { damping_per_s: 0.0, ..slab(AWAY).matter };
     let ball = Rigid::ball(0.03).mass_kg(0.05).at([0.0, 0.0, 0.5 + CELL_M + 0.03]).rate_hz(120.0);
     Scene::builder()
@@ -61,7 +61,7 @@ fn scene() -> Scene {
         .unwrap()
 }
 
-/// The middle cells and those beside them in both layers.
+/// The middle cells and their neighbours in both layers.
 fn cross(at: DVec3) -> Command {
     let at = at + DVec3::Z * 0.5;
     Command::carve(at - DVec3::Z * CELL_M, at + DVec3::Z * CELL_M, 1.2 * CELL_M)

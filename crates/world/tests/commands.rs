@@ -1,4 +1,5 @@
-//! Commands do what mechanics says they do, for as long as they were sent for, whatever the steps of what obeys them.
+//! Commands have the effect that mechanics predicts, for as long as they were sent for, whatever the steps of the
+//! object that obeys them.
 
 use glam::{DQuat, DVec3};
 use metachron_contact::joint::{JointKind, Motor, MotorGoal};
@@ -310,7 +311,7 @@ fn a_command_that_its_object_does_not_take_names_it_its_model_and_what_it_takes(
             let begins = format!("\"{name}\" (model \"{model}\") takes no {lacks}; it takes ");
             assert!(said.starts_with(&begins) && takes.iter().all(|word| said.contains(word)), "{said}");
         }
-        // what all take
+        // commands that all take
         world.command(object, Command::step(SimSpan::from_millis(2))).unwrap();
         world.command(object, Command::wake()).unwrap();
         let state = world.latest(object).unwrap().body.clone();

@@ -52,7 +52,7 @@ fn every_bounce_is_told_when_it_happened() {
 #[test]
 fn a_filter_keeps_what_it_was_asked_for() {
     let world = bouncing(0.0);
-    // m v over a step of 1/240 s, but for what of it the first step bears
+    // m v over a step of 1/240 s, as far as the first step bears it
     let loud = 0.5 * 0.2 * (2.0 * 9.81 * 0.5_f64).sqrt() * 240.0;
     let [mut loud_ones, mut contacts, mut states] =
         [EventFilter::contacts().above_n(loud), EventFilter::contacts(), EventFilter::states()]

@@ -172,7 +172,7 @@ fn joints_of_a_loop_are_set_together_or_not_at_all() {
     let [c, d] = ["c", "d"].map(|name| state(&world, name, -0.4, 0.0));
     let wrong = JointState { position: -0.3, ..d };
     assert!(matches!(world.set_joint_states(&[set[0], set[1], c, wrong]), Err(WorldError::OpenLoop { .. })));
-    // what closes the loop follows
+    // the joint that closes the loop follows
     world.set_joint_states(&[set[0], set[1], c]).unwrap();
     assert!((world.joint_state(d.joint).unwrap().position + 0.4).abs() < 1e-12);
     world.advance(SimSpan::from_millis(1));

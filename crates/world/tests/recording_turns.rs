@@ -31,7 +31,7 @@ fn replayed(scene: &Scene, recording: Recording) -> World {
     world
 }
 
-/// A heap that forms and parts, a hinged arm, a tube, and what comes to rest.
+/// A heap that forms and parts, a hinged arm, a tube, and bodies that come to rest.
 fn scene() -> Scene {
     let hinge = JointKind::Revolute { axis: DVec3::Y, range_rad: None, motor: None };
     let ball = |x: f64, speed: f64, hz: f64| {

@@ -1,6 +1,6 @@
 //! From worked cases to answers, as JSON values: the format at both ends, and which function answers which policy.
 //!
-//! In: the case file. Out: one answer for every policy that a case expects. Never here: a policy; those are the crate's.
+//! In: the case file. Out: one answer for every policy that a case expects. Never here: a policy; the crate has them.
 
 use metachron_lod::grisoni::{Gains, GrisoniLaw, Limits};
 use metachron_lod::select::gobbetti;

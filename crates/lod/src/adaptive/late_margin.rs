@@ -1,4 +1,5 @@
-//! The margin that keeps late frames rare: an upper quantile of how much longer a frame takes than those around it, from the newest frames.
+//! The margin that keeps late frames rare: an upper quantile of how much longer a frame takes than its neighbours, from
+//! the newest frames.
 //!
 //! In: predicted and measured times of frames. Out: the fraction of T to leave free. Never here: a clock, a choice, how slow the machine is.
 //! Theory: `docs/theory/budget.md`, eq. 37, 38, after (Wil41).
@@ -11,7 +12,8 @@ pub const LATE_SHARE: f64 = 1.0 / 64.0;
 const FRAMES: usize = 256;
 /// Fewest frames that may exceed the bound: one slow frame is a hiccup.
 const EXCEEDING_LEAST: usize = 2;
-/// A frame that took more than this many times what those around it took is a stall: no margin that leaves a picture would have prevented it.
+/// A frame that took more than this many times as long as its neighbours is a stall: no margin that leaves a picture
+/// would have prevented it.
 const STALL: f64 = 4.0;
 /// Frames around a frame, itself among them, whose median stands for the speed of the machine: half of them in a row that are slow are a
 /// change of the load, fewer are scatter. With 9 a slow wander of the machine, which γ follows only in part, was half missed; with 25

@@ -288,7 +288,8 @@ impl Adaptive {
         self.slowness[stage.min(STAGES - 1)]
     }
 
-    /// The present margin, as a fraction of T: what the scatter requires, as far as it is not reserved for others, who may be made to wait.
+    /// The present margin, as a fraction of T: the part that the scatter requires, as far as it is not reserved for
+    /// others, who may be made to wait.
     #[must_use]
     pub fn margin(&self) -> f64 {
         self.settings.margin.max(self.late.margin() - self.reserved)

@@ -80,13 +80,15 @@ impl Terms {
         table.iter().zip(&self.slowness).map(|(&t, k)| t as f64 * k).sum()
     }
 
-    /// Factors from gain per tick of the table to gain per measured tick, for an object's steps: new ones, and those taken last time.
+    /// Factors from gain per tick of the table to gain per measured tick, for an object's steps: new ones, and steps
+    /// taken last time.
     fn worth(&self, object: &Object) -> [f64; 2] {
         let worth = object.weight * self.per_slowness[usize::from(object.stage)];
         [worth, worth * if object.just_rose() { JUST_ROSE_FACTOR.max(self.stay_factor) } else { self.stay_factor }]
     }
 
-    /// How many steps of an object are on offer: all that have a gain and can ever fit; if the object has just fallen, those it had.
+    /// How many steps of an object are on offer: all that have a gain and can ever fit; if the object has just fallen,
+    /// the steps it had.
     fn on_offer(&self, object: &Object, steps: &[Step]) -> usize {
         let most = match (object.weight > 0.0, object.just_fell()) {
             (false, _) => 0,
@@ -176,7 +178,8 @@ impl Picker {
         result
     }
 
-    /// Takes all steps above the bucket in which the budget ends, and collects those in it in `edge`. Gives the ticks taken by the table;
+    /// Takes all steps above the bucket in which the budget ends, and collects the steps in it in `edge`. Gives the
+    /// ticks taken by the table;
     /// `None` where that bucket is not among the near ones.
     fn find_edge(&mut self, options: &Options, terms: &Terms, near: Near) -> Option<[u64; STAGES]> {
         let (mut table, all) = self.take_far(options, terms, near);
@@ -235,7 +238,7 @@ impl Picker {
         }
     }
 
-    /// Takes the near steps above a bucket, and collects those in it in `edge`.
+    /// Takes the near steps above a bucket, and collects the steps in it in `edge`.
     fn take_above(&mut self, edge: usize) {
         self.edge.clear();
         // along a hull buckets never rise: each object's steps above the edge come first
@@ -254,8 +257,8 @@ impl Picker {
         self.edge.sort_unstable_by(|a, b| b.merit.total_cmp(&a.merit).then(place(a).cmp(&place(b))));
     }
 
-    /// Takes the steps on the edge that fit, and gives the gain per tick of the first that does not. One large step must not block those
-    /// after it, whose gains are nearly as high; but no further step of its object is taken.
+    /// Takes the steps on the edge that fit, and gives the gain per tick of the first that does not. One large step
+    /// must not block the steps after it, whose gains are nearly as high; but no further step of its object is taken.
     fn take_edge(&mut self, options: &Options, terms: &Terms, result: &mut PickResult) -> f64 {
         let mut lambda = 0.0;
         for edge in &self.edge {

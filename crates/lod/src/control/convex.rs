@@ -1,4 +1,4 @@
-//! Any number of triangles for every object (GB99), and what of it stays from frame to frame.
+//! Any number of triangles for every object (GB99), kept from frame to frame where it changes little.
 //!
 //! In: the objects in view, a time. Out: a number of triangles for each, and a promise. Never here: the optimum itself
 //! ([`crate::select::gobbetti`], [`crate::select::barrier`]). Theory: `docs/theory/budget.md`, section 5.

@@ -1,4 +1,5 @@
-//! The groups that the default policy draws by an impostor: those whose members gain less than their time costs at the present price.
+//! The groups that the default policy draws by an impostor: groups whose members gain less than their time costs at the
+//! present price.
 //!
 //! In: groups, λ and γ of the last plan. Out: which groups are closed. Never here: the choice of the impostor, or levels of members.
 //! Theory: `docs/theory/control.md`, eq. 24.

@@ -316,8 +316,9 @@ impl PictureControl {
         }));
     }
 
-    /// Time that the default policy would take of a frame without competition, seconds, and the gain of one more second, pixels: 0 if it
-    /// has all it can use, be it that what others leave is less than what the scatter of frames makes it leave free. `None` for policies without a price.
+    /// Time that the default policy would take of a frame without competition, seconds, and the gain of one more
+    /// second, pixels: 0 if it has all it can use, also where others leave less time than the scatter of frames makes
+    /// it leave free. `None` for policies without a price.
     #[must_use]
     pub fn wants(&self) -> Option<(f64, f64)> {
         if self.policy != Policy::Adaptive || self.plan.levels.is_empty() {

@@ -56,7 +56,7 @@ pub struct Plan {
     pub levels: Vec<LevelDemand>,
     /// Triangles of everything in view.
     pub polygons: f64,
-    /// Triangles of everything in view at its finest: what the policy `full` would draw.
+    /// Triangles of everything in view at its finest, as the policy `full` would draw it.
     pub full_polygons: f64,
     /// The promise of the choice; zeros if the policy predicts nothing.
     pub promise: Promise,

@@ -106,7 +106,7 @@ impl Policy {
         matches!(self, Self::Greedy | Self::GreedyIncremental | Self::GreedyRepaired)
     }
 
-    /// Whether the slider of hysteresis changes what the policy chooses.
+    /// Whether the slider of hysteresis changes the policy's choice.
     #[must_use]
     pub const fn has_hysteresis(self) -> bool {
         self.has_printed_benefit() || matches!(self, Self::Adaptive)

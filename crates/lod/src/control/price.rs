@@ -112,7 +112,7 @@ impl Prices {
         }
     }
 
-    /// The same prices without those by area: for policies that use two stages only (FS93, MB97, GB99).
+    /// The same prices without prices by area: for policies that use two stages only (FS93, MB97, GB99).
     #[must_use]
     pub fn by_lines(self) -> Self {
         Self { areas: None, ..self }
@@ -202,8 +202,8 @@ impl Prices {
         self.strokes[stroke as usize]
     }
 
-    /// Seconds of an object with `polygons` triangles that covers `pixels`, by what its pieces are drawn as: strokes and pieces in full are two
-    /// draws, of which each covers the pixels of its share of the pieces.
+    /// Seconds of an object with `polygons` triangles that covers `pixels`, by how its pieces are drawn: strokes and
+    /// pieces in full are two draws, of which each covers the pixels of its share of the pieces.
     #[must_use]
     pub fn pieces_s(&self, pieces: Option<Pieces>, shading: Shading, polygons: f64, pixels: f64) -> f64 {
         let Some(pieces) = pieces else { return self.object_s(shading, polygons, pixels) };
@@ -312,7 +312,7 @@ mod tests {
             areas: None,
         };
         let found = Prices::fitted(&pictures(1, &machine)).unwrap().by_lines();
-        // without interruptions: no model predicts those
+        // without interruptions: no model predicts these
         let others = pictures(2, &machine);
         let calm = others.iter().filter(|p| p.seconds < 1.3 * machine.predict_s(p));
         let mut errors: Vec<_> = calm.map(|p| (found.predict_s(p) / p.seconds - 1.0).abs()).collect();

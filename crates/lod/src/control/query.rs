@@ -38,7 +38,7 @@ pub(super) struct FrameQuery<'a> {
     pub fixed_s: f64,
     /// Time in it that the frame does not spend but leaves to agents, seconds, ≥ 0.
     pub reserve_s: f64,
-    /// Whether Robin Hood shares once more what no object took.
+    /// Whether Robin Hood shares the time once more that no object took.
     pub spend_rest: bool,
     /// Which objects are left out of this frame; empty for none.
     pub out: &'a [bool],

@@ -40,8 +40,8 @@ pub struct RateLimits {
     pub share: f64,
 }
 
-/// The gains of the law: how much of a difference one demand removes. What an agent's own work asks to coarsen it removes at once: its load
-/// is known, and late turns lose simulated time.
+/// The gains of the law: how much of a difference one demand removes. Where an agent's own work asks to coarsen, the
+/// whole difference is removed at once: its load is known, and late turns lose simulated time.
 #[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct RateGains {
     /// Share of the way to a finer level that one demand goes, 0.02 … 1, where nobody else delays the agent.
@@ -95,7 +95,7 @@ const WINDOW_TURNS: u32 = 8;
 /// A turn of more than this many times the mean of the last windows is clamped to it: such delays are due to the scheduler, not the agent.
 const SPIKE: f64 = 8.0;
 
-/// Above this ratio of real to wanted period, beyond what the agent's own work explains, the agent counts as delayed by others.
+/// Above this ratio of real to wanted period, beyond the agent's own work, the agent counts as delayed by others.
 const LATE: f64 = 1.03;
 
 /// Least |Δ ln| of a demand, dimensionless: re-meshing costs accuracy, which 10 % of ε do not justify.
@@ -231,7 +231,8 @@ impl RateControl {
         self.limits.share
     }
 
-    /// Sets what makes a visible difference. Until the next call nothing finer is demanded; afterwards the agent returns to its own target.
+    /// Sets the ε and step that make a visible difference. Until the next call nothing finer is demanded; afterwards
+    /// the agent returns to its own target.
     /// A longer step counts where the coarsest ε is fine enough.
     pub fn set_visible(&mut self, detail: VisibleDetail) {
         let RateLimits { dt_wanted_s, dt_max_s, work_power, .. } = self.limits;

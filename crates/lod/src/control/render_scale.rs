@@ -1,9 +1,11 @@
-//! The scale of the picture and its shadows: what of it is drawn, where everything else is as coarse as it may be and frames are still late.
+//! The scale of the picture and its shadows, where everything else is as coarse as it may be and frames are still late.
 //!
-//! In: the time that a frame would have taken with all else at its coarsest, and what drawing it otherwise would take by the prices.
+//! In: the time that a frame would have taken with all else at its coarsest, and its time drawn otherwise by the
+//! prices.
 //! Out: a [`PictureRung`]. Never here: levels of objects, drawing, enlarging. Theory: `docs/theory/control.md`, section 11.
 //!
-//! Pixels are the last to be taken and the first to be given back. What a scale saves is known from the prices, and its error is learnt from
+//! Pixels are the last to be taken and the first to be given back. The saving of a scale is known from the prices, and
+//! its error is learnt from
 //! the time before and after each change; whether a frame is late is decided by the mean of the frames since the last change and its
 //! uncertainty, so that a machine that trembles does not move the picture.
 
@@ -22,8 +24,8 @@ pub(super) struct PictureRung {
     pub shadows: bool,
 }
 
-/// From the least to the most: all scales of a range, without shadows up to half the width and height, with them from there on. What has
-/// one scale alone is fixed, with its shadows.
+/// From the least to the most: all scales of a range, without shadows up to half the width and height, with them from
+/// there on. A range of one scale alone is fixed, with its shadows.
 fn rungs(range: (f64, f64)) -> Vec<PictureRung> {
     let most = SCALES.iter().rposition(|scale| *scale <= range.1 + NEAR).unwrap_or(0);
     let least = SCALES.iter().position(|scale| *scale >= range.0 - NEAR).map_or(most, |least| least.min(most));
@@ -44,8 +46,8 @@ const FRAMES_MIN: f64 = 3.0;
 /// A frame past the mean by this many standard deviations, and by this logarithm at least, is a stall, and so many of them in a row are
 /// another load.
 const STALL: (f64, f64) = (4.0, 0.1);
-/// Standard errors by which a mean must be past a threshold, and what few frames add to that, over their number less one: near Student's
-/// 0.975 quantile.
+/// Standard errors by which a mean must be past a threshold, and the addition for few frames, over their number less
+/// one: near Student's 0.975 quantile.
 const CERTAIN: (f64, f64) = (2.0, 4.6);
 /// A scale is gone to if it is predicted to need this fraction of the time, or less: the rest, and the uncertainty,
 /// keep pixels from being taken and given in turn.
@@ -136,7 +138,7 @@ impl Times {
     }
 }
 
-/// The times before a change, kept until those after it are known.
+/// The times before a change, kept until the times after it are known.
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct Change {
     before: Window,
@@ -201,7 +203,7 @@ impl RenderScale {
         self.rungs[self.at]
     }
 
-    /// Whether anything is taken of the picture: what else there is may not take the time that it needs.
+    /// Whether anything is taken of the picture: then no other part may take the time that it needs.
     pub fn is_reduced(&self) -> bool {
         self.at + 1 < self.rungs.len()
     }
@@ -251,7 +253,7 @@ impl RenderScale {
         self.rungs.len() == 1
     }
 
-    /// Forgets the frames at this scale: they were unlike those to come.
+    /// Forgets the frames at this scale: they were unlike later ones.
     pub fn disturb(&mut self) {
         (self.times, self.unlike, self.odd, self.change) = (Times::default(), Times::default(), 0.0, None);
     }
@@ -282,7 +284,8 @@ impl RenderScale {
         }
     }
 
-    /// Counts a frame: among those at this scale, or, if it is unlike them, among such, which replace them once they are enough in a row. Where
+    /// Counts a frame: among the frames at this scale, or, if it is unlike them, among such, which replace them once
+    /// they are enough in a row. Where
     /// too many are unlike the others all count.
     fn add(&mut self, frame: &ScaledFrame) {
         let Times { work, .. } = self.times;

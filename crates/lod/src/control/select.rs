@@ -36,7 +36,7 @@ impl Select {
         self.threshold.observe(work_s, target_s);
     }
 
-    /// Chooses by `policy`; `levels` has one entry per object, of which those in view with rungs are set.
+    /// Chooses by `policy`; `levels` has one entry per object, of which the entries in view with rungs are set.
     pub fn choose(&mut self, policy: Policy, query: &FrameQuery<'_>, levels: &mut [LevelDemand]) -> Promise {
         match policy {
             Policy::RobinHood => robin_hood::choose(query, levels),
@@ -47,7 +47,7 @@ impl Select {
         }
     }
 
-    /// Every object has one rung; the cheapest of all if even those do not fit.
+    /// Every object has one rung; the cheapest of all if even the cheapest do not fit.
     fn knapsack(&mut self, policy: Policy, query: &FrameQuery<'_>, levels: &mut [LevelDemand]) -> Promise {
         let mut problem = Problem::new(Mode::ExactlyOne, query.budget());
         let objects: Vec<_> = query.drawable().collect();

@@ -31,7 +31,7 @@ impl Overlap {
             Self::Fitted(serial) => {
                 let serial = crate::within(serial, 0.0, 1.0);
                 let longer = frame - serial * logic;
-                // if drawing were the shorter of the two, it would be what lengthens the logic
+                // if drawing were the shorter of the two, it would lengthen the logic
                 if longer >= logic { longer } else { ((frame - logic) / serial).min(logic) }
             }
         }
@@ -43,7 +43,8 @@ impl Overlap {
         logic.max(drawing) + serial * logic.min(drawing)
     }
 
-    /// z from measured frames (logic, drawing, frame), by least squares over those where both matter; 1 where none does.
+    /// z from measured frames (logic, drawing, frame), by least squares over the frames where both matter; 1 where none
+    /// does.
     #[must_use]
     pub fn fit(frames: &[(f64, f64, f64)]) -> Self {
         let mut fit = OverlapFit::default();

@@ -4,7 +4,8 @@
 //! Theory: `docs/theory/budget.md`, eq. 18 and 20.
 //!
 //! The paper's own argument does not hold: neither its incremental form nor its flat one is ever within a constant of the optimum, as
-//! opening a group changes many parts at once. What holds is the certificate: an answer of half the bound is of half the optimum.
+//! opening a group changes many parts at once. The certificate holds: an answer of half the bound is of half the
+//! optimum.
 
 use alloc::vec::Vec;
 

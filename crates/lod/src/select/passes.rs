@@ -1,6 +1,7 @@
 //! Passes of an incremental search: one rise, then as many falls as needed (FS93, §6; MB97, §4).
 //!
-//! In: a search whose objects or nodes rise and fall. Out: how many passes it took, and whether it converged. Never here: what rises, the answer.
+//! In: a search whose objects or nodes rise and fall. Out: how many passes it took, and whether it converged. Never
+//! here: the objects, the answer.
 
 /// A search from the choice of the frame before.
 pub(super) trait Search {

@@ -23,7 +23,7 @@ pub struct AgentVerdict {
     pub late_share: f64,
     /// Turns of z from finer to coarser or back, per second, over all disturbances.
     pub reversals_per_s: f64,
-    /// Mean e^(z* − z), at most 1: the work that the agent did of what its share would have paid for.
+    /// Mean e^(z* − z), at most 1: the agent's work as a part of the work that its share would have paid for.
     pub quality: f64,
     /// The number to minimise (control.md, eq. 31c).
     pub objective: f64,

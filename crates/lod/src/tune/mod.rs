@@ -42,7 +42,7 @@ pub use search::{Family, Search, SearchResult, search};
 pub use trials::{Extent, Margins, Verdict, judge, measure, speeds_in_reach};
 pub use tuning::{NORMALISED, Origin, Row, Tuning, tune};
 
-/// The law accepts what scenes, the window and the search allow.
+/// The law accepts all gains that scenes, the window and the search allow.
 const _: () = {
     use crate::log_law;
     use metachron_core::gains;

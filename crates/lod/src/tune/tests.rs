@@ -54,7 +54,7 @@ fn the_logarithmic_and_the_pi_law_follow_the_recursion_worked_out_by_hand() {
         let frames = played(&plant(dead_time, (0, 5)), law, rate, 2.0);
         let hand = by_hand(kappa, lead, 0.9 / TARGET_HZ, (rate, dead_time, frames.len()));
         for (k, (frame, expected)) in frames.iter().zip(&hand).enumerate() {
-            // levels are 3 % apart, and what one frame is off by the next has in its error
+            // levels are 3 % apart, and the rounding of one frame is in the error of the next
             let off = (frame.ratio / expected - 1.0).abs();
             assert!(off < 2.0 * CUT, "{law:?} from {rate}, frame {k}: {} and {expected}", frame.ratio);
         }

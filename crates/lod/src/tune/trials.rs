@@ -52,7 +52,7 @@ pub struct Verdict {
     pub margins: Option<Margins>,
     /// Speeds of the machine, relative to the plant's own, at which the law settles within a second and does not oscillate.
     pub robust_to: Vec<f64>,
-    /// Speeds tested: those at which the picture can be made to take the time of a frame.
+    /// Speeds tested: speeds at which the picture can be made to take the time of a frame.
     pub asked: Vec<f64>,
     /// The speed among them nearest to the machine's own, at which all else was measured; 1 if none was tested.
     pub at_speed: f64,
@@ -159,7 +159,8 @@ impl Verdict {
         self.shortfall.total_cmp(&other.shortfall).then(self.objective.total_cmp(&other.objective))
     }
 
-    /// The same order as one number for the simplex: J/(1 + J) of a law that keeps its margins, past 1 by what another lacks.
+    /// The same order as one number for the simplex: J/(1 + J) of a law that keeps its margins, past 1 by the shortfall
+    /// of another.
     pub(super) fn rank(&self) -> f64 {
         let within = self.objective / (1.0 + self.objective);
         if self.is_safe() { within } else { 1.0 + self.shortfall + TIE * within }

@@ -149,7 +149,7 @@ mod tests {
             for row in &tuning.rows {
                 let law = matches!(row.verdict.candidate, Candidate::Feedback(_));
                 assert!(!law || tuning.best.compare(&row.verdict).is_le(), "{row:?} and {:?}", tuning.best);
-                // a row says what the law is worth, not what the search held of it
+                // a row has the worth of its law, not the search's estimate of it
                 assert_eq!(judge(&plant, row.verdict.candidate, target_hz, EXTENT), row.verdict);
             }
             let compared = tuning.rows.iter().filter(|row| !matches!(row.origin, Origin::Found(_))).count();

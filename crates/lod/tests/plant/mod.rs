@@ -238,7 +238,7 @@ pub struct Run {
     pub object_frames: usize,
 }
 
-/// Runs a policy for `frames` frames; what a frame took is known `delay` frames after it was chosen.
+/// Runs a policy for `frames` frames; the time of a frame is known `delay` frames after it was chosen.
 pub fn run(policy: &mut dyn Policy, machine: &mut Machine, frames: usize, delay: usize) -> Run {
     let hall = Auditorium::new();
     let mut run = Run { times: vec![], binding: vec![], quality: vec![], changes: 0, reversals: 0, object_frames: 0 };

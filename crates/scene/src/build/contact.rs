@@ -1,4 +1,4 @@
-//! Reads what objects say about their contacts.
+//! Reads the contact traits of objects.
 //!
 //! In: [`ContactFile`]s, the names of all groups of the scene. Out: [`ContactTraits`]; problems to the [`Checker`]. Never here: forces.
 
@@ -15,7 +15,7 @@ const GROUPS_MAX: usize = 32;
 pub(super) struct GroupNames {
     /// The place of a name is that of its bit.
     bits: Vec<String>,
-    /// Those for which there is none; they are reported.
+    /// Rules for which there is none; they are reported.
     refused: BTreeSet<String>,
 }
 

@@ -1,6 +1,7 @@
 //! The forces at which attachments yield and tear.
 //!
-//! In: what a joint or coupling of a scene file gives. Out: the two, in order; problems to the [`Checker`]. Never here: what then happens.
+//! In: the forces that a joint or coupling of a scene file gives. Out: the two, in order; problems to the [`Checker`].
+//! Never here: their effect.
 
 use super::TEARING;
 use crate::check::{Checker, Place};

@@ -1,6 +1,6 @@
 //! Objects that a scene repeats on a grid: how many, where, how turned, and under which names.
 //!
-//! In: the common keys of one object. Out: [`Copies`]. Never here: what the object is.
+//! In: the common keys of one object. Out: [`Copies`]. Never here: the kind of object.
 
 use super::POSITION_MAX_M;
 use super::rigid::rotation;

@@ -100,7 +100,7 @@ impl Owners {
         (0..all).find(|group| self.around(*group).take(all).any(|outer| outer == *group))
     }
 
-    /// The agents of a group and of those in it.
+    /// The agents of a group and of the groups in it.
     fn agents_in<'a>(&self, group: usize, agents: &'a [Member]) -> Vec<&'a Member> {
         let is_in = |owner: &Option<usize>| owner.is_some_and(|inner| inner == group || self.is_within(inner, group));
         agents.iter().zip(&self.agents).filter(|(_, owner)| is_in(owner)).map(|(agent, _)| agent).collect()
@@ -110,7 +110,7 @@ impl Owners {
         self.around(inner).any(|group| group == outer)
     }
 
-    /// All groups, each after those in it, which come directly before it.
+    /// All groups, each after the groups in it, which come directly before it.
     fn inner_first(&self) -> Vec<usize> {
         let mut order = Vec::with_capacity(self.groups.len());
         self.push_within(None, &mut order);

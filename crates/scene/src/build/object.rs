@@ -65,7 +65,7 @@ struct Known<'a> {
     groups: &'a GroupNames,
 }
 
-/// Names and what each denotes.
+/// Names, and the object that each denotes.
 #[derive(Debug, Default)]
 pub(crate) struct Names(BTreeMap<String, NamedObject>);
 
@@ -223,7 +223,7 @@ pub(crate) fn read_objects(
         entry.copies = copies(c, &entry.place, &entry.common, entry.model.repeats(), most);
         let count = counts.entry(what).or_insert(0);
         *count += entry.copies.len() * entry.model.parts();
-        // none of its copies and of those after it are made
+        // no copies of this object and of later ones are made
         if *count > most {
             too_many(c, &entry.place.path, &format!("{count} {what}"), most);
             entry.copies = Copies::single();
@@ -396,7 +396,7 @@ fn agents(c: &mut Checker<'_, '_>, entries: &[Entry], known: &Known<'_>, context
     members
 }
 
-/// Reports what only the model can find wrong with an object: builds it once and drops it.
+/// Reports faults of an object that only its model can find: builds it once and drops it.
 fn check_buildable(c: &mut Checker<'_, '_>, place: &Place, member: &Member) {
     let verdict = match member.spec.clone() {
         Spec::Tube(spec) => match Tube::new(spec) {

@@ -131,7 +131,7 @@ fn restraint(c: &mut Checker<'_, '_>, place: &Place, file: &RigidFile) -> Restra
     }
 }
 
-/// Reports what slows down, or keeps from moving, what forces do not move anyway.
+/// Reports keys that slow down, or keep from moving, an object that forces do not move anyway.
 fn refuse_restraint(c: &mut Checker<'_, '_>, place: &Place, file: &RigidFile, what: &str) {
     let keys = [
         ("gravity_scale", file.gravity_scale.is_some()),
@@ -146,7 +146,7 @@ fn refuse_restraint(c: &mut Checker<'_, '_>, place: &Place, file: &RigidFile, wh
     }
 }
 
-/// How a kinematic object is led; `None` for one that moves by what acts on it.
+/// How a kinematic object is led; `None` for one that forces move.
 fn led(c: &mut Checker<'_, '_>, place: &Place, file: &RigidFile, rotation: DQuat) -> Option<Led> {
     let is_led = file.kinematic == Some(true);
     for (key, given) in [("keyframe", file.keyframe.is_some()), ("repeat", file.repeat.is_some())] {

@@ -1,6 +1,7 @@
 //! Reads the sensors of a scene file, and the names of its joints.
 //!
-//! In: [`SensorFile`]s, the objects and joints of the scene. Out: [`Sensor`]s; problems to the [`Checker`]. Never here: what sensors read.
+//! In: [`SensorFile`]s, the objects and joints of the scene. Out: [`Sensor`]s; problems to the [`Checker`]. Never here:
+//! readings.
 
 use super::object::{NamedObject, Objects};
 use super::rigid::{point_or_zero, rotation};

@@ -277,7 +277,8 @@ struct WantedCage {
     eps_m: f64,
 }
 
-/// Notes in a draft what a generated surface takes with its cage, whose nodes a `coarse` surface of the same shape tells.
+/// Notes in a draft the memory of a generated surface and of its cage, whose nodes a `coarse` surface of the same shape
+/// tells.
 fn draft_cage(c: &mut Checker<'_, '_>, place: &Place, coarse: &Triangles, wanted: &WantedCage) {
     // the cage of the coarse surface may have a few more
     let cage = Cage::new(coarse, wanted.eps_m / wanted.scale, 2 * VERTICES_MAX as usize);
@@ -362,7 +363,7 @@ fn one_division(
     }
     let before = c.count();
     let range = eps_m.map(|eps| c.ends(place, "eps_m", eps, &LENGTH));
-    // a range that was reported says nothing of what would fit
+    // a range that was reported says nothing of one that would fit
     range.filter(|_| c.count() == before)
 }
 

@@ -1,4 +1,5 @@
-//! Reads what soft bodies take from files as it is: solids of tetrahedra, sheets of open surfaces; and their materials.
+//! Reads the meshes that soft bodies take from files as they are: solids of tetrahedra, sheets of open surfaces; and
+//! their materials.
 //!
 //! In: the bytes of a file. Out: shapes of soft bodies, every fault reported with its key. Never here: closed surfaces in cages ([`super::soft`]).
 

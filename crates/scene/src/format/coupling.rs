@@ -30,9 +30,9 @@ pub struct CouplingFile {
     /// Force above which an `attach` without a `law` tears, N, 1e-6 … 1e9: the mean over a common step of the two. It is gone then for
     /// good, and the report has it under `events`. Default: never.
     pub tears_above_n: Option<f64>,
-    /// Greatest force that an `attach` without a `law` gives, N, 1e-6 … 1e9 and below `tears_above_n`: what would take more moves the place
-    /// at which it holds, or lengthens one with a `rest_m`, for good. The report has the first time under `events`. Default: as much as it
-    /// takes.
+    /// Greatest force that an `attach` without a `law` gives, N, 1e-6 … 1e9 and below `tears_above_n`: a greater load
+    /// moves the place at which it holds, or lengthens one with a `rest_m`, for good. The report has the first time
+    /// under `events`. Default: as much as it takes.
     pub yields_above_n: Option<f64>,
 }
 

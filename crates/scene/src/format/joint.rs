@@ -66,7 +66,8 @@ pub struct MotorFile {
     pub max_torque_n_m: Option<f64>,
     /// Stiffness of the spring to `position_deg`, N·m/rad, 1e-6 … 1e9.
     pub stiffness_n_m_rad: Option<f64>,
-    /// Damping against `velocity_rad_s`, N·m·s/rad, 0 … 1e7: without a position the motor gives this times what the velocity lacks.
+    /// Damping against `velocity_rad_s`, N·m·s/rad, 0 … 1e7: without a position the motor gives this times the missing
+    /// velocity.
     pub damping_n_m_s_rad: Option<f64>,
     /// Position of a `prismatic` joint at which its spring rests, metres, up to 1e4 in magnitude.
     pub position_m: Option<f64>,
@@ -76,7 +77,8 @@ pub struct MotorFile {
     pub max_force_n: Option<f64>,
     /// Stiffness of the spring to `position_m`, N/m, 1e-6 … 1e9.
     pub stiffness_n_m: Option<f64>,
-    /// Damping against `velocity_m_s`, N·s/m, 0 … 1e7: without a position the motor gives this times what the velocity lacks.
+    /// Damping against `velocity_m_s`, N·s/m, 0 … 1e7: without a position the motor gives this times the missing
+    /// velocity.
     pub damping_n_s_m: Option<f64>,
 }
 

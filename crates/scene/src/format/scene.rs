@@ -17,7 +17,7 @@ pub struct SceneFile {
     /// Version of this format: 1.
     #[schemars(range(min = 1, max = 1))]
     pub format: i64,
-    /// One line that says what the scene shows.
+    /// One line that describes the scene.
     pub description: Option<String>,
     /// How agents are run. Default `auto`: `threads` for a few, `pool` for many.
     /// `lockstep` runs them on one thread in virtual time, with declared costs.
@@ -59,7 +59,7 @@ pub struct SceneFile {
     #[serde(default)]
     #[schemars(length(max = 1000))]
     pub group: Vec<GroupFile>,
-    /// Rooms of a building; at most 1000. What is in a cell is drawn only where it may be seen through portals.
+    /// Rooms of a building; at most 1000. Objects in a cell are drawn only where they may be seen through portals.
     #[serde(default)]
     #[schemars(length(max = 1000))]
     pub cell: Vec<CellFile>,
@@ -168,7 +168,7 @@ pub struct TargetFile {
     /// Greatest lag from reading the camera to the finished picture, milliseconds, 1 … 1000: levels are chosen so that it is kept, and the
     /// camera is drawn at its predicted pose for that time. Default: no bound, and the camera is drawn where it was read.
     pub lag_ms: Option<f64>,
-    /// Share that is reserved for choosing levels, of what culling leaves of `lag_ms`, 0.001 … 0.5. Default 0.05.
+    /// Share reserved for choosing levels, of the part that culling leaves of `lag_ms`, 0.001 … 0.5. Default 0.05.
     pub optimiser_share: Option<f64>,
     /// Whether `adaptive` and `robin-hood` spend time left over when everything is at its finest on still smoother shapes and softer
     /// shadows. Default false.

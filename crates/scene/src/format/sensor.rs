@@ -1,4 +1,4 @@
-//! `[[sensor]]`: what programs read by name, and the report has at the end.
+//! `[[sensor]]`: readings that programs take by name, and that the report has at the end.
 
 use super::Point;
 use schemars::JsonSchema;

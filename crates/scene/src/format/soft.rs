@@ -13,8 +13,9 @@ pub struct SheetFile {
     pub size_m: Option<[f64; 2]>,
     /// Cells along x and y, which never change; at most 10,000 vertices in all. Either this, `eps_m` or `file`.
     pub segments: Option<[u32; 2]>,
-    /// Largest length ε of a cell, metres: one number, or `[finest, coarsest]`, of which the controllers choose while it runs. What it touches,
-    /// grasps and shows is the lattice of the finest. At most 10,000 vertices at the finest.
+    /// Largest length ε of a cell, metres: one number, or `[finest, coarsest]`, of which the controllers choose while
+    /// it runs. Its surface in contacts, grasps and pictures is the lattice of the finest. At most 10,000 vertices at
+    /// the finest.
     pub eps_m: Option<OneOrRange<f64>>,
     /// A surface as a file of triangles, STL, binary glTF (.glb, +y up) or OBJ, its path relative to the scene file: at rest the sheet has its
     /// shape and its vertices. It may be open.
@@ -49,7 +50,7 @@ pub struct SheetFile {
     pub self_contact: Option<bool>,
 }
 
-/// A soft solid: a box, a ball, or what a closed surface encloses.
+/// A soft solid: a box, a ball, or the volume within a closed surface.
 #[derive(Debug, Clone, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct SolidFile {
@@ -101,8 +102,8 @@ pub struct SolidFile {
     pub rotation_deg: Option<Point>,
     /// Velocity of the whole solid at the start, m/s, up to 1e4. Default: none.
     pub velocity_m_s: Option<Point>,
-    /// Faces of a box whose vertices never move; of a mesh, sides of the box around it: the vertices of its
-    /// cage there, of tetrahedra those within half a mean edge. Default none.
+    /// Faces of a box whose vertices never move; of a mesh, sides of the box around it: the vertices of its cage there,
+    /// of tetrahedra the vertices within half a mean edge. Default none.
     pub hold: Option<Vec<SolidSide>>,
     /// Coulomb friction coefficient, 0 … 10; a pair takes the geometric mean. Default 0.3.
     #[schemars(range(min = 0.0, max = 10.0))]
@@ -121,8 +122,9 @@ pub struct RopeFile {
     pub radius_m: f64,
     /// Number of segments, 1 … 2047, which never changes. Either this or `eps_m`.
     pub segments: Option<u32>,
-    /// Largest length ε of a segment, metres: one number, or `[finest, coarsest]`, of which the controllers choose while it runs. What it
-    /// touches, grasps and shows is the line of the finest. At most 2047 segments at the finest.
+    /// Largest length ε of a segment, metres: one number, or `[finest, coarsest]`, of which the controllers choose
+    /// while it runs. Its line in contacts, grasps and pictures is the line of the finest. At most 2047 segments at the
+    /// finest.
     pub eps_m: Option<OneOrRange<f64>>,
     /// Young's modulus, Pa, 1 … 1e11.
     pub young_pa: f64,

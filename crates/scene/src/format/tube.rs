@@ -138,8 +138,8 @@ pub struct AttachFile {
     pub slack_m: Option<f64>,
     /// Damping per length, N·s/m², 0 … 1e6. Default 0.
     pub damping_n_s_m2: Option<f64>,
-    /// Force of the whole part above which all of it tears off, N, 1e-6 … 1e9: the mean over a common step of what the tube touches. It is
-    /// gone then for good, and the report has it under `events`. Default: never.
+    /// Force of the whole part above which all of it tears off, N, 1e-6 … 1e9: the mean over a common step of the
+    /// bodies that the tube touches. It is gone then for good, and the report has it under `events`. Default: never.
     pub tears_above_n: Option<f64>,
     /// Greatest force that the whole part gives, N, 1e-6 … 1e9 and below `tears_above_n`, spread evenly along it: where more would be taken it
     /// slips, and holds from then on where it has come to. Default: as much as it takes.

@@ -189,7 +189,7 @@ pub fn storm(executor: ExecutorKind, threads: usize, calls: u64, most: Duration,
                 all.calls += tally.calls;
                 all.lost.extend(tally.lost);
             }
-            // who advances a world that another thread has paused waits until it runs again: all of them may
+            // a caller that advances a world which another thread has paused waits until it runs again: all of them may
             Err(_) if Instant::now() < late => world.drive(TimelineCommand::Run),
             Err(error) => {
                 let missing = (0..threads).filter(|thread| !returned[*thread]);
@@ -250,7 +250,7 @@ struct Caller {
 const CALLS: usize = 30;
 
 impl Caller {
-    /// Makes the call of a number. What an object that has left refuses is no fault.
+    /// Makes the call of a number. An error of an object that has left is no fault.
     fn call(&mut self, which: usize, thread: usize) {
         match which {
             0..=9 => self.change(which, thread),

@@ -39,7 +39,7 @@ fn main() -> Result<(), String> {
     if faults == 0 { Ok(()) } else { Err(format!("{faults} faults")) }
 }
 
-/// Prints a line, and what went wrong; how much that was.
+/// Prints a line, and the failures; how many these were.
 fn print(what: &str, executor: ExecutorKind, tally: &Tally, began: Instant) -> usize {
     let Tally { checkpoints, restores, changes, calls, lost, parked } = tally;
     println!(

@@ -1,6 +1,6 @@
 //! Sensors of a scene built in code.
 //!
-//! In: names. Out: [`Sensor`]s of the scene. Never here: what sensors read.
+//! In: names. Out: [`Sensor`]s of the scene. Never here: readings.
 
 use super::SceneBuildError;
 use crate::scene::{Member, Spec};

@@ -1,4 +1,5 @@
-//! A model fails in the step in which another of its cluster takes what a partner with a clock of its own gave: nothing of that is lost.
+//! A model fails in the step in which another of its cluster takes the impulses of a partner with a clock of its own:
+//! none of them is lost.
 
 use super::ms;
 use super::rogue::{HALF_M, Kind, Rogue, Switch};

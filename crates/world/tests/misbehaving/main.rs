@@ -99,7 +99,7 @@ fn lived(world: &World) -> String {
     agents.map(of).collect::<Vec<_>>().join("; ")
 }
 
-/// Where those far away are at each millisecond, in a world where nobody misbehaves.
+/// Where the distant bodies are at each millisecond, in a world where nobody misbehaves.
 fn far_paths() -> Vec<Vec<Seen>> {
     let world = World::start(&scene(&Arc::default(), true), ExecutorKind::Lockstep).unwrap();
     let at = |_| {
@@ -132,7 +132,7 @@ impl Case<'_> {
         self.check(ended, &format!("{span_ms} ms do not end {after}: {}", lived(&self.world)));
     }
 
-    /// Lets the rogue misbehave from now on, and calls what brings its code to run.
+    /// Lets the rogue misbehave from now on, and makes a call that runs its code.
     fn misbehave(&mut self, rogue: Object, now: &Checkpoint) {
         self.switch.set(self.kind);
         match self.kind {
@@ -155,7 +155,7 @@ impl Case<'_> {
         }
     }
 
-    /// Checks who is parked and what events say of it, and what stands there now.
+    /// Checks which agents are parked, their events, and the states now.
     fn check_parked(&mut self, events: &mut Events) -> Left {
         let [rogue, rider] = self.world.objects(["rogue", "rider"]).unwrap();
         let at = self.world.agents().of(rogue.id()).unwrap();
@@ -232,8 +232,8 @@ fn one_that_misbehaves_is_parked_and_all_others_step_as_without_it() {
                 for _ in 0..repeats() {
                     let left = case(executor, kind, leads, &mut faults);
                     let name = format!("{kind:?} on {executor:?}, leads {leads}");
-                    // in real time who is of one cluster may differ now and then, how long its steps are and how they round with it; nobody
-                    // is faster than 4 m/s
+                    // in real time the members of a cluster may differ now and then, and so the length and rounding of
+                    // its steps; nobody is faster than 4 m/s
                     let is_on_path = |(path, seen): (&Seen, &Seen)| {
                         let apart_s = path.time_ns.abs_diff(seen.time_ns) as f64 * 1e-9;
                         let allowed_m = 1e-4 + 4.0 * apart_s;

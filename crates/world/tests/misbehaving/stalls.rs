@@ -52,7 +52,7 @@ fn a_step_that_does_not_end_is_told_of_and_the_world_goes_on() {
             saving.join().unwrap();
             assert!(world.time() > metachron_core::SimTime::ZERO && world.timeline().until().is_none());
         }
-        // what joins meanwhile falls
+        // an object that joins meanwhile falls
         let new = world.add("new", Rigid::ball(0.05).at([0.0, 3.0, 1.0])).unwrap();
         eventually("others go on", || steps(&world, "new") > 5);
         world.remove(new).unwrap();

@@ -50,7 +50,7 @@ impl PictureControl {
         let drawn_by = prices.with_shadows(here.shadows);
         let levels_s: f64 = self.drawn().map(|(_, seen, level)| object_s(&drawn_by, seen, level)).sum();
         let (all_s, least_s) = (drawn_by.backdrop_s(backdrop) + levels_s, priced_s(here));
-        // what levels take above their least, by the prices and as fast as this frame was drawn
+        // the time of levels above their least, by the prices and as fast as this frame was drawn
         let levels_s = if all_s > 0.0 { drawn_s * (1.0 - least_s / all_s).max(0.0) } else { 0.0 };
         let frame = ScaledFrame {
             coarsest_s: work_s - levels_s,

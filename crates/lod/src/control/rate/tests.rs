@@ -255,7 +255,7 @@ fn continued_bursts_count_by_their_mean() {
         agent.run(29.0);
         agent.bursts = None;
         let load = mean * agent.load();
-        // the dead zone, and what a window more or less of bursts among sixteen makes
+        // the dead zone, and the effect of a window more or less of bursts among sixteen
         assert!((0.7..1.1).contains(&load), "every {} s: {load}", bursts.every_s);
         assert!(agent.demands.is_empty(), "every {} s it comes to rest: {:?}", bursts.every_s, agent.demands);
     }

@@ -75,7 +75,7 @@ fn what_cannot_be_read_is_named_with_what_would_be() {
     assert!(why(huge.as_bytes()).contains("it says that it has 99999999999 points"));
     assert_eq!(why(b""), "it is empty");
     assert!(why(b"hello").contains("it begins neither as a gmsh file"));
-    // what VTK says about an array changes nothing
+    // VTK's information about an array changes nothing
     let annotated = xml.replacen("<CellData>", "<CellData><DataArray type=\"Int8\" Name=\"more\" format=\"ascii\">1 <InformationKey name=\"a\"><Value>7</Value></InformationKey></DataArray>", 1);
     assert_eq!(read(annotated.as_bytes()).unwrap().regions, read(SAMPLES[8].1).unwrap().regions);
     let cut = &SAMPLES[6].1[..900];

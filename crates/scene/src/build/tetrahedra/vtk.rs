@@ -82,7 +82,7 @@ impl Reader<'_> {
         Ok(grid)
     }
 
-    /// Goes past what VTK says about an array, which ends at an empty line.
+    /// Goes past VTK's information about an array, which ends at an empty line.
     fn skip_metadata(&mut self) {
         self.words.rest_of_line();
         while !self.words.rest_of_line().is_empty() {}

@@ -2,7 +2,7 @@
 
 use super::*;
 
-/// Meshes of which those from `first` on are in view.
+/// Meshes of which the ones from `first` on are in view.
 fn meshes(first: u32) -> Vec<ObjectView> {
     let kind = Kind::Counted { radius_m: 0.1, least: 20, most: 40_000 };
     let range = ResolutionRange { eps_m: (1.0, 1.0), n: (0, 6) };

@@ -29,7 +29,7 @@ fn a_frame_is_compared_with_the_prices_that_it_was_drawn_by_when_shadows_are_tak
     for at in 0..120 {
         shadowed.push(control.shadows());
         frame(&mut control, &views, Duration::from_millis(4));
-        // what a price is too low looks like logic that drawing does not hide
+        // the miss of a price that is too low looks like logic that drawing does not hide
         let lost_s = control.logic.lost_s(16e-3);
         assert!(lost_s < 1e-6, "frame {at}: {lost_s}");
     }

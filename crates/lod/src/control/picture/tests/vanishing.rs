@@ -1,4 +1,4 @@
-//! Objects that may vanish, and the benefit as printed: what a scene may ask for beyond levels.
+//! Objects that may vanish, and the benefit as printed: options of a scene beyond levels.
 
 use super::policies::{control, holes, mesh};
 use super::*;
