@@ -1,4 +1,5 @@
-//! A haptic device beside a world: a thread of its own, at 1 kHz, leads a stylus into soft tissue and gives back what that meets.
+//! A haptic device beside a world: a thread of its own, at 1 kHz, leads a stylus into soft tissue and gives back its
+//! contact force.
 //!
 //! `cargo run --no-default-features --features devices --example haptic_loop`; the device is simulated: a handle in a hand, at the end of a link.
 //! A device of your own implements `Device`: a pose in, a wrench out.

@@ -1,4 +1,5 @@
-//! A program acts on a world that runs, and hears what happens in it: a crate is pushed along the floor until it strikes a ball.
+//! A program acts on a world that runs, and hears its events: a crate is pushed along the floor until it strikes a
+//! ball.
 //!
 //! `cargo run --no-default-features --example push_and_listen`
 

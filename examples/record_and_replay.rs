@@ -1,4 +1,4 @@
-//! A run is one small file: what a program did to a world is written down, and done again to the same bits.
+//! A run is one small file: a program's calls to a world are written down, and repeated to the same bits.
 //!
 //! `cargo run --no-default-features --example record_and_replay -- run.rec`
 

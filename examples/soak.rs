@@ -17,11 +17,11 @@ const CHANGES_PER_MINUTE: u64 = 10_000;
 /// Objects that are in the world at once.
 const CROWD: usize = 24;
 /// The most by which the resident memory of the process may grow for each change after the first third, KiB: half of the 450 bytes that a number costs
-/// whose object has left, and what the system's allocator has not given back yet.
+/// whose object has left, and the memory that the system's allocator has not given back yet.
 const GROWTH_MAX_KIB: f64 = 1.0;
 /// The longest that a call which changes the world may take.
 const WAIT_MAX: Duration = Duration::from_secs(1);
-/// The share of their momentum by which that of all may change: rounding, and what a solve leaves.
+/// The share of their momentum by which the momentum of all may change: rounding, and the residual of solves.
 const MOMENTUM_MAX: f64 = 1e-6;
 /// Momentum is looked at once in so many changes.
 const CHECKED: u64 = 50;

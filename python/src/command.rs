@@ -1,4 +1,4 @@
-//! Keyword arguments of commands: where on an object, under which key, for how long; and what drives a joint.
+//! Keyword arguments of commands: where on an object, under which key, for how long; and the motor of a joint.
 //!
 //! In: keywords as Python gives them. Out: the engine's values. Never here: whether an object takes the command.
 
@@ -49,7 +49,7 @@ impl<'a, 'py> Keywords<'a, 'py> {
         }
     }
 
-    /// The command under its key and for its time; what its key has is taken back where nothing `is_given`.
+    /// The command under its key and for its time; the command under that key is taken back where nothing `is_given`.
     pub fn timed(&self, command: Command, is_given: bool) -> PyResult<Command> {
         let command = if is_given { command } else { command.taken_back() };
         let command = command.key(self.get("key")?.unwrap_or(0));

@@ -31,7 +31,7 @@ pub struct Paths {
 }
 
 impl Export {
-    /// Begins the files; `fixed` is the surface of what never moves.
+    /// Begins the files; `fixed` is the surface of static solids.
     pub fn create(world: &World, fixed: &Surface, paths: Paths) -> PyResult<Self> {
         let Paths { mcap, vtk, perfetto } = paths;
         let given: Vec<_> = [&mcap, &vtk, &perfetto].into_iter().flatten().collect();

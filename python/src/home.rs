@@ -20,7 +20,7 @@ impl Home {
         self == Self::here()
     }
 
-    /// An error in a child: who waits there for threads of the parent waits for ever.
+    /// An error in a child: a child that waits there for threads of the parent waits for ever.
     pub fn check(self, what: &str) -> PyResult<()> {
         if self.is_here() {
             return Ok(());

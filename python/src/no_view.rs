@@ -1,6 +1,6 @@
 //! The module without its feature `view`: no picture can be drawn, which says how to build one that draws.
 //!
-//! In: what asks for a picture. Out: an error. Never here: drawing.
+//! In: calls that ask for a picture. Out: an error. Never here: drawing.
 
 use crate::camera::Shot;
 use metachron::world::{Scene, World};

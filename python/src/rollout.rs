@@ -215,7 +215,7 @@ fn gather(results: Receiver<Outcome>, worlds: usize) -> PyResult<Vec<Played>> {
 }
 
 impl Motion {
-    /// Adds what a body is like now.
+    /// Adds the present points of a body.
     fn record(&mut self, body: &Body) {
         let motion = Points::of(body);
         self.positions.extend(motion.positions.iter().flat_map(|v| v.to_array()));

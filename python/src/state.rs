@@ -42,7 +42,7 @@ impl<'a> Points<'a> {
 }
 
 impl State {
-    /// Pose and motion of what does not bend: rotation and spin.
+    /// Rotation and spin of a rigid body or tool.
     fn turning(&self, what: &str) -> PyResult<(DQuat, DVec3)> {
         match &self.0.body {
             Body::Rigid(rigid) => Ok((rigid.rotation, rigid.spin)),

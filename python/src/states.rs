@@ -1,6 +1,6 @@
 //! The newest states of all objects as arrays.
 //!
-//! In: a world. Out: read-only arrays. Never here: a lock, what only some objects have ([`crate::state`]).
+//! In: a world. Out: read-only arrays. Never here: a lock, properties that only some objects have ([`crate::state`]).
 
 use crate::numbers::{array, rows};
 use crate::state::Points;

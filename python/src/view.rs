@@ -73,7 +73,7 @@ impl Pictures {
     }
 }
 
-/// Lets something be drawn at this size. What has failed is made anew for the next picture.
+/// Lets something be drawn at this size. A screen that has failed is made anew for the next picture.
 fn with_screen<T>(size: Size, draw: impl FnOnce(&mut Offscreen) -> Result<T, GpuError>) -> PyResult<T> {
     let mut kept = locked(&SCREEN);
     kept.as_ref().map_or(Ok(()), |screen| screen.home.check("what draws"))?;

@@ -63,7 +63,7 @@ const PATIENCE: Duration = Duration::from_millis(20);
 /// Keyword arguments.
 type Given<'py> = Bound<'py, PyDict>;
 
-/// Does what may wait for the world, while other threads of Python run.
+/// Makes a call that may wait for the world, while other threads of Python run.
 fn apart<T: Send>(work: impl FnOnce() -> T + Send) -> T {
     Python::attach(|py| py.detach(work))
 }

@@ -1,4 +1,4 @@
-//! `calibrate`: what drawing costs on this machine's adapter.
+//! `calibrate`: the cost of drawing on this machine's adapter.
 //!
 //! In: an adapter, a table in the user's cache or in a file. Out: the table, measured where it is not known. Never here: the measurement and
 //! the fit ([`metachron_session::calibrate`]).

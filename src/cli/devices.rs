@@ -1,6 +1,6 @@
 //! `--device`: devices that lead objects of a run.
 //!
-//! In: what to serve, a session. Out: threads that serve, their reports. Never here: what happens in a tick.
+//! In: the devices to serve, a session. Out: threads that serve, their reports. Never here: the phases of a tick.
 
 use anyhow::Context;
 use metachron_console::output::BadInput;

@@ -16,7 +16,7 @@ use std::cell::RefCell;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
-/// Longest file that a model names, bytes: as of those beside a scene.
+/// Longest file that a model names, bytes: as of the files beside a scene.
 const MESH_BYTES_MAX: u64 = 64 << 20;
 
 /// Writes the scene.
@@ -158,7 +158,8 @@ fn srdf(args: &ImportArgs) -> anyhow::Result<Option<String>> {
     Ok(Some(text))
 }
 
-/// Prints what the scene has otherwise than the model: as JSON, or in two lists, of equal entries the first with their number.
+/// Prints the parts that the scene has otherwise than the model: as JSON, or in two lists, of equal entries the first
+/// with their number.
 fn print_list(args: &ImportArgs, imported: &Imported) -> anyhow::Result<()> {
     let (moving, harmless): (Vec<_>, Vec<_>) = imported.left_out.iter().partition(|entry| entry.changes_motion);
     if args.json {

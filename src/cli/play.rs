@@ -215,7 +215,7 @@ fn drawing(session: &Session, request: &Request, picture: bool, size: Size) -> a
     Ok(Drawing::Every(Box::new(Offscreen::new(gpu, size, options)?)))
 }
 
-/// An error with what caused it, in a line.
+/// An error with its causes, in a line.
 fn shown_with_causes(error: &dyn std::error::Error) -> String {
     let causes = std::iter::successors(error.source(), |cause| cause.source());
     causes.fold(error.to_string(), |text, cause| format!("{text}: {cause}"))

@@ -1,6 +1,6 @@
 //! `replay`: repeats a recorded run and reports on it.
 //!
-//! In: arguments. Out: what `run` gives, of the run that was recorded, or where the two differ.
+//! In: arguments. Out: the outputs of `run`, of the run that was recorded, or where the two differ.
 //! Never here: how a recording is repeated ([`metachron_world::World::replay`]).
 
 use super::args::ReplayArgs;

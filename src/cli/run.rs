@@ -93,7 +93,7 @@ pub struct Played {
     pub frames: Vec<FrameRecord>,
     /// Why a requested window could not be opened.
     pub no_window: Option<String>,
-    /// Why the run ended early: the open window was lost, or a file could not be written. What was done until then counts.
+    /// Why the run ended early: the open window was lost, or a file could not be written. The frames until then count.
     pub failure: Option<String>,
     /// The file of the picture.
     pub picture: Option<PathBuf>,
@@ -233,7 +233,7 @@ pub(super) fn stem(name: &str) -> String {
     Path::new(name).file_stem().map_or_else(|| "scene".to_owned(), |s| s.to_string_lossy().into_owned())
 }
 
-/// Refuses what cannot be run as asked, and outputs that cannot be written: before the run rather than after.
+/// Refuses runs that are impossible as asked, and outputs that cannot be written: before the run rather than after.
 fn check_inputs(args: &RunArgs) -> anyhow::Result<()> {
     if args.oracle && !args.headless {
         let why = "--oracle runs the scene twice without a window; add --headless";

@@ -50,7 +50,7 @@ impl CrateFiles {
         Self { modules: modules.collect() }
     }
 
-    /// For each file those whose items it uses.
+    /// For each file the files whose items it uses.
     pub fn arrows(&self) -> BTreeMap<&str, BTreeSet<&str>> {
         self.modules.iter().map(|(path, module)| (module.file.as_str(), self.used_by(path, module))).collect()
     }

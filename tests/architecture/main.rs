@@ -46,7 +46,7 @@ const ABSENT: [(&str, &[&str]); 8] = [
     ("crates/session", &["egui", "std::thread::spawn"]),
 ];
 
-/// Where a crate that otherwise knows no file has one: what the program itself has written, and reads again.
+/// Where a crate that otherwise knows no file has one: files that the program itself has written, and reads again.
 const OWN_FILES: [&str; 3] =
     ["crates/world/src/checkpoint.rs", "crates/world/src/recording.rs", "crates/world/src/recording_file.rs"];
 
@@ -272,7 +272,7 @@ fn names_are_compared_word_by_word() {
     assert_eq!(types("pub struct Hall {\n    pub(super) enum B;\nfn type_of() {}"), ["Hall", "B"]);
 }
 
-/// Where the parenthesis of the parameters is, if what begins at `at` are generics or it.
+/// Where the parenthesis of the parameters is, if generics or it begin at `at`.
 fn after_generics(text: &str, at: usize) -> Option<usize> {
     let mut depth = 0;
     for (offset, c) in text[at..].char_indices() {

@@ -259,7 +259,8 @@ object = "ball"
 #[test]
 fn who_comes_to_agents_that_live_slower_takes_their_time_for_its_own() {
     let folder = Folder::with(&format!("{}{BALL}", slope()));
-    // of the 0.45 s of its fall those below lived through 0.12; it would stand still until they have caught up, at 1.7 s
+    // of the 0.45 s of its fall the agents below lived through 0.12; it would stand still until they have caught up, at
+    // 1.7 s
     let play = |seconds: &str| folder.lockstep(&["--seconds", seconds, "--set", "machine.step.sheet.base_us=40000"]);
     let ball = at(&play("1.1"), "ball");
     assert!(ball[2] < 0.25, "{ball:?}");
@@ -299,7 +300,7 @@ fn a_slow_box_that_lies_on_a_sheet_lies_there_after_one_step_of_the_sheet_was_he
     assert!((before[2] - after[2]).abs() < 2e-3, "{before:?} {after:?}");
 }
 
-/// A ball that rolls down a sheet and off it, against what stands on a stand.
+/// A ball that rolls down a sheet and off it, against the objects on a stand.
 const ROLLING: &str = r#"
 [[object]]
 name = "slider"

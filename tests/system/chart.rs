@@ -97,7 +97,7 @@ fn told(subject: &str, out: &Path, names: &[&str]) -> Value {
 
 #[test]
 fn the_quick_diagrams_answer_as_theory_does() {
-    // the best error of each benchmark with the few segments of `--quick`, and what those leave of space
+    // the best error of each benchmark with the few segments of `--quick`, and their spatial error
     let limits = [
         ("end-moment", 3e-3),
         ("helix", 8e-3),

@@ -21,7 +21,7 @@ fn holds(experiment: &Value, claims: usize) {
     holds_but(experiment, claims, &[]);
 }
 
-/// Those claims of an experiment fail of which docs/policies.md says so, and no others.
+/// Exactly the claims of an experiment fail of which docs/policies.md says so.
 fn holds_but(experiment: &Value, claims: usize, told: &[&str]) {
     let findings = experiment["findings"].as_array().unwrap();
     assert_eq!(findings.len(), claims, "{findings:#?}");

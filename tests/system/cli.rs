@@ -4,7 +4,7 @@ use assert_cmd::Command;
 use std::process::Output;
 
 fn metachron(arguments: &[&str]) -> Output {
-    // what a user's shell says of colours or of METACHRON_ must not reach the tests
+    // a user's shell variables about colours or METACHRON_ must not reach the tests
     let mut command = Command::cargo_bin("metachron").unwrap();
     command.env_clear().args(arguments).output().unwrap()
 }

@@ -6,12 +6,12 @@ use std::path::{Path, PathBuf};
 use std::process::Output;
 use tempfile::TempDir;
 
-/// The program, without what a user's shell says of it.
+/// The program, without the variables of a user's shell.
 pub fn program() -> std::process::Command {
     cleaned(env!("CARGO_BIN_EXE_metachron"))
 }
 
-/// A program, without what a user's shell says of it. The variables kept are those an adapter is found by.
+/// A program, without the variables of a user's shell, except the ones by which an adapter is found.
 pub fn cleaned(name: &str) -> std::process::Command {
     let mut command = std::process::Command::new(name);
     command.env_clear();

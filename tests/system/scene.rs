@@ -1,4 +1,4 @@
-//! Scenes as users write them: what loads, and what an error shows.
+//! Scenes as users write them: the scenes that load, and the text of errors.
 
 use metachron_scene::{SceneError, Source, load};
 use metachron_world::Scene;

@@ -1,4 +1,4 @@
-//! Joints, couplings, grids and faults as users write them: what loads, and what an error shows.
+//! Joints, couplings, grids and faults as users write them: the scenes that load, and the text of errors.
 
 use glam::DVec3;
 use metachron_contact::Law;

@@ -1,4 +1,4 @@
-//! The built-in scenes as physics: what their descriptions promise happens, in virtual time.
+//! The built-in scenes as physics: the promises of their descriptions hold, in virtual time.
 
 use crate::play::{Folder, lockstep, number, point};
 use std::fs::read_to_string;

@@ -76,7 +76,7 @@ fn what_tears_is_an_event_of_the_report_and_without_one_there_is_none() {
     );
     for (event, weight_n) in events.iter().zip([9.81, 0.062 * 9.81]) {
         assert!(event["kind"] == "tore" && number(event, "/at_s") < 0.1, "{event}");
-        // what slows the hose down adds to its weight
+        // the force that slows the hose down adds to its weight
         let weights = number(event, "/force_n") / weight_n;
         assert!(weights > 0.9 && weights < 1.05, "{event}");
     }
@@ -120,7 +120,8 @@ fn boxes_that_fall_onto_each_other_with_long_steps_gain_no_energy() {
 fn a_tube_that_falls_across_another_one_hangs_on_it_at_its_own_rate() {
     let report = lockstep("crossing", &["--seconds", "2.5"]);
     let [rope, hose] = [0, 1].map(|k| point(&report, &format!("/probes/{k}/position_m")));
-    // their axes cross at the sum of both radii, 25 mm, less what the curved hose is off above the rope; the floor is far below
+    // their axes cross at the sum of both radii, 25 mm, less the offset of the curved hose above the rope; the floor is
+    // far below
     assert!(hose[2] - rope[2] > 0.02 && hose[2] > 0.1, "rope {rope:?}, hose {hose:?}");
     let coupling = coupling(&report, "hose", "rope");
     assert_eq!((coupling["kind"].as_str(), coupling["contacts"].as_f64() > Some(0.0)), (Some("cluster"), true));

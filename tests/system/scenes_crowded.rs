@@ -89,7 +89,8 @@ fn a_box_stays_on_two_tubes_on_the_floor_whose_clocks_differ() {
             let told = format!("{left} + {right} Hz, {mass_kg} kg");
             let at = point(&report, "/probes/0/position_m");
             assert!((at[2] - 0.04).abs() < 5e-4 && at[0].hypot(at[1]) < 0.015, "{told}: it is at {at:?}");
-            // g h² of the step before the first that is told, 2.7 mm, is no less than what a landing may leave
+            // g h² of the step before the first that is told, 2.7 mm, is no less than the depth that a landing may
+            // leave
             assert!(deepest_m(&report) < 1.5e-3, "{told}: {:?}", deepest_m(&report));
         }
     }
@@ -154,7 +155,8 @@ fn a_box_that_tips_off_a_rope_on_the_floor_leans_on_it_at_slow_clocks() {
     }
 }
 
-/// It was thrown off, or fell between them: two owners gave to the second tube, of whom neither knew what that one bore.
+/// Two owners give to the second tube, and neither knows the other's load on it: the block must not be thrown off, or
+/// fall between them.
 #[test]
 fn a_soft_block_lies_on_two_taut_tubes_that_touch() {
     for hz in [120.0, 240.0] {
@@ -189,7 +191,7 @@ fn a_soft_plate_on_two_ropes_presses_the_cloth_under_them_with_the_weight_of_all
         let pressed_n: f64 = on_cloth.map(|pair| number(pair, "/force_n")).sum();
         let volume_m3 = 0.12 * 0.12 * 0.02 + 2.0 * 0.18 * std::f64::consts::PI * 0.006 * 0.006;
         let weight_n = 1050.0 * 9.81 * volume_m3;
-        // what sways by itself in the step that is told
+        // within the sway of the step that is told
         assert!((pressed_n - weight_n).abs() < 0.06 * weight_n, "{hz} Hz: {pressed_n} N for {weight_n}");
     }
 }

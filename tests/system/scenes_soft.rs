@@ -1,4 +1,5 @@
-//! Sheets, solids and ropes as users write them: what loads, what an error shows, and what the scenes with them do.
+//! Sheets, solids and ropes as users write them: the scenes that load, the text of errors, and the motion in these
+//! scenes.
 
 use crate::play::{Folder, agent, lockstep, number, point};
 use metachron_geometry::{Generator, Triangles, generate_surface};
@@ -231,7 +232,8 @@ fn in_the_cavity_a_grasper_lifts_the_gut_while_a_probe_presses_the_liver() {
         let pair = all.iter().find(|c| c["a"] == a && c["b"] == b);
         pair.map_or(0.0, |pair| number(pair, "/force_n"))
     };
-    // more than a third of the gut's 0.4 N, with what the mesentery holds, and less than the jaws' springs give at 2 cm
+    // more than a third of the gut's 0.4 N, with the load on the mesentery, and less than the force of the jaws'
+    // springs at 2 cm
     assert!((0.15..1.2).contains(&force("grasper", "gut")), "{report}");
     assert!(force("liver", "probe") > 0.1, "{report}");
 }
@@ -259,7 +261,7 @@ fn a_soft_body_that_sleeps_wakes_for_what_bends_and_falls_on_it() {
     }
 }
 
-/// Its steps of a millisecond take longer than that, and who pushed it was 18 ms ahead: it flew off.
+/// Its steps of a millisecond take longer than that, while the body that pushes it is 18 ms ahead: it must not fly off.
 #[test]
 fn a_soft_ball_that_falls_a_metre_on_a_soft_block_of_its_rate_lies_on_it() {
     let soft = "young_pa = 1e5\ndensity_kg_m3 = 1050.0\ndamping_per_s = 3.0\n";
@@ -280,7 +282,8 @@ fn a_soft_ball_that_falls_a_metre_on_a_soft_block_of_its_rate_lies_on_it() {
     }
 }
 
-/// The slab gave as if the lowest box were alone, and expected nothing of what lay on that: 13 mm deep at 240 Hz, through at 60.
+/// The slab must bear the whole stack: where it gives as if the lowest box were alone, this sinks 13 mm deep at 240 Hz,
+/// and through at 60.
 #[test]
 fn a_stack_of_boxes_stands_on_a_soft_slab_at_equal_and_unequal_rates() {
     let floor = "[[object]]\nname = \"floor\"\nmodel = \"rigid\"\nshape = \"plane\"\nfixed = true\n";

@@ -104,7 +104,7 @@ fn a_steady_turn_on_a_thread_of_its_own_asks_the_system_for_its_wait_alone() {
 #[test]
 fn workers_of_a_pool_ask_the_system_for_less_than_a_wait_a_turn() {
     let cores = std::thread::available_parallelism().map_or(1, std::num::NonZero::get);
-    // a worker for each, and who watches over them; nobody takes the place of one that ends with the run
+    // a worker for each, and the thread that watches over them; nobody takes the place of one that ends with the run
     only_waits("pool", "pool:", cores + 1);
 }
 

@@ -131,7 +131,7 @@ impl<'a> Tuned<'a> {
     }
 
     /// That its agents were led through their ranges and answered as work does that goes with elements and steps, and that no gains of their
-    /// table are better than those found.
+    /// table are better than the best found.
     fn tunes_the_agents_own_loops(&self) {
         for plant in self.said["agents"]["plants"].as_array().unwrap() {
             assert!((0.5..1.1).contains(&number(plant, "/power")), "{}: {plant}", self.scene);

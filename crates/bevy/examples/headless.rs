@@ -1,4 +1,5 @@
-//! A ball, a hose and a jelly that entities follow, without a window: what each frame would draw, five times a second, for two seconds.
+//! A ball, a hose and a jelly that entities follow, without a window: the transforms and meshes of frames, five times a
+//! second, for two seconds.
 //!
 //! `cargo run --example headless`. With a window `DefaultPlugins` take the place of the plugins here, and each entity gets a material.
 

@@ -93,7 +93,7 @@ impl Drag {
     }
 }
 
-/// Turns what the pointer does into drags.
+/// Turns the pointer's presses, moves and releases into drags.
 pub(super) fn take_pointer(
     world: Res<'_, MetachronWorld>,
     followers: Res<'_, Followers>,

@@ -60,7 +60,7 @@ pub struct Refused {
 #[derive(Debug, Resource)]
 pub(super) struct Listener(pub Events);
 
-/// Passes on what happened.
+/// Passes on the events.
 pub(super) fn tell(
     mut listener: ResMut<'_, Listener>,
     followers: Res<'_, Followers>,

@@ -1,6 +1,6 @@
 //! Entities and objects: which entity brought an object into the world, and which one follows which.
 //!
-//! In: components. Out: objects that join and leave, transforms of a frame. Never here: what a mesh is made of, time.
+//! In: components. Out: objects that join and leave, transforms of a frame. Never here: the points of meshes, time.
 
 use super::MetachronWorld;
 use super::axes::{rotation_to_bevy, to_bevy};
@@ -45,8 +45,9 @@ impl Simulated {
     }
 }
 
-/// Leads the entity's [`Transform`] by an object: centre of mass and rotation of a rigid body, tip and rotation of a tool. What bends has no
-/// place of its own: its entity stays at the origin, where its [`SurfaceMesh`] is in the world's axes.
+/// Leads the entity's [`Transform`] by an object: centre of mass and rotation of a rigid body, tip and rotation of a
+/// tool. A deformable has no place of its own: its entity stays at the origin, where its [`SurfaceMesh`] is in the
+/// world's axes.
 ///
 /// The newest state of the object is led on by its velocities to the world's time, for at most 0.1 s. The scale is left as it is. A parent's
 /// transform comes on top: entities that follow have none, or one at the origin. When the object has left the entity stays where it was.

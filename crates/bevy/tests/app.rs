@@ -75,7 +75,7 @@ fn a_ball_falls_as_gravity_says_and_rests_on_its_radius() {
     let early = run::<ContactMessage>(&mut app, 0.4);
     assert_eq!(early, []);
     let t = app.world().resource::<Time<Virtual>>().elapsed_secs_f64();
-    // what its newest state is led on by is at most a step of 1/240 s, in which gravity adds less than 9e-5 m
+    // its newest state is led on by at most a step of 1/240 s, in which gravity adds less than 9e-5 m
     let fallen = 1.0 - G * t * t / 2.0;
     assert!((f64::from(place(&app, ball).y) - fallen).abs() < 1e-4, "{} {fallen}", place(&app, ball));
     let contacts = run::<ContactMessage>(&mut app, 1.5);

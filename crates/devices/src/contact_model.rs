@@ -64,7 +64,7 @@ impl ContactModel {
         Ok(true)
     }
 
-    /// Where the object was led to: a kinematic body is there, a tool is off it by what its drive gives.
+    /// Where the object was led to: a kinematic body is there, a tool is off it by the give of its drive.
     fn stand(&mut self, state: &Snapshot, middle_m: DVec3) {
         match &state.body {
             Body::Rigid(body) => {
@@ -97,7 +97,7 @@ impl ContactModel {
     }
 }
 
-/// The centre of mass of an object in its own axes, metres: its states tell of that, what leads it of the origin.
+/// The centre of mass of an object in its own axes, metres: states give that, commanded poses the origin.
 fn middle_of(world: &World, object: Object) -> DVec3 {
     match world.agents().of(object.id()).and_then(|agent| agent.form()).map(|form| form.kind.clone()) {
         Some(ShapeKind::Solid(shape)) => shape.com_local,

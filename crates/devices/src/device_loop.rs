@@ -36,7 +36,7 @@ pub struct LoopOptions {
 }
 
 impl Default for LoopOptions {
-    /// 1 kHz; a tank of what 5 N give over 4 cm.
+    /// 1 kHz; a tank with the work of 5 N over 4 cm.
     fn default() -> Self {
         Self { rate_hz: 1000.0, tank_j: 0.2 }
     }
@@ -148,7 +148,7 @@ impl DeviceLoop {
         self.report.presses += u64::from((state.buttons & !before.map_or(0, |before| before.buttons)).count_ones());
         let led = self.lead(&state);
         let felt = self.feel(&state);
-        // what the hand holds is released where there is nothing to feel
+        // without a wrench to feel, the hand is given none
         let wanted = *felt.as_ref().unwrap_or(&Wrench::default());
         let limits = self.device.limits();
         let given = self.tank.admit(&limits.of(&wanted), &Handle { state, limits, period_s: self.period_s });

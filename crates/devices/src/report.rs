@@ -11,7 +11,8 @@ pub struct DeviceReport {
     pub object: String,
     /// How often it was read.
     pub ticks: u64,
-    /// Whether the system gave its thread real-time priority. Without that, ticks are late by what other programs take of the cores.
+    /// Whether the system gave its thread real-time priority. Without that, other programs on the cores make ticks
+    /// late.
     pub realtime: bool,
     /// By how much ticks were late, milliseconds.
     pub late_ms: Quantiles,

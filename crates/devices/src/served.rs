@@ -1,6 +1,6 @@
 //! A device that is served by a thread of its own.
 //!
-//! In: a loop. Out: its report, at any time and at the end. Never here: what happens in a tick.
+//! In: a loop. Out: its report, at any time and at the end. Never here: the phases of a tick.
 
 use super::device_loop::DeviceLoop;
 use super::report::DeviceReport;
@@ -41,7 +41,7 @@ impl Served {
         self.report.lock().unwrap_or_else(PoisonError::into_inner).clone()
     }
 
-    /// Ends it, and says what happened.
+    /// Ends it, and returns the report.
     #[must_use]
     pub fn stop(mut self) -> DeviceReport {
         self.end();

@@ -1,18 +1,19 @@
-//! The energy tank: what a device may give the hand before it has to take something in.
+//! The energy tank: the energy that a device may give the hand before it has to take something in.
 //!
 //! In: the wrenches that were sent, the ones of them that have acted, their work. Out: the wrench that may be sent.
 //! Never here: where the force comes from.
 //!
 //! A force that is held between samples, or that comes late, can give more energy than the contact has taken (docs/theory/coupling.md, section 6). The tank
-//! (FSMS11) begins full, is emptied by what the handle gets and filled, up to its capacity, by what the hand puts in: from any
-//! moment on the hand gets no more than the capacity beyond what it puts in. A wrench is admitted as far as the tank
-//! covers the energy that it and the wrenches on their way can give at the speed of the handle.
+//! (FSMS11) begins full, is emptied by energy that the handle gets and filled, up to its capacity, by energy that the
+//! hand puts in: from any moment on the hand gets no more than the capacity beyond its own. A wrench is admitted as far
+//! as the tank covers the energy that it and the wrenches on their way can give at the speed of the handle.
 
 use super::device::{DeviceState, Limits};
 use metachron_core::Wrench;
 use std::collections::VecDeque;
 
-/// How much further than by its velocity and the wrenches sent the handle may go within one sample, metres and radians: by what the hand does.
+/// How much further than by its velocity and the wrenches sent the handle may go within one sample, metres and radians:
+/// by the hand's own force.
 const SURPRISE_M: f64 = 5e-5;
 const SURPRISE_RAD: f64 = 5e-4;
 /// By how much the velocity of the handle may grow until a wrench acts.
@@ -62,13 +63,13 @@ impl EnergyTank {
         self.level_j
     }
 
-    /// The most energy that the handle has been given from any moment on, beyond what the hand put in, J.
+    /// The most energy that the handle has been given from any moment on, beyond the energy that the hand put in, J.
     #[must_use]
     pub const fn out_j(&self) -> f64 {
         self.out_j
     }
 
-    /// Books what the handle was given since the last state, and which wrenches are no more on their way.
+    /// Books the energy that the handle was given since the last state, and which wrenches are no more on their way.
     pub fn settle(&mut self, now: &DeviceState) {
         let last = self.first + self.sent.len() as u64 - 1;
         let applied = now.applied.clamp(self.first, last);

@@ -1,6 +1,6 @@
 //! The colour that stands for an object in files of other programs.
 //!
-//! In: its name. Out: red, green and blue. Never here: textures, what the renderer of a scene draws with.
+//! In: its name. Out: red, green and blue. Never here: textures, the colours in pictures of a scene.
 
 /// Static solids: grey.
 pub(super) const OF_FIXED: [f64; 3] = [0.6, 0.6, 0.6];

@@ -18,13 +18,13 @@ use std::fs::File;
 use std::io::BufWriter;
 use std::path::{Path, PathBuf};
 
-/// A chunk is closed, and what came before is safe from a crash, after so much simulated time.
+/// A chunk is closed, and the data before it is safe from a crash, after so much simulated time.
 const CHUNK_S: f64 = 1.0;
 /// Points of surfaces are given to this part of a metre: a micrometre.
 const SHOWN_PER_M: f64 = 1e6;
 /// The frame that all others are in.
 const WORLD: &str = "world";
-/// The entity of what never moves.
+/// The entity of static solids.
 const FIXED: &str = "fixed";
 
 /// A file in MCAP.

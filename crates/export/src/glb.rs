@@ -17,7 +17,7 @@ use std::path::Path;
 const SMOOTH_COS: f64 = 0.7;
 /// Our axes in glTF's, by columns: x stays, y becomes −z, z becomes y.
 const UPRIGHT: [i32; 16] = [1, 0, 0, 0, 0, 0, -1, 0, 0, 1, 0, 0, 0, 0, 0, 1];
-/// The names that glTF has for numbers and for what a view of the buffer holds.
+/// The names that glTF has for numbers and for the contents of a view of the buffer.
 const FLOAT: u32 = 5126;
 const UNSIGNED_INT: u32 = 5125;
 const VERTICES: u32 = 34962;

@@ -1,5 +1,5 @@
-//! Runs as files that other programs open: MCAP (Foxglove, Lichtblick, Rerun), VTK series (ParaView), one moment as binary glTF, a trace
-//! of what ran when (Perfetto).
+//! Runs as files that other programs open: MCAP (Foxglove, Lichtblick, Rerun), VTK series (ParaView), one moment as
+//! binary glTF, a trace of turns (Perfetto).
 //!
 //! In: [`Moment`]s of a world, which hold every object's newest state and its surface; its turns and events. Out: files.
 //! Never here: running a world, choosing the moments, drawing.

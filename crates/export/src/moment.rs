@@ -32,7 +32,7 @@ pub struct ObjectMoment {
     pub surface: Surface,
 }
 
-/// Takes moments of a world; what does not change is made once.
+/// Takes moments of a world; parts that do not change are made once.
 #[derive(Debug, Default)]
 pub struct Moments {
     rigid: BTreeMap<AgentId, LocalMesh>,

@@ -36,7 +36,8 @@ pub struct Frame {
 
 /// A trace in a file: slices for steps, with dt, ε, lateness and leader, and for waits; instants for events.
 ///
-/// It takes [`PerfettoFile::BYTES_MAX`] bytes at most: what comes later is left out, and [`PerfettoFile::is_full`] says so.
+/// It takes [`PerfettoFile::BYTES_MAX`] bytes at most: later entries are left out, and [`PerfettoFile::is_full`] says
+/// so.
 pub struct PerfettoFile {
     path: PathBuf,
     file: BufWriter<File>,
@@ -68,7 +69,7 @@ impl PerfettoFile {
     /// The most bytes of a file.
     pub const BYTES_MAX: u64 = BYTES_MAX;
 
-    /// Begins a file, over one that exists, with what the world does from now on.
+    /// Begins a file, over one that exists, with the turns and events of the world from now on.
     ///
     /// # Errors
     /// [`ExportError::File`].
@@ -94,7 +95,8 @@ impl PerfettoFile {
         Ok(it)
     }
 
-    /// Writes what happened since the last call, and the frame that has just ended, if there is one. To be called a few times a second at
+    /// Writes the turns and events since the last call, and the frame that has just ended, if there is one. To be
+    /// called a few times a second at
     /// least: an object keeps its newest [`metachron_runtime::TURNS_KEPT`] turns.
     ///
     /// # Errors
@@ -108,7 +110,7 @@ impl PerfettoFile {
         frame.map_or(Ok(()), |frame| self.frame(frame))
     }
 
-    /// Completes the file with what happened since the last call.
+    /// Completes the file with the turns and events since the last call.
     ///
     /// # Errors
     /// [`ExportError::File`].

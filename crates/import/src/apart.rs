@@ -25,7 +25,7 @@ impl Model {
         found
     }
 
-    /// Whether a fixed solid is named in a pair: couplings are between what can move.
+    /// Whether a fixed solid is named in a pair: couplings are between objects that can move.
     pub(crate) fn is_apart(&self, name: &str) -> bool {
         self.apart.iter().any(|pair| pair.a == name || pair.b == name)
     }

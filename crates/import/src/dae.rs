@@ -8,7 +8,7 @@ use roxmltree::{Document, Node};
 use std::collections::BTreeMap;
 use std::rc::Rc;
 
-/// Deepest nesting of nodes, those included that others name.
+/// Deepest nesting of nodes, also of nodes that others name.
 const DEPTH_MAX: usize = 64;
 /// Most elements of a file, each as often as others name it.
 const ELEMENTS_MAX: usize = 1_000_000;

@@ -22,9 +22,10 @@ pub struct Folders<'a> {
     pub model: &'a Path,
     /// The folder of the scene.
     pub scene: &'a Path,
-    /// Reads what the model includes, and meshes that scenes cannot name; `None` refuses a model in several files.
+    /// Reads files that the model includes, and meshes that scenes cannot name; `None` refuses a model in several
+    /// files.
     pub read: Option<ReadFile<'a>>,
-    /// Reads the meshes that are mirrored, stretched or weigh; `None` lists those.
+    /// Reads the meshes that are mirrored, stretched or weigh; `None` lists them as left out.
     pub surface: Option<ReadSurface<'a>>,
 }
 

@@ -1,7 +1,7 @@
 //! URDF robots and MJCF models as scene files.
 //!
 //! In: the text of a model and its folder. Out: the text of a scene, and a list of all that has no place in one ([`Imported`]).
-//! Never here: files that are opened (the caller reads what a model includes, [`ReadFile`]), running a scene, checking the
+//! Never here: files that are opened (the caller reads included files, [`ReadFile`]), running a scene, checking the
 //! scene that comes out (`metachron-scene` does).
 //!
 //! Links become rigid objects whose axes are the link's, joints `[[joint]]` tables, collision geometries shapes and
@@ -73,7 +73,8 @@ impl std::fmt::Debug for Options<'_> {
 /// Reads a model of the kind that its root element says: a robot as [`urdf`], an MJCF model as [`mjcf`].
 ///
 /// # Errors
-/// As those two, for another root, and where an MJCF model has no such keyframe or it has other numbers than the model has coordinates.
+/// As of these two, for another root, and where an MJCF model has no such keyframe or it has other numbers than the
+/// model has coordinates.
 pub fn model<'a>(text: &str, folders: impl Into<Folders<'a>>, options: &Options<'_>) -> Result<Imported, ImportError> {
     let root = xml::parse(text, None)?;
     match root.tag.as_str() {
@@ -94,8 +95,8 @@ pub fn urdf<'a>(text: &str, folders: impl Into<Folders<'a>>) -> Result<Imported,
     of_urdf(&xml::parse(text, None)?, folders.into(), &Options::default())
 }
 
-/// Reads an MJCF model, its classes of defaults and frames resolved. Meshes and included files are looked for in the folder of the model; what is
-/// included comes by [`Folders::read`].
+/// Reads an MJCF model, its classes of defaults and frames resolved. Meshes and included files are looked for in the
+/// folder of the model; included files come by [`Folders::read`].
 ///
 /// # Errors
 /// [`ImportError`] at the first element that no scene can have, as [`urdf`].

@@ -9,7 +9,7 @@ use crate::pose::Pose;
 use glam::{DMat3, DVec3};
 use metachron_geometry::Solid;
 
-/// Radius of what stands in for a body without a shape or moments of its own, metres.
+/// Radius of the ball that stands in for a body without a shape or moments of its own, metres.
 pub(crate) const STAND_IN_M: f64 = 0.01;
 /// The mass of a link without mass between two joints, of the body that it carries: the solver takes a thousand to one.
 const LENT: f64 = 1e-3;

@@ -1,7 +1,7 @@
 //! Meshes of a model as the hulls of a scene: scenes name .glb, STL and OBJ files, and all else becomes an OBJ file beside the scene.
 //!
-//! In: names of files with their scale, points, ellipsoids. Out: shapes, and the files that the scene needs. Never here: files that are opened or
-//! written (the caller does), what a mesh is on.
+//! In: names of files with their scale, points, ellipsoids. Out: shapes, and the files that the scene needs. Never
+//! here: files that are opened or written (the caller does), the bodies of meshes.
 
 use crate::folders::{Folders, extension, plain};
 use crate::imported::{ImportError, MeshFile};

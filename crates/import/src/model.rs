@@ -1,6 +1,6 @@
 //! A robot as both kinds of files describe it: links, joints, and which links do not collide with each other.
 //!
-//! In: what the readers found. Out: plain data. Never here: XML, TOML.
+//! In: the results of the readers. Out: plain data. Never here: XML, TOML.
 
 use crate::imported::MeshFile;
 use crate::place::Place;
@@ -71,7 +71,7 @@ pub(crate) struct Link {
     pub(crate) is_lent: bool,
 }
 
-/// How a body looks, and what its surface is like.
+/// How a body looks, with the material of its surface.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Look {
     pub(crate) colour: Option<[u8; 3]>,
@@ -159,7 +159,7 @@ pub(crate) struct Fixed {
 }
 
 impl Fixed {
-    /// Whether it can be let through: couplings are between what can move, and a plane never does.
+    /// Whether it can be let through: couplings are between objects that can move, and a plane never does.
     pub(crate) const fn can_pass(&self) -> bool {
         self.part.touches && !matches!(self.part.shape, Shape::Solid(Solid::Plane))
     }

@@ -1,6 +1,6 @@
 //! Where in which file something is.
 //!
-//! In: what a reader knows of an element. Out: notes and errors about it. Never here: XML, what an element means.
+//! In: the place of an element. Out: notes and errors about it. Never here: XML, the meaning of elements.
 
 use crate::imported::{ImportError, LeftOut};
 use std::rc::Rc;

@@ -1,6 +1,6 @@
 //! Positions with rotations.
 //!
-//! In: numbers of files. Out: [`Pose`]s, and the angles that scenes write. Never here: what stands there.
+//! In: numbers of files. Out: [`Pose`]s, and the angles that scenes write. Never here: the objects at these places.
 
 use glam::{DMat3, DQuat, DVec3};
 

@@ -1,6 +1,7 @@
 //! A settled model as the text of a scene.
 //!
-//! In: a [`Model`] where every link has a mass and a part. Out: TOML. Never here: what the model was read from.
+//! In: a [`Model`] where every link has a mass and a part. Out: TOML. Never here: the format that the model was read
+//! from.
 
 use crate::imported::LeftOut;
 use crate::model::{
@@ -14,12 +15,12 @@ use std::fmt::Write;
 
 /// Largest angle of a range of a scene, radians, and a little for rounding.
 const ANGLE_MAX_RAD: f64 = std::f64::consts::PI * (1.0 + 1e-12);
-/// A number this much smaller than those beside it is rounding.
+/// A number this much smaller than its neighbours is rounding.
 const NOTHING: f64 = 1e-12;
 /// Where something is within this of the origin, metres, it is there.
 const SAME_M: f64 = 1e-12;
 
-/// The text of a scene; what does not fit in it goes to `notes`.
+/// The text of a scene; parts of the model that do not fit in it go to `notes`.
 pub(crate) fn write(model: &Model, notes: &mut Vec<LeftOut>) -> String {
     let mut out = String::from("format = 1\n");
     put(&mut out, "description", &quoted(&format!("{}, imported", model.name)));
@@ -91,7 +92,8 @@ fn vector(v: DVec3) -> String {
     format!("[{}, {}, {}]", number(v.x), number(v.y), number(v.z))
 }
 
-/// A solid that stays: `fixed`, or `kinematic` where something passes through it, as couplings are between what can move.
+/// A solid that stays: `fixed`, or `kinematic` where something passes through it, as couplings are between objects that
+/// can move.
 fn write_fixed(out: &mut String, fixed: &Fixed, way: &str, masks: &BTreeSet<Masks>) {
     out.push_str("\n[[object]]\n");
     put(out, "name", &quoted(&fixed.name));
@@ -282,7 +284,7 @@ fn within(motor: Motor, joint: &Joint, notes: &mut Vec<LeftOut>) -> Motor {
     Motor::Spring { position: position.clamp(least, greatest), stiffness, damping, max_effort }
 }
 
-/// How scenes call what belongs to a joint that turns, or slides.
+/// The names in scenes of the values of a joint that turns, or slides.
 struct Unit {
     is_angle: bool,
     range: &'static str,

@@ -139,7 +139,8 @@ fn fate(link: &Link, joint: Option<&Joint>, before: &[Fate], model: &Model) -> R
 /// How much longer than its rope a distance may be by rounding alone, metres.
 const ROUNDING_M: f64 = 1e-9;
 
-/// Brings the ends of ties to the bodies that links become; what ties a body to itself is left out, and so is a rope that is too short to start with.
+/// Brings the ends of ties to the bodies that links become; a tie of a body to itself is left out, and so is a rope
+/// that is too short to start with.
 fn move_ties(model: &mut Model, fates: &[Fate], notes: &mut Vec<LeftOut>) {
     let Model { links, ties, .. } = model;
     for end in ties.iter_mut().flat_map(|tie| &mut tie.ends) {
@@ -165,7 +166,8 @@ fn move_ties(model: &mut Model, fates: &[Fate], notes: &mut Vec<LeftOut>) {
     });
 }
 
-/// Brings joints that close loops to the bodies that links become, and leaves of the others those whose link remains itself.
+/// Brings joints that close loops to the bodies that links become, and leaves of the others the joints whose link
+/// remains itself.
 fn move_joints(model: &mut Model, fates: &[Fate], notes: &mut Vec<LeftOut>) {
     let Model { links, joints, .. } = model;
     let host = |link: usize| match fates[link] {
@@ -175,7 +177,7 @@ fn move_joints(model: &mut Model, fates: &[Fate], notes: &mut Vec<LeftOut>) {
     };
     let mut hangs = vec![false; links.len()];
     joints.retain_mut(|joint| {
-        // what a link hangs on comes first
+        // the joint that a link hangs on comes first
         if !std::mem::replace(&mut hangs[joint.child], true) {
             return fates[joint.child] == Fate::Itself;
         }

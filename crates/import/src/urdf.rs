@@ -12,8 +12,8 @@ use glam::{DMat3, DVec3};
 use metachron_geometry::Solid;
 use std::collections::BTreeMap;
 
-/// Looks, other programs' tables, and limits of drives, which a robot has none of until a program drives it. What a joint that does not move says about
-/// its motion has no meaning.
+/// Looks, other programs' tables, and limits of drives, which a robot has none of until a program drives it. Keys about
+/// the motion of a joint that does not move have no meaning.
 pub(crate) const HARMLESS: Harmless = Harmless {
     elements: "visual material color texture transmission safety_controller calibration sensor plugin ros2_control verbose \
         self_collision_checking axis limit dynamics implicitSpringDamper provideFeedback selfCollide",

@@ -1,6 +1,7 @@
 //! XML as a tree that knows which of its elements and attributes were read.
 //!
-//! In: text. Out: [`Element`]s, numbers of their attributes, and the list of what no reader asked for. Never here: the meaning of a tag.
+//! In: text. Out: [`Element`]s, numbers of their attributes, and the list of elements and attributes that no reader
+//! asked for. Never here: the meaning of a tag.
 
 use crate::imported::{ImportError, LeftOut};
 use crate::place::Place;

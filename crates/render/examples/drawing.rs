@@ -83,8 +83,8 @@ fn measure(gpu: &Gpu) -> Result<(), GpuError> {
     Ok(())
 }
 
-/// Prints what a frame, a triangle and a pixel cost of one kind of time; `few` and `many` are pictures of few pixels, with few and
-/// many triangles.
+/// Prints the cost of a frame, a triangle and a pixel in one kind of time; `few` and `many` are pictures of few pixels,
+/// with few and many triangles.
 fn report(name: &str, points: &[Cost], few: Cost, many: Cost, ms: fn(&Cost) -> f64) {
     let pairs: Vec<_> = points.iter().map(|cost| (cost.triangles as f64, ms(cost))).collect();
     let (base, slope) = line(&pairs);

@@ -4,8 +4,8 @@
 //! In: an adapter. Out: measured pictures. Never here: a fit, a file. The benchmark takes one to three seconds on a software rasteriser
 //! (CPU); no picture is begun after three seconds, the rest is left for the next run.
 //!
-//! All pictures are drawn once, then all once more in another order, and so on: what slows the machine down for a while slows no kind of
-//! picture more than another, and the median of a picture's times does not see it.
+//! All pictures are drawn once, then all once more in another order, and so on: a machine that is slower for a while
+//! slows no kind of picture more than another, and the median of a picture's times does not see it.
 
 use super::draw::RendererOptions;
 use super::level::{Level, Shading};
@@ -328,7 +328,7 @@ mod tests {
             let mut sorted = round.clone();
             sorted.sort_unstable();
             assert_eq!(sorted, (0..55).collect::<Vec<_>>());
-            // what follows each other in one round does not in another
+            // pictures that follow each other in one round do not in another
             let pairs = |of: &[usize]| of.windows(2).map(|pair| (pair[0], pair[1])).collect::<Vec<_>>();
             let same =
                 rounds[..k].iter().flat_map(|other| pairs(other)).filter(|pair| pairs(round).contains(pair)).count();

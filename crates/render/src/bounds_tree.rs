@@ -1,4 +1,5 @@
-//! A hierarchy of bounding boxes over everything that can be drawn: what a view may show is found without asking each object.
+//! A hierarchy of bounding boxes over everything that can be drawn: the items that a view may show are found without
+//! asking each object.
 //!
 //! In: a box for each item, again whenever it moves. Out: the items whose boxes pass a test that every box around them passes as well.
 //! Never here: the test itself.

@@ -114,8 +114,8 @@ impl Group {
 }
 
 impl SceneView {
-    /// Says which of the actors the last actors are drawn in place of, one list for each: these are not counted as objects, and move as the
-    /// members do if one of those moves.
+    /// Says which of the actors the last actors are drawn in place of, one list for each: these are not counted as
+    /// objects, and move as the members do if one of them moves.
     pub fn set_groups(&mut self, groups: &[Vec<usize>]) {
         self.impostors = groups.len();
         let before = self.tracks.len().saturating_sub(groups.len());

@@ -14,7 +14,7 @@ use metachron_geometry::{Cut, ProgressiveMesh};
 pub(super) struct Allowance {
     /// Morph fraction per frame; 1 and more is immediate.
     pub step: f32,
-    /// Triangles that may be drawn beyond those requested.
+    /// Triangles that may be drawn beyond the requested ones.
     pub triangles: f64,
 }
 

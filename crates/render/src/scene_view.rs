@@ -226,7 +226,7 @@ impl SceneView {
         }
     }
 
-    /// Chooses what lights the scene from the next picture on.
+    /// Chooses the environment light of the scene from the next picture on.
     pub fn set_environment(&mut self, environment: Environment) {
         self.picture.environment = environment;
     }
@@ -382,7 +382,7 @@ impl Track {
         self.renew();
     }
 
-    /// Finds what depends on the pose.
+    /// Finds the values that depend on the pose.
     fn renew(&mut self) {
         self.bounds = self.find_bounds();
         (self.fresh, self.cut_m) = (true, None);

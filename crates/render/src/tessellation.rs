@@ -133,7 +133,7 @@ fn control(from: SkinPoint, to: DVec3) -> DVec3 {
     from.position + (way - from.normal * way.dot(from.normal)) / 3.0
 }
 
-/// The normal between two points: what a parabola that meets both normals has in its middle (VPBM01, eq. 8).
+/// The normal between two points: the middle normal of a parabola that meets both normals (VPBM01, eq. 8).
 fn middle_normal(a: SkinPoint, b: SkinPoint) -> DVec3 {
     let (way, sum) = (b.position - a.position, a.normal + b.normal);
     let length = way.length_squared();

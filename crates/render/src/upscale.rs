@@ -1,7 +1,7 @@
 //! Shows a drawn picture on a target: texel by texel where their sizes are equal, else enlarged.
 //!
-//! In: the texture of a picture, a pass into the target. Out: a draw that covers the pass's viewport. Never here: who decides how many pixels a
-//! picture is drawn with; the target.
+//! In: the texture of a picture, a pass into the target. Out: a draw that covers the pass's viewport. Never here: the
+//! choice of how many pixels a picture is drawn with; the target.
 //!
 //! Enlarging is by the cubic (KEY81) with the slopes of Catmull and Rom, which keeps edges sharp and is exact for parabolas. In software its
 //! nine filtered samples take as long as shading a pixel; there one filtered sample (bilinear) has to do, at a third of that.

@@ -38,9 +38,10 @@ pub struct Visibility {
 /// How many actors a view may show, without impostors, by tests of which the second is stricter.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct VisibleCounts {
-    /// Those with a part in a cell that the eye reaches through portals, or in no cell and in the frustum (eye-to-cell visibility).
+    /// Objects with a part in a cell that the eye reaches through portals, or in no cell and in the frustum
+    /// (eye-to-cell visibility).
     pub potentially_visible: u64,
-    /// Those in what portals leave of the frustum in their cells (eye-to-object visibility).
+    /// Objects in the part of the frustum that portals leave in their cells (eye-to-object visibility).
     pub visible: u64,
 }
 
@@ -52,7 +53,7 @@ pub(super) struct Survey {
     items: Vec<Bounded>,
     tree: BoundsTree,
     reach: Reach,
-    /// The items that the last camera may see, and those with a part in a region that it reaches.
+    /// The items that the last camera may see, and the items with a part in a region that it reaches.
     in_sight: Vec<bool>,
     in_reach: Vec<bool>,
     /// The cells that it reaches.
@@ -242,7 +243,7 @@ fn visibility_of(track: &Track, camera: &Camera, size: Size, frustum: &Frustum, 
         Body::Soft(soft) => {
             let sum: f64 = soft.velocities.iter().map(|v| across(*v)).sum();
             let half = bounds.half_m;
-            // the mean side of its bounding box: more than a sheet covers, about what a ball covers
+            // the mean side of its bounding box: more than a sheet covers, about as much as a ball covers
             let area = 4.0 / 3.0 * (half.x * half.y + half.y * half.z + half.z * half.x);
             (area * scale * scale, (sum / soft.velocities.len().max(1) as f64).sqrt(), None)
         }

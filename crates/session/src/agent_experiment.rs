@@ -63,7 +63,7 @@ impl Governor for Sweep {
         if self.turns < SKIPPED + TURNS {
             return Demand::default();
         }
-        // what the agent took up, which is inside ranges of its own
+        // the ε that the agent took up, which is inside ranges of its own
         let eps_m = measure.resolution.map(|held| held.eps_m);
         let z = self.limits.z_of(&metachron_lod::control::RateDemand { dt_s, eps_m });
         let window = AgentWindow { z, load: self.work_s / self.periods_s };

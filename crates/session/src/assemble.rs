@@ -1,4 +1,4 @@
-//! Converts a scene into what the renderer draws and what control chooses among; `metachron_world` makes its agents.
+//! Converts a scene into actors for the renderer and views for control; `metachron_world` makes its agents.
 //!
 //! In: a [`Scene`]. Out: actors and static solids for the renderer, views for control, governors of agents.
 //! Never here: time passing.

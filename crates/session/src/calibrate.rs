@@ -66,7 +66,7 @@ pub struct PriceTable {
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum ImportError {
-    /// It is not what [`PriceTable::export`] writes.
+    /// It is not in the format of [`PriceTable::export`].
     #[error("expected a table of prices as `metachron calibrate --export` writes it: {0}")]
     NoTable(String),
     /// It was measured by another version of the program.

@@ -33,8 +33,8 @@ pub struct Coupling {
     /// Impulse given and not yet taken at the last reading, N·s.
     pub in_flight_n_s: f64,
     /// Largest difference between the ledgers of both sides at equal revisions, as a share of the impulse exchanged; if the revisions never
-    /// were equal, the difference of the newest ledgers beyond what the owner reports as in flight. `None` where there are no two ledgers
-    /// to compare.
+    /// were equal, the difference of the newest ledgers beyond the impulse that the owner reports as in flight. `None`
+    /// where there are no two ledgers to compare.
     pub momentum_error: Option<f64>,
     /// Whether both ledgers were ever seen at the same revision.
     pub(super) compared: bool,
@@ -199,7 +199,8 @@ impl Couplings {
     }
 }
 
-/// Difference between the ledgers of what `owner` gave and `other` took, N·s, and whether both have the same revision.
+/// Difference between the impulses in the ledgers that `owner` gave and `other` took, N·s, and whether both have the
+/// same revision.
 fn difference_n_s(mine: &Snapshot, owner: AgentId, theirs: &Snapshot, other: AgentId) -> Option<(f64, bool)> {
     let given = mine.given.iter().find(|ledger| ledger.with == other)?;
     let taken = theirs.taken.iter().find(|ledger| ledger.with == owner)?;

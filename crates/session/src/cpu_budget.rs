@@ -1,7 +1,7 @@
 //! The CPU budget: shares the cores among agents' steps at one price, which the picture pays too where it is drawn on them.
 //!
-//! In: the agents' load at their finest, what the frame loop takes or would like to. Out: a share for every agent, and the time budget of
-//! the picture.
+//! In: the agents' load at their finest, the time that the frame loop takes or would like to. Out: a share for every
+//! agent, and the time budget of the picture.
 //! Never here: the market's law (`metachron_lod::adaptive::joint` has it), steps, drawing. Theory: `docs/theory/budget.md`, eq. 54 … 59.
 //!
 //! Agents and the frame loop exchange these numbers through atomics, without waiting.
@@ -54,7 +54,7 @@ impl AgentBudget {
         self.id
     }
 
-    /// The frame loop sets what makes a visible difference.
+    /// The frame loop sets the ε and step that make a visible difference.
     pub fn set_visible(&self, detail: VisibleDetail) {
         self.visible_eps.store(detail.eps_m.to_bits(), Ordering::Relaxed);
         self.visible_dt.store(detail.dt_s.to_bits(), Ordering::Relaxed);

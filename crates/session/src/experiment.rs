@@ -2,7 +2,8 @@
 //!
 //! In: a session and the means of drawing; or a [`Design`] for a caller that draws the frames itself. Out: the objects in view, the
 //! polygons and the time of every frame.
-//! The controller does not learn from these frames. Never here: what the numbers mean ([`metachron_lod::tune`] says).
+//! The controller does not learn from these frames. Never here: the meaning of the numbers ([`metachron_lod::tune`]
+//! says).
 //! The design: steps over the whole range, then a pseudo-random binary sequence around its middle, so that both the line and the delay can
 //! be separated from a drift of the scene.
 

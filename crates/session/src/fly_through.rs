@@ -1,6 +1,7 @@
 //! A scene seen along its camera's path, frame by frame: each frame at its own place, however long the previous one took.
 //!
-//! In: a scene, the means of drawing. Out: a record and a picture of every frame. Never here: what the numbers mean.
+//! In: a scene, the means of drawing. Out: a record and a picture of every frame. Never here: the meaning of the
+//! numbers.
 //! Agents are paused; only the camera moves. So all policies see the same frames, on any machine.
 //! In lockstep a frame takes its declared time, and only the requested pictures are drawn.
 
@@ -63,7 +64,8 @@ impl FlyThrough {
         drawn.then(|| pictured(&self.session, &self.camera, &mut self.drawing)).transpose()
     }
 
-    /// The levels of the last frame in another style, and where `from` is given seen by that camera: what the frame did not see is left out.
+    /// The levels of the last frame in another style, and where `from` is given seen by that camera: objects that the
+    /// frame did not see are left out.
     /// `None` where nothing draws.
     ///
     /// # Errors

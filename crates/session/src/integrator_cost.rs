@@ -1,4 +1,4 @@
-//! Measures what a solve of each integrator of the tube costs relative to implicit Euler on this machine.
+//! Measures the cost of a solve of each integrator of the tube relative to implicit Euler on this machine.
 //!
 //! Out: a factor for every integrator. Never here: how many solves a step takes; tubes count them as their work.
 

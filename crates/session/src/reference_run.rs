@@ -69,7 +69,7 @@ pub struct PairError {
     pub impulse_oracle_n_s: f64,
 }
 
-/// Distance of one agent's states from those on the common clock.
+/// Distance of one agent's states from the states on the common clock.
 #[derive(Debug, Clone, Copy, Default)]
 struct Distance {
     points: u64,
@@ -325,7 +325,7 @@ mod tests {
         // free flight is exact at any step; between ticks of 0.5 ms it is interpolated linearly: g dt²/2 = 1.2 µm
         let oracle = oracle.unwrap();
         let states = oracle.states;
-        // what nothing touches stays as far from where it was as its start was moved
+        // an agent that nothing touches stays as far from where it was as its start was moved
         assert!((oracle.sensitivity_m / MOVED_M - 1.0).abs() < 1e-6, "{} m", oracle.sensitivity_m);
         assert!(states > 40 && calls > 5 && !distances.is_empty(), "{states} states, told {calls} times");
         for distance in distances {

@@ -345,8 +345,8 @@ impl Session {
         self.world.command(self.world.object_of(to)?, Command::Spring(Keyed::first(pull)))
     }
 
-    /// Sets the pressure of what fills an agent, inside minus outside, Pa. An agent that nothing fills or that does not exist and a number that is
-    /// not finite give an error.
+    /// Sets the pressure of an agent's filling, inside minus outside, Pa. An agent that nothing fills or that does not
+    /// exist and a number that is not finite give an error.
     pub fn set_pressure(&self, of: AgentId, pressure_pa: f64) -> Result<(), WorldError> {
         self.world.command(self.world.object_of(of)?, Command::pressure(pressure_pa))
     }

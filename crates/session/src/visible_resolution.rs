@@ -1,6 +1,7 @@
 //! Resolution and rate that an agent's simulation needs for the current view.
 //!
-//! In: what the camera sees of every actor, and by which level it is drawn. Out: for each steered agent, the ε and the step below which no
+//! In: the visibility of every actor, and by which level it is drawn. Out: for each steered agent, the ε and the step
+//! below which no
 //! difference is visible. Never here: the agent's reaction to it ([`metachron_lod::control::RateControl`] does). Theory:
 //! `docs/theory/control.md`, section 5.
 
@@ -116,7 +117,8 @@ impl AgentGroup {
         self.side_px = impostor.filter(|_| self.is_whole(seen.states)).map(side);
     }
 
-    /// Whether no agent outside is in a cluster with one of the group's own: what these touch is drawn by the impostor too.
+    /// Whether no agent outside is in a cluster with one of the group's own: bodies that these touch are drawn by the
+    /// impostor too.
     fn is_whole(&self, states: &[Arc<Snapshot>]) -> bool {
         let leader = |at: usize| states[at].cluster.map_or(at, |cluster| cluster.leader.0 as usize);
         let agents = self.holds.len().min(states.len());

@@ -1,6 +1,6 @@
 //! The window: a running scene with panels around its picture, keys and mouse.
 //!
-//! In: a plan of what to play. Out: the outcome of the run. Never here: physics, a law of control, the format of scenes.
+//! In: a plan of the run. Out: the outcome of the run. Never here: physics, a law of control, the format of scenes.
 //!
 //! ```
 //! use metachron_viewer::ui::{Command, SHORTCUTS, keys_text};

@@ -1,7 +1,8 @@
 //! Tuning while a window shows the scene: an experiment on its own frames, then a search on its own thread.
 //!
 //! In: frames of a session, one after the other. Out: the progress, and finally gains or a reason why there are none. Until then the
-//! session stays as it was, except during the experiment's frames. Never here: a window, what good gains are ([`metachron_lod::tune`] says).
+//! session stays as it was, except during the experiment's frames. Never here: a window, the measure of good gains
+//! ([`metachron_lod::tune`] has it).
 
 use metachron_lod::control::{Law, PictureControl, Policy};
 use metachron_lod::tune::{Candidate, Extent, Family, Observed, Plant, Search, Verdict, refusal, search};

@@ -195,7 +195,7 @@ impl<'a> WindowSimulation<'a> {
         self.refresh();
     }
 
-    /// Sets the pressure of what fills an object; the slider stays where it is put.
+    /// Sets the pressure of an object's filling; the slider stays where it is put.
     fn set_pressure(&mut self, agent: AgentId, pressure_pa: f64) {
         if self.session.set_pressure(agent, pressure_pa).is_err() {
             return;
@@ -297,7 +297,7 @@ impl<'a> WindowSimulation<'a> {
     }
 }
 
-/// Whether an action changes what the run will do, other than when.
+/// Whether an action changes the later run, other than when.
 const fn acts(action: &Action) -> bool {
     !matches!(
         action,

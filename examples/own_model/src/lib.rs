@@ -1,4 +1,4 @@
-//! A model of one's own: a pontoon that floats between piles, up and down, and carries what others put on it.
+//! A model of one's own: a pontoon that floats between piles, up and down, and carries bodies put on it.
 //!
 //! In: its hull, the water's density and drag. Out: an [`Agent`] for `Custom`. Never here: the bodies that rest on it.
 //!

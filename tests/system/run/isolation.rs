@@ -65,7 +65,7 @@ fn the_first_line_says_what_an_agent_gave_up_and_at_the_free_pace_none_gives_up_
     let (line, late) = run("lockstep", "real-time");
     let hog = |report: &Value, pointer: &str| number(agent(report, "hog"), pointer);
     assert!(line.contains("1 of 5 agents gave up time, most of all hog"), "{line}");
-    // of 31 frames at 60 Hz it lives what steps of 9 ms have time for
+    // of 31 frames at 60 Hz it lives only the share for which steps of 9 ms have time
     assert!(hog(&late, "/given_up_s") > 0.2 && hog(&late, "/lived_s") < 0.3, "{late}");
     for executor in ["lockstep", "threads", "pool"] {
         let (line, report) = run(executor, "free");

@@ -14,7 +14,7 @@ const SIZE: Size = Size { width: 1600, height: 900 };
 const WIDE: [(&str, &str); 3] = [
     ("object.intestine.picture_eps_m", "[0.0005, 0.2]"),
     ("object.intestine.n", "[1, 6]"),
-    // the scene's own margin of 0.3 leaves the set point of 60 Hz below what filling 1600 by 900 pixels is declared to cost
+    // the scene's own margin of 0.3 leaves the set point of 60 Hz below the declared cost of filling 1600 by 900 pixels
     ("target.margin", "0.1"),
 ];
 

@@ -1,6 +1,6 @@
 //! Classes of defaults: every element gets the attributes that its class has and it has not.
 //!
-//! In: the tree of a file. Out: the same without `default` elements. Never here: what an attribute means.
+//! In: the tree of a file. Out: the same without `default` elements. Never here: the meaning of attributes.
 
 use crate::imported::ImportError;
 use crate::xml::Element;
@@ -14,7 +14,7 @@ pub(super) const ROTATIONS: [&str; 5] = ["quat", "axisangle", "euler", "xyaxes",
 /// Elements of a class by their tags.
 type Class = BTreeMap<String, Element>;
 
-/// Gives all elements of a file what their classes have.
+/// Gives all elements of a file the attributes of their classes.
 ///
 /// # Errors
 /// For a class that there is none of.
@@ -57,7 +57,7 @@ fn kind(tag: &str) -> &str {
     if ["spatial", "fixed"].contains(&tag) { "tendon" } else { tag }
 }
 
-/// Gives an element, and all in it, what their classes have; `ambient` is the class of what names none.
+/// Gives an element, and all in it, the attributes of their classes; `ambient` is the class of elements that name none.
 fn give(element: &mut Element, ambient: &str, classes: &BTreeMap<String, Class>) -> Result<(), ImportError> {
     let own = element.text("class").unwrap_or(ambient).to_owned();
     let inside = element.text("childclass").unwrap_or(ambient).to_owned();

@@ -1,6 +1,7 @@
 //! Files that a model includes: the contents of their root take the place of the `include`.
 //!
-//! In: the tree of a model, its folder. Out: the same with all that it includes, each element knowing its file. Never here: what one means.
+//! In: the tree of a model, its folder. Out: the same with all that it includes, each element knowing its file. Never
+//! here: the meaning of elements.
 
 use crate::folders::Folders;
 use crate::imported::{ImportError, LeftOut};
@@ -31,7 +32,7 @@ impl Includes<'_> {
         let mut at = 0;
         while at < element.all().len() {
             if element.all()[at].tag == "include" {
-                // what comes in its place may include others
+                // elements that come in its place may include others
                 let inside = self.of(element.all()[at].read())?;
                 element.all_mut().splice(at..=at, inside);
             } else {

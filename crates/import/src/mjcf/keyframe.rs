@@ -1,6 +1,7 @@
-//! The keyframe that a model starts from: where its joints are, and what its actuators are commanded.
+//! The keyframe that a model starts from: the positions of its joints, and the commands of its actuators.
 //!
-//! In: `key` elements. Out: their numbers, joint by joint. Never here: what a joint makes of them; the keyframes that are not started from.
+//! In: `key` elements. Out: their numbers, joint by joint. Never here: the use of them in joints; the keyframes that
+//! are not started from.
 
 use crate::imported::ImportError;
 use crate::xml::Element;

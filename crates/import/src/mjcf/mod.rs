@@ -92,7 +92,7 @@ pub(crate) fn read(
     Ok(model)
 }
 
-/// Gravity, whether anything touches anything, and what surrounds the bodies.
+/// Gravity, whether anything touches anything, and the medium around the bodies.
 fn read_options(root: &Element, model: &mut Model, notes: &mut Vec<LeftOut>) -> Result<(), ImportError> {
     for option in root.children("option") {
         if let Some(gravity) = option.numbers("gravity")? {

@@ -66,7 +66,7 @@ fn what_holds_a_body_without_mass_holds_the_one_that_it_is_part_of() {
     let metachron_core::Body::Rigid(state) = world.latest(world.object("arm").unwrap()).unwrap().body else {
         panic!("a rigid body")
     };
-    // it would fall by more than a metre; what steps leave of a weld is microns
+    // it would fall by more than a metre; the error of a weld after the steps is microns
     assert!(state.position.distance(glam::DVec3::X) < 1e-4, "{}", state.position);
     assert_eq!(
         left_out(&import(&text("arm")).unwrap()),
@@ -84,7 +84,7 @@ fn noted_of(file: &str, bytes: &[u8]) -> String {
     left_out(&model(&text, read_from(folder.path()), &Options::default()).unwrap()).join("\n")
 }
 
-/// A Collada file with as many instances of four points as `instances`, and what its accessor says.
+/// A Collada file with as many instances of four points as `instances`, and the attributes of its accessor.
 fn dae(points: &str, accessor: &str, instances: usize) -> String {
     format!(
         r##"<COLLADA><geometry id="g"><mesh><source id="s"><float_array>{points}</float_array><accessor {accessor}/></source>

@@ -1,4 +1,4 @@
-//! Imported models against closed forms, and against what MuJoCo makes of the same file.
+//! Imported models against closed forms, and against MuJoCo's motion of the same file.
 
 mod hostile;
 mod mjcf;

@@ -402,7 +402,7 @@ fn a_general_actuator_with_an_affine_bias_is_a_servo_and_shares_its_joint_with_a
     assert_eq!(left_out(&imported), [""; 0]);
     let world = start(&imported, &["hinge"], 500.0);
     advance(&world, 4.0);
-    // it rests where what a step would still give is below what solves stop at
+    // it rests where the change of a step would be below the tolerance of solves
     assert!((position(&world, "hinge") - 0.325).abs() < 1e-4, "{}", position(&world, "hinge"));
 }
 

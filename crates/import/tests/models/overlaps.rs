@@ -71,7 +71,7 @@ fn what_is_of_two_models_or_of_the_world_keeps_its_contact_although_it_overlaps(
 fn a_link_passes_through_the_fixed_base_that_it_hangs_on_and_others_collide_with_it() {
     let imported = import(&chain(BASE, &[0.0, 0.5, 1.0]), None);
     assert_eq!(apart(&imported), [["0", "1"]]);
-    // through one of the scene's own: couplings are between what can move
+    // through one of the scene's own: couplings are between objects that can move
     assert!(imported.toml.contains("name = \"0\"\nmodel = \"rigid\"\nkinematic = true\n"), "{}", imported.toml);
 }
 

@@ -57,7 +57,7 @@ fn speckle(image: &RgbaImage, x: u32, y: u32) -> f64 {
 }
 
 /// The largest distance from Lambert's law, in steps of 1/255 below it, and the darkest speckle, over the pixels whose normals `at` gives;
-/// and how many pixels those are.
+/// and how many pixels these are.
 fn worst(image: &RgbaImage, at: impl Fn(DVec2) -> Option<DVec3>) -> (f64, f64, u32) {
     let (mut below, mut speckled, mut count) = (0.0_f64, 0.0_f64, 0);
     for (x, y) in (1..SIZE.height - 1).flat_map(|y| (1..SIZE.width - 1).map(move |x| (x, y))) {

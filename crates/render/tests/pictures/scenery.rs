@@ -243,7 +243,7 @@ fn shadings_agree_where_triangles_are_small() {
     };
     let fine = mean(Shading::PerPixel);
     for shading in [Shading::Flat, Shading::Gouraud] {
-        // a triangle is a few pixels: what differs is where its colour is taken
+        // a triangle is a few pixels: the pictures differ by where its colour is taken
         assert!((mean(shading) / fine - 1.0).abs() < 0.02, "{shading:?}: {} and {fine}", mean(shading));
     }
 }

@@ -10,7 +10,7 @@ pub struct Setting {
     pub dt_s: f64,
     /// Number of pieces that the object's length is divided into; zero if it is not divided.
     pub pieces: u32,
-    /// Number of the integrator among those allowed.
+    /// Number of the integrator among the allowed ones.
     pub method: usize,
 }
 

@@ -31,7 +31,7 @@ pub struct ChoiceSummary {
     pub holes: Option<u64>,
     /// Passes of a hierarchical search that goes on from the frame before (MB97); `None` for other policies.
     pub passes: Option<Spread>,
-    /// Objects per frame in cells that the eye reached through portals, and those in no cell in view.
+    /// Objects per frame in cells that the eye reached through portals, and objects in no cell in view.
     pub potentially_visible: Option<f64>,
     /// Objects per frame in view: where there are cells, the objects that portals leave in view.
     pub visible: Option<f64>,

@@ -2,7 +2,7 @@
 //!
 //! In: one row per frame and the target. Out: spreads, misses, errors on binding frames, settling. Never here: measuring.
 //!
-//! x is a frame's work in units of the target. *Binding* frames are those whose full-detail cost exceeds 1.15 of it:
+//! x is a frame's work in units of the target. *Binding* frames are frames whose full-detail cost exceeds 1.15 of it:
 //! the others would be on time without any policy and say nothing about one.
 
 use crate::FrameRecord;

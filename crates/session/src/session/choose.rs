@@ -35,7 +35,7 @@ impl Session {
         self.scene_view.picture()
     }
 
-    /// Makes the picture of the last frame's levels as `camera` sees it, without what that frame did not see.
+    /// Makes the picture of the last frame's levels as `camera` sees it, without objects that that frame did not see.
     pub fn compose_levels(&mut self, camera: &Camera, size: Size, style: Style) -> &Picture {
         let seen = |(view, level): (&ObjectView, &Level)| {
             let triangles = if view.visible { level.triangles } else { 0 };
@@ -78,7 +78,7 @@ impl Session {
         assemble::update_views(&mut self.views, self.scene_view.seen(), self.scene_view.updated(), of);
     }
 
-    /// Sets the levels of this frame: those chosen while the previous frame was drawn, else chosen now.
+    /// Sets the levels of this frame: levels chosen while the previous frame was drawn, else chosen now.
     fn choose(&mut self, started: Duration, size: Size) {
         self.chosen.select = Duration::ZERO;
         if !self.control.take_up(&self.views) {
@@ -123,8 +123,8 @@ impl Session {
         Backdrop { pixels: drawn.pixels(), enlarged: if drawn == size { 0.0 } else { size.pixels() }, triangles }
     }
 
-    /// Logic done elsewhere while a frame was drawn in `draw`: the next choice, and what the steps of agents took of each core. In virtual
-    /// time agents do not slow the drawing.
+    /// Logic done elsewhere while a frame was drawn in `draw`: the next choice, and the time of agents' steps on each
+    /// core. In virtual time agents do not slow the drawing.
     pub fn logic_beside(&mut self, draw: Duration) -> Duration {
         let next = self.chosen.select_next.unwrap_or_default();
         if self.is_virtual() {

@@ -1,6 +1,7 @@
-//! Reading of states: what a frame shows, who has joined, who has left.
+//! Reading of states: the states of a frame, agents that have joined, agents that have left.
 //!
-//! In: what agents have published. Out: an up-to-date scene view and list of couplings. Never here: a choice, drawing.
+//! In: the published states of agents. Out: an up-to-date scene view and list of couplings. Never here: a choice,
+//! drawing.
 
 use super::super::assemble;
 use super::Session;
@@ -15,13 +16,13 @@ impl Session {
         self.gather();
     }
 
-    /// Simulated time of what the last frame shows.
+    /// Simulated time of the states in the last frame.
     #[must_use]
     pub const fn picture_time(&self) -> SimTime {
         self.chosen.sim
     }
 
-    /// Reads the newest states and poses what the frame shows: these, or the moment that is looked at.
+    /// Reads the newest states and poses the states of the frame: these, or the moment that is looked at.
     pub(super) fn gather(&mut self) {
         let now = self.world.time();
         let shown = self.rewind.as_ref().and_then(super::Rewind::shown_beside);

@@ -1,7 +1,7 @@
 //! A session whose run is recorded, and one that repeats a recording.
 //!
 //! In: a session before its first frame, a place to write to; a recording. Out: a recording; a session whose frames show it.
-//! Never here: what a recording is made of ([`metachron_world::Recording`]), arguments.
+//! Never here: the contents of a recording ([`metachron_world::Recording`]), arguments.
 
 use super::super::error::SessionError;
 use super::Session;
@@ -10,7 +10,8 @@ use metachron_world::{RecordError, Recording, Scene, SceneText, World};
 use std::io::Write;
 
 impl Session {
-    /// Plays `scene` again as `recording` has it, at most to the simulated time `until`: frames see what happened, and change nothing.
+    /// Plays `scene` again as `recording` has it, at most to the simulated time `until`: frames see it, and change
+    /// nothing.
     ///
     /// # Errors
     /// [`SessionError::Replay`] where the recording is of another scene; [`SessionError::World`].

@@ -170,7 +170,7 @@ impl Session {
 
     fn going_on(&self) -> Result<Option<Box<GoingOn>>, CheckpointError> {
         if self.world.replayed().is_some() {
-            // a replay does what its recording says: it can be looked at
+            // a replay repeats its recording: it can be looked at
             return Ok(None);
         }
         Ok(Some(Box::new(GoingOn {
@@ -252,7 +252,7 @@ impl Session {
             return self.look_live().map(|()| false);
         }
         self.look_at_moment(at)?;
-        // once more without the pause: what a paused frame loop has done since is undone
+        // once more without the pause: changes of a paused frame loop since then are undone
         self.put_back(at)?;
         self.branch_off();
         Ok(true)

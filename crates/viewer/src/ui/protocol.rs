@@ -97,7 +97,7 @@ pub enum Action {
     DragEnd,
     /// Select an object, or none.
     Select(Option<AgentId>),
-    /// The pressure of what fills an object.
+    /// The pressure of an object's filling.
     Pressure {
         /// The object.
         agent: AgentId,
@@ -276,7 +276,7 @@ pub struct Status {
     pub messages: Vec<Message>,
 }
 
-/// The scale of contact forces, and those on tools.
+/// The scale of contact forces, and the forces on tools.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Forces {
     /// Metres that the arrow of one newton has; 0 before any was drawn.
@@ -423,7 +423,7 @@ pub struct TurnRow {
     pub dropped_s: f64,
 }
 
-/// The pressure of what fills an object.
+/// The pressure of an object's filling.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Filled {
     /// The one that it started with or was set last, inside minus outside, Pa.

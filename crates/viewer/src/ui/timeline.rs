@@ -1,4 +1,4 @@
-//! The timeline: a scrubber over the moments that are kept, a button back to the present, and what the moments cost.
+//! The timeline: a scrubber over the moments that are kept, a button back to the present, and the cost of the moments.
 //!
 //! In: the [`Status`]. Out: [`Action`]s. Never here: the moments.
 

@@ -1,6 +1,7 @@
 //! The files of the scene that is shown: opened, read again, and watched for changes.
 //!
-//! In: a path, what the files say. Out: another session, or a message while the old one runs on. Never here: what a scene means.
+//! In: a path, the text of files. Out: another session, or a message while the old one runs on. Never here: the meaning
+//! of a scene.
 
 use super::WindowSimulation;
 use crate::ui::{Message, Severity};

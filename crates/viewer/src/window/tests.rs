@@ -1,4 +1,4 @@
-//! The window without its surface: what its buttons do to the run, frame by frame.
+//! The window without its surface: the effect of its buttons on the run, frame by frame.
 //!
 //! In virtual time, which passes a frame a picture, so that every number is the same each time.
 

@@ -9,7 +9,7 @@ use metachron_world::CheckpointError;
 use std::time::Duration;
 
 impl WindowSimulation<'_> {
-    /// Runs, pauses, steps or changes the speed; what runs on from a moment of the past is as it was then.
+    /// Runs, pauses, steps or changes the speed; a run that goes on from a moment of the past is as it was then.
     pub(super) fn drive(&mut self, drive: TimelineCommand) {
         let goes_on = matches!(drive, TimelineCommand::Run | TimelineCommand::Step(_));
         let put_back = goes_on && self.go_on_from_there();

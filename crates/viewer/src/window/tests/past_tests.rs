@@ -1,4 +1,4 @@
-//! The window's way back, and what joins, leaves and changes while it is open.
+//! The window's way back, and objects that join, leave and change while it is open.
 
 use super::super::*;
 use super::{frame, plan, with_plan, with_simulation, with_tube};
