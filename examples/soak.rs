@@ -3,8 +3,7 @@
 //!
 //! `cargo run --release --no-default-features --example soak -- --minutes 10`, or `--quick` for a minute of it. While
 //! nothing joins or leaves, momentum stays as it is; memory grows by no more than a stated bound for each; no call
-//! waits long. It
-//! ends with an error where one of these does not hold.
+//! waits long. It ends with an error where one of these does not hold.
 //! Bodies float in a space without gravity towards its middle, where they meet.
 
 use metachron::prelude::*;

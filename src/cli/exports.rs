@@ -1,8 +1,7 @@
 //! Files of a run for other programs: one moment a frame, the last moment, a trace.
 //!
 //! In: paths, a world that is played, its frames. Out: an MCAP file, a VTK series, binary glTF, a Perfetto trace. Never
-//! here: their contents
-//! ([`metachron_export`]).
+//! here: their contents ([`metachron_export`]).
 
 use metachron_console::output::message;
 use metachron_export::{

@@ -1,9 +1,8 @@
 //! Every built-in scene, 60 frames in lockstep: the bits of its last state and its whole report stay as they were recorded.
 //!
 //! The file says nothing about whether they are right; other tests do. It lets structure and names change safely: a
-//! commit
-//! that only moves or renames leaves `tests/reference/golden.json` as it is, and one that changes it says old, new and why.
-//! `METACHRON_RECORD=1 cargo test --test system golden` writes it anew.
+//! commit that only moves or renames leaves `tests/reference/golden.json` as it is, and one that changes it says old,
+//! new and why. `METACHRON_RECORD=1 cargo test --test system golden` writes it anew.
 
 use crate::play::{lockstep, metachron};
 use serde_json::{Map, Value, json};

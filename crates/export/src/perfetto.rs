@@ -96,8 +96,7 @@ impl PerfettoFile {
     }
 
     /// Writes the turns and events since the last call, and the frame that has just ended, if there is one. To be
-    /// called a few times a second at
-    /// least: an object keeps its newest [`metachron_runtime::TURNS_KEPT`] turns.
+    /// called a few times a second at least: an object keeps its newest [`metachron_runtime::TURNS_KEPT`] turns.
     ///
     /// # Errors
     /// [`ExportError::File`].

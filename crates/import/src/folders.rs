@@ -1,8 +1,7 @@
 //! Where files that a model names are.
 //!
 //! In: a path as a model writes it. Out: the path as the scene writes it, the text of an included file. Never here: its
-//! meaning, files that
-//! are opened (the caller's [`ReadFile`] does).
+//! meaning, files that are opened (the caller's [`ReadFile`] does).
 
 use crate::imported::ImportError;
 use crate::xml::Element;

@@ -3,8 +3,8 @@
 //! In: the name of an environment. Out: directions and radiances, linear. Never here: shadows, materials, the GPU.
 //!
 //! The light from a direction d, a unit vector, is L(d) = m + 3/2 s d_z, with m the mean and s half the difference of
-//! the two hemispheres'
-//! light. A surface of normal n then receives, over π, ∫ L(d) max(d·n, 0) dω / π = m + s n_z (RH01): `sky` facing up, `ground` facing down.
+//! the two hemispheres' light. A surface of normal n then receives, over π, ∫ L(d) max(d·n, 0) dω / π = m + s n_z
+//! (RH01): `sky` facing up, `ground` facing down.
 
 use glam::DVec3;
 

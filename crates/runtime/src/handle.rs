@@ -238,8 +238,7 @@ impl AgentHandle {
     }
 
     /// The simulated time that it has not lived, where time is at `now`: its dropped time and its lag. Zero of one that
-    /// has failed or
-    /// left.
+    /// has failed or left.
     #[must_use]
     pub fn given_up(&self, now: SimTime) -> SimSpan {
         let Some(shared) = self.live() else { return SimSpan::ZERO };

@@ -153,8 +153,7 @@ pub trait Run: Send {
     fn remove(&mut self, id: AgentId) -> Result<(), SendError>;
 
     /// Lets no further turn begin and waits for turns in progress (with a timeout): all that a recording of the run is
-    /// to have has happened then. From
-    /// now on commands are refused ([`SendError::Ended`]).
+    /// to have has happened then. From now on commands are refused ([`SendError::Ended`]).
     fn end_turns(&mut self);
 
     /// Ends the run: waits for the turns in progress (with a timeout) and returns every agent's statistics. Existing handles keep showing
@@ -163,10 +162,9 @@ pub trait Run: Send {
 
     /// Writes the state of the run and of all its agents to an archive, or reads it from one into a run of the same first agents, which then
     /// goes on as that run did; in lockstep to the bit. Agents that joined since are taken out, agents that left since
-    /// are put back: an agent
-    /// that joined the run of the state and is not in this one is made by `absent`. In real time all turns in progress end first, each agent at
-    /// a time of its own, and the clock goes on from where it is. Watched points keep their samples. A state that one executor has written
-    /// another can read.
+    /// are put back: an agent that joined the run of the state and is not in this one is made by `absent`. In real time
+    /// all turns in progress end first, each agent at a time of its own, and the clock goes on from where it is.
+    /// Watched points keep their samples. A state that one executor has written another can read.
     ///
     /// # Errors
     /// [`ArchiveError::Refused`] where a step does not end within the time that it may last ([`Run::set_stall_limit`]), and by agents and governors

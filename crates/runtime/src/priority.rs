@@ -30,8 +30,7 @@ pub struct PriorityRefused {
 
 impl Priority {
     /// Sets the priority of this thread: for threads of a caller that have to be as steady as agents' threads. After a
-    /// refusal it has its
-    /// previous one.
+    /// refusal it has its previous one.
     ///
     /// # Errors
     /// [`PriorityRefused`].

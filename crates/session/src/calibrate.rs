@@ -132,8 +132,7 @@ pub enum CalibrateError {
 }
 
 /// Prices of the adapter of this name: the known ones, else measured on the device that `open` returns; `None` if there
-/// is no such
-/// device or it cannot be measured. `report` receives a line if anything is measured.
+/// is no such device or it cannot be measured. `report` receives a line if anything is measured.
 pub(super) fn prices(adapter: &str, open: impl FnOnce() -> Option<Gpu>, report: fn(&str)) -> Option<Prices> {
     if let Some(known) = PriceTable::known(adapter) {
         return Some(known.prices);

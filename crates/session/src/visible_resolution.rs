@@ -1,9 +1,8 @@
 //! Resolution and rate that an agent's simulation needs for the current view.
 //!
 //! In: the visibility of every actor, and by which level it is drawn. Out: for each steered agent, the ε and the step
-//! below which no
-//! difference is visible. Never here: the agent's reaction to it ([`metachron_lod::control::RateControl`] does). Theory:
-//! `docs/theory/control.md`, section 5.
+//! below which no difference is visible. Never here: the agent's reaction to it
+//! ([`metachron_lod::control::RateControl`] does). Theory: `docs/theory/control.md`, section 5.
 
 use super::assemble;
 use super::cpu_budget::AgentBudget;

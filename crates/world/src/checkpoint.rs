@@ -4,8 +4,7 @@
 //! have, to the bit. Never here: what the state of an object is (`archive` of each says it), the scene.
 //!
 //! A file: [`MAGIC`], the version of the format, the length and the checksum of the rest, then the program's version,
-//! the scene's
-//! identity, the time, the state. All numbers of its head are little-endian.
+//! the scene's identity, the time, the state. All numbers of its head are little-endian.
 
 use super::joined::{JoinedParts, archive_parts};
 use super::{Scene, WorldError};

@@ -62,8 +62,7 @@ impl World {
     }
 
     /// Takes an object out: at its next step nothing of it is left, and bodies that rested on it fall. Its name is free
-    /// again; it itself is an error
-    /// from then on.
+    /// again; it itself is an error from then on.
     ///
     /// # Errors
     /// [`WorldError::Foreign`], [`WorldError::Gone`], [`WorldError::Stopped`] and [`WorldError::Stalled`].

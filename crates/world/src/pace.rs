@@ -62,8 +62,8 @@ impl World {
     }
 
     /// The most simulated time that one of its objects has not lived, though time has passed: its dropped time and its
-    /// lag now. Zero as
-    /// long as the declared machine of lockstep, or this one, is fast enough; at [`Pace::Free`] it does not grow.
+    /// lag now. Zero as long as the declared machine of lockstep, or this one, is fast enough; at [`Pace::Free`] it
+    /// does not grow.
     #[must_use]
     pub fn given_up(&self) -> SimSpan {
         let now = self.time();

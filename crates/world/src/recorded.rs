@@ -33,10 +33,9 @@ impl Governor for Silent {
 
 impl World {
     /// Writes down from now on, to the file at `path`, all calls that change the world, so that [`World::replay`] can
-    /// repeat them, to the bit: of a
-    /// world on threads or in a pool also the order of its turns. A world that has run before begins with a checkpoint, whatever joined it and left
-    /// it; one with an agent of your own that joined does not begin. In lockstep commands of other threads wait for
-    /// the call in progress from now on.
+    /// repeat them, to the bit: of a world on threads or in a pool also the order of its turns. A world that has run
+    /// before begins with a checkpoint, whatever joined it and left it; one with an agent of your own that joined does
+    /// not begin. In lockstep commands of other threads wait for the call in progress from now on.
     ///
     /// # Errors
     /// [`RecordError`]; nothing is recorded then. In lockstep the file is as it was unless it is that which cannot be written.

@@ -34,8 +34,7 @@ impl World {
     /// [`WorldError::NotTaken`] for an object that takes no state; [`WorldError::Refused`] for a state of another kind
     /// or length, with the expected one, and for numbers that are not finite or beyond their bounds
     /// ([`metachron_runtime::OutOfBounds`]); [`WorldError::Foreign`], [`WorldError::Gone`] and [`WorldError::Stopped`].
-    /// The object stays
-    /// as it is then, and where it has divided itself otherwise before it takes the state up.
+    /// The object stays as it is then, and where it has divided itself otherwise before it takes the state up.
     pub fn set_state(&self, object: Object, state: &Body) -> Result<(), WorldError> {
         let agent = self.agent(object)?;
         let refused = |reason: String| WorldError::Refused { name: agent.name().to_owned(), reason };

@@ -348,8 +348,8 @@ impl World {
 
     /// Ends the run for all clones: waits for the turns in progress (boundedly) and returns the metrics of every agent. A recording ends with
     /// these turns, in the states that are final; [`World::end_recording`] gives its outcome. Latest states stay
-    /// readable. An object whose
-    /// step does not end is parked; where that keeps another thread in lockstep, the recording ends where its step does.
+    /// readable. An object whose step does not end is parked; where that keeps another thread in lockstep, the
+    /// recording ends where its step does.
     pub fn stop(&self) -> Vec<AgentStats> {
         loop {
             match self.state() {

@@ -37,8 +37,7 @@ impl Default for ChoiceHold {
 
 impl ChoiceHold {
     /// Whether the last choice may stay: `predicted` is its time now, `goal` the budget, both as fractions of T;
-    /// `can_rise` where
-    /// not everything is at its finest.
+    /// `can_rise` where not everything is at its finest.
     pub(crate) fn keeps(&mut self, predicted: f64, goal: f64, can_rise: bool) -> bool {
         self.spare = if can_rise && goal - predicted > SPARE { self.spare.saturating_add(1) } else { 0 };
         let (late, rises) = (predicted > (PAST_BUDGET * goal).min(1.0), self.spare >= self.patience);

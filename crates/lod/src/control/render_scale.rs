@@ -5,9 +5,8 @@
 //! Out: a [`PictureRung`]. Never here: levels of objects, drawing, enlarging. Theory: `docs/theory/control.md`, section 11.
 //!
 //! Pixels are the last to be taken and the first to be given back. The saving of a scale is known from the prices, and
-//! its error is learnt from
-//! the time before and after each change; whether a frame is late is decided by the mean of the frames since the last change and its
-//! uncertainty, so that a machine that trembles does not move the picture.
+//! its error is learnt from the time before and after each change; whether a frame is late is decided by the mean of
+//! the frames since the last change and its uncertainty, so that a machine that trembles does not move the picture.
 
 /// Fractions of the picture's width and height that can be drawn: steps of a twentieth, which are not seen.
 pub(super) const SCALES: [f64; 14] = [0.35, 0.4, 0.45, 0.5, 0.55, 0.6, 0.65, 0.7, 0.75, 0.8, 0.85, 0.9, 0.95, 1.0];
@@ -285,8 +284,7 @@ impl RenderScale {
     }
 
     /// Counts a frame: among the frames at this scale, or, if it is unlike them, among such, which replace them once
-    /// they are enough in a row. Where
-    /// too many are unlike the others all count.
+    /// they are enough in a row. Where too many are unlike the others all count.
     fn add(&mut self, frame: &ScaledFrame) {
         let Times { work, .. } = self.times;
         let is_odd = work.excludes(frame.coarsest_s);

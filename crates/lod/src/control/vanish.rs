@@ -24,8 +24,7 @@ pub(super) struct Vanish {
 
 impl Vanish {
     /// Finds the objects left out: from everything at its coarsest the ones with the least benefit per cost, until the
-    /// rest fits. `slowness`: how much
-    /// slower the machine is than the prices.
+    /// rest fits. `slowness`: how much slower the machine is than the prices.
     pub fn update(&mut self, query: &FrameQuery<'_>, groups: &Groups, slowness: f64) {
         let before = core::mem::take(&mut self.out);
         let was_out = |at: usize| before.get(at).copied().unwrap_or(false);

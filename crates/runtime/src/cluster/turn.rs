@@ -4,11 +4,9 @@
 //!
 //! admit      agents that want to be led
 //! gather     each to the leader's time: one that is behind steps alone, one that is ahead waits
-//! step       all that are at one time as one problem ([`super::macro_step`]); where that fails, without the members to
-//! blame ([`super::exclusion`])
+//! step       all at one time as one problem ([`super::macro_step`]), or without failed members ([`super::exclusion`])
 //! write, conclude    the state of each by its own writer
-//! part       members that have lost touch make their own turns again; several that still belong together are led by
-//! the lowest number
+//! part       members that have lost touch go on alone; several that still belong together are led by the lowest number
 //!
 //! The leader has the lowest number. Never here: which agents touch, threads, events.
 

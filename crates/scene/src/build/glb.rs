@@ -2,9 +2,9 @@
 //!
 //! In: any bytes. Out: the triangles of every mesh that a node of the scene instantiates, placed as the nodes say, z
 //! up, and the image of their base colour; or the fault of the file. Never here: lights, skins, external files,
-//! decoding of images. No number in
-//! the file is trusted, as the file may be hostile (the crate `gltf` panics on an accessor index out of range, so the few tables needed
-//! are read here), and points and primitives that many nodes instantiate are counted before they are read.
+//! decoding of images. No number in the file is trusted, as the file may be hostile (the crate `gltf` panics on an
+//! accessor index out of range, so the few tables needed are read here), and points and primitives that many nodes
+//! instantiate are counted before they are read.
 
 mod tables;
 

@@ -1,8 +1,7 @@
 //! Reads files of triangles: OBJ by [`super::obj`], STL by [`super::stl`], and binary glTF by [`super::glb`].
 //!
 //! In: any bytes. Out: a surface with valid indices, within bounds and manifold, or the fault of the file. Meshes for
-//! drawing and
-//! for contact are both read here. Never here: the file system.
+//! drawing and for contact are both read here. Never here: the file system.
 //!
 //! Manifold is judged by positions, not by indices: a seam of points that are doubled for their texture coordinates or normals is no
 //! rim, and hides no branch. It is judged object by object (of an OBJ file `o` and `g`, of glTF the mesh of a node): boxes side by side

@@ -1,8 +1,8 @@
 //! Reads OBJ files as points and triangles, line by line.
 //!
 //! In: any bytes. Out: the triangles of every face, with the texture coordinates of their corners, or the fault of the
-//! file, with
-//! its line. Never here: materials, normals (they are only counted), curves; lines with other keywords are skipped.
+//! file, with its line. Never here: materials, normals (they are only counted), curves; lines with other keywords are
+//! skipped.
 //!
 //! A truncated file is recognised by an incomplete line or by faces whose points are missing. A cut at the end of a line, or inside
 //! its last number, leaves a valid file.

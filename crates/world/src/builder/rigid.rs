@@ -31,8 +31,7 @@ impl Rigid {
     }
 
     /// Several solids as one body, each with the origin and the rotation of its axes in the body's, metres. All are
-    /// equally dense; see
-    /// [`CompoundPart::density`].
+    /// equally dense; see [`CompoundPart::density`].
     #[must_use]
     pub fn compound(parts: impl IntoIterator<Item = CompoundPart>) -> Self {
         Self::new(Solid::Compound { parts: parts.into_iter().collect() })

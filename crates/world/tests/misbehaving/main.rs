@@ -248,8 +248,7 @@ fn one_that_misbehaves_is_parked_and_all_others_step_as_without_it() {
                         faults.push(format!("{name}: far away {:?}, on no path of theirs", left.far));
                     }
                     // in virtual time bodies that touch it step as if it had refused the step at its start, but where
-                    // it fails at its end
-                    // or later
+                    // it fails at its end or later
                     let wanted = if left.is_parked { &refuses.near } else { &clean.near };
                     let at_end = matches!(
                         kind,

@@ -1,8 +1,7 @@
 //! Frames drawn differently from their choice: chosen while the frame before is drawn (GB99), or late before drawing starts.
 //!
 //! In: the objects in view now, then the objects in view when the frame is drawn. Out: the plan of that frame. Never
-//! here: the drawing in
-//! between.
+//! here: the drawing in between.
 //! Theory: `docs/theory/control.md`, section 6.
 
 use super::super::feedback::unseen;
