@@ -63,7 +63,7 @@ mod pages {
 pub mod prelude {
     pub use glam::{DQuat, DVec3};
     pub use metachron_contact::joint::{JointKind, Motor, MotorGoal};
-    pub use metachron_contact::{Agent, Input, Inputs};
+    pub use metachron_contact::{Agent, Input, Inputs, OwnSteps, Stepping};
     pub use metachron_core::{AgentId, Anchor, Body, Resolution, ResolutionRange, SimSpan, SimTime, Snapshot};
     pub use metachron_geometry::Solid;
     pub use metachron_world::{

@@ -22,13 +22,16 @@ pub trait Agent: Send {
     /// The model's name: as scenes write it `tube`, `rigid`, `sheet`, `solid`, `rope`, `tool` or `synthetic`, else one of its own.
     fn model(&self) -> &'static str;
 
-    /// Advances the state by exactly `dt`: the step of a body that touches nothing. The runtime steps members ([`Self::member`]) by their
-    /// cluster, where contacts, joints, links and grasps are solved; a step of this kind knows no contact.
-    ///
-    /// # Errors
-    /// [`StepError::BadSpan`] leaves the state untouched. After [`StepError::Diverged`] the agent must not step again;
-    /// its last snapshot stays valid.
-    fn step(&mut self, dt: SimSpan, context: &StepContext<'_>) -> Result<StepReport, StepError>;
+    /// How it is stepped: by itself, or in a contact cluster with all that it touches.
+    fn stepping(&mut self) -> Stepping<'_>;
+
+    /// The agent as contact clusters step it; `None` for a model that steps itself.
+    fn member(&mut self) -> Option<&mut dyn ClusterMember> {
+        match self.stepping() {
+            Stepping::Cluster(member) => Some(member),
+            Stepping::Own(_) => None,
+        }
+    }
 
     /// Shifts the agent's own time by `by_s` seconds: later where positive, earlier where negative. Nothing else changes: stored times and
     /// scripts shift along, and no impulse is in flight to or from the agent.
@@ -111,11 +114,24 @@ pub trait Agent: Send {
     fn form(&self) -> Option<Arc<CollisionShape>> {
         None
     }
+}
 
-    /// The agent as contact clusters step it, together with all that it touches; `None` for a model that touches nothing.
-    fn member(&mut self) -> Option<&mut dyn ClusterMember> {
-        None
-    }
+/// How an agent is stepped.
+pub enum Stepping<'a> {
+    /// By itself: a model that touches nothing.
+    Own(&'a mut dyn OwnSteps),
+    /// In a contact cluster, where contacts, joints, links and grasps are solved: alone where nothing touches it.
+    Cluster(&'a mut dyn ClusterMember),
+}
+
+/// The steps of a model that touches nothing.
+pub trait OwnSteps {
+    /// Advances the state by exactly `dt`.
+    ///
+    /// # Errors
+    /// [`StepError::BadSpan`] leaves the state untouched. After [`StepError::Diverged`] the agent must not step again;
+    /// its last snapshot stays valid.
+    fn step(&mut self, dt: SimSpan, context: &StepContext<'_>) -> Result<StepReport, StepError>;
 }
 
 /// The other agents and springs that an agent sees while it steps.

@@ -57,8 +57,8 @@ pub mod solve;
 pub mod step;
 
 pub use agent::{
-    Agent, AnchorForce, AnchorSpring, Carving, Law, Link, MOTION_MAX, Neighbour, PoseGoal, SetMotion, SetMotor,
-    StepContext,
+    Agent, AnchorForce, AnchorSpring, Carving, Law, Link, MOTION_MAX, Neighbour, OwnSteps, PoseGoal, SetMotion,
+    SetMotor, StepContext, Stepping,
 };
 pub use inputs::{Input, Inputs};
 pub use push_out::PUSH_OUT_SHARE;

@@ -37,22 +37,6 @@ pub enum StepError {
         /// The quantity that stopped being finite first, and where.
         what: String,
     },
-    /// The substeps are too long for the integrator. State: untouched.
-    #[error(
-        "the substep of this {model} is {substep_s:.2e} s; {integrator} is stable up to {limit_s:.2e} s with {segments} segments: use more substeps, a shorter step, fewer segments or an implicit integrator"
-    )]
-    Unstable {
-        /// The model's name.
-        model: &'static str,
-        /// The integrator's name.
-        integrator: &'static str,
-        /// Number of segments that the body is divided into.
-        segments: usize,
-        /// The substep that the step would use, in seconds.
-        substep_s: f64,
-        /// The longest substep at which the integrator is stable, in seconds.
-        limit_s: f64,
-    },
 }
 
 /// The longest step any model takes, in seconds: past it a real-time agent no longer follows its scene.

@@ -1,7 +1,8 @@
 //! What does a step of a solid or a sheet by itself take? Prints milliseconds a step by the number of nodes.
 
 use glam::{DQuat, DVec3};
-use metachron_contact::{Agent, StepContext};
+use metachron_contact::StepContext;
+use metachron_contact::step::LoneStepper;
 use metachron_core::{AgentId, SimSpan, SimTime};
 use metachron_geometry::ContactTraits;
 use metachron_models::soft::{MaterialLaw, Side, SoftBody, SoftMatter, SoftShape, SoftSpec};
@@ -54,13 +55,13 @@ fn step(name: &str, shape: SoftShape, matter: SoftMatter, held: Side) {
     };
     let Ok(mut body) = SoftBody::new(spec) else { return println!("{name}: refused") };
     let dt = SimSpan::from_millis(10);
-    let mut time = SimTime::ZERO;
+    let (mut stepper, mut time) = (LoneStepper::default(), SimTime::ZERO);
     let mut started = Instant::now();
     for at in 0..WARM_UP + STEPS {
         if at == WARM_UP {
             started = Instant::now();
         }
-        if let Err(error) = body.step(dt, &StepContext::alone(AgentId(0), time)) {
+        if let Err(error) = stepper.step(&mut body, dt, StepContext::alone(AgentId(0), time)) {
             return println!("{name}: {error}");
         }
         time += dt;

@@ -22,13 +22,10 @@
 //! ```
 
 use glam::DVec3;
-use metachron_contact::detect::ClusterScene;
-use metachron_contact::member::{ContactMemory, Participant};
-use metachron_contact::step::ClusterStepper;
+use metachron_contact::step::LoneStepper;
 use metachron_contact::{Agent, AnchorSpring, Neighbour, StepContext};
 use metachron_core::{
-    AgentId, Archive, ArchiveError, Body, DT_MAX_S, Grip, HASH_START, PlainLoop, Resolution, SimSpan, SimTime,
-    Snapshot, StepError,
+    AgentId, Archive, ArchiveError, Body, DT_MAX_S, HASH_START, Resolution, SimSpan, SimTime, Snapshot, StepError,
 };
 
 mod bits;
@@ -132,22 +129,11 @@ impl<'a> Suite<'a> {
 
     /// Builds the agent and its clock.
     fn start(&self) -> Run<'_> {
-        Run { agent: (self.make)(), time: SimTime::ZERO, neighbours: &self.neighbours, cluster: None }
-    }
-
-    /// The same, stepped in one of its ways.
-    fn start_stepped(&self, by: Stepping) -> Run<'_> {
-        let cluster = (by == Stepping::Cluster).then(Box::default);
-        Run { cluster, ..self.start() }
-    }
-
-    /// The ways in which the agent can be stepped.
-    fn steppings(&self) -> &'static [Stepping] {
-        if (self.make)().member().is_some() { &[Stepping::Itself, Stepping::Cluster] } else { &[Stepping::Itself] }
+        Run { agent: (self.make)(), time: SimTime::ZERO, neighbours: &self.neighbours, stepper: Box::default() }
     }
 }
 
-/// Tests the agent of `suite` against every promise; those about bits also where a cluster steps it, if it is a member.
+/// Tests the agent of `suite` against every promise; stepped as a run steps an agent that meets nobody.
 #[must_use]
 pub fn check(suite: &Suite<'_>) -> Vec<Breach> {
     let promises = [
@@ -169,31 +155,12 @@ pub fn check(suite: &Suite<'_>) -> Vec<Breach> {
 /// The number of the agent under test.
 const ME: AgentId = AgentId(0);
 
-/// What steps an agent.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Stepping {
-    /// Its own step ([`Agent::step`]).
-    Itself,
-    /// A cluster in which it is alone ([`ClusterStepper`]).
-    Cluster,
-}
-
 /// An agent and its own time.
 struct Run<'a> {
     agent: Box<dyn Agent>,
     time: SimTime,
     neighbours: &'a [Neighbour],
-    /// The cluster that steps it; `None` where it steps itself.
-    cluster: Option<Box<Cluster>>,
-}
-
-/// A cluster of one member.
-#[derive(Default)]
-struct Cluster {
-    scene: ClusterScene,
-    stepper: ClusterStepper,
-    memory: ContactMemory,
-    grips: Vec<Grip>,
+    stepper: Box<LoneStepper>,
 }
 
 impl Run<'_> {
@@ -201,39 +168,14 @@ impl Run<'_> {
     fn archive(&mut self, archive: &mut Archive<'_>) -> Result<(), ArchiveError> {
         self.agent.archive(archive)?;
         archive.value(&mut self.time)?;
-        self.cluster.iter_mut().try_for_each(|cluster| {
-            archive.value(&mut cluster.memory)?;
-            cluster.stepper.archive(archive)
-        })
-    }
-}
-
-impl Cluster {
-    /// Steps `agent`, which is a member.
-    fn step(&mut self, agent: &mut dyn Agent, dt: SimSpan, context: StepContext<'_>) -> Result<(), StepError> {
-        let Self { scene, stepper, memory, grips } = self;
-        let Some(member) = agent.member() else { return Ok(()) };
-        let mut all = [Participant {
-            id: ME,
-            member: member.into(),
-            context,
-            laws: &[],
-            memory,
-            parts: 1,
-            alone_s: dt.as_secs_f64(),
-            grips,
-        }];
-        stepper.step(scene, &mut all, dt, &PlainLoop).map(drop)
+        self.stepper.archive(archive)
     }
 }
 
 impl Run<'_> {
     fn step(&mut self, dt: SimSpan, hands: &[AnchorSpring]) -> Result<(), StepError> {
         let context = StepContext { neighbours: self.neighbours, hands, ..StepContext::alone(ME, self.time) };
-        match &mut self.cluster {
-            Some(cluster) => cluster.step(self.agent.as_mut(), dt, context)?,
-            None => self.agent.step(dt, &context).map(drop)?,
-        }
+        self.stepper.step(self.agent.as_mut(), dt, context)?;
         self.time += dt;
         Ok(())
     }

@@ -5,6 +5,7 @@
 //!
 //! ```
 //! use glam::DVec3;
+//! use metachron_contact::step::LoneStepper;
 //! use metachron_contact::{Agent, StepContext};
 //! use metachron_core::{AgentId, SimSpan, SimTime, Snapshot};
 //! use metachron_geometry::Solid;
@@ -12,7 +13,8 @@
 //!
 //! let ball = RigidSpec::free(Solid::Ball { radius_m: 0.1 }, DVec3::Z * 5.0, 1.0);
 //! let mut ball = RigidBody::new(RigidSpec { gravity: DVec3::NEG_Z * 9.81, ..ball }).unwrap();
-//! ball.step(SimSpan::from_millis(100), &StepContext::alone(AgentId(0), SimTime::ZERO)).unwrap();
+//! let alone = StepContext::alone(AgentId(0), SimTime::ZERO);
+//! LoneStepper::default().step(&mut ball, SimSpan::from_millis(100), alone).unwrap();
 //! let mut state = Snapshot::default();
 //! ball.write_snapshot(&mut state);
 //! let (position, _) = state.body.probe(0.0).unwrap();

@@ -3,7 +3,7 @@
 //! In: two power laws and their range of spacings. Out: work in microseconds, a residual in metres.
 //! Never here: a clock. A step burns its cost in arithmetic, so its microseconds are nominal: see [`Synthetic`].
 
-use metachron_contact::{Agent, Input, Inputs, StepContext};
+use metachron_contact::{Agent, Input, Inputs, OwnSteps, StepContext, Stepping};
 use metachron_core::{
     Archive, ArchiveError, Body, Resolution, ResolutionRange, SimSpan, Snapshot, StepError, StepReport, archive_values,
     check_span,
@@ -121,14 +121,8 @@ impl Agent for Synthetic {
         "synthetic"
     }
 
-    /// Burns its cost and counts the step.
-    fn step(&mut self, dt: SimSpan, _context: &StepContext<'_>) -> Result<StepReport, StepError> {
-        check_span(dt)?;
-        if self.does_work {
-            self.do_work();
-        }
-        self.steps += 1;
-        Ok(StepReport { work: self.cost_us(), substeps: 1, at_rest: false })
+    fn stepping(&mut self) -> Stepping<'_> {
+        Stepping::Own(self)
     }
 
     fn resolution(&self) -> Option<Resolution> {
@@ -155,6 +149,18 @@ impl Agent for Synthetic {
 
     fn archive(&mut self, archive: &mut Archive<'_>) -> Result<(), ArchiveError> {
         archive_values!(archive, self.resolution, self.steps, self.sink)
+    }
+}
+
+impl OwnSteps for Synthetic {
+    /// Burns its cost and counts the step.
+    fn step(&mut self, dt: SimSpan, _context: &StepContext<'_>) -> Result<StepReport, StepError> {
+        check_span(dt)?;
+        if self.does_work {
+            self.do_work();
+        }
+        self.steps += 1;
+        Ok(StepReport { work: self.cost_us(), substeps: 1, at_rest: false })
     }
 }
 

@@ -2,6 +2,7 @@
 
 use glam::{DQuat, DVec3};
 use metachron_contact::audit::*;
+use metachron_contact::step::LoneStepper;
 use metachron_contact::{Agent, AnchorSpring, StepContext};
 use metachron_core::{AgentId, Anchor, Body, Impulse, Ledger, RigidState, SimSpan, SimTime, Site, Snapshot};
 use metachron_models::rod::{Material, Section, Tube, TubeSpec};
@@ -81,9 +82,10 @@ fn swung() -> Tube {
         stiffness_n_m: 5.0,
         damping_n_s_m: 0.0,
     };
+    let mut stepper = LoneStepper::default();
     for k in 0..40 {
         let around = StepContext { hands: &[hand], ..StepContext::alone(AgentId(0), at(0.004 * f64::from(k))) };
-        tube.step(SimSpan::from_secs_f64(0.004).unwrap(), &around).unwrap();
+        stepper.step(&mut tube, SimSpan::from_secs_f64(0.004).unwrap(), around).unwrap();
     }
     tube
 }

@@ -2,7 +2,8 @@
 
 use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
 use glam::DVec3;
-use metachron_contact::{Agent, StepContext};
+use metachron_contact::StepContext;
+use metachron_contact::step::LoneStepper;
 use metachron_core::{AgentId, N_MAX, Resolution, ResolutionRange, SimSpan, SimTime};
 use metachron_models::rod::Tube;
 use metachron_models::rod::{Material, Section, TubeSpec};
@@ -28,10 +29,10 @@ fn step_tube(c: &mut Criterion) {
     let dt = SimSpan::from_nanos(5_000_000);
     let context = StepContext::alone(AgentId(0), SimTime::ZERO);
     for segments in [16_usize, 64, 256] {
-        let mut tube = tube(segments);
+        let (mut tube, mut stepper) = (tube(segments), LoneStepper::default());
         group.throughput(Throughput::Elements(segments as u64));
         group.bench_function(BenchmarkId::from_parameter(segments), |b| {
-            b.iter(|| tube.step(dt, &context).expect("it swings freely"));
+            b.iter(|| stepper.step(&mut tube, dt, context).expect("it swings freely"));
         });
     }
     group.finish();

@@ -7,7 +7,7 @@
 use super::agent_runner::contained;
 use super::handle::Shared;
 use metachron_contact::member::{CallMark, GuardedMember};
-use metachron_contact::{Agent, Inputs, StepContext};
+use metachron_contact::{Agent, Inputs, OwnSteps, StepContext, Stepping};
 use metachron_core::SimSpan;
 use metachron_core::{Archive, ArchiveError, Snapshot, StepError, StepReport};
 use metachron_geometry::CollisionShape;
@@ -94,7 +94,11 @@ impl Model {
     /// # Errors
     /// Its own, and as [`Self::call`].
     pub fn step(&mut self, dt: SimSpan, context: &StepContext<'_>) -> Result<StepReport, String> {
-        self.call(|agent| agent.step(dt, context))?.map_err(|error: StepError| error.to_string())
+        let stepped = self.call(|agent| match agent.stepping() {
+            Stepping::Own(own) => Some(own.step(dt, context)),
+            Stepping::Cluster(_) => None,
+        })?;
+        stepped.ok_or("a member of clusters has no steps of its own")?.map_err(|error| error.to_string())
     }
 
     /// Writes or reads its state. One that is broken writes none, and one that is read whole is not broken any more.
@@ -144,11 +148,17 @@ impl Agent for Nothing {
         "nothing"
     }
 
-    fn step(&mut self, _dt: SimSpan, _context: &StepContext<'_>) -> Result<StepReport, StepError> {
-        Ok(StepReport { work: 0.0, substeps: 1, at_rest: true })
+    fn stepping(&mut self) -> Stepping<'_> {
+        Stepping::Own(self)
     }
 
     fn write_snapshot(&self, into: &mut Snapshot) {
         into.clear();
+    }
+}
+
+impl OwnSteps for Nothing {
+    fn step(&mut self, _dt: SimSpan, _context: &StepContext<'_>) -> Result<StepReport, StepError> {
+        Ok(StepReport { work: 0.0, substeps: 1, at_rest: true })
     }
 }

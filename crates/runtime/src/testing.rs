@@ -9,7 +9,7 @@ use glam::{DQuat, DVec3};
 use metachron_contact::member::{ClusterMember, Role};
 use metachron_contact::remote::{GivenAt, Ledgers};
 use metachron_contact::solve::Side;
-use metachron_contact::{Agent, Input, Inputs, StepContext};
+use metachron_contact::{Agent, Input, Inputs, OwnSteps, StepContext, Stepping};
 use metachron_core::{
     AgentId, Body, Bounds, N_MAX, Resolution, ResolutionRange, RigidState, SimSpan, SimTime, Snapshot, StepError,
     StepReport,
@@ -265,24 +265,6 @@ impl Agent for Dummy {
         archive_values!(archive, self.steps, self.x, self.z, self.taken, self.given, self.ledgers)
     }
 
-    fn step(&mut self, dt: SimSpan, context: &StepContext<'_>) -> Result<StepReport, StepError> {
-        let dt_s = dt.as_secs_f64();
-        if [Fault::Hang, Fault::Slow].map(|fault| Some((self.steps + 1, fault))).contains(&self.fault) {
-            self.record(context.time, context);
-        }
-        self.fail(dt_s)?;
-        self.steps += 1;
-        let met = context.neighbours.iter().filter_map(|n| n.snapshot.body.probe(0.0)).map(|(at, _)| at.x);
-        let pulled = context.anchor_springs().map(|p| p.target.x);
-        self.x += dt_s * (1.0 + met.chain(pulled).map(|x| x - self.x).sum::<f64>());
-        self.exchange_impulses(context, dt_s);
-        (self.me, self.time) = (context.me, context.time + dt);
-        self.z += dt_s * self.ball.map_or(0.0, |(_, speed_m_s)| speed_m_s);
-        self.record(self.time, context);
-        let at_rest = self.rest_from.is_some_and(|from| self.steps >= from);
-        Ok(StepReport { work: self.work, substeps: 1, at_rest })
-    }
-
     fn inputs(&self) -> Inputs {
         Inputs::of(&[Input::Spring, Input::Force, Input::Resolution])
     }
@@ -293,6 +275,10 @@ impl Agent for Dummy {
 
     fn set_resolution(&mut self, wanted: Resolution) {
         self.resolution = wanted;
+    }
+
+    fn stepping(&mut self) -> Stepping<'_> {
+        if self.is_member { Stepping::Cluster(self) } else { Stepping::Own(self) }
     }
 
     fn write_snapshot(&self, into: &mut Snapshot) {
@@ -317,9 +303,25 @@ impl Agent for Dummy {
     fn form(&self) -> Option<Arc<CollisionShape>> {
         self.form.clone()
     }
+}
 
-    fn member(&mut self) -> Option<&mut dyn ClusterMember> {
-        if self.is_member { Some(self) } else { None }
+impl OwnSteps for Dummy {
+    fn step(&mut self, dt: SimSpan, context: &StepContext<'_>) -> Result<StepReport, StepError> {
+        let dt_s = dt.as_secs_f64();
+        if [Fault::Hang, Fault::Slow].map(|fault| Some((self.steps + 1, fault))).contains(&self.fault) {
+            self.record(context.time, context);
+        }
+        self.fail(dt_s)?;
+        self.steps += 1;
+        let met = context.neighbours.iter().filter_map(|n| n.snapshot.body.probe(0.0)).map(|(at, _)| at.x);
+        let pulled = context.anchor_springs().map(|p| p.target.x);
+        self.x += dt_s * (1.0 + met.chain(pulled).map(|x| x - self.x).sum::<f64>());
+        self.exchange_impulses(context, dt_s);
+        (self.me, self.time) = (context.me, context.time + dt);
+        self.z += dt_s * self.ball.map_or(0.0, |(_, speed_m_s)| speed_m_s);
+        self.record(self.time, context);
+        let at_rest = self.rest_from.is_some_and(|from| self.steps >= from);
+        Ok(StepReport { work: self.work, substeps: 1, at_rest })
     }
 }
 

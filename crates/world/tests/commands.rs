@@ -3,7 +3,7 @@
 
 use glam::{DQuat, DVec3};
 use metachron_contact::joint::{JointKind, Motor, MotorGoal};
-use metachron_contact::{Agent, StepContext};
+use metachron_contact::{Agent, OwnSteps, StepContext, Stepping};
 use metachron_core::{Anchor, Body, Resolution, RigidState, SimSpan, Snapshot, SoftState, StepError, StepReport};
 use metachron_geometry::Solid;
 use metachron_models::soft::Side;
@@ -208,12 +208,18 @@ impl Agent for Idle {
         "idle"
     }
 
-    fn step(&mut self, _dt: SimSpan, _context: &StepContext<'_>) -> Result<StepReport, StepError> {
-        Ok(StepReport { work: 1.0, substeps: 1, at_rest: false })
+    fn stepping(&mut self) -> Stepping<'_> {
+        Stepping::Own(self)
     }
 
     fn write_snapshot(&self, into: &mut Snapshot) {
         into.clear();
+    }
+}
+
+impl OwnSteps for Idle {
+    fn step(&mut self, _dt: SimSpan, _context: &StepContext<'_>) -> Result<StepReport, StepError> {
+        Ok(StepReport { work: 1.0, substeps: 1, at_rest: false })
     }
 }
 

@@ -374,6 +374,16 @@ impl metachron_contact::Agent for Broken {
         "broken"
     }
 
+    fn stepping(&mut self) -> metachron_contact::Stepping<'_> {
+        metachron_contact::Stepping::Own(self)
+    }
+
+    fn write_snapshot(&self, into: &mut metachron_core::Snapshot) {
+        into.body = Body::Nothing;
+    }
+}
+
+impl metachron_contact::OwnSteps for Broken {
     fn step(
         &mut self,
         dt: SimSpan,
@@ -381,9 +391,5 @@ impl metachron_contact::Agent for Broken {
     ) -> Result<metachron_core::StepReport, metachron_core::StepError> {
         let what = "it always does".to_owned();
         Err(metachron_core::StepError::Diverged { model: "broken", dt_s: dt.as_secs_f64(), what })
-    }
-
-    fn write_snapshot(&self, into: &mut metachron_core::Snapshot) {
-        into.body = Body::Nothing;
     }
 }

@@ -5,7 +5,7 @@ mod kept;
 use glam::{DQuat, DVec3};
 use kept::recorded;
 use metachron_contact::joint::JointKind;
-use metachron_contact::{Agent, StepContext};
+use metachron_contact::{Agent, OwnSteps, StepContext, Stepping};
 use metachron_core::{Anchor, SimSpan, SimTime, Snapshot, StepError, StepReport};
 use metachron_geometry::Solid;
 use metachron_runtime::{Demand, Governor, TimelineCommand, TurnMeasure};
@@ -207,6 +207,16 @@ impl Agent for Gated {
         "gated"
     }
 
+    fn stepping(&mut self) -> Stepping<'_> {
+        Stepping::Own(self)
+    }
+
+    fn write_snapshot(&self, into: &mut Snapshot) {
+        into.steps = self.steps;
+    }
+}
+
+impl OwnSteps for Gated {
     fn step(&mut self, _dt: SimSpan, _context: &StepContext<'_>) -> Result<StepReport, StepError> {
         self.gate.stepping.store(true, SeqCst);
         while !self.gate.open.load(SeqCst) {
@@ -214,10 +224,6 @@ impl Agent for Gated {
         }
         self.steps += 1;
         Ok(StepReport { work: 1.0, substeps: 1, at_rest: false })
-    }
-
-    fn write_snapshot(&self, into: &mut Snapshot) {
-        into.steps = self.steps;
     }
 }
 

@@ -8,7 +8,7 @@ mod kept;
 
 use driver::{Amount, Tally, churn, storm};
 use kept::recorded;
-use metachron_contact::{Agent, StepContext};
+use metachron_contact::{Agent, OwnSteps, StepContext, Stepping};
 use metachron_core::{Archive, ArchiveError, SimSpan, Snapshot, StepError, StepReport};
 use metachron_geometry::Solid;
 use metachron_runtime::AgentState;
@@ -67,10 +67,8 @@ impl Agent for Clerk {
         "clerk"
     }
 
-    fn step(&mut self, dt: SimSpan, _context: &StepContext<'_>) -> Result<StepReport, StepError> {
-        self.steps += 1;
-        self.half_s += dt.as_secs_f64() / 2.0;
-        Ok(StepReport { work: 1.0, substeps: 1, at_rest: false })
+    fn stepping(&mut self) -> Stepping<'_> {
+        Stepping::Own(self)
     }
 
     fn write_snapshot(&self, into: &mut Snapshot) {
@@ -87,6 +85,14 @@ impl Agent for Clerk {
             return Err(ArchiveError::Refused { what: "a clerk that is on strike".to_owned() });
         }
         archive.value(&mut self.half_s)
+    }
+}
+
+impl OwnSteps for Clerk {
+    fn step(&mut self, dt: SimSpan, _context: &StepContext<'_>) -> Result<StepReport, StepError> {
+        self.steps += 1;
+        self.half_s += dt.as_secs_f64() / 2.0;
+        Ok(StepReport { work: 1.0, substeps: 1, at_rest: false })
     }
 }
 

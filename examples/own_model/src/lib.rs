@@ -5,10 +5,9 @@
 //! It is one node on one spring that goes as deep as water carries it (Archimedes): m z'' = B(z) − m g − c z', with the surface at z = 0.
 //! A step is linearly implicit: (m + h c + h² k) v' = m v + h (B − m g), where k = −dB/dz; contact adds its impulses on the right.
 
-use metachron::contact::StepContext;
 use metachron::contact::member::{ClusterMember, Pose, Role};
 use metachron::contact::solve::{Block, ProblemError, Side, SideTerm};
-use metachron::core::{Archive, ArchiveError, Bounds, RigidState, StepError, StepReport, archive_values, check_span};
+use metachron::core::{Archive, ArchiveError, Bounds, RigidState, StepError, archive_values};
 use metachron::geometry::{CollisionShape, ContactSide, Place, PlacedShape, ShapeKind, ShapePose, SolidShape};
 use metachron::glam::DMat3;
 use metachron::prelude::*;
@@ -181,12 +180,8 @@ impl Agent for Pontoon {
         "pontoon"
     }
 
-    fn step(&mut self, dt: SimSpan, _context: &StepContext<'_>) -> Result<StepReport, StepError> {
-        let h_s = check_span(dt)?;
-        self.begin(h_s)?;
-        let alone = self.free;
-        self.end(&alone, h_s, false)?;
-        Ok(StepReport { work: 1.0, substeps: 1, at_rest: false })
+    fn stepping(&mut self) -> Stepping<'_> {
+        Stepping::Cluster(self)
     }
 
     fn write_snapshot(&self, into: &mut Snapshot) {
@@ -220,9 +215,5 @@ impl Agent for Pontoon {
 
     fn form(&self) -> Option<Arc<CollisionShape>> {
         Some(Arc::clone(&self.form))
-    }
-
-    fn member(&mut self) -> Option<&mut dyn ClusterMember> {
-        Some(self)
     }
 }

@@ -120,25 +120,27 @@ impl ConstraintRows {
         true
     }
 
-    /// The forces by which `member` is held, of rows that gave `impulses` within a fine step of `h_s` seconds, added to `grips`.
-    pub fn grips(&self, member: usize, impulses: &[DVec3], h_s: f64, grips: &mut Vec<Grip>) {
-        let mut last = None;
+    /// Adds the forces by which rows that gave `impulses` in a fine step hold `member` to `grips`, in the mean over `span_s` seconds: the same
+    /// springs in the same order in each fine step.
+    pub fn grips(&self, member: usize, impulses: &[DVec3], span_s: f64, grips: &mut Vec<Grip>) {
+        let (mut last, mut count) = (None, 0);
         for (owner, impulse) in self.owners.iter().zip(impulses) {
             let Some(hold) = owner.hold else { continue };
             let (by, force_n) = if owner.member == member {
-                (hold.side_1, *impulse / h_s)
+                (hold.side_1, *impulse / span_s)
             } else if owner.other == Some(member) {
-                (Some(hold.side_0), -*impulse / h_s)
+                (Some(hold.side_0), -*impulse / span_s)
             } else {
                 continue;
             };
             // the rows of one spring are one force
             let tie = Some((owner.member, owner.partner));
-            match grips.last_mut().filter(|_| last == tie) {
+            count += usize::from(last != tie);
+            last = tie;
+            match grips.get_mut(count - 1) {
                 Some(grip) => grip.force_n += force_n,
                 None => grips.push(Grip { by, force_n }),
             }
-            last = tie;
         }
     }
 }

@@ -27,7 +27,7 @@ pub struct Participant<'a> {
     pub parts: u32,
     /// How long a step it makes alone, seconds: so far ahead it looks for others.
     pub alone_s: f64,
-    /// The forces of springs and grasps on it in the last fine step.
+    /// The mean forces of springs and grasps on it over the macro step.
     pub grips: &'a mut Vec<Grip>,
 }
 

@@ -17,6 +17,7 @@
 
 mod doubling;
 mod external;
+mod lone;
 mod phases;
 mod plan;
 mod record;
@@ -38,6 +39,7 @@ use crate::step::report::Sums;
 pub use doubling::StepDoubling;
 pub use external::{ExternalImpulses, KnownImpulse, LineRow, RemoteImpulse};
 use glam::DVec3;
+pub use lone::LoneStepper;
 use metachron_core::{Archive, ArchiveError, ParallelFor, SimSpan, StepError, Wrench, check_span};
 use metachron_geometry::narrow_phase::TouchKey;
 pub use plan::Plan;
@@ -198,9 +200,8 @@ impl ClusterStepper {
             if self.divide_joints(all) || self.divide(all, h_s) {
                 return Ok(false);
             }
-            let is_last = fine + 1 == parts;
-            self.record(all, h_s, is_last, dt);
-            if is_last {
+            self.record(all, h_s, dt);
+            if fine + 1 == parts {
                 self.note_stiffness(all, h_s);
             }
             self.step_pile(all, h_s, report)?;

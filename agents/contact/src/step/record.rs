@@ -46,13 +46,13 @@ impl ClusterStepper {
     }
 
     /// Notes what the next step starts from.
-    pub(super) fn record(&mut self, all: &mut [Participant<'_>], h_s: f64, last: bool, dt: SimSpan) {
+    pub(super) fn record(&mut self, all: &mut [Participant<'_>], h_s: f64, dt: SimSpan) {
         self.record_spins(all, h_s);
         self.record_contacts(all, h_s);
         self.record_constraints(all, h_s);
         let now = all.first().map_or(SimTime::ZERO, |one| one.context.time + dt);
         self.search.recycled.note(all, now);
-        let Self { solver, search, constraints, external, .. } = self;
+        let Self { solver, search, constraints, external, macro_s, .. } = self;
         for &[a, b] in &search.near {
             let (now, other) = (all[a].context.time + dt, all[b].id);
             all[a].memory.meet(other, now);
@@ -64,9 +64,7 @@ impl ClusterStepper {
             let begins = SimSpan::from_secs_f64(external.after_s).unwrap_or(SimSpan::ZERO);
             one.memory.sense(mine.iter().map(|pair| pair.partner), one.context.time + begins);
             one.memory.turn(one.context.time + dt);
-            if last {
-                constraints.grips(member, &solver.solution().rows_n_s, h_s, one.grips);
-            }
+            constraints.grips(member, &solver.solution().rows_n_s, *macro_s, one.grips);
         }
     }
 

@@ -2,23 +2,12 @@
 //!
 //! In: a [`Suite`]. Out: the promises that were broken. Never here: promises about physics ([`super::physics`]).
 
-use super::{Run, Stepping, Suite, too_long};
+use super::{Run, Suite, too_long};
 use metachron_core::{Archive, ArchiveError, SimSpan, StepError};
-
-/// Tests a promise in every way in which the agent can be stepped.
-fn stepped(suite: &Suite<'_>, kept: fn(&Suite<'_>, Stepping) -> Result<(), String>) -> Result<(), String> {
-    suite.steppings().iter().try_for_each(|&by| {
-        kept(suite, by).map_err(|what| if by == Stepping::Cluster { format!("in a cluster: {what}") } else { what })
-    })
-}
 
 /// A refused step changes no bit, neither of the state nor of the steps after it.
 pub(super) fn refused_span(suite: &Suite<'_>) -> Result<(), String> {
-    stepped(suite, refused_span_by)
-}
-
-fn refused_span_by(suite: &Suite<'_>, by: Stepping) -> Result<(), String> {
-    let (mut refusing, mut reference) = (suite.start_stepped(by), suite.start_stepped(by));
+    let (mut refusing, mut reference) = (suite.start(), suite.start());
     for i in 0..suite.steps.min(50) {
         let before = refusing.hash();
         for bad in [SimSpan::ZERO, too_long(), SimSpan::from_nanos(u64::MAX)] {
@@ -44,11 +33,6 @@ fn refused_span_by(suite: &Suite<'_>, by: Stepping) -> Result<(), String> {
     Ok(())
 }
 
-/// Two agents with the same inputs give the same bits.
-pub(super) fn same_bits(suite: &Suite<'_>) -> Result<(), String> {
-    stepped(suite, same_bits_by)
-}
-
 /// The step number `i` of a run in which the agent is pulled and divided anew.
 fn busy_step(suite: &Suite<'_>, run: &mut Run<'_>, i: u32) -> Result<(), String> {
     let pulled = (suite.steps / 3..suite.steps / 2).contains(&i);
@@ -60,11 +44,7 @@ fn busy_step(suite: &Suite<'_>, run: &mut Run<'_>, i: u32) -> Result<(), String>
 
 /// What is saved and read back goes on with the same bits.
 pub(super) fn archive(suite: &Suite<'_>) -> Result<(), String> {
-    stepped(suite, archive_by)
-}
-
-fn archive_by(suite: &Suite<'_>, by: Stepping) -> Result<(), String> {
-    let (mut run, mut other) = (suite.start_stepped(by), suite.start_stepped(by));
+    let (mut run, mut other) = (suite.start(), suite.start());
     let marks = [1, 2, 3, 5].map(|part| part * suite.steps / 6);
     for i in 0..suite.steps {
         busy_step(suite, &mut run, i)?;
@@ -83,7 +63,7 @@ fn archive_by(suite: &Suite<'_>, by: Stepping) -> Result<(), String> {
         let bytes = archive.into_bytes();
         // built anew at one mark, elsewhere at the next
         if i == marks[1] {
-            other = suite.start_stepped(by);
+            other = suite.start();
         } else {
             (0..5).try_for_each(|_| other.must_step(suite.dt, suite.pull.as_slice()))?;
         }
@@ -96,8 +76,9 @@ fn archive_by(suite: &Suite<'_>, by: Stepping) -> Result<(), String> {
     Ok(())
 }
 
-fn same_bits_by(suite: &Suite<'_>, by: Stepping) -> Result<(), String> {
-    let (mut one, mut other) = (suite.start_stepped(by), suite.start_stepped(by));
+/// Two agents with the same inputs give the same bits.
+pub(super) fn same_bits(suite: &Suite<'_>) -> Result<(), String> {
+    let (mut one, mut other) = (suite.start(), suite.start());
     for i in 0..suite.steps {
         [&mut one, &mut other].into_iter().try_for_each(|run| busy_step(suite, run, i))?;
         if one.hash() != other.hash() {
@@ -109,12 +90,8 @@ fn same_bits_by(suite: &Suite<'_>, by: Stepping) -> Result<(), String> {
 
 /// Steps and snapshots allocate nothing once the sizes have settled.
 pub(super) fn allocation(suite: &Suite<'_>) -> Result<(), String> {
-    stepped(suite, allocation_by)
-}
-
-fn allocation_by(suite: &Suite<'_>, by: Stepping) -> Result<(), String> {
     let Some((count, allowed)) = suite.allocations else { return Ok(()) };
-    let mut run = suite.start_stepped(by);
+    let mut run = suite.start();
     let mut snapshot = run.snapshot();
     for _ in 0..suite.steps {
         run.must_step(suite.dt, suite.pull.as_slice())?;
@@ -136,17 +113,13 @@ fn allocation_by(suite: &Suite<'_>, by: Stepping) -> Result<(), String> {
 
 /// Under any pull no state is written that is not finite: the agent reports that it has diverged, or ignores the pull.
 pub(super) fn finite(suite: &Suite<'_>) -> Result<(), String> {
-    stepped(suite, finite_by)
-}
-
-fn finite_by(suite: &Suite<'_>, by: Stepping) -> Result<(), String> {
-    let mut run = suite.start_stepped(by);
+    let mut run = suite.start();
     for i in 0..suite.steps {
         check_finite(&run).map_err(|what| format!("before step {i}: {what}"))?;
         run.must_step(suite.dt, suite.pull.as_slice())?;
     }
     for pull in &suite.absurd {
-        let mut run = suite.start_stepped(by);
+        let mut run = suite.start();
         run.must_step(suite.dt, &[])?;
         match run.step(suite.dt, &[*pull]) {
             Ok(()) | Err(StepError::Diverged { .. }) => {}

@@ -5,7 +5,7 @@ use crate::rigid::{KinematicBody, Led, RigidSpec};
 use glam::{DQuat, DVec3};
 use metachron_contact::member::{ClusterMember, Role};
 use metachron_contact::solve::Side;
-use metachron_contact::{Agent, AnchorSpring, Input, Inputs, SetMotion, StepContext};
+use metachron_contact::{Agent, AnchorSpring, Input, Inputs, OwnSteps, SetMotion, StepContext, Stepping};
 use metachron_core::{Anchor, Body, CurveState, Resolution, SimSpan, Snapshot, StepError, StepReport, check_span};
 use metachron_geometry::{CollisionShape, ContactSide, Place, PlacedShape, Solid};
 use std::sync::Arc;
@@ -40,26 +40,6 @@ impl Agent for Row {
         "row"
     }
 
-    fn step(&mut self, dt: SimSpan, context: &StepContext<'_>) -> Result<StepReport, StepError> {
-        if self.breaks(Promise::RefusedSpan) {
-            self.height += 1e-12;
-        }
-        let dt_s = check_span(dt)?;
-        if context.hands.iter().any(|hand| !hand.target.is_finite()) {
-            if !self.breaks(Promise::Finite) {
-                return Err(StepError::Diverged { model: "row", dt_s, what: "a hand".to_owned() });
-            }
-            self.height = f64::NAN;
-        }
-        let born = BORN.fetch_add(1, Ordering::Relaxed) as f64;
-        let noise = if self.breaks(Promise::SameBits) { born * 1e-12 } else { 0.0 };
-        let lost = if self.breaks(Promise::ExactTime) { 0.99 } else { 1.0 };
-        self.height += self.speed * dt_s + noise;
-        self.speed -= G * dt_s * lost;
-        self.steps += 1;
-        Ok(StepReport { work: 1.0, substeps: 1, at_rest: false })
-    }
-
     fn set_motion(&mut self, motion: &SetMotion) -> bool {
         self.speed = motion.velocity_m_s.map_or(self.speed, |v| v.z);
         motion.velocity_m_s.is_some()
@@ -78,6 +58,10 @@ impl Agent for Row {
             self.speed *= 1.0 + 1e-9;
         }
         self.held = wanted;
+    }
+
+    fn stepping(&mut self) -> Stepping<'_> {
+        Stepping::Own(self)
     }
 
     fn write_snapshot(&self, into: &mut Snapshot) {
@@ -103,6 +87,28 @@ impl Agent for Row {
 
     fn mass_kg(&self) -> f64 {
         1.0
+    }
+}
+
+impl OwnSteps for Row {
+    fn step(&mut self, dt: SimSpan, context: &StepContext<'_>) -> Result<StepReport, StepError> {
+        if self.breaks(Promise::RefusedSpan) {
+            self.height += 1e-12;
+        }
+        let dt_s = check_span(dt)?;
+        if context.hands.iter().any(|hand| !hand.target.is_finite()) {
+            if !self.breaks(Promise::Finite) {
+                return Err(StepError::Diverged { model: "row", dt_s, what: "a hand".to_owned() });
+            }
+            self.height = f64::NAN;
+        }
+        let born = BORN.fetch_add(1, Ordering::Relaxed) as f64;
+        let noise = if self.breaks(Promise::SameBits) { born * 1e-12 } else { 0.0 };
+        let lost = if self.breaks(Promise::ExactTime) { 0.99 } else { 1.0 };
+        self.height += self.speed * dt_s + noise;
+        self.speed -= G * dt_s * lost;
+        self.steps += 1;
+        Ok(StepReport { work: 1.0, substeps: 1, at_rest: false })
     }
 }
 
@@ -172,8 +178,8 @@ impl Agent for Slab {
         "slab"
     }
 
-    fn step(&mut self, dt: SimSpan, context: &StepContext<'_>) -> Result<StepReport, StepError> {
-        self.body.step(dt, context)
+    fn stepping(&mut self) -> Stepping<'_> {
+        Stepping::Cluster(self)
     }
 
     fn write_snapshot(&self, into: &mut Snapshot) {
@@ -190,10 +196,6 @@ impl Agent for Slab {
 
     fn form(&self) -> Option<Arc<CollisionShape>> {
         self.body.form()
-    }
-
-    fn member(&mut self) -> Option<&mut dyn ClusterMember> {
-        Some(self)
     }
 }
 

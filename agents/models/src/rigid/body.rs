@@ -1,18 +1,14 @@
 //! The rigid body agent.
 //!
-//! In: a [`RigidSpec`], steps. Out: a new [`Motion`] and a snapshot. Never here: what it touches ([`super::member`] is its part in a cluster).
+//! In: a [`RigidSpec`]. Out: a snapshot. Never here: its steps ([`super::member`]).
 
 use super::mass_properties::MassDistribution;
 use super::member::Unknowns;
 use super::motion::{Flight, Motion};
 use super::{RigidError, RigidSpec};
 use glam::{DQuat, DVec3};
-use metachron_contact::member::ClusterMember;
-use metachron_contact::{Agent, Input, Inputs, SetMotion, StepContext};
-use metachron_core::{
-    Archive, ArchiveError, Body, Bounds, RigidState, SimSpan, Snapshot, StepError, StepReport, archive_values,
-    check_span,
-};
+use metachron_contact::{Agent, Input, Inputs, SetMotion, Stepping};
+use metachron_core::{Archive, ArchiveError, Body, Bounds, RigidState, Snapshot, archive_values};
 use metachron_geometry::{CollisionShape, ShapeKind, SolidShape};
 use std::sync::Arc;
 
@@ -109,16 +105,8 @@ impl Agent for RigidBody {
         "rigid"
     }
 
-    /// Flies freely for `dt`. Springs on it are rows of its cluster's problem, and not here.
-    fn step(&mut self, dt: SimSpan, _context: &StepContext<'_>) -> Result<StepReport, StepError> {
-        let dt_s = check_span(dt)?;
-        self.begin(dt_s)?;
-        let free = self.unknowns.free;
-        self.end(&free, dt_s, false)?;
-        if self.is_calm() {
-            self.rest();
-        }
-        Ok(StepReport { work: 1.0, substeps: 1, at_rest: self.at_rest })
+    fn stepping(&mut self) -> Stepping<'_> {
+        Stepping::Cluster(self)
     }
 
     fn inputs(&self) -> Inputs {
@@ -159,10 +147,6 @@ impl Agent for RigidBody {
 
     fn form(&self) -> Option<Arc<CollisionShape>> {
         Some(self.form.clone())
-    }
-
-    fn member(&mut self) -> Option<&mut dyn ClusterMember> {
-        Some(self)
     }
 
     /// Its estimate of its own error is the rounding of its coordinates.

@@ -12,10 +12,10 @@ use crate::trajectory::{Pose as Pace, Script};
 use glam::{DQuat, DVec3};
 use metachron_contact::member::{ClusterMember, MaterialPoint, Pose, Role};
 use metachron_contact::solve::Side;
-use metachron_contact::{Agent, Input, Inputs, PoseGoal, SetMotion, StepContext};
+use metachron_contact::{Agent, Input, Inputs, PoseGoal, SetMotion, StepContext, Stepping};
 use metachron_core::{
     Anchor, Archive, ArchiveError, Body, Bounds, Inertia, RigidState, SimSpan, SimTime, Snapshot, StepError,
-    StepReport, archive_values, check_span, shortest_turn,
+    archive_values, shortest_turn,
 };
 use metachron_geometry::{CollisionShape, ContactSide, Place, PlacedShape, ShapeKind, ShapePose, SolidShape};
 use std::sync::Arc;
@@ -223,13 +223,8 @@ impl Agent for KinematicBody {
         "rigid"
     }
 
-    fn step(&mut self, dt: SimSpan, context: &StepContext<'_>) -> Result<StepReport, StepError> {
-        let dt_s = check_span(dt)?;
-        self.look(context, dt_s);
-        self.begin(dt_s)?;
-        self.end(&[], dt_s, false)?;
-        self.now.at_rest = self.is_calm();
-        Ok(StepReport { work: 1.0, substeps: 1, at_rest: self.now.at_rest })
+    fn stepping(&mut self) -> Stepping<'_> {
+        Stepping::Cluster(self)
     }
 
     fn shift_clock(&mut self, by_s: f64) {
@@ -278,9 +273,5 @@ impl Agent for KinematicBody {
 
     fn form(&self) -> Option<Arc<CollisionShape>> {
         Some(self.form.clone())
-    }
-
-    fn member(&mut self) -> Option<&mut dyn ClusterMember> {
-        Some(self)
     }
 }

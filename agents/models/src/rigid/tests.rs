@@ -3,6 +3,7 @@
 use super::{Restraint, RigidBody, RigidError, RigidSpec};
 use glam::{DQuat, DVec3};
 use metachron_contact::member::ClusterMember;
+use metachron_contact::step::LoneStepper;
 use metachron_contact::{Agent, StepContext};
 use metachron_core::{AgentId, Body, Inertia, RigidState, SimSpan, SimTime, Snapshot, StepError, StepReport};
 use metachron_geometry::Solid;
@@ -24,7 +25,7 @@ fn span(seconds: f64) -> SimSpan {
 }
 
 fn step(body: &mut RigidBody, dt: f64) -> StepReport {
-    body.step(span(dt), &StepContext::alone(AgentId(0), SimTime::ZERO)).unwrap()
+    LoneStepper::default().step(body, span(dt), StepContext::alone(AgentId(0), SimTime::ZERO)).unwrap()
 }
 
 fn snapshot(body: &RigidBody) -> Snapshot {
@@ -73,7 +74,8 @@ fn a_step_of_no_length_or_of_hours_is_refused_and_leaves_the_state() {
     step(&mut body, 0.01);
     let before = state(&body);
     for bad in [SimSpan::ZERO, span(1.5), span(1e6), SimSpan::from_nanos(u64::MAX)] {
-        let error = body.step(bad, &StepContext::alone(AgentId(0), SimTime::ZERO)).unwrap_err();
+        let alone = StepContext::alone(AgentId(0), SimTime::ZERO);
+        let error = LoneStepper::default().step(&mut body, bad, alone).unwrap_err();
         assert!(matches!(error, StepError::BadSpan { .. }), "{error}");
         assert_eq!(state(&body), before);
     }

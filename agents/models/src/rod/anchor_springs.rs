@@ -1,15 +1,13 @@
-//! External springs: attachments along the tube, and pulls at material points.
+//! Attachments along the tube, as springs at its nodes.
 //!
-//! In: specs and pulls. Out: forces and stiffnesses at nodes, implicit in the step. Never here: clamps and pins (they are
+//! In: specs. Out: forces and stiffnesses at nodes, implicit in the step. Never here: clamps and pins (they are
 //! not springs: their slots are removed from the system). Theory: docs/theory/rod.md, eq. 21–24.
 
 use super::discretization::Discretization;
 use super::spec::Attachment;
 use super::sym3::Sym3;
 use glam::DVec3;
-use metachron_contact::AnchorSpring;
 use metachron_contact::member::Slid;
-use metachron_core::{AgentId, Anchor};
 
 /// The spring of an attachment at one node.
 #[derive(Debug, Clone, Copy, serde::Serialize, serde::Deserialize)]
@@ -140,59 +138,6 @@ pub fn carry_slips(before: &[NodeSpring], into: &mut [NodeSpring]) {
             (Some(one), None) | (None, Some(one)) => one.slid,
             (None, None) => Slid::default(),
         };
-    }
-}
-
-/// A pull on this tube during one step.
-#[derive(Debug, Clone, Copy)]
-pub struct Tie {
-    /// The agent that pulls; `None` for the user's spring.
-    pub by: Option<AgentId>,
-    /// The segment that contains the material point.
-    pub segment: usize,
-    /// Share of the segment at which the point is, 0 … 1.
-    pub share: f64,
-    /// The spring; its target is where it is at the start of the step.
-    spring: AnchorSpring,
-    /// Impulse of the spring on the tube in this step, N·s.
-    pub impulse: DVec3,
-}
-
-impl Tie {
-    /// The tie of a pull; `None` where it has no point on this tube or is not finite.
-    pub fn new(pull: &AnchorSpring, division: &Discretization) -> Option<Self> {
-        let AnchorSpring { anchor, target, target_velocity, stiffness_n_m, damping_n_s_m, .. } = *pull;
-        let Anchor::Arc(arc_m) = anchor else { return None };
-        let fair = |c: f64| c.is_finite() && c >= 0.0;
-        let finite = target.is_finite() && target_velocity.is_finite();
-        if !(finite && arc_m.is_finite() && fair(stiffness_n_m) && fair(damping_n_s_m)) {
-            return None;
-        }
-        let (segment, share) = division.locate(arc_m);
-        Some(Self { by: pull.by, segment, share, spring: *pull, impulse: DVec3::ZERO })
-    }
-
-    /// Interpolates a quantity given at the ends of the segment to the tied point.
-    #[inline]
-    pub fn mix(&self, a: DVec3, b: DVec3) -> DVec3 {
-        a * (1.0 - self.share) + b * self.share
-    }
-
-    /// Records the impulse of a substep of `h` seconds that has ended `after` seconds into the step, with the point at `x` and velocity `v`.
-    pub fn record(&mut self, x: DVec3, v: DVec3, [after, h]: [f64; 2]) {
-        self.impulse += self.force(x, v, after) * h;
-    }
-
-    /// Force on the point at `x` with velocity `v`, `after` seconds into the step, N (eq. 24).
-    pub fn force(&self, x: DVec3, v: DVec3, after: f64) -> DVec3 {
-        let AnchorSpring { target, target_velocity, stiffness_n_m, damping_n_s_m, .. } = self.spring;
-        (target + target_velocity * after - x) * stiffness_n_m + (target_velocity - v) * damping_n_s_m
-    }
-
-    /// Change of a substep's impulse per change of the point's velocity: h² k + h d, kg.
-    #[inline]
-    pub fn implicit(&self, h: f64) -> Sym3 {
-        Sym3::identity(self.spring.stiffness_n_m * (h * h) + self.spring.damping_n_s_m * h)
     }
 }
 

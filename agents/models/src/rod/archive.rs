@@ -10,12 +10,11 @@ impl Tube {
     pub(super) fn archive_state(&mut self, archive: &mut Archive<'_>) -> Result<(), ArchiveError> {
         archive_values!(archive, self.resolution, self.division, self.now, self.stepper.past)?;
         archive_values!(archive, self.let_go, self.springs, self.spec.pressure_pa, self.spec.pressure_keys)?;
-        archive_values!(archive, self.grips, self.rest, self.at_rest, self.acceleration, self.time)?;
+        archive_values!(archive, self.rest, self.at_rest, self.acceleration, self.time)?;
         archive_values!(archive, self.script_from_s, self.steps)?;
-        let Self { wall, doubling, unknowns, .. } = self;
+        let Self { wall, unknowns, .. } = self;
         archive.fixed("whether its wall gives", wall.is_some())?;
         wall.iter_mut().try_for_each(|wall| archive.value(&mut wall.now))?;
-        doubling.archive(archive)?;
         unknowns.archive(archive)?;
         let (nodes, segments) = (self.division.arc_m.len(), self.division.segments());
         let is_whole = segments >= 2 && nodes == segments + 1 && self.now.is_of(segments);

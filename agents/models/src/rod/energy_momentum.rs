@@ -121,15 +121,7 @@ mod tests {
         // elasticity only: both velocities are zero
         now.u.fill(DVec3::ZERO);
         next.u.fill(DVec3::ZERO);
-        let problem = SubstepProblem {
-            matter,
-            division,
-            springs: &[],
-            ties: &[],
-            h: 1.0,
-            until: 0.0,
-            integrator: Default::default(),
-        };
+        let problem = SubstepProblem { matter, division, springs: &[], h: 1.0, integrator: Default::default() };
         let (mut rows, mut rhs) = (vec![Row::ZERO; now.u.len()], vec![DVec3::ZERO; now.u.len()]);
         fill_mean(&problem, &now, &next, &mut rows, &mut rhs);
         let mut work = 0.0;

@@ -8,7 +8,7 @@ use super::banded_ldl::Row;
 use super::state::{DividedRod, RodMaterial, RodState};
 use super::step::{Divergence, Stepper};
 use super::sym3::Sym3;
-use super::system::{Iterate, SubstepProblem, add_springs, add_ties, gyrate, hold_ends};
+use super::system::{Iterate, SubstepProblem, add_springs, gyrate, hold_ends};
 use glam::DVec3;
 
 impl Stepper {
@@ -48,7 +48,6 @@ impl Stepper {
         }
         let iterate = Iterate { start: now, at: now, first: true };
         add_springs(problem, &iterate, rows, rhs);
-        add_ties(problem, &iterate, rows, rhs);
         hold_ends(problem.matter, rows, rhs);
     }
 

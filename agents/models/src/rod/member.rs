@@ -9,6 +9,7 @@ use super::energy_limiter;
 use super::history::History;
 use super::method::Integrator;
 use super::rest::RestDetector;
+use super::spec::TubeSpec;
 use super::state::RodState;
 use super::step::{Divergence, Setting, Stepper, TURN_MAX_RAD};
 use super::system::SubstepProblem;
@@ -32,8 +33,8 @@ pub(super) struct Unknowns {
     /// Positions of its nodes where its skin is now, and the radius there, metres.
     places: Vec<DVec3>,
     radii_m: Vec<f64>,
-    /// By how much its free motion in the step begun raises its energy, J.
-    rise_j: f64,
+    /// Whether its free motion in the step begun is good in one piece: there is a factor, and its energy does not rise.
+    is_whole: bool,
     quiet_before: bool,
     /// What its attachments that may tear gave in the last step.
     attached: Vec<OwnAttachment>,
@@ -56,8 +57,8 @@ struct Kept {
     steps: u64,
 }
 
-/// Velocities differ by less than this through rounding alone, m/s and rad/s.
-const ROUNDING_M_S: f64 = 1e-9;
+/// Velocities differ by less than this through rounding alone, as a share of them and of 1 m/s or rad/s.
+const ROUNDING: f64 = 1e-9;
 /// What a section may change by in a step as a share of its radius: its forces are linear in it.
 const WALL_REACH: f64 = 0.05;
 /// The strain of a step in which its free motion raises its energy: it is made in two.
@@ -97,18 +98,29 @@ impl ClusterMember for Tube {
     }
 
     fn begin(&mut self, h_s: f64) -> Result<(), StepError> {
-        let solved = self.step_by(h_s, |stepper, now, setting, _| {
+        let solved = self.step_by(h_s, |stepper, now, setting| {
             let problem = whole_step(setting, h_s);
             stepper.take_sections(now);
+            if stepper.solve(now, &problem, true).is_err() {
+                // far out the whole system has no factor: that of masses alone stands for it
+                stepper.assemble_light(now, &problem, false);
+                return stepper.factor_and_solve().map(|()| false);
+            }
+            stepper.advance(now, &problem, true);
+            if stepper.energy_rise(now, &problem) <= 0.0 {
+                return Ok(true);
+            }
+            let rise_j = stepper.follow(now, &problem, &[]);
+            // the cluster's problem is about the state that the step starts from
             stepper.solve(now, &problem, true)?;
-            stepper.follow(now, &problem)
+            Ok(rise_j <= 0.0)
         });
-        self.unknowns.rise_j = solved.map_err(|divergence| self.diverged(divergence, h_s))?;
+        self.unknowns.is_whole = solved.map_err(|divergence| self.diverged(divergence, h_s))?;
         let then = self.time + SimSpan::from_secs_f64(h_s).unwrap_or(SimSpan::ZERO);
         self.follow_pressure(then);
         self.begin_wall(h_s, then).map_err(|divergence| self.diverged(divergence, h_s))?;
         let mut unknowns = std::mem::take(&mut self.unknowns);
-        unknowns.take(&self.stepper.rows, &self.stepper.next.u, &self.now.x);
+        unknowns.take(&self.stepper.rows, &self.stepper.rhs, &self.now.x);
         unknowns.radii_m.clear();
         match &self.wall {
             Some(wall) => {
@@ -206,6 +218,7 @@ impl ClusterMember for Tube {
     }
 
     fn strain(&self, v: &[DVec3], h_s: f64) -> f64 {
+        let divides_itself = self.integrates_free_motion(h_s) && self.unknowns.are_free(v);
         let (v, rates) = v.split_at(self.now.u.len());
         let reaches_m = self.wall.as_ref().map_or(f64::INFINITY, |wall| WALL_REACH * wall.law.outer_m);
         let fastest_m_s = rates.iter().map(|rate| rate.length_squared()).fold(0.0, f64::max).sqrt();
@@ -214,9 +227,12 @@ impl ClusterMember for Tube {
         let pulls = ends.zip(&self.division.length).map(|((a, b), length_m)| a.distance_squared(*b) / length_m.powi(2));
         // what a segment turns or stretches by, as a share of it
         let bent = spins.max(pulls.fold(0.0, f64::max).sqrt()) * h_s / TURN_MAX_RAD;
-        let changes = bent.max(fastest_m_s * h_s / reaches_m);
-        // an energy that is no number rises too
-        if self.unknowns.rise_j <= 0.0 { changes } else { changes.max(RISES) }
+        let widened = fastest_m_s * h_s / reaches_m;
+        if divides_itself {
+            return widened;
+        }
+        let changes = bent.max(widened);
+        if self.unknowns.is_whole { changes } else { changes.max(RISES) }
     }
 
     fn keep(&mut self) {
@@ -258,10 +274,9 @@ impl ClusterMember for Tube {
 
     fn end(&mut self, v: &[DVec3], h_s: f64, touched: bool) -> Result<(), StepError> {
         let before = self.momentum().0;
+        let integrates_freely = self.integrates_free_motion(h_s);
         let unknowns = std::mem::take(&mut self.unknowns);
-        // what it gained in parts is what it would have gained but for rounding
-        let gained = v.iter().zip(&unknowns.free).all(|(v, free)| v.distance(*free) <= ROUNDING_M_S);
-        let is_free = !touched && gained && self.integrates_free_motion(h_s);
+        let is_free = !touched && unknowns.are_free(v) && integrates_freely;
         let (of_rod, of_wall) = v.split_at(self.now.u.len());
         let finite = self.wall_stays_finite(of_wall, h_s)
             && if is_free { self.advance_freely(h_s) } else { self.advance_with(of_rod, h_s, &unknowns) };
@@ -269,7 +284,7 @@ impl ClusterMember for Tube {
         if !finite {
             return Err(self.diverged(Divergence { slot: None }, h_s));
         }
-        self.end_wall(Some(of_wall), h_s);
+        self.end_wall(of_wall, h_s);
         self.unknowns.places.clone_from(&self.now.x);
         self.note_attachments();
         self.acceleration = (self.momentum().0 - before) / (self.mass_kg() * h_s);
@@ -365,9 +380,12 @@ impl Tube {
         present.extend(self.now.u.iter().chain(&wall.now.rate));
     }
 
-    /// Whether its own integrator makes a step of `h_s` seconds that nothing acts on; in contact all of them are implicit Euler.
+    /// Whether its own integrator makes a step of `h_s` seconds in which nothing acts on it, in as many substeps as that takes. In contact all of
+    /// them are implicit Euler in one piece.
     fn integrates_free_motion(&self, h_s: f64) -> bool {
-        self.spec.integrator != Integrator::ImplicitEuler && self.check_substep(h_s).is_ok()
+        let TubeSpec { integrator, substeps, .. } = self.spec;
+        let is_simple = integrator == Integrator::ImplicitEuler && substeps == 1 && self.unknowns.is_whole;
+        !is_simple && self.substep_is_short(h_s)
     }
 
     /// Notes what the attachments that may tear and never yield give at the end of a step: implicit Euler has given that all along it.
@@ -390,21 +408,14 @@ impl Tube {
 
     /// Makes the step begun by its own integrator; whether its state is finite then.
     fn advance_freely(&mut self, h_s: f64) -> bool {
-        self.ties.clear();
         self.step_by(h_s, Stepper::step).is_ok()
     }
 
     /// Ends the step begun with the velocities `v`; whether its state is finite then.
     fn advance_with(&mut self, v: &[DVec3], h_s: f64, unknowns: &Unknowns) -> bool {
-        self.step_by(h_s, |stepper, now, setting, _| {
-            let mut rise_j = unknowns.rise_j;
-            if *v != unknowns.free[..v.len()] {
-                let problem = whole_step(setting, h_s);
-                stepper.rhs.clear();
-                stepper.rhs.extend_from_slice(v);
-                stepper.advance(now, &problem, true);
-                rise_j = stepper.energy_rise(now, &problem) - work_j(&stepper.rows, v, &unknowns.free);
-            }
+        self.step_by(h_s, |stepper, now, setting| {
+            let problem = whole_step(setting, h_s);
+            let rise_j = stepper.follow_cluster(now, &problem, [v, &unknowns.free[..v.len()]]);
             if rise_j > 0.0 {
                 energy_limiter::remove(rise_j, &mut stepper.next, setting.matter, setting.division);
             }
@@ -428,20 +439,7 @@ fn lasting(springs: &[NodeSpring]) -> &[NodeSpring] {
 fn whole_step<'a>(setting: &Setting<'a>, h_s: f64) -> SubstepProblem<'a> {
     let Setting { matter, division, integrator, .. } = *setting;
     let springs = lasting(setting.springs);
-    SubstepProblem { matter, division, springs, ties: &[], h: h_s, until: h_s, integrator }
-}
-
-/// The work of the impulses that change the velocities of a step from `free` to `v`: (v − free)ᵀ A v, joules.
-fn work_j(rows: &[Row], v: &[DVec3], free: &[DVec3]) -> f64 {
-    let given = |row: usize| v[row] - free[row];
-    let of_row = |(row, numbers): (usize, &Row)| {
-        let (here, before) = (v[row], |back: usize| row.checked_sub(back));
-        let near = before(1)
-            .map_or(0.0, |at| given(row).dot(numbers.near * v[at]) + given(at).dot(numbers.near.transpose() * here));
-        let far = before(2).map_or(0.0, |at| given(row).dot(numbers.far * v[at]) + given(at).dot(numbers.far * here));
-        given(row).dot(numbers.diag * here) + near + far
-    };
-    rows.iter().enumerate().map(of_row).sum()
+    SubstepProblem { matter, division, springs, h: h_s, integrator }
 }
 
 /// Nothing joins the centre line to a wall that gives within a step (eq. 66).
@@ -454,6 +452,11 @@ impl Response for Tube {
 }
 
 impl Unknowns {
+    /// Whether `v` are its velocities without contact, but for the rounding of those that are gained in parts.
+    fn are_free(&self, v: &[DVec3]) -> bool {
+        v.iter().zip(&self.free).all(|(v, free)| v.distance(*free) <= ROUNDING * (1.0 + free.length()))
+    }
+
     /// Writes or reads what is known of it between steps.
     pub(super) fn archive(&mut self, archive: &mut Archive<'_>) -> Result<(), ArchiveError> {
         archive_values!(archive, self.places, self.radii_m, self.present, self.quiet_before)

@@ -6,8 +6,6 @@
 use super::discretization::Discretization;
 use super::state::RodMaterial;
 use super::tube::Tube;
-use metachron_contact::Agent;
-use metachron_core::StepError;
 
 /// Time integration of a tube.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
@@ -73,15 +71,9 @@ impl Tube {
         self.spec.integrator.longest_substep_s(&self.matter, &self.division)
     }
 
-    /// Refuses a step whose substeps are too long for the integrator.
-    pub(super) fn check_substep(&self, dt_s: f64) -> Result<(), StepError> {
-        let Some(limit_s) = self.longest_substep_s() else { return Ok(()) };
-        let substep_s = dt_s / f64::from(self.spec.substeps);
-        if substep_s <= limit_s {
-            return Ok(());
-        }
-        let (integrator, segments) = (self.spec.integrator.name(), self.segments());
-        Err(StepError::Unstable { model: self.model(), integrator, segments, substep_s, limit_s })
+    /// Whether the substeps of a step of `dt_s` seconds are short enough for the integrator.
+    pub(super) fn substep_is_short(&self, dt_s: f64) -> bool {
+        self.longest_substep_s().is_none_or(|limit_s| dt_s / f64::from(self.spec.substeps) <= limit_s)
     }
 }
 

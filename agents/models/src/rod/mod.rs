@@ -30,7 +30,6 @@ mod second_order;
 mod spec;
 mod state;
 mod step;
-mod step_doubling;
 mod sym3;
 mod system;
 #[cfg(test)]

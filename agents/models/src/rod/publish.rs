@@ -27,9 +27,7 @@ impl Tube {
         into.resolution = Some(self.resolution);
         into.nodes = Some(self.now.x.len() as u32);
         into.energy_j = self.energy_j();
-        into.drift_m = self.doubling.error_m();
-        into.residual_m = residual::estimate_m(&self.now, &self.matter, &self.division) + into.drift_m;
-        into.grips.clone_from(&self.grips);
+        into.residual_m = residual::estimate_m(&self.now, &self.matter, &self.division);
         (into.at_rest, into.acceleration) = (self.at_rest, self.acceleration);
         into.bounds = Some(bounds(&self.now, self.widest_m()));
         self.publish_curve(into);

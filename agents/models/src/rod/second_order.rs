@@ -1,7 +1,7 @@
 //! Substeps of second order: BDF2 and the energy-momentum rule, used where nothing external makes velocities jump.
 //!
-//! In: a state and the changes before it. Out: the next state, or a request for smaller substeps: where the tube is pulled, and
-//! where the iteration does not converge, the substep is one of implicit Euler.
+//! In: a state and the changes before it. Out: the next state, or a request for smaller substeps: where
+//! the iteration does not converge, the substep is one of implicit Euler.
 //! Never here: implicit Euler itself ([`super::step`]). Theory: docs/theory/rod.md, eq. 43–48.
 
 use super::energy_momentum::fill_mean;
@@ -29,20 +29,18 @@ impl Stepper {
         problem: &SubstepProblem<'_>,
         trial: Trial,
     ) -> Result<Verdict, Divergence> {
-        if problem.ties.is_empty() {
-            let converged = match problem.integrator {
-                Integrator::EnergyMomentum => self.solve_energy_momentum(now, problem),
-                _ => self.solve_bdf2(now, problem),
-            };
-            let rise = self.energy_rise(now, problem);
-            let converged = converged && rise <= self.past.reserve_j() && self.next.is_finite();
-            if trial.bounds_turns && !(converged && self.farthest_turn(now) <= TURN_MAX_RAD) {
-                return Ok(Verdict::TooFar);
-            }
-            if converged {
-                self.past.spend(rise);
-                return Ok(Verdict::Good);
-            }
+        let converged = match problem.integrator {
+            Integrator::EnergyMomentum => self.solve_energy_momentum(now, problem),
+            _ => self.solve_bdf2(now, problem),
+        };
+        let rise = self.energy_rise(now, problem);
+        let converged = converged && rise <= self.past.reserve_j() && self.next.is_finite();
+        if trial.bounds_turns && !(converged && self.farthest_turn(now) <= TURN_MAX_RAD) {
+            return Ok(Verdict::TooFar);
+        }
+        if converged {
+            self.past.spend(rise);
+            return Ok(Verdict::Good);
         }
         self.attempt_euler(now, problem, trial)
     }
@@ -58,7 +56,6 @@ impl Stepper {
             self.next.strain(problem.matter, problem.division);
             let iterate = Iterate { start: &start, at: &self.next, first: false };
             assemble(&problem, &iterate, &mut self.rows, &mut self.rhs);
-            self.solves += 1;
             if self.factor.factor(&self.rows).is_err() {
                 break;
             }
@@ -129,7 +126,6 @@ impl Stepper {
             fill_matrix(&tangent, &self.next, &mut self.rows, &mut self.rhs);
             fill_mean(&tangent, now, &self.next, &mut self.rows, &mut self.rhs);
             hold_ends(problem.matter, &mut self.rows, &mut self.rhs);
-            self.solves += 1;
             if self.factor.factor(&self.rows).is_err() {
                 return false;
             }

@@ -1,9 +1,9 @@
 //! One step of the tube: linearly implicit Euler, divided into substeps where one is not enough.
 //!
-//! In: a state, a span, attachments and pulls. Out: the state exactly that span later. Never here: other agents, resolution.
+//! In: a state, a span, attachments. Out: the state exactly that span later. Never here: other agents, resolution.
 //! Theory: docs/theory/rod.md, eq. 11–20 and 26–28.
 
-use super::anchor_springs::{NodeSpring, Tie};
+use super::anchor_springs::NodeSpring;
 use super::banded_ldl::{Factor, Row};
 use super::discretization::Discretization;
 use super::energy_limiter;
@@ -60,12 +60,12 @@ pub struct Stepper {
     pub(super) factor: Factor,
     pub(super) rhs: Vec<DVec3>,
     pub(super) next: RodState,
+    /// Impulses of a cluster on its slots in the step begun, N·s and N·m·s.
+    given: Vec<DVec3>,
     /// Changes of the previous substep, and an extrapolated start state for rules that need one.
     pub(super) past: History,
     pub(super) ahead: RodState,
     pub(super) projector: Projector,
-    /// Systems factored in the step for accepted substeps, iterations included: its work.
-    pub(super) solves: u32,
 }
 
 /// What may end a trial substep without a next state.
@@ -91,7 +91,7 @@ impl Stepper {
     ///
     /// # Errors
     /// [`Divergence`] where the next state is not finite; `now` is then the last state that was.
-    pub fn step(&mut self, now: &mut RodState, setting: &Setting<'_>, ties: &mut [Tie]) -> Result<u32, Divergence> {
+    pub fn step(&mut self, now: &mut RodState, setting: &Setting<'_>) -> Result<u32, Divergence> {
         self.take_sections(now);
         let ticks = u64::from(setting.substeps) << HALVINGS;
         let tick = setting.dt / ticks as f64;
@@ -102,21 +102,19 @@ impl Stepper {
                 matter: setting.matter,
                 division: setting.division,
                 springs: setting.springs,
-                ties,
                 h,
-                until: tick * (elapsed + size) as f64,
                 integrator: setting.integrator,
             };
             let stretched = h * now.stretch > setting.longest_s && size > 1;
-            let solves = self.solves;
             let trial = Trial { bounds_turns: size > TURN_TICKS, may_divide: size > 1 };
             if stretched || self.attempt(now, &problem, trial)? == Verdict::TooFar {
-                (self.solves, size) = (solves, size / 2);
+                size /= 2;
                 continue;
             }
-            let until = problem.until;
-            self.accept(now, ties, [until, h]);
-            self.remember(now, setting.integrator, ties.is_empty(), h);
+            std::mem::swap(now, &mut self.next);
+            if matches!(setting.integrator, Integrator::Bdf2 | Integrator::EnergyMomentum) {
+                self.past.record(&self.next, now, h);
+            }
             (elapsed, taken) = (elapsed + size, taken + 1);
             // double again, where that ends on the grid of the longer substep
             if size < 1 << HALVINGS && elapsed.is_multiple_of(2 * size) {
@@ -166,7 +164,7 @@ impl Stepper {
         if trial.bounds_turns && self.fastest_spin() * problem.h > TURN_MAX_RAD {
             return Ok(Verdict::TooFar);
         }
-        let rise = self.follow(now, problem)?;
+        let rise = self.follow(now, problem, &[]);
         let finite = self.next.is_finite();
         if trial.may_divide && (rise > 0.0 || !finite) {
             return Ok(Verdict::TooFar);
@@ -177,26 +175,48 @@ impl Stepper {
         if finite && self.next.is_finite() { Ok(Verdict::Good) } else { Err(Divergence { slot: None }) }
     }
 
-    /// Moves along the solution of the first system, and along those about where that leads while the energy rises; by how much it still does.
-    ///
-    /// # Errors
-    /// Where the first system cannot be factored.
-    pub(super) fn follow(&mut self, now: &RodState, problem: &SubstepProblem<'_>) -> Result<f64, Divergence> {
+    /// Moves along the solution of the first system in `rhs`; while the energy rises by more than the impulses `given` to its slots work, moves
+    /// along the solutions about the states that these lead to. The rise that is left, J. No impulses at all where `given` is empty.
+    pub(super) fn follow(&mut self, now: &RodState, problem: &SubstepProblem<'_>, given: &[DVec3]) -> f64 {
         self.advance(now, problem, true);
-        let mut rise_j = self.energy_rise(now, problem);
+        let rise_j = |stepper: &Self| {
+            let work_j: f64 = given.iter().zip(&stepper.next.u).map(|(given, v)| given.dot(*v)).sum();
+            stepper.energy_rise(now, problem) - work_j
+        };
+        let mut risen_j = rise_j(self);
         for _ in 0..ITERATIONS_MORE {
-            if rise_j <= 0.0 || !self.next.is_finite() {
+            if risen_j <= 0.0 || !self.next.is_finite() {
                 break;
             }
-            // a state far out may have no next iterate: then the best so far is judged, with the first system
-            if self.solve(now, problem, false).is_err() {
-                self.solve(now, problem, true)?;
+            assemble(problem, &Iterate { start: now, at: &self.next, first: false }, &mut self.rows, &mut self.rhs);
+            self.rhs.iter_mut().zip(given).for_each(|(rhs, given)| *rhs += *given);
+            // a state far out may have no next iterate: then the best so far is judged
+            if self.factor_and_solve().is_err() {
                 break;
             }
             self.advance(now, problem, false);
-            rise_j = self.energy_rise(now, problem);
+            risen_j = rise_j(self);
         }
-        Ok(rise_j)
+        risen_j
+    }
+
+    /// The same from the velocities `v` of a cluster, which give the tube the impulses A (v − free).
+    pub(super) fn follow_cluster(
+        &mut self,
+        now: &RodState,
+        problem: &SubstepProblem<'_>,
+        [v, free]: [&[DVec3]; 2],
+    ) -> f64 {
+        let mut given = std::mem::take(&mut self.given);
+        given.clear();
+        if v != free {
+            given.extend((0..v.len()).map(|row| product(&self.rows, row, |at| v[at] - free[at])));
+        }
+        self.rhs.clear();
+        self.rhs.extend_from_slice(v);
+        let rise_j = self.follow(now, problem, &given);
+        self.given = given;
+        rise_j
     }
 
     /// Builds and solves the system about the iterate; leaves the change of velocities in `rhs` (eq. 11).
@@ -213,7 +233,6 @@ impl Stepper {
 
     /// Factors and solves the assembled system.
     pub(super) fn factor_and_solve(&mut self) -> Result<(), Divergence> {
-        self.solves += 1;
         self.factor.factor(&self.rows).map_err(|slot| Divergence { slot: Some(slot) })?;
         self.factor.solve(&mut self.rhs);
         Ok(())
@@ -243,49 +262,28 @@ impl Stepper {
         next.strain(problem.matter, problem.division);
     }
 
-    /// Energy of `next` beyond that of `now` and the work of pulls, less rounding, J (eq. 27).
+    /// Energy of `next` beyond that of `now`, less rounding, J (eq. 27).
     pub(super) fn energy_rise(&self, now: &RodState, problem: &SubstepProblem<'_>) -> f64 {
         let (before, after) = (energy(now, problem.springs), energy(&self.next, problem.springs));
-        let (mut work, mut effort) = (0.0, 0.0_f64);
-        for tie in problem.ties {
-            let (a, b) = (tie.segment, tie.segment + 1);
-            let x = tie.mix(self.next.x[a], self.next.x[b]);
-            let v = tie.mix(self.next.u[2 * a], self.next.u[2 * b]);
-            let done = tie.force(x, v, problem.until).dot(x - tie.mix(now.x[a], now.x[b]));
-            work += done;
-            effort += done.abs();
-        }
         let lifted = (self.next.gravity_j - now.gravity_j).abs();
-        let at_work = self.next.kinetic_j + self.next.elastic_j + now.elastic_j + lifted + effort;
+        let at_work = self.next.kinetic_j + self.next.elastic_j + now.elastic_j + lifted;
         // the sums themselves round at their own size, and positions at theirs
         let sums = f64::EPSILON * 64.0 * (before.abs() + after.abs() + now.gravity_j.abs());
         let rounding = sums + STRAIN_SLACK * STRAIN_SLACK * problem.matter.ea * problem.division.total_m();
-        after - before - work - ENERGY_SLACK * at_work - rounding
+        after - before - ENERGY_SLACK * at_work - rounding
     }
+}
 
-    /// Stores what rules of second order need of the substep that ended at `now`, where nothing made velocities jump.
-    fn remember(&mut self, now: &RodState, integrator: Integrator, untied: bool, h: f64) {
-        if !matches!(integrator, Integrator::Bdf2 | Integrator::EnergyMomentum) {
-            return;
-        }
-        if untied {
-            self.past.record(&self.next, now, h);
-        } else {
-            self.past.forget();
-        }
-    }
-
-    /// Makes `next` the state and books the impulses of pulls, `end` seconds into the step in a substep of `h` seconds.
-    fn accept(&mut self, now: &mut RodState, ties: &mut [Tie], [end, h]: [f64; 2]) {
-        std::mem::swap(now, &mut self.next);
-        for tie in &mut *ties {
-            let (a, b) = (tie.segment, tie.segment + 1);
-            // constraints act after the tie: its impulse belongs to the velocity before them
-            let later = tie.mix(self.projector.gain(2 * a), self.projector.gain(2 * b));
-            let (x, v) = (tie.mix(now.x[a], now.x[b]) - later * h, tie.mix(now.u[2 * a], now.u[2 * b]) - later);
-            tie.record(x, v, [end, h]);
-        }
-    }
+/// A row of A x.
+fn product(rows: &[Row], row: usize, x: impl Fn(usize) -> DVec3) -> DVec3 {
+    let before = |back: usize| row.checked_sub(back);
+    let own = rows[row].diag * x(row);
+    let lower = before(1).map_or(DVec3::ZERO, |at| rows[row].near * x(at))
+        + before(2).map_or(DVec3::ZERO, |at| rows[row].far * x(at));
+    let after = |on: usize| rows.get(row + on);
+    let upper = after(1).map_or(DVec3::ZERO, |next| next.near.transpose() * x(row + 1))
+        + after(2).map_or(DVec3::ZERO, |next| next.far * x(row + 2));
+    own + lower + upper
 }
 
 /// The sum of kinetic, elastic and gravitational energy and that of the attachments, J (eq. 10).

@@ -3,7 +3,7 @@
 //! In: the state at the start of the step, the iterate it is linearised about. Out: rows and right side, in slots.
 //! Never here: acceptance of the result ([`super::step`]). Theory: docs/theory/rod.md, eq. 11–15, 19–24.
 
-use super::anchor_springs::{NodeSpring, Tie};
+use super::anchor_springs::NodeSpring;
 use super::banded_ldl::Row;
 use super::discretization::Discretization;
 use super::method::Integrator;
@@ -21,12 +21,8 @@ pub struct SubstepProblem<'a> {
     pub division: &'a Discretization,
     /// Attachments.
     pub springs: &'a [NodeSpring],
-    /// Pulls.
-    pub ties: &'a [Tie],
     /// The substep, seconds.
     pub h: f64,
-    /// Seconds from the start of the step to the end of this substep.
-    pub until: f64,
     /// Time integrator.
     pub integrator: Integrator,
 }
@@ -53,7 +49,6 @@ pub fn assemble(problem: &SubstepProblem<'_>, iterate: &Iterate<'_>, rows: &mut 
     fill_matrix(problem, iterate.at, rows, rhs);
     fill_right_side(problem, iterate, rhs);
     add_springs(problem, iterate, rows, rhs);
-    add_ties(problem, iterate, rows, rhs);
     hold_ends(problem.matter, rows, rhs);
 }
 
@@ -176,22 +171,6 @@ pub fn add_springs(problem: &SubstepProblem<'_>, iterate: &Iterate<'_>, rows: &m
         rows[slot].diag += linear.stiffness * (h * h) + Sym3::identity(h * linear.damping);
         let force = linear.force + linear.stiffness * ahead - iterate.moved(slot) * linear.damping;
         rhs[slot] += force * h;
-    }
-}
-
-/// Pulls, shared between the two nodes of their segment (eq. 24).
-pub fn add_ties(problem: &SubstepProblem<'_>, iterate: &Iterate<'_>, rows: &mut [Row], rhs: &mut [DVec3]) {
-    for tie in problem.ties {
-        let (left, right) = (2 * tie.segment, 2 * tie.segment + 2);
-        let point = tie.mix(iterate.at.x[tie.segment], iterate.at.x[tie.segment + 1]);
-        let moved = tie.mix(iterate.moved(left), iterate.moved(right));
-        let impulse = tie.force(point, moved, problem.until) * problem.h;
-        let (implicit, w) = (tie.implicit(problem.h), tie.share);
-        rows[left].diag += implicit * ((1.0 - w) * (1.0 - w));
-        rows[right].diag += implicit * (w * w);
-        rows[right].far += implicit * (w * (1.0 - w));
-        rhs[left] += impulse * (1.0 - w);
-        rhs[right] += impulse * w;
     }
 }
 

@@ -5,7 +5,7 @@
 
 mod agent;
 
-use super::anchor_springs::{NodeSpring, Tie, carry_slips, springs};
+use super::anchor_springs::{NodeSpring, carry_slips, springs};
 use super::check::{TubeError, check};
 use super::discretization;
 use super::discretization::Discretization;
@@ -16,12 +16,11 @@ use super::rest::RestDetector;
 use super::rest_curve::RestCurve;
 use super::state::{RodMaterial, RodState};
 use super::step::{Divergence, Setting, Stepper, energy};
-use super::step_doubling::Doubling;
 use super::wall::{Wall, WallLaw};
 use super::{Section, TubeSpec, WallModel};
 use glam::DVec3;
 use metachron_contact::Agent;
-use metachron_core::{Grip, Resolution, SimTime, StepError};
+use metachron_core::{Resolution, SimTime, StepError};
 use metachron_geometry::{CollisionShape, ShapeKind};
 use std::sync::Arc;
 
@@ -45,10 +44,7 @@ pub struct Tube {
     /// By how much its muscles alone would narrow each node in the step begun, metres.
     pub(super) squeeze_m: Vec<f64>,
     pub(super) springs: Vec<NodeSpring>,
-    pub(super) ties: Vec<Tie>,
-    pub(super) grips: Vec<Grip>,
     pub(super) rest: RestDetector,
-    pub(super) doubling: Doubling,
     pub(super) at_rest: bool,
     /// The mean acceleration of its centre of mass in the last step, m/s².
     pub(super) acceleration: DVec3,
@@ -106,10 +102,7 @@ impl Tube {
             wall,
             squeeze_m: vec![],
             springs: vec![],
-            ties: vec![],
-            grips: vec![],
             rest: RestDetector::default(),
-            doubling: Doubling::default(),
             at_rest: false,
             form: Arc::new(form),
             time: SimTime::ZERO,
@@ -136,13 +129,13 @@ impl Tube {
     pub(super) fn step_by<T>(
         &mut self,
         dt: f64,
-        act: impl FnOnce(&mut Stepper, &mut RodState, &Setting<'_>, &mut [Tie]) -> T,
+        act: impl FnOnce(&mut Stepper, &mut RodState, &Setting<'_>) -> T,
     ) -> T {
-        let Self { stepper, now, ties, matter, division, springs, .. } = self;
+        let Self { stepper, now, matter, division, springs, .. } = self;
         let substeps = self.spec.substeps;
         let integrator = self.spec.integrator;
         let longest_s = integrator.longest_substep_s(matter, division).unwrap_or(f64::INFINITY);
-        act(stepper, now, &Setting { matter, division, springs, dt, substeps, integrator, longest_s }, ties)
+        act(stepper, now, &Setting { matter, division, springs, dt, substeps, integrator, longest_s })
     }
 
     /// The numbers it was built from.

@@ -52,11 +52,6 @@ impl Projector {
         velocities.iter_mut().zip(&self.gain).for_each(|(v, gain)| *v += *gain);
     }
 
-    /// Change of a slot's velocity by the last projection; zero where there was none.
-    pub fn gain(&self, slot: usize) -> DVec3 {
-        self.gain.get(slot).copied().unwrap_or(DVec3::ZERO)
-    }
-
     fn predict(&mut self, now: &RodState, velocities: &[DVec3], h: f64) {
         let count = now.q.len();
         self.x.clear();

@@ -15,17 +15,16 @@ impl SoftBody {
         archive.fixed("the number of cells", self.cells())?;
         let nodes = self.positions.len();
         let mut turns: Vec<_> = self.mesh.turns().collect();
-        archive_values!(archive, self.positions, self.velocities, turns, self.before)?;
-        let lengths = [self.positions.len(), self.velocities.len(), self.before.len()];
+        archive_values!(archive, self.positions, self.velocities, turns)?;
+        let lengths = [self.positions.len(), self.velocities.len()];
         if let Some(found) = lengths.iter().find(|length| **length != nodes) {
             let (found, expected) = (found.to_string(), nodes.to_string());
             return Err(ArchiveError::Mismatch { what: "the number of nodes", found, expected });
         }
         self.mesh.set_turns(&turns);
-        archive_values!(archive, self.grips, self.acceleration, self.at_rest, self.quiet_s, self.steps)?;
-        let Self { skin, doubling, unknowns, .. } = self;
+        archive_values!(archive, self.acceleration, self.at_rest, self.quiet_s, self.steps)?;
+        let Self { skin, unknowns, .. } = self;
         skin.iter_mut().try_for_each(|skin| skin.archive(archive))?;
-        doubling.archive(archive)?;
         unknowns.archive(archive)
     }
 

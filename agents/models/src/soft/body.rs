@@ -1,26 +1,19 @@
-//! The soft body agent: vertices, springs, and its rest detection.
+//! The soft body agent: its vertices, and what is set and published of them.
 //!
-//! In: a [`SoftSpec`], steps, pulls. Out: snapshots ([`super::publish`]). Never here: how a step is solved ([`super::step`]), contact.
+//! In: a [`SoftSpec`]. Out: snapshots ([`super::publish`]). Never here: how a step is solved ([`super::step`]), contact.
 //! Theory: docs/theory/soft.md.
 
-use super::anchor_springs::VertexSpring;
 use super::carrier::Carrier;
 use super::division::{Division, form};
 use super::fe_mesh::FeMesh;
 use super::member::Unknowns;
 use super::skin::Skin;
 use super::spec::{SoftError, SoftSpec};
-use super::step_doubling::Doubling;
 use super::system::System;
-use crate::limits::{QUIET_ACCELERATION_M_S2, QUIET_S, QUIET_SPEED_M_S};
 use crate::set_motion::{WholeMotion, check_nodes};
 use glam::DVec3;
-use metachron_contact::member::ClusterMember;
-use metachron_contact::{Agent, AnchorSpring, Carving, Input, Inputs, SetMotion, StepContext};
-use metachron_core::{
-    Archive, ArchiveError, Body, Bounds, Grip, Removed, Resolution, SimSpan, Snapshot, StepError, StepReport,
-    check_span,
-};
+use metachron_contact::{Agent, Carving, Input, Inputs, SetMotion, Stepping};
+use metachron_core::{Archive, ArchiveError, Body, Bounds, Removed, Resolution, Snapshot};
 use metachron_geometry::{Aabb, Carried, CollisionShape, ShapeKind};
 use std::sync::Arc;
 
@@ -45,14 +38,10 @@ pub struct SoftBody {
     pub(super) free: Vec<DVec3>,
     /// The right side of eq. 1: the momenta of the vertices with what forces add in the substep, kg·m/s.
     pub(super) impulses: Vec<DVec3>,
-    pub(super) ties: Vec<VertexSpring>,
     pub(super) form: Arc<CollisionShape>,
-    pub(super) grips: Vec<Grip>,
     /// The mean acceleration of the centre of mass in the last step, m/s².
     pub(super) acceleration: DVec3,
     pub(super) at_rest: bool,
-    pub(super) doubling: Doubling,
-    pub(super) before: Vec<DVec3>,
     pub(super) quiet_s: f64,
     pub(super) steps: u64,
     /// What it is in a contact cluster.
@@ -86,16 +75,12 @@ impl SoftBody {
             level: 0,
             impulses: vec![],
             free: positions.clone(),
-            before: velocities.clone(),
             positions,
             velocities,
             mesh,
             form: form(&spec, surface),
-            ties: vec![],
-            grips: vec![],
             acceleration: spec.gravity,
             at_rest: false,
-            doubling: Doubling::default(),
             quiet_s: 0.0,
             steps: 0,
             unknowns: Unknowns::default(),
@@ -142,8 +127,6 @@ impl SoftBody {
 
     /// Wakes it, and forgets what holds for steps before.
     pub(super) fn woken(&mut self) {
-        self.doubling.watch.cancel();
-        self.before.clone_from(&self.velocities);
         (self.quiet_s, self.at_rest) = (0.0, false);
         self.follow();
     }
@@ -173,52 +156,9 @@ impl SoftBody {
         Bounds { low, high, speed_m_s: speed }
     }
 
-    /// Lists this step's springs: the user's, and those of tools that grasp it.
-    pub(super) fn gather_springs(&mut self, context: &StepContext<'_>) {
-        let mut ties = std::mem::take(&mut self.ties);
-        ties.clear();
-        ties.extend(context.anchor_springs().filter_map(|pull| {
-            let vertex = VertexSpring::vertex_of(&pull, self.seen().len())?;
-            // its point is apart from where its nodes carry it, as the skin is there
-            let skin = self.skin.as_ref();
-            let apart = skin.map_or(DVec3::ZERO, |skin| skin.apart_of(vertex as usize));
-            let easing_m_s = skin.map_or(DVec3::ZERO, |skin| skin.easing_m_s(vertex));
-            let (target, target_velocity) = (pull.target - apart, pull.target_velocity - easing_m_s);
-            VertexSpring::new(&AnchorSpring { target, target_velocity, ..pull }, self.carried(vertex))
-        }));
-        self.ties = ties;
-    }
-
-    /// Counts quiet time; returns whether it has been quiet for long enough.
-    fn update_rest(&mut self, dt: f64) -> bool {
-        let calm = self.spec.sleep && self.ties.is_empty() && self.is_eased();
-        let Self { velocities, before, .. } = self;
-        let pairs = velocities.iter().zip(before.iter());
-        let limit = (QUIET_SPEED_M_S, QUIET_ACCELERATION_M_S2 * dt);
-        let mut still = pairs.map(|(v, was)| v.length() <= limit.0 && v.distance(*was) <= limit.1);
-        let quiet = calm && still.all(|still| still);
-        self.quiet_s = if quiet { self.quiet_s + dt } else { 0.0 };
-        let at_rest = self.quiet_s >= QUIET_S;
-        if at_rest {
-            self.doubling.watch.rest();
-            velocities.fill(DVec3::ZERO); // the drawn state of a sleeping body must not drift
-        }
-        before.clone_from(velocities);
-        at_rest
-    }
-
     /// The momentum of its vertices, kg·m/s.
     pub(super) fn linear_momentum(&self) -> DVec3 {
         self.mesh.mass_kg.iter().zip(&self.velocities).map(|(mass, v)| *v * *mass).sum()
-    }
-
-    /// Ends a step of `dt` seconds that began with the momentum `before`: books grips, counts quiet time.
-    fn finish_step(&mut self, before: DVec3, dt: f64) {
-        self.grips.clear();
-        self.grips.extend(self.ties.iter().map(|tie| Grip { by: tie.by, force_n: tie.impulse / dt }));
-        self.acceleration = (self.linear_momentum() - before) / (self.mass_kg() * dt);
-        self.steps += 1;
-        self.at_rest = self.update_rest(dt);
     }
 }
 
@@ -227,15 +167,8 @@ impl Agent for SoftBody {
         self.spec.shape.model()
     }
 
-    /// Advances by `dt`: one solve, more where an edge would turn or stretch too far in one.
-    fn step(&mut self, dt: SimSpan, context: &StepContext<'_>) -> Result<StepReport, StepError> {
-        let dt_s = check_span(dt)?;
-        let before = self.linear_momentum();
-        let (substeps, doubled) = self.advance(context, dt_s)?;
-        self.ease(dt_s);
-        self.finish_step(before, dt_s);
-        self.follow();
-        Ok(StepReport { work: self.work() * f64::from(substeps + doubled), substeps, at_rest: self.at_rest })
+    fn stepping(&mut self) -> Stepping<'_> {
+        Stepping::Cluster(self)
     }
 
     fn resolution(&self) -> Option<Resolution> {
@@ -299,10 +232,6 @@ impl Agent for SoftBody {
 
     fn archive(&mut self, archive: &mut Archive<'_>) -> Result<(), ArchiveError> {
         self.archive_state(archive)
-    }
-
-    fn member(&mut self) -> Option<&mut dyn ClusterMember> {
-        Some(self)
     }
 
     fn form(&self) -> Option<Arc<CollisionShape>> {

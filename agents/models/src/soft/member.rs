@@ -100,7 +100,6 @@ impl ClusterMember for SoftBody {
     }
 
     fn begin(&mut self, h_s: f64) -> Result<(), StepError> {
-        self.ties.clear();
         self.predict(h_s, Purpose::Shared).map_err(|what| self.diverged(what, h_s))?;
         let Self { system, free, velocities, positions, unknowns, .. } = self;
         let moving = |list: &[DVec3], into: &mut Vec<DVec3>| {

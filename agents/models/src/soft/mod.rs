@@ -5,7 +5,6 @@
 //! Unknowns of a step are the velocities of the vertices, a slot each. One substep builds and factors A = (1 + h c) M + h (h + b) K
 //! (`fe_mesh`, `system`), solves for the velocities, and moves (`step`); in a cluster the body offers this matrix as a member (`member`).
 
-mod anchor_springs;
 mod archive;
 mod bar;
 mod bending;
@@ -30,7 +29,6 @@ mod shell_bending;
 mod skin;
 mod spec;
 mod step;
-mod step_doubling;
 mod system;
 #[cfg(test)]
 mod tests;

@@ -13,10 +13,8 @@ impl SoftBody {
         into.resolution = self.present_resolution();
         into.nodes = Some(self.nodes());
         into.energy_j = self.energy_j();
-        into.drift_m = self.doubling.watch.error_m();
-        into.residual_m = self.mesh.residual_m(&self.positions) + into.drift_m;
+        into.residual_m = self.mesh.residual_m(&self.positions);
         into.removed = self.removed;
-        into.grips.clone_from(&self.grips);
         (into.at_rest, into.acceleration) = (self.at_rest, self.acceleration);
         into.bounds = Some(self.bounds());
         self.write_state(into.body.soft_mut());

@@ -105,7 +105,6 @@ impl SoftBody {
     /// By how much elastic forces accelerate the present nodes, at the nodes of another carrier, m/s²: where it rests, what bears its weight.
     fn elastic_m_s2_at(&mut self, carrier: &Carrier) -> Vec<DVec3> {
         let weight = std::mem::take(&mut self.spec.gravity);
-        self.ties.clear();
         self.assemble(BALANCE_S);
         self.spec.gravity = weight;
         let nodes = self.system.forces.iter().zip(&self.mesh.mass_kg).zip(&self.mesh.held);
@@ -201,7 +200,7 @@ impl SoftBody {
     fn settle(&mut self, h: f64) -> bool {
         let velocities = std::mem::take(&mut self.velocities);
         self.velocities = vec![DVec3::ZERO; velocities.len()];
-        let (gravity, ties) = (self.spec.gravity, std::mem::take(&mut self.ties));
+        let gravity = self.spec.gravity;
         if !self.mesh.held.contains(&true) {
             self.spec.gravity = DVec3::ZERO;
         }
@@ -209,7 +208,7 @@ impl SoftBody {
         if solved {
             self.positions.iter_mut().zip(&self.free).for_each(|(x, v)| *x += *v * h);
         }
-        (self.velocities, self.spec.gravity, self.ties) = (velocities, gravity, ties);
+        (self.velocities, self.spec.gravity) = (velocities, gravity);
         solved
     }
 

@@ -157,18 +157,6 @@ impl System {
         }
     }
 
-    /// Adds an inertia between two vertices that an element joins, or to one, kg; where `ends` are two, both orders are given.
-    pub fn resist(&mut self, ends: [usize; 2], inertia_kg: f64) {
-        let [Some(row), Some(column)] = ends.map(|end| self.rows[end].map(|row| row as usize)) else { return };
-        let by = DMat3::from_diagonal(DVec3::splat(inertia_kg));
-        if row == column {
-            return self.weigh(ends[0], by);
-        }
-        if let Ok(at) = self.blocks.binary_search_by_key(&(row, column), |block| (block.row, block.column)) {
-            self.blocks[at].value += by;
-        }
-    }
-
     /// Replaces the velocities `x` of all vertices, from which a solution may start, by A⁻¹ of impulses on them (N·s), or by what is near it
     /// where others find it; held vertices stay still.
     ///

@@ -15,6 +15,7 @@ mod statics;
 
 use super::{MaterialLaw, RegionMatter, Side, SoftBody, SoftError, SoftMatter, SoftShape, SoftSpec};
 use glam::{DMat3, DQuat, DVec3};
+use metachron_contact::step::LoneStepper;
 use metachron_contact::{Agent, SetMotion, StepContext};
 use metachron_core::{AgentId, Body, SimSpan, SimTime, Snapshot, SoftState};
 use metachron_geometry::{ContactTraits, ShapeKind, Tetrahedra, Triangles};
@@ -129,8 +130,9 @@ fn dt(seconds: f64) -> SimSpan {
 
 /// Steps a body alone for so many steps.
 fn run(body: &mut SoftBody, dt_s: f64, steps: u32) {
+    let mut stepper = LoneStepper::default();
     for _ in 0..steps {
-        body.step(dt(dt_s), &StepContext::alone(AgentId(0), SimTime::ZERO)).unwrap();
+        stepper.step(body, dt(dt_s), StepContext::alone(AgentId(0), SimTime::ZERO)).unwrap();
     }
 }
 

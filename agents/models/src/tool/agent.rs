@@ -14,11 +14,10 @@ use super::pivot::Pivot;
 use super::{ToolError, ToolSpec};
 use crate::trajectory::{PointMotion, Pose, Script};
 use glam::{DQuat, DVec3};
-use metachron_contact::member::ClusterMember;
-use metachron_contact::{Agent, AnchorSpring, Input, Inputs, StepContext};
+use metachron_contact::{Agent, AnchorSpring, Input, Inputs, StepContext, Stepping};
 use metachron_core::{
-    AgentId, Anchor, Archive, ArchiveError, Body, Bounds, GRASP_BELOW, SimSpan, Snapshot, StepError, StepReport,
-    ToolState, archive_values, check_span, shortest_turn,
+    AgentId, Anchor, Archive, ArchiveError, Body, Bounds, GRASP_BELOW, Snapshot, ToolState, archive_values,
+    shortest_turn,
 };
 use metachron_geometry::ToolShape;
 use metachron_geometry::{CollisionShape, ShapeKind};
@@ -154,18 +153,6 @@ impl Tool {
     pub(super) fn has_reached(&self, end: &Pose) -> bool {
         (self.commanded.position - end.tip).length() < ARRIVED && self.commanded.velocity.length() < ARRIVED
     }
-
-    /// Whether the tool has come to the end of its script and waits there, empty.
-    fn try_rest(&mut self) -> bool {
-        let end = self.script.at(self.unknowns.time().as_secs_f64());
-        let rests = self.tool.is_idle && self.drive.has_arrived() && !self.jaws.holds() && self.tool.jaw == end.jaw;
-        if rests {
-            self.commanded = PointMotion { position: end.tip, velocity: DVec3::ZERO };
-            (self.tool.tip, self.tool.velocity) = (end.tip, DVec3::ZERO);
-            (_, self.tool.rotation) = through(self.pivot, end.tip, self.tool.rotation);
-        }
-        rests
-    }
 }
 
 /// The pose of a tool with its tip as near to `tip` as it reaches, and its shaft through the pivot if it has one.
@@ -211,17 +198,8 @@ impl Agent for Tool {
         "tool"
     }
 
-    /// Moves the tip by `dt` along its path, and the jaws.
-    ///
-    /// Only the target of a user spring counts: a tool is driven, so stiffness and damping have no effect on it.
-    fn step(&mut self, dt: SimSpan, context: &StepContext<'_>) -> Result<StepReport, StepError> {
-        let dt_s = check_span(dt)?;
-        self.begin_at(context);
-        self.begin(dt_s)?;
-        self.end(&[self.alone_m_s(dt_s)], dt_s, false)?;
-        self.move_jaws(context, dt_s);
-        self.at_rest = self.try_rest();
-        Ok(StepReport { work: 1.0, substeps: 1, at_rest: self.at_rest })
+    fn stepping(&mut self) -> Stepping<'_> {
+        Stepping::Cluster(self)
     }
 
     fn inputs(&self) -> Inputs {
@@ -254,9 +232,5 @@ impl Agent for Tool {
 
     fn form(&self) -> Option<Arc<CollisionShape>> {
         Some(self.form.clone())
-    }
-
-    fn member(&mut self) -> Option<&mut dyn ClusterMember> {
-        Some(self)
     }
 }

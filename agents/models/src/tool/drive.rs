@@ -66,14 +66,6 @@ impl Drive {
         self.rate
     }
 
-    /// The same at the end of a step of `h` seconds in which nothing but the spring acts on the tip: linearly implicit, within the limit.
-    pub(super) fn rate_alone(&self, h: f64) -> DVec3 {
-        let (m, k, c) = (self.mass_kg(), self.stiffness_n_m(), self.damping_n_s_m());
-        let rate = (self.rate * m - self.off * (h * k)) / (m + h * (c + h * k));
-        let force = ((rate - self.rate) * (m / h)).clamp_length_max(self.limit_n);
-        self.rate + force * (h / m)
-    }
-
     /// Whether it gives all that it can.
     pub(super) fn is_saturated(&self) -> bool {
         self.is_saturated

@@ -60,11 +60,6 @@ impl Unknowns {
         archive_values!(archive, self.led, self.led_m_s, self.led_rad_s, self.jaw_per_s)
     }
 
-    /// Its own time.
-    pub fn time(&self) -> SimTime {
-        self.time
-    }
-
     pub fn new(tool: &ToolState, mass_kg: f64) -> Self {
         let value = DMat3::from_diagonal(DVec3::splat(mass_kg));
         Self {
@@ -121,11 +116,6 @@ impl Tool {
     /// How the point `arm_m` from its tip moves with the tip.
     fn side_at(&self, arm_m: DVec3) -> Side {
         self.pivot.map_or_else(|| Side::node(0, 0), |pivot| pivot.side(self.tool.tip, arm_m))
-    }
-
-    /// The velocity of its tip at the end of the step begun, of `h_s` seconds, where nothing but its drive acts on it, m/s.
-    pub(super) fn alone_m_s(&self, h_s: f64) -> DVec3 {
-        self.unknowns.led_m_s + self.drive.rate_alone(h_s)
     }
 }
 
@@ -308,6 +298,12 @@ impl ClusterMember for Tool {
     fn rest(&mut self) {
         self.at_rest = true;
         self.tool.velocity = DVec3::ZERO;
+        // rounding of its way back from a user must not stay
+        if self.drive.has_arrived() {
+            let end = self.script.at(self.unknowns.time.as_secs_f64());
+            self.commanded = PointMotion { position: end.tip, velocity: DVec3::ZERO };
+            (self.tool.tip, self.tool.rotation) = through(self.pivot, end.tip, self.tool.rotation);
+        }
     }
 }
 

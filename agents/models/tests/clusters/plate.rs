@@ -3,8 +3,8 @@
 use glam::{DMat3, DQuat, DVec3};
 use metachron_contact::member::{ClusterMember, Role};
 use metachron_contact::solve::{Block, Side};
-use metachron_contact::{Agent, StepContext};
-use metachron_core::{Body, Bounds, RigidState, SimSpan, Snapshot, StepError, StepReport};
+use metachron_contact::{Agent, Stepping};
+use metachron_core::{Body, Bounds, RigidState, Snapshot, StepError};
 use metachron_geometry::{CollisionShape, ContactSide, Place, PlacedShape, ShapeKind, ShapePose, Solid, SolidShape};
 use std::sync::Arc;
 
@@ -113,12 +113,8 @@ impl Agent for Plate {
         "plate"
     }
 
-    fn step(&mut self, dt: SimSpan, _context: &StepContext<'_>) -> Result<StepReport, StepError> {
-        let h_s = dt.as_secs_f64();
-        self.begin(h_s)?;
-        let free = self.free;
-        self.end(&free, h_s, false)?;
-        Ok(StepReport { work: 1.0, substeps: 1, at_rest: false })
+    fn stepping(&mut self) -> Stepping<'_> {
+        Stepping::Cluster(self)
     }
 
     fn write_snapshot(&self, into: &mut Snapshot) {
@@ -145,9 +141,5 @@ impl Agent for Plate {
 
     fn form(&self) -> Option<Arc<CollisionShape>> {
         Some(Arc::clone(&self.form))
-    }
-
-    fn member(&mut self) -> Option<&mut dyn ClusterMember> {
-        Some(self)
     }
 }

@@ -5,8 +5,8 @@ use crate::table::{GRAVITY, Table, placed, spring};
 use glam::{DQuat, DVec3};
 use metachron_contact::member::{ClusterMember, MaterialPoint, Partner, Role};
 use metachron_contact::solve::Side;
-use metachron_contact::{Agent, AnchorSpring, StepContext};
-use metachron_core::{AgentId, Anchor, Body, SimSpan, Snapshot, StepError, StepReport, ToolState};
+use metachron_contact::{Agent, AnchorSpring, Stepping};
+use metachron_core::{AgentId, Anchor, Body, Snapshot, StepError, ToolState};
 use metachron_geometry::{
     CollisionShape, ContactSide, ContactTraits, Place, PlacedShape, ShapeKind, ShapePose, Solid, SolidShape,
 };
@@ -235,17 +235,12 @@ impl Agent for Pusher {
         "pusher"
     }
 
-    fn step(&mut self, dt: SimSpan, _context: &StepContext<'_>) -> Result<StepReport, StepError> {
-        self.place.x += self.m_s * dt.as_secs_f64();
-        Ok(StepReport { work: 1.0, substeps: 1, at_rest: false })
+    fn stepping(&mut self) -> Stepping<'_> {
+        Stepping::Cluster(self)
     }
 
     fn write_snapshot(&self, into: &mut Snapshot) {
         into.clear();
-    }
-
-    fn member(&mut self) -> Option<&mut dyn ClusterMember> {
-        Some(self)
     }
 }
 

@@ -5,8 +5,8 @@
 
 use super::cast::{Model, agent, rate_hz};
 use super::machine::own_cpu;
-use anyhow::Context;
-use metachron_contact::{Agent, StepContext};
+use anyhow::{Context, bail};
+use metachron_contact::{Agent, StepContext, Stepping};
 use metachron_core::{AgentId, SimSpan, SimTime};
 use metachron_runtime::THREADS_MAX;
 use std::cmp::Reverse;
@@ -95,8 +95,8 @@ fn run_alone(agent: &mut dyn Agent, dt: SimSpan, start: Instant, span: Duration)
 
 /// One step of an agent without neighbours.
 pub(super) fn step(agent: &mut dyn Agent, dt: SimSpan) -> anyhow::Result<()> {
-    let context = StepContext::alone(AgentId(0), SimTime::ZERO);
-    agent.step(dt, &context)?;
+    let Stepping::Own(own) = agent.stepping() else { bail!("a {} does not step by itself", agent.model()) };
+    own.step(dt, &StepContext::alone(AgentId(0), SimTime::ZERO))?;
     Ok(())
 }
 

@@ -5,7 +5,8 @@
 use super::super::chart::GRAVITY;
 use anyhow::Context;
 use glam::DVec3;
-use metachron_contact::{Agent, StepContext};
+use metachron_contact::step::LoneStepper;
+use metachron_contact::{Agent, OwnSteps, StepContext, Stepping};
 use metachron_core::{N_MAX, Resolution, ResolutionRange, SimSpan, Snapshot, StepError, StepReport};
 use metachron_geometry::Solid;
 use metachron_models::rigid::RigidBody;
@@ -47,6 +48,8 @@ const SYNTHETIC_US: f64 = 0.85;
 /// An agent that takes part in no contact: the benchmark measures agents, not contacts.
 struct IsolatedAgent {
     agent: Box<dyn Agent>,
+    /// What steps a member of clusters, as if it were in one of its own.
+    stepper: Option<Box<LoneStepper>>,
     rests: bool,
 }
 
@@ -59,7 +62,7 @@ pub(super) fn agent(model: Model, k: usize) -> anyhow::Result<Box<dyn Agent>> {
         Model::Rod => Box::new(rod(place, ROD_SEGMENTS, false)?),
         Model::Rigid => Box::new(ball(place)?),
     };
-    Ok(Box::new(IsolatedAgent { agent, rests: model == Model::Asleep }))
+    Ok(Box::new(IsolatedAgent { agent, stepper: None, rests: model == Model::Asleep }))
 }
 
 fn synthetic() -> anyhow::Result<Synthetic> {
@@ -112,17 +115,16 @@ impl Agent for IsolatedAgent {
         self.agent.model()
     }
 
-    fn step(&mut self, dt: SimSpan, context: &StepContext<'_>) -> Result<StepReport, StepError> {
-        let report = self.agent.step(dt, context)?;
-        Ok(StepReport { at_rest: self.rests || report.at_rest, ..report })
-    }
-
     fn resolution(&self) -> Option<Resolution> {
         self.agent.resolution()
     }
 
     fn set_resolution(&mut self, wanted: Resolution) {
         self.agent.set_resolution(wanted);
+    }
+
+    fn stepping(&mut self) -> Stepping<'_> {
+        Stepping::Own(self)
     }
 
     fn write_snapshot(&self, into: &mut Snapshot) {
@@ -135,5 +137,15 @@ impl Agent for IsolatedAgent {
 
     fn mass_kg(&self) -> f64 {
         self.agent.mass_kg()
+    }
+}
+
+impl OwnSteps for IsolatedAgent {
+    fn step(&mut self, dt: SimSpan, context: &StepContext<'_>) -> Result<StepReport, StepError> {
+        let report = match self.agent.stepping() {
+            Stepping::Own(own) => own.step(dt, context)?,
+            Stepping::Cluster(_) => self.stepper.get_or_insert_default().step(&mut *self.agent, dt, *context)?,
+        };
+        Ok(StepReport { at_rest: self.rests || report.at_rest, ..report })
     }
 }

@@ -33,8 +33,6 @@ pub(super) struct Bound {
 pub(super) struct Play {
     bodies: Vec<Member>,
     scene: ClusterScene,
-    /// Whether there is nothing that it could touch: it then steps by itself, as agents that touch nothing do.
-    is_alone: bool,
     stepper: ClusterStepper,
     time: SimTime,
     snapshot: Snapshot,
@@ -53,7 +51,6 @@ impl Play {
     pub(super) fn new(bodies: Vec<Box<dyn Agent>>, obstacles: &[Obstacle], step_s: f64) -> anyhow::Result<Self> {
         let member = |agent| Member { agent, step_s, memory: ContactMemory::default(), grips: Vec::new() };
         Ok(Self {
-            is_alone: obstacles.is_empty() && bodies.len() == 1,
             bodies: bodies.into_iter().map(member).collect(),
             scene: ClusterScene::new(obstacles).context("the static solids")?,
             stepper: ClusterStepper::default(),
@@ -92,13 +89,7 @@ impl Play {
 
     /// Makes one macro step.
     pub(super) fn step(&mut self) -> anyhow::Result<ClusterReport> {
-        let Self { bodies, scene, stepper, time, is_alone, .. } = self;
-        if let ([body], true) = (&mut bodies[..], *is_alone) {
-            let dt = SimSpan::from_secs_f64(body.step_s).context("the length of a step")?;
-            body.agent.step(dt, &StepContext::alone(AgentId(0), *time))?;
-            *time += dt;
-            return Ok(ClusterReport::default());
-        }
+        let Self { bodies, scene, stepper, time, .. } = self;
         let mut wishes = Vec::with_capacity(bodies.len());
         for body in bodies.iter_mut() {
             wishes.push((body.agent.member().context("a body that touches nothing")?.role(), body.step_s));

@@ -6,8 +6,8 @@ use super::super::chart::GRAVITY;
 use glam::{DQuat, DVec3};
 use metachron_contact::member::{ClusterMember, MaterialPoint, Role};
 use metachron_contact::solve::Side;
-use metachron_contact::{Agent, StepContext};
-use metachron_core::{Anchor, SimSpan, Snapshot, StepError, StepReport};
+use metachron_contact::{Agent, Stepping};
+use metachron_core::{Anchor, Snapshot, StepError};
 use metachron_geometry::{CollisionShape, ContactSide, Place, PlacedShape, ShapeError, ShapeKind, ShapePose};
 use metachron_geometry::{Solid, SolidShape};
 
@@ -97,16 +97,11 @@ impl Agent for ShakenFloor {
         "floor"
     }
 
-    fn step(&mut self, dt: SimSpan, _context: &StepContext<'_>) -> Result<StepReport, StepError> {
-        self.time_s += dt.as_secs_f64();
-        Ok(StepReport { work: 1.0, substeps: 1, at_rest: false })
+    fn stepping(&mut self) -> Stepping<'_> {
+        Stepping::Cluster(self)
     }
 
     fn write_snapshot(&self, into: &mut Snapshot) {
         into.clear();
-    }
-
-    fn member(&mut self) -> Option<&mut dyn ClusterMember> {
-        Some(self)
     }
 }

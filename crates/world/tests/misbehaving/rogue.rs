@@ -3,8 +3,8 @@
 use glam::{DMat3, DVec3};
 use metachron_contact::member::{ClusterMember, Locked, MaterialPoint, Pose, Role};
 use metachron_contact::solve::{Block, Side, SideTerm};
-use metachron_contact::{Agent, Inputs, SetMotion, StepContext};
-use metachron_core::{AgentId, Anchor, Archive, ArchiveError, Body, Bounds, SimSpan, Snapshot, StepError, StepReport};
+use metachron_contact::{Agent, Inputs, SetMotion, StepContext, Stepping};
+use metachron_core::{AgentId, Anchor, Archive, ArchiveError, Body, Bounds, Snapshot, StepError};
 use metachron_geometry::{CollisionShape, ContactSide, Place, PlacedShape, ShapePose, Solid};
 use metachron_models::rigid::{RigidBody, RigidSpec};
 use std::sync::Arc;
@@ -188,10 +188,6 @@ impl Agent for Rogue {
         "rogue"
     }
 
-    fn step(&mut self, dt: SimSpan, context: &StepContext<'_>) -> Result<StepReport, StepError> {
-        self.body.step(dt, context)
-    }
-
     fn resolution(&self) -> Option<metachron_core::Resolution> {
         self.switch.panics(Kind::Resolution);
         None
@@ -209,6 +205,11 @@ impl Agent for Rogue {
     fn set_state(&mut self, state: &Body) -> Result<(), String> {
         self.switch.panics(Kind::SetState);
         self.body.set_state(state)
+    }
+
+    fn stepping(&mut self) -> Stepping<'_> {
+        self.switch.panics(Kind::Member);
+        Stepping::Cluster(self)
     }
 
     fn write_snapshot(&self, into: &mut Snapshot) {
@@ -246,11 +247,6 @@ impl Agent for Rogue {
     fn form(&self) -> Option<Arc<CollisionShape>> {
         self.switch.panics(Kind::Form);
         self.body.form()
-    }
-
-    fn member(&mut self) -> Option<&mut dyn ClusterMember> {
-        self.switch.panics(Kind::Member);
-        Some(self)
     }
 }
 

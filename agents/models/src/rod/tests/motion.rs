@@ -3,6 +3,7 @@
 use super::*;
 use glam::{DQuat, DVec3};
 use metachron_contact::AnchorSpring;
+use metachron_contact::step::LoneStepper;
 use metachron_core::Snapshot;
 
 fn snapshot(tube: &Tube) -> Snapshot {
@@ -143,7 +144,8 @@ fn a_refused_step_leaves_every_bit() {
     tube.set_state(state);
     let before = snapshot(&tube).fold_hash(metachron_core::HASH_START);
     for bad in [SimSpan::ZERO, SimSpan::from_secs_f64(2.0).unwrap()] {
-        assert!(tube.step(bad, &StepContext::alone(AgentId(0), SimTime::ZERO)).is_err());
+        let alone = StepContext::alone(AgentId(0), SimTime::ZERO);
+        assert!(LoneStepper::default().step(&mut tube, bad, alone).is_err());
         assert_eq!(snapshot(&tube).fold_hash(metachron_core::HASH_START), before);
     }
 }
@@ -167,12 +169,12 @@ fn the_published_force_of_a_pull_is_what_moves_the_tube() {
 fn published_force_moves(integrator: Integrator) {
     let mut tube = free_tube_by(integrator, 16, 8.0);
     let hands = [pull(0.43, DVec3::new(0.5, 0.2, 0.1)), pull(0.9, DVec3::new(0.9, 0.0, -0.3))];
-    let mut time = SimTime::ZERO;
+    let (mut stepper, mut time) = (LoneStepper::default(), SimTime::ZERO);
     for _ in 0..100 {
         let before = tube.momentum().0;
         let context = StepContext { hands: &hands, ..StepContext::alone(AgentId(0), time) };
-        tube.step(millis(8.0), &context).unwrap();
-        let force: DVec3 = snapshot(&tube).grips.iter().map(|g| g.force_n).sum();
+        stepper.step(&mut tube, millis(8.0), context).unwrap();
+        let force: DVec3 = stepper.grips().iter().map(|g| g.force_n).sum();
         let gained = (tube.momentum().0 - before) / 8e-3;
         // the balance of forces holds to the accuracy of the solve, of forces of about 10 N
         assert!((gained - force).length() < 1e-9, "{}: {gained} N, published {force} N", integrator.name());
@@ -187,15 +189,15 @@ fn a_tube_on_a_spring_hangs_where_its_weight_balances_the_spring() {
     spec.damping_per_s = 8.0;
     let mut tube = Tube::new(spec).unwrap();
     let hands = [pull(0.5, DVec3::new(0.5, 0.0, 0.0))];
-    let mut time = SimTime::ZERO;
+    let (mut stepper, mut time) = (LoneStepper::default(), SimTime::ZERO);
     for _ in 0..2000 {
         let context = StepContext { hands: &hands, ..StepContext::alone(AgentId(0), time) };
-        tube.step(millis(10.0), &context).unwrap();
+        stepper.step(&mut tube, millis(10.0), context).unwrap();
         time += millis(10.0);
     }
     let weight = tube.mass_kg() * 9.81;
     let snapshot = snapshot(&tube);
-    assert!((snapshot.grips[0].force_n - DVec3::Z * weight).length() < 1e-6 * weight); // e^(−4 t) of 20 s, and rounding
+    assert!((stepper.grips()[0].force_n - DVec3::Z * weight).length() < 1e-6 * weight); // e^(−4 t) of 20 s, and rounding
     let sag = -snapshot.body.point(metachron_core::Anchor::Arc(0.5)).unwrap().0.z;
     assert!((sag - weight / 40.0).abs() < 1e-6, "{sag} m");
 }
@@ -232,17 +234,17 @@ fn a_tube_at_rest_reports_it_and_wakes_when_pulled() {
     spec.damping_per_s = 6.0;
     spec.sleep = true;
     let mut tube = Tube::new(spec).unwrap();
-    let mut time = SimTime::ZERO;
+    let (mut stepper, mut time) = (LoneStepper::default(), SimTime::ZERO);
     let mut asleep = false;
     for _ in 0..1500 {
-        asleep = tube.step(millis(10.0), &StepContext::alone(AgentId(0), time)).unwrap().at_rest;
+        asleep = stepper.step(&mut tube, millis(10.0), StepContext::alone(AgentId(0), time)).unwrap().at_rest;
         time += millis(10.0);
         assert!(!asleep || time > SimTime::from_nanos(500_000_000));
     }
     assert!(asleep);
     let hands = [pull(1.0, DVec3::new(1.0, 0.0, 0.0))];
     let context = StepContext { hands: &hands, ..StepContext::alone(AgentId(0), time) };
-    assert!(!tube.step(millis(10.0), &context).unwrap().at_rest);
+    assert!(!stepper.step(&mut tube, millis(10.0), context).unwrap().at_rest);
 }
 
 #[test]

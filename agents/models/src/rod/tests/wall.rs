@@ -1,6 +1,7 @@
 //! A wall that gives, against closed forms: Lamé's thick tube, Brazier's bent tube, a gas in a closed volume, the ends of a dent.
 
 use super::*;
+use metachron_contact::step::LoneStepper;
 use std::f64::consts::PI;
 
 const YOUNG_PA: f64 = 1e6;
@@ -188,7 +189,7 @@ fn pressure_that_follows_keys_is_as_if_set_by_hand_before_every_step() {
     for _ in 0..100 {
         by_hand.set_pressure_pa(300.0 * (time + dt).as_secs_f64()).unwrap();
         for tube in [&mut led, &mut by_hand] {
-            tube.step(dt, &StepContext::alone(AgentId(0), time)).unwrap();
+            LoneStepper::default().step(tube, dt, StepContext::alone(AgentId(0), time)).unwrap();
         }
         time += dt;
     }

@@ -1,70 +1,23 @@
-//! The tube as an agent: its step by itself, its states, another resolution.
+//! The tube as an agent: its states, another resolution.
 //!
-//! In: steps, pulls, motions and states that are set, requests for a resolution. Out: reports, snapshots ([`super::super::publish`]). Never
-//! here: its step in a cluster ([`super::super::member`]).
+//! In: motions and states that are set, requests for a resolution. Out: snapshots ([`super::super::publish`]). Never here: its steps
+//! ([`super::super::member`]).
 
-use super::super::anchor_springs::Tie;
 use super::super::discretization;
 use super::super::remesh::MeshedRod;
 use super::super::state::RodState;
-use super::super::step::{Divergence, Setting, Stepper};
 use super::{Tube, nearest_resolution};
 use crate::set_motion::WholeMotion;
 use glam::DVec3;
-use metachron_contact::member::ClusterMember;
-use metachron_contact::{Agent, Input, Inputs, SetMotion, StepContext};
-use metachron_core::{
-    Archive, ArchiveError, Body, Grip, Resolution, SimSpan, SimTime, Snapshot, StepError, StepReport, check_span,
-};
+use metachron_contact::{Agent, Input, Inputs, SetMotion, Stepping};
+use metachron_core::{Archive, ArchiveError, Body, Resolution, Snapshot};
 use metachron_geometry::CollisionShape;
 use std::sync::Arc;
 
 impl Tube {
-    /// Repeats a step of `dt` seconds in twice `substeps`, if its turn has come.
-    fn repeat_step(&mut self, dt: f64, substeps: u32) {
-        if !self.doubling.is_on() {
-            return;
-        }
-        let mut doubling = std::mem::take(&mut self.doubling);
-        self.step_by(dt, |stepper, now, setting, _| doubling.end(stepper, now, &Setting { substeps, ..*setting }));
-        self.doubling = doubling;
-    }
-
-    /// A step of the wall that nothing touches, after that of the centre line.
-    fn step_wall(&mut self, dt_s: f64, then: SimTime) -> Result<(), Divergence> {
-        self.follow_pressure(then);
-        self.begin_wall(dt_s, then)?;
-        let finite = self.wall.as_ref().is_none_or(|wall| wall.stays_finite(wall.free(), dt_s));
-        if !finite {
-            return Err(Divergence { slot: None });
-        }
-        self.end_wall(None, dt_s);
-        self.present_velocities();
-        Ok(())
-    }
-
-    fn record_grips(&mut self, dt: f64) {
-        self.grips.clear();
-        self.grips.extend(self.ties.iter().map(|tie| Grip { by: tie.by, force_n: tie.impulse / dt }));
-    }
-
     /// Whether it is held somewhere, so that nothing puts it elsewhere.
     fn stays(&self) -> bool {
         self.matter.held.contains(&true) || !self.spec.attachments.is_empty()
-    }
-
-    /// Whether the tube is at rest after a step of `dt` seconds; it is then stopped exactly.
-    fn update_rest(&mut self, dt: f64) -> bool {
-        if !self.spec.sleep || self.changes_by_itself() || !self.ties.is_empty() {
-            self.rest.wake();
-            return false;
-        }
-        let at_rest = self.observe_rest(dt);
-        if at_rest {
-            self.doubling.rest();
-            self.stop();
-        }
-        at_rest
     }
 }
 
@@ -73,33 +26,8 @@ impl Agent for Tube {
         "tube"
     }
 
-    /// Advances the tube by exactly `dt` (docs/theory/rod.md, eq. 11–28).
-    ///
-    /// pulls    the springs of the user and of tools on this tube
-    /// step     substeps of its integrator (`Stepper::step`)
-    /// doubling the error in time, estimated now and then
-    /// grips    the mean force of each pull
-    /// rest     whether it may sleep
-    fn step(&mut self, dt: SimSpan, context: &StepContext<'_>) -> Result<StepReport, StepError> {
-        let dt_s = check_span(dt)?;
-        self.check_substep(dt_s)?;
-        self.ties.clear();
-        self.ties.extend(context.anchor_springs().filter_map(|pull| Tie::new(&pull, &self.division)));
-        let before = self.momentum().0;
-        self.stepper.solves = 0;
-        let begins = self.doubling.begins(self.steps, context.me);
-        self.doubling.begin(begins, &self.now, &self.ties, &self.stepper);
-        let taken = self.step_by(dt_s, Stepper::step);
-        let substeps = taken.map_err(|divergence| self.diverged(divergence, dt_s))?;
-        self.repeat_step(dt_s, substeps);
-        self.record_grips(dt_s);
-        self.step_wall(dt_s, context.time + dt).map_err(|divergence| self.diverged(divergence, dt_s))?;
-        self.acceleration = (self.momentum().0 - before) / (self.mass_kg() * dt_s);
-        self.time = context.time + dt;
-        self.steps += 1;
-        self.at_rest = self.update_rest(dt_s);
-        let work = self.segments() as f64 * f64::from(self.stepper.solves);
-        Ok(StepReport { work, substeps, at_rest: self.at_rest })
+    fn stepping(&mut self) -> Stepping<'_> {
+        Stepping::Cluster(self)
     }
 
     fn shift_clock(&mut self, by_s: f64) {
@@ -186,10 +114,6 @@ impl Agent for Tube {
 
     fn archive(&mut self, archive: &mut Archive<'_>) -> Result<(), ArchiveError> {
         self.archive_state(archive)
-    }
-
-    fn member(&mut self) -> Option<&mut dyn ClusterMember> {
-        Some(self)
     }
 
     fn form(&self) -> Option<Arc<CollisionShape>> {

@@ -40,12 +40,12 @@ impl Tube {
         begun
     }
 
-    /// Moves the wall at `rates` for the `h_s` seconds begun, freely where there are none: as far as that makes no energy (eq. 66).
-    pub(in crate::rod) fn end_wall(&mut self, rates: Option<&[DVec3]>, h_s: f64) {
+    /// Moves the wall at `rates` for the `h_s` seconds begun, as far as that makes no energy (eq. 66).
+    pub(in crate::rod) fn end_wall(&mut self, rates: &[DVec3], h_s: f64) {
         let filling = self.filling();
         let Self { wall, now, matter, division, squeeze_m, .. } = self;
         let Some(wall) = wall else { return };
-        let work_j = rates.map_or(0.0, |rates| wall.work_j(rates));
+        let work_j = wall.work_j(rates);
         let before = [now.elastic_j, wall.energy_j(division, filling), wall.muscle_j(division, squeeze_m)];
         let rounding_j = wall.rounding_j(division, filling);
         wall.keep();

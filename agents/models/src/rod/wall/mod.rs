@@ -300,10 +300,10 @@ impl Wall {
         self.kept.clone_from(&self.now.shape);
     }
 
-    /// Moves the sections kept for `h_s` seconds at a share of these rates, or of their free ones.
-    pub fn advance(&mut self, rates: Option<&[DVec3]>, share: f64, h_s: f64) {
-        let Self { now: Sections { shape, rate }, kept, free, .. } = self;
-        rate.copy_from_slice(rates.unwrap_or(free));
+    /// Moves the sections kept for `h_s` seconds at a share of these rates.
+    pub fn advance(&mut self, rates: &[DVec3], share: f64, h_s: f64) {
+        let Self { now: Sections { shape, rate }, kept, .. } = self;
+        rate.copy_from_slice(rates);
         rate.iter_mut().for_each(|rate| *rate *= share);
         shape.iter_mut().zip(&*rate).zip(&*kept).for_each(|((shape, rate), kept)| *shape = *kept + *rate * h_s);
     }

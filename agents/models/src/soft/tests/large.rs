@@ -33,7 +33,9 @@ fn gradients_give_the_velocities_of_a_factor() {
         factor.respond(&mut exact);
         let off = moving().zip(&exact).map(|(vertex, exact)| body.free[vertex].distance(*exact)).fold(0.0, f64::max);
         assert!(off < 2e-6, "step {step}: {off:e} m/s off");
-        body.finish_substep(0.01);
+        let SoftBody { positions, velocities, free, .. } = &mut body;
+        velocities.clone_from(free);
+        positions.iter_mut().zip(&*velocities).for_each(|(x, v)| *x += *v * 0.01);
     }
     let sag_m = 0.1 - body.positions.iter().map(|at| at.z).fold(0.0, f64::max);
     assert!(sag_m > 3e-3, "it sags by {sag_m} m");

@@ -4,6 +4,7 @@ use super::*;
 use crate::conformance::{Suite, check, fall_deviation};
 use crate::soft::{NodeSpacing, SoftError};
 use metachron_contact::AnchorSpring;
+use metachron_contact::step::LoneStepper;
 use metachron_core::{Anchor, Resolution};
 
 /// The spacings that tests go through, metres, as shares of the length of a body.
@@ -169,11 +170,12 @@ fn a_hand_keeps_its_vertex_of_the_skin_through_changes_of_spacing() {
         let (stiffness_n_m, damping_n_s_m, anchor) = (50.0, 1.0, Anchor::Vertex(vertex));
         let pull =
             AnchorSpring { by: None, anchor, target, target_velocity: DVec3::ZERO, stiffness_n_m, damping_n_s_m };
+        let mut stepper = LoneStepper::default();
         for cells in [5.0, 20.0, 8.0, 3.0] {
             body.set_resolution(at(length_m / cells));
             let context = StepContext { hands: &[pull], ..StepContext::alone(AgentId(0), SimTime::ZERO) };
             for _ in 0..200 {
-                body.step(dt(0.01), &context).unwrap();
+                stepper.step(&mut body, dt(0.01), context).unwrap();
             }
             let off = body.seen()[vertex as usize].distance(target);
             assert!(off < 1e-4, "{} in {cells} cells: {off} m from the hand", body.model());

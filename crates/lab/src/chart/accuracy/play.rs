@@ -7,6 +7,7 @@ use super::super::stability::common::plain_tube;
 use super::diagram::Case;
 use cpu_time::ThreadTime;
 use glam::DVec3;
+use metachron_contact::step::LoneStepper;
 use metachron_contact::{Agent, AnchorSpring, StepContext};
 use metachron_core::{AgentId, Body, CurveState, SimSpan, SimTime, Snapshot};
 use metachron_models::rod::Integrator;
@@ -40,9 +41,12 @@ pub(super) fn metre() -> Vec<DVec3> {
 /// An agent and its stepping.
 pub(in super::super) struct Play {
     agent: Box<dyn Agent>,
+    stepper: LoneStepper,
     dt: SimSpan,
     time: SimTime,
     cpu_s: f64,
+    /// Substeps of each fine step, as its integrator makes them.
+    substeps_each: u32,
     substeps: u64,
     steps: u64,
 }
@@ -58,17 +62,19 @@ impl Play {
         let needed = |limit_s: f64| libm::ceil(1.1 * dt_s / limit_s) as u32;
         let limit_s = Tube::new(spec.clone()).ok()?.longest_substep_s();
         spec.substeps = spec.substeps.max(limit_s.map_or(1, needed));
-        Self::of(Box::new(Tube::new(spec).ok()?), dt_s)
+        let substeps = spec.substeps;
+        Self::of(Box::new(Tube::new(spec).ok()?), dt_s, substeps)
     }
 
     /// The soft body of a case; `None` where it cannot be built.
     pub(super) fn soft(spec: SoftSpec, case: &Case) -> Option<Self> {
-        Self::of(Box::new(SoftBody::new(spec).ok()?), case.dt_ms * 1e-3)
+        Self::of(Box::new(SoftBody::new(spec).ok()?), case.dt_ms * 1e-3, 1)
     }
 
-    fn of(agent: Box<dyn Agent>, dt_s: f64) -> Option<Self> {
+    fn of(agent: Box<dyn Agent>, dt_s: f64, substeps_each: u32) -> Option<Self> {
         let dt = SimSpan::from_secs_f64(dt_s)?;
-        Some(Self { agent, dt, time: SimTime::ZERO, cpu_s: 0.0, substeps: 0, steps: 0 })
+        let stepper = LoneStepper::default();
+        Some(Self { agent, stepper, dt, time: SimTime::ZERO, cpu_s: 0.0, substeps_each, substeps: 0, steps: 0 })
     }
 
     /// Steps on for `seconds` under `hands`; whether every step succeeded.
@@ -78,8 +84,8 @@ impl Play {
         let mut sound = true;
         while sound && self.time.as_secs_f64() < until {
             let context = StepContext { hands, ..StepContext::alone(AgentId(0), self.time) };
-            match self.agent.step(self.dt, &context) {
-                Ok(report) => self.substeps += u64::from(report.substeps),
+            match self.stepper.step(&mut *self.agent, self.dt, context) {
+                Ok(report) => self.substeps += u64::from(report.substeps * self.substeps_each),
                 Err(_) => sound = false,
             }
             self.time += self.dt;

@@ -11,7 +11,7 @@ use metachron_contact::detect::ClusterScene;
 use metachron_contact::member::{ContactMemory, Participant};
 use metachron_contact::remote::{MacroStep, PairClock, Pairs, Remotes, computes, part};
 use metachron_contact::step::ClusterStepper;
-use metachron_contact::{Agent, AnchorSpring, Law, Link, Neighbour, StepContext};
+use metachron_contact::{Agent, AnchorSpring, Law, Link, Neighbour, StepContext, Stepping};
 use metachron_core::{AgentId, Body, Grip, PlainLoop, SimSpan, Snapshot, StepError};
 use metachron_geometry::CollisionShape;
 use std::sync::Arc;
@@ -238,7 +238,10 @@ impl Cluster {
         let Self { memory, grips, pairs, remotes, stepper, overlaps } = self;
         let Around { context, law } = around;
         let laws: Vec<(AgentId, Law)> = context.neighbours.iter().map(|other| (other.id, other.law)).collect();
-        let Some(member) = agent.member() else { return agent.step(dt, &context).map(drop) };
+        let member = match agent.stepping() {
+            Stepping::Own(own) => return own.step(dt, &context).map(drop),
+            Stepping::Cluster(member) => member,
+        };
         let id = context.me;
         let mut list = vec![Participant {
             id,

@@ -10,8 +10,9 @@ use super::super::table::Table;
 use super::common::{GRAVITY, plain_tube};
 use super::hanging::Hanging;
 use glam::DVec3;
+use metachron_contact::step::LoneStepper;
 use metachron_contact::{Agent, StepContext};
-use metachron_core::{AgentId, SimSpan, SimTime, Snapshot, StepError};
+use metachron_core::{AgentId, SimSpan, SimTime, Snapshot};
 use metachron_models::rod::Integrator;
 use metachron_models::rod::Tube;
 use metachron_models::rod::{Material, Section, TubeSpec};
@@ -206,16 +207,15 @@ fn fall(case: &Case) -> Fall {
     let given_j = spec.section.mass_per_length_kg_m * GRAVITY * LENGTH_M * LENGTH_M;
     let mut out = Fall { tip: None, energy_rise: 0.0, stretch: 1.0, substeps_per_step: 0.0, refused: false };
     let (Ok(mut tube), Some(dt)) = (Tube::new(spec), SimSpan::from_secs_f64(case.dt_ms * 1e-3)) else { return out };
+    if tube.longest_substep_s().is_some_and(|limit_s| dt.as_secs_f64() > limit_s) {
+        return Fall { refused: true, ..out };
+    }
     let start_j = tube.energy_j();
+    let mut stepper = LoneStepper::default();
     let (mut time, mut steps, mut substeps) = (SimTime::ZERO, 0_u32, 0_u32);
     while time.as_secs_f64() < SECONDS {
-        match tube.step(dt, &StepContext::alone(AgentId(0), time)) {
-            Ok(report) => substeps += report.substeps,
-            Err(error) => {
-                out.refused = steps == 0 && matches!(error, StepError::Unstable { .. });
-                return out;
-            }
-        }
+        let Ok(report) = stepper.step(&mut tube, dt, StepContext::alone(AgentId(0), time)) else { return out };
+        substeps += report.substeps;
         (time, steps) = (time + dt, steps + 1);
         out.substeps_per_step = f64::from(substeps) / f64::from(steps);
         out.stretch = out.stretch.max(tube.stretch());

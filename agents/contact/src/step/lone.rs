@@ -1,0 +1,80 @@
+//! Steps of an agent that meets nobody, as a run makes them: by itself, or in a cluster of one.
+//!
+//! In: an agent, what it sees, the static solids around it. Out: the agent a step later, the forces of springs on it. Never here: other agents.
+
+use super::{ClusterReport, ClusterStepper};
+use crate::agent::{Agent, Stepping};
+use crate::detect::ClusterScene;
+use crate::member::{ClusterMember, ContactMemory, Participant};
+use crate::{Neighbour, StepContext};
+use metachron_core::{Archive, ArchiveError, Grip, PlainLoop, SimSpan, StepError, StepReport};
+
+/// Steps one agent, and remembers what it touches between steps.
+#[derive(Default)]
+pub struct LoneStepper {
+    /// The static solids and the budget around it.
+    pub scene: ClusterScene,
+    stepper: ClusterStepper,
+    memory: ContactMemory,
+    grips: Vec<Grip>,
+    report: ClusterReport,
+}
+
+impl LoneStepper {
+    /// Advances `agent` by exactly `dt`, and stops it where it may rest.
+    ///
+    /// # Errors
+    /// Those of [`ClusterStepper::step`] and of [`crate::OwnSteps::step`].
+    pub fn step(
+        &mut self,
+        agent: &mut dyn Agent,
+        dt: SimSpan,
+        context: StepContext<'_>,
+    ) -> Result<StepReport, StepError> {
+        let member = match agent.stepping() {
+            Stepping::Own(own) => return own.step(dt, &context),
+            Stepping::Cluster(member) => member,
+        };
+        let Self { scene, stepper, memory, grips, report } = self;
+        let id = context.me;
+        let laws: Vec<_> = context.neighbours.iter().map(|Neighbour { id, law, .. }| (*id, *law)).collect();
+        let mut all = [Participant {
+            id,
+            member: member.into(),
+            context,
+            laws: &laws,
+            memory,
+            parts: 1,
+            alone_s: dt.as_secs_f64(),
+            grips,
+        }];
+        *report = stepper.step(scene, &mut all, dt, &PlainLoop)?;
+        let [Participant { member, .. }] = &mut all;
+        let at_rest = stepper.lets_rest() && member.is_calm();
+        if at_rest {
+            member.rest();
+        }
+        Ok(StepReport { work: report.work, substeps: report.fine_steps, at_rest })
+    }
+
+    /// The mean forces of springs and grasps on the agent over the last step.
+    #[must_use]
+    pub fn grips(&self) -> &[Grip] {
+        &self.grips
+    }
+
+    /// What the cluster of one did in the last step.
+    #[must_use]
+    pub fn report(&self) -> &ClusterReport {
+        &self.report
+    }
+
+    /// Writes or reads what the next step starts from.
+    ///
+    /// # Errors
+    /// [`ArchiveError`] for what is no state of one.
+    pub fn archive(&mut self, archive: &mut Archive<'_>) -> Result<(), ArchiveError> {
+        archive.value(&mut self.memory)?;
+        self.stepper.archive(archive)
+    }
+}
