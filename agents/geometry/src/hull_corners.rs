@@ -30,7 +30,7 @@ pub fn hull_corners(points: &[DVec3], tolerance_m: f64) -> Vec<DVec3> {
             Some(Face { corner: a, normal: (b - a).cross(c - a).try_normalize()?, farthest: None })
         });
         let mut faces: Vec<_> = faces.collect();
-        // a hull only grows: what is inside of this one is inside of the next; corners stay where they are
+        // a hull only grows: a point inside this one is inside the next; corners stay where they are
         outside.retain(|at| kept.binary_search(at).is_err());
         outside.retain(|&at| faces.iter_mut().fold(false, |is_outside, face| face.note(at, centred[at]) | is_outside));
         let highest_m = faces.iter().filter_map(|face| Some(face.farthest?.height_m)).fold(0.0, f64::max);

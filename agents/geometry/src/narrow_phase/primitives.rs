@@ -265,7 +265,7 @@ impl Piece<'_> {
 }
 
 impl Strand<'_> {
-    /// Whether a span may be in a box: with what is behind it by its thickness.
+    /// Whether a span may be in a box: the span's box is grown by its thickness.
     fn is_in(&self, around: Aabb) -> bool {
         let is_near = |span: usize| {
             let [a, b] = self.ends(span);

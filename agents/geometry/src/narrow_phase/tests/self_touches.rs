@@ -1,4 +1,4 @@
-//! What deforms against itself: tubes, sheets and solids against closed forms and brute force.
+//! Deformables against themselves: tubes, sheets and solids against closed forms and brute force.
 
 use super::surfaces::skin_of;
 use super::*;

@@ -133,7 +133,7 @@ proptest! {
                 let found = first(&a, &b, reach_m);
                 let until = found.as_ref().map_or(1.0, |(share, _)| *share);
                 let (mut room, mut other) = (Default::default(), Default::default());
-                // what starts in or through another is told at once, or, where it is deep inside, by nobody
+                // shapes that start through each other are reported at once, or, deep inside each other, not at all
                 let starts = all(&a.within(0.0, &mut room).unwrap(), &b.within(0.0, &mut other).unwrap(), reach_m);
                 if until == 0.0 || starts.iter().any(|touch| touch.gap_m <= reach_m) {
                     continue;
