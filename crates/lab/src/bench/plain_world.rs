@@ -11,7 +11,7 @@ use rapier3d::geometry::{ColliderBuilder, SharedShape};
 use rapier3d::parry::math::{Pose, Rotation, Vec3};
 use rapier3d::pipeline::PhysicsWorld;
 
-/// What a world is made with.
+/// The settings that a world is made with.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Frame {
     pub settings: Settings,

@@ -69,7 +69,7 @@ pub(super) struct Row {
 struct Case {
     /// The name of the scene, for `--only`.
     scene: &'static str,
-    /// What follows it in the name of the test; empty for a scene of one case.
+    /// The end of the name of the test, after the scene; empty for a scene of one case.
     variant: String,
     seconds: f64,
     stage: Box<dyn Fn() -> anyhow::Result<Stage>>,
@@ -92,7 +92,7 @@ impl Case {
         Self { scene, variant: variant.into(), seconds, stage: Box::new(stage), levels: &LEVELS }
     }
 
-    /// The same without time for a solve: rapier3d steps what it can.
+    /// The same without time for a solve: rapier3d steps the bodies that it can step.
     fn hurried(self) -> Self {
         Self { levels: &HURRIED, ..self }
     }

@@ -42,7 +42,7 @@ pub(super) struct Frame {
     /// Things in view, and those of them that were left out.
     pub(super) objects: usize,
     pub(super) holes: usize,
-    /// Levels that changed, and those that changed back within three frames.
+    /// Changes of level, and changes that were reversed within three frames.
     pub(super) changes: usize,
     pub(super) reversals: usize,
     /// Polygons that were drawn.

@@ -11,7 +11,7 @@ use metachron_lod::control::Policy;
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct OverRounds {
     median: f64,
-    /// Half of the range: what a median may differ by for no reason.
+    /// Half of the range: a difference of medians up to this has no cause.
     spread: f64,
 }
 
@@ -60,7 +60,7 @@ impl Numbers {
     }
 }
 
-/// Error of 19 of 20 predictions over what is allowed.
+/// Error of 19 of 20 predictions over the allowed one.
 fn error(row: &Row) -> f64 {
     error_over_allowed(row.model_error95, row.spread95)
 }
