@@ -3,8 +3,8 @@
 //! In: forces of springs and joints with the places where they act. Out: rows that resist changes of a spin. Never here: forces themselves.
 //! Theory: docs/theory/clusters.md, eq. 22.
 //!
-//! A force f at an arm r turns a body back with the stiffness f·r, which no row knows. What is light and holds much swings by it faster
-//! than steps can follow, and would be thrown. Where h² of that stiffness is more than steps bear, so much inertia is added across the
+//! A force f at an arm r turns a body back with the stiffness f·r, which no row knows. A light body that holds much swings by it faster
+//! than steps can follow, and would be thrown. Where h² of that stiffness is more than steps bear, inertia is added across the
 //! arm: it takes no energy, and a turn that steps can follow has none of it.
 
 use crate::constraint::{ConstraintRows, End, FineStep, ForceAtArm, GeometricStiffness, RowOwner};

@@ -1,6 +1,7 @@
-//! What never changes around all clusters of a scene: static solids, joints, how deep contacts rest, how far their solves go.
+//! The fixed part of a scene around all clusters: static solids, joints, how deep contacts rest, how far their solves go.
 //!
-//! In: the obstacles and joints of a scene. Out: the same, ready for searches; shared by all clusters. Never here: what moves.
+//! In: the obstacles and joints of a scene. Out: the same, ready for searches; shared by all clusters. Never here:
+//! moving bodies.
 
 use crate::joint::{Joint, JointError};
 use crate::lists::refill;

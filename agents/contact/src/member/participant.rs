@@ -1,4 +1,4 @@
-//! A body in its cluster's step: what it sees and remembers, how far it is in its own step, and what others see of it in a fine step.
+//! A body in its cluster's step: its view and memory, how far it is in its own step, and its motion as others see it in a fine step.
 //!
 //! In: a member, its context, its memory; its velocities at the start of its step and without contact, impulses. Out: which others it may touch, the
 //! velocities at which its place moves. Never here: contacts, the problem. Theory: docs/theory/clusters.md, section 9 (eq. 24 to 26).
@@ -17,7 +17,7 @@ pub struct Participant<'a> {
     pub id: AgentId,
     /// The body.
     pub member: GuardedMember<'a>,
-    /// What it sees at the start of the macro step.
+    /// Its surroundings at the start of the macro step.
     pub context: StepContext<'a>,
     /// The laws of its pairs other than [`Law::Cluster`], by rising numbers: a pair with one is not the cluster's.
     pub laws: &'a [(AgentId, Law)],
@@ -91,7 +91,7 @@ pub(crate) struct Progress {
     pub v_so_far: Vec<DVec3>,
     /// û: the velocities at which its place moves in this fine step without the impulses sought.
     pub v_predicted: Vec<DVec3>,
-    /// The momentum that it does not answer yet (clusters.md, eq. 16a): what is solved for together with the impulses sought. Empty for none.
+    /// The momentum that it does not answer yet (clusters.md, eq. 16a), solved for together with the impulses sought. Empty for none.
     pub unanswered: Vec<DVec3>,
     /// û with the impulses that the last solve found.
     pub v_solved: Vec<DVec3>,
@@ -145,7 +145,7 @@ impl Progress {
         (self.touched, self.held) = (true, true);
     }
 
-    /// Adds what known impulses change its velocities by within its step; none where there are none.
+    /// Adds the changes of its velocities by known impulses within its step; none where there are none.
     pub fn push(&mut self, change: &[DVec3]) {
         change.clone_into(&mut self.dv_known);
         self.dv_free.iter_mut().zip(change).for_each(|(dv_free, change)| *dv_free += *change);
@@ -159,7 +159,7 @@ impl Progress {
         self.touched = true;
     }
 
-    /// Finds v̄(p), û and what they leave unanswered, of the fine step that begins (eq. 24).
+    /// Finds v̄(p), û and the momentum that they leave unanswered, of the fine step that begins (eq. 24).
     pub fn look(&mut self, member: &dyn ClusterMember) {
         self.dv_impacts.clear();
         self.dx_impacts.clear();

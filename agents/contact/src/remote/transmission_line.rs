@@ -150,7 +150,7 @@ impl Line {
         self.arriving = None;
     }
 
-    /// The step that began is made, with what [`Self::arriving`] said.
+    /// Takes over the wave that [`Self::arriving`] found, as the step is made.
     pub fn settle(&mut self) {
         self.arrived = self.arriving.take().unwrap_or(self.arrived);
     }
