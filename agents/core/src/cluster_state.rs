@@ -49,7 +49,7 @@ impl SolveLevel {
 /// How a cluster was solved. Counts are those of all steps that its leader has led so far.
 #[derive(Debug, Clone, Copy, PartialEq, Default, serde::Serialize, serde::Deserialize)]
 pub struct ClusterSolves {
-    /// Contacts of the last step, also of those that bear nothing.
+    /// Contacts of the last step, unloaded ones included.
     pub contacts: u32,
     /// Problems solved.
     pub problems: u64,

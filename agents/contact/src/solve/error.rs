@@ -1,4 +1,4 @@
-//! Why a contact problem is refused: what is wrong, and where.
+//! Why a contact problem is refused: the fault, and its place.
 //!
 //! In: nothing. Out: one enum of errors. Never here: the checks themselves (`validate.rs`).
 
@@ -19,7 +19,7 @@ pub enum ProblemError {
     Member {
         /// Its place in the problem.
         member: usize,
-        /// What about it.
+        /// Its fault.
         reason: &'static str,
     },
     /// The matrix of a member has no Cholesky factor.
@@ -41,7 +41,7 @@ pub enum ProblemError {
     Contact {
         /// Its place in the problem.
         contact: usize,
-        /// What about it.
+        /// Its fault.
         reason: &'static str,
     },
     /// The data of a joint's row are not those of one.
@@ -49,7 +49,7 @@ pub enum ProblemError {
     Row {
         /// Its place in the problem.
         row: usize,
-        /// What about it.
+        /// Its fault.
         reason: &'static str,
     },
 }
