@@ -63,7 +63,7 @@ pub struct ClusterSolves {
     pub level: SolveLevel,
     /// Factors of the last step.
     pub last_factors: u32,
-    /// The most by which an answer of the last step misses the laws, m/s, ≥ 0; infinite where numbers overflowed.
+    /// The greatest miss of laws and momentum by answers of the last step, m/s, ≥ 0; infinite where numbers overflowed.
     pub miss_m_s: f64,
     /// The deepest overlap of the last step, metres, ≥ 0.
     pub depth_m: f64,

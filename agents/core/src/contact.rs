@@ -1,4 +1,4 @@
-//! The contacts and grasps of an agent, as its state publishes them.
+//! The contacts of an agent and the efforts of its joints, as its state publishes them.
 
 use crate::{AgentId, SimTime};
 use glam::DVec3;

@@ -1,4 +1,4 @@
-//! Promises about bits: refused steps, repeated runs, memory, what is not finite.
+//! Promises about bits: refused steps, repeated runs, memory, states that are not finite.
 //!
 //! In: a [`Suite`]. Out: the promises that were broken. Never here: promises about physics ([`super::physics`]).
 
@@ -58,7 +58,7 @@ fn busy_step(suite: &Suite<'_>, run: &mut Run<'_>, i: u32) -> Result<(), String>
     run.must_step(suite.dt, suite.pull.filter(|_| pulled).as_slice())
 }
 
-/// What is saved and read back goes on with the same bits.
+/// A saved state that is read back goes on with the same bits.
 pub(super) fn archive(suite: &Suite<'_>) -> Result<(), String> {
     stepped(suite, archive_by)
 }

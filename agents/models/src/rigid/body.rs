@@ -1,6 +1,6 @@
 //! The rigid body agent.
 //!
-//! In: a [`RigidSpec`], steps. Out: a new [`Motion`] and a snapshot. Never here: what it touches ([`super::member`] is its part in a cluster).
+//! In: a [`RigidSpec`], steps. Out: a new [`Motion`] and a snapshot. Never here: contacts ([`super::member`] is its part in a cluster).
 
 use super::mass_properties::MassDistribution;
 use super::member::Unknowns;
@@ -32,7 +32,7 @@ pub struct RigidBody {
     pub(super) at_rest: bool,
     pub(super) calm_s: f64,
     pub(super) steps: u64,
-    /// What it is in a contact cluster.
+    /// Its unknowns in a contact cluster.
     pub(super) unknowns: Unknowns,
 }
 

@@ -35,7 +35,7 @@ pub(super) struct Unknowns {
     /// By how much its free motion in the step begun raises its energy, J.
     rise_j: f64,
     quiet_before: bool,
-    /// What its attachments that may tear gave in the last step.
+    /// The forces of its attachments that may tear in the last step.
     attached: Vec<OwnAttachment>,
     kept: Kept,
 }
@@ -58,7 +58,7 @@ struct Kept {
 
 /// Velocities differ by less than this through rounding alone, m/s and rad/s.
 const ROUNDING_M_S: f64 = 1e-9;
-/// What a section may change by in a step as a share of its radius: its forces are linear in it.
+/// The most by which a section may change in a step, as a share of its radius: its forces are linear in it.
 const WALL_REACH: f64 = 0.05;
 /// The strain of a step in which its free motion raises its energy: it is made in two.
 const RISES: f64 = 2.0;
@@ -212,7 +212,7 @@ impl ClusterMember for Tube {
         let spins = v.iter().skip(1).step_by(2).map(|w| w.length_squared()).fold(0.0, f64::max).sqrt();
         let ends = v.iter().step_by(2).zip(v.iter().skip(2).step_by(2));
         let pulls = ends.zip(&self.division.length).map(|((a, b), length_m)| a.distance_squared(*b) / length_m.powi(2));
-        // what a segment turns or stretches by, as a share of it
+        // the turn or stretch of a segment, as a share of it
         let bent = spins.max(pulls.fold(0.0, f64::max).sqrt()) * h_s / TURN_MAX_RAD;
         let changes = bent.max(fastest_m_s * h_s / reaches_m);
         // an energy that is no number rises too
@@ -259,7 +259,7 @@ impl ClusterMember for Tube {
     fn end(&mut self, v: &[DVec3], h_s: f64, touched: bool) -> Result<(), StepError> {
         let before = self.momentum().0;
         let unknowns = std::mem::take(&mut self.unknowns);
-        // what it gained in parts is what it would have gained but for rounding
+        // velocities that it gained in parts are those of its free motion but for rounding
         let gained = v.iter().zip(&unknowns.free).all(|(v, free)| v.distance(*free) <= ROUNDING_M_S);
         let is_free = !touched && gained && self.integrates_free_motion(h_s);
         let (of_rod, of_wall) = v.split_at(self.now.u.len());
@@ -337,7 +337,7 @@ impl Tube {
         (axes.conjugate() * outward).truncate().normalize_or_zero()
     }
 
-    /// Adds what the skin moves by where the sections of two nodes widen and flatten: in and out, and along itself, for it does not stretch
+    /// Adds the motion of the skin where the sections of two nodes widen and flatten: in and out, and along itself, for it does not stretch
     /// as it flattens (eq. 67).
     fn skin_side(&self, side: Side, nodes: [usize; 2], share: f64, outward: DVec3) -> Side {
         let mut terms = [SideTerm::weighted(0, 0.0); SIDE_TERMS_MAX];
@@ -370,7 +370,8 @@ impl Tube {
         self.spec.integrator != Integrator::ImplicitEuler && self.check_substep(h_s).is_ok()
     }
 
-    /// Notes what the attachments that may tear and never yield give at the end of a step: implicit Euler has given that all along it.
+    /// Notes the forces of attachments that may tear and never yield at the end of a step: implicit Euler has given
+    /// these all along it.
     fn note_attachments(&mut self) {
         let Self { spec, springs, now, unknowns, .. } = self;
         let attached = &mut unknowns.attached;
@@ -408,7 +409,7 @@ impl Tube {
             if rise_j > 0.0 {
                 energy_limiter::remove(rise_j, &mut stepper.next, setting.matter, setting.division);
             }
-            // what follows has no two steps of one kind before it
+            // the next step has no two steps of one kind before it
             stepper.past.forget();
             let finite = stepper.next.is_finite();
             if finite {
@@ -454,7 +455,7 @@ impl Response for Tube {
 }
 
 impl Unknowns {
-    /// Writes or reads what is known of it between steps.
+    /// Writes or reads the state that is known between steps.
     pub(super) fn archive(&mut self, archive: &mut Archive<'_>) -> Result<(), ArchiveError> {
         archive_values!(archive, self.places, self.radii_m, self.present, self.quiet_before)
     }

@@ -68,7 +68,7 @@ pub struct Stepper {
     pub(super) solves: u32,
 }
 
-/// What may end a trial substep without a next state.
+/// The conditions that may end a trial substep without a next state.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Trial {
     /// Whether no segment may turn further than [`TURN_MAX_RAD`].
@@ -263,7 +263,8 @@ impl Stepper {
         after - before - work - ENERGY_SLACK * at_work - rounding
     }
 
-    /// Stores what rules of second order need of the substep that ended at `now`, where nothing made velocities jump.
+    /// Stores the history that rules of second order need of the substep that ended at `now`, where nothing made
+    /// velocities jump.
     fn remember(&mut self, now: &RodState, integrator: Integrator, untied: bool, h: f64) {
         if !matches!(integrator, Integrator::Bdf2 | Integrator::EnergyMomentum) {
             return;

@@ -1,6 +1,6 @@
 //! The tube: one divided rod, its attachments, its radius, its rest.
 //!
-//! In: a [`TubeSpec`], pressures. Out: what it is made of, its radius, its energy. Never here: its turns (`agent.rs`), how a step is solved
+//! In: a [`TubeSpec`], pressures. Out: its matter, its radius, its energy. Never here: its turns (`agent.rs`), how a step is solved
 //! ([`super::step`]), contact, the transfer of a state to another division ([`super::remesh`]). Theory: docs/theory/rod.md.
 
 mod agent;
@@ -58,7 +58,7 @@ pub struct Tube {
     /// Own time at which its wave and its pressure start, seconds.
     pub(super) script_from_s: f64,
     pub(super) steps: u64,
-    /// What it is in a contact cluster.
+    /// Its unknowns in a contact cluster.
     pub(super) unknowns: Unknowns,
 }
 
@@ -170,7 +170,7 @@ impl Tube {
     }
 
     /// Mechanical energy, joules: kinetic, elastic, attachments, and gravitational, zero at the origin; of a tube whose wall gives also
-    /// that of the wall and of what fills it, zero in the undeformed tube.
+    /// that of the wall and of its filling, zero in the undeformed tube.
     #[must_use]
     pub fn energy_j(&self) -> f64 {
         let rod_j = energy(&self.now, &self.springs);
@@ -306,7 +306,7 @@ impl Tube {
 }
 
 impl Tube {
-    /// Begins from a state that it was set to, or divided anew: what steps before it said is of another.
+    /// Begins from a state that it was set to, or divided anew: the history of steps before is of another.
     pub(super) fn begin_anew(&mut self) {
         self.stepper.forget();
         self.present_velocities();

@@ -14,7 +14,7 @@ use metachron_geometry::Carried;
 pub(super) struct VertexSpring {
     /// The pulling agent; `None` for a user spring.
     pub by: Option<AgentId>,
-    /// What carries the point that it pulls at.
+    /// The nodes that carry the point that it pulls at.
     pub at: Carried,
     /// Position of the other end at the start of the substep, metres, and its velocity, m/s.
     target: DVec3,

@@ -1,6 +1,6 @@
 //! A soft body's own estimate of its error in time, metres: from time to time steps are repeated with twice the substeps.
 //!
-//! In: the body before a step and after it. Out: what the steps of a tenth of a second do wrong. Never here: errors in space
+//! In: the body before a step and after it. Out: the error of the steps of a tenth of a second. Never here: errors in space
 //! ([`crate::soft::fe_mesh`]), any change of its state. Theory: docs/theory/control.md, eq. 31, 32.
 
 use super::anchor_springs::VertexSpring;

@@ -1,4 +1,4 @@
-//! What a tube says of its own error, against independent answers.
+//! A tube's estimate of its own error, against independent answers.
 
 use super::*;
 use glam::DVec3;
@@ -18,8 +18,8 @@ fn apart(a: &Tube, b: &Tube) -> f64 {
     a.state().x.iter().zip(&b.state().x).map(|(a, b)| a.distance(*b)).fold(0.0, f64::max)
 }
 
-/// What a tube says that its steps do wrong in a tenth of a second, `seconds` after it was let go, and how far it is from where
-/// another rule in fine steps takes the same state.
+/// A tube's estimate of the error of its steps in a tenth of a second, `seconds` after it was let go, and how far it is
+/// from where another rule in fine steps takes the same state.
 fn estimated_and_true(
     integrator: Integrator,
     (segments, dt_ms): (usize, f64),
@@ -51,7 +51,7 @@ fn the_error_in_time_is_estimated_within_a_factor_of_five_and_mostly_of_two() {
                 let [said, truth] = estimated_and_true(integrator, (16, dt_ms), motion);
                 let name = integrator.name();
                 let ratio = said / truth;
-                // it is rather too great than too small: what two steps do wrong is partly taken back by others
+                // the estimate is rather too great than too small: errors of two steps are partly taken back by others
                 assert!(ratio > 1.0 / 3.0 && ratio < 5.0, "{name} {dt_ms} ms {motion:?}: {said} m for {truth} m");
                 ratios.push(ratio);
             }

@@ -17,7 +17,7 @@ fn swinging(integrator: Integrator, segments: usize, substeps: u32) -> Tube {
     Tube::new(spec).unwrap()
 }
 
-/// μ g L²/2, J: what a fall of the cable's middle by half its length gives.
+/// μ g L²/2, J: the energy of a fall of the cable's middle by half its length.
 fn scale_j(tube: &Tube) -> f64 {
     tube.mass_kg() * 9.81 * tube.length_m() / 2.0
 }
@@ -47,7 +47,7 @@ fn second_order_methods_follow_the_swinging_cable() {
         let (rms, least, most, substeps) = swing_error(&mut swinging(integrator, 32, 4));
         let name = integrator.name();
         println!("{name}: RMS {rms:e} m, energy {least:e} … {most:e}, {substeps} substeps a step");
-        // the wanted bounds; 4.4e-4 m is what 32 links leave of space alone (`link_chain_error_vs_extrapolated`)
+        // the wanted bounds; 4.4e-4 m is the error of 32 links in space alone (`link_chain_error_vs_extrapolated`)
         assert!(rms <= 5e-4, "{name}: {rms} m");
         assert!(least >= -loses && most <= 1e-6, "{name}: energy from {least} to {most}");
     }
@@ -173,7 +173,7 @@ fn an_explicit_tube_that_stretches_on_its_way_takes_shorter_substeps_and_hangs_a
     println!("limit {limit_s:e} s at rest, stretched {most:.3} times, {substeps} substeps, {apart_m:e} m apart");
     assert!(limit_s > 2e-3 && limit_s < 2e-3 * most, "{limit_s} s, stretched {most} times");
     assert!(substeps > 3000, "{substeps} substeps in 3000 steps");
-    assert!(apart_m < 1e-7, "{apart_m} m"); // what is left of the swing after 6 s: 1.2e-9 measured
+    assert!(apart_m < 1e-7, "{apart_m} m"); // the rest of the swing after 6 s: 1.2e-9 measured
 }
 
 #[test]

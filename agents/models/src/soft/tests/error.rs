@@ -1,4 +1,4 @@
-//! What a soft body says of its own error, against closed forms and the same body in fine steps.
+//! A soft body's estimate of its own error, against closed forms and the same body in fine steps.
 
 use super::*;
 use metachron_core::DRIFT_S;
@@ -32,7 +32,7 @@ fn the_error_of_falling_is_that_of_the_closed_form() {
 
 #[test]
 fn the_error_of_a_swing_is_estimated_within_a_factor_of_three_but_for_immediate_reversals() {
-    // a solid turns round within the tenth of a second: what two steps say of that is too little
+    // a solid turns round within the tenth of a second: two steps tell too little of that
     let ends = vec![Side::Left, Side::Right];
     let cases = [
         (rope(), 1e6, vec![Side::Left], 1.0 / 3.0),
