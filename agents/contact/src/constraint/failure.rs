@@ -18,7 +18,7 @@ use glam::DVec3;
 const WHOLE: f64 = 0.5;
 /// A row whose force is this share of the most that it gives has yielded, but for the accuracy of a solve.
 const ALL_SHARE: f64 = 1.0 - 1e-6;
-/// A spring slips by no less than the stretch for this share of its greatest force: less is the accuracy of a solve.
+/// A spring has not slipped within the stretch for this share of its greatest force: that is the accuracy of a solve.
 const SLIP_SHARE: f64 = 1e-6;
 
 /// An attachment that tore at the end of a macro step, or began to yield in it.

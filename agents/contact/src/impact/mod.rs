@@ -21,7 +21,7 @@ use metachron_core::{DisjointSets, ParallelFor, StepError};
 /// By which share of the speed that an impact loses its contact gives way (eq. 5), and the least by which it does, m/s.
 const YIELD_SHARE: f64 = 3e-5;
 const YIELD_MIN_M_S: f64 = 2e-6;
-/// The miss at which the solve ends, in the velocity by which contacts give way.
+/// The miss at which the solve ends, in multiples of the velocity by which contacts give way.
 const MISS_YIELDS: f64 = 0.1;
 
 /// The impacts of a fine step.

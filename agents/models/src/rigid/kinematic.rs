@@ -237,7 +237,7 @@ impl Agent for KinematicBody {
         self.script.iter_mut().for_each(|script| script.begin_later(by_s));
     }
 
-    /// Its place alone: its motion is left to its leader.
+    /// Its place alone: its motion follows from its goal or keyframes.
     fn set_motion(&mut self, set: &SetMotion) -> bool {
         let BodyPose { position, rotation } = self.now.at;
         let origin_m = set.position_m.unwrap_or(position - rotation * self.com_local);

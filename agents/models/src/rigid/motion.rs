@@ -23,7 +23,7 @@ pub(super) struct Motion {
     pub angular: DVec3,
 }
 
-/// The forces on a body that nothing touches.
+/// Gravity and restraint of a body that nothing touches.
 #[derive(Debug, Clone, Copy, Default)]
 pub(super) struct Flight {
     /// m/s², along axes that are not locked.

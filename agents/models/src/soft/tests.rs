@@ -1,4 +1,4 @@
-//! The laws of a soft body, against closed forms.
+//! The mechanics of a soft body, against closed forms.
 
 mod beam;
 mod embedded;

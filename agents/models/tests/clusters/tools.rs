@@ -1,4 +1,4 @@
-//! Tools and led bodies in clusters: what a drive presses with, what jaws hold, what a led body pushes.
+//! Tools and led bodies in clusters: the press of a drive, the hold of jaws, the push of a led body.
 
 use crate::bodies::{block, cube, rigid, sheet};
 use crate::table::{GRAVITY, Table, placed, spring};

@@ -1,4 +1,4 @@
-//! What bodies and static solids say about their contacts: groups, rules of pairs, sensors, friction about normals. Against closed forms.
+//! The contact traits of bodies and static solids: groups, rules of pairs, sensors, friction about normals. Against closed forms.
 
 use crate::bodies::{rigid, solid};
 use crate::joints::{G, state};
@@ -141,7 +141,7 @@ fn a_ball_rebounds_by_the_restitution_that_its_pairs_rule_makes() {
     }
 }
 
-/// What a body has sensed of one partner, after some seconds.
+/// The touch of a body with one partner that senses it or that it senses, after some seconds.
 fn sensed(table: &mut Table, body: usize, with: ContactPartner, seconds: f64) -> SensorTouch {
     table.play(seconds);
     let found: Vec<_> = table.sensed(body).iter().filter(|touch| touch.with == with).collect();
