@@ -241,11 +241,11 @@ impl PoseGoal {
 /// Another place or velocity for an agent. A field that is `None` stays as it is.
 #[derive(Debug, Clone, Copy, PartialEq, Default, serde::Serialize, serde::Deserialize)]
 pub struct SetMotion {
-    /// Where the origin of a rigid body's axes is, or the centre of mass of a body that bends, metres.
+    /// Where the origin of a rigid body's axes is, or the centre of mass of a deformable, metres.
     pub position_m: Option<DVec3>,
-    /// The rotation of a rigid body, from its axes to the world's; by how much a body that bends is turned about its centre of mass.
+    /// The rotation of a rigid body, from its axes to the world's; by how much a deformable is turned about its centre of mass.
     pub rotation: Option<DQuat>,
-    /// The velocity of its centre of mass, m/s: of a body that bends, of all its matter.
+    /// The velocity of its centre of mass, m/s: of a deformable, of all its matter.
     pub velocity_m_s: Option<DVec3>,
     /// Its spin about its centre of mass, world axes, rad/s.
     pub spin_rad_s: Option<DVec3>,

@@ -114,7 +114,7 @@ fn rigid(
     let Inertia::Rigid { inverse_mass, inverse_inertia } = member.snapshot.inertia else { return };
     let Some(state) = settled(member, members, at) else { return };
     in_flight(member, members, |_, _, dj, _| sum.add_in_flight(dj));
-    // free rotation keeps angular momentum and energy: both are those of the published rotation
+    // free rotation keeps angular momentum and energy: both are as in the published rotation
     let is_locked = |answers: DVec3| [0, 1, 2].map(|axis| answers[axis] == 0.0);
     let turns = DVec3::new(inverse_inertia.x_axis.x, inverse_inertia.y_axis.y, inverse_inertia.z_axis.z);
     let inertia = inverse_of_free(inverse_inertia, is_locked(turns));

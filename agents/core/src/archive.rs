@@ -155,7 +155,7 @@ impl<'a> Archive<'a> {
     /// A part that may be missing: `make` makes the one that `visit` reads into, where there is none.
     ///
     /// # Errors
-    /// Those of `visit`; [`ArchiveError::Malformed`].
+    /// The errors of `visit`; [`ArchiveError::Malformed`].
     pub fn option<T>(
         &mut self,
         part: &mut Option<T>,
@@ -174,7 +174,7 @@ impl<'a> Archive<'a> {
     /// A list of parts that `visit` reads into: the parts that are there, and as many more as `make` has to make.
     ///
     /// # Errors
-    /// Those of `visit`; [`ArchiveError::Malformed`].
+    /// The errors of `visit`; [`ArchiveError::Malformed`].
     pub fn list<T>(
         &mut self,
         parts: &mut Vec<T>,
@@ -233,7 +233,7 @@ impl<'a> Archive<'a> {
     /// A part with a name, which an error then says.
     ///
     /// # Errors
-    /// Those of `visit`.
+    /// The errors of `visit`.
     pub fn within(
         &mut self,
         part: impl Display,

@@ -9,7 +9,7 @@ use glam::DVec3;
 pub struct Removed {
     /// How many of its cells.
     pub cells: u32,
-    /// How many triangles its skin has lost, net of those that close it over the inside: below zero where these are more.
+    /// How many triangles its skin has lost, net of new ones that close it: below zero where these are more.
     pub triangles: i32,
     /// Their mass, kg.
     pub mass_kg: f64,

@@ -176,7 +176,7 @@ impl Tetrahedra {
     }
 }
 
-/// Those of the faces of all cells that one cell alone has.
+/// The faces that only one cell has, of the faces of all cells.
 #[must_use]
 pub fn lone_faces(mut faces: Vec<[u32; 3]>) -> Vec<[u32; 3]> {
     let mut cells: HashMap<[u32; 3], u32> = HashMap::with_capacity(faces.len());

@@ -1,11 +1,11 @@
-//! How a body that bends is moved as a whole: turned and shifted about its centre of mass, with the velocities of a rigid body.
+//! How a deformable is moved as a whole: turned and shifted about its centre of mass, with the velocities of a rigid body.
 //!
 //! In: where its matter is, where it is to go. Out: a map of points and velocities. Never here: which body may be moved.
 
 use glam::{DQuat, DVec3};
 use metachron_contact::SetMotion;
 
-/// A rigid motion of a body that bends.
+/// A rigid motion of a deformable.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct WholeMotion {
     centre_m: DVec3,

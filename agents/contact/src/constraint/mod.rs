@@ -44,7 +44,7 @@ pub(crate) struct RowOwner {
     pub key: u32,
     /// The two ends of the pull, where it is a force by which a user or an agent holds a body.
     pub hold: Option<Holders>,
-    /// The force above which its tie tears, N, and the most that it gives: infinite of one that never tears or yields, and of rows that hold turns.
+    /// The force above which its tie tears, N, and the most that it gives: infinite for a tie that never tears or yields, and for rows of turns.
     pub tears_above_n: f64,
     pub yields_above_n: f64,
     /// The axes in which it keeps its slip.
@@ -56,7 +56,7 @@ pub(crate) struct RowOwner {
 }
 
 impl RowOwner {
-    /// Of the first row of a tie that holds no member, neither tears nor yields and owes nothing.
+    /// The owner of the first row of a tie that holds no member, neither tears nor yields and owes nothing.
     pub fn new(member: usize, other: Option<usize>, partner: Partner) -> Self {
         let (tears_above_n, yields_above_n) = (f64::INFINITY, f64::INFINITY);
         let (hold, frame, own, owes) = (None, Frame::WORLD, None, false);
@@ -78,7 +78,7 @@ impl RowOwner {
     }
 }
 
-/// The two ends of a force, as each is told to the other: `None` is the user.
+/// The two ends of a force, as each is reported to the other: `None` is the user.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Holders {
     pub side_0: AgentId,

@@ -272,7 +272,7 @@ impl Search {
         found.map_or(true, |at| way_m > self.looks[at].clear_m)
     }
 
-    /// Takes up those of the touches found that may close.
+    /// Takes up the touches found that may close.
     fn take(&mut self, round: &Round<'_, '_>, pair: Pair<'_>, found: Found<'_>) {
         let Self { contacts, owners, touches, looks, known, moved, thinning, .. } = self;
         thinning.begin_pair();

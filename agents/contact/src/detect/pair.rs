@@ -71,9 +71,9 @@ pub(crate) struct Round<'a, 'p> {
 /// By which velocities a place is judged.
 #[derive(Clone, Copy)]
 pub(crate) enum Judge {
-    /// Those at the start and without contact, each side's alone too.
+    /// By velocities at the start and without contact, each side's alone too.
     Predicted,
-    /// Those of a solution.
+    /// By velocities of a solution.
     Solved,
 }
 

@@ -53,7 +53,7 @@ impl Recycled {
         self.touches.clear();
     }
 
-    /// Fills `into` with the places of a pair: those known, or else all that `find` gives within the reach that it is told.
+    /// Fills `into` with the places of a pair: the known ones, or else all that `find` gives within the reach passed to it.
     pub(super) fn touches(
         &mut self,
         pair: &SolidPair<'_>,

@@ -34,7 +34,7 @@ pub struct ClusterScene {
 #[derive(Debug, Default)]
 struct StaticTree {
     tree: Bvh,
-    /// The numbers of the solids in the tree, by its leaves, and of those without an end, as a plane.
+    /// The numbers of the solids in the tree, by its leaves, and of endless ones, as a plane.
     bounded: Vec<u32>,
     endless: Vec<u32>,
 }
@@ -261,7 +261,7 @@ mod tests {
         obstacles.insert(100, Obstacle::new("floor", Solid::Plane));
         let scene = ClusterScene::new(&obstacles).unwrap();
         let mut near = vec![7];
-        // up to the touch, as single precision tells it
+        // up to the touch, to single precision
         let around = Aabb { low: DVec3::new(10.75, -1.0, -1.0), high: DVec3::new(13.25, 1.0, 1.0) };
         scene.statics_near(around, &mut near);
         let meets = |solid: &StaticSolid| solid.bounds().meets(around);

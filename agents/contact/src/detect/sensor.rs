@@ -131,7 +131,7 @@ impl Point {
     }
 }
 
-/// A point of the skin, in the solid's own axes, of one that is made of points.
+/// A point of the skin of a solid that is made of points, in the solid's own axes.
 fn corner(solid: &Solid) -> Option<DVec3> {
     match solid {
         Solid::Hull { points_m } => points_m.first().copied(),

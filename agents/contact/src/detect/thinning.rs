@@ -120,7 +120,7 @@ fn retain_from<T>(from: usize, list: &mut Vec<T>, is_kept: &[bool]) {
     list.retain(|_| marks.next() == Some(&true));
 }
 
-/// Marks those of a patch's contacts that bore most in the last step: which of them bear is then settled as steps go on.
+/// Marks the contacts of a patch that bore most in the last step: which of them bear is then settled as steps go on.
 fn keep_loaded(group: &[usize], loads_n: &[f64], loaded: &mut Vec<usize>, is_kept: &mut [bool]) {
     refill(loaded, group.iter().copied().filter(|at| loads_n[*at] > 0.0));
     loaded.sort_unstable_by(|a, b| loads_n[*b].total_cmp(&loads_n[*a]).then(a.cmp(b)));

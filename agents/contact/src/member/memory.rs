@@ -78,7 +78,7 @@ pub(crate) struct Remembered {
     pub spin: Spin,
 }
 
-/// One pair, with its places by rising names, those of one name by their triangles.
+/// One pair, with its places by rising names; places of one name by their triangles.
 #[derive(Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 pub(crate) struct PairMemory {
     pub partner: Partner,
@@ -283,7 +283,7 @@ impl ContactMemory {
         &mut self.near_pair(partner, now).found
     }
 
-    /// The agents that were near lately, at `now`: those that were so in a step in the memory of the lower number.
+    /// The agents that were near lately, at `now`, of the pairs that this memory keeps.
     pub fn near(&self, now: SimTime) -> impl Iterator<Item = AgentId> + '_ {
         self.pairs.iter().filter_map(move |pair| match pair.partner {
             Partner::Agent(id) if pair.near_until > now => Some(id),

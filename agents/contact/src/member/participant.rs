@@ -68,7 +68,7 @@ impl Participant<'_> {
 /// How far a member is in its own step (eq. 24–26).
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Progress {
-    /// How many steps it makes in the macro step, where it bends.
+    /// How many steps it makes in the macro step.
     pub parts: u32,
     /// The length of the step that it has begun before all others do, seconds; 0 for none.
     pub begun_s: f64,

@@ -87,7 +87,7 @@ impl Lines {
         }
     }
 
-    /// The step that heard the lines is made.
+    /// Takes over the waves read in the step, which is made.
     pub fn settle(&mut self) {
         self.all.iter_mut().for_each(|line| line.line.settle());
     }

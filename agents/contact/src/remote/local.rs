@@ -120,7 +120,7 @@ fn own_compliance(member: &GuardedMember<'_>, blocks: &[usize], storage: &mut [V
     }
 }
 
-/// Visits the impulses of sides of a member that are those of an impulse at a site.
+/// Visits the sides of a member at a site, with their shares of an impulse there.
 pub(crate) fn visit_sides(
     member: &dyn ClusterMember,
     site: Site,

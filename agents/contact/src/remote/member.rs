@@ -1,5 +1,5 @@
-//! A partner of an asynchronous pair as a member of the problem that computes the pair: foretold from its snapshot, it answers impulses by
-//! the local model that it has published.
+//! A partner of an asynchronous pair as a member of the problem that computes the pair: predicted from its snapshot, it
+//! answers impulses by the local model that it has published.
 //!
 //! In: a snapshot, impulses in flight to the partner. Out: a skin, blocks and velocities as any member has them. Never here: the ledger,
 //! which pairs there are, the partner's own contacts: those are in its local model. Theory: docs/theory/coupling.md, section 3.
@@ -15,7 +15,7 @@ use metachron_core::{AgentId, Anchor, Body, Impulse, Inertia, LocalBlock, LocalM
 use metachron_geometry::{CollisionShape, ContactSide, Place, PlacedShape, ShapeKind};
 use std::sync::Arc;
 
-/// No partner is foretold by more than this many of its steps.
+/// No partner is predicted by more than this many of its steps.
 const FORETOLD_STEPS: f64 = 2.0;
 
 /// A partner that is stepped elsewhere.

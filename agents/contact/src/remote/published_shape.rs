@@ -1,4 +1,4 @@
-//! The matter of an agent outside a cluster: its skin and its points, as its snapshot tells and as they are foretold.
+//! The matter of an agent outside a cluster: its skin and its points, as published in its snapshot and as predicted.
 //!
 //! In: published bodies, velocities. Out: placed skins, points, which slots an impulse at a site acts on. Never here: how it answers impulses.
 
@@ -14,7 +14,7 @@ pub(crate) struct Motion {
 }
 
 impl Motion {
-    /// As a published body does; `None` of one that bends.
+    /// The motion of a published body; `None` for a deformable.
     pub fn of(body: &Body) -> Option<Self> {
         let (velocity_m_s, spin_rad_s) = match body {
             Body::Rigid(rigid) => (rigid.velocity, rigid.spin),

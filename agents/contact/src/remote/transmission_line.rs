@@ -219,7 +219,7 @@ mod tests {
             let (h, other) = (steps[i], 1 - i);
             lines[i].receive(shown[other].0, shown[other].1, i == 0, h);
             let c = lines[i].arriving(t[i], h);
-            // a step that is begun again hears the same
+            // a step that is begun again reads the same
             lines[i].open();
             assert_eq!(lines[i].arriving(t[i], h), c);
             lines[i].settle();

@@ -11,7 +11,7 @@ pub(super) const STICK_SHARE: f64 = 0.999;
 /// The impulses that a row may give.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) enum Law {
-    /// Those of Coulomb's cone: no pull, and friction up to μ times the push.
+    /// Impulses in Coulomb's cone: no pull, and friction up to μ times the push.
     Coulomb {
         /// The coefficient μ.
         friction: f64,
@@ -21,7 +21,7 @@ pub(super) enum Law {
         /// The length, N·s; infinite for all.
         limit: f64,
     },
-    /// Those along the first axis between two bounds.
+    /// Impulses along the first axis between two bounds.
     Between {
         /// The least, ≤ 0.
         low: f64,

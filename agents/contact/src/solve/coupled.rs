@@ -25,10 +25,11 @@ pub(super) struct Coupled {
     /// The part of the members' matrix that is in it, and its couplings.
     own: Vec<Block>,
     pairs: Vec<Pair>,
-    /// Where two terms of a row meet, by front, those with one place next to each other; those of front k start at `of_fronts[k]`.
+    /// Where two terms of a row meet, by front, meetings of one place next to each other; the meetings of front k start
+    /// at `of_fronts[k]`.
     meetings: Vec<Meeting>,
     of_fronts: Vec<usize>,
-    /// The fronts of all meetings, row by row; those of row k start at `starts[k]`.
+    /// The fronts of all meetings, row by row; the fronts of row k start at `starts[k]`.
     fronts: Vec<usize>,
     starts: Vec<usize>,
     /// The blocks of all rows that the meetings were found for.

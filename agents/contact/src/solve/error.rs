@@ -36,7 +36,7 @@ pub enum ProblemError {
         /// How many were given.
         terms: usize,
     },
-    /// A contact's data are not those of a contact.
+    /// The data of a contact make no contact.
     #[error("contact {contact}: {reason}")]
     Contact {
         /// Its place in the problem.
@@ -44,7 +44,7 @@ pub enum ProblemError {
         /// Its fault.
         reason: &'static str,
     },
-    /// The data of a joint's row are not those of one.
+    /// The data of a joint's row make no row.
     #[error("row {row}: {reason}")]
     Row {
         /// Its place in the problem.

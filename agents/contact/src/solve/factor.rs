@@ -224,7 +224,7 @@ impl Cholesky {
         self.layouts.len()
     }
 
-    /// A new matrix, of those blocks that there is room for. Fronts whose numbers are the last one's need no new factor.
+    /// A new matrix, of the blocks that there is room for. Fronts whose numbers are the last one's need no new factor.
     pub fn set(&mut self, blocks: &[Block]) {
         std::mem::swap(&mut self.base, &mut self.before);
         self.base.fill(0.0);

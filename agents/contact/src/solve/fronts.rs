@@ -58,7 +58,7 @@ struct Tree {
 }
 
 impl Fronts {
-    /// Checks fronts that were read: that they are those of one matrix.
+    /// Checks that fronts which were read belong to one matrix.
     ///
     /// # Errors
     /// [`ArchiveError::Mismatch`].

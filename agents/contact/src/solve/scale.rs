@@ -122,7 +122,7 @@ impl Scales {
 }
 
 impl Sample {
-    /// Counts a row, and keeps it where it is one of those wanted.
+    /// Counts a row, and keeps it where it is a wanted one.
     fn meet(&mut self, row: usize) {
         if self.last.replace(row) == Some(row) {
             return;

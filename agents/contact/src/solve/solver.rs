@@ -160,8 +160,8 @@ impl Solver {
         &self.solution
     }
 
-    /// How easily both sides of a contact of the last problem give way along its normal, 1/kg, by the compliance of the whole member as far
-    /// as samples tell (eq. 6): that of the member `first`, then the other.
+    /// How easily both sides of a contact of the last problem give way along its normal, 1/kg, by the compliance of the
+    /// whole member as sampled (eq. 6): that of the member `first`, then the other.
     pub(crate) fn inverse_masses(&self, contact: usize, first: Option<usize>) -> [f64; 2] {
         let Iterate { rows, system, .. } = &self.iterate;
         system.along_normal(rows, contact, first)

@@ -12,7 +12,7 @@
 //!             that close fast rebound
 //! (plan)      where the solution strains a member too far, all begins again in shorter steps
 //! record      impulses that the next step starts from, sums of pairs, yielded attachments
-//! integrate   members move; those whose step ends take its velocities
+//! integrate   members move; members whose step ends take its velocities
 //! tear        attachments that gave more than they can bear are gone from the next macro step on
 
 mod doubling;

@@ -138,8 +138,8 @@ impl ClusterStepper {
         })
     }
 
-    /// Puts all back to the start of the macro step but those whose code has unwound, from wherever in it that came. Until all are kept none has
-    /// moved.
+    /// Puts all back to the start of the macro step but members whose code has unwound, from wherever in it that came.
+    /// Until all are kept none has moved.
     pub(super) fn put_back(&mut self, all: &mut [Participant<'_>]) {
         if !self.is_kept {
             return;

@@ -17,7 +17,7 @@ pub struct ClusterReport {
     pub fine_steps: u32,
     /// Contacts of the last fine step, unloaded ones included.
     pub contacts: u32,
-    /// Those of them that are a rigid pile's, which rapier3d has; all others are the problem's.
+    /// The contacts of a rigid pile among them, which rapier3d has; all others are the problem's.
     pub pile_contacts: u32,
     /// Factors of the coupled matrix in all fine steps.
     pub factors: u32,
@@ -25,7 +25,7 @@ pub struct ClusterReport {
     pub products: u32,
     /// Solves in all fine steps.
     pub solves: u32,
-    /// Those of them that ended within interior points, before all laws held.
+    /// The solves among them that ended within interior points, before all laws held.
     pub unfinished: u32,
     /// The dearest level of a solve.
     pub level: SolveLevel,

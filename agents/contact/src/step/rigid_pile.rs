@@ -36,7 +36,7 @@ const LONGEST_S: f64 = 1.0 / 240.0;
 const STEPS_MAX: f64 = 64.0;
 /// Nothing is farther from the origin or faster than this, metres, m/s and rad/s.
 const REACH_MAX: f32 = 1e6;
-/// By how many radii of its body a contact is foreseen.
+/// By how many radii of its body a contact is predicted.
 const FORESEEN_RADII: f64 = 2.0;
 /// How stiff contacts are: so columns of boxes sink by a tenth of a millimetre (docs/throughput.md).
 const STIFF: SpringCoefficients<f32> = SpringCoefficients { natural_frequency: 300.0, damping_ratio: 10.0 };

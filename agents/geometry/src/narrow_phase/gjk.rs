@@ -194,7 +194,8 @@ impl Simplex {
         self.corners[..self.count].iter().map(|c| c.way.length() + c.on[0].length()).fold(0.0, f64::max)
     }
 
-    /// Adds a corner and drops those that the nearest point does not need; false for a corner that was there before.
+    /// Adds a corner and drops the corners that the nearest point does not need; false for a corner that was there
+    /// before.
     fn add(&mut self, corner: Corner) -> bool {
         if self.corners[..self.count].iter().any(|known| known.way == corner.way) {
             return false;

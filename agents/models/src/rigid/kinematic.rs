@@ -3,9 +3,9 @@
 //! In: a [`RigidSpec`] with [`super::Led`], poses ([`StepContext::pose`]). Out: its motion, a snapshot. Never here: its
 //! contacts and their forces on it ([`Snapshot::contact_wrench`]).
 //!
-//! A pose is reached within the step in which it is heard, whatever the distance: a body in contact sees the velocity
-//! that this takes. A body that is led no more goes back to its keyframes as a tool does to its script; without any it
-//! stays where it is.
+//! A pose is reached within the step in which it is received, whatever the distance: a body in contact sees the
+//! velocity that this takes. A body that is led no more goes back to its keyframes as a tool does to its script;
+//! without any it stays where it is.
 
 use super::mass_properties::MassDistribution;
 use super::{RigidError, RigidSpec};

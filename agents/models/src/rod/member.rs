@@ -420,12 +420,12 @@ impl Tube {
     }
 }
 
-/// Those of its springs that never yield.
+/// Its springs that never yield.
 fn lasting(springs: &[NodeSpring]) -> &[NodeSpring] {
     &springs[..springs.partition_point(|spring| !spring.yields())]
 }
 
-/// A step of `h_s` seconds in one piece. Springs on the tube, and those of its own that yield, are rows of the cluster's problem.
+/// A step of `h_s` seconds in one piece. Springs on the tube, and its own springs that yield, are rows of the cluster's problem.
 fn whole_step<'a>(setting: &Setting<'a>, h_s: f64) -> SubstepProblem<'a> {
     let Setting { matter, division, integrator, .. } = *setting;
     let springs = lasting(setting.springs);

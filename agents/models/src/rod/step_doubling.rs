@@ -51,7 +51,7 @@ impl Doubling {
         self.schedule.rest();
     }
 
-    /// Whether step number `steps` of the tube `me` is the first of those to be repeated.
+    /// Whether step number `steps` of the tube `me` is the first of the steps to be repeated.
     pub fn begins(&mut self, steps: u64, me: AgentId) -> bool {
         self.schedule.begins(steps, me)
     }

@@ -183,8 +183,8 @@ impl Tube {
         self.spec.pressure_pa = wanted_pa.unwrap_or(self.spec.pressure_pa);
     }
 
-    /// Sets the pressure inside minus outside, Pa, while it runs, in place of one that follows keys; of a sealed tube that of its gas in the
-    /// undeformed tube, as if more had been let in.
+    /// Sets the pressure inside minus outside, Pa, while it runs, in place of a pressure that follows keys; of a sealed
+    /// tube the pressure of its gas in the undeformed tube, as if more had been let in.
     ///
     /// # Errors
     /// [`TubeError::OutOfRange`] for a pressure that a new tube would not take; it then keeps the one it has.

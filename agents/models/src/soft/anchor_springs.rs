@@ -1,4 +1,4 @@
-//! External springs at vertices of a soft body: the user's and those of tools. Implicit in the step.
+//! External springs at vertices of a soft body: of the user and of tools. Implicit in the step.
 //!
 //! In: pulls. Out: forces and stiffness in the system, and the impulse of each spring. Never here: vertices that never move.
 //! Theory: docs/theory/soft.md, eq. 4.

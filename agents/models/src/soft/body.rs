@@ -173,7 +173,7 @@ impl SoftBody {
         Bounds { low, high, speed_m_s: speed }
     }
 
-    /// Lists this step's springs: the user's, and those of tools that grasp it.
+    /// Lists this step's springs: the user's, and springs of tools that grasp it.
     pub(super) fn gather_springs(&mut self, context: &StepContext<'_>) {
         let mut ties = std::mem::take(&mut self.ties);
         ties.clear();

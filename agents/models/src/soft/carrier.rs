@@ -137,8 +137,8 @@ fn spread_in(cage: &Cage, at_m: DVec3, list: &[DVec3]) -> DVec3 {
 }
 
 impl SkinPoints {
-    /// Those of a body whose skin does not change with its cells: of a closed surface its points, of a sheet or a rope the vertices of the
-    /// lattice that its shape names.
+    /// The points of a body whose skin does not change with its cells: of a closed surface its points, of a sheet or a
+    /// rope the vertices of the lattice that its shape names.
     pub fn of(spec: &SoftSpec) -> Self {
         if let SoftShape::Embedded { surface, .. } = &spec.shape {
             let inward = inward_of(surface);

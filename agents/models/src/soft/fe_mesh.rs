@@ -40,7 +40,7 @@ pub(super) struct FeMesh {
     /// Three vertices in a row, and the distance of the middle one from the line at rest, metres.
     pub(super) rows: Vec<([u32; 3], f64)>,
     pub(super) triangles: Vec<[u32; 3]>,
-    /// The edges of its skin; of a cage those of its cells.
+    /// The edges of its skin; of a cage the edges of its cells.
     pub(super) edges: Vec<[u32; 2]>,
     /// Pairs of vertices whose distance says how far a step bends the body, where its edges do not say all.
     pub(super) stretched: Vec<[u32; 2]>,

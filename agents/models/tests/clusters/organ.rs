@@ -11,7 +11,7 @@ use metachron_models::rigid::{RigidBody, RigidSpec};
 use metachron_models::soft::{MaterialLaw, Side, SoftBody, SoftMatter, SoftShape, SoftSpec};
 use std::sync::Arc;
 
-/// Where the probe presses and the ball lies, above the bed, metres.
+/// Where the probe presses and the ball rests, above the bed, metres.
 const PROBED: DVec3 = DVec3::new(0.06, -0.01, 0.042);
 const BALL: DVec3 = DVec3::new(-0.04, 0.0, 0.092);
 /// The finest cage of these tests, metres.

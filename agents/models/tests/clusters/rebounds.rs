@@ -1,4 +1,4 @@
-//! Balls that bounce, against the closed form: heights e²ⁿ h, speeds after a blow by momentum and restitution.
+//! Balls that bounce, against the closed form: heights e²ⁿ h, speeds after an impact by momentum and restitution.
 
 use crate::bodies::rigid;
 use crate::table::{GRAVITY, Table, placed};

@@ -76,7 +76,7 @@ impl StepHarness {
         Some(AgentId(self.actors.len() as u32 - 1))
     }
 
-    /// Attaches fixed springs to an agent, instead of those it had.
+    /// Attaches fixed springs to an agent, instead of the springs it had.
     pub(super) fn attach_springs(&mut self, id: AgentId, hands: impl IntoIterator<Item = AnchorSpring>) {
         let actor = &mut self.actors[id.0 as usize];
         actor.hands.clear();

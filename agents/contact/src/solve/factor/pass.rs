@@ -1,7 +1,8 @@
 //! A pass over the fronts whose numbers have changed: each is filled, takes the updates of those below it, and is
 //! eliminated.
 //!
-//! In: where the numbers of fronts are, those of the matrix. Out: the factor's numbers. Never here: which fronts are stale, solutions.
+//! In: where the numbers of fronts are, the numbers of the matrix. Out: the factor's numbers. Never here: which fronts
+//! are stale, solutions.
 
 use super::super::fronts::Front;
 use super::super::tiles::{TILE, eliminate, triangle};

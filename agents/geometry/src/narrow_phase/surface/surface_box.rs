@@ -187,7 +187,7 @@ impl SurfaceQuery<'_> {
             let Some(out) = across.map(|across| self.out_toward(cuboid, bits, corners[0], across)) else { return };
             let gap_m = out.dot(at - corners[0]);
             let position = at - out * gap_m;
-            // of those as near as each other the lesser number counts
+            // of equally near ones the lesser number counts
             let is_near = nearest.is_none_or(|(least_m, _, _, first)| {
                 gap_m.abs() < least_m.abs() || (gap_m.abs() == least_m.abs() && number < first)
             });

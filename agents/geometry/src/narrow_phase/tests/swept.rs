@@ -4,7 +4,7 @@ use super::surfaces::{block_skin, flat_sheet, skin_of};
 use super::*;
 use crate::{Obstacle, StaticSolid};
 
-/// As the search: a touch may be told this much early, metres.
+/// As the search: a touch may be reported this much early, metres.
 const EARLY_M: f64 = 1.1e-6;
 
 /// Contacts up to a tenth of a millimetre beyond.
@@ -100,7 +100,7 @@ proptest! {
 
 proptest! {
     // the same motions every time: in one of some forty an edge of a block comes first upon an edge of a closed skin, where no contact is
-    // told (docs/theory/contact.md, section 7)
+    // reported (docs/theory/contact.md, section 7)
     #![proptest_config(ProptestConfig { rng_seed: proptest::test_runner::RngSeed::Fixed(1), ..ProptestConfig::with_cases(6) })]
 
     /// Of every pair of kinds in any motion: nothing overlaps before the first touch, and there it is that near.

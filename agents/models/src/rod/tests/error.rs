@@ -100,7 +100,7 @@ fn similar_tubes_do_not_repeat_their_steps_together() {
     let mut tubes = vec![let_go(Integrator::ImplicitEuler, 8, 0.0); 12];
     let mut repeated = [0; 240];
     for repeated in &mut repeated {
-        // all move alike: a step of one that takes more than the least of all is made twice
+        // all move alike: a tube whose step takes more than the least of all makes it twice
         let step = |(tube, me): (&mut Tube, AgentId)| {
             tube.step(millis(2.0), &StepContext::alone(me, SimTime::ZERO)).unwrap().work
         };

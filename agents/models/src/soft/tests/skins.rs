@@ -52,7 +52,7 @@ fn agree(list: &[Touch], normal: DVec3, gap_m: f64) -> Result<(), TestCaseError>
 
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(300))]
-    /// Edges of a side that cross those of the face below once told depths of half an edge, aside.
+    /// Edges of a side that cross edges of the face below once reported depths of half an edge, aside.
     #[test]
     fn a_face_on_a_face_has_its_gap_everywhere_and_pushes_straight(
         (x, y) in (-0.1_f64..0.1, -0.1_f64..0.1),

@@ -157,7 +157,7 @@ fn cases(quick: bool) -> Vec<Case> {
     all
 }
 
-/// Those of large clusters by which ways of solving them were chosen.
+/// The cases of large clusters by which ways of solving them were chosen.
 fn from_prototype(quick: bool) -> Vec<Case> {
     let seconds = |full: f64| if quick { 0.3 } else { full };
     let of = |scene: &'static str, full_s: f64, stage: fn() -> Stage| {
@@ -180,7 +180,7 @@ fn from_prototype(quick: bool) -> Vec<Case> {
     all
 }
 
-/// Those of the cases that are asked for; all where none is named.
+/// The cases that are asked for; all where none is named.
 fn chosen(all: Vec<Case>, only: &[String]) -> anyhow::Result<Vec<Case>> {
     for name in only {
         if !all.iter().any(|case| case.scene == name) {

@@ -39,7 +39,7 @@ pub(super) struct Frame {
     pub(super) gap: f64,
     /// Benefit over the bound at the true costs.
     pub(super) quality: f64,
-    /// Things in view, and those of them that were left out.
+    /// Things in view, and the things among them that were left out.
     pub(super) objects: usize,
     pub(super) holes: usize,
     /// Changes of level, and changes that were reversed within three frames.

@@ -28,7 +28,7 @@ pub(in super::super) struct Row {
     place: String,
     /// All objects of the scene.
     objects: u64,
-    /// Those in the frustum, as if nothing hid them.
+    /// Objects in the frustum, as if nothing hid them.
     in_frustum: u64,
     potentially_visible: u64,
     visible: u64,

@@ -64,7 +64,7 @@ pub(in super::super) struct Row {
     raw_drift: f64,
     in_flight: f64,
     beyond: f64,
-    /// Number of samples at which all clocks agreed, and number of those with an impact since the previous one.
+    /// Number of samples at which all clocks agreed, and number of such samples with an impact since the previous one.
     looks: u32,
     blows: u32,
     /// The longest time without an impact, seconds.

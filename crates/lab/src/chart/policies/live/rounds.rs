@@ -65,8 +65,8 @@ fn error(row: &Row) -> f64 {
     error_over_allowed(row.model_error95, row.spread95)
 }
 
-/// Whether the default has the fewest late frames of the policies of as high a value, the highest value of those as few frames of which are
-/// late, and predicts its frames.
+/// Whether the default has the fewest late frames of the policies of as high a value, the highest value of the policies with as few late
+/// frames, and predicts its frames.
 ///
 /// A difference counts where it is greater than the spread over the rounds of both; in a single round there is none. A policy whose value is
 /// not known competes by its late frames alone.
