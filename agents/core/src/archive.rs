@@ -32,7 +32,7 @@ pub struct Archive<'a> {
     bytes: Bytes<'a>,
     /// Published states that several objects share: each is stored once, where it is met first.
     snapshots: Vec<Arc<Snapshot>>,
-    /// Of those written, the place of each in that list, by its address.
+    /// The place in that list of each state written, by the state's address.
     places: HashMap<usize, usize>,
 }
 

@@ -31,7 +31,7 @@ pub struct FailedAttachment {
     pub other: Option<usize>,
     /// A link, a joint, or an attachment that is the participant's own.
     pub partner: Partner,
-    /// Of one that tore the force that it gave: the mean over the macro step, and over those cut short before it; else that at which it yields, N.
+    /// The force of a torn attachment, the mean over the macro step and over those cut short before it; else the force at which it yields, N.
     pub force_n: f64,
 }
 

@@ -13,7 +13,7 @@ use crate::member::{ClusterMember, Participant};
 use crate::solve::{Hold, JointRow, Side};
 use glam::DVec3;
 
-/// Of h² times the stiffness of a force, the share that a body's inertia has to reach: ¼ is where steps begin to throw it.
+/// The share of h² times the stiffness of a force that a body's inertia has to reach: at ¼ steps begin to throw it.
 const INERTIA_SHARE: f64 = 0.5;
 /// The key of the first row of added inertia of a tie.
 const ADDED: u32 = 8;

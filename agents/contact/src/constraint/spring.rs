@@ -227,7 +227,7 @@ fn computes_link(all: &[Participant<'_>], one: &Participant<'_>, link: &Link) ->
     }
 }
 
-/// Where the far end of a link is that is no participant: it moves on as it was last published.
+/// The far end of a link to a body that is no participant: it moves on as it was last published.
 fn seen_point(one: &Participant<'_>, link: &Link, after_s: f64) -> Option<MaterialPoint> {
     let seen = &one.context.neighbours.iter().find(|other| other.id == link.other)?.snapshot;
     let (position, led_m_s) = seen.body.point(link.there)?;

@@ -81,7 +81,7 @@ pub const DEPTH_RANGE_M: RangeInclusive<f64> = 1e-6..=1e-3;
 /// How far the solves of a scene's contacts go.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 pub enum SolveBudget {
-    /// Until all laws hold, whatever that takes.
+    /// Until all laws hold, at any cost.
     Exact,
     /// As far as there is time in the macro step, in a run that goes by a clock.
     Timed {

@@ -18,7 +18,8 @@ use glam::DVec3;
 use meeting::{Closing, Meeting, Work};
 use metachron_core::{DisjointSets, ParallelFor, StepError};
 
-/// By which share of the speed that an impact loses its contact gives way (eq. 5), and the least by which it does, m/s.
+/// The share of the speed lost in an impact by which its contact gives way (eq. 5), and the least by which it does,
+/// m/s.
 const YIELD_SHARE: f64 = 3e-5;
 const YIELD_MIN_M_S: f64 = 2e-6;
 /// The miss at which the solve ends, in multiples of the velocity by which contacts give way.

@@ -112,7 +112,7 @@ impl<'a> GuardedMember<'a> {
         self.mark.is_some_and(CallMark::is_running)
     }
 
-    /// Forgets that it has refused a step: of one that is only tried.
+    /// Forgets a refused step, where the step was only tried.
     pub(crate) fn forgive(&self) {
         self.mark.map(CallMark::take_refused);
     }

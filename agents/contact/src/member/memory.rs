@@ -66,9 +66,9 @@ pub(crate) struct Remembered {
     pub key: TouchKey,
     /// The impulse of one second at the rate of the last step: its mean force, world axes, N.
     pub force_n: DVec3,
-    /// The most that it has borne since its pair was last relieved, likewise, N, ≥ 0: the compliance of a contact is for that.
+    /// Its greatest load since its pair was last relieved, likewise, N, ≥ 0: the compliance of a contact is for that.
     pub load_n: f64,
-    /// How deep it lies because its bodies began inside each other, metres, ≥ 0 (eq. 2a).
+    /// How deep it rests because its bodies began inside each other, metres, ≥ 0 (eq. 2a).
     pub overlap_m: f64,
     /// The force that pushed it out of that in the last step, along its normal, N, ≥ 0.
     pub push_n: f64,

@@ -105,7 +105,7 @@ pub trait ClusterMember: Send {
         None
     }
 
-    /// By how much its skin at `place` lies inside the shape that [`Self::skin`] gives, metres: of a section that is not round, whose shape
+    /// By how much its skin at `place` is inside the shape that [`Self::skin`] gives, metres: for a section that is not round the shape
     /// is the round one about it.
     fn recess_m(&self, place: &Place, contact: ContactSide) -> f64 {
         let _ = (place, contact);

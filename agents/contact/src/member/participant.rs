@@ -104,9 +104,10 @@ pub(crate) struct Progress {
     pub touched: bool,
     pub held: bool,
     pub bears: bool,
-    /// By how much impacts change its velocities at the end of the fine step; empty for none.
+    /// The changes of its velocities by impacts, at the end of the fine step; empty for none.
     pub dv_impacts: Vec<DVec3>,
-    /// By how much it is then elsewhere than if they had done so at its start, metres and radians (eq. 27); empty for none.
+    /// How far it is then from where impacts at the start of the step would have brought it, metres and radians (eq.
+    /// 27); empty for none.
     pub dx_impacts: Vec<DVec3>,
     /// Work of its steps within the macro step, in the unit of its model.
     pub work: f64,

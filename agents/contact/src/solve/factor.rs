@@ -411,7 +411,7 @@ impl Layout {
 }
 
 impl Target {
-    /// Of a row of numbers, in a front whose eliminated columns have this room.
+    /// The target of a row of numbers, in a front whose eliminated columns have this room.
     fn new(at: usize, room: usize) -> Self {
         let near = at / TILE * TILE * room + at % TILE;
         match at.checked_sub(room) {

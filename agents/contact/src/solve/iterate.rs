@@ -76,7 +76,7 @@ impl State {
         self.lists_mut().into_iter().zip(other.lists()).for_each(|(list, from)| list.clone_from(from));
     }
 
-    /// Of rows, then of blocks.
+    /// Lists of rows, then of blocks.
     fn lists(&self) -> [&Vec<DVec3>; 4] {
         [&self.lambda, &self.velocity, &self.change, &self.left]
     }

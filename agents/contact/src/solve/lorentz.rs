@@ -93,7 +93,7 @@ impl Lorentz {
 }
 
 impl Scaling {
-    /// Of two points inside the cone.
+    /// The scaling of two points inside the cone.
     pub fn of(l: Lorentz, y: Lorentz) -> Self {
         let [of_l, of_y] = [l, y].map(|x| x.det().max(DET_MIN));
         let (unit_l, unit_y) = (l.times(of_l.sqrt().recip()), y.times(of_y.sqrt().recip()));

@@ -77,7 +77,7 @@ pub struct Contact {
     pub tangents: [DVec3; 2],
     /// The distance along the normal, metres; a depth is negative.
     pub gap_m: f64,
-    /// How far it lies in that much of it counts as apart, metres, ≥ 0: bodies that began inside each other are held where they are, and pushed out
+    /// The overlap that counts as apart, metres, ≥ 0: bodies that began inside each other are held where they are, and pushed out
     /// by a row of its own (eq. 2a).
     pub overlap_m: f64,
     /// Coulomb's coefficient μ ≥ 0.

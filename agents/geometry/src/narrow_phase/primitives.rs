@@ -16,7 +16,7 @@ use rapier3d::parry::shape::{Shape, SharedShape};
 /// moved about with every pair that is looked at.
 #[derive(Clone, Copy)]
 pub(super) enum Pieces<'a> {
-    /// Of a form that has no others; `None` where it touches nothing.
+    /// The piece of a form that has no others; `None` where it touches nothing.
     One(Option<Piece<'a>>),
     Compound {
         parts: &'a [CompoundPart],

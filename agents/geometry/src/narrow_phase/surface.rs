@@ -27,7 +27,8 @@ use surface_surface::SkinPair;
 /// Two soft skins that have passed each other by more than this share of an edge are ignored: they came from elsewhere.
 const DEEP_SHARE: f64 = 0.5;
 
-/// By how much more than is asked for the features of a skin are found that may touch it, as a share of the length of an edge.
+/// By how much more than the reach asked for the features of a skin are found that may touch it, as a share of an
+/// edge's length.
 const ROOM_SHARE: f64 = 0.25;
 
 /// Storage that searches keep.
@@ -35,7 +36,7 @@ const ROOM_SHARE: f64 = 0.25;
 pub(super) struct SurfaceScratch {
     /// The patches of either surface that are near the other.
     patches: [Vec<u32>; 2],
-    /// Of each skin that was searched against itself.
+    /// The pairs of each skin that was searched against itself.
     own: Vec<KnownPairs>,
 }
 

@@ -49,7 +49,7 @@ struct BodyPose {
 struct Now {
     time: SimTime,
     at: BodyPose,
-    /// Of its middle and about it, in the last step.
+    /// The velocity of its middle and its spin, in the last step.
     velocity: DVec3,
     spin: DVec3,
     /// Where the user leads it now.

@@ -25,7 +25,8 @@ pub(super) struct ShellBending {
 #[derive(Debug, Clone, Copy)]
 struct Fold {
     angle: f64,
-    /// By the positions of both ends of the edge, of the corner on this side and of that across it, 1/m.
+    /// Gradients by the positions of both ends of the edge, of the corner on this side and of the corner across it,
+    /// 1/m.
     slopes: [DVec3; 4],
 }
 

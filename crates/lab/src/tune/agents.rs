@@ -37,7 +37,7 @@ pub(super) fn tune(args: &TuneArgs, scene: &Scene, stopped: &AtomicBool) -> anyh
     Ok(AgentLoops { responses: done.agents, tuning })
 }
 
-/// Of agents with the same limits the one of the median load; at most [`PLANTS_MAX`].
+/// For each set of limits the agent of the median load; at most [`PLANTS_MAX`].
 fn typical(responses: &[AgentResponse]) -> Vec<AgentPlant> {
     let mut kinds: Vec<Vec<&AgentPlant>> = Vec::new();
     for plant in responses.iter().filter_map(|response| response.plant.as_ref().ok()) {

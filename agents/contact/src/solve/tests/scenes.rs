@@ -16,7 +16,7 @@ pub struct Stack {
     /// Displacement and turn of each box.
     pub places: Vec<[DVec3; 2]>,
     pub velocities: Vec<[DVec3; 2]>,
-    /// Of each of the four corners of each box: the impulse and the slip owed of the last step.
+    /// The impulse and the slip owed of the last step at each of the four corners of each box.
     impulses: Vec<DVec3>,
     owed: Vec<DVec3>,
     compliances: Vec<f64>,

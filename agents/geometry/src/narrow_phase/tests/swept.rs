@@ -103,7 +103,7 @@ proptest! {
     // reported (docs/theory/contact.md, section 7)
     #![proptest_config(ProptestConfig { rng_seed: proptest::test_runner::RngSeed::Fixed(1), ..ProptestConfig::with_cases(6) })]
 
-    /// Of every pair of kinds in any motion: nothing overlaps before the first touch, and there it is that near.
+    /// For every pair of kinds in any motion: nothing overlaps before the first touch, and there it is that near.
     #[test]
     fn before_the_first_touch_nothing_overlaps(
         p in vector(0.15), q in vector(0.15), u in vector(0.3), v in vector(0.3), r in turn(), s in turn(),

@@ -92,7 +92,7 @@ pub(super) struct Row {
     pub ms_per_step_p99: f64,
     /// Ratio to the same body without the addition of the test: held, hung, or with a prescribed wall; NaN without one.
     pub over_plain: f64,
-    /// Of the cost in the number of nodes, over the test's rows up to this one; NaN for fewer than two.
+    /// The exponent of the cost in the number of nodes, over the test's rows up to this one; NaN for fewer than two.
     pub exponent: f64,
     /// How far the cube's top has sunk at the end, its mean, metres; NaN of other bodies.
     pub sag_m: f64,
