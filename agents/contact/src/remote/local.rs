@@ -1,8 +1,8 @@
 //! The local model of a participant at the end of a macro step, for partners that compute their pairs with it: which of its blocks they may move, its
 //! compliance there, and the matrix of the member that stands for it: the inverse of that.
 //!
-//! In: the last solve, partners' published states, their forces. Out: blocks, velocities, accelerations and W; A = W⁻¹ as a dense square. Never here:
-//! ledgers. Theory: docs/theory/coupling.md, section 3 (eq. 7m).
+//! In: the last solve, partners' published states, their forces. Out: blocks, velocities, accelerations and W; A = W⁻¹ as a dense
+//! square. Never here: ledgers. Theory: docs/theory/coupling.md, section 3 (eq. 7m).
 
 use crate::lists::reset;
 use crate::member::problem::respond;
