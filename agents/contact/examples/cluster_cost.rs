@@ -1,4 +1,5 @@
-//! What does a solve of a cluster cost? Prints medians for tubes, a solid and piles of boxes: first, cold, at rest, and for each factor.
+//! The cost of a solve of a cluster, as medians for tubes, a solid and piles of boxes: first, cold, at rest, and for
+//! each factor.
 //!
 //! `cargo run --release -p metachron-contact --example cluster_cost [part of a name]`
 //!

@@ -1,7 +1,7 @@
 //! The contract of an agent: an object that advances by its own steps; by which laws and links two of them act on each other.
 //!
-//! In: a step length and what the agent can see of the others ([`StepContext`]). Out: a new state and what the step took.
-//! Never here: clocks, threads, files, the GPU. What every agent promises is tested by the suite `metachron_models::conformance`.
+//! In: a step length and the agent's view of the others ([`StepContext`]). Out: a new state and a report of the step.
+//! Never here: clocks, threads, files, the GPU. The suite `metachron_models::conformance` tests the promises of every agent.
 
 use crate::Inputs;
 use crate::joint::Motor;
@@ -49,8 +49,8 @@ pub trait Agent: Send {
         let _ = wanted;
     }
 
-    /// Sets the pressure of what fills the agent, inside minus outside, Pa; `false`, and no change, for one that nothing fills and for a
-    /// pressure that it refuses.
+    /// Sets the pressure of the agent's filling, inside minus outside, Pa; `false`, and no change, for an agent without
+    /// one and for a pressure that it refuses.
     fn set_pressure_pa(&mut self, pressure_pa: f64) -> bool {
         let _ = pressure_pa;
         false
@@ -62,23 +62,23 @@ pub trait Agent: Send {
         false
     }
 
-    /// Removes the cells whose middles are within `carving`, between two steps: what went; `None`, and no change, where there are none, where
-    /// none would be left, and for a model without cells.
+    /// Removes the cells whose middles are within `carving`, between two steps: the matter removed; `None`, and no change, where there are no
+    /// such cells, where none would be left, and for a model without cells.
     fn carve(&mut self, carving: &Carving) -> Option<Removed> {
         let _ = carving;
         None
     }
 
-    /// Takes another state between two steps, as its snapshots publish it: what they do not have, such as spins of a tube's parts, is at rest.
+    /// Takes another state between two steps, as its snapshots publish it: motion that these lack, such as spins of a tube's parts, is zero.
     ///
     /// # Errors
-    /// What does not fit; nothing is changed then.
+    /// The reason why the state does not fit; nothing is changed then.
     fn set_state(&mut self, state: &Body) -> Result<(), String> {
         let _ = state;
         Err(format!("a {} takes no state", self.model()))
     }
 
-    /// What it takes of what users do to it, the same for as long as it lives: the runtime refuses any command that needs more. A model names
+    /// The inputs of users that it takes, the same for as long as it lives: the runtime refuses any command that needs another. A model names
     /// here the springs, forces, torques and poses that its steps look at, and the methods above that it has of its own; by default nothing.
     fn inputs(&self) -> Inputs {
         Inputs::NONE
@@ -92,14 +92,14 @@ pub trait Agent: Send {
     ///
     /// # Errors
     /// [`ArchiveError::Refused`] by a model that does not save its state, as this one does where a model has nothing else;
-    /// [`ArchiveError`] for a state of another agent. After an error while reading it reads what it has written itself just before, and goes on from
-    /// that.
+    /// [`ArchiveError`] for a state of another agent. After an error of reading, the agent reads the state that it wrote itself just before, and
+    /// goes on from that.
     fn archive(&mut self, archive: &mut Archive<'_>) -> Result<(), ArchiveError> {
         let _ = archive;
         Err(ArchiveError::Refused { what: format!("model \"{}\"", self.model()) })
     }
 
-    /// Linear momentum (kg·m/s) and angular momentum about the origin (kg·m²/s), in world axes; zero for a model without mass, as of what is led.
+    /// Linear momentum (kg·m/s) and angular momentum about the origin (kg·m²/s), in world axes; zero for a model without mass, as of a led body.
     fn momentum(&self) -> (DVec3, DVec3) {
         (DVec3::ZERO, DVec3::ZERO)
     }
@@ -213,7 +213,7 @@ pub struct AnchorForce {
 pub struct SetMotor {
     /// The joint's number in the scene.
     pub joint: u32,
-    /// What drives it; `None` for nothing.
+    /// Its motor; `None` for none.
     pub motor: Option<Motor>,
 }
 
@@ -234,7 +234,7 @@ impl PoseGoal {
     /// Whether a body can be led there.
     ///
     /// # Errors
-    /// What is wrong.
+    /// A sentence that names the fault.
     pub fn check(&self) -> Result<(), &'static str> {
         let Self { position_m, rotation, velocity_m_s, spin_rad_s } = *self;
         check_motion([Some(position_m), Some(velocity_m_s), Some(spin_rad_s)], Some(rotation))
@@ -254,14 +254,14 @@ impl PoseGoal {
     }
 }
 
-/// Another place or velocity for an agent. What is `None` stays.
+/// Another place or velocity for an agent. A field that is `None` stays as it is.
 #[derive(Debug, Clone, Copy, PartialEq, Default, serde::Serialize, serde::Deserialize)]
 pub struct SetMotion {
-    /// Where the origin of a rigid body's axes is, or the centre of mass of a body that bends, metres.
+    /// Where the origin of a rigid body's axes is, or the centre of mass of a deformable, metres.
     pub position_m: Option<DVec3>,
-    /// The rotation of a rigid body, from its axes to the world's; by how much a body that bends is turned about its centre of mass.
+    /// The rotation of a rigid body, from its axes to the world's; by how much a deformable is turned about its centre of mass.
     pub rotation: Option<DQuat>,
-    /// The velocity of its centre of mass, m/s: of a body that bends, of all its matter.
+    /// The velocity of its centre of mass, m/s: of a deformable, of all its matter.
     pub velocity_m_s: Option<DVec3>,
     /// Its spin about its centre of mass, world axes, rad/s.
     pub spin_rad_s: Option<DVec3>,
@@ -271,7 +271,7 @@ impl SetMotion {
     /// Whether a body can be moved so.
     ///
     /// # Errors
-    /// What is wrong.
+    /// A sentence that names the fault.
     pub fn check(&self) -> Result<(), &'static str> {
         check_motion([self.position_m, self.velocity_m_s, self.spin_rad_s], self.rotation)
     }
@@ -287,7 +287,7 @@ fn check_motion(vectors: [Option<DVec3>; 3], rotation: Option<DQuat>) -> Result<
         "a velocity must be finite, at most 1e6 m/s along each axis",
         "a spin must be finite, at most 1e6 rad/s about each axis",
     ];
-    // no comparison holds for what is no number
+    // no comparison holds for NaN
     let is_out = |v: DVec3| !(v.is_finite() && v.abs().max_element() <= MOTION_MAX);
     if let Some((_, problem)) = vectors.into_iter().zip(problems).find(|(v, _)| v.is_some_and(is_out)) {
         return Err(problem);
@@ -323,7 +323,7 @@ impl Carving {
     }
 }
 
-/// Beyond this age a tool's motion is no longer extrapolated, in seconds: a stopped tool must not drag what it grasps along.
+/// Beyond this age a tool's motion is no longer extrapolated, in seconds: a stopped tool must not drag a grasped body along.
 const EXTRAPOLATION_MAX_S: f64 = 0.1;
 
 /// By how many seconds the motion of a tool, published at `published`, is extrapolated to reach `time`.
@@ -407,7 +407,7 @@ pub struct Link {
     /// The force above which it tears, N, > 0: the mean over a macro step of its cluster. Infinite where it never does; an asynchronous
     /// link never does.
     pub tears_above_n: f64,
-    /// The force that it gives at most, N, > 0, below that at which it tears: what would take more moves the place at which it holds, or
+    /// The force that it gives at most, N, > 0, below that at which it tears: a greater load moves the place at which it holds, or
     /// lengthens it. Infinite where it never yields; an asynchronous link never does.
     pub yields_above_n: f64,
 }

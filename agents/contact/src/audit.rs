@@ -6,7 +6,7 @@
 //! Plain addition of the energies of two clocks would count the half of an impact that one side has felt, but not the half that the
 //! other has still to receive.
 //!
-//! Exact for rigid bodies whose acceleration is constant in between. Tubes count as published, with the work of what is on its way.
+//! Exact for rigid bodies whose acceleration is constant in between. Tubes count as published, with the work of impulses in flight.
 
 use glam::{DMat3, DQuat, DVec3};
 use metachron_core::{
@@ -42,7 +42,7 @@ pub struct Audit {
 /// Audits agents at `at`. Tools and bodies that nothing moves are not counted: impulses given to them leave the system.
 ///
 /// `potential` gives the potential energy in joules of a rigid body in a state, from gravity and external springs; that of
-/// tubes is part of what they publish.
+/// tubes is part of their published states.
 #[must_use]
 pub fn audit(members: &[Member<'_>], at: SimTime, potential: &mut dyn FnMut(AgentId, &RigidState) -> f64) -> Audit {
     let mut sum = Audit::default();
@@ -114,7 +114,7 @@ fn rigid(
     let Inertia::Rigid { inverse_mass, inverse_inertia } = member.snapshot.inertia else { return };
     let Some(state) = settled(member, members, at) else { return };
     in_flight(member, members, |_, _, dj, _| sum.add_in_flight(dj));
-    // free rotation keeps angular momentum and energy: both are those of the published rotation
+    // free rotation keeps angular momentum and energy: both are as in the published rotation
     let is_locked = |answers: DVec3| [0, 1, 2].map(|axis| answers[axis] == 0.0);
     let turns = DVec3::new(inverse_inertia.x_axis.x, inverse_inertia.y_axis.y, inverse_inertia.z_axis.z);
     let inertia = inverse_of_free(inverse_inertia, is_locked(turns));
@@ -127,13 +127,13 @@ fn rigid(
     sum.angular += state.position.cross(state.velocity * mass) + angular_momentum;
 }
 
-/// Adds a tube as it published itself: what is in flight to it counts as in flight alone.
+/// Adds a tube as it published itself: impulses in flight to it count as in flight alone.
 fn curve(sum: &mut Audit, member: &Member<'_>, members: &[Member<'_>], state: &CurveState) {
     let motion = Motion::of(member, state);
     sum.energy_j += member.snapshot.energy_j;
     sum.momentum += motion.momentum;
     sum.angular += motion.angular;
-    // what is on its way is taken as its local model answers it: J·v + ½ J·W J
+    // impulses in flight are taken as its local model answers them: J·v + ½ J·W J
     let model = &member.snapshot.local_model;
     let mut pushed = vec![DVec3::ZERO; model.blocks.len()];
     in_flight(member, members, |_, site, dj, _| {

@@ -1,9 +1,9 @@
 //! The kinds of input from users that an agent takes.
 //!
-//! In: the kinds that a model names ([`super::Agent::inputs`]), and those that a command needs. Out: which of these the agent does not take, in words.
-//! Never here: commands themselves, what a model makes of them.
+//! In: the kinds that a model names ([`super::Agent::inputs`]), and the kinds that a command needs. Out: the needed kinds that the agent
+//! does not take, in words. Never here: commands themselves, their effect on a model.
 
-/// A kind of what users do to an agent.
+/// A kind of input that users give an agent.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Input {
     /// Springs to its material points.
@@ -20,7 +20,7 @@ pub enum Input {
     Velocity,
     /// Another whole state ([`super::Agent::set_state`]).
     State,
-    /// The pressure of what fills it ([`super::Agent::set_pressure_pa`]).
+    /// The pressure of its filling ([`super::Agent::set_pressure_pa`]).
     Pressure,
     /// Regions in which its cells are removed ([`super::Agent::carve`]).
     Carving,

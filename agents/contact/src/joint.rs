@@ -22,11 +22,11 @@ pub struct Joint {
     pub rest: DQuat,
     /// Whether the two bodies also collide with each other; also once it has torn.
     pub collide: bool,
-    /// The force above which it tears, N, > 0: the mean over a macro step of its cluster; what it gives against turns does not count.
+    /// The force above which it tears, N, > 0: the mean over a macro step of its cluster; its torque does not count.
     /// Infinite where it never does.
     pub tears_above_n: f64,
-    /// The force that it gives at most, N, > 0, below that at which it tears: what would take more moves the place at which it holds, a
-    /// rope's length or a spring's length at rest. What it gives against turns is not bounded. Infinite where it never yields.
+    /// The force that it gives at most, N, > 0, below that at which it tears: a greater load moves the place at which it holds, a
+    /// rope's length or a spring's length at rest. Its torque is not bounded. Infinite where it never yields.
     pub yields_above_n: f64,
 }
 
@@ -41,7 +41,7 @@ pub enum JointKind {
         axis: DVec3,
         /// Range of b's rotation relative to a about the axis, radians about the zero of `rest`, within −π … π.
         range_rad: Option<[f64; 2]>,
-        /// What drives it, in radians and newton metres.
+        /// Its motor, in radians and newton metres.
         motor: Option<Motor>,
     },
     /// Rotation about every axis, like a ball in its socket.
@@ -52,7 +52,7 @@ pub enum JointKind {
         axis: DVec3,
         /// Range of b's anchor relative to a's along the axis, metres.
         range_m: Option<[f64; 2]>,
-        /// What drives it, in metres and newtons.
+        /// Its motor, in metres and newtons.
         motor: Option<Motor>,
     },
     /// A spring between the anchors.
@@ -91,13 +91,13 @@ impl Joint {
 /// A motor of a joint: of a hinge in radians and newton metres, of a slide in metres and newtons.
 #[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Motor {
-    /// What it drives the joint to.
+    /// The goal to which it drives the joint.
     pub goal: MotorGoal,
     /// The most effort that it gives, N·m or N, > 0; infinite for as much as it takes.
     pub max_effort: f64,
 }
 
-/// What a motor drives a joint to: how b moves relative to a.
+/// The goal of a motor: how b moves relative to a.
 #[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
 pub enum MotorGoal {
     /// A velocity, rad/s or m/s, kept as exactly as the bound of the motor allows.

@@ -1,4 +1,4 @@
-//! Interaction between agents: contact clusters, asynchronous pairs, and what an agent is.
+//! Interaction between agents: contact clusters, asynchronous pairs, and the contract of an agent.
 //!
 //! In: bodies as members of clusters (matrices, free velocities, skins), scenes of static solids and joints; for asynchronous pairs
 //! snapshots of neighbours. Out: velocities and impulses, and the ledgers of asynchronous pairs. Never here: any model's own state, threads.

@@ -1,6 +1,6 @@
 //! Lists that keep their storage from step to step, and such as are sorted by keys.
 //!
-//! In: a list, values. Out: the list with these, or the one entry sought. Never here: what is in them.
+//! In: a list, values. Out: the list with these, or the one entry sought. Never here: the meaning of values.
 
 /// Other values in the storage of a list.
 pub(crate) fn refill<T>(list: &mut Vec<T>, values: impl IntoIterator<Item = T>) {

@@ -1,7 +1,7 @@
 //! State written to bytes, and read back in place: one visitor for both ways, so that neither knows a field that the other does not.
 //!
 //! In: objects that show their state field by field. Out: bytes ([`Archive::writer`]), or the same objects as they were when these were
-//! written ([`Archive::reader`]). What an object is built from is not written: it is read into one built alike.
+//! written ([`Archive::reader`]). The parts that an object is built from are not written: it is read into one built alike.
 //! Never here: files, versions ([`metachron_world::Checkpoint`](https://docs.rs/metachron-world) has both), what an object's state is.
 //!
 //! ```
@@ -32,7 +32,7 @@ pub struct Archive<'a> {
     bytes: Bytes<'a>,
     /// Published states that several objects share: each is stored once, where it is met first.
     snapshots: Vec<Arc<Snapshot>>,
-    /// Of those written, the place of each in that list, by its address.
+    /// The place in that list of each state written, by the state's address.
     places: HashMap<usize, usize>,
 }
 
@@ -58,15 +58,15 @@ pub enum ArchiveError {
     Malformed {
         /// Where, counted from the first byte of the state.
         at: usize,
-        /// What was expected there.
+        /// The type that was expected there.
         expected: &'static str,
-        /// What is wrong with it.
+        /// The decoder's error.
         reason: String,
     },
     /// The state is that of another object than the one it is read into.
     #[error("{what} is {found} in the saved state; expected {expected}")]
     Mismatch {
-        /// What differs.
+        /// The value that differs.
         what: &'static str,
         /// As it is saved.
         found: String,
@@ -82,7 +82,7 @@ pub enum ArchiveError {
     /// A model panicked while its state was written or read.
     #[error("{reason}")]
     Panicked {
-        /// With what.
+        /// The message of the panic.
         reason: String,
     },
     /// An error within a part that has a name.
@@ -109,7 +109,7 @@ impl<'a> Archive<'a> {
         Self { bytes, snapshots: Vec::new(), places: HashMap::new() }
     }
 
-    /// Whether it reads: what objects derive from their state has to be made anew then.
+    /// Whether it reads: values that objects derive from their state have to be made anew then.
     #[must_use]
     pub const fn is_reading(&self) -> bool {
         matches!(self.bytes, Bytes::Read { .. })
@@ -155,7 +155,7 @@ impl<'a> Archive<'a> {
     /// A part that may be missing: `make` makes the one that `visit` reads into, where there is none.
     ///
     /// # Errors
-    /// Those of `visit`; [`ArchiveError::Malformed`].
+    /// The errors of `visit`; [`ArchiveError::Malformed`].
     pub fn option<T>(
         &mut self,
         part: &mut Option<T>,
@@ -171,10 +171,10 @@ impl<'a> Archive<'a> {
         Ok(())
     }
 
-    /// A list of parts that `visit` reads into: those that are there, and as many more as `make` has to make.
+    /// A list of parts that `visit` reads into: the parts that are there, and as many more as `make` has to make.
     ///
     /// # Errors
-    /// Those of `visit`; [`ArchiveError::Malformed`].
+    /// The errors of `visit`; [`ArchiveError::Malformed`].
     pub fn list<T>(
         &mut self,
         parts: &mut Vec<T>,
@@ -194,7 +194,7 @@ impl<'a> Archive<'a> {
         Ok(())
     }
 
-    /// A published state. What was one state when it was written is one again.
+    /// A published state. Places that shared one state when it was written share one again.
     ///
     /// # Errors
     /// [`ArchiveError::Malformed`].
@@ -233,7 +233,7 @@ impl<'a> Archive<'a> {
     /// A part with a name, which an error then says.
     ///
     /// # Errors
-    /// Those of `visit`.
+    /// The errors of `visit`.
     pub fn within(
         &mut self,
         part: impl Display,
@@ -242,7 +242,7 @@ impl<'a> Archive<'a> {
         visit(self).map_err(|reason| ArchiveError::Within { part: part.to_string(), reason: Box::new(reason) })
     }
 
-    /// What was written; nothing of an archive that reads.
+    /// The bytes that were written; empty for an archive that reads.
     #[must_use]
     pub fn into_bytes(self) -> Vec<u8> {
         match self.bytes {

@@ -1,6 +1,6 @@
-//! What happened to attachments of a scene, as the agents publish it that they hold.
+//! Events of a scene's attachments, as the agents that hold them publish them.
 //!
-//! In: what yielded or tore, when, and by which force. Out: the same in snapshots and reports. Never here: forces.
+//! In: which attachment failed, when, and by which force. Out: the same in snapshots and reports. Never here: forces.
 
 use crate::{AgentId, SimTime};
 use std::fmt;
@@ -32,7 +32,7 @@ impl fmt::Display for AttachmentId {
 pub struct AttachmentEvent {
     /// Which one.
     pub attachment: AttachmentId,
-    /// What happened.
+    /// Whether it yielded or tore.
     pub kind: AttachmentEventKind,
     /// The agent at its other end; `None` is the world.
     pub with: Option<AgentId>,
@@ -42,7 +42,7 @@ pub struct AttachmentEvent {
     pub force_n: f64,
 }
 
-/// What can happen to an attachment.
+/// The kinds of events of an attachment.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, serde::Serialize, serde::Deserialize)]
 pub enum AttachmentEventKind {
     /// It slipped for the first time.

@@ -32,14 +32,14 @@ pub enum Body {
     Soft(SoftState),
 }
 
-/// The vertices of a soft body. What joins them is the agent's shape (`metachron_geometry::SurfaceShape`).
+/// The vertices of a soft body. The agent's shape (`metachron_geometry::SurfaceShape`) joins them.
 #[derive(Debug, Clone, Default, serde::Serialize, serde::Deserialize)]
 pub struct SoftState {
     /// Positions, metres, world axes.
     pub positions: Vec<DVec3>,
     /// Their velocities, m/s.
     pub velocities: Vec<DVec3>,
-    /// What carries them, as its agent published it; `None` where the vertices are solved for themselves.
+    /// The nodes that carry them, as the agent published them; `None` where the vertices are solved for themselves.
     pub nodes: Option<SoftNodes>,
 }
 

@@ -1,4 +1,4 @@
-//! What a contact cluster did, as its members publish it.
+//! How a contact cluster was solved, as its members publish it.
 
 use crate::AgentId;
 
@@ -49,7 +49,7 @@ impl SolveLevel {
 /// How a cluster was solved. Counts are those of all steps that its leader has led so far.
 #[derive(Debug, Clone, Copy, PartialEq, Default, serde::Serialize, serde::Deserialize)]
 pub struct ClusterSolves {
-    /// Contacts of the last step, those that bear nothing included.
+    /// Contacts of the last step, unloaded ones included.
     pub contacts: u32,
     /// Problems solved.
     pub problems: u64,
@@ -63,7 +63,7 @@ pub struct ClusterSolves {
     pub level: SolveLevel,
     /// Factors of the last step.
     pub last_factors: u32,
-    /// What laws and momentum miss at most by an answer of the last step, m/s, ≥ 0; infinite where numbers overflowed.
+    /// The greatest miss of laws and momentum by answers of the last step, m/s, ≥ 0; infinite where numbers overflowed.
     pub miss_m_s: f64,
     /// The deepest overlap of the last step, metres, ≥ 0.
     pub depth_m: f64,

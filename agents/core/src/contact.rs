@@ -1,4 +1,4 @@
-//! What touches an agent and holds it now, as its state publishes it.
+//! The contacts of an agent and the efforts of its joints, as its state publishes them.
 
 use crate::{AgentId, SimTime};
 use glam::DVec3;
@@ -12,7 +12,7 @@ pub enum ContactPartner {
     Agent(AgentId),
 }
 
-/// What others give a body by contact: a force, and a torque about its centre of mass, world axes.
+/// The contact force on a body and its torque about the centre of mass, world axes.
 #[derive(Debug, Clone, Copy, PartialEq, Default, serde::Serialize, serde::Deserialize)]
 pub struct Wrench {
     /// N.
@@ -37,7 +37,7 @@ impl std::ops::Mul<f64> for Wrench {
     }
 }
 
-/// What a joint's motor and its stops give together along the way that it leaves free.
+/// The effort of a joint's motor and stops together along the direction that the joint leaves free.
 #[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct JointEffort {
     /// The joint's number in the scene.

@@ -13,8 +13,8 @@ pub struct InverseMass {
     pub angular_per_kg_m2: DMat3,
 }
 
-/// The inverse of the part of a symmetric `matrix` along the axes that are not `locked`, zero along those that are: how a body answers that
-/// moves along, or turns about, the others alone.
+/// The inverse of the part of a symmetric `matrix` along the axes that are not `locked`, and zero along the locked ones: the response of a
+/// body that moves along, or turns about, the free axes alone.
 #[must_use]
 pub fn inverse_of_free(matrix: DMat3, locked: [bool; 3]) -> DMat3 {
     let mut free = matrix;

@@ -247,8 +247,9 @@ impl Ledger {
         }
     }
 
-    /// Begins a step of the owner at `now`: removes late parts from `coming`, as they have acted, except those that still wait for a
-    /// peer's answer. Drops the pages that the peer has taken completely, and starts a new page where the present one is full.
+    /// Begins a step of the owner at `now`: removes late parts from `coming`, as they have acted, but for parts that
+    /// still wait for a peer's answer. Drops the pages that the peer has taken completely, and starts a new page where
+    /// the present one is full.
     ///
     /// `taken` is the peer's copy, `None` where it has none yet. A new page starts only when no older one waits:
     /// a peer that has stopped acknowledging costs two pages and no more.

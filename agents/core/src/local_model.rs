@@ -1,7 +1,7 @@
 //! How a body answers one partner of an asynchronous pair until its next state: the local model that it publishes.
 //!
-//! In: what a body's cluster knows at the end of its step. Out: the same for a partner with another clock, or a device. Never here: how a
-//! partner uses it. Theory: docs/theory/coupling.md, section 3.
+//! In: the state of a body's cluster at the end of its step. Out: the same for a partner with another clock, or a
+//! device. Never here: how a partner uses it. Theory: docs/theory/coupling.md, section 3.
 
 use crate::{AgentId, SimTime};
 use glam::{DMat3, DVec3};
@@ -18,23 +18,23 @@ pub struct LocalBlock {
     pub acceleration: DVec3,
 }
 
-/// What a partner did to the body in its last step.
+/// The effect of a partner on the body in its last step.
 #[derive(Debug, Clone, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct LocalPartner {
     /// The partner.
     pub id: AgentId,
     /// The partner's own time in the reading by which the body took impulses last.
     pub read: SimTime,
-    /// What it is expected to go on giving each block a second, N or N·m.
+    /// The force or torque that it is expected to go on exerting on each block, N or N·m.
     pub forces: Vec<DVec3>,
 }
 
 /// A body as its partners need it: where they may touch it or are linked to it.
 #[derive(Debug, Clone, PartialEq, Default, serde::Serialize, serde::Deserialize)]
 pub struct LocalModel {
-    /// The body's step, in which it gives evenly what it takes, seconds, > 0.
+    /// The length of the body's step, over which it spreads the impulses that it takes, seconds, > 0.
     pub step_s: f64,
-    /// Whether contacts or springs of its cluster held it in the last step: it then forgets an impulse within a step, and what is free keeps it.
+    /// Whether contacts or springs of its cluster held it in the last step: a held body forgets an impulse within a step, a free one keeps it.
     pub held: bool,
     /// The blocks that may move under the partners' impulses.
     pub blocks: Vec<LocalBlock>,

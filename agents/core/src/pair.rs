@@ -1,4 +1,4 @@
-//! What a coupling between two agents does now, as its owner publishes it.
+//! The present state of a coupling between two agents, as its owner publishes it.
 
 use super::wave::Wave;
 use crate::AgentId;
@@ -33,7 +33,7 @@ impl PairKind {
     }
 }
 
-/// What a coupling does now, published by its owner.
+/// The present state of a coupling, published by its owner.
 #[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct PairState {
     /// The agent on the other side.
@@ -55,7 +55,7 @@ pub struct PairState {
     pub inverse_mass_per_kg: Option<[f64; 2]>,
     /// The mass that the law adds to the other side, kg: k T² of wave variables, else zero.
     pub parasitic_kg: f64,
-    /// What this end of a line sends; with wave variables both sides publish the pair.
+    /// The wave that this end of a line sends; with wave variables both sides publish the pair.
     pub wave: Option<Wave>,
 }
 

@@ -1,7 +1,7 @@
 //! Loops whose rounds may run on several threads at the same time.
 //!
-//! In: two lists, what is done with each pair of their elements. Out: the same bits on any threads: rounds write to their own
-//! elements only. Never here: threads; those who have some implement [`ParallelFor`].
+//! In: two lists, a function of each pair of their elements. Out: the same bits on any threads: rounds write to their
+//! own elements only. Never here: threads; crates that have some implement [`ParallelFor`].
 
 use std::fmt;
 
@@ -22,7 +22,7 @@ impl ParallelFor for PlainLoop {
     }
 }
 
-/// What has fewer than two jobs of so many blocks of three velocities is not divided: one takes some 50 µs, and to hand it over takes 10.
+/// A loop over fewer than two jobs of so many blocks of three velocities is not divided: a job takes some 50 µs, handing it over 10.
 const JOB_MIN: usize = 64;
 
 /// Whether rounds of `size` blocks in all are worth more than one thread.
@@ -106,7 +106,7 @@ mod tests {
         assert_eq!(jobs(&[JOB_MIN - 1, JOB_MIN]), 1);
         assert_eq!(jobs(&[1; 2 * JOB_MIN]), 2);
         assert_eq!(jobs(&[1; 8 * JOB_MIN]), 8);
-        // what is large is not divided, and what is small around it is not left to one thread each
+        // a large round is not divided, and the small ones around it are not left to one thread each
         assert_eq!(jobs(&[1, 1, 10 * JOB_MIN, 1, 1]), 3);
     }
 }

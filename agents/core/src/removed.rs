@@ -1,6 +1,6 @@
-//! What was taken out of a body: a sum since the start, so that a state that is read late, twice or never does no harm.
+//! The matter taken out of a body: a sum since the start, so that a state read late, twice or never does no harm.
 //!
-//! In: what went in each step. Out: their sum. Never here: what went where.
+//! In: the matter removed in each step. Out: its sum. Never here: where it was.
 
 use glam::DVec3;
 
@@ -9,7 +9,7 @@ use glam::DVec3;
 pub struct Removed {
     /// How many of its cells.
     pub cells: u32,
-    /// How many triangles its skin has fewer, net of those that close it over what was inside: below zero where these are more.
+    /// How many triangles its skin has lost, net of new ones that close it: below zero where these are more.
     pub triangles: i32,
     /// Their mass, kg.
     pub mass_kg: f64,

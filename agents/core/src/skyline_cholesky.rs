@@ -104,8 +104,8 @@ impl<const B: usize> SkylineCholesky<B> {
         (0..self.rows() / B).all(|body| self.factor_body(B * body))
     }
 
-    /// Factors the B rows of a body, beginning with row `i`: all B together against the rows of earlier bodies, so that each of those is
-    /// read once.
+    /// Factors the B rows of a body, beginning with row `i`: all B together against the rows of earlier bodies, so that
+    /// each earlier row is read once.
     fn factor_body(&mut self, i: usize) -> bool {
         let Self { first, start, values } = self;
         let (done, mut rest) = values.split_at_mut(start[i]);

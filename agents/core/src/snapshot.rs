@@ -36,7 +36,7 @@ pub struct Snapshot {
     pub at_rest: bool,
     /// Its smooth acceleration, m/s², without couplings and impacts. Others predict its motion by it.
     pub acceleration: DVec3,
-    /// How its spin changed in the mean of the last step, rad/s², world axes; zero of what bends, and of what is led.
+    /// The mean change of its spin in the last step, rad/s², world axes; zero for all but dynamic rigid bodies.
     pub angular_acceleration: DVec3,
     /// Its response to impulses.
     pub inertia: Inertia,
@@ -50,29 +50,29 @@ pub struct Snapshot {
     pub local_model: LocalModel,
     /// The couplings that it owns.
     pub pairs: Vec<PairState>,
-    /// What it touches in the cluster that it is stepped in, but for agents of lower numbers: these publish it.
+    /// Its contacts in the cluster that steps it, but for agents of lower numbers: these publish theirs.
     pub contacts: Vec<ContactState>,
-    /// What all that it touches in that cluster gave it, in the mean of the last step, about its centre of mass; zero of a body that bends. Of
-    /// heaps that rapier3d steps it has what acts along normals.
+    /// The contact wrench on it in that cluster, the mean of the last step, about its centre of mass; zero for a deformable.
+    /// In a rigid pile that rapier3d steps it contains normal impulses alone.
     pub contact_wrench: Wrench,
-    /// What its hinges and slides gave in the mean of the last step, of those whose first body it is.
+    /// The efforts of the hinges and slides whose first body it is, the means of the last step.
     pub efforts: Vec<JointEffort>,
     /// Its part in a contact cluster; `None` where it steps by itself.
     pub cluster: Option<ClusterState>,
     /// Rigid bodies that it has touched for so long that the two should share one clock.
     pub bonds: Vec<AgentId>,
-    /// What happened to its attachments since the start; each is reported by one of its two agents.
+    /// The events of its attachments since the start; each is reported by one of its two agents.
     pub events: Vec<AttachmentEvent>,
-    /// What touched a sensor, or sensed it, since the start; each pair is reported by one of its two agents.
+    /// The touches of sensors that it took part in since the start; each pair is reported by one of its two agents.
     pub sensed: Vec<SensorTouch>,
-    /// What was taken out of it since the start.
+    /// The matter taken out of it since the start.
     pub removed: Removed,
 }
 
 /// A body's response to impulses: its inverse mass, at the time of the snapshot.
 #[derive(Debug, Clone, Default, serde::Serialize, serde::Deserialize)]
 pub enum Inertia {
-    /// Immovable, or what impulses do is not published.
+    /// Immovable, or its response to impulses is not published.
     #[default]
     Immovable,
     /// A rigid body about its centre of mass.
@@ -85,8 +85,8 @@ pub enum Inertia {
 }
 
 impl Snapshot {
-    /// Empties what an agent may leave unset, keeping the storage. Ledgers stay, for agents with ledgers to overwrite:
-    /// their storage is nested.
+    /// Empties the fields that an agent may leave unset, keeping the storage. Ledgers stay, for agents with ledgers to
+    /// overwrite: their storage is nested.
     pub fn clear(&mut self) {
         self.touches.clear();
         self.grips.clear();

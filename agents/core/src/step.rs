@@ -1,4 +1,4 @@
-//! The report of a step, and the errors of one that is refused or diverges.
+//! The report of a step, and the errors of a step that is refused or diverges.
 
 use crate::SimSpan;
 
@@ -6,8 +6,8 @@ use crate::SimSpan;
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct StepReport {
     /// Work done, in the model's unit; a declared machine gives the cost of a unit in seconds.
-    /// Tube: segments × systems solved: one per substep, more where its rule iterates, plus those of its own error estimate.
-    /// Rigid, tool: 1. Synthetic: its declared microseconds.
+    /// Tube: segments × systems solved: one per substep, more where its rule iterates, plus the systems of its own
+    /// error estimate. Rigid, tool: 1. Synthetic: its declared microseconds.
     pub work: f64,
     /// Number of substeps that the step was divided into, ≥ 1.
     pub substeps: u32,

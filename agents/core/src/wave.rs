@@ -1,4 +1,4 @@
-//! What one end of a transmission line publishes (docs/theory/coupling.md, eq. 10).
+//! The data that one end of a transmission line publishes (docs/theory/coupling.md, eq. 10).
 
 use crate::SimTime;
 use glam::DVec3;

@@ -1,4 +1,4 @@
-//! How long do the contact searches of what bends take, against its size? Prints CSV.
+//! How long do the contact searches of deformables take, against their size? Prints CSV.
 //!
 //! `cargo run --release -p metachron-geometry --example contact_rate`
 

@@ -10,7 +10,7 @@ use glam::DVec3;
 const COLUMNS: usize = 6;
 /// How far columns are from the middles of their squares, as a share of a cell: few surfaces have vertices or edges in such columns.
 const COLUMN_SHIFT: [f64; 2] = [1.137e-5, -0.731e-5];
-/// A cell with less inside than this share of what the fullest has is no cell of the cage: its nodes would weigh next to nothing.
+/// A cell filled less than this share of the fullest one is no cell of the cage: its nodes would weigh next to nothing.
 const FILL_LEAST: f64 = 0.01;
 /// How far inward a point of the surface is taken to be when its cell is looked for, as a share of a cell.
 const INWARD: f64 = 1e-3;
@@ -38,7 +38,7 @@ pub struct Carried {
 }
 
 impl Carried {
-    /// What moves with one node.
+    /// A point that moves with one node.
     #[must_use]
     pub const fn by_node(node: u32) -> Self {
         Self { nodes: [node; 4], weights: [1.0, 0.0, 0.0, 0.0] }
@@ -50,7 +50,7 @@ impl Carried {
         pairs.filter(|(_, weight)| *weight != 0.0).map(|(node, weight)| (node as usize, weight))
     }
 
-    /// The weighted mean of what the nodes have.
+    /// The weighted mean of the nodes' values.
     #[must_use]
     pub fn mean(&self, of: &[DVec3]) -> DVec3 {
         self.terms().map(|(node, weight)| of[node] * weight).sum()
@@ -87,7 +87,7 @@ impl Cage {
     pub fn new(surface: &Triangles, eps_m: f64, nodes_max: usize) -> Option<Self> {
         let Aabb { low, high } = Aabb::of(&surface.points);
         let counts = cage_counts(surface, eps_m);
-        // what is inside fills no less than a hundredth of any box around an organ: far more places than nodes are a mistake
+        // the inside fills no less than a hundredth of any box around an organ: far more places than nodes are a mistake
         let places = counts.iter().try_fold(1_usize, |product, count| product.checked_mul(*count))?;
         if places > nodes_max.saturating_mul(200) {
             return None;
@@ -160,7 +160,7 @@ impl Cage {
         columns
     }
 
-    /// Makes cells of what is filled, so that their volumes sum to `whole_m3`; `None` where nothing is.
+    /// Makes cells of the filled places, so that their volumes sum to `whole_m3`; `None` where none is filled.
     fn keep_filled(&mut self, volumes: &[[f64; 8]], whole_m3: f64) -> Option<()> {
         let [nx, ny, nz] = self.counts;
         let full = self.cell_m.element_product();
@@ -295,8 +295,8 @@ impl Cage {
         self.cell_at(at_m + inward * (INWARD * self.cell_m.min_element()))
     }
 
-    /// Takes cells away, not all of them; those that are left are numbered anew in the same order, nodes keep their numbers, and what was in a
-    /// cell that is gone belongs to the nearest one that is left.
+    /// Takes cells away, not all of them; the others are numbered anew in the same order, nodes keep their numbers, and matter of a cell that
+    /// is gone belongs to the nearest one that is left.
     pub fn remove(&mut self, is_gone: &[bool]) {
         let mut gone = is_gone.iter();
         self.cells.retain(|_| !gone.next().copied().unwrap_or_default());

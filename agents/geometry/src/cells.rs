@@ -32,7 +32,7 @@ pub enum Region {
 pub struct Portal {
     /// Its corners in their order around it, metres; three or more.
     pub corners_m: Vec<DVec3>,
-    /// What it is between.
+    /// The regions on its two sides.
     pub between: [Region; 2],
 }
 
@@ -62,7 +62,7 @@ impl Side {
     }
 }
 
-/// What is wrong with cells and portals, by the number of each.
+/// The faults of cells and portals, by the number of each.
 #[derive(Debug, Clone, PartialEq)]
 pub enum CellsError {
     /// A cell without a volume.
@@ -262,7 +262,7 @@ impl Cells {
             return Exposure::Outside;
         }
         let volume = |size: DVec3| if size.min_element() > 0.0 { size.element_product() } else { 0.0 };
-        // what stands on the floor of a cell is in it
+        // an object that stands on the floor of a cell is in it
         let (middle, half) =
             (0.5 * (low_m + high_m), (0.5 * (high_m - low_m) - TOUCH_M).max(DVec3::splat(0.1 * TOUCH_M)));
         let (low, high) = (middle - half, middle + half);
@@ -270,8 +270,8 @@ impl Cells {
         if within >= (1.0 - 1e-9) * volume(high - low) { Exposure::Within } else { Exposure::Partly }
     }
 
-    /// The walls of a cell on these sides, `thickness_m` thick and within it, as lower and upper corners of boxes that do not overlap: what
-    /// portals leave of each side, whose bounding rectangles they cut out.
+    /// The walls of a cell on these sides, `thickness_m` thick and within it, as lower and upper corners of boxes that do not overlap: each
+    /// side less the bounding rectangles of its portals.
     #[must_use]
     pub fn walls(&self, cell: usize, sides: &[Side], thickness_m: f64) -> Vec<(DVec3, DVec3)> {
         let Some(it) = self.cells.get(cell) else { return Vec::new() };

@@ -18,7 +18,7 @@ pub struct CollisionShape {
     pub friction: f64,
     /// Coefficient of restitution, 0 … 1; a pair takes the larger, where neither side's traits say otherwise.
     pub restitution: f64,
-    /// What else it says about its contacts.
+    /// Its groups, combine rules, spin friction, and whether it is a sensor.
     pub traits: ContactTraits,
 }
 
@@ -29,7 +29,7 @@ impl CollisionShape {
         Self { kind, friction, restitution: 0.0, traits: ContactTraits::default() }
     }
 
-    /// Whether it is the skin of what has cells: of a sheet or a solid.
+    /// Whether it is the skin of a body with cells: of a sheet or a solid.
     #[must_use]
     pub fn has_cells(&self) -> bool {
         matches!(&self.kind, ShapeKind::Surface(surface) if !surface.triangles.is_empty())
@@ -66,7 +66,8 @@ impl CollisionShape {
         self.traits.spin_radius_m.max(other.traits.spin_radius_m)
     }
 
-    /// The coefficient of restitution of the two (contact.md, eq. 13): what bends gives back what it has stored, and has none.
+    /// The coefficient of restitution of the two (contact.md, eq. 13): 0 for deformables, which give back what they
+    /// have stored.
     #[must_use]
     pub fn restitution_with(&self, other: &Self) -> f64 {
         if [self, other].iter().any(|side| matches!(side.kind, ShapeKind::Chain | ShapeKind::Surface(_))) {

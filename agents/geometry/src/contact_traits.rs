@@ -1,15 +1,15 @@
-//! How a skin takes part in contact beside its friction and restitution: what it collides with, how a pair shares its coefficients, whether it only
-//! senses.
+//! How a skin takes part in contact beside its friction and restitution: its collision groups, the rules by which a pair shares coefficients,
+//! and whether it is a sensor.
 //!
-//! In: what a scene says of an object. Out: the same of a pair. Never here: where skins touch, impulses.
+//! In: the traits that a scene gives an object. Out: the same of a pair. Never here: where skins touch, impulses.
 //! Theory: docs/theory/contact.md, section 5.
 
-/// What a skin says about its contacts, the same for bodies and static solids.
+/// The contact traits of a skin, the same for bodies and static solids.
 #[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct ContactTraits {
-    /// What it collides with.
+    /// The groups that it is in and collides with.
     pub groups: CollisionGroups,
-    /// Whether it only senses: what touches it is reported, and no force acts.
+    /// Whether it is a sensor: its touches are reported, and no force acts.
     pub is_sensor: bool,
     /// How a pair with it shares frictions; `None` leaves that to the other side.
     pub friction_rule: Option<CombineRule>,
@@ -20,7 +20,7 @@ pub struct ContactTraits {
     pub spin_radius_m: f64,
 }
 
-/// The groups that an object is in, and those that it collides with: a bit each.
+/// The groups that an object is in, and the groups that it collides with: a bit each.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 pub struct CollisionGroups {
     /// The groups that it is in.
@@ -59,7 +59,7 @@ impl Default for ContactTraits {
 }
 
 impl ContactTraits {
-    /// Those of what says nothing.
+    /// The traits of a skin for which a scene gives none.
     pub const NONE: Self = Self {
         groups: CollisionGroups::ALL,
         is_sensor: false,
@@ -81,7 +81,7 @@ impl CollisionGroups {
 }
 
 impl CombineRule {
-    /// The rule of a pair: the later one of those that its sides give, `default` where neither does.
+    /// The rule of a pair: the later one of its sides' rules, `default` where neither has one.
     #[must_use]
     pub fn of_pair(sides: [Option<Self>; 2], default: Self) -> Self {
         sides.into_iter().flatten().max().unwrap_or(default)

@@ -15,11 +15,11 @@ pub struct Stroke {
     pub from: Vec3,
     /// Vector to the end of a line, metres; unit normal of a leaf.
     pub way: Vec3,
-    /// Half the width of a line; radius of a disc that covers what the leaf covers on average over all directions of view, metres.
+    /// Half the width of a line; radius of a disc of the area that the leaf covers on average over all directions of view, metres.
     pub radius_m: f32,
 }
 
-/// What the pieces are.
+/// The kind of the pieces.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum PieceKind {
     /// Boughs, thick ones first: a line of two triangles, or a generalized cylinder.
@@ -75,7 +75,7 @@ impl PieceKind {
 }
 
 impl Foliage {
-    /// What the pieces are.
+    /// The kind of the pieces.
     #[must_use]
     pub fn kind(&self) -> PieceKind {
         self.kind
@@ -106,8 +106,9 @@ impl Foliage {
         (least, self.mesh.triangles.len() as u32)
     }
 
-    /// What is drawn with at most `triangles`, at least with one stroke, where a metre is `pixels` large: of n pieces p strokes up to p = n, past it p − n pieces in full
-    /// and 2n − p strokes (RH05, §6.2). Boughs wider than a line can be are in full, whatever that leaves for the others (RH05, §6.1).
+    /// The pieces to draw with at most `triangles`, at least one stroke, where a metre is `pixels` large: of n pieces p strokes up to p = n, past
+    /// it p − n pieces in full and 2n − p strokes (RH05, §6.2). Boughs wider than a line can be are in full, whatever that leaves for the others
+    /// (RH05, §6.1).
     #[must_use]
     pub fn cut(&self, triangles: u32, pixels: f64) -> FoliageCut {
         let all = self.strokes.len() as u32;

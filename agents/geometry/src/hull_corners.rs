@@ -1,6 +1,6 @@
 //! The corners of a convex hull, as few as a tolerance allows.
 //!
-//! In: points, a tolerance. Out: those of the points that are corners. Never here: faces that last, shapes.
+//! In: points, a tolerance. Out: the points that are corners. Never here: faces that last, shapes.
 //!
 //! Faces are raised to the farthest point above them until none is farther than the tolerance, as by Quickhull (Barber, Dobkin, Huhdanpaa
 //! 1996): further corners cost every search time and change the shape by less.
@@ -9,8 +9,8 @@ use super::Aabb;
 use super::parry_shapes::hull_triangles;
 use glam::DVec3;
 
-/// Those of `points`, in their order, above the faces of whose hull no other point is higher than `tolerance_m` metres (≥ 0; below a millionth
-/// of their extent single precision tells nothing apart). All of them where they span no volume or one is not finite.
+/// A subset of `points`, in their order, above the faces of whose hull no other point is higher than `tolerance_m` metres (≥ 0; below a
+/// millionth of their extent single precision tells nothing apart). All of them where they span no volume or one is not finite.
 #[must_use]
 pub fn hull_corners(points: &[DVec3], tolerance_m: f64) -> Vec<DVec3> {
     if points.is_empty() || !points.iter().all(|point| point.is_finite()) {
@@ -30,7 +30,7 @@ pub fn hull_corners(points: &[DVec3], tolerance_m: f64) -> Vec<DVec3> {
             Some(Face { corner: a, normal: (b - a).cross(c - a).try_normalize()?, farthest: None })
         });
         let mut faces: Vec<_> = faces.collect();
-        // a hull only grows: what is inside of this one is inside of the next; corners stay where they are
+        // a hull only grows: a point inside this one is inside the next; corners stay where they are
         outside.retain(|at| kept.binary_search(at).is_err());
         outside.retain(|&at| faces.iter_mut().fold(false, |is_outside, face| face.note(at, centred[at]) | is_outside));
         let highest_m = faces.iter().filter_map(|face| Some(face.farthest?.height_m)).fold(0.0, f64::max);

@@ -26,7 +26,7 @@ pub fn creased_mesh(points_m: &[DVec3], triangles: &[[u32; 3]]) -> PrimitiveMesh
     painted_mesh(points_m, &[], triangles)
 }
 
-/// The same with texture coordinates for each point; missing ones are 0, and so are those that are not finite.
+/// The same with texture coordinates for each point; missing and non-finite ones are 0.
 ///
 /// Coincident points count as one for the normals: the texture has seams, the shading has none.
 #[must_use]

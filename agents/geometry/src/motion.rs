@@ -1,4 +1,4 @@
-//! The declared motion of what nothing simulates: it turns at a constant rate and swings along a line.
+//! The declared motion of an object that nothing simulates: it turns at a constant rate and swings along a line.
 //!
 //! In: a placement at time zero, a time. Out: the placement then, and its velocity. Never here: physics.
 
@@ -20,7 +20,7 @@ pub struct Motion {
 }
 
 impl Motion {
-    /// Placement and velocity, m/s, at the time `seconds` of what is at `rest` at time zero.
+    /// Placement and velocity, m/s, at the time `seconds` of an object that is at `rest` at time zero.
     #[must_use]
     pub fn at(&self, rest: &Placement, seconds: f64) -> (Placement, DVec3) {
         let turn = turn(self.spin_rad_s * seconds);

@@ -54,7 +54,7 @@ pub enum ShapeError {
     BadPart {
         /// Number of the part, from 0.
         index: usize,
-        /// What is wrong with it.
+        /// The fault of the part.
         why: String,
     },
     /// A triangle refers to a corner that does not exist.

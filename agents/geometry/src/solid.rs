@@ -130,7 +130,7 @@ pub struct Obstacle {
     pub friction: f64,
     /// Coefficient of restitution, 0 … 1.
     pub restitution: f64,
-    /// What else it says about its contacts.
+    /// Its groups, combine rules, spin friction, and whether it is a sensor.
     pub traits: ContactTraits,
 }
 

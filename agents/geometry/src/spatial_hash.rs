@@ -75,7 +75,7 @@ impl Grid {
     }
 }
 
-/// Boxes in a uniform hash grid: those that meet a region, each once.
+/// Boxes in a uniform hash grid, which finds the boxes that meet a region, each once.
 #[derive(Debug, Clone, Default)]
 pub struct BoxGrid {
     cell_m: f64,

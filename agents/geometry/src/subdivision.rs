@@ -9,7 +9,8 @@ use std::collections::HashMap;
 type Midpoints = HashMap<[u32; 2], u32>;
 
 /// The surface with edges of at most `longest_m` metres: longer ones are halved, on both sides alike, until there are none, or as many
-/// triangles as `triangles_max`. Points stay and keep their numbers; new ones follow, in the middles of edges. What was closed is closed.
+/// triangles as `triangles_max`. Points stay and keep their numbers; new ones follow, in the middles of edges. A closed
+/// surface stays closed.
 #[must_use]
 pub fn subdivided(surface: &Triangles, longest_m: f64, triangles_max: usize) -> Triangles {
     let Triangles { mut points, mut triangles } = surface.clone();

@@ -1,4 +1,4 @@
-//! Meshes of tetrahedra: what is wrong with one, and the surface around it.
+//! Meshes of tetrahedra: the faults of one, and the surface around it.
 //!
 //! In: points and corners. Out: the first fault with its place, the boundary. Never here: files, materials.
 
@@ -17,7 +17,7 @@ pub struct Tetrahedra {
     pub regions: Vec<i64>,
 }
 
-/// What is wrong with a mesh of tetrahedra; all numbers from 0.
+/// A fault of a mesh of tetrahedra; all numbers from 0.
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
 pub enum TetrahedraFault {
     /// There are none.
@@ -176,7 +176,7 @@ impl Tetrahedra {
     }
 }
 
-/// Those of the faces of all cells that one cell alone has.
+/// The faces that only one cell has, of the faces of all cells.
 #[must_use]
 pub fn lone_faces(mut faces: Vec<[u32; 3]>) -> Vec<[u32; 3]> {
     let mut cells: HashMap<[u32; 3], u32> = HashMap::with_capacity(faces.len());

@@ -103,7 +103,7 @@ impl ToolShape {
     pub fn opening_m_s(&self, local_m: DVec3, rate_per_s: f64) -> DVec3 {
         let hinge = DVec3::new(0.0, 0.0, -JAW_BEHIND * JAW_LENGTH * self.shaft_radius_m);
         let arm = local_m - hinge;
-        // what lies behind the hinge is no jaw; one is on either side of the middle
+        // a point behind the hinge is on no jaw; one jaw is on either side of the middle
         let swing = if arm.z > 0.0 { JAW_SWING_RAD * rate_per_s * local_m.x.signum() } else { 0.0 };
         (DVec3::Y * swing).cross(arm)
     }

@@ -1,4 +1,5 @@
-//! How deep do fifteen scenes land and lie at equal and unlike rates, what do they weigh, make and take? Prints a line for each.
+//! How deep do fifteen scenes land and rest at equal and unlike rates, how much do they weigh, gain and cost? Prints a
+//! line for each.
 //!
 //! `cluster_scenes [rates, as 60:60,240:60] [start of a name]`
 

@@ -1,4 +1,4 @@
-//! What does a whole step of a cluster cost, with its search? Prints the mean of each of some scenes at 60 Hz while it lands and at rest.
+//! The cost of a whole step of a cluster with its search: the mean of each of some scenes at 60 Hz while it lands and at rest.
 //!
 //! `cargo run --release -p metachron-models --example cluster_steps [part of a name]`
 
@@ -141,7 +141,7 @@ fn organ(cells: u32) -> Placed {
     placed(SoftBody::new(SoftSpec { matter, ..spec }).unwrap(), false)
 }
 
-/// What a fine skin encloses, in a cage of 800 vertices, grown to its bed, under a ball.
+/// The inside of a fine skin, in a cage of 800 vertices, grown to its bed, under a ball.
 fn caged() -> Table {
     let spec = solid(DVec3::new(0.0, 0.0, 0.03), DVec3::new(0.18, 0.12, 0.06), [18, 12, 6], 1.2e4);
     let surface = std::sync::Arc::new(spec.shape.skin().unwrap());

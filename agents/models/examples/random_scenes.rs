@@ -1,4 +1,4 @@
-//! How do random scenes fare? Prints those that fail, counts of faults, and what a simulated second takes.
+//! How do random scenes fare? Prints the scenes that fail, counts of faults, and the cost of a simulated second.
 //!
 //! `random_scenes [stacks-mixed | stacks-60 | stacks-240 | pairs | tips | piles] [last number] [first number]`
 

@@ -1,4 +1,4 @@
-//! What does a step of a solid or a sheet by itself take? Prints milliseconds a step by the number of nodes.
+//! The cost of a step of a solid or a sheet by itself: milliseconds a step by the number of nodes.
 
 use glam::{DQuat, DVec3};
 use metachron_contact::StepContext;

@@ -1,6 +1,6 @@
 //! The promises of every agent, as one test suite for any model.
 //!
-//! In: a [`Suite`]: how to build the agent, what to do to it. Out: every broken promise ([`Breach`]), normally none.
+//! In: a [`Suite`]: how to build the agent, how to drive it. Out: every broken promise ([`Breach`]), normally none.
 //! Never here: promises of a single model; those are tested next to that model.
 //!
 //! ```
@@ -46,7 +46,7 @@ pub type CountAllocations<'a> = &'a dyn Fn(&mut dyn FnMut()) -> u64;
 /// Distance of an agent from its exact state after so many seconds, relative to that state.
 pub type Deviation<'a> = &'a dyn Fn(&dyn Agent, f64) -> f64;
 
-/// An agent and what to do to it.
+/// An agent and how to drive it.
 pub struct Suite<'a> {
     /// Builds the agent, identical each time, in a state of motion.
     pub make: Make<'a>,
@@ -67,7 +67,7 @@ pub struct Suite<'a> {
     pub resolutions: Vec<Resolution>,
     /// Builds the agent in a case that converges, and the number of steps of `dt` until it has.
     pub converging: Option<(Make<'a>, u32)>,
-    /// What is put on the agent, if others may rest on it.
+    /// The load that is put on the agent, if others may rest on it.
     pub load: Option<Load<'a>>,
     /// Counts allocations, and the number allowed per step once warm.
     pub allocations: Option<(CountAllocations<'a>, f64)>,
@@ -86,12 +86,12 @@ pub enum Promise {
     Residual,
     /// The same calls give the same bits.
     SameBits,
-    /// What is saved and read back goes on with the same bits, in an agent built anew and in one that was elsewhere. A model that saves nothing
-    /// keeps this promise.
+    /// A saved state that is read back goes on with the same bits, in an agent built anew and in one that was elsewhere. A model that saves
+    /// nothing keeps this promise.
     Archive,
     /// A body that rests on it gives it its weight, within 1 %, and stays, whatever the rates of both.
     Carries,
-    /// What [`Agent::inputs`] names it takes, and nothing else.
+    /// It takes the inputs that [`Agent::inputs`] names, and no others.
     Inputs,
     /// Nothing is allocated once the sizes settle.
     Allocation,
@@ -164,7 +164,7 @@ struct Run<'a> {
 }
 
 impl Run<'_> {
-    /// Writes or reads it, with what its cluster knows of it.
+    /// Writes or reads it, with its cluster's memory of it.
     fn archive(&mut self, archive: &mut Archive<'_>) -> Result<(), ArchiveError> {
         self.agent.archive(archive)?;
         archive.value(&mut self.time)?;

@@ -1,6 +1,6 @@
 //! Models of matter as agents: rigid bodies, elastic tubes, soft bodies, driven tools.
 //!
-//! In: step lengths and what an agent sees of the others. Out: states, as snapshots.
+//! In: step lengths and an agent's view of the others. Out: states, as snapshots.
 //! Never here: a clock, a thread, a file, the GPU. Theory: `docs/theory/rod.md`, `docs/theory/soft.md`.
 //!
 //! ```

@@ -1,11 +1,11 @@
-//! How a body that bends is moved as a whole: turned and shifted about its centre of mass, with the velocities of a rigid body.
+//! How a deformable is moved as a whole: turned and shifted about its centre of mass, with the velocities of a rigid body.
 //!
 //! In: where its matter is, where it is to go. Out: a map of points and velocities. Never here: which body may be moved.
 
 use glam::{DQuat, DVec3};
 use metachron_contact::SetMotion;
 
-/// A rigid motion of a body that bends.
+/// A rigid motion of a deformable.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct WholeMotion {
     centre_m: DVec3,
@@ -45,7 +45,8 @@ impl WholeMotion {
         self.turn
     }
 
-    /// The velocity of what is at `x` already: that of a rigid body where one is given, else the one that it had, turned along.
+    /// The velocity of a part that is at `x` already: that of a rigid body where one is given, else the one that it
+    /// had, turned along.
     pub fn velocity(&self, x: DVec3, had: DVec3) -> DVec3 {
         if self.velocity_m_s.is_none() && self.spin_rad_s.is_none() {
             return self.turn * had;
@@ -66,7 +67,7 @@ const HELD_M: f64 = 1e-6;
 /// Whether the nodes of another state fit those of a body, `held` where they cannot be moved.
 ///
 /// # Errors
-/// What does not.
+/// The first fault, in words.
 pub(crate) fn check_nodes(now: &[DVec3], to: [&[DVec3]; 2], held: impl Fn(usize) -> bool) -> Result<(), String> {
     let [positions, velocities] = to;
     for (what, found) in [("positions", positions.len()), ("velocities", velocities.len())] {

@@ -1,6 +1,6 @@
 //! Principal axes of symmetric matrices.
 //!
-//! In: a matrix. Out: its eigenvalues and axes. Never here: what they mean.
+//! In: a matrix. Out: its eigenvalues and axes. Never here: their meaning.
 
 use glam::{DMat3, DVec3};
 
@@ -19,7 +19,7 @@ pub(crate) fn principal_axes(mut matrix: DMat3) -> PrincipalAxes {
     for (p, q) in (0..SWEEPS).flat_map(|_| [(0, 1), (0, 2), (1, 2)]) {
         let off = matrix.col(q)[p];
         let (low, high) = (matrix.col(p)[p], matrix.col(q)[q]);
-        // what is lost against the diagonal turns nothing
+        // an entry lost against the diagonal turns nothing
         if off.abs() <= 1e-3 * f64::EPSILON * (low.abs() + high.abs()) {
             continue;
         }

@@ -1,4 +1,4 @@
-//! The path through the keyframes of what is led: a smooth curve through all of them, and the way back to it.
+//! The path through the keyframes of a led body: a smooth curve through all of them, and the way back to it.
 //!
 //! In: keyframes and a time. Out: a [`Pose`] and its velocity. Never here: user springs, grasping jaws.
 //!
@@ -9,12 +9,12 @@
 use glam::{DQuat, DVec3, DVec4};
 use metachron_core::{Archive, ArchiveError};
 
-/// Rate at which what was led elsewhere returns to its script, 1/s: nine tenths of the distance in a second.
+/// Rate at which a body that was led elsewhere returns to its script, 1/s: nine tenths of the distance in a second.
 const RETURN_RATE_PER_S: f64 = 4.0;
 /// Rotations whose dot product is within this of one are the same.
 const SAME_TURN: f64 = 1e-14;
 
-/// Pose of what is led at one time of its script.
+/// Pose of a led body at one time of its script.
 #[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Keyframe {
     /// Seconds from the start of the script, ≥ 0.
@@ -82,7 +82,8 @@ pub(crate) struct Script {
 }
 
 impl Pose {
-    /// The pose `dt` seconds later of what is here, while its script goes from one pose to another: the offset from it decays.
+    /// The pose `dt` seconds later of a body that is here, while its script goes from one pose to another: the offset
+    /// from it decays.
     pub(crate) fn returning(&self, from: &Self, to: &Self, dt: f64) -> Self {
         let motion = |pose: &Self| PointMotion { position: pose.tip, velocity: pose.velocity };
         let off = motion(self).relative_to(motion(from)).decayed(RETURN_RATE_PER_S, dt);

@@ -11,7 +11,7 @@ use std::error::Error;
 use std::fs;
 use std::time::Duration;
 
-/// What drawing costs: seconds a frame, and seconds a triangle.
+/// The costs of drawing: seconds a frame, and seconds a triangle.
 #[derive(Clone, Copy)]
 struct Machine {
     name: &'static str,
@@ -90,7 +90,7 @@ fn watch(control: &mut PictureControl, stage: &[ObjectView], machine: Machine, s
     frames
 }
 
-/// Brings a loop to rest at its target, then makes ε `factor` times what it was.
+/// Brings a loop to rest at its target, then multiplies ε by `factor`.
 fn push(name: &'static str, law: Law, machine: Machine, target_hz: f64, factor: f64) -> Run {
     let stage = stage();
     let margin = 1.0 - law.set_share();

@@ -1,5 +1,5 @@
-//! Rows that contacts bring with them: friction about the normal, of sides that turn as a whole, bounded by what presses the contact; and the
-//! push-out of bodies that began inside each other, bounded by what moves the two alone.
+//! Rows that contacts bring with them: friction about the normal, of sides that turn as a whole, bounded by the contact's pressure; and the
+//! push-out of bodies that began inside each other, bounded by the impulse that moves the two alone at a given speed.
 //!
 //! In: contacts of a fine step. Out: rows behind those of joints. Never here: where places are, the solve.
 //! Theory: docs/theory/clusters.md, section 2.
@@ -11,7 +11,7 @@ use crate::push_out::{PUSH_OUT_MAX_M_S, push_out_m_s};
 use crate::solve::{Contact, Hold, JointRow, Pressed};
 
 impl ConstraintRows {
-    /// Lays out the rows of contacts anew, behind all others: those of spins, then those that push out.
+    /// Lays out the rows of contacts anew, behind all others: rows of spins, then rows that push out.
     pub fn lay_contacts(&mut self, search: &mut Search, all: &[Participant<'_>], h_s: f64) {
         self.rows.truncate(self.owners.len());
         for (contact, (owner, at)) in search.owners.iter_mut().zip(&search.contacts).enumerate() {
@@ -52,7 +52,7 @@ pub(crate) fn spin_row(all: &[Participant<'_>], owner: &Owner, at: &Contact, con
     })
 }
 
-/// How a member moves as a whole, or what never does; `None` of a body that does not.
+/// The pose of a member that moves as a whole, or of the world; `None` for a deformable.
 fn turns(all: &[Participant<'_>], member: Option<usize>) -> Option<Pose> {
     let Some(member) = member else { return Some(Pose::WORLD) };
     let pose = all[member].member.pose(&[], 0.0)?;

@@ -1,8 +1,8 @@
-//! Attachments that fail: what gave more than it can bear over a macro step has torn from the next one on, and what gives all that it may slips
-//! and holds from then on where it has come to.
+//! Attachments that fail: one that gave more than it can bear over a macro step has torn from the next one on; one that gives the most that
+//! it may slips, and holds from then on where it has come to.
 //!
-//! In: rows with the impulses that they gave, what members say of their own attachments. Out: what tore or yielded, in the memory of the member that
-//! remembers it. Never here: what a row is made of, its bound ([`Hold::limited`](crate::solve::Hold::limited)), how events are reported.
+//! In: rows with their impulses, members' own attachments. Out: torn and yielded attachments, in the memory of the member that remembers
+//! them. Never here: how a row is made, its bound ([`Hold::limited`](crate::solve::Hold::limited)), how events are reported.
 //! Theory: docs/theory/clusters.md, eq. 28 and 29.
 
 use crate::constraint::{ConstraintRows, FineStep, Frame, Pull, RowOwner, Slides, SlidingRow};
@@ -18,7 +18,7 @@ use glam::DVec3;
 const WHOLE: f64 = 0.5;
 /// A row whose force is this share of the most that it gives has yielded, but for the accuracy of a solve.
 const ALL_SHARE: f64 = 1.0 - 1e-6;
-/// A spring slips by what it would give this share of the most for, or more: less is the accuracy of a solve.
+/// A spring has not slipped within the stretch for this share of its greatest force: that is the accuracy of a solve.
 const SLIP_SHARE: f64 = 1e-6;
 
 /// An attachment that tore at the end of a macro step, or began to yield in it.
@@ -31,7 +31,7 @@ pub struct FailedAttachment {
     pub other: Option<usize>,
     /// A link, a joint, or an attachment that is the participant's own.
     pub partner: Partner,
-    /// Of one that tore the force that it gave: the mean over the macro step, and over those cut short before it; else that at which it yields, N.
+    /// The force of a torn attachment, the mean over the macro step and over those cut short before it; else the force at which it yields, N.
     pub force_n: f64,
 }
 
@@ -60,7 +60,7 @@ impl Failures {
         self.yielded.clear();
     }
 
-    /// Adds what a row gave.
+    /// Adds the impulse of a row.
     pub fn note(&mut self, owner: &RowOwner, impulse_n_s: DVec3) {
         if owner.tears_above_n < f64::INFINITY {
             let order = |owner: &RowOwner| (owner.member, owner.partner);
@@ -70,7 +70,7 @@ impl Failures {
         }
     }
 
-    /// Adds what the own attachments of a member gave over its step of `h_s` seconds, which has ended.
+    /// Adds the impulses of a member's own attachments over its step of `h_s` seconds, which has ended.
     pub fn note_own(&mut self, member: usize, body: &dyn ClusterMember, h_s: f64) {
         for own in body.attachments() {
             let owner = RowOwner::new(member, None, Partner::Attachment(own.number));
@@ -78,8 +78,8 @@ impl Failures {
         }
     }
 
-    /// Ends a macro step of `macro_s` seconds: what gave too much has torn (eq. 28), and both its members remember that. What was given in
-    /// a step that was cut short counts together with the next: a joint that takes back what it is off gives that as a blow.
+    /// Ends a macro step of `macro_s` seconds: an attachment that gave too much has torn (eq. 28), and both its members remember that. The
+    /// impulse of a step that was cut short counts together with the next: a joint corrects its error by a great force in a short time.
     pub fn end(&mut self, all: &mut [Participant<'_>], macro_s: f64) {
         if self.loads.is_empty() {
             return;
@@ -155,7 +155,7 @@ impl Participant<'_> {
 }
 
 impl Slides {
-    /// What has slipped where its row has moved by so much, world axes, metres.
+    /// The slip of a row that has moved by `by_m`, world axes, metres.
     fn slid(self, by_m: DVec3) -> Slid {
         match self {
             Self::Point(Frame { to_own, sign }) => Slid { moved_m: to_own * by_m * sign, longer_m: 0.0 },
@@ -176,7 +176,7 @@ impl ConstraintRows {
     pub(crate) fn spring_slides(&mut self, step: &FineStep<'_, '_>, pull: &Pull, slides: Slides) {
         let Pull { stiffness_n_m, damping_n_s_m, .. } = *pull;
         let Some(owner) = self.owners.last().filter(|_| stiffness_n_m > 0.0) else { return };
-        // what its damper bears need not be slipped
+        // the part that its damper bears need not be slipped
         let per_m_s = step.h_s + damping_n_s_m / stiffness_n_m;
         self.slides(slides, per_m_s, SLIP_SHARE * owner.yields_above_n / stiffness_n_m);
     }

@@ -3,8 +3,8 @@
 //! In: forces of springs and joints with the places where they act. Out: rows that resist changes of a spin. Never here: forces themselves.
 //! Theory: docs/theory/clusters.md, eq. 22.
 //!
-//! A force f at an arm r turns a body back with the stiffness f·r, which no row knows. What is light and holds much swings by it faster
-//! than steps can follow, and would be thrown. Where h² of that stiffness is more than steps bear, so much inertia is added across the
+//! A force f at an arm r turns a body back with the stiffness f·r, which no row knows. A light body that holds much swings by it faster
+//! than steps can follow, and would be thrown. Where h² of that stiffness is more than steps bear, inertia is added across the
 //! arm: it takes no energy, and a turn that steps can follow has none of it.
 
 use crate::constraint::{ConstraintRows, End, FineStep, ForceAtArm, GeometricStiffness, RowOwner};
@@ -13,7 +13,7 @@ use crate::member::{ClusterMember, Participant};
 use crate::solve::{Hold, JointRow, Side};
 use glam::DVec3;
 
-/// Of h² times the stiffness of a force, the share that a body's inertia has to reach: ¼ is where steps begin to throw it.
+/// The share of h² times the stiffness of a force that a body's inertia has to reach: at ¼ steps begin to throw it.
 const INERTIA_SHARE: f64 = 0.5;
 /// The key of the first row of added inertia of a tie.
 const ADDED: u32 = 8;

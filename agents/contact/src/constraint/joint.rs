@@ -3,10 +3,10 @@
 //! In: the joints of a scene, poses of participants. Out: rows whose targets bring both bodies to where the joint holds them at the
 //! end of the step, by the poses that they will then have. Never here: springs (`spring.rs`), contacts.
 //!
-//! A row knows velocities: held at zero, they let whatever turns drift off by ω² h² of its arm in each step, and lose what taking
-//! that back takes. So a target contains how far the joint would be off after the step, for velocities near the answer: those of the
-//! step before, then those of the answer itself, until the joint holds. Positions are kept as by RATTLE (AND83): to second order, and
-//! what turns keeps its energy. Theory: docs/theory/clusters.md, eq. 21.
+//! A row knows velocities: held at zero, they let a turning body drift off by ω² h² of its arm in each step, and taking
+//! that back costs energy. So a target contains how far the joint would be off after the step, for velocities near the
+//! answer: those of the step before, then those of the answer itself, until the joint holds. Positions are kept as by
+//! RATTLE (AND83): to second order, and a turning body keeps its energy. Theory: docs/theory/clusters.md, eq. 21.
 
 use crate::constraint::{ConstraintRows, End, FineStep, Frame, Pull, RowOwner, Slides};
 use crate::detect::ClusterScene;
@@ -24,7 +24,7 @@ use std::f64::consts::{PI, TAU};
 /// A row that gave this share of the most that it may is not asked whether it holds.
 const YIELDS_SHARE: f64 = 0.999;
 
-/// The key of a motor's row: above those of what holds its joint.
+/// The key of a motor's row: above the keys of the rows that hold its joint.
 const MOTOR: u32 = 16;
 
 /// The joints of a fine step.
@@ -32,15 +32,15 @@ const MOTOR: u32 = 16;
 pub(crate) struct Joints {
     /// Whether a motor keeps one of them moving.
     pub drives: bool,
-    /// How many times as many fine steps they ask for that do not hold, or in which bodies turn too far.
+    /// How many times as many fine steps are asked for by joints that do not hold, or in which bodies turn too far.
     pub ask: u32,
-    /// What they missed in this macro step when they did not hold last, metres or radians.
+    /// Their miss when they last did not hold in this macro step, metres or radians.
     pub missed_m: f64,
     held: Vec<Held>,
     parts: Vec<Part>,
 }
 
-/// What a joint gave in a macro step along the way that it leaves free.
+/// The impulse of a joint's motor and stops in a macro step, along the direction that the joint leaves free.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct JointTotal {
     /// The participant that is its first body.
@@ -76,16 +76,16 @@ struct Held {
     rotations: [DQuat; 2],
 }
 
-/// What joints do with some velocities by the end of a fine step.
+/// How well joints hold with some velocities by the end of a fine step.
 #[derive(Debug, Clone, Copy, Default)]
 pub(crate) struct Aimed {
-    /// By how much one misses what it is to hold, metres or radians.
+    /// The greatest miss of a joint, metres or radians.
     pub miss_m: f64,
-    /// By how much a body in a joint turns.
+    /// The greatest turn of a body in a joint.
     pub turn_rad: f64,
 }
 
-/// What a row of a joint is about.
+/// The part of a joint that a row holds.
 #[derive(Debug, Clone, Copy)]
 struct Part {
     /// The joint, by its place here, and the row among those of the problem.
@@ -117,7 +117,7 @@ struct Off {
     travel: f64,
 }
 
-/// What a joint holds together, its points or its turns, and whose the first row of these is.
+/// Two points or two turns that a joint holds together, and the owner of their first row.
 #[derive(Clone, Copy)]
 struct Together {
     sides: [Side; 2],
@@ -171,7 +171,7 @@ impl Joints {
             return;
         }
         let points = Together { sides: [ends[0].side(), ends[1].side()], owner };
-        // what holds a turn gives no force
+        // a row that holds a turn gives no force
         let turns = [a.turns.of_member(first), second.map_or(Side::FIXED, |at| b.turns.of_member(at))];
         let turns = Together { sides: turns, owner: lasting };
         let as_before_n = all[first].memory.recall(owner.partner, TouchKey::default()).force_n;
@@ -229,12 +229,12 @@ impl Joints {
             JointKind::Spring { .. } => {}
         }
         if let Some((motor, Together { sides, .. })) = driven {
-            // what it gives is not what holds its joint together
+            // a motor's effort is no force that holds its joint together
             self.drive(step, constraints, &motor, Together { sides, owner: turns.owner });
         }
     }
 
-    /// Lays out the row of a motor of the joint that was noted last, between spins of a hinge, points of a slide. What moves b forward pushes a back.
+    /// Lays out the row of a motor of the joint noted last, between spins of a hinge, points of a slide. A push that moves b forward pushes a back.
     fn drive(&mut self, step: &FineStep<'_, '_>, constraints: &mut ConstraintRows, motor: &Motor, of: Together) {
         let Some(Held { of: Jointed { joint, .. }, axis, now, .. }) = self.held.last().copied() else { return };
         self.drives |= motor.moves();
@@ -250,7 +250,7 @@ impl Joints {
                 let law = Spring { stiffness_n_m: stiffness, damping_n_s_m: damping, stretch_m: axis * -off };
                 let row = row.with_spring(law, h_s);
                 let compliance = row.compliance_per_kg.unwrap_or(0.0);
-                // what a step resolves, it need not damp (eq. 22a)
+                // a motion that steps resolve need not be damped (eq. 22a)
                 let stiff = h_s * h_s * stiffness;
                 let before = |member: usize| &step.progress[member].v_before[..];
                 let [of_a, of_b] = of.sides.map(|side| velocity(&side, before).dot(axis));
@@ -263,7 +263,8 @@ impl Joints {
         constraints.push(step, row, RowOwner { key: MOTOR, owes: row.compliance_per_kg.is_none(), ..of.owner });
     }
 
-    /// Adds to `totals` what motors and stops gave b against a along the ways that their joints leave free.
+    /// Adds to `totals` the impulses of motors and stops on b against a, along the directions that their joints leave
+    /// free.
     pub fn note_efforts(&self, constraints: &ConstraintRows, rows_n_s: &[DVec3], totals: &mut Vec<JointTotal>) {
         for held in self.held.iter().filter(|held| held.of.joint.takes_motor()) {
             let rows = held.rows[0]..held.rows[1];
@@ -278,7 +279,7 @@ impl Joints {
     }
 
     /// Sets the targets of all rows so that joints hold at the end of the step, to the first order about `velocities` of members.
-    /// Returns what they would do with these velocities themselves.
+    /// Returns how well they would hold with these velocities themselves.
     pub fn aim<'v>(
         &self,
         all: &[Participant<'_>],
@@ -361,7 +362,7 @@ impl Way {
         if open { DVec3::ZERO } else { off - off.clamp_length_max(PUSH_OUT_MAX_M_S * h_s) }
     }
 
-    /// The part of a miss that counts: in directions in which the row holds, and of a stop what lies beyond it.
+    /// The part of a miss that counts: in directions in which the row holds, and of a stop the way beyond it.
     fn missed(self, miss: DVec3, row: &JointRow) -> f64 {
         match row.hold {
             Hold::All { .. } => miss.length(),

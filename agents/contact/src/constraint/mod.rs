@@ -1,6 +1,6 @@
 //! Rows of the cluster's problem that hold two points or two spins together: springs, links, drives, joints.
 //!
-//! In: rows with what they belong to. Out: the same in a list, and the forces that they gave. Never here: contacts, what a row is made of.
+//! In: rows with their owners. Out: the same in a list, and the forces that they gave. Never here: contacts, how a row is made.
 
 pub(crate) mod contact_rows;
 pub(crate) mod failure;
@@ -42,21 +42,21 @@ pub(crate) struct RowOwner {
     pub partner: Partner,
     /// The name of the row within its tie.
     pub key: u32,
-    /// Who pulls at whom, where it is a force by which somebody holds a body.
+    /// The two ends of the pull, where it is a force by which a user or an agent holds a body.
     pub hold: Option<Holders>,
-    /// The force above which its tie tears, N, and the most that it gives: infinite of one that never tears or yields, and of rows that hold turns.
+    /// The force above which its tie tears, N, and the most that it gives: infinite for a tie that never tears or yields, and for rows of turns.
     pub tears_above_n: f64,
     pub yields_above_n: f64,
     /// The axes in which it keeps its slip.
     pub frame: Frame,
     /// Its place among the springs of its member that yield, where it is one of them.
     pub own: Option<usize>,
-    /// Whether it takes back what it has crept: of one that knows its velocity, and no place.
+    /// Whether it takes back its creep: true for a row that holds a velocity and knows no position.
     pub owes: bool,
 }
 
 impl RowOwner {
-    /// Of the first row of a tie that holds no member, neither tears nor yields and owes nothing.
+    /// The owner of the first row of a tie that holds no member, neither tears nor yields and owes nothing.
     pub fn new(member: usize, other: Option<usize>, partner: Partner) -> Self {
         let (tears_above_n, yields_above_n) = (f64::INFINITY, f64::INFINITY);
         let (hold, frame, own, owes) = (None, Frame::WORLD, None, false);
@@ -78,7 +78,7 @@ impl RowOwner {
     }
 }
 
-/// The two ends of a force, as each is told to the other: `None` is the user.
+/// The two ends of a force, as each is reported to the other: `None` is the user.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Holders {
     pub side_0: AgentId,
@@ -88,11 +88,11 @@ pub(crate) struct Holders {
 /// The rows of a fine step.
 #[derive(Debug, Default)]
 pub(crate) struct ConstraintRows {
-    /// Behind those with an owner are those that contacts bring.
+    /// Rows with an owner, then the rows that contacts bring.
     pub rows: Vec<JointRow>,
-    /// One for each row but for those.
+    /// One for each row but for those of contacts.
     pub owners: Vec<RowOwner>,
-    /// Those that may slip.
+    /// The rows that may slip.
     pub sliding: Vec<SlidingRow>,
     /// The forces at arms that come with them.
     pub geometric_stiffness: GeometricStiffness,
@@ -106,7 +106,8 @@ impl ConstraintRows {
         self.sliding.clear();
     }
 
-    /// Adds a row, which starts from what it gave in the last step; whether it did. Left out is one of which neither side moves.
+    /// Adds a row, which starts from its impulse in the last step; whether it did. A row of which neither side moves is
+    /// left out.
     pub fn push(&mut self, step: &FineStep<'_, '_>, row: JointRow, owner: RowOwner) -> bool {
         let sound = row.target_m_s.is_finite() && row.compliance_per_kg.is_none_or(|r| r > 0.0 && r.is_finite());
         if !sound || row.sides.iter().all(|side| side.terms().is_empty()) {
@@ -145,7 +146,8 @@ impl ConstraintRows {
     }
 }
 
-/// Whether a row passes on an impact: what gives no more than a force gives nothing in no time, and what it could push is not there yet.
+/// Whether a row passes on an impact: a bounded force gives nothing in no time, and a one-sided row without a load has
+/// not met its other end.
 pub(crate) fn is_rigid(row: &JointRow) -> bool {
     let unbounded = match row.hold {
         Hold::All { limit_n_s } | Hold::Across { limit_n_s, .. } => limit_n_s == f64::INFINITY,
@@ -171,7 +173,7 @@ pub(crate) struct End {
     pub point: MaterialPoint,
 }
 
-/// What is between two ends.
+/// The spring between two ends.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Pull {
     pub stiffness_n_m: f64,
@@ -190,7 +192,7 @@ impl End {
 pub(crate) enum Slides {
     /// The point at an end moves.
     Point(Frame),
-    /// A length grows by what side 0 moves along the axis from side 1 to it.
+    /// A length grows by the motion of side 0 along the axis from side 1 to it.
     Length {
         /// World axes, of length 1.
         axis: DVec3,
@@ -237,7 +239,7 @@ pub(crate) struct SlidingRow {
     pub slides: Slides,
     /// By how much it slips for each unit of velocity by which it gives way, seconds.
     pub per_m_s: f64,
-    /// What it may be off without having slipped, metres.
+    /// How far it may be off without having slipped, metres.
     pub free_m: f64,
 }
 
@@ -245,7 +247,7 @@ pub(crate) struct SlidingRow {
 #[derive(Debug, Default)]
 pub(crate) struct GeometricStiffness {
     pulls: Vec<ForceAtArm>,
-    /// Of each participant, how much inertia its pulls ask for, in shares of what it has.
+    /// Of each participant, how much inertia its pulls ask for, in shares of its own.
     asked: Vec<f64>,
 }
 

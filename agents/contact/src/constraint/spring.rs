@@ -1,7 +1,7 @@
 //! Springs between two points: of users and grasps, drives, links between agents, a member's own springs to the world that yield. All are rows that
 //! are implicit at both ends, whatever the ends are.
 //!
-//! In: what members see of springs and links on them, what drives them, what they say of their own springs. Out: rows. Never here: contacts, joints,
+//! In: springs and links on members as they see them, drives, members' own springs. Out: rows. Never here: contacts, joints,
 //! links by wave variables, springs that never yield (a part of their member's matrix).
 //! Theory: docs/theory/clusters.md, eq. 14 and 29; docs/theory/rod.md, eq. 21.
 
@@ -103,7 +103,7 @@ impl ConstraintRows {
     }
 
     /// A spring between two points: in all directions where it has no length of its own, else along the line between them. Where it is
-    /// stretched, a turn of that line is taken back as well, with the stiffness that its tension gives: what is light would tremble.
+    /// stretched, a turn of that line is taken back as well, with the stiffness that its tension gives: a light body would jitter.
     pub fn spring(&mut self, step: &FineStep<'_, '_>, ends: &[End; 2], pull: &Pull, owner: RowOwner) {
         let [a, b] = ends;
         let sides = [a.side(), b.side()];
@@ -164,7 +164,8 @@ impl ConstraintRows {
         let Link { stiffness_n_m, damping_n_s_m, rest_m, .. } = *link;
         let hold = Some(Holders { side_0: all[member].id, side_1: Some(link.other) });
         let mut owner = RowOwner { hold, ..RowOwner::new(member, other, partner) };
-        // it tears and yields where both ends are in this problem: what one of them does not see would go on holding it
+        // it tears and yields where both ends are in this problem: an end that did not see it fail would go on holding
+        // it
         if let Some(other) = other.filter(|other| !all[*other].member.is_remote()) {
             owner.frame = Frame::of_link(all, [member, other], link);
             (owner.tears_above_n, owner.yields_above_n) = (link.tears_above_n, link.yields_above_n);
@@ -226,7 +227,7 @@ fn computes_link(all: &[Participant<'_>], one: &Participant<'_>, link: &Link) ->
     }
 }
 
-/// Where the far end of a link is that is no participant: it moves on as it was last published.
+/// The far end of a link to a body that is no participant: it moves on as it was last published.
 fn seen_point(one: &Participant<'_>, link: &Link, after_s: f64) -> Option<MaterialPoint> {
     let seen = &one.context.neighbours.iter().find(|other| other.id == link.other)?.snapshot;
     let (position, led_m_s) = seen.body.point(link.there)?;

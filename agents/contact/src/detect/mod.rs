@@ -43,7 +43,7 @@ struct Found<'a> {
     clear_m: f64,
 }
 
-/// Reusable storage, and what was found.
+/// Reusable storage, and the places found.
 #[derive(Default)]
 pub(crate) struct Search {
     pub contacts: Vec<Contact>,
@@ -56,7 +56,7 @@ pub(crate) struct Search {
     point: sensor::Point,
     /// Members that rapier3d steps have no contacts but with the others; empty where there are none.
     domains: Vec<Domain>,
-    /// What was looked at in this fine step, by rising names once it is sorted.
+    /// The pairs that were searched in this fine step, by rising names once it is sorted.
     looks: Vec<Look>,
     /// How many contacts were found before the solve.
     known: usize,
@@ -120,8 +120,8 @@ impl Search {
         self.near.retain(|pair| !apart(*pair));
     }
 
-    /// Adds the places that bodies would have passed with the velocities `solved`: what is struck moves as nobody foresaw. Returns
-    /// whether there are any; contacts are then in a new order.
+    /// Adds the places that bodies would have passed with the velocities `solved`: a body that is struck moves unlike
+    /// its prediction. Returns whether there are any; contacts are then in a new order.
     pub fn add_passed(&mut self, round: &Round<'_, '_>) -> bool {
         let Round { all, h_s, .. } = *round;
         if (0..all.len()).all(|member| self.is_pile(member)) {
@@ -166,7 +166,7 @@ impl Search {
             self.find_of(round, Pair { member, against: Against::Own });
         }
         if one.member.is_led() {
-            return; // what leads it is stronger than what never moves
+            return; // the drive of a led body is stronger than any static solid
         }
         let Some(form) = one.member.skin().map(|skin| skin.form) else { return };
         let Some(reach) = self.boxes.of(member) else { return };
@@ -272,7 +272,7 @@ impl Search {
         found.map_or(true, |at| way_m > self.looks[at].clear_m)
     }
 
-    /// Takes up those of the touches found that may close.
+    /// Takes up the touches found that may close.
     fn take(&mut self, round: &Round<'_, '_>, pair: Pair<'_>, found: Found<'_>) {
         let Self { contacts, owners, touches, looks, known, moved, thinning, .. } = self;
         thinning.begin_pair();

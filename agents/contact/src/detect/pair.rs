@@ -31,7 +31,8 @@ pub(crate) struct Owner {
     /// Its friction about the normal, and its row in the problem.
     pub spin: Spin,
     pub spin_row: Option<usize>,
-    /// What pushes its sides apart where their bodies began inside each other, N, ≥ 0, and its row in the problem.
+    /// The force that pushes its sides apart where their bodies began inside each other, N, ≥ 0, and its row in the
+    /// problem.
     pub push_n: f64,
     pub push_row: Option<usize>,
     /// The point of the participant's skin.
@@ -58,7 +59,7 @@ impl Owner {
     }
 }
 
-/// What a round of the search goes by.
+/// The inputs of a round of the search.
 pub(crate) struct Round<'a, 'p> {
     pub scene: &'a ClusterScene,
     pub all: &'a [Participant<'p>],
@@ -70,13 +71,13 @@ pub(crate) struct Round<'a, 'p> {
 /// By which velocities a place is judged.
 #[derive(Clone, Copy)]
 pub(crate) enum Judge {
-    /// Those at the start and without contact, each side's alone too.
+    /// By velocities at the start and without contact, each side's alone too.
     Predicted,
-    /// Those of a solution.
+    /// By velocities of a solution.
     Solved,
 }
 
-/// What a member is searched against.
+/// The other side that a member is searched against.
 #[derive(Clone, Copy)]
 pub(crate) enum Against<'a> {
     /// Another member.
@@ -87,7 +88,7 @@ pub(crate) enum Against<'a> {
     Own,
 }
 
-/// A member and what it is searched against.
+/// A member and the other side that it is searched against.
 #[derive(Clone, Copy)]
 pub(crate) struct Pair<'a> {
     pub(crate) member: usize,
@@ -190,8 +191,8 @@ impl Facing<'_> {
     }
 }
 
-/// Whether a gap may close within the step, by the motion of both or of either alone, as it is or as it would be without contact: what
-/// lies on something that the ground stops would else not be seen.
+/// Whether a gap may close within the step, by the motion of both or of either alone, as it is or as it would be
+/// without contact: a body that rests on one that the ground stops would else not be seen.
 pub(crate) fn closes(touch: &Touch, facing: &Facing<'_>, progress: &[Progress], h_s: f64) -> bool {
     let led = facing.led_m_s.map(|led| led.dot(touch.normal));
     [(|p: &Progress| &p.v_before[..]) as fn(&Progress) -> &[DVec3], |p: &Progress| &p.v_predicted[..]].into_iter().any(
@@ -204,7 +205,7 @@ pub(crate) fn closes(touch: &Touch, facing: &Facing<'_>, progress: &[Progress], 
     )
 }
 
-/// A contact of the problem; from what is stepped elsewhere it comes out in that one's steps.
+/// A contact of the problem; an overlap with a body that is stepped elsewhere is pushed out in the steps of that body.
 pub(crate) fn taken_up(round: &Round<'_, '_>, owner: &Owner, touch: &Touch, facing: &Facing<'_>) -> Contact {
     let Facing { skins: [mine, theirs], sides, led_m_s, .. } = *facing;
     let let_go_m_s = slower_push_out(touch, round.scene.depth_m(), round.h_s, owner.late_s);
@@ -224,8 +225,8 @@ pub(crate) fn taken_up(round: &Round<'_, '_>, owner: &Owner, touch: &Touch, faci
     }
 }
 
-/// The velocity that a contact's sides are let go on with where one of them takes `late_s` seconds to answer: what is deeper than contacts
-/// rest, `rests_m`, is pushed out once in that time, and not in each step of `h_s` until it shows (eq. 8).
+/// The velocity that a contact's sides are let go on with where one of them takes `late_s` seconds to answer: an overlap deeper than
+/// contacts rest, `rests_m`, is pushed out once in that time, and not in each step of `h_s` until it shows (eq. 8).
 fn slower_push_out(touch: &Touch, rests_m: f64, h_s: f64, late_s: f64) -> DVec3 {
     if touch.gap_m >= -rests_m || late_s <= h_s {
         return DVec3::ZERO;

@@ -12,7 +12,8 @@ use metachron_geometry::{Aabb, ShapePose, Touch};
 
 /// Bodies whose boxes come closer than this within the time looked ahead belong together, metres.
 const NEAR_M: f64 = 2e-3;
-/// A pair that comes nearer by more than this in a step is swept, metres: what is nearest at its start then says little of what it meets.
+/// A pair that comes nearer by more than this in a step is swept, metres: the nearest places at its start then say
+/// little of those that meet.
 pub(super) const FAR_M: f64 = 0.02;
 
 /// Where a member may be in a step.
@@ -144,7 +145,7 @@ fn swept<'a>(round: &Round<'a, '_>, member: usize, nodes: &'a mut Vec<DVec3>) ->
     Some(SweptShape { start: body.skin()?, end })
 }
 
-/// How far a solid or a tool goes, metres; what bends has no place of its own.
+/// How far a solid or a tool goes, metres; zero for a deformable, which has no pose of its own.
 fn way(shape: &SweptShape<'_>) -> DVec3 {
     match (shape.start.view, shape.end.view) {
         (ShapePose::Solid { position: from, .. }, ShapePose::Solid { position: to, .. }) => to - from,

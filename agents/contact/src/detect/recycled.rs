@@ -1,4 +1,4 @@
-//! Places of pairs of solids, kept from step to step: they move along with the two, and what lies still is not searched again.
+//! Places of pairs of solids, kept from step to step: they move along with the two, and a resting pair is not searched again.
 //!
 //! In: where two solids are; what their pair remembers of places found. Out: their places now, if these are known; what the pair is to remember. Never
 //! here: how places are found.
@@ -53,7 +53,7 @@ impl Recycled {
         self.touches.clear();
     }
 
-    /// Fills `into` with the places of a pair: those known, or else all that `find` gives within the reach that it is told.
+    /// Fills `into` with the places of a pair: the known ones, or else all that `find` gives within the reach passed to it.
     pub(super) fn touches(
         &mut self,
         pair: &SolidPair<'_>,
@@ -74,7 +74,8 @@ impl Recycled {
         into.retain(|touch| touch.gap_m <= reach_m);
     }
 
-    /// Lets the pairs remember what was found at `now`; those with static solids that are not near are forgotten at once.
+    /// Lets the pairs remember the places found at `now`; those with static solids that are not near are forgotten at
+    /// once.
     pub fn note(&mut self, all: &mut [Participant<'_>], now: SimTime) {
         let mut rest = &self.touches[..];
         for &Searched { member, partner, first, reach_m, count } in &self.searched {

@@ -1,6 +1,7 @@
-//! What never changes around all clusters of a scene: static solids, joints, how deep contacts rest, how far their solves go.
+//! The fixed part of a scene around all clusters: static solids, joints, how deep contacts rest, how far their solves go.
 //!
-//! In: the obstacles and joints of a scene. Out: the same, ready for searches; shared by all clusters. Never here: what moves.
+//! In: the obstacles and joints of a scene. Out: the same, ready for searches; shared by all clusters. Never here:
+//! moving bodies.
 
 use crate::joint::{Joint, JointError};
 use crate::lists::refill;
@@ -33,7 +34,7 @@ pub struct ClusterScene {
 #[derive(Debug, Default)]
 struct StaticTree {
     tree: Bvh,
-    /// The numbers of the solids in the tree, by its leaves, and of those without an end, as a plane.
+    /// The numbers of the solids in the tree, by its leaves, and of endless ones, as a plane.
     bounded: Vec<u32>,
     endless: Vec<u32>,
 }
@@ -80,7 +81,7 @@ pub const DEPTH_RANGE_M: RangeInclusive<f64> = 1e-6..=1e-3;
 /// How far the solves of a scene's contacts go.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 pub enum SolveBudget {
-    /// Until all laws hold, whatever that takes.
+    /// Until all laws hold, at any cost.
     Exact,
     /// As far as there is time in the macro step, in a run that goes by a clock.
     Timed {
@@ -260,7 +261,7 @@ mod tests {
         obstacles.insert(100, Obstacle::new("floor", Solid::Plane));
         let scene = ClusterScene::new(&obstacles).unwrap();
         let mut near = vec![7];
-        // up to the touch, as single precision tells it
+        // up to the touch, to single precision
         let around = Aabb { low: DVec3::new(10.75, -1.0, -1.0), high: DVec3::new(13.25, 1.0, 1.0) };
         scene.statics_near(around, &mut near);
         let meets = |solid: &StaticSolid| solid.bounds().meets(around);

@@ -1,4 +1,4 @@
-//! Which pairs of a cluster touch of which one side only senses.
+//! Pairs of a cluster that touch and of which one side is a sensor.
 //!
 //! In: members with the velocities they would have. Out: pairs that touch where a fine step begins, or that meet on their way through it.
 //! Never here: forces, how often a pair has touched (`member/memory.rs`).
@@ -21,7 +21,7 @@ pub(crate) struct Sensed {
 }
 
 impl Search {
-    /// Finds all such pairs among those that are near.
+    /// Finds all such pairs, of members that are near each other and of members with static solids.
     pub fn sense(&mut self, round: &Round<'_, '_>) {
         self.sensed.clear();
         let Round { scene, all, .. } = *round;
@@ -76,7 +76,7 @@ impl Search {
         }
     }
 
-    /// Whether one of a pair is inside the other, by a point of it: what is deep inside has no places of its skin.
+    /// Whether one of a pair is inside the other, by a point of it: deep inside another body a skin has no places.
     fn holds(&mut self, round: &Round<'_, '_>, pair: Pair<'_>) -> bool {
         let Self { touches: into, scratch, point, .. } = self;
         let Some(here) = round.all[pair.member].member.skin() else { return false };
@@ -113,7 +113,8 @@ impl Default for Point {
 }
 
 impl Point {
-    /// It where a point of a body is: of what has one on its skin that one, as its middle may be beside it.
+    /// The ball at a point of a body; at a point of its surface where one is known, as a centre of mass may lie outside
+    /// the shape.
     fn at(&self, body: &PlacedShape<'_>) -> Option<PlacedShape<'_>> {
         let position = match (body.view, &body.form.kind) {
             (ShapePose::Solid { position, rotation }, ShapeKind::Solid(SolidShape { solid, com_local, .. })) => {
@@ -130,7 +131,7 @@ impl Point {
     }
 }
 
-/// A point of the skin, in the solid's own axes, of one that is made of points.
+/// A point of the skin of a solid that is made of points, in the solid's own axes.
 fn corner(solid: &Solid) -> Option<DVec3> {
     match solid {
         Solid::Hull { points_m } => points_m.first().copied(),

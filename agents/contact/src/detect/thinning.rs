@@ -1,4 +1,4 @@
-//! As many contacts between a cell that carries a skin and what it touches as the cell can tell apart, however fine the skin is.
+//! As many contacts between a cell that carries a skin and its partner as the cell can tell apart, however fine the skin is.
 //!
 //! In: the contacts found of a pair, the cells that carry their places. Out: which of them are kept. Never here: how they were found.
 //! Theory: docs/theory/contact.md, section 3.
@@ -11,11 +11,11 @@ use crate::solve::Contact;
 use glam::DVec3;
 use metachron_geometry::Touch;
 
-/// Nodes of a cell: a patch keeps as many contacts of those that bore in the last step, and one near each node.
+/// Nodes of a cell: a patch keeps as many of the contacts that bore in the last step, and one near each node.
 const NODES: usize = 8;
 /// Contacts that a patch may have without being thinned.
 const KEPT_MOST: usize = 2 * NODES;
-/// Of two contacts whose gaps differ by less than this, metres, the one nearer to the node is taken: what is flat stands on its corners.
+/// Of two contacts whose gaps differ by less than this, metres, the one nearer to the node is taken: a flat body stands on its corners.
 const EQUAL_M: f64 = 1e-6;
 
 /// Where contacts of a pair move with the same few nodes along the same axis.
@@ -29,16 +29,16 @@ pub(super) struct Patch {
     axis: (u8, bool),
 }
 
-/// Reusable storage, and what was thinned.
+/// Reusable storage, and the patches thinned.
 #[derive(Default)]
 pub(super) struct Thinning {
     /// The patch of each contact of the pair; `None` where no cell carries it.
     patches: Vec<Option<Patch>>,
-    /// What each of them bore in the last step, N.
+    /// The load of each contact in the last step, N.
     loads_n: Vec<f64>,
     /// The contacts with a patch, by their patches.
     order: Vec<usize>,
-    /// Those of a patch that bore, and the deepest near each of its nodes.
+    /// The contacts of a patch that bore, and the deepest near each of its nodes.
     loaded: Vec<usize>,
     deepest: Vec<Deepest>,
     is_kept: Vec<bool>,
@@ -51,7 +51,7 @@ pub(super) struct Thinning {
 struct Deepest {
     /// The node's member, and its block.
     node: (usize, usize),
-    /// Its gap, metres, less what a larger share of the node counts.
+    /// Its gap, metres, less a bonus for a larger share of the node.
     gap_m: f64,
     at: usize,
 }
@@ -68,7 +68,7 @@ impl Thinning {
         self.loads_n.clear();
     }
 
-    /// Orders what was thinned in this fine step.
+    /// Sorts the patches thinned in this fine step.
     pub fn sort(&mut self) {
         self.full.sort_unstable();
     }
@@ -114,20 +114,20 @@ impl Thinning {
     }
 }
 
-/// Keeps what is before number `from`, and of the others those that are marked.
+/// Keeps the elements before number `from`, and the marked ones of the others.
 fn retain_from<T>(from: usize, list: &mut Vec<T>, is_kept: &[bool]) {
     let mut marks = std::iter::repeat_n(&true, from).chain(is_kept);
     list.retain(|_| marks.next() == Some(&true));
 }
 
-/// Marks those of a patch's contacts that bore most in the last step: which of them bear is then settled as steps go on.
+/// Marks the contacts of a patch that bore most in the last step: which of them bear is then settled as steps go on.
 fn keep_loaded(group: &[usize], loads_n: &[f64], loaded: &mut Vec<usize>, is_kept: &mut [bool]) {
     refill(loaded, group.iter().copied().filter(|at| loads_n[*at] > 0.0));
     loaded.sort_unstable_by(|a, b| loads_n[*b].total_cmp(&loads_n[*a]).then(a.cmp(b)));
     loaded.iter().take(NODES).for_each(|at| is_kept[*at] = true);
 }
 
-/// Marks the deepest of a patch's contacts for each node among those that move most with it.
+/// Marks the deepest of a patch's contacts for each node among the contacts that move most with it.
 fn keep_deepest(group: &[usize], contacts: &[Contact], patch: Patch, deepest: &mut Vec<Deepest>, is_kept: &mut [bool]) {
     deepest.clear();
     for at in group {

@@ -10,7 +10,7 @@ const IMPACT_M_S: f64 = 0.05;
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Closing {
     pub gap_m: f64,
-    /// How fast it closes, and by how much that grows, of sides of which those that others held in the last step gain nothing.
+    /// How fast it closes, and by how much that grows; a side that others held in the last step gains nothing.
     pub speed_m_s: f64,
     pub gain_m_s2: f64,
     /// The most by which it would if nothing held either side, or if one of them were stopped.
@@ -38,7 +38,7 @@ impl Closing {
     pub fn meeting(&self, restitution: f64, [macro_s, step_s]: [f64; 2]) -> Option<Meeting> {
         let Self { gap_m, speed_m_s, gain_m_s2, fall_m_s2 } = *self;
         let after_s = first_root(gap_m, speed_m_s, gain_m_s2)?.max(-step_s);
-        // others may drive them together in this step: of what they gain they have no more then
+        // others may drive the sides together in this step alone: a meeting after it has no more of that gain
         let within_s = after_s.min(step_s);
         let (gained_m_s, gains_m_s) = (gain_m_s2 * within_s, -gain_m_s2 * (step_s - within_s));
         let closing_m_s = speed_m_s + gained_m_s;
@@ -56,8 +56,8 @@ impl Meeting {
     }
 }
 
-/// The work of what acts between bodies that touch, J: that of the solution of a step, and its first and second derivative by the share of the
-/// impacts that acts.
+/// The work of the forces between bodies that touch, J: that of the solution of a step, and its first and second
+/// derivative by the share of the impacts that acts.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Work {
     pub solved_j: f64,

@@ -18,10 +18,11 @@ use glam::DVec3;
 use meeting::{Closing, Meeting, Work};
 use metachron_core::{DisjointSets, ParallelFor, StepError};
 
-/// By which share of the speed that an impact loses its contact gives way (eq. 5), and the least by which it does, m/s.
+/// The share of the speed lost in an impact by which its contact gives way (eq. 5), and the least by which it does,
+/// m/s.
 const YIELD_SHARE: f64 = 3e-5;
 const YIELD_MIN_M_S: f64 = 2e-6;
-/// At how many times what contacts give way by the solve ends.
+/// The miss at which the solve ends, in multiples of the velocity by which contacts give way.
 const MISS_YIELDS: f64 = 0.1;
 
 /// The impacts of a fine step.
@@ -39,7 +40,7 @@ pub(crate) struct Impacts {
     found: Vec<Impact>,
     /// The flight of each participant, until something holds it.
     flights: Vec<Flight>,
-    /// Participants that touch or are joined, and the work of what acts between them where any of them collide.
+    /// Participants that touch or are joined, and the work of the forces between them where any of them collide.
     touching: DisjointSets,
     works: Vec<Option<Work>>,
     /// The problem, with the contact and the row of the step that each of its own is.
@@ -77,7 +78,8 @@ pub(crate) struct SolvedStep<'a, 'p> {
     pub members: &'a mut ProblemMembers,
     pub progress: &'a mut [Progress],
     pub threads: &'a dyn ParallelFor,
-    /// Whether bodies may be where a flight brings them: another solve would stop those that pass into others.
+    /// Whether bodies may be where a flight brings them: bodies that pass into others are stopped only by another
+    /// solve.
     pub may_fly: bool,
 }
 
@@ -171,7 +173,7 @@ impl Impacts {
         closing.meeting(owner.restitution, [*macro_s, *step_s])
     }
 
-    /// Finds the contacts that rebound: those that bear, and met fast.
+    /// Finds the bouncing contacts: they bear, and met fast.
     fn find(&mut self, search: &Search, progress: &[Progress]) {
         for (at, (contact, owner)) in search.contacts.iter().zip(&search.owners).enumerate() {
             let bears = contact.warm_n_s != DVec3::ZERO;
@@ -275,12 +277,12 @@ impl Impacts {
         PUSH_OUT_SHARE * depth_m / yield_m_s
     }
 
-    /// Finds the work of bodies that touch, by what the solution of the step and impacts gave.
+    /// Finds the work of bodies that touch, by the impulses of the step's solution and of impacts.
     fn weigh(&mut self, search: &Search, constraints: &ConstraintRows, step: &Solution, progress: &[Progress]) {
         let Self { solver, found, touching, works, contacts, contacts_of, rows_of, .. } = self;
         let solution = solver.solution();
         let struck = |body: usize| progress[body].place.map_or(&[][..], |place| solution.velocities(place));
-        // with what the velocities of sides are against each other where they meet, beside those at the start and at the end of the step
+        // with the velocities of sides against each other where they meet, beside those at the start and at the end of the step
         let mut add = |sides: &[Side; 2], [solved, given]: [DVec3; 2], [at_start, at_end]: [DVec3; 2]| {
             let body = movers(sides).next();
             let Some(work) = body.and_then(|body| works[touching.lowest(body)].as_mut()) else { return };
@@ -305,8 +307,8 @@ impl Impacts {
         }
     }
 
-    /// Gives bodies what impacts change of their velocities, and moves those that fly to where they have come to (eq. 27). Others are where the
-    /// solution of the step leaves them.
+    /// Gives bodies the changes of their velocities by impacts, and moves flying bodies to where they have come to (eq.
+    /// 27). Others are where the solution of the step leaves them.
     fn take(
         &mut self,
         all: &[Participant<'_>],
@@ -362,7 +364,7 @@ impl Impacts {
         }
     }
 
-    /// Adds to what members do not answer what impacts leave.
+    /// Adds the momentum that impacts leave to the momentum that members do not answer yet.
     pub fn leave(&self, progress: &mut [Progress]) {
         for state in progress.iter_mut().filter(|state| !state.dv_impacts.is_empty()) {
             let left = state.place.map_or(&[][..], |place| self.solver.solution().unanswered(place));

@@ -6,7 +6,7 @@
 use glam::{DQuat, DVec3};
 use metachron_geometry::{Place, ShapePose, Touch};
 
-/// How far a point of one solid may have gone against the other since their places were found, metres: less than what has met is apart by.
+/// How far a point of one solid may have gone against the other since their places were found, metres: the gap below which sides have met.
 pub(crate) const MOVED_M: f64 = 1e-6;
 
 /// Where a solid is.
@@ -38,7 +38,7 @@ pub(crate) struct FoundPlaces {
 impl Pose {
     pub const HERE: Self = Self { position: DVec3::ZERO, rotation: DQuat::IDENTITY };
 
-    /// `None` of what is no solid.
+    /// `None` for a shape that is no solid.
     fn of(view: ShapePose<'_>) -> Option<Self> {
         match view {
             ShapePose::Solid { position, rotation } => Some(Self { position, rotation }),
@@ -71,7 +71,7 @@ impl TwoSolids {
         self.first.position.distance(then.position) + angle_rad * self.radius_m
     }
 
-    /// A place in the axes of the second, into the world's; `by` moves what is fixed to the first.
+    /// A place in the axes of the second, into the world's; `by` moves a point that is fixed to the first.
     pub fn placed(&self, touch: &Touch, by: impl Fn(DVec3) -> DVec3) -> Touch {
         let Touch { on_a: Place::Point(a), on_b: Place::Point(b), .. } = *touch else { return *touch };
         let moved = by(a);

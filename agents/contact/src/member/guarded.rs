@@ -1,7 +1,8 @@
-//! A member of a cluster whose code may be anybody's: every call of it is marked while it runs, and what it returns is checked.
+//! A member of a cluster whose code may be a third party's: every call of it is marked while it runs, and its answers
+//! are checked.
 //!
 //! In: a member, the mark of its agent. Out: the same answers; from one that no step can go on with the call never returns, it unwinds like a
-//! panic of the member. Whoever catches that finds by the marks whose code it was. Never here: what becomes of the agent, catching.
+//! panic of the member. Its catcher finds by the marks whose code it was. Never here: the fate of the agent, catching.
 
 use crate::StepContext;
 use crate::member::{ClusterMember, Drive, Locked, MaterialPoint, OwnAttachment, OwnSpring, Pose, Role, Slid};
@@ -13,22 +14,22 @@ use metachron_geometry::{ContactSide, Place, PlacedShape, ShapePose};
 use std::panic::resume_unwind;
 use std::sync::atomic::{AtomicBool, Ordering::Relaxed};
 
-/// Whether code of an agent's model runs, readable from any thread. It stays so where that code has panicked, or has answered what nobody can
-/// go on with: the model is not called again then.
+/// Whether code of an agent's model runs, readable from any thread. It stays so where that code has panicked, or has given an answer that no
+/// step can use: the model is not called again then.
 #[derive(Debug, Default)]
 pub struct CallMark {
     running: AtomicBool,
     refused: AtomicBool,
 }
 
-/// Why a call of a model unwinds that has not panicked: what it answered.
+/// The reason why a call of a model unwinds that has not panicked: its answer, in words.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct BadAnswer(pub String);
 
 /// A member whose calls are marked.
 pub struct GuardedMember<'a> {
     inner: &'a mut dyn ClusterMember,
-    /// `None` of one whose code nobody watches: its panics are its caller's, and its answers are taken as they are.
+    /// `None` for a member that is not watched: its panics are its caller's, and its answers are taken as they are.
     mark: Option<&'a CallMark>,
     /// How many blocks it has, of a member that is watched.
     blocks: usize,
@@ -62,7 +63,7 @@ impl CallMark {
     }
 }
 
-/// Runs a call of a model, marked where somebody watches it.
+/// Runs a call of a model, marked where it is watched.
 fn marked<T>(mark: Option<&CallMark>, call: impl FnOnce() -> T) -> T {
     match mark {
         Some(mark) => mark.during(call),
@@ -111,7 +112,7 @@ impl<'a> GuardedMember<'a> {
         self.mark.is_some_and(CallMark::is_running)
     }
 
-    /// Forgets that it has refused a step: of one that is only tried.
+    /// Forgets a refused step, where the step was only tried.
     pub(crate) fn forgive(&self) {
         self.mark.map(CallMark::take_refused);
     }
@@ -121,7 +122,7 @@ impl<'a> GuardedMember<'a> {
         self.response().map(|by| Lent { by, mark: self.mark })
     }
 
-    /// Ends the step for what it has answered, which was found to be of no use only then; nothing of one whose calls are not marked.
+    /// Ends the step for an answer that was found to be of no use only then; nothing for a member whose calls are not marked.
     pub(crate) fn reject(&self, what: String) {
         if let Some(mark) = self.mark {
             mark.during(|| reject(what));

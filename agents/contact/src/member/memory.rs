@@ -1,4 +1,4 @@
-//! What a pair of bodies remembers from step to step: impulses, slip owed, and when the two were last near.
+//! The memory of a pair of bodies from step to step: impulses, slip owed, and when the two were last near.
 //!
 //! In: contacts with their impulses. Out: the same for the next step. Never here: contacts that are new.
 //! A pair is remembered by its lower number, so that nothing has to be moved when clusters join or part.
@@ -32,7 +32,7 @@ pub enum Partner {
     Link(u32),
     /// The far end of a joint, by its number in the scene.
     Joint(u32),
-    /// What drives the body.
+    /// The drive of the body.
     Drive,
     /// The end of a transmission line, by its number among those of the macro step.
     Line(u32),
@@ -59,18 +59,18 @@ pub struct Slip {
     pub(crate) slid: Slid,
 }
 
-/// What a contact or a joint hands to the next step.
+/// The values that a contact or a joint hands to the next step.
 #[derive(Debug, Clone, Copy, PartialEq, Default, serde::Serialize, serde::Deserialize)]
 pub(crate) struct Remembered {
     /// The name of the place within its pair.
     pub key: TouchKey,
     /// The impulse of one second at the rate of the last step: its mean force, world axes, N.
     pub force_n: DVec3,
-    /// The most that it has borne since its pair was last relieved, likewise, N, ≥ 0: the compliance of a contact is for that.
+    /// Its greatest load since its pair was last relieved, likewise, N, ≥ 0: the compliance of a contact is for that.
     pub load_n: f64,
-    /// How deep it lies because its bodies began inside each other, metres, ≥ 0 (eq. 2a).
+    /// How deep it rests because its bodies began inside each other, metres, ≥ 0 (eq. 2a).
     pub overlap_m: f64,
-    /// What pushed it out of that in the last step, along its normal, N, ≥ 0.
+    /// The force that pushed it out of that in the last step, along its normal, N, ≥ 0.
     pub push_n: f64,
     /// The slip owed, world axes, metres.
     pub owed_slip_m: DVec3,
@@ -78,7 +78,7 @@ pub(crate) struct Remembered {
     pub spin: Spin,
 }
 
-/// One pair, with its places by rising names, those of one name by their triangles.
+/// One pair, with its places by rising names; places of one name by their triangles.
 #[derive(Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 pub(crate) struct PairMemory {
     pub partner: Partner,
@@ -109,8 +109,8 @@ impl Clone for PairMemory {
 }
 
 impl PairMemory {
-    /// Notes what each place has borne in the step that was made. A compliance that followed each step's load would let a place rest equally
-    /// deep whatever it bears: nothing would resist where load moves from one side of a body to the other, and what is tall would sway for ever.
+    /// Notes the load of each place in the step that was made. A compliance that followed each step's load would let a place rest equally deep
+    /// under any load: nothing would resist where load moves from one side of a body to the other, and a tall body would sway for ever.
     fn note_loads(&mut self) {
         let (mut bears_n, mut borne_n) = (0.0, 0.0);
         for place in &mut self.places {
@@ -118,7 +118,7 @@ impl PairMemory {
             place.load_n = place.load_n.max(force_n);
             (bears_n, borne_n) = (bears_n + force_n, borne_n + place.load_n);
         }
-        // what a body bears as a whole has become another: it landed, or was relieved
+        // the whole load of a body has become another: it landed, or was relieved
         if bears_n < RELIEVED_SHARE * borne_n {
             self.places.iter_mut().for_each(|place| place.load_n = place.force_n.length());
         }
@@ -133,13 +133,13 @@ pub struct ContactMemory {
     torn: Vec<Partner>,
     /// Links, joints and own attachments of the body that have slipped, sorted by them.
     slips: Vec<Slip>,
-    /// What attachments that may tear have given in macro steps that were cut short.
+    /// The impulses of attachments that may tear, in macro steps that were cut short.
     unfinished: Vec<UnfinishedLoad>,
-    /// What touched a sensor, or sensed the body, sorted by partners. They stay.
+    /// The bodies that touched a sensor, or the sensors that the body touched, sorted by partners. They stay.
     sensed: Vec<SensorTouch>,
 }
 
-/// What an attachment has given since its force was last looked at.
+/// The impulse of an attachment since its force was last looked at.
 #[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
 pub(crate) struct UnfinishedLoad {
     pub partner: Partner,
@@ -226,7 +226,7 @@ impl ContactMemory {
         self.recall_left(partner, key, |_| true)
     }
 
-    /// The same; a place that is new takes over what a place of the same name remembers only where `is_left` says that nothing touches there any
+    /// The same; a new place takes over the values of a place of the same name only where `is_left` says that nothing touches there any
     /// more. A new one may lie as deep as it does where its pair is new too, or began inside each other.
     pub(crate) fn recall_left(
         &self,
@@ -283,7 +283,7 @@ impl ContactMemory {
         &mut self.near_pair(partner, now).found
     }
 
-    /// The agents that were near lately, at `now`: those that were so in a step in the memory of the lower number.
+    /// The agents that were near lately, at `now`, of the pairs that this memory keeps.
     pub fn near(&self, now: SimTime) -> impl Iterator<Item = AgentId> + '_ {
         self.pairs.iter().filter_map(move |pair| match pair.partner {
             Partner::Agent(id) if pair.near_until > now => Some(id),
@@ -300,7 +300,7 @@ impl ContactMemory {
         }
     }
 
-    /// Adds what an attachment gave in a macro step. Returns all that it has given since this last returned something, once that is over a
+    /// Adds the impulse of an attachment in a macro step. Returns the sum since this last returned something, once that is over a
     /// time of `whole_s` seconds.
     pub(crate) fn bear(&mut self, load: UnfinishedLoad, whole_s: f64) -> Option<UnfinishedLoad> {
         let at = self.unfinished.iter().position(|before| before.partner == load.partner);
@@ -335,7 +335,7 @@ impl ContactMemory {
         self.sensed[place..].iter_mut().for_each(|known| known.note(false, at));
     }
 
-    /// What touched a sensor, or sensed the body, by rising partners.
+    /// The bodies that touched a sensor, or the sensors that the body touched, by rising partners.
     #[must_use]
     pub fn sensed(&self) -> &[SensorTouch] {
         &self.sensed
@@ -446,7 +446,7 @@ mod tests {
             [0, 1].map(|vertex| memory.recall(partner, key(vertex)).load_n)
         };
         assert_eq!(load_n([4.0, 1.0]), [4.0, 1.0]);
-        // load moves from one place to the other: both are as hard as what they have borne
+        // load moves from one place to the other: both stay as hard as under their greatest load
         assert_eq!(load_n([0.0, 5.0]), [4.0, 5.0]);
         assert_eq!(load_n([1.0, 1.0]), [4.0, 5.0]);
         assert_eq!(load_n([0.5, 0.25]), [0.5, 0.25], "an eighth of nine is more than they bear");

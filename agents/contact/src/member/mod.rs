@@ -1,4 +1,4 @@
-//! What a body offers the cluster that it is stepped in.
+//! The interface of a body to the cluster that steps it.
 //!
 //! In: steps, velocities. Out: a matrix, velocities without contact, a skin, how points of it move. Never here: contacts, other bodies.
 
@@ -26,7 +26,7 @@ pub trait ClusterMember: Send {
     /// How it takes part.
     fn role(&self) -> Role;
 
-    /// Reads its surroundings at the start of a macro step of `dt_s` seconds: what leads it, what it may grasp.
+    /// Reads its surroundings at the start of a macro step of `dt_s` seconds: its goal, the bodies that it may grasp.
     fn look(&mut self, context: &StepContext<'_>, dt_s: f64) {
         let _ = (context, dt_s);
     }
@@ -54,8 +54,9 @@ pub trait ClusterMember: Send {
         None
     }
 
-    /// The velocity of each block at the end of the step begun, if nothing touched the body. Where [`Self::unanswered`] says what it lacks it is
-    /// near that: places are foreseen by it, and into how many parts the step is divided is seen by the solution.
+    /// The velocity of each block at the end of the step begun, if nothing touched the body. Where [`Self::unanswered`]
+    /// has momentum left, this is an estimate: it predicts places, and the solution tells into how many parts the step
+    /// is divided.
     fn free(&self) -> &[DVec3] {
         &[]
     }
@@ -71,7 +72,7 @@ pub trait ClusterMember: Send {
         &[]
     }
 
-    /// Receives before the end of its step what its last velocities leave unanswered of all that it was given, N·s on each block (eq. 17).
+    /// Receives before the end of its step the momentum that its last velocities leave unanswered, N·s on each block (eq. 17).
     fn leave(&mut self, unanswered: &[DVec3]) {
         let _ = unanswered;
     }
@@ -80,7 +81,7 @@ pub trait ClusterMember: Send {
     fn skin(&self) -> Option<PlacedShape<'_>>;
 
     /// Its skin once it has gone on from where it is for `t_s` seconds with the velocities `v`; `nodes` is storage for it. `None` for a body
-    /// that does not say: what such a body meets is found by what is near it at the start of a step, however far it goes.
+    /// that does not say: its contacts are found near it at the start of a step, however far it goes.
     fn skin_after<'a>(&'a self, v: &[DVec3], t_s: f64, nodes: &'a mut Vec<DVec3>) -> Option<PlacedShape<'a>> {
         let _ = nodes;
         let skin = self.skin()?;
@@ -104,7 +105,7 @@ pub trait ClusterMember: Send {
         None
     }
 
-    /// By how much its skin at `place` lies inside the shape that [`Self::skin`] gives, metres: of a section that is not round, whose shape
+    /// By how much its skin at `place` is inside the shape that [`Self::skin`] gives, metres: for a section that is not round the shape
     /// is the round one about it.
     fn recess_m(&self, place: &Place, contact: ContactSide) -> f64 {
         let _ = (place, contact);
@@ -134,7 +135,7 @@ pub trait ClusterMember: Send {
         block as u32
     }
 
-    /// How long what is given to it takes to show, seconds: of one that is stepped elsewhere a step of its own, and nothing of all others.
+    /// How long an impulse on it takes to show, seconds: a step of its own for a body that is stepped elsewhere, 0 for all others.
     fn answers_after_s(&self) -> f64 {
         0.0
     }
@@ -151,7 +152,7 @@ pub trait ClusterMember: Send {
         None
     }
 
-    /// The spring by which it follows what leads it; `None` for a body that nothing drives.
+    /// The spring by which it follows its goal; `None` for a body that nothing drives.
     fn drive(&self) -> Option<Drive> {
         None
     }
@@ -161,7 +162,7 @@ pub trait ClusterMember: Send {
         self.role() == Role::Kinematic
     }
 
-    /// Whether it passes through `other` where the two meet, as jaws do through what they hold.
+    /// Whether it passes through `other` where the two meet, as jaws do through a body that they hold.
     fn spares(&self, other: AgentId) -> bool {
         let _ = other;
         false
@@ -172,8 +173,8 @@ pub trait ClusterMember: Send {
         v.iter().map(|v| v.length_squared()).fold(0.0, f64::max).sqrt()
     }
 
-    /// By how much the velocities `v` would turn or stretch it in a step of `h_s` seconds, as a share of what its linear forces can take:
-    /// above 1 the step should be divided. Zero for a body whose forces are exact.
+    /// By how much the velocities `v` would turn or stretch it in a step of `h_s` seconds, as a share of the most that
+    /// its linear forces can take: above 1 the step should be divided. Zero for a body whose forces are exact.
     fn strain(&self, v: &[DVec3], h_s: f64) -> f64 {
         let _ = (v, h_s);
         0.0
@@ -195,14 +196,14 @@ pub trait ClusterMember: Send {
     fn move_to(&mut self, v: &[DVec3], t_s: f64);
 
     /// Ends the step begun, of `h_s` seconds, with these velocities. `touched` is false where nothing acted on the body but impacts at the
-    /// start, which account for what `v` is beyond its free velocities: its motion after them is then its own.
+    /// start, which make the difference of `v` from its free velocities: its motion after them is then its own.
     ///
     /// # Errors
-    /// [`StepError::Diverged`] where the state would not be finite; it is then what it was before.
+    /// [`StepError::Diverged`] where the state would not be finite; it is then as it was before.
     fn end(&mut self, v: &[DVec3], h_s: f64, touched: bool) -> Result<(), StepError>;
 
-    /// Its own attachments to the world that may tear, with what they gave over the step that ended last. Springs to other members, and
-    /// those that yield, are rows of the problem.
+    /// Its own attachments to the world that may tear, with their forces over the step that ended last. Springs to other members, and
+    /// springs that yield, are rows of the problem.
     fn attachments(&self) -> &[OwnAttachment] {
         &[]
     }
@@ -287,7 +288,7 @@ pub struct Pose {
     pub led_rad_s: DVec3,
 }
 
-/// What an attachment that is a body's own gave over a step, and can bear.
+/// An attachment that is a body's own, with its force over a step, and the most that it can bear.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct OwnAttachment {
     /// Its number among those of the body.
@@ -367,7 +368,7 @@ impl MaterialPoint {
 }
 
 impl Pose {
-    /// What stands still, at the origin of the world.
+    /// The pose of the world: at rest, at the origin.
     pub const WORLD: Self = Self {
         centre_m: DVec3::ZERO,
         origin_m: DVec3::ZERO,

@@ -1,4 +1,4 @@
-//! A body in its cluster's step: what it sees and remembers, how far it is in its own step, and what others see of it in a fine step.
+//! A body in its cluster's step: its view and memory, how far it is in its own step, and its motion as others see it in a fine step.
 //!
 //! In: a member, its context, its memory; its velocities at the start of its step and without contact, impulses. Out: which others it may touch, the
 //! velocities at which its place moves. Never here: contacts, the problem. Theory: docs/theory/clusters.md, section 9 (eq. 24 to 26).
@@ -17,7 +17,7 @@ pub struct Participant<'a> {
     pub id: AgentId,
     /// The body.
     pub member: GuardedMember<'a>,
-    /// What it sees at the start of the macro step.
+    /// Its surroundings at the start of the macro step.
     pub context: StepContext<'a>,
     /// The laws of its pairs other than [`Law::Cluster`], by rising numbers: a pair with one is not the cluster's.
     pub laws: &'a [(AgentId, Law)],
@@ -68,7 +68,7 @@ impl Participant<'_> {
 /// How far a member is in its own step (eq. 24–26).
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Progress {
-    /// How many steps it makes in the macro step, where it bends.
+    /// How many steps it makes in the macro step.
     pub parts: u32,
     /// The length of the step that it has begun before all others do, seconds; 0 for none.
     pub begun_s: f64,
@@ -91,7 +91,7 @@ pub(crate) struct Progress {
     pub v_so_far: Vec<DVec3>,
     /// û: the velocities at which its place moves in this fine step without the impulses sought.
     pub v_predicted: Vec<DVec3>,
-    /// The momentum that it does not answer yet (clusters.md, eq. 16a): what is solved for together with the impulses sought. Empty for none.
+    /// The momentum that it does not answer yet (clusters.md, eq. 16a), solved for together with the impulses sought. Empty for none.
     pub unanswered: Vec<DVec3>,
     /// û with the impulses that the last solve found.
     pub v_solved: Vec<DVec3>,
@@ -104,9 +104,10 @@ pub(crate) struct Progress {
     pub touched: bool,
     pub held: bool,
     pub bears: bool,
-    /// By how much impacts change its velocities at the end of the fine step; empty for none.
+    /// The changes of its velocities by impacts, at the end of the fine step; empty for none.
     pub dv_impacts: Vec<DVec3>,
-    /// By how much it is then elsewhere than if they had done so at its start, metres and radians (eq. 27); empty for none.
+    /// How far it is then from where impacts at the start of the step would have brought it, metres and radians (eq.
+    /// 27); empty for none.
     pub dx_impacts: Vec<DVec3>,
     /// Work of its steps within the macro step, in the unit of its model.
     pub work: f64,
@@ -145,7 +146,7 @@ impl Progress {
         (self.touched, self.held) = (true, true);
     }
 
-    /// Adds what known impulses change its velocities by within its step; none where there are none.
+    /// Adds the changes of its velocities by known impulses within its step; none where there are none.
     pub fn push(&mut self, change: &[DVec3]) {
         change.clone_into(&mut self.dv_known);
         self.dv_free.iter_mut().zip(change).for_each(|(dv_free, change)| *dv_free += *change);
@@ -159,7 +160,7 @@ impl Progress {
         self.touched = true;
     }
 
-    /// Finds v̄(p), û and what they leave unanswered, of the fine step that begins (eq. 24).
+    /// Finds v̄(p), û and the momentum that they leave unanswered, of the fine step that begins (eq. 24).
     pub fn look(&mut self, member: &dyn ClusterMember) {
         self.dv_impacts.clear();
         self.dx_impacts.clear();

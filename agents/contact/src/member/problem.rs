@@ -10,7 +10,7 @@ use crate::solve::{Contact, JointRow, Member, Problem, ProblemError, Report, Res
 use glam::DVec3;
 use metachron_core::{ParallelFor, StepError, recycled};
 
-/// Sweeps by which a member without a factor answers known impulses; each at least halves what is left of an M-matrix's.
+/// Sweeps by which a member without a factor answers known impulses; each at least halves the rest for an M-matrix.
 const SWEEPS_MAX: usize = 400;
 /// A member of more blocks that lends no factor gets none: the problem is solved by conjugate gradients.
 const FACTORED_BLOCKS_MAX: usize = 200;

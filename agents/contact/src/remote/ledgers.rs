@@ -1,6 +1,6 @@
-//! Impulses between two clocks: what an agent has given its partners, and what it has taken of what they gave.
+//! Impulses between two clocks: those that an agent has given its partners, and those that it has taken from them.
 //!
-//! In: impulses of the pairs that the agent computes, snapshots of partners. Out: what is new, each impulse once, and the part of a
+//! In: impulses of the pairs that the agent computes, snapshots of partners. Out: new impulses, each once, and the part of a
 //! snapshot by which partners read. Never here: how an impulse was found, how a body answers. Theory: docs/theory/coupling.md, section 2.
 
 use crate::lists::entry;
@@ -17,7 +17,7 @@ pub struct Ledgers {
     taken: Vec<Taken>,
 }
 
-/// What was taken from one partner.
+/// The impulses taken from one partner.
 #[derive(Debug, Clone, serde::Serialize, serde::Deserialize)]
 struct Taken {
     copy: Ledger,
@@ -36,7 +36,7 @@ const fn unread() -> Ledger {
     Ledger::new(AgentId(0))
 }
 
-/// What a partner gave a site a second in the last step, N and N·m.
+/// The force of a partner at a site in the last step, N and N·m.
 #[derive(Debug, Clone, Copy, serde::Serialize, serde::Deserialize)]
 struct SiteForce {
     site: Site,
@@ -79,7 +79,7 @@ impl Ledgers {
             }
             let taken = self.taken_mut(neighbour.id);
             taken.read = taken.read.max(neighbour.snapshot.time);
-            // what is not newer than the copy is not read
+            // a ledger that is not newer than the copy is not read
             if taken.copy.revision >= ledger.revision {
                 continue;
             }
@@ -95,7 +95,7 @@ impl Ledgers {
         }
     }
 
-    /// The step that took what was new is made.
+    /// Takes over the copies read in the step, which is made.
     pub fn settle(&mut self) {
         for taken in &mut self.taken {
             if std::mem::take(&mut taken.is_new) {
@@ -110,8 +110,8 @@ impl Ledgers {
         ledger.give(at.site, at.time, at.after_s, impulse);
     }
 
-    /// What `other` has been given and had not taken in the snapshot that is seen, J − J_ack, and that times the seconds since it acted:
-    /// (J − J_ack) t − (S − S_ack) at the time `at`.
+    /// The impulses that `other` has been given and had not taken in the snapshot that is seen, J − J_ack, and the same
+    /// times the seconds since they acted: (J − J_ack) t − (S − S_ack) at the time `at`.
     pub fn in_flight(&self, me: AgentId, other: &Neighbour, at: SimTime, visit: impl FnMut(Site, Impulse, Impulse)) {
         if let Ok(place) = self.given.binary_search_by_key(&other.id, |ledger| ledger.with) {
             self.given[place].beyond(acknowledged(other, me), at, visit);
@@ -126,7 +126,7 @@ impl Ledgers {
         sum.length()
     }
 
-    /// What `from` gave a second in the last step, N and N·m.
+    /// The forces of `from` in the last step, N and N·m.
     pub fn forces(&self, from: AgentId, mut visit: impl FnMut(Site, Impulse)) {
         if let Ok(place) = self.taken.binary_search_by_key(&from, |taken| taken.copy.with) {
             self.taken[place].forces.iter().for_each(|at| visit(at.site, at.force));
@@ -146,7 +146,7 @@ impl Ledgers {
         Some(self.taken[place].read)
     }
 
-    /// Writes what partners read.
+    /// Writes the ledgers that partners read.
     pub fn write(&self, into: &mut Snapshot) {
         copy(self.given.iter(), &mut into.given);
         copy(self.taken.iter().map(|taken| &taken.copy), &mut into.taken);
@@ -179,7 +179,7 @@ pub struct GivenAt {
     pub after_s: f64,
 }
 
-/// The copy that `other` keeps of what `me` has given it.
+/// The copy that `other` keeps of the impulses that `me` has given it.
 #[must_use]
 pub fn acknowledged(other: &Neighbour, me: AgentId) -> Option<&Ledger> {
     other.snapshot.taken.iter().find(|ledger| ledger.with == me)

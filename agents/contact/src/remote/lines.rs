@@ -1,7 +1,8 @@
 //! The ends of transmission lines at one agent: links and contacts by wave variables.
 //!
-//! In: what partners published of their ends. Out: rows for the cluster's problem, and the waves that this end sends. Never here: the law
-//! of a line (`transmission_line.rs`), the other end: it does the same for itself. Theory: docs/theory/coupling.md, eq. 10 to 11.
+//! In: the ends of partners as they published them. Out: rows for the cluster's problem, and the waves that this end
+//! sends. Never here: the law of a line (`transmission_line.rs`), the other end, which does the same for itself.
+//! Theory: docs/theory/coupling.md, eq. 10 to 11.
 
 use crate::lists::entry;
 use crate::member::{ClusterMember, Participant};
@@ -63,7 +64,7 @@ struct Pressed {
 }
 
 impl Lines {
-    /// Writes or reads what the next macro step needs of it.
+    /// Writes or reads the state that the next macro step needs.
     pub fn archive(&mut self, archive: &mut Archive<'_>) -> Result<(), ArchiveError> {
         archive.value(&mut self.all)
     }
@@ -86,7 +87,7 @@ impl Lines {
         }
     }
 
-    /// The step that heard the lines is made.
+    /// Takes over the waves read in the step, which is made.
     pub fn settle(&mut self) {
         self.all.iter_mut().for_each(|line| line.line.settle());
     }
@@ -150,7 +151,7 @@ impl Lines {
         let whole: f64 = found.iter().map(|touch| -touch.gap_m).sum();
         let normal: DVec3 = found.iter().map(|touch| touch.normal * -touch.gap_m).sum();
         let normal = normal.try_normalize()?;
-        // points of what moves as a whole have a middle
+        // points of bodies that move as a whole have a mean
         let middle = |of: fn(&Touch) -> Place| {
             found.iter().try_fold(DVec3::ZERO, |sum, touch| match of(touch) {
                 Place::Point(at) => Some(sum + at * (-touch.gap_m / whole)),
@@ -170,7 +171,7 @@ impl Lines {
         })
     }
 
-    /// Sends what the ends at `place` answer, and writes the states of the pairs.
+    /// Sends the answers of the ends at `place`, and writes the states of the pairs.
     pub fn answer(&mut self, place: usize, stepper: &mut ClusterStepper, states: &mut Vec<PairState>, dt_s: f64) {
         let external = stepper.external();
         for line in &mut self.all {
@@ -221,7 +222,7 @@ impl LineLaw {
 }
 
 impl LineAt {
-    /// What arrives from the other end during the step, N.
+    /// The wave that arrives from the other end during the step, N.
     fn listen(&mut self, one: &Participant<'_>, other: &Neighbour, dt_s: f64) -> DVec3 {
         let pair = other.snapshot.pairs.iter().find(|pair| pair.with == one.id);
         self.line.receive(other.snapshot.time, pair.and_then(|pair| pair.wave), other.computed_here, dt_s);

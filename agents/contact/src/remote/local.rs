@@ -1,8 +1,8 @@
 //! The local model of a participant at the end of a macro step, for partners that compute their pairs with it: which of its blocks they may move, its
 //! compliance there, and the matrix of the member that stands for it: the inverse of that.
 //!
-//! In: the last solve, partners' published states, what they give. Out: blocks, velocities, accelerations and W; A = W⁻¹ as a dense square. Never here:
-//! ledgers. Theory: docs/theory/coupling.md, section 3 (eq. 7m).
+//! In: the last solve, partners' published states, their forces. Out: blocks, velocities, accelerations and W; A = W⁻¹ as a dense
+//! square. Never here: ledgers. Theory: docs/theory/coupling.md, section 3 (eq. 7m).
 
 use crate::lists::reset;
 use crate::member::problem::respond;
@@ -22,7 +22,8 @@ const PLACES_MAX: usize = 12;
 const STEPS_AHEAD: f64 = 2.0;
 /// And at least so far, metres.
 const NEAR_M: f64 = 2e-3;
-/// The share of its largest compliance that every direction has at least: what its contacts hold does not make its matrix singular.
+/// The share of its largest compliance that every direction has at least: a direction held by contacts does not make
+/// its matrix singular.
 const YIELD_SHARE: f64 = 1e-9;
 
 /// Reusable storage.
@@ -38,14 +39,14 @@ pub(crate) struct Scratch {
     pub(crate) columns: [Vec<DVec3>; 2],
 }
 
-/// Blocks of a participant, with what its partners give them.
+/// Blocks of a participant, with the forces of its partners on them.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct LocalQuery<'a> {
     /// The participant.
     pub place: usize,
     /// Its blocks.
     pub blocks: &'a [usize],
-    /// What all partners go on giving each block, N or N·m.
+    /// The lasting forces of all partners on each block, N or N·m.
     pub lasting: &'a [DVec3],
 }
 
@@ -96,7 +97,7 @@ impl ClusterStepper {
             let free = (state.dv_free[block] - pushed) / own_s;
             let row = &into.compliance[at * blocks.len()..(at + 1) * blocks.len()];
             let pushed: DVec3 = row.iter().zip(query.lasting).map(|(w, force)| *w * *force).sum();
-            // what is held goes on as it does: its contacts take what its forces would change
+            // a held body goes on as it does: its contacts take up any change by forces
             let acceleration = if held { DVec3::ZERO } else { free + pushed };
             into.blocks.push(LocalBlock { slot: member.slot_of(block), velocity: state.v_before[block], acceleration });
         }
@@ -119,7 +120,7 @@ fn own_compliance(member: &GuardedMember<'_>, blocks: &[usize], storage: &mut [V
     }
 }
 
-/// Visits what an impulse at a site gives to sides of a member.
+/// Visits the sides of a member at a site, with their shares of an impulse there.
 pub(crate) fn visit_sides(
     member: &dyn ClusterMember,
     site: Site,

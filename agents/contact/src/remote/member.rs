@@ -1,7 +1,7 @@
-//! A partner of an asynchronous pair as a member of the problem that computes the pair: foretold from its snapshot, it answers impulses by
-//! the local model that it has published.
+//! A partner of an asynchronous pair as a member of the problem that computes the pair: predicted from its snapshot, it
+//! answers impulses by the local model that it has published.
 //!
-//! In: a snapshot, what is on its way to the partner. Out: a skin, blocks and velocities as any member has them. Never here: the ledger,
+//! In: a snapshot, impulses in flight to the partner. Out: a skin, blocks and velocities as any member has them. Never here: the ledger,
 //! which pairs there are, the partner's own contacts: those are in its local model. Theory: docs/theory/coupling.md, section 3.
 
 use crate::Neighbour;
@@ -15,14 +15,14 @@ use metachron_core::{AgentId, Anchor, Body, Impulse, Inertia, LocalBlock, LocalM
 use metachron_geometry::{CollisionShape, ContactSide, Place, PlacedShape, ShapeKind};
 use std::sync::Arc;
 
-/// No partner is foretold by more than this many of its steps.
+/// No partner is predicted by more than this many of its steps.
 const FORETOLD_STEPS: f64 = 2.0;
 
 /// A partner that is stepped elsewhere.
 #[derive(Debug, Default)]
 pub struct RemoteMember {
     form: Option<Arc<CollisionShape>>,
-    /// How it moves as it is led, which no impulse changes; `None` of what impulses move.
+    /// How it moves as it is led, which no impulse changes; `None` for a body that impulses move.
     led: Option<Motion>,
     /// The participants that compute their pairs with it.
     partners: Vec<AgentId>,
@@ -33,9 +33,9 @@ pub struct RemoteMember {
     now: Vec<DVec3>,
     free: Vec<DVec3>,
     gain_m_s2: Vec<DVec3>,
-    /// What deviates from the model's own forecast, N·s for each block.
+    /// The impulses that deviate from the model's own forecast, N·s for each block.
     deviation: Vec<DVec3>,
-    /// How far that has moved it, N·s² for each block.
+    /// How far these have moved it, N·s² for each block.
     carried: Vec<DVec3>,
     flight: Vec<InFlight>,
     /// The time of the snapshot that the matrix was made for.
@@ -44,14 +44,14 @@ pub struct RemoteMember {
     matrix: Vec<f64>,
 }
 
-/// What is on its way to a block: an impulse, and that times the seconds since it acted.
+/// An impulse in flight to a block, and the same times the seconds since it acted.
 #[derive(Debug, Clone, Copy, Default)]
 struct InFlight {
     impulse: DVec3,
     way: DVec3,
 }
 
-/// What a participant knows of its pair with a partner.
+/// A participant's view of its pair with a partner.
 pub struct RemoteView<'a> {
     /// The participant.
     pub id: AgentId,
@@ -86,14 +86,15 @@ impl RemoteMember {
         known && (self.led.is_some() || !self.blocks.is_empty())
     }
 
-    /// Adds a participant that computes its pair with the partner, to which it has `given` what is on its way (eq. 5).
+    /// Adds a participant that computes its pair with the partner; `given` visits the impulses in flight to the partner
+    /// (eq. 5).
     pub fn add_partner(&mut self, view: &RemoteView<'_>, given: impl FnOnce(&mut dyn FnMut(Site, Impulse, Impulse))) {
         self.partners.push(view.id);
         let model = &self.model;
         let since_s = view.time.secs_after(view.neighbour.snapshot.time);
         let partner = model.partners.iter().find(|partner| partner.id == view.id);
         let age_s = partner.map_or(0.0, |partner| view.time.secs_after(partner.read).max(0.0));
-        // what was given before its step began acts on what is held evenly through it; what was given since is foretold to act
+        // impulses given before its step began act on a held body evenly through it; later ones are predicted to act
         let before = if since_s > 0.0 && age_s > 0.0 { (1.0 - since_s / age_s).max(0.0) } else { 0.0 };
         let begun = (since_s / model.step_s).clamp(0.0, 1.0);
         let acts = if model.held { before * begun + (1.0 - before) } else { 1.0 };
@@ -108,7 +109,7 @@ impl RemoteMember {
             add(impulse, |flight| &mut flight.impulse);
             add(way, |flight| &mut flight.way);
         });
-        // what deviates has moved what is held for no longer than its step
+        // a deviation has moved a held body for no longer than its step
         let moved_s = if since_s > 0.0 { since_s } else { age_s }.min(model.step_s);
         for (at, InFlight { impulse, way }) in flight.iter().enumerate() {
             let force = partner.and_then(|partner| partner.forces.get(at)).copied().unwrap_or(DVec3::ZERO);
@@ -166,7 +167,7 @@ impl RemoteMember {
         }
     }
 
-    /// A side of points of the partner with shares; what has no block leaves its share to the others.
+    /// A side of points of the partner with shares; a point without a block leaves its share to the others.
     fn shared(&self, points: &[(u32, f64)], spin: Option<(u32, DVec3)>) -> Side {
         let mut terms = [SideTerm::weighted(0, 0.0); 4];
         let mut count = 0;
@@ -276,7 +277,7 @@ impl ClusterMember for RemoteMember {
         }
     }
 
-    // its own cluster knows what static solids do to it
+    // its own cluster solves its contacts with static solids
     fn is_led(&self) -> bool {
         true
     }
@@ -285,7 +286,7 @@ impl ClusterMember for RemoteMember {
         true
     }
 
-    // what is led answers nothing
+    // a led body answers nothing
     fn answers_after_s(&self) -> f64 {
         if self.led.is_some() { 0.0 } else { self.model.step_s }
     }

@@ -1,12 +1,12 @@
-//! Pairs whose sides keep clocks of their own: each sees the other's newest published state, one of them computes what they give each
-//! other, and a ledger or a transmission line carries it across.
+//! Pairs whose sides keep clocks of their own: each sees the other's newest published state, one of them computes the
+//! impulses between them, and a ledger or a transmission line carries these across.
 //!
-//! In: what a cluster's members see of partners outside. Out: remote members and known impulses for the cluster's step; after it, what
-//! partners read. Never here: contacts, solves, clocks. Theory: docs/theory/coupling.md.
+//! In: partners outside a cluster, as its members see them. Out: remote members and known impulses for the cluster's
+//! step; after it, the data that partners read. Never here: contacts, solves, clocks. Theory: docs/theory/coupling.md.
 //!
-//! join     takes what partners gave, sees those that are met here, lays out lines
+//! join     takes the impulses of partners, sees the partners that are met here, lays out lines
 //! (step)   the cluster's problem, with partners as remote members
-//! part     settles what was taken, books what remote members were given, publishes local models
+//! part     settles the impulses taken, books those given to remote members, publishes local models
 //!
 //! A step that is not made has taken nothing: the next join finds the same.
 
@@ -111,7 +111,8 @@ impl Remote {
 }
 
 impl Remotes {
-    /// Writes or reads what the next macro step needs of them: what partners gave is remembered, what they are is seen anew.
+    /// Writes or reads the state that the next macro step needs: the memory of each partner is kept, the partner is
+    /// seen anew.
     ///
     /// # Errors
     /// [`ArchiveError::Malformed`].
@@ -132,7 +133,8 @@ impl Remotes {
         )
     }
 
-    /// Before a macro step: takes what partners of `locals` gave them, and adds the partners that they meet as remote members.
+    /// Before a macro step: takes the impulses of partners on `locals`, and adds the partners that they meet as remote
+    /// members.
     pub fn join<'a>(
         &'a mut self,
         locals: &mut Vec<Participant<'a>>,
@@ -168,7 +170,7 @@ impl Remotes {
         }
     }
 
-    /// Sees a partner, for one of those that meet it.
+    /// Sees a partner, for one of the participants that meet it.
     fn see(&mut self, other: &Neighbour, context: &StepContext<'_>, ledgers: &Ledgers) {
         let remote = entry(&mut self.all, &other.id, |remote| remote.seen.id, || Remote::new(other.clone()));
         if !remote.met {
@@ -183,7 +185,7 @@ impl Remotes {
     }
 }
 
-/// After a macro step that took `dt_s` seconds: books what remote members were given, and makes the local models that partners read.
+/// After a macro step that took `dt_s` seconds: books the impulses on remote members, and makes the local models that partners read.
 /// `all` are the participants of the step, remote members last.
 pub fn part(all: &[Participant<'_>], pairs: &mut [Option<&mut Pairs>], stepper: &mut ClusterStepper, dt_s: f64) {
     // first of all: the step is made, whatever a member's code does now
@@ -202,7 +204,7 @@ pub fn part(all: &[Participant<'_>], pairs: &mut [Option<&mut Pairs>], stepper: 
 }
 
 impl Pairs {
-    /// Writes or reads what the next macro step needs of them.
+    /// Writes or reads the state that the next macro step needs.
     ///
     /// # Errors
     /// [`ArchiveError::Malformed`].
@@ -211,8 +213,8 @@ impl Pairs {
         self.lines.archive(archive)
     }
 
-    /// Takes what partners gave as impulses that act evenly over the step. What nothing holds goes to where blows would have carried it,
-    /// had they come when they acted (eq. 4).
+    /// Takes the impulses of partners as forces that act evenly over the step. A block that nothing holds goes to where
+    /// impacts would have carried it, had they come when the impulses acted (eq. 4).
     fn take(&mut self, place: usize, one: &mut Participant<'_>, stepper: &mut ClusterStepper, dt_s: f64) {
         self.ledgers.open(&one.context);
         let known = &mut stepper.external().known;
@@ -242,7 +244,7 @@ impl Pairs {
         }
     }
 
-    /// Books what this agent gave remote members.
+    /// Books the impulses of this agent on remote members.
     fn book(&mut self, place: usize, all: &[Participant<'_>], stepper: &mut ClusterStepper, dt_s: f64) {
         let Self { ledgers, states, .. } = self;
         let context = all[place].context;
@@ -313,7 +315,7 @@ impl Pairs {
         }
         for (at, all) in goes_on.iter_mut().enumerate() {
             let Some(weight) = weight.get(blocks[at]) else { continue };
-            // what goes on is shared as it was given
+            // the lasting force is shared as the whole was given
             let (lasts, whole) = (lasting(*all, *weight), all.dot(*weight));
             for partner in &mut model.partners {
                 let share = if whole > 0.0 { partner.forces[at].dot(*weight) / whole } else { 0.0 };
@@ -332,7 +334,7 @@ impl Pairs {
         into.pairs.extend_from_slice(&self.states);
     }
 
-    /// Whether anything acts between it and a partner: then it must not rest, as who rests gives nothing and takes nothing.
+    /// Whether anything acts between it and a partner: then it must not rest, as a resting agent gives and takes nothing.
     #[must_use]
     pub fn is_active(&self) -> bool {
         self.ledgers.has_taken() || self.states.iter().any(|state| state.force_n > 0.0 || state.in_flight_n_s > 0.0)
@@ -351,8 +353,8 @@ impl std::fmt::Debug for Pairs {
     }
 }
 
-/// What of a force on a free block goes on: the block's weight where the force bears it, and no blow (docs/theory/coupling.md, section 3). A force of half the weight
-/// bears it already: a body that hops a little is not let fall.
+/// The lasting part of a force on a free block: the block's weight where the force bears it, and no impact (docs/theory/coupling.md,
+/// section 3). A force of half the weight bears it already: a body that hops a little is not let fall.
 fn lasting(force: DVec3, weight: DVec3) -> DVec3 {
     let square = weight.length_squared();
     if square > 0.0 { weight * (force.dot(weight) / (BEARS_SHARE * square)).clamp(0.0, 1.0) } else { DVec3::ZERO }

@@ -1,4 +1,4 @@
-//! The matter of an agent outside a cluster: its skin and its points, as its snapshot tells and as they are foretold.
+//! The matter of an agent outside a cluster: its skin and its points, as published in its snapshot and as predicted.
 //!
 //! In: published bodies, velocities. Out: placed skins, points, which slots an impulse at a site acts on. Never here: how it answers impulses.
 
@@ -14,7 +14,7 @@ pub(crate) struct Motion {
 }
 
 impl Motion {
-    /// As a published body does; `None` of one that bends.
+    /// The motion of a published body; `None` for a deformable.
     pub fn of(body: &Body) -> Option<Self> {
         let (velocity_m_s, spin_rad_s) = match body {
             Body::Rigid(rigid) => (rigid.velocity, rigid.spin),
@@ -132,7 +132,8 @@ impl PublishedShape {
         Some((segment, if length > 0.0 { ((arc_m - self.arc_m[segment]) / length).clamp(0.0, 1.0) } else { 0.0 }))
     }
 
-    /// Moves what a block is about by its velocity for some seconds, and by `way` besides; points have moved by their drift already.
+    /// Moves the part of the body that a block stands for, by its velocity for some seconds and by `way`; points have
+    /// moved by their drift already.
     pub(crate) fn shift(&mut self, block: &LocalBlock, way: DVec3, for_s: f64) {
         match (self.point_of(block.slot), self.points.is_empty(), block.slot) {
             (Some(place), ..) => self.points[place] += (block.velocity - self.drift[place]) * for_s + way,
@@ -148,7 +149,7 @@ impl PublishedShape {
         }
     }
 
-    /// What an impulse at a site gives to slots.
+    /// Visits the shares of slots in an impulse at a site.
     pub(crate) fn visit_blocks(&self, site: Site, impulse: Impulse, mut visit: impl FnMut(u32, DVec3)) {
         match site {
             Site::Whole => {

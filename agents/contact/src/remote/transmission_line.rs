@@ -150,7 +150,7 @@ impl Line {
         self.arriving = None;
     }
 
-    /// The step that began is made, with what [`Self::arriving`] said.
+    /// Takes over the wave that [`Self::arriving`] found, as the step is made.
     pub fn settle(&mut self) {
         self.arrived = self.arriving.take().unwrap_or(self.arrived);
     }
@@ -219,7 +219,7 @@ mod tests {
             let (h, other) = (steps[i], 1 - i);
             lines[i].receive(shown[other].0, shown[other].1, i == 0, h);
             let c = lines[i].arriving(t[i], h);
-            // a step that is begun again hears the same
+            // a step that is begun again reads the same
             lines[i].open();
             assert_eq!(lines[i].arriving(t[i], h), c);
             lines[i].settle();

@@ -1,4 +1,4 @@
-//! What bounds the impulse of a row, as a second-order cone, and where a row is on its way through it.
+//! The bound of a row's impulse, as a second-order cone, and the place of a row on its way through it.
 //!
 //! In: the law of a row, impulses and velocities in its frame. Out: points of the cone, gains, steps. Never here: other rows, matrices.
 //! Theory: `docs/theory/clusters.md`, eq. C1–C5.
@@ -10,7 +10,7 @@ use glam::{DMat3, DVec3};
 
 /// How an impulse λ lies in a second-order cone: l = (h·λ + l₀, T λ + l̄).
 ///
-/// Of Coulomb's cone the head is the radius of its disc, of one bound what is left to it, of two bounds or a ball half of what lies
+/// Of Coulomb's cone the head is the radius of its disc, of one bound the way left to it, of two bounds or a ball half of the room
 /// between, which no impulse changes.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Chart {
@@ -20,7 +20,7 @@ pub(super) struct Chart {
     at: Lorentz,
 }
 
-/// What bounds a row's impulse.
+/// The bound of a row's impulse.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub(super) enum Bound {
     /// It gives nothing.
@@ -147,7 +147,7 @@ impl Inside {
             let head = chart.head.dot(velocity) / (length * length);
             self.dual = Lorentz::new(head.max(tail.length()) + by_m_s / length, tail);
         } else {
-            // what is not at its bound leaves no velocity
+            // a row that is not at its bound leaves no velocity
             let asked = at.impulse - velocity / row.scale;
             let tail = chart.tail * (row.law.project(asked).value - asked) * row.scale;
             let size = point.tail.length();
@@ -193,7 +193,7 @@ impl Inside {
         self.target = Lorentz::default().plus(self.dual, -1.0);
     }
 
-    /// The corrector's: a point with l·ŷ = `centre_j`, by what the predictor's steps make together.
+    /// The corrector's: a point with l·ŷ = `centre_j`, less the second-order term of the predictor's steps.
     pub fn aim_inside(&mut self, impulse: DVec3, centre_j: f64) {
         let Bound::Cone(chart) = self.bound else { return };
         let more = self.scaling.second_order(self.primal_step, self.dual_step);

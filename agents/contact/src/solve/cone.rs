@@ -8,10 +8,10 @@ use glam::{DMat3, DVec3};
 /// A contact sticks while its friction is below this share of the most that Coulomb allows, a row while its impulse is of the most it may give.
 pub(super) const STICK_SHARE: f64 = 0.999;
 
-/// What impulses a row may give.
+/// The impulses that a row may give.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) enum Law {
-    /// Those of Coulomb's cone: no pull, and friction up to μ times the push.
+    /// Impulses in Coulomb's cone: no pull, and friction up to μ times the push.
     Coulomb {
         /// The coefficient μ.
         friction: f64,
@@ -21,7 +21,7 @@ pub(super) enum Law {
         /// The length, N·s; infinite for all.
         limit: f64,
     },
-    /// Those along the first axis between two bounds.
+    /// Impulses along the first axis between two bounds.
     Between {
         /// The least, ≤ 0.
         low: f64,
@@ -114,7 +114,7 @@ fn ball(limit: f64, z: DVec3) -> Projection {
     }
 }
 
-/// The length of what is not along the normal.
+/// The length of the part across the normal.
 pub(super) fn tangential(z: DVec3) -> f64 {
     let square = z.y * z.y + z.z * z.z;
     // `hypot` takes four times as long, and is needed where squares overflow alone

@@ -1,4 +1,4 @@
-//! A part of the members' matrix with what contacts add to it, ⊕ A/f + Jᵀ G J, and its factor.
+//! A part of the members' matrix with the terms that contacts add to it, ⊕ A/f + Jᵀ G J, and its factor.
 //!
 //! In: members, which of their blocks are whole in it, rows, a gain of each row. Out: solutions. Never here: which parts are wanted, laws of
 //! contact. Theory: `docs/theory/clusters.md`, eq. 8.
@@ -19,16 +19,17 @@ const NOWHERE: usize = usize::MAX;
 #[derive(Debug, Clone, Default)]
 pub(super) struct Coupled {
     factor: Cholesky,
-    /// The blocks that it is of, and what each of all blocks is called in it.
+    /// The blocks that it is of, and the place of each of all blocks in it.
     met: Vec<usize>,
     places: Vec<usize>,
-    /// Of the members' matrix the part that is in it, and what that couples.
+    /// The part of the members' matrix that is in it, and its couplings.
     own: Vec<Block>,
     pairs: Vec<Pair>,
-    /// Where two terms of a row meet, by front, those with one place next to each other; those of front k start at `of_fronts[k]`.
+    /// Where two terms of a row meet, by front, meetings of one place next to each other; the meetings of front k start
+    /// at `of_fronts[k]`.
     meetings: Vec<Meeting>,
     of_fronts: Vec<usize>,
-    /// The fronts of all meetings, row by row; those of row k start at `starts[k]`.
+    /// The fronts of all meetings, row by row; the fronts of row k start at `starts[k]`.
     fronts: Vec<usize>,
     starts: Vec<usize>,
     /// The blocks of all rows that the meetings were found for.
@@ -56,7 +57,7 @@ struct Meeting {
 }
 
 impl Coupled {
-    /// Writes or reads what the next matrix needs: the order of its factor.
+    /// Writes or reads the order of its factor, which the next matrix needs.
     pub fn archive(&mut self, archive: &mut Archive<'_>) -> Result<(), ArchiveError> {
         if archive.is_reading() {
             self.forget();
@@ -215,7 +216,7 @@ impl Coupled {
     }
 }
 
-/// What the blocks of rows are called, with an end of each row, so that lists are equal where all rows' are.
+/// The places of the blocks of rows, with an end of each row, so that lists are equal where those of all rows are.
 fn names<'a>(rows: &'a Rows, places: &'a [usize]) -> impl Iterator<Item = usize> + 'a {
     let of_row = |row| rows.terms(row).iter().map(|term| places[term.block]).chain(std::iter::once(usize::MAX));
     (0..rows.len()).flat_map(of_row)

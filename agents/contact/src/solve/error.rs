@@ -1,4 +1,4 @@
-//! Why a contact problem is refused: what is wrong, and where.
+//! Why a contact problem is refused: the fault, and its place.
 //!
 //! In: nothing. Out: one enum of errors. Never here: the checks themselves (`validate.rs`).
 
@@ -19,7 +19,7 @@ pub enum ProblemError {
     Member {
         /// Its place in the problem.
         member: usize,
-        /// What about it.
+        /// Its fault.
         reason: &'static str,
     },
     /// The matrix of a member has no Cholesky factor.
@@ -36,20 +36,20 @@ pub enum ProblemError {
         /// How many were given.
         terms: usize,
     },
-    /// A contact's data are not those of a contact.
+    /// The data of a contact make no contact.
     #[error("contact {contact}: {reason}")]
     Contact {
         /// Its place in the problem.
         contact: usize,
-        /// What about it.
+        /// Its fault.
         reason: &'static str,
     },
-    /// The data of a joint's row are not those of one.
+    /// The data of a joint's row make no row.
     #[error("row {row}: {reason}")]
     Row {
         /// Its place in the problem.
         row: usize,
-        /// What about it.
+        /// Its fault.
         reason: &'static str,
     },
 }

@@ -79,7 +79,7 @@ struct Target {
 /// A matrix with its factor.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Cholesky {
-    /// The order as it was made, and what its factor and the changes of it cost then.
+    /// The order as it was made, and the cost then of its factor and of changes of it.
     order: Vec<usize>,
     fresh_cost: f64,
     fronts: Fronts,
@@ -101,7 +101,7 @@ pub(super) struct Cholesky {
     update: Vec<f64>,
     /// Fronts whose numbers are no longer those of the matrix.
     stale: Vec<bool>,
-    /// What such fronts cost before each front, and in all.
+    /// The cost of the stale fronts before each front, and of all.
     costs: Vec<f64>,
     permuted: Vec<DVec3>,
     local: Vec<f64>,
@@ -151,7 +151,7 @@ impl Cholesky {
         true
     }
 
-    /// What a factor of a matrix with these couplings would cost, about in multiplications.
+    /// The cost that a factor of a matrix with these couplings would have, about in multiplications.
     pub fn cost_of(size: usize, pairs: &[Pair]) -> f64 {
         let neighbours = neighbours(size, pairs);
         Ordered::new(&neighbours, &[]).fronts.cost
@@ -203,7 +203,7 @@ impl Cholesky {
         self.permuted = vec![DVec3::ZERO; self.owners.len()];
     }
 
-    /// What a factor costs, about in multiplications.
+    /// The cost of a factor, about in multiplications.
     pub fn cost(&self) -> f64 {
         self.fronts.cost
     }
@@ -224,7 +224,7 @@ impl Cholesky {
         self.layouts.len()
     }
 
-    /// A new matrix, of those blocks that there is room for. Fronts whose numbers are the last one's need no new factor.
+    /// A new matrix, of the blocks that there is room for. Fronts whose numbers are the last one's need no new factor.
     pub fn set(&mut self, blocks: &[Block]) {
         std::mem::swap(&mut self.base, &mut self.before);
         self.base.fill(0.0);
@@ -261,7 +261,7 @@ impl Cholesky {
         self.stale[front] = true;
     }
 
-    /// Factors the matrix and what `more` adds to the columns of each front, where numbers have changed.
+    /// Factors the matrix and the terms that `more` adds to the columns of each front, where numbers have changed.
     ///
     /// # Errors
     /// A block at which the matrix is not positive definite.
@@ -335,7 +335,7 @@ impl Cholesky {
     }
 }
 
-/// What a factor and the changes to come cost, about in multiplications.
+/// The cost of a factor and of the changes to come, about in multiplications.
 fn expected_cost(fronts: &Fronts, changes: &[bool]) -> f64 {
     fronts.cost + CHANGES * fronts.changed(changes)
 }
@@ -411,7 +411,7 @@ impl Layout {
 }
 
 impl Target {
-    /// Of a row of numbers, in a front whose eliminated columns have this room.
+    /// The target of a row of numbers, in a front whose eliminated columns have this room.
     fn new(at: usize, room: usize) -> Self {
         let near = at / TILE * TILE * room + at % TILE;
         match at.checked_sub(room) {

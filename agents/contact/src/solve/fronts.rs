@@ -13,9 +13,9 @@ pub(super) struct Front {
     pub columns: usize,
     /// The later blocks that they are coupled with, by rising places in the order.
     pub rows: Vec<usize>,
-    /// The front that takes up what is left of this one.
+    /// The front that takes up the rest of this one.
     pub parent: Option<usize>,
-    /// What it costs, about in multiplications.
+    /// Its cost, about in multiplications.
     pub cost: f64,
 }
 
@@ -25,7 +25,7 @@ pub(super) struct Fronts {
     pub fronts: Vec<Front>,
     /// Where each block stands in the order of elimination.
     pub rank: Vec<usize>,
-    /// What a factor costs, about in multiplications.
+    /// The cost of a factor, about in multiplications.
     pub cost: f64,
 }
 
@@ -36,7 +36,7 @@ struct Size {
     rows: usize,
 }
 
-/// What a front costs besides multiplications, in these: by itself, and for each number that it hands on.
+/// The cost of a front besides multiplications, in these: by itself, and for each number that it hands on.
 const COST_FRONT: f64 = 1000.0;
 const COST_NUMBER: f64 = 4.0;
 
@@ -58,7 +58,7 @@ struct Tree {
 }
 
 impl Fronts {
-    /// Checks fronts that were read: that they are those of one matrix.
+    /// Checks that fronts which were read belong to one matrix.
     ///
     /// # Errors
     /// [`ArchiveError::Mismatch`].
@@ -86,7 +86,8 @@ impl Fronts {
         tree.listed(order)
     }
 
-    /// What a factor costs again after blocks have changed that `changes` says do: their fronts, and all above them.
+    /// The cost of a factor again after changes of the blocks that `changes` marks: of their fronts, and all above
+    /// them.
     pub fn changed(&self, changes: &[bool]) -> f64 {
         let mut stale = vec![false; self.fronts.len()];
         let mut own = vec![false; self.rank.len()];
@@ -135,7 +136,7 @@ impl Tree {
     /// Makes a column's front larger by those below it that cost less within it.
     fn take_up(&mut self, column: usize) {
         let mut below = std::mem::take(&mut self.children[column]);
-        // those that bring the fewest zeros first
+        // the fronts that bring the fewest zeros first
         below.sort_by_key(|&child| (usize::MAX - self.rows[child].len(), child));
         let mut kept = Vec::with_capacity(below.len());
         for child in below {

@@ -1,7 +1,7 @@
 //! The iterative form of a Newton step: preconditioned conjugate gradients (HS52) on ⊕ A/f, or on ⊕ A/f + Jᵀ G J; minimal residuals
 //! where slopes of laws are not symmetric, in either form: generalised conjugate residuals (EES83), each direction stored with its image.
 //!
-//! In: an operator, a right side, a start and a goal. Out: a solution and exactly what it leaves. Never here: when the goal is met
+//! In: an operator, a right side, a start and a goal. Out: a solution and its exact residual. Never here: when the goal is met
 //! well enough for a law of contact. Theory: `docs/theory/clusters.md`, section 6 and eq. 8b and 15.
 
 use super::coupled::Coupled;
@@ -12,7 +12,7 @@ use crate::lists::{refill, reset};
 use glam::{DMat3, DVec3};
 use metachron_core::{Archive, ArchiveError, ParallelFor};
 
-/// Starts from the true residual: what is summed up along the way differs from it by rounding.
+/// Starts from the true residual: the sum along the way differs from it by rounding.
 const ROUNDS: usize = 3;
 /// The most products of a round: some, so many for each block (in exact numbers three would do), and never more than the last.
 const PRODUCTS_BASE: usize = 50;
@@ -20,7 +20,7 @@ const PRODUCTS_PER_BLOCK: usize = 12;
 const PRODUCTS_MAX: usize = 3000;
 /// The most directions of a round where slopes of laws are not symmetric, each of which is stored.
 const DIRECTIONS_MAX: usize = 60;
-/// The share of a goal at which a round ends: the rest is for rounding, and for what laws then change.
+/// The share of a goal at which a round ends: the rest is for rounding, and for the changes of laws afterwards.
 const SHARE_OF_GOAL: f64 = 0.5;
 
 /// One system of linear equations.
@@ -36,12 +36,12 @@ pub(super) struct Task<'a> {
     pub goal: f64,
 }
 
-/// What is multiplied by: ⊕ A/f, with Jᵀ G J where there are contacts in it.
+/// The matrix of a product: ⊕ A/f, with Jᵀ G J where there are contacts in it.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Operator<'a> {
     pub members: &'a Members,
     pub contacts: Option<Stiffness<'a>>,
-    /// What changes no block by more than this by itself may be left, m/s.
+    /// A residual that changes no block by more than this by itself may be left, m/s.
     pub still_m_s: f64,
 }
 
@@ -52,15 +52,15 @@ pub(super) struct Stiffness<'a> {
     pub gains: &'a [DMat3],
     /// S, the part of each row that no factor holds; empty where there is none.
     pub skews: &'a [Skew],
-    /// Who factors it.
+    /// The threads that factor it.
     pub threads: &'a dyn ParallelFor,
 }
 
 /// The preconditioner and the storage of conjugate gradients.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Gradients {
-    /// Of ⊕ A/f what is near, with Jᵀ G J whole: all of members that lend a factor and of rigid ones, of others the blocks on the diagonal
-    /// that rows touch. What is not in it is a block by itself.
+    /// The near part of ⊕ A/f, with Jᵀ G J whole: all of members that lend a factor and of rigid ones, of others the
+    /// blocks on the diagonal that rows touch. A block outside it stands by itself.
     near: Coupled,
     direction: Vec<DVec3>,
     image: Vec<DVec3>,
@@ -84,7 +84,7 @@ impl Stiffness<'_> {
 }
 
 impl Operator<'_> {
-    /// Whether what is left is at this share of what may be.
+    /// Whether the residual is at this share of its bounds.
     pub fn is_done(&self, task: &Task<'_>, share: f64) -> bool {
         let Size { squared, fastest_m_s } = self.members.measure(task.left);
         squared <= (share * task.goal).powi(2) || fastest_m_s <= share * self.still_m_s
@@ -106,7 +106,7 @@ impl Operator<'_> {
 }
 
 impl Gradients {
-    /// Writes or reads what the next problem needs: the order of the factor of what is near.
+    /// Writes or reads the order of the factor of the near part, which the next problem needs.
     pub fn archive(&mut self, archive: &mut Archive<'_>) -> Result<(), ArchiveError> {
         self.near.archive(archive)
     }
@@ -133,7 +133,7 @@ impl Gradients {
         self.near.factor(contacts).is_ok()
     }
 
-    /// Solves until what is left is at its goal, or as far as products reach.
+    /// Solves until the residual is at its goal, or as far as products reach.
     pub fn solve(&mut self, operator: &Operator<'_>, task: &mut Task<'_>) {
         if task.right.iter().all(|r| *r == DVec3::ZERO) {
             task.x.fill(DVec3::ZERO);
@@ -154,7 +154,7 @@ impl Gradients {
         self.measure(operator, task);
     }
 
-    /// What a solution leaves.
+    /// Finds the residual of a solution.
     pub fn measure(&mut self, operator: &Operator<'_>, task: &mut Task<'_>) {
         task.left.copy_from_slice(task.right);
         if task.x.iter().any(|x| *x != DVec3::ZERO) {
@@ -164,7 +164,7 @@ impl Gradients {
         }
     }
 
-    /// Solves for what is left with the preconditioner.
+    /// Solves for the residual with the preconditioner.
     fn solve_near(&mut self, operator: &Operator<'_>, left: &[DVec3], into: &mut [DVec3]) {
         let by_themselves = into.iter_mut().zip(&operator.members.mobilities).zip(left);
         by_themselves.for_each(|((z, mobility), left)| *z = *mobility * *left);
@@ -194,7 +194,7 @@ impl Gradients {
         let mut power = f64::INFINITY;
         self.direction.fill(DVec3::ZERO);
         for _ in 0..most {
-            // `image` serves as storage for what the preconditioner makes of the residual
+            // `image` serves as storage for the preconditioned residual
             let mut image = std::mem::take(&mut self.image);
             self.solve_near(operator, task.left, &mut image);
             self.image = image;
@@ -250,7 +250,8 @@ pub(super) struct Residuals {
 }
 
 impl Residuals {
-    /// Makes what a task leaves smaller, direction by direction. `aim` makes one of what is left, or tells that there is none.
+    /// Makes the residual of a task smaller, direction by direction. `aim` makes a direction of it, or tells that there
+    /// is none.
     pub fn descend(
         &mut self,
         operator: &Operator<'_>,

@@ -1,8 +1,8 @@
-//! How bodies and contacts answer a push after a solve, all contacts and rows being held as they were solved: what a partner outside the cluster
-//! meets, and how stiff the contacts of what is led are.
+//! How bodies and contacts answer a push after a solve, all contacts and rows being held as they were solved: the compliance that a partner
+//! outside the cluster meets, and the stiffness of the contacts of led bodies.
 //!
-//! In: the last problem of a solver. Out: velocities of blocks per impulse on them; impulses of contacts against a motion. Never here: the solve,
-//! who asks. Theory: `docs/theory/coupling.md`, eq. 7m and 7s.
+//! In: the last problem of a solver. Out: velocities of blocks per impulse on them; impulses of contacts against a motion. Never here: the
+//! solve, the use of the answers. Theory: `docs/theory/coupling.md`, eq. 7m and 7s.
 
 use super::gradients::{Stiffness, Task};
 use super::iterate::Iterate;
@@ -14,10 +14,10 @@ use metachron_core::PlainLoop;
 
 /// The share of an impulse that a solve without a factor may leave.
 const LEFT_SHARE: f64 = 1e-6;
-/// The same where what contacts give is sought: they are harder than bodies by 10⁴ to 10⁷, and what they give is the difference.
+/// The same for the impulses of contacts, which are harder than bodies by 10⁴ to 10⁷: these impulses are a difference.
 const LEFT_BY_CONTACTS: f64 = 1e-9;
 
-/// Storage of right sides and their solutions, and what contacts resist with.
+/// Storage of right sides and their solutions, and of the resistance of contacts.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Held {
     right: Vec<DVec3>,
@@ -47,7 +47,7 @@ impl Solver {
         true
     }
 
-    /// By how much the impulse of each contact on its side 0 changes where side 0 moves by `moved_m_s` against side 1 beyond what blocks do, one
+    /// By how much the impulse of each contact on its side 0 changes where side 0 moves by `moved_m_s` against side 1 beyond its blocks, one
     /// of each contact, world axes: −S u with S = G − G J (⊕A/f + JᵀGJ)⁻¹ Jᵀ G. `None` where rounding leaves no factor.
     pub(crate) fn resistance(&mut self, moved_m_s: &[DVec3]) -> Option<&[DVec3]> {
         if !self.hold() {

@@ -1,6 +1,6 @@
 //! Interior points: Mehrotra's predictor and corrector on Coulomb's cones and on all bounds of rows, by one factor a step.
 //!
-//! In: an iterate. Out: the same nearer to where all laws hold, its impulses inside of what each law allows after every step.
+//! In: an iterate. Out: the same nearer to where all laws hold, its impulses inside the bounds of each law after every step.
 //! Never here: when to stop, the last digits (`newton.rs`), cones themselves. Theory: `docs/theory/clusters.md`, eq. C1–C5.
 
 use super::bound::{Bound, Inside};
@@ -9,8 +9,8 @@ use super::lorentz::Lorentz;
 use super::newton::Aim;
 use crate::lists::refill;
 
-/// How far inside their cones impulses and dual points start, in means of what laws and momentum miss, √J, so that λ·y is the same for all
-/// rows and none moves another by more than its own share; and the least of it, m/s.
+/// How far inside their cones impulses and dual points start, in means of the miss of laws and momentum, √J, so that
+/// λ·y is the same for all rows and none moves another by more than its own share; and the least of it, m/s.
 const INSIDE: f64 = 3.0;
 const INSIDE_MIN_M_S: f64 = 1e-5;
 /// The most of the way to the nearest edge that a step goes.
@@ -23,14 +23,14 @@ const SPREAD: f64 = 3.0;
 const GOLDEN: f64 = 0.618_033_988_749_894_9;
 /// The least share of the gap that a step aims at.
 const CENTRING_MIN: f64 = 1e-6;
-/// The share of its right side that a step may leave: by gradients, and of what follows slopes that no factor holds.
+/// The share of its right side that a step may leave: by gradients, and where it follows slopes that no factor holds.
 const LEAVE: f64 = 1e-3;
 
 /// Storage of the way.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Interior {
     rows: Vec<Inside>,
-    /// How often it was stuck, the best place of these, and what that misses, √J.
+    /// How often it was stuck, the best place of these, and the miss there, √J.
     stuck: u32,
     best: Kept,
     least: f64,
@@ -125,7 +125,8 @@ impl Interior {
         iterate.remeasure();
     }
 
-    /// Lets bounds and compliances follow the impulses; what is between bounds that move keeps its place between them.
+    /// Lets bounds and compliances follow the impulses; an impulse between bounds that move keeps its place between
+    /// them.
     fn follow(&mut self, iterate: &mut Iterate, yield_m_s: f64) {
         iterate.press();
         let mut moved = false;

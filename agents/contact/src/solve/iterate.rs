@@ -1,8 +1,7 @@
 //! The iterate that all levels of a solution share, and the linear step that they take.
 //!
-//! In: rows and matrices of a problem. Out: impulses, velocities, steps of them, and what momentum lacks where equations were not
-//! solved to their end.
-//! Never here: when to stop, how far to step.
+//! In: rows and matrices of a problem. Out: impulses, velocities, steps of them, and the momentum left where equations were not
+//! solved to their end. Never here: when to stop, how far to step.
 //! Theory: `docs/theory/clusters.md`, eq. 8 and 15–17.
 
 use super::cone::Projection;
@@ -35,13 +34,13 @@ pub(super) struct Iterate {
     pub step: State,
     /// G of each row.
     pub gains: Vec<DMat3>,
-    /// What friction that follows pressure adds to G of each row.
+    /// The terms that friction which follows pressure adds to G of each row.
     pub skews: Vec<Skew>,
-    /// What free velocities leave unanswered, N·s; empty where they answer all.
+    /// The momentum that free velocities leave unanswered, N·s; empty where they answer all.
     pub unanswered: Vec<DVec3>,
     /// λ + c of each row: the impulse it would have if no velocity changed.
     pub pull: Vec<DVec3>,
-    /// Whether velocities are those that the impulses make, and not those of a step.
+    /// Whether velocities are the response to the impulses, and not those of a step.
     pub exact: bool,
     /// Newton steps so far.
     pub steps: usize,
@@ -55,7 +54,7 @@ pub(super) struct Kept {
     compliances: Vec<f64>,
 }
 
-/// What became of impulses when they were made those that laws ask for.
+/// The outcome of setting impulses by the laws.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) enum Refined {
     /// None changed.
@@ -77,7 +76,7 @@ impl State {
         self.lists_mut().into_iter().zip(other.lists()).for_each(|(list, from)| list.clone_from(from));
     }
 
-    /// Of rows, then of blocks.
+    /// Lists of rows, then of blocks.
     fn lists(&self) -> [&Vec<DVec3>; 4] {
         [&self.lambda, &self.velocity, &self.change, &self.left]
     }
@@ -105,7 +104,7 @@ impl Iterate {
         self.steps = 0;
     }
 
-    /// Takes up what the members' free velocities leave unanswered.
+    /// Takes up the momentum that the members' free velocities leave unanswered.
     pub fn take_unanswered(&mut self, members: &[Member<'_>]) {
         self.unanswered.clear();
         if members.iter().all(|member| member.unanswered.is_empty()) {
@@ -152,7 +151,7 @@ impl Iterate {
         self.update_velocities();
     }
 
-    /// Makes impulses those that laws ask for, and velocities theirs where a factor makes them. Returns what that came to.
+    /// Sets impulses by the laws, and velocities by the impulses where a factor makes them. Returns the outcome.
     pub fn refine(&mut self, members: &[Member<'_>]) -> Refined {
         if self.system.form == StepForm::Direct {
             if !self.obey() {
@@ -176,7 +175,7 @@ impl Iterate {
         }
     }
 
-    /// Makes impulses those that laws ask for at the velocities as they are; returns whether any was not.
+    /// Sets impulses by the laws at the velocities as they are; returns whether any changed.
     fn obey(&mut self) -> bool {
         let Self { rows, state, .. } = self;
         let mut any = false;
@@ -188,12 +187,12 @@ impl Iterate {
         any
     }
 
-    /// Bounds rows by what presses their contacts now.
+    /// Bounds rows by the pressure of their contacts now.
     pub fn press(&mut self) {
         self.rows.press(&self.state.lambda);
     }
 
-    /// Makes impulses those that laws allow; returns whether any was not.
+    /// Projects impulses on their laws; returns whether any changed.
     pub fn allow(&mut self) -> bool {
         self.press();
         let mut any = false;
@@ -205,7 +204,7 @@ impl Iterate {
         any
     }
 
-    /// Stores what [`Self::go_back`] goes back to.
+    /// Stores the state to which [`Self::go_back`] goes back.
     pub fn keep(&self, kept: &mut Kept) {
         kept.state.copy(&self.state);
         refill(&mut kept.compliances, self.rows.rows.iter().map(|row| row.compliance));
@@ -254,7 +253,7 @@ impl Iterate {
         self.pull[row] = self.state.lambda[row] + pulled + more;
     }
 
-    /// What momentum velocities leave unanswered, of impulses that have been changed without them.
+    /// Finds the momentum that velocities leave unanswered, where impulses have been changed without them.
     pub fn remeasure(&mut self) {
         self.exact = false;
         self.scatter_given();
@@ -283,7 +282,8 @@ impl Iterate {
         scratch.iter_mut().zip(&step.left).for_each(|(right, av)| *right -= *av);
     }
 
-    /// Factors ⊕A/f + JᵀGJ of the gains as they are, or what serves gradients for it; `false` where rounding leaves none.
+    /// Factors ⊕A/f + JᵀGJ of the gains as they are, or its counterpart for gradients; `false` where rounding leaves
+    /// none.
     pub fn factor(&mut self, threads: &dyn ParallelFor) -> bool {
         self.steps += 1;
         self.system.factor(Stiffness { rows: &self.rows, gains: &self.gains, skews: &self.skews, threads })
@@ -298,7 +298,7 @@ impl Iterate {
         step.change.fill(DVec3::ZERO);
         let contacts = Stiffness { rows, gains: &self.gains, skews: &self.skews, threads };
         system.solve(contacts, &mut Task { right: scratch, x: &mut step.change, left: &mut step.left, goal });
-        // what was left before is part of the right side, and goes
+        // the rest from before is part of the right side, and goes
         step.left.iter_mut().zip(&state.left).for_each(|(left, before)| *left -= *before);
         rows.velocities(&step.change, &mut step.velocity);
         for row in 0..rows.len() {
@@ -314,21 +314,21 @@ impl Iterate {
         finite
     }
 
-    /// A⁻¹ r of what free velocities leave unanswered, as the storage of a step; what that leaves too.
+    /// A⁻¹ r of the momentum that free velocities leave unanswered, as the storage of a step; with its residual.
     pub fn complete(&mut self, members: &[Member<'_>]) {
         let Self { system, step, unanswered, .. } = self;
         step.change.fill(DVec3::ZERO);
         step.left.fill(DVec3::ZERO);
         if !unanswered.is_empty() {
             let State { change: x, left, .. } = step;
-            // nothing else than rounding ends this: what it left would be energy that no one counts
+            // nothing else than rounding ends this: a residual would be energy that is not counted
             let still_m_s = std::mem::take(&mut system.still_m_s);
             system.respond(members, &mut Task { right: unanswered, x, left, goal: 0.0 });
             system.still_m_s = still_m_s;
         }
     }
 
-    /// A share of all impulses, and of what they changed and left beside what [`Self::complete`] found.
+    /// A share of all impulses, and of their changes and residuals beside those that [`Self::complete`] found.
     pub fn shorten(&mut self, share: f64) {
         let State { lambda, change, left, .. } = &mut self.state;
         lambda.iter_mut().for_each(|impulse| *impulse *= share);

@@ -45,7 +45,7 @@ pub struct JointRow {
     pub sides: [Side; 2],
     /// In which directions, and how strongly.
     pub hold: Hold,
-    /// The velocity that the row asks for, world axes, m/s or 1/s; what lies in none of its directions has no meaning.
+    /// The velocity that the row asks for, world axes, m/s or 1/s; a part in none of its directions has no meaning.
     pub target_m_s: DVec3,
     /// The velocity by which the row gives way for each unit of impulse, 1/kg or 1/(kg m²), > 0; `None` for that of contacts (eq. 5).
     pub compliance_per_kg: Option<f64>,
@@ -56,7 +56,7 @@ pub struct JointRow {
     /// The most that it gives along an axis, as the velocity by which that moves its sides where nothing else holds them, m/s, ≥ 0; infinite for
     /// as much as it takes. Bounds of its own count as well.
     pub limit_m_s: f64,
-    /// What bounds its impulse, where that is what presses a contact; bounds of its own count as well.
+    /// The contact whose pressure bounds its impulse, where there is one; bounds of its own count as well.
     pub pressed: Option<Pressed>,
 }
 
@@ -183,8 +183,8 @@ impl JointRow {
         Self { compliance_per_kg: Some(compliance), target_m_s: stretch_m * (-h_s * k * compliance), ..self }
     }
 
-    /// The same row with what is left to a stop, or of a rope's slack, along the axis of [`Hold::pushing`]: a gap may close within the
-    /// step, and what is passed is taken back as of a contact (eq. 2).
+    /// The same row with the way left to a stop, or the slack of a rope, along the axis of [`Hold::pushing`]: a gap may
+    /// close within the step, and a way past the stop is taken back as of a contact (eq. 2).
     #[must_use]
     pub fn with_gap(self, gap_m: f64, h_s: f64) -> Self {
         let opening = if gap_m >= 0.0 { -gap_m / h_s } else { -push_out_m_s(gap_m, h_s) };

@@ -93,7 +93,7 @@ impl Lorentz {
 }
 
 impl Scaling {
-    /// Of two points inside the cone.
+    /// The scaling of two points inside the cone.
     pub fn of(l: Lorentz, y: Lorentz) -> Self {
         let [of_l, of_y] = [l, y].map(|x| x.det().max(DET_MIN));
         let (unit_l, unit_y) = (l.times(of_l.sqrt().recip()), y.times(of_y.sqrt().recip()));
@@ -117,7 +117,7 @@ impl Scaling {
         v.times(2.0 * v.dot(x)).plus(x.mirrored(), -1.0).times(self.beta.recip())
     }
 
-    /// W (ν \ (W⁻¹ Δy ∘ W Δl)): what both steps make together (C5).
+    /// W (ν \ (W⁻¹ Δy ∘ W Δl)): the second-order term of both steps (C5).
     pub fn second_order(&self, dl: Lorentz, dy: Lorentz) -> Lorentz {
         self.scale(self.nu.divide(self.unscale(dy).product(self.scale(dl))))
     }

@@ -8,24 +8,24 @@ use super::members::worse;
 use super::problem::Member;
 use metachron_core::ParallelFor;
 
-/// What is left of what is missed by a step that is worth another.
+/// A step that does not bring the miss below this share of the one before is followed by a more exact one.
 const HALF: f64 = 0.5;
-/// The share of what is missed that an inexact step may leave (eq. 16), and the least that it comes down to, by the last factor, while
-/// steps do not halve what is missed: rough steps serve as well as exact ones until the laws' kinks are near.
+/// The share of the miss that an inexact step may leave (eq. 16), and the least that it comes down to, by the last factor, while
+/// steps do not halve the miss: rough steps serve as well as exact ones until the laws' kinks are near.
 const LEAVE_MOST: f64 = 0.1;
 const LEAVE_LEAST: f64 = 1e-3;
 const LEAVE_LESS: f64 = 0.1;
 
-/// What the way needs to know besides the problem.
+/// The parameters of the way besides the problem.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Aim<'a> {
     /// The members, whose responses velocities follow from.
     pub members: &'a [Member<'a>],
     /// The miss at which all laws hold, m/s.
     pub tolerance_m_s: f64,
-    /// What a contact gives way by, m/s (eq. 5).
+    /// The velocity by which a contact gives way, m/s (eq. 5).
     pub yield_m_s: f64,
-    /// Who makes large factors.
+    /// The threads that make large factors.
     pub threads: &'a dyn ParallelFor,
 }
 
@@ -34,8 +34,8 @@ pub(super) struct Aim<'a> {
 pub(super) struct Patience {
     /// The most of all.
     pub steps: usize,
-    /// The most in a row that do not come to this share of what was missed at least: which contacts stick and slide is found in whole steps, on
-    /// the way of which more may be missed.
+    /// The most in a row that do not bring the miss to this share of the least so far: which contacts stick and slide is found in whole
+    /// steps, on the way of which the miss may grow.
     pub stale: usize,
     pub left: f64,
 }
@@ -62,7 +62,7 @@ pub(super) fn solve(iterate: &mut Iterate, aim: &Aim<'_>, patience: Patience) ->
                         return true;
                     }
                 }
-                // what is left and the contacts are solved together, to the end
+                // the rest and the contacts are solved together, to the end
                 Refined::Unanswered => {
                     linearise(iterate);
                     most_left = 0.0;

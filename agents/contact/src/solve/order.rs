@@ -1,7 +1,7 @@
 //! The order in which a sparse matrix is eliminated: approximate minimum degree on the quotient graph (GL89), (ADD96).
 //!
 //! In: the neighbours of each node. Out: the nodes in their order. Never here: numbers of the matrix.
-//! Nodes that are to come late come after all others, so that what is eliminated before them stays when they change.
+//! Nodes that are to come late come after all others, so that the elimination before them stays when they change.
 //! Nodes that cannot be told apart go together; of equal degrees the lowest node goes first, so the order depends on the graph alone.
 
 use std::collections::BTreeSet;
@@ -21,7 +21,7 @@ struct Quotient<'a> {
     weights: Vec<usize>,
     /// The nodes that go with each one, right after it.
     followers: Vec<Vec<usize>>,
-    /// What nodes that stand for themselves or others are joined to, at most.
+    /// The most that the nodes left are joined to, each counted with the nodes that it stands for.
     degrees: Vec<usize>,
     /// Nodes left, by degree.
     open: BTreeSet<Ranked>,
@@ -140,7 +140,7 @@ impl<'a> Quotient<'a> {
             }
             !members[known].is_empty()
         });
-        // what the new clique joins needs no edge of its own
+        // a node that the new clique joins needs no edge of its own
         nodes[other].retain(|&next| weights[next] > 0 && marks[next] != *mark);
         let beside = reached_weight - weights[other];
         let through: usize = cliques[other].iter().map(|&known| outside[known]).sum();
@@ -150,7 +150,7 @@ impl<'a> Quotient<'a> {
         cliques[other].push(clique);
     }
 
-    /// Nodes with the same neighbours become one; those that are joined to the new clique alone go with the node that made it.
+    /// Nodes with the same neighbours become one; nodes that are joined to the new clique alone go with the node that made it.
     fn merge_alike(&mut self, reached: &mut Vec<usize>, made_by: usize) {
         reached.sort_by_cached_key(|&node| (self.alike(node), node));
         for (at, &first) in reached.iter().enumerate() {
@@ -232,7 +232,7 @@ mod tests {
         let mut order = minimum_degree(&neighbours, &[]);
         order.sort_unstable();
         assert!(order.into_iter().eq(0..side * side));
-        // what comes late comes after all others
+        // late nodes come after all others
         let late: Vec<bool> = (0..side * side).map(|i| i % 5 == 2).collect();
         let mut order = minimum_degree(&neighbours, &late);
         assert!(order.iter().map(|&node| late[node]).is_sorted(), "{order:?}");

@@ -1,6 +1,6 @@
 //! One frictional contact problem over several bodies, as plain data.
 //!
-//! In: what members and contacts are at the start of a step. Out: the same with names. Never here: joints (`joint.rs`), search for
+//! In: members and contacts at the start of a step. Out: the same with names. Never here: joints (`joint.rs`), search for
 //! contacts, state between steps, the solve. Theory: `docs/theory/clusters.md`, section 2.
 
 use super::cone::STICK_SHARE;
@@ -56,13 +56,13 @@ pub struct Member<'a> {
     /// The velocity v̂ of each block without the impulses sought: m/s, or 1/s for spins. None of a body that is led.
     pub free: &'a [DVec3],
     /// The momentum that those velocities do not answer yet, A (v − v̂) of the velocity v that the body would have: kg m/s. Empty for none;
-    /// what is given is solved for together with the contacts.
+    /// it is answered together with the contacts.
     pub unanswered: &'a [DVec3],
     /// Its velocities when the step began, near which gradients look for the answer first; empty where nothing is known.
     pub now: &'a [DVec3],
     /// How much of its own step an impulse moves it by, in fine steps: f ≥ 1 where its step is longer than h, else 1.
     pub share: f64,
-    /// The factor of A that it lends; `None` to have A factored here. What is lent is taken for positive definite.
+    /// The factor of A that it lends; `None` to have A factored here. A lent factor is taken for positive definite.
     pub response: Option<&'a dyn Response>,
 }
 
@@ -77,12 +77,13 @@ pub struct Contact {
     pub tangents: [DVec3; 2],
     /// The distance along the normal, metres; a depth is negative.
     pub gap_m: f64,
-    /// How far it lies in that much of it counts as apart, metres, ≥ 0: bodies that began inside each other are held where they are, and pushed out
+    /// The overlap that counts as apart, metres, ≥ 0: bodies that began inside each other are held where they are, and pushed out
     /// by a row of its own (eq. 2a).
     pub overlap_m: f64,
     /// Coulomb's coefficient μ ≥ 0.
     pub friction: f64,
-    /// The speed at which the sides must part at least, m/s, ≥ 0: of an impact what its restitution asks for (eq. 3b), else 0.
+    /// The speed at which the sides must part at least, m/s, ≥ 0: of an impact the speed that its restitution asks for
+    /// (eq. 3b), else 0.
     pub parting_m_s: f64,
     /// The velocity of side 1's surface beyond that of its blocks, as of a conveyor or of a solid that is led along a path, world axes,
     /// m/s.
@@ -106,7 +107,7 @@ pub struct Problem<'a> {
     pub contacts: &'a [Contact],
     /// Where they are joined.
     pub rows: &'a [JointRow],
-    /// Who makes large factors: the answer has the same bits by however many.
+    /// The threads that make large factors: the answer has the same bits by however many.
     pub threads: &'a dyn ParallelFor,
 }
 
@@ -117,7 +118,7 @@ impl Contact {
         DMat3::from_cols(self.normal, self.tangents[0], self.tangents[1])
     }
 
-    /// What the gap, the slip owed and a rebound add to the velocity, in the frame (eq. 2, 3, 3b).
+    /// The terms that the gap, the slip owed and a rebound add to the velocity, in the frame (eq. 2, 3, 3b).
     #[must_use]
     pub fn bias_m_s(&self, h_s: f64) -> DVec3 {
         let gap_m = self.gap_m + self.overlap_m;

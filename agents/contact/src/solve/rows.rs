@@ -1,6 +1,7 @@
 //! The rows of a contact problem: Jacobian, free velocities, laws, scales and compliances of all contacts and rows of joints.
 //!
-//! In: a problem. Out: products with J and Jᵀ, and what each row needs for its law, in its own frame (x along the normal).
+//! In: a problem. Out: products with J and Jᵀ, and the data that each row needs for its law, in its own frame (x along
+//! the normal).
 //! Never here: matrices of members, impulses. Theory: `docs/theory/clusters.md`, eq. 1–6.
 
 use super::cone::{Law, Projection, tangential};
@@ -35,7 +36,7 @@ pub(super) struct Row {
     pub frame: DMat3,
     /// 1 for each axis that the law is about; along the others nothing is given or seen.
     pub held: DVec3,
-    /// What gap, slip owed, rebound or target add to the velocity.
+    /// The terms that gap, slip owed, rebound or target add to the velocity.
     pub bias: DVec3,
     /// The velocity of a surface beyond that of its blocks, taken from the velocity.
     surface: DVec3,
@@ -67,11 +68,11 @@ pub(super) struct Rows {
     /// How many of them are contacts.
     pub contacts: usize,
     terms: Vec<Term>,
-    /// Rows that are bounded by what presses a contact.
+    /// Rows that are bounded by the pressure of a contact.
     pressed: Vec<PressedRow>,
 }
 
-/// A row that gives at most a multiple of what presses a contact.
+/// A row that gives at most a multiple of the pressure of a contact.
 #[derive(Debug, Clone, Copy)]
 struct PressedRow {
     row: usize,
@@ -204,7 +205,7 @@ impl Rows {
         self.rows.push(Row { start, end: self.terms.len(), ..row });
     }
 
-    /// Bounds rows by what presses their contacts in these impulses, and by their own bounds.
+    /// Bounds rows by the pressure of their contacts in these impulses, and by their own bounds.
     pub fn press(&mut self, impulses: &[DVec3]) {
         for &PressedRow { row, contact, reach_m, low, high } in &self.pressed {
             // one that nothing answers is idle

@@ -14,8 +14,9 @@ use std::ops::Range;
 
 /// Contacts of a member whose exact compliance is compared with the estimate of its diagonal.
 const SAMPLES: usize = 4;
-/// The directions, in the frames of rows, along which they are. A sum over these is one over axes, as what joins two axes has both signs;
-/// and their own sum is as long as they are together, so that what moves a whole member counts as if each were alone.
+/// The directions, in the frames of rows, along which they are. A sum over these is one over axes, as terms that join
+/// two axes have both signs; and their own sum is as long as they are together, so that a motion of a whole member
+/// counts as if each were alone.
 const DIRECTIONS: [DVec3; SAMPLES] =
     [DVec3::ONE, DVec3::new(-1.0, 1.0, 1.0), DVec3::new(1.0, -1.0, 1.0), DVec3::new(1.0, 1.0, -1.0)];
 /// Up to so many blocks there is a solve for each sample; of more, one for all: they are far apart then, and each solve is dear.
@@ -35,7 +36,7 @@ pub(super) struct Scales {
     left: Vec<DVec3>,
 }
 
-/// The rows of one member at which it is sampled, and what was found.
+/// The rows of one member at which it is sampled, and the results.
 #[derive(Debug, Clone, Copy, Default)]
 struct Sample {
     /// Rows that touch the member.
@@ -121,7 +122,7 @@ impl Scales {
 }
 
 impl Sample {
-    /// Counts a row, and keeps it where it is one of those wanted.
+    /// Counts a row, and keeps it where it is a wanted one.
     fn meet(&mut self, row: usize) {
         if self.last.replace(row) == Some(row) {
             return;

@@ -48,7 +48,7 @@ impl Side {
     pub const FIXED: Self =
         Self { member: 0, terms: [SideTerm { block: 0, map: DMat3::ZERO }; SIDE_TERMS_MAX], count: 0 };
 
-    /// A point whose velocity is the sum of what `terms` give.
+    /// A point whose velocity is the sum of its `terms`.
     ///
     /// # Errors
     /// [`ProblemError::LongSide`] for more than [`SIDE_TERMS_MAX`] terms.

@@ -17,7 +17,7 @@ use glam::DVec3;
 use metachron_core::{Archive, ArchiveError, SolveLevel};
 use std::ops::Range;
 
-/// What a solve aims at.
+/// The goals and limits of a solve.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Settings {
     /// The miss of a law at which a solve is done, m/s, > 0 (eq. 9). Larger lets piles drift; below 10⁻⁹ rounding is met.
@@ -26,7 +26,7 @@ pub struct Settings {
     pub depth_m: f64,
     /// How the equations of a step are solved.
     pub form: StepForm,
-    /// The velocity by which what velocities leave unanswered in the iterative form may change a block by itself, m/s, > 0 (eq. 17). By
+    /// The velocity by which momentum left unanswered in the iterative form may change a block by itself, m/s, > 0 (eq. 17). By
     /// factors momentum is balanced to rounding.
     pub still_m_s: f64,
     /// The most factors of a solve; `None` for as many as the tolerance takes, as in the iterative form, which makes none. After five from
@@ -54,7 +54,7 @@ impl Default for Settings {
     }
 }
 
-/// What a solve took, and how good its answer is.
+/// The cost of a solve, and how good its answer is.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Report {
     /// How far it went.
@@ -63,11 +63,11 @@ pub struct Report {
     pub factors: usize,
     /// Products of conjugate gradients with a matrix of the members' size, all for scales, steps and responses; none in the direct form.
     pub products: usize,
-    /// What laws and momentum miss at most by the answer given, m/s (eq. 9); infinite where numbers overflowed and nothing is given.
+    /// The most by which the answer misses laws and momentum, m/s (eq. 9); infinite where numbers overflowed and nothing is given.
     pub miss_m_s: f64,
     /// The most work that the answer does but for push-out, J (eq. 12); above zero by rounding only.
     pub work_j: f64,
-    /// What all impulses were multiplied by to be passive; 1 but for answers that are far off.
+    /// The factor that makes all impulses passive; 1 but for answers that are far off.
     pub ray: f64,
 }
 
@@ -82,7 +82,7 @@ pub struct Solution {
     pub contacts_m_s: Vec<DVec3>,
     /// The velocity by which each contact gives way for an impulse, 1/kg: R of eq. 5.
     pub compliances_per_kg: Vec<f64>,
-    /// What the solve took.
+    /// The report of the solve.
     pub report: Report,
     velocities: Vec<DVec3>,
     unanswered: Vec<DVec3>,
@@ -125,7 +125,7 @@ pub struct Solver {
 }
 
 impl Solver {
-    /// Writes or reads what the next solve needs of those before: orders of elimination. Impulses are remembered by who gave them.
+    /// Writes or reads the orders of elimination, which the next solve takes over. Impulses are remembered by their givers.
     pub(crate) fn archive(&mut self, archive: &mut Archive<'_>) -> Result<(), ArchiveError> {
         self.iterate.system.archive(archive)
     }
@@ -160,8 +160,8 @@ impl Solver {
         &self.solution
     }
 
-    /// How easily both sides of a contact of the last problem give way along its normal, 1/kg, by the compliance of the whole member as far
-    /// as samples tell (eq. 6): that of the member `first`, then the other.
+    /// How easily both sides of a contact of the last problem give way along its normal, 1/kg, by the compliance of the
+    /// whole member as sampled (eq. 6): that of the member `first`, then the other.
     pub(crate) fn inverse_masses(&self, contact: usize, first: Option<usize>) -> [f64; 2] {
         let Iterate { rows, system, .. } = &self.iterate;
         system.along_normal(rows, contact, first)
@@ -251,7 +251,7 @@ impl Solver {
             let (miss_m_s, before) = (newton::miss_m_s(iterate), iterate.steps);
             if miss_m_s < try_below_m_s.max(aim.tolerance_m_s) {
                 iterate.keep(kept);
-                // what Newton's method has not finished is of no use: half of a budget is kept for what is
+                // Newton's method is of no use unfinished: half of a budget is kept for interior points, which are
                 patience.steps = (last - before) / if entered { 1 } else { 2 };
                 if newton::solve(iterate, aim, patience) {
                     let near = if iterate.steps == before { SolveLevel::Kept } else { SolveLevel::Near };
@@ -308,7 +308,7 @@ impl Solver {
 }
 
 impl Settings {
-    /// v_s of eq. 5: what push-out gives back in a step at the depth wanted.
+    /// v_s of eq. 5: the velocity of push-out in a step at the depth wanted.
     fn yield_m_s(&self, h_s: f64) -> f64 {
         PUSH_OUT_SHARE * self.depth_m / h_s
     }

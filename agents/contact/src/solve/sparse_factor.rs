@@ -11,7 +11,7 @@ use std::sync::{Mutex, PoisonError};
 
 /// A sparse matrix of 3 × 3 blocks with its Cholesky factor, front by front (Duff and Reid 1983), in an order of minimum degree.
 ///
-/// The structure is found once and kept while all blocks lie in it; nothing is then allocated, and what has not changed is not factored
+/// The structure is found once and kept while all blocks lie in it; nothing is then allocated, and an unchanged part is not factored
 /// again. Its numbers have the same bits on every processor and by however many threads.
 #[derive(Debug, Default)]
 pub struct SparseFactor {
@@ -30,7 +30,7 @@ impl SparseFactor {
         self.cost = factor.cost();
     }
 
-    /// What a factor of such a matrix would cost, about in multiplications, without room for its numbers.
+    /// The cost that a factor of such a matrix would have, about in multiplications, without room for its numbers.
     #[must_use]
     pub fn cost_of(size: usize, blocks: &[Block]) -> f64 {
         let pairs: Vec<Pair> = blocks.iter().map(Pair::of).collect();
@@ -40,7 +40,7 @@ impl SparseFactor {
     /// Factors the matrix of `size` blocks that is given by its lower half; entries with one place add up.
     ///
     /// # Errors
-    /// The first block at which it is not positive definite; what was factored before is lost.
+    /// The first block at which it is not positive definite; the factor from before is lost.
     pub fn factor(&mut self, size: usize, blocks: &[Block], threads: &dyn ParallelFor) -> Result<(), usize> {
         self.shape(size, blocks);
         let factor = self.factor.get_mut().unwrap_or_else(PoisonError::into_inner);
@@ -48,7 +48,7 @@ impl SparseFactor {
         factor.factor(threads, |_, _| ())
     }
 
-    /// What a factor of this structure costs, about in multiplications.
+    /// The cost of a factor of this structure, about in multiplications.
     #[must_use]
     pub const fn cost(&self) -> f64 {
         self.cost

@@ -1,6 +1,6 @@
 //! The linear equations of a contact problem, by either form: responses of members, and Newton steps.
 //!
-//! In: members, rows, and a gain of each row. Out: solutions, with what they leave. Never here: laws of contact, steps of the
+//! In: members, rows, and a gain of each row. Out: solutions, with their residuals. Never here: laws of contact, steps of the
 //! iteration. Theory: `docs/theory/clusters.md`, eq. 8 and section 6.
 
 use super::coupled::Coupled;
@@ -17,7 +17,7 @@ use std::ops::Range;
 /// How the linear equations of a Newton step are solved.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum StepForm {
-    /// By a sparse factor of the members' size, to rounding. For what is thin or rigid, and for stiff solids.
+    /// By a sparse factor of the members' size, to rounding. For thin or rigid bodies, and for stiff solids.
     #[default]
     Direct,
     /// By conjugate gradients without any factor, as exactly as the step is worth. For solids of some hundred nodes and more, where a
@@ -34,7 +34,7 @@ const FOLLOWED: End = End { directions: 30, share: 0.1 };
 pub(super) struct System {
     /// The form in which the next members are taken up.
     pub form: StepForm,
-    /// The velocity by which what is left unanswered may change a block by itself, m/s (eq. 17).
+    /// The velocity by which unanswered momentum may change a block by itself, m/s (eq. 17).
     pub still_m_s: f64,
     pub members: Members,
     /// The matrix of members that lend no factor, and that of all members with contacts, in the direct form.
@@ -51,7 +51,7 @@ pub(super) struct System {
 }
 
 impl System {
-    /// Writes or reads what the next problem needs.
+    /// Writes or reads the orders of factors, which the next problem needs.
     pub fn archive(&mut self, archive: &mut Archive<'_>) -> Result<(), ArchiveError> {
         self.own.archive(archive)?;
         self.coupled.archive(archive)?;
@@ -80,7 +80,7 @@ impl System {
         })
     }
 
-    /// Solves with ⊕ A/f: what members do under impulses. Those that lend a factor are those taken up last.
+    /// Solves with ⊕ A/f: the response of members to impulses. Lent factors are those of the members taken up last.
     pub fn respond(&mut self, members: &[Member<'_>], task: &mut Task<'_>) {
         match self.form {
             StepForm::Direct => {
@@ -92,8 +92,8 @@ impl System {
         self.lend(members, task);
     }
 
-    /// What velocities `x` leave of the impulses `right` before anything is solved: by a factor, and for members that lend one, nothing, as
-    /// they are solved for at once; else a Newton step takes up what is left together with the contacts.
+    /// The impulses that velocities `x` leave of `right` before anything is solved: by a factor, and for members that lend one, none, as
+    /// they are solved for at once; else a Newton step takes up the rest together with the contacts.
     pub fn begin(&mut self, members: &[Member<'_>], task: &mut Task<'_>) {
         if self.form == StepForm::Direct {
             return self.respond(members, task);
@@ -128,7 +128,7 @@ impl System {
         self.gradients.solve(&operator, &mut Task { right: &self.right, x, left, goal: *goal });
     }
 
-    /// Factors ⊕ A/f + Jᵀ G J, or what of it is near; `false` where rounding leaves it without a factor.
+    /// Factors ⊕ A/f + Jᵀ G J, or its near part; `false` where rounding leaves it without a factor.
     pub fn factor(&mut self, contacts: Stiffness<'_>) -> bool {
         let Self { members, coupled, gradients, .. } = self;
         let is_first = !std::mem::replace(&mut self.is_coupled, true);
@@ -166,7 +166,7 @@ impl System {
         }
     }
 
-    /// Lets what a factor has solved follow the part that is not in it.
+    /// Lets the solution by a factor follow the part that is not in it.
     fn follow(&mut self, contacts: Stiffness<'_>, task: &mut Task<'_>) {
         let Self { members, coupled, residuals, .. } = self;
         contacts.add_skew(task.x, task.left);

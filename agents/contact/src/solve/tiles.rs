@@ -1,6 +1,6 @@
 //! Dense kernels of a factor, over tiles of 4 × 4 numbers.
 //!
-//! In: columns of a front that are to be eliminated, and room for what they leave. Out: their factor and that rest. Never here: where
+//! In: columns of a front that are to be eliminated, and room for their update. Out: their factor and that update. Never here: where
 //! numbers come from. Plain loops over tiles of fixed size, compiled for the widest vectors that a processor has. Products and sums are
 //! rounded one by one and in one order whatever the width, so the bits are the same everywhere.
 //!
@@ -24,7 +24,7 @@ pub(super) fn filled(size: usize) -> usize {
     size.next_multiple_of(TILE)
 }
 
-/// Factors the `columns` columns of `lower`, whose first rows are a square, and takes from the triangle `update` what they give to
+/// Factors the `columns` columns of `lower`, whose first rows are a square, and takes from the triangle `update` their terms in
 /// the rows below. A diagonal tile is left as the inverse of its factor.
 ///
 /// # Errors
@@ -162,7 +162,7 @@ fn invert_factor(tile: &mut Tile) -> Result<(), usize> {
     Ok(())
 }
 
-/// x ← L⁻¹ x of the square, and what it takes from the rows below.
+/// x ← L⁻¹ x of the square, and takes its terms from the rows below.
 #[inline(always)]
 pub(super) fn solve_down(lower: &[f64], columns: usize, x: &mut [f64]) {
     for (row, chunk) in lower.chunks_exact(TILE * columns).enumerate() {

@@ -1,6 +1,6 @@
 //! The checks of a contact problem, so that the solve meets only finite numbers and places that exist.
 //!
-//! In: a problem. Out: nothing, or what is wrong. Never here: whether matrices are positive definite (their factor tells).
+//! In: a problem. Out: nothing, or its fault. Never here: whether matrices are positive definite (their factor tells).
 
 use super::error::ProblemError;
 use super::joint::{Hold, JointRow, Pressed};
@@ -39,7 +39,7 @@ fn named(fault: Option<&'static str>, error: impl Fn(&'static str) -> ProblemErr
     fault.map_or(Ok(()), |reason| Err(error(reason)))
 }
 
-/// Of the first check that does not hold, what is wrong then.
+/// The fault of the first check that does not hold.
 fn first_fault<const N: usize>(checks: [(bool, &'static str); N]) -> Option<&'static str> {
     checks.into_iter().find(|(holds, _)| !holds).map(|(_, fault)| fault)
 }

@@ -1,7 +1,7 @@
 //! The error that a macro step of a cluster makes, of each member: the step made a second time in halves, without a trace.
 //!
 //! In: members at the start of a macro step. Out: how far each is from where the same steps in twice as many parts would leave it, over a row of
-//! them. Never here: which steps are repeated, what is made of the error. Theory: docs/theory/control.md, eq. 31; docs/theory/clusters.md, section 9.
+//! them. Never here: which steps are repeated, the use of the error. Theory: docs/theory/control.md, eq. 31; docs/theory/clusters.md, section 9.
 
 use crate::detect::ClusterScene;
 use crate::member::{ClusterMember, Participant};
@@ -20,29 +20,29 @@ pub struct StepDoubling {
     /// Whether there was one.
     made: bool,
     now: Vec<DVec3>,
-    /// By whom and by how much each point is off in the row so far.
+    /// The members of the row so far, and by how much each point of theirs is off.
     row: Vec<AgentId>,
     off: Vec<Vec<DVec3>>,
     apart_m: Vec<f64>,
 }
 
 impl StepDoubling {
-    /// Writes or reads what the next macro step needs of it.
+    /// Writes or reads the state that the next macro step needs.
     ///
     /// # Errors
-    /// [`ArchiveError`] for what is no state of one.
+    /// [`ArchiveError`] for a state of another kind.
     pub fn archive(&mut self, archive: &mut Archive<'_>) -> Result<(), ArchiveError> {
         archive_values!(archive, self.row, self.off)?;
         self.stepper.archive(archive)
     }
 
-    /// Bounds its solves as those of the step that it repeats ([`ClusterStepper::set_factors_max`]): it costs no more, and what a bound leaves is
-    /// no error of the time step.
+    /// Bounds its solves as those of the step that it repeats ([`ClusterStepper::set_factors_max`]): it costs no more, and the rest that a bound
+    /// leaves is no error of the time step.
     pub fn set_factors_max(&mut self, most: Option<u32>) {
         self.stepper.set_factors_max(most);
     }
 
-    /// Begins a row: what steps so far were off by no longer counts.
+    /// Begins a row: the errors of steps so far no longer count.
     pub fn begin_row(&mut self) {
         self.row.clear();
     }
@@ -64,7 +64,7 @@ impl StepDoubling {
         stepper.keep(all);
         all.iter_mut().for_each(|one| one.parts *= 2);
         let outcome = stepper.step(scene, all, dt, threads);
-        // what cannot be made in shorter steps may be made in these
+        // a step that cannot be made in shorter parts may be made in these
         all.iter().for_each(|one| one.member.forgive());
         if outcome.is_ok() {
             finer.resize_with(all.len(), Vec::new);
@@ -77,8 +77,8 @@ impl StepDoubling {
         Ok(report.work)
     }
 
-    /// Compares the members with where the finer step left them, after the same macro step. What a step is off by adds to what those of its row
-    /// before were off by, point by point: what trembles is off to the other side in the next step.
+    /// Compares the members with where the finer step left them, after the same macro step. The error of a step adds to the errors of its row
+    /// before, point by point: a jittering body is off to the other side in the next step.
     pub fn compare(&mut self, all: &[Participant<'_>]) {
         let Self { finer, made, now, row, off, apart_m, .. } = self;
         apart_m.clear();

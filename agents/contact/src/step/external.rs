@@ -1,7 +1,7 @@
-//! What reaches a cluster from outside within a macro step, and what it gives to partners that are stepped elsewhere.
+//! Impulses on a cluster from outside within a macro step, and its impulses on partners that are stepped elsewhere.
 //!
 //! In: impulses that partners gave before, forces of users, ends of transmission lines; the impulses of a solve. Out: velocities that known impulses make,
-//! rows of lines, sums of what remote members were given. Never here: ledgers, waves. Theory: docs/theory/coupling.md, eq. 3, 4c and 10.
+//! rows of lines, sums of the impulses on remote members. Never here: ledgers, waves. Theory: docs/theory/coupling.md, eq. 3, 4c and 10.
 
 use crate::constraint::{ConstraintRows, FineStep, RowOwner};
 use crate::lists::reset;
@@ -38,7 +38,7 @@ pub struct LineRow {
     pub target_m_s: DVec3,
 }
 
-/// What a block of a remote member was given by a participant in a macro step.
+/// The impulse of a participant on a block of a remote member in a macro step.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct RemoteImpulse {
     /// The participant that touches the remote member or is linked to it.
@@ -56,13 +56,13 @@ pub struct RemoteImpulse {
 /// All of it in one macro step.
 #[derive(Debug, Default)]
 pub struct ExternalImpulses {
-    /// What acts on participants.
+    /// The impulses known to act on participants.
     pub known: Vec<KnownImpulse>,
     /// Ends of lines at participants.
     pub lines: Vec<LineRow>,
-    /// What each line gave its participant in the last macro step, N·s.
+    /// The impulse of each line on its participant in the last macro step, N·s.
     pub line_impulses: Vec<DVec3>,
-    /// What remote members were given in the last macro step.
+    /// The impulses on remote members in the last macro step.
     pub given: Vec<RemoteImpulse>,
     /// When the present fine step begins, seconds from the start of the macro step.
     pub(crate) after_s: f64,
@@ -71,7 +71,7 @@ pub struct ExternalImpulses {
 }
 
 impl ExternalImpulses {
-    /// Forgets what acted in the last macro step.
+    /// Forgets the inputs of the last macro step.
     pub fn clear(&mut self) {
         self.known.clear();
         self.lines.clear();
@@ -83,9 +83,9 @@ impl ExternalImpulses {
         reset(&mut self.line_impulses, self.lines.len(), DVec3::ZERO);
     }
 
-    /// Lets what acts on the participant at `place` act in its own step of `own_s` seconds within a macro step of `macro_s`: the known
-    /// impulses on it and the forces of users, Jᵀ of them. What knows how it answers takes the velocities that they make; what leaves that to
-    /// the cluster takes them as momentum.
+    /// Lets external impulses on the participant at `place` act in its own step of `own_s` seconds within a macro step
+    /// of `macro_s`: the known ones and the forces of users, Jᵀ of them. A member that answers all momentum itself
+    /// takes the velocities that they make; one that leaves momentum to the cluster takes them as momentum.
     pub(super) fn act(
         &mut self,
         place: usize,
@@ -124,7 +124,7 @@ impl ExternalImpulses {
         }
     }
 
-    /// Adds what contacts or rows gave a side of theirs, where it is that of a remote member.
+    /// Adds the impulse of contacts or rows on a side of theirs, where it is that of a remote member.
     pub(super) fn note(&mut self, all: &[Participant<'_>], by: usize, side: &Side, impulse: DVec3) {
         if side.terms().is_empty() || impulse == DVec3::ZERO || !all[side.member].member.is_remote() {
             return;
@@ -143,14 +143,14 @@ impl ExternalImpulses {
         }
     }
 
-    /// Adds what rows of lines gave.
+    /// Adds the impulses of lines' rows.
     pub(super) fn note_line(&mut self, owner: &RowOwner, impulse: DVec3) {
         if let Partner::Line(number) = owner.partner {
             self.line_impulses[number as usize] += impulse;
         }
     }
 
-    /// Adds what lines give in a fine step of `h_s` seconds at ends that move as they are led: no unknown, as nothing changes how they move.
+    /// Adds the impulses of lines in a fine step of `h_s` seconds at led ends: no unknowns, as nothing changes how these move.
     pub(super) fn give_led(&mut self, h_s: f64) {
         for (line, given) in self.lines.iter().zip(&mut self.line_impulses).filter(|(line, _)| line.is_led()) {
             let asked = line.hold.held_part(line.target_m_s * (line.resistance_n_s_m * h_s));

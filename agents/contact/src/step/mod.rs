@@ -1,6 +1,6 @@
 //! The steps of a contact cluster: bodies that touch or are joined advance together, each by steps of its own length.
 //!
-//! In: members at one common time, the static solids, what members remember of each other. Out: members a macro step later.
+//! In: members at one common time, the static solids, members' memories of each other. Out: members a macro step later.
 //! Never here: which bodies belong to a cluster, threads, clocks. Theory: docs/theory/clusters.md, section 9.
 //!
 //! plan        how many steps each member makes within the macro step; more where its free motion would strain it
@@ -11,8 +11,8 @@
 //! solve       one problem for all; again with the places that bodies struck would pass, and until joints hold where bodies will be; then contacts
 //!             that close fast rebound
 //! (plan)      where the solution strains a member too far, all begins again in shorter steps
-//! record      impulses that the next step starts from, sums of pairs, what yielded
-//! integrate   members move; those whose step ends take its velocities
+//! record      impulses that the next step starts from, sums of pairs, yielded attachments
+//! integrate   members move; members whose step ends take its velocities
 //! tear        attachments that gave more than they can bear are gone from the next macro step on
 
 mod doubling;
@@ -67,7 +67,7 @@ pub struct ClusterStepper {
     members: ProblemMembers,
     sums: Sums,
     failures: Failures,
-    /// What participants remembered when the macro step began.
+    /// The memories of participants when the macro step began.
     kept: Vec<ContactMemory>,
     /// Whether that is of this macro step, and members have kept their states.
     is_kept: bool,
@@ -83,16 +83,16 @@ pub struct ClusterStepper {
 }
 
 impl ClusterStepper {
-    /// Writes or reads what the next macro step needs of those before, but for what its members and their memories know.
+    /// Writes or reads the state that the next macro step needs, but for the part of its members and their memories.
     ///
     /// # Errors
-    /// [`ArchiveError`] for what is no state of a stepper.
+    /// [`ArchiveError`] for a state of another kind.
     pub fn archive(&mut self, archive: &mut Archive<'_>) -> Result<(), ArchiveError> {
         self.solver.archive(archive)?;
         self.pile.archive(archive)
     }
 
-    /// How many steps each solve of the next macro steps has time for, each a factor or what serves gradients for one; `None` for as many as the
+    /// How many steps each solve of the next macro steps has time for, each a factor or its counterpart for gradients; `None` for as many as the
     /// laws take. It makes as many as the scene grants in any case ([`SolveBudget`](crate::detect::SolveBudget)); with time for fewer than three,
     /// rigid bodies that nothing else touches are stepped by rapier3d. Momentum is exact and no answer makes energy at any number.
     pub fn set_factors_max(&mut self, most: Option<u32>) {
@@ -105,23 +105,25 @@ impl ClusterStepper {
         self.macro_s
     }
 
-    /// What acts on participants of the next step from outside, and what the last one gave to remote members.
+    /// External impulses on participants of the next step, and the impulses of the last one on remote members.
     pub fn external(&mut self) -> &mut ExternalImpulses {
         &mut self.external
     }
 
     /// Advances `all`, by rising numbers and at one common time, by `dt`.
     ///
-    /// A member whose motion would strain it too far makes 2, 4 … 64 times as many steps: its free motion before the solve, and what the
-    /// solve makes of it after, from the start of the macro step; so do all rigid members where joints turn far or do not hold. Members' own
-    /// work is done on `threads`, if there are enough of them; the bits are the same on however many.
+    /// A member whose motion would strain it too far makes 2, 4 … 64 times as many steps: by its free motion before the
+    /// solve, and by its solved motion after, from the start of the macro step; so do all rigid members where joints
+    /// turn far or do not hold. Members' own work is done on `threads`, if there are enough of them; the bits are the
+    /// same on however many.
     ///
     /// # Errors
     /// [`StepError::BadSpan`] for a span that no body steps by. [`StepError::Diverged`] where the state of a member stops being finite: all are
     /// as they were.
     ///
     /// # Panics
-    /// Where a member does, or answers what no step goes on with ([`GuardedMember`](crate::member::GuardedMember)): all others are as they were.
+    /// Where a member does, or gives an answer that no step can use ([`GuardedMember`](crate::member::GuardedMember)):
+    /// all others are as they were.
     pub fn step(
         &mut self,
         scene: &ClusterScene,
@@ -223,13 +225,14 @@ impl ClusterStepper {
         &self.sums.totals[start..self.sums.totals.partition_point(|total| total.member <= member)]
     }
 
-    /// What contacts gave a participant that moves as a whole in the last macro step, about its centre of mass, N·s and N·m·s; zero of others.
+    /// The contact impulse on a participant that moves as a whole in the last macro step, about its centre of mass, N·s
+    /// and N·m·s; zero of others.
     #[must_use]
     pub fn wrench_of(&self, member: usize) -> Wrench {
         self.sums.wrenches.get(member).copied().unwrap_or_default()
     }
 
-    /// What hinges and slides gave in the last macro step along the ways that they leave free.
+    /// The impulses of hinges and slides in the last macro step along the directions that they leave free.
     pub fn efforts(&self) -> &[JointTotal] {
         &self.sums.efforts
     }

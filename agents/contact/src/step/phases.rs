@@ -15,7 +15,8 @@ use metachron_core::parallel::for_each;
 use metachron_core::{ParallelFor, StepError};
 
 impl ClusterStepper {
-    /// Begins the steps of members that are at the end of one, and finds what all others see of each other (eq. 24).
+    /// Begins the steps of members that are at the end of one, and finds the velocities of all as others see them (eq.
+    /// 24).
     pub(super) fn begin(
         &mut self,
         all: &mut [Participant<'_>],
@@ -42,7 +43,7 @@ impl ClusterStepper {
         Ok(())
     }
 
-    /// Finds where members may touch, but for those that are a rigid pile: their contacts are not the problem's.
+    /// Finds where members may touch, but for members of a rigid pile: their contacts are not the problem's.
     pub(super) fn detect(&mut self, scene: &ClusterScene, all: &[Participant<'_>], h_s: f64) {
         let Self { search, pile, progress, .. } = self;
         let round = Round { scene, all, progress, h_s, judge: Judge::Predicted };
@@ -117,7 +118,7 @@ impl ClusterStepper {
         Ok(())
     }
 
-    /// The failure of the first participant that has failed in what all did at the same time.
+    /// The failure of the first participant that failed in the loop over all.
     pub(super) fn first_failure(&mut self) -> Result<(), StepError> {
         let failures = self.progress.iter_mut().map(|state| state.failure.take());
         failures.fold(None, Option::or).map_or(Ok(()), Err)

@@ -1,7 +1,7 @@
 //! How many steps each member of a cluster makes within a macro step and how long that is; and how the macro step begins anew in shorter ones.
 //!
-//! In: what each member wants, what a solve made of it, joints that do not hold. Out: the plan; members and their memories as they were at the start of
-//! the macro step. Never here: steps themselves. Theory: docs/theory/clusters.md, section 9 (eq. 23).
+//! In: the step that each member wants, its strain by a solve, joints that do not hold. Out: the plan; members and their memories as they were
+//! at the start of the macro step. Never here: steps themselves. Theory: docs/theory/clusters.md, section 9 (eq. 23).
 
 use crate::member::{ClusterMember, ContactMemory, Participant, Role};
 use crate::step::ClusterStepper;
@@ -20,7 +20,7 @@ const DIVIDED_MAX: u32 = 64;
 pub struct Plan {
     /// The macro step, seconds.
     pub macro_s: f64,
-    /// Steps of what bends and wants the longest ones are this long, seconds.
+    /// The longest step that a deformable wants, or any member where none is one, seconds.
     pub longest_s: f64,
     /// The most steps that a member makes.
     pub parts: u32,
@@ -42,7 +42,7 @@ impl Plan {
         plan
     }
 
-    /// How many steps a member that bends makes.
+    /// How many steps a deformable makes.
     #[must_use]
     pub fn parts_of(&self, wanted_s: f64) -> u32 {
         let ratio = self.longest_s / wanted_s;
@@ -97,16 +97,16 @@ impl ClusterStepper {
         let mut any = false;
         for (one, state) in all.iter().zip(&mut self.progress) {
             let so_far = one.member.strain(&state.v_before, h_s * f64::from(state.part));
-            // what is too much already grows through the rest of its step
+            // a strain that is too much already grows through the rest of its step
             let more = if so_far > 1.0 { times(so_far * f64::from(state.share) / f64::from(state.part)) } else { 1 };
-            // what its free motion asked for counts
+            // the division that its free motion asked for counts
             any |= more > 1 && state.divide(more, one.parts * DIVIDED_MAX);
         }
         any
     }
 }
 
-/// How many times as many steps a member needs that this one strains so far, as a share of what it can take.
+/// How many times as many steps a member needs that this one strains so far, as a share of the strain that it can take.
 pub(super) fn times(strain: f64) -> u32 {
     let mut times = 1;
     while times < DIVIDED_MAX && strain > f64::from(times) {
@@ -116,7 +116,7 @@ pub(super) fn times(strain: f64) -> u32 {
 }
 
 impl ClusterStepper {
-    /// Keeps what a macro step starts from.
+    /// Keeps the states from which a macro step starts.
     pub(super) fn keep(&mut self, all: &mut [Participant<'_>]) {
         self.kept.resize_with(all.len(), ContactMemory::default);
         for (one, kept) in all.iter_mut().zip(&mut self.kept) {
@@ -126,7 +126,7 @@ impl ClusterStepper {
         self.is_kept = true;
     }
 
-    /// Does what code of members may unwind from: all others are then put back.
+    /// Runs a part of the step from which code of members may unwind: all others are then put back.
     pub(super) fn guard<'p, T>(
         &mut self,
         all: &mut [Participant<'p>],
@@ -138,8 +138,8 @@ impl ClusterStepper {
         })
     }
 
-    /// Puts all back to the start of the macro step but those whose code has unwound, from wherever in it that came. Until all are kept none has
-    /// moved.
+    /// Puts all back to the start of the macro step but members whose code has unwound, from wherever in it that came.
+    /// Until all are kept none has moved.
     pub(super) fn put_back(&mut self, all: &mut [Participant<'_>]) {
         if !self.is_kept {
             return;

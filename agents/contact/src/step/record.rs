@@ -1,7 +1,7 @@
-//! What a fine step starts from of the one before, and leaves to the next and to reports: impulses, slip owed, what sensors saw, the stiffness of
-//! contacts.
+//! The data that a fine step takes from the one before, and leaves to the next and to reports: impulses, slip owed, touches of sensors, the
+//! stiffness of contacts.
 //!
-//! In: what participants remember; a solution. Out: contacts that start from it; memories, totals of pairs. Never here: rows of joints as they
+//! In: participants' memories; a solution. Out: contacts that start from it; memories, totals of pairs. Never here: rows of joints as they
 //! are laid out, the solve. Theory of the stiffness: docs/theory/coupling.md, eq. 7s.
 
 use crate::constraint::place_key;
@@ -20,7 +20,7 @@ use metachron_core::{SimSpan, SimTime};
 const OVERLAP_SHARE: f64 = 2.0;
 
 impl ClusterStepper {
-    /// Starts every contact from what the last step gave.
+    /// Starts every contact from its impulse in the last step.
     pub(super) fn warm_start(&mut self, all: &[Participant<'_>], h_s: f64) {
         let Self { search: Search { owners, contacts, .. }, taken_over, .. } = self;
         taken_over.clear();
@@ -68,7 +68,7 @@ impl ClusterStepper {
         }
     }
 
-    /// Notes what contacts hand to the next step, and adds up what they gave, push-outs and impacts included.
+    /// Notes the data that contacts hand to the next step, and adds up their impulses, push-outs and impacts included.
     fn record_contacts(&mut self, all: &mut [Participant<'_>], h_s: f64) {
         let Self { solver, search, external, impacts, .. } = self;
         let solution = solver.solution();
@@ -100,13 +100,13 @@ impl ClusterStepper {
                     total.inverse_mass_per_kg = Some(solver.inverse_masses(k, self.progress[owner.member].place));
                 }
             } else if contact.gap_m < self.depth_m {
-                // no nearer than what bears something lies deep: the two touch, though nothing presses them together now
+                // no nearer than loaded contacts lie deep: the two touch, though nothing presses them together now
                 total_of(&mut self.sums.totals, owner.member, owner.partner);
             }
         }
     }
 
-    /// Notes what rows of constraints hand to the next step, and what they gave.
+    /// Notes the data that rows of constraints hand to the next step, and their impulses.
     fn record_constraints(&mut self, all: &mut [Participant<'_>], h_s: f64) {
         let Self { solver, constraints, joints, external, failures, sums, impacts, .. } = self;
         let solution = solver.solution();
@@ -128,7 +128,7 @@ impl ClusterStepper {
         failures.slip(all, constraints, &solution.rows_n_s, &self.progress);
     }
 
-    /// Notes what the spins of contacts were given.
+    /// Notes the impulses of the spins of contacts.
     fn record_spins(&mut self, all: &[Participant<'_>], h_s: f64) {
         let Self { solver, search, constraints, external, progress, .. } = self;
         let solution = solver.solution();

@@ -15,9 +15,9 @@ use metachron_core::{SolveLevel, Wrench};
 pub struct ClusterReport {
     /// Fine steps that it was made in.
     pub fine_steps: u32,
-    /// Contacts of the last fine step, those that bear nothing included.
+    /// Contacts of the last fine step, unloaded ones included.
     pub contacts: u32,
-    /// Those of them that are a rigid pile's, which rapier3d has; all others are the problem's.
+    /// The contacts of a rigid pile among them, which rapier3d has; all others are the problem's.
     pub pile_contacts: u32,
     /// Factors of the coupled matrix in all fine steps.
     pub factors: u32,
@@ -25,11 +25,11 @@ pub struct ClusterReport {
     pub products: u32,
     /// Solves in all fine steps.
     pub solves: u32,
-    /// Those of them that ended within interior points, before all laws held.
+    /// The solves among them that ended within interior points, before all laws held.
     pub unfinished: u32,
     /// The dearest level of a solve.
     pub level: SolveLevel,
-    /// What laws and momentum miss at most by the answer of any solve, m/s (clusters.md, eq. 9).
+    /// The most by which the answer of any solve misses laws and momentum, m/s (clusters.md, eq. 9).
     pub miss_m_s: f64,
     /// The deepest overlap seen, metres.
     pub depth_m: f64,
@@ -42,7 +42,7 @@ pub struct ClusterReport {
 pub struct PairTotal {
     /// The participant of lower number, by its place in the list.
     pub member: usize,
-    /// What it touched, or by which of its links it is held.
+    /// The partner that it touched, or the link by which it is held.
     pub partner: Partner,
     /// The impulse on the participant, world axes, N·s.
     pub impulse_n_s: DVec3,
@@ -73,7 +73,7 @@ impl PairTotal {
     }
 }
 
-/// Adds an impulse at a point to what contacts gave a body, if that moves as a whole.
+/// Adds an impulse at a point to the contact wrench of a body, if that moves as a whole.
 pub(super) fn give(wrench: &mut Wrench, member: &dyn ClusterMember, impulse_n_s: DVec3, point_m: DVec3) {
     if let Some(pose) = member.pose(&[], 0.0) {
         wrench.add(impulse_n_s, point_m - pose.centre_m);
@@ -112,11 +112,11 @@ impl ClusterReport {
 /// The sums over all fine steps of a macro step.
 #[derive(Debug, Default)]
 pub(super) struct Sums {
-    /// What pairs and links gave, by participants and partners.
+    /// The impulses of pairs and links, by participants and partners.
     pub totals: Vec<PairTotal>,
-    /// What contacts gave each participant, N·s and N·m·s.
+    /// The contact impulse on each participant, N·s and N·m·s.
     pub wrenches: Vec<Wrench>,
-    /// What joints gave along the ways that they leave free.
+    /// The impulses of joints along the directions that they leave free.
     pub efforts: Vec<JointTotal>,
 }
 

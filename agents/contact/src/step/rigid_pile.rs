@@ -1,8 +1,8 @@
 //! A rigid pile: rigid bodies for whose problem there is no time, stepped by rapier3d: the coarsest level of a solve.
 //!
-//! In: members with the velocities that they would have without contact. Out: those that they have with it, where they are then, what each
-//! pair gave. Bodies lie in each other as deep as rapier3d lets them (some tenths of a millimetre), in single precision.
-//! Never here: bodies that bend, which touch none of the rigid pile; rows of springs and joints: these are solved before, as if nothing touched.
+//! In: members with the velocities that they would have without contact. Out: their velocities with it, where they are then, the impulses of
+//! each pair. Bodies lie in each other as deep as rapier3d lets them (some tenths of a millimetre), in single precision.
+//! Never here: deformables, which touch none of the rigid pile; rows of springs and joints: these are solved before, as if nothing touched.
 //! Theory: docs/theory/clusters.md, section 9.
 
 use crate::detect::domain::{Domain, assign};
@@ -30,13 +30,13 @@ use rapier3d::pipeline::PhysicsWorld;
 pub const FACTORS_SAFE: u32 = 3;
 /// They are one until there is time for so many.
 const FACTORS_AGAIN: u32 = 2 * FACTORS_SAFE;
-/// No step of rapier3d is longer than this, seconds: what lands sinks by a part of its way in one.
+/// No step of rapier3d is longer than this, seconds: a landing body sinks by a part of its way in one.
 const LONGEST_S: f64 = 1.0 / 240.0;
 /// The most steps of rapier3d in a fine step: no body goes farther in one than half its radius, as far as that takes no more.
 const STEPS_MAX: f64 = 64.0;
 /// Nothing is farther from the origin or faster than this, metres, m/s and rad/s.
 const REACH_MAX: f32 = 1e6;
-/// By how many radii of its body a contact is foreseen.
+/// By how many radii of its body a contact is predicted.
 const FORESEEN_RADII: f64 = 2.0;
 /// How stiff contacts are: so columns of boxes sink by a tenth of a millimetre (docs/throughput.md).
 const STIFF: SpringCoefficients<f32> = SpringCoefficients { natural_frequency: 300.0, damping_ratio: 10.0 };
@@ -66,12 +66,12 @@ struct World {
     origin_m: DVec3,
     /// By rising numbers.
     bodies: Vec<Known>,
-    /// Storage: members that something touches, and what contacts give.
+    /// Storage: members that something touches, and the impulses of contacts.
     touched: Vec<usize>,
     given: Vec<Given>,
 }
 
-/// What a contact gave a member in a step of rapier3d.
+/// The impulse of a contact on a member in a step of rapier3d.
 struct Given {
     member: usize,
     partner: Partner,
@@ -91,7 +91,7 @@ struct Known {
     mass_kg: f64,
     inertia: DMat3,
     radius_m: f64,
-    /// Whether anything has touched it in the step: what flies does so exactly, as its member says.
+    /// Whether anything has touched it in the step: a flying body moves exactly, as its member says.
     touched: bool,
 }
 
@@ -175,7 +175,7 @@ impl RigidPile {
     }
 
     /// Steps the members of the rigid pile by `h_s` seconds from where they are: in, each one's velocities at the end without contact; out, with it.
-    /// What pairs gave is added to sums.
+    /// The impulses of pairs are added to sums.
     ///
     /// # Errors
     /// [`StepError::Diverged`] where rapier3d has no finite answer.
@@ -273,7 +273,7 @@ impl World {
         Self { physics, origin_m, bodies: Vec::new(), touched: Vec::new(), given: Vec::new() }
     }
 
-    /// Takes up the members of the rigid pile as they are, and what changes their velocities in the step.
+    /// Takes up the members of the rigid pile as they are, and the changes of their velocities in the step.
     fn take(&mut self, all: &[Participant<'_>], domains: &[Domain], progress: &[Progress], h_s: f64) {
         let Self { physics, bodies, origin_m, .. } = self;
         bodies.retain(|known| {
@@ -298,7 +298,7 @@ impl World {
             let known = bodies[at];
             let Some(inside) = physics.bodies.get_mut(known.handle) else { continue };
             let now = [&state.v_start[0], &state.v_start[1]].map(|v| v.as_vec3());
-            // what is set anew is searched anew
+            // a body that is set anew is searched anew
             let pose = body.pose(*origin_m);
             if *inside.position() != pose {
                 inside.set_position(pose, true);
@@ -337,7 +337,7 @@ impl World {
         })
     }
 
-    /// Notes what pairs gave in the last step, along the normals of their contacts; whether its places `count`.
+    /// Notes the impulses of pairs in the last step, along the normals of their contacts; whether its places `count`.
     fn read(&mut self, all: &[Participant<'_>], counts: bool) -> PileReport {
         let mut report = PileReport::default();
         let (mut touched, mut given) = (std::mem::take(&mut self.touched), std::mem::take(&mut self.given));
@@ -446,7 +446,7 @@ fn insert(physics: &mut PhysicsWorld, one: &Participant<'_>, body: &Placed<'_>, 
         .locked_axes(locked.map_or(LockedAxes::empty(), axes_of))
         .soft_ccd_prediction((FORESEEN_RADII * body.shape.radius_m) as f32)
         .allow_fast_rotation(true)
-        // the members' own flight, which is part of what changes their velocities, has the gyroscopic part
+        // the members' own flight, a part of the change of their velocities, has the gyroscopic part
         .gyroscopic_forces_enabled(false);
     let collider = skin(body.shape.shape.clone(), body.form).mass_properties(matter);
     let (handle, _) = physics.insert(builder, collider.user_data(Side::Body(one.id).name()));
@@ -468,8 +468,8 @@ fn of_static(solid: &StaticSolid, origin_m: DVec3) -> Option<ColliderBuilder> {
     Some(skin(shape, &solid.form).position(at))
 }
 
-/// A shape with its skin: a pair takes the geometric mean of both frictions, and the larger restitution. What only senses is found
-/// elsewhere.
+/// A shape with its skin: a pair takes the geometric mean of both frictions, and the larger restitution. Touches of
+/// sensors are found elsewhere.
 fn skin(shape: SharedShape, form: &CollisionShape) -> ColliderBuilder {
     let CollisionShape { friction, restitution, traits, .. } = form;
     let [member_of, collides_with] =

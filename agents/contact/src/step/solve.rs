@@ -1,6 +1,7 @@
 //! The solve of a fine step: again with the places that bodies struck would pass, and until joints hold where bodies will be.
 //!
-//! In: members with what they see, places, rows. Out: every member's impulses. Never here: how places are found, how rows are laid out.
+//! In: members with their surroundings, places, rows. Out: every member's impulses. Never here: how places are found,
+//! how rows are laid out.
 //! Theory: docs/theory/clusters.md, section 9.
 
 use crate::constraint::joint::Aimed;
@@ -16,11 +17,11 @@ use crate::step::{ClusterStepper, On};
 use glam::DVec3;
 use metachron_core::{ParallelFor, StepError};
 
-/// The most solves of a fine step: what is struck reaches what it strikes one body further in each, and joints converge.
+/// The most solves of a fine step: an impact reaches one body further in each, and joints converge.
 const ROUNDS_MAX: u32 = 6;
 /// Joints hold to this share of the depth of contacts, in metres and radians.
 const JOINT_SHARE: f64 = 0.25;
-/// From so many fine steps on, joints that do not hold ask for more only while that brings what they miss below this share of it.
+/// From so many fine steps on, joints that do not hold ask for more only while that brings their miss below this share of it.
 const PARTS_HOPED: f64 = 16.0;
 const MISS_SHRINKS: f64 = 0.7;
 /// By how much a body in a joint may turn in a fine step: the force of the joint is where it is at the start.
@@ -45,7 +46,7 @@ impl ClusterStepper {
         self.joints.ask = 1;
         let is_open = |state: &Progress| !state.unanswered.is_empty();
         if self.search.contacts.is_empty() && self.constraints.rows.is_empty() && !self.progress.iter().any(is_open) {
-            // what touches nothing moves as it would
+            // a member that touches nothing moves as it would
             self.progress.iter_mut().for_each(Progress::go_on);
             return Ok(());
         }
@@ -72,17 +73,17 @@ impl ClusterStepper {
             let joints_done = miss_m < joint_miss_m(*depth_m) || miss_m > last_miss_m;
             let holds = miss_m < joint_miss_m(*depth_m);
             let made = (*macro_s / h_s).round();
-            // what cannot hold does not in shorter steps either
+            // a joint that cannot hold does not in shorter steps either
             let helps = made < PARTS_HOPED || miss_m < MISS_SHRINKS * joints.missed_m;
             joints.ask = times(turn_rad / TURN_MAX_RAD).max(if holds || !helps { 1 } else { 2 });
             missed_m = if holds { joints.missed_m } else { miss_m };
-            // the last look is followed by no solve that would stop what flies
+            // the last look is followed by no solve that would stop flying bodies
             let is_last = round == ROUNDS_MAX;
             if joints_done || is_last {
                 self.rebound(on, all, !is_last, report)?;
             }
             let look = Round { scene: on.scene, all, progress: &self.progress, h_s, judge: Judge::Solved };
-            // what is added is solved
+            // new contacts are solved
             let passed = !is_last && self.search.add_passed(&look);
             // with other contacts joints start anew
             last_miss_m = if passed { f64::INFINITY } else { miss_m };
@@ -103,7 +104,7 @@ impl ClusterStepper {
         report: &mut ClusterReport,
     ) -> Result<(), StepError> {
         let Self { solver, search, constraints, progress, members, .. } = self;
-        // what no row touches and knows how it would move does so, and makes no problem larger
+        // a member that no row touches and that knows its free motion moves by it, and makes no problem larger
         let mut count = 0..;
         progress.iter_mut().for_each(|state| state.place = (!state.unanswered.is_empty()).then_some(0));
         let sides =
@@ -142,7 +143,7 @@ impl ClusterStepper {
         Ok(())
     }
 
-    /// Finds what the impulses found hold, and how places move by them.
+    /// Finds the members that the impulses hold, and how places move by them.
     fn note_motion(&mut self, all: &[Participant<'_>]) {
         let Self { solver, search, constraints, progress, .. } = self;
         let solution = solver.solution();

@@ -12,7 +12,7 @@ use glam::DVec3;
 
 /// A span counts as flat on a block wherever its gap is above the lowest by at most this share of its radius.
 const FLAT_SHARE: f64 = 2e-3;
-/// What turns by more than this in a quarter of the way to the edge of a flat stretch is curved, radians: the lowest place bears it alone.
+/// A stretch whose normal turns by more than this in a quarter of the way to its edge is curved, radians: the lowest place bears it alone.
 const FLAT_RAD: f64 = 5e-4;
 /// The edges of a flat stretch count if they are at least this many radii from other places.
 const APART_RADII: f64 = 0.25;

@@ -49,7 +49,7 @@ const ROUNDING: f64 = 1e-15;
 /// Closer than this share of the sizes, parts count as overlapping: the vector between them has no direction any more.
 const TOUCHING_SHARE: f64 = 1e-12;
 
-/// What a search finds.
+/// The result of a search.
 pub(super) enum Found {
     Apart(Separation),
     /// They are farther than the reach, or not finite.
@@ -62,7 +62,7 @@ pub(super) struct Difference<'a> {
     parts: [&'a dyn Convex; 2],
 }
 
-/// What is convex.
+/// A convex shape.
 pub(super) trait Convex {
     /// A point near it, metres.
     fn origin(&self) -> DVec3;
@@ -143,7 +143,7 @@ impl<'a> Difference<'a> {
         if let Found::Apart(separation) = self.search(reach_m) { Some(separation) } else { None }
     }
 
-    /// The same, and what there is where they are not apart.
+    /// The same, also whether the two overlap or are beyond the reach.
     pub fn search(&self, reach_m: f64) -> Found {
         let start = self.parts[0].origin() - self.parts[1].origin();
         let mut simplex = Simplex::of(self.support(-start.normalize_or(DVec3::X)));
@@ -194,7 +194,8 @@ impl Simplex {
         self.corners[..self.count].iter().map(|c| c.way.length() + c.on[0].length()).fold(0.0, f64::max)
     }
 
-    /// Adds a corner and drops those that the nearest point does not need; false for a corner that was there before.
+    /// Adds a corner and drops the corners that the nearest point does not need; false for a corner that was there
+    /// before.
     fn add(&mut self, corner: Corner) -> bool {
         if self.corners[..self.count].iter().any(|known| known.way == corner.way) {
             return false;

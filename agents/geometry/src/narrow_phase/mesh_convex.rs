@@ -2,8 +2,8 @@
 //!
 //! In: a block and a mesh. Out: contacts with normals towards the block. Never here: strands and skins, which meet the mesh's distance field.
 //!
-//! A normal that leads into a neighbouring triangle is turned into the cone of those that the mesh allows there: a body that slides across
-//! two coplanar triangles is not caught by their edge. What comes from behind a triangle does not touch it.
+//! A normal that leads into a neighbouring triangle is turned into the cone that the mesh allows there: a body that slides across
+//! two coplanar triangles is not caught by their edge. A body behind a triangle does not touch it.
 
 use super::convex_convex::{ConvexScratch, SAME_SHARE, SINGLE_SHARE, clip, parts, pose};
 use super::gjk::{Convex, Difference, Found, Part, Rounded, Separation};

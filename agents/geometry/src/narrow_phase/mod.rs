@@ -131,13 +131,13 @@ impl Searches {
     }
 }
 
-/// Drops what is not finite, sorts by rising keys and makes equal keys differ.
+/// Drops touches that are not finite, sorts by rising keys and makes equal keys differ.
 fn finish(into: &mut Vec<Touch>) {
     into.retain(|touch| touch.gap_m.is_finite() && touch.normal.is_finite());
     name(into);
 }
 
-/// What deforms, at rest: what of it is near itself there never touches.
+/// A deformable at rest: its parts that are near each other there never touch.
 #[derive(Debug, Clone, Copy)]
 pub enum RestShape<'a> {
     /// The arc length of each node of a tube, metres.

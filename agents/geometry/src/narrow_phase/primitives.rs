@@ -16,7 +16,7 @@ use rapier3d::parry::shape::{Shape, SharedShape};
 /// moved about with every pair that is looked at.
 #[derive(Clone, Copy)]
 pub(super) enum Pieces<'a> {
-    /// Of a form that has no others; `None` where it touches nothing.
+    /// The piece of a form that has no others; `None` where it touches nothing.
     One(Option<Piece<'a>>),
     Compound {
         parts: &'a [CompoundPart],
@@ -265,7 +265,7 @@ impl Piece<'_> {
 }
 
 impl Strand<'_> {
-    /// Whether a span may be in a box: with what is behind it by its thickness.
+    /// Whether a span may be in a box: the span's box is grown by its thickness.
     fn is_in(&self, around: Aabb) -> bool {
         let is_near = |span: usize| {
             let [a, b] = self.ends(span);

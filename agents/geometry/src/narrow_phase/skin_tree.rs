@@ -43,7 +43,7 @@ struct SkinTree {
     vertices: PatchList,
     edges: PatchList,
     triangles: PatchList,
-    /// All vertices of what is in each patch.
+    /// The vertices of all features of each patch.
     corners: PatchList,
 }
 
@@ -61,7 +61,7 @@ pub(super) struct PlacedSkin {
     normals: Vec<DVec3>,
 }
 
-/// The form of a skin, as long as somebody else has it.
+/// The form of a skin, as long as another owner has it.
 pub(super) struct KnownForm {
     vertices: Weak<[u32]>,
     edges: Weak<[[u32; 2]]>,
@@ -118,7 +118,7 @@ impl KnownForm {
         }
     }
 
-    /// Whether somebody else has it.
+    /// Whether another owner has it.
     pub fn is_had(&self) -> bool {
         self.fans.strong_count() > 0
     }
@@ -348,7 +348,7 @@ mod tests {
         }
     }
 
-    /// What of these features meets a region, one by one.
+    /// The features that meet a region, tested one by one.
     fn within<const N: usize>(features: &[[u32; N]], positions: &[DVec3], region: Aabb) -> Vec<u32> {
         let around = |of: &[u32; N]| Aabb::of(&of.map(|vertex| positions[vertex as usize]));
         (0..).zip(features).filter(|(_, of)| around(of).meets(region)).map(|(number, _)| number).collect()

@@ -3,9 +3,9 @@
 //! In: an [`Obstacle`], a placed body. Out: places with normals from the solid towards the body, the box around the solid.
 //! Never here: what a touch does, how long a flight past them lasts.
 //!
-//! A rigid body meets a plane as the top face of a slab under it, larger than it: so its corners and edges rest on it as on any face. What
-//! deforms meets the plane itself. A mesh is its triangles, an open one too: balls, capsules, tubes and skins meet its distance field, all
-//! else each triangle near it.
+//! A rigid body meets a plane as the top face of a slab under it, larger than it: so its corners and edges rest on it
+//! as on any face. A deformable meets the plane itself. A mesh is its triangles, an open one too: balls, capsules,
+//! tubes and skins meet its distance field, other shapes each triangle near them.
 
 use super::mesh_convex::PlacedMesh;
 use super::primitives::{Block, Piece, Pieces};
@@ -52,7 +52,7 @@ pub enum StaticSolidError {
     Shape {
         /// The solid's name.
         name: String,
-        /// What is wrong with the shape.
+        /// The fault of its shape.
         source: ShapeError,
     },
     /// Its place is not finite, or its rotation is zero.
@@ -134,7 +134,7 @@ impl StaticSolid {
     }
 
     /// The share 0 … 1 of a body's motion at which it first comes within reach of this, and its contacts at that moment, by
-    /// rising keys; `None` and no contacts where it does not ([`super::first_touch`]). Triangles of a mesh let through what comes from behind.
+    /// rising keys; `None` and no contacts where it does not ([`super::first_touch`]). A body behind a triangle of a mesh passes through it.
     pub fn first_touch(
         &self,
         body: &SweptShape<'_>,

@@ -3,9 +3,9 @@
 //! In: a surface and another piece. Out: touching places, with the normal towards the surface; a lower bound of the gap.
 //! Theory: docs/theory/contact.md, eq. 7–11.
 //!
-//! A place is reported by the vertex, edge or triangle in whose region the other lies ([`crate::narrow_phase::voronoi_regions`]): what lies ahead on a flat skin is
-//! no wall. On what is round each node over a triangle and each edge that it crosses is a place. A place of the other side is reported in
-//! the surface itself, so that both sides are pushed at one point.
+//! A place is reported by the vertex, edge or triangle in whose region the other lies ([`crate::narrow_phase::voronoi_regions`]): a part of
+//! a flat skin that lies ahead is no wall. On a round piece each node over a triangle and each edge that it crosses is a place. A place of
+//! the other side is reported in the surface itself, so that both sides are pushed at one point.
 
 mod self_pairs;
 mod surface_box;
@@ -27,7 +27,8 @@ use surface_surface::SkinPair;
 /// Two soft skins that have passed each other by more than this share of an edge are ignored: they came from elsewhere.
 const DEEP_SHARE: f64 = 0.5;
 
-/// By how much more than is asked for the features of a skin are found that may touch it, as a share of the length of an edge.
+/// By how much more than the reach asked for the features of a skin are found that may touch it, as a share of an
+/// edge's length.
 const ROOM_SHARE: f64 = 0.25;
 
 /// Storage that searches keep.
@@ -35,7 +36,7 @@ const ROOM_SHARE: f64 = 0.25;
 pub(super) struct SurfaceScratch {
     /// The patches of either surface that are near the other.
     patches: [Vec<u32>; 2],
-    /// Of each skin that was searched against itself.
+    /// The pairs of each skin that was searched against itself.
     own: Vec<KnownPairs>,
 }
 
@@ -271,7 +272,7 @@ impl SurfaceScratch {
     }
 }
 
-/// How far from a part of the other the vertices, edges and triangles of a surface are tested, beyond what [`Piece::is_in`] allows, metres.
+/// How far from a part of the other the vertices, edges and triangles of a surface are tested, beyond the box of [`Piece::is_in`], metres.
 fn look_m(surface: &Surface<'_>, other: &Piece<'_>, reach_m: f64) -> f64 {
     let SurfaceShape { radius_m, edge_m, .. } = *surface.form;
     match other {

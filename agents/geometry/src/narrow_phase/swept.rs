@@ -31,7 +31,7 @@ pub struct SweptReach {
     /// They touch once they are this near, metres, ≥ 0.
     pub reach_m: f64,
     /// Contacts at the moment of a touch have up to so much more gap, metres, ≥ 0: a span may leave its nearest place to its end, which is a
-    /// little farther, and what touches next is at hand.
+    /// little farther, and the place that touches next is at hand.
     pub around_m: f64,
 }
 

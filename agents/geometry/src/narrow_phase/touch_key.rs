@@ -8,7 +8,7 @@
 pub struct TouchKey {
     /// The pieces of both shapes that meet: a tool has six, all else one.
     pub pieces: [u8; 2],
-    /// What meets.
+    /// The kind of features that meet.
     pub kind: TouchKind,
     /// The convex parts of both sides, or the triangle of a static mesh and the part on it; zero for all else.
     pub parts: [u32; 2],
@@ -18,7 +18,7 @@ pub struct TouchKey {
     pub place: u32,
 }
 
-/// What meets in a contact.
+/// The kinds of features that meet in a contact.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, PartialOrd, Ord, Hash, serde::Serialize, serde::Deserialize)]
 pub enum TouchKind {
     /// Corners, edges or faces of convex parts, as parry packs them.

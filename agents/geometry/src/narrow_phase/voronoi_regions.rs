@@ -10,11 +10,11 @@ use glam::DVec3;
 const NONE: u32 = u32::MAX;
 /// How far a vector may lean over a neighbouring edge and still belong to the spot, as a share of that edge.
 pub(super) const LEAN_SHARE: f64 = 1e-3;
-/// By how much two features may lean over what is next to them, where their own directions make the normal: about what a body turns by in
+/// By how much two features may lean over their neighbours, where their own directions make the normal: about the turn of a body in
 /// a step, radians.
 pub(super) const LEAN: f64 = 0.1;
-/// By how much an edge that stands out is above a line between the far corners of its triangles, metres: a tenth of what contacts give way at their
-/// usual depth. A place that bears a good part of a load would else be gone, and come back, where a skin gets a little flatter.
+/// By how much an edge that stands out is above a line between the far corners of its triangles, metres: a tenth of the usual depth of
+/// contacts. A place that bears a good part of a load would else be gone, and come back, where a skin gets a little flatter.
 const RIDGE_M: f64 = 2e-6;
 /// A vector is no way out when removing its parts along the skin leaves less than this share of it.
 const OUT_SHARE: f64 = 0.5;

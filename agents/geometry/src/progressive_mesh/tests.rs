@@ -1,4 +1,4 @@
-//! What a totally ordered mesh must keep, against the mesh it was made of and brute force.
+//! The promises of a totally ordered mesh, against the mesh it was made of and brute force.
 
 use super::{Cut, ProgressiveMesh, ProgressiveMeshError};
 use crate::near_triangle;
@@ -221,7 +221,7 @@ fn a_morph_leads_from_the_finer_cut_to_the_coarser_one() {
     let set = |faces: &[[Vec3; 3]]| -> BTreeSet<Face> {
         faces.iter().filter(|f| area(f) > 0.0).map(|f| turned(*f)).collect()
     };
-    // what is left of the finer mesh at the end of its way is the coarser one, face by face
+    // at the end of its way the finer mesh is the coarser one, face by face
     assert_eq!(set(&moved(1.0)), set(&faces(&tom, coarse)));
 }
 

@@ -186,7 +186,7 @@ impl Surface {
         })
     }
 
-    /// Collapses `u`, which must not be a hub, onto `v`: moves its triangles, and calls `gone` with those that vanish.
+    /// Collapses `u`, which must not be a hub, onto `v`: moves its triangles, and calls `gone` with each that vanishes.
     pub fn collapse(&mut self, u: u32, v: u32, mut gone: impl FnMut(u32)) {
         for number in std::mem::take(&mut self.around[u as usize]) {
             let t = self.triangles[number as usize];

@@ -1,4 +1,4 @@
-//! Promises about bits: refused steps, repeated runs, memory, what is not finite.
+//! Promises about bits: refused steps, repeated runs, memory, states that are not finite.
 //!
 //! In: a [`Suite`]. Out: the promises that were broken. Never here: promises about physics ([`super::physics`]).
 
@@ -42,7 +42,7 @@ fn busy_step(suite: &Suite<'_>, run: &mut Run<'_>, i: u32) -> Result<(), String>
     run.must_step(suite.dt, suite.pull.filter(|_| pulled).as_slice())
 }
 
-/// What is saved and read back goes on with the same bits.
+/// A saved state that is read back goes on with the same bits.
 pub(super) fn archive(suite: &Suite<'_>) -> Result<(), String> {
     let (mut run, mut other) = (suite.start(), suite.start());
     let marks = [1, 2, 3, 5].map(|part| part * suite.steps / 6);

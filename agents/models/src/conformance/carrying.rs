@@ -35,7 +35,7 @@ const WEIGHT_SHARE: f64 = 0.01;
 /// The most that the cube moves once it rests, m/s.
 const STILL_M_S: f64 = 1e-3;
 
-/// What lies on a member gives it its weight.
+/// A body that rests on a member gives it its weight.
 pub(super) fn carries(suite: &Suite<'_>) -> Result<(), String> {
     let Some(load) = &suite.load else { return Ok(()) };
     let wanted_s = suite.dt.as_secs_f64();
@@ -85,7 +85,8 @@ impl Scales {
         })
     }
 
-    /// Lets the two come to rest and compares what the agent gives in the last quarter of the time with the cube's weight.
+    /// Lets the two come to rest and compares the force of the agent in the last quarter of the time with the cube's
+    /// weight.
     fn weigh(&mut self, load: &Load<'_>, wanted_s: [f64; 2]) -> Result<(), String> {
         let (mut given_n_s, mut weighed_s) = (DVec3::ZERO, 0.0);
         while self.time.as_secs_f64() < load.settles_s {

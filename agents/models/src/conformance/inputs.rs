@@ -1,6 +1,8 @@
-//! The promise that a model takes what it names ([`Agent::inputs`](metachron_contact::Agent::inputs)), and nothing else.
+//! The promise that a model takes the inputs that it names ([`Agent::inputs`](metachron_contact::Agent::inputs)), and
+//! no others.
 //!
-//! In: a [`Suite`]. Out: what is named and refused, or taken and not named. Never here: springs, forces and poses, which show in steps alone.
+//! In: a [`Suite`]. Out: an input that is named and refused, or taken and not named. Never here: springs, forces and
+//! poses, which show in steps alone.
 
 use super::{Run, Suite};
 use glam::DVec3;

@@ -28,7 +28,7 @@ pub struct RigidBody {
     pub(super) at_rest: bool,
     pub(super) calm_s: f64,
     pub(super) steps: u64,
-    /// What it is in a contact cluster.
+    /// Its unknowns in a contact cluster.
     pub(super) unknowns: Unknowns,
 }
 

@@ -1,10 +1,11 @@
 //! A kinematic body: a solid that moves as it is led, by poses that users send or by keyframes, and gives way to nothing.
 //!
-//! In: a [`RigidSpec`] with [`super::Led`], poses ([`StepContext::pose`]). Out: its motion, a snapshot. Never here: what it touches, what
-//! that gives it ([`Snapshot::contact_wrench`]).
+//! In: a [`RigidSpec`] with [`super::Led`], poses ([`StepContext::pose`]). Out: its motion, a snapshot. Never here: its
+//! contacts and their forces on it ([`Snapshot::contact_wrench`]).
 //!
-//! A pose is reached within the step in which it is heard, whatever the distance: what is touched sees the velocity that this takes. A body
-//! that is led no more goes back to its keyframes as a tool does to its script; without any it stays where it is.
+//! A pose is reached within the step in which it is received, whatever the distance: a body in contact sees the
+//! velocity that this takes. A body that is led no more goes back to its keyframes as a tool does to its script;
+//! without any it stays where it is.
 
 use super::mass_properties::MassDistribution;
 use super::{RigidError, RigidSpec};
@@ -23,7 +24,7 @@ use std::sync::Arc;
 /// A solid that moves as it is led.
 pub struct KinematicBody {
     form: Arc<CollisionShape>,
-    /// Its middle in its own axes, metres: the centre of mass of what fills it.
+    /// Its middle in its own axes, metres: the centre of mass of a homogeneous filling.
     com_local: DVec3,
     radius_m: f64,
     script: Option<Script>,
@@ -48,7 +49,7 @@ struct BodyPose {
 struct Now {
     time: SimTime,
     at: BodyPose,
-    /// Of its middle and about it, in the last step.
+    /// The velocity of its middle and its spin, in the last step.
     velocity: DVec3,
     spin: DVec3,
     /// Where the user leads it now.
@@ -95,7 +96,7 @@ impl KinematicBody {
         let arm = at.rotation * self.com_local;
         let now = Pace {
             tip: at.position - arm,
-            // the mean of a step is no slope: only what it was led to elsewhere is a deviation
+            // the mean of a step is no slope: only a body led elsewhere deviates
             velocity: if self.is_on(&from) { from.velocity } else { velocity - self.now.spin.cross(arm) },
             rotation: at.rotation,
             jaw: 0.0,
@@ -231,7 +232,7 @@ impl Agent for KinematicBody {
         self.script.iter_mut().for_each(|script| script.begin_later(by_s));
     }
 
-    /// Only elsewhere: how it moves is for what leads it.
+    /// Its place alone: its motion follows from its goal or keyframes.
     fn set_motion(&mut self, set: &SetMotion) -> bool {
         let BodyPose { position, rotation } = self.now.at;
         let origin_m = set.position_m.unwrap_or(position - rotation * self.com_local);

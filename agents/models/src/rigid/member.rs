@@ -15,7 +15,7 @@ use metachron_geometry::{ContactSide, Place, PlacedShape, ShapePose};
 /// The block of its spin; block 0 is the velocity of its centre of mass.
 const SPIN: usize = 1;
 
-/// How many times as heavy a body is along an axis that is locked: of what an impulse would move it, one part in so many is left, and is then
+/// How many times as heavy a body is along an axis that is locked: one part in so many is left of the motion by an impulse, and is then
 /// taken away.
 const LOCKED_TIMES: f64 = 1e8;
 
@@ -61,7 +61,7 @@ impl Default for Unknowns {
 }
 
 impl Unknowns {
-    /// Writes or reads what is known of it between steps.
+    /// Writes or reads the velocities that are known between steps.
     pub(super) fn archive(&mut self, archive: &mut Archive<'_>) -> Result<(), ArchiveError> {
         archive.value(&mut self.now)
     }

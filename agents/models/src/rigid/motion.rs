@@ -23,7 +23,7 @@ pub(super) struct Motion {
     pub angular: DVec3,
 }
 
-/// What acts on a body that nothing touches.
+/// Gravity and restraint of a body that nothing touches.
 #[derive(Debug, Clone, Copy, Default)]
 pub(super) struct Flight {
     /// m/s², along axes that are not locked.
@@ -262,7 +262,7 @@ mod tests {
         let (mut one, mut many) = (tumbling(), tumbling());
         one.fly(&body, &g, 0.5);
         (0..500).for_each(|_| many.fly(&body, &g, 0.001));
-        // a closed form has no step; what turns is of fourth order in it
+        // a closed form has no step; the turn is of fourth order in it
         assert!((one.position - many.position).length() < 1e-12 && (one.velocity - many.velocity).length() < 1e-12);
         assert!(one.rotation.angle_between(many.rotation) < 1e-4);
         let left = (-1.0_f64).exp();

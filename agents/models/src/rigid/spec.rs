@@ -28,16 +28,16 @@ pub struct RigidSpec {
     pub restitution: f64,
     /// Coulomb friction coefficient, ≥ 0; a pair takes the geometric mean.
     pub friction: f64,
-    /// What else it says about its contacts.
+    /// Its groups, combine rules, spin friction, and whether it is a sensor.
     pub traits: ContactTraits,
     /// Gravity, m/s².
     pub gravity: DVec3,
     /// Whether the body may report that it is at rest.
     pub sleep: bool,
-    /// What slows it down and where it cannot move.
+    /// Its damping, and the axes along and about which it cannot move.
     pub restraint: Restraint,
     /// How it is led, of a kinematic body ([`super::KinematicBody`]), whose mass, velocity, spin and gravity have no meaning; `None` for a
-    /// body that moves by what acts on it.
+    /// body that moves by the forces on it.
     pub led: Option<Led>,
 }
 
@@ -51,7 +51,7 @@ pub struct GivenInertia {
     pub about_com_kg_m2: DMat3,
 }
 
-/// What slows a rigid body down wherever it is, and the axes of the world along and about which it does not move.
+/// The damping of a rigid body wherever it is, and the axes of the world along and about which it does not move.
 #[derive(Debug, Clone, Copy, PartialEq, Default, serde::Serialize, serde::Deserialize)]
 pub struct Restraint {
     /// Its velocity decays by this rate, 1/s, 0 … 1e6.
@@ -65,12 +65,12 @@ pub struct Restraint {
 }
 
 impl Restraint {
-    /// What is left of a velocity, m/s.
+    /// The part of a velocity along free axes, m/s.
     pub(super) fn translation(&self, v: DVec3) -> DVec3 {
         left(self.locked_translation, v)
     }
 
-    /// What is left of a spin, rad/s.
+    /// The part of a spin about free axes, rad/s.
     pub(super) fn rotation(&self, w: DVec3) -> DVec3 {
         left(self.locked_rotation, w)
     }

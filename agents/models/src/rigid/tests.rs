@@ -1,4 +1,4 @@
-//! What a rigid body must do by itself, against closed forms.
+//! The motion of a rigid body by itself, against closed forms.
 
 use super::{Restraint, RigidBody, RigidError, RigidSpec};
 use glam::{DQuat, DVec3};

@@ -90,7 +90,7 @@ impl NodeSpring {
 }
 
 /// Lists the springs of `attachments`, by their numbers, at the nodes of `division`: each node takes the share of its dual length (eq. 23) of
-/// stiffness, damping and the force that it yields at. Those that yield come last.
+/// stiffness, damping and the force that it yields at. Springs that yield come last.
 pub fn springs<'a>(
     attachments: impl Iterator<Item = (u32, &'a Attachment)>,
     division: &Discretization,
@@ -122,7 +122,7 @@ pub fn springs<'a>(
     into.sort_by_key(NodeSpring::yields);
 }
 
-/// Gives springs the slips of those that held the same stretches before, linear along each between its nodes.
+/// Gives springs the slips of the springs that held the same stretches before, linear along each between its nodes.
 pub fn carry_slips(before: &[NodeSpring], into: &mut [NodeSpring]) {
     for spring in into.iter_mut().filter(|spring| spring.yields()) {
         let same = || before.iter().filter(|other| other.attachment == spring.attachment);

@@ -1,12 +1,12 @@
-//! What of a tube is saved between steps, and read back into one of the same scene.
+//! The part of a tube that is saved between steps, and read back into one of the same scene.
 //!
-//! In: an archive. Out: the division and the state on it, all to the bit. Never here: what a tube is built from.
+//! In: an archive. Out: the division and the state on it, all to the bit. Never here: the specification of a tube.
 
 use super::tube::Tube;
 use metachron_core::{Archive, ArchiveError, archive_values};
 
 impl Tube {
-    /// Writes or reads the state: what its division and its springs are follows from changes of ε and slips that are past.
+    /// Writes or reads the state, with its division and springs, which follow from past changes of ε and past slips.
     pub(super) fn archive_state(&mut self, archive: &mut Archive<'_>) -> Result<(), ArchiveError> {
         archive_values!(archive, self.resolution, self.division, self.now, self.stepper.past)?;
         archive_values!(archive, self.let_go, self.springs, self.spec.pressure_pa, self.spec.pressure_keys)?;

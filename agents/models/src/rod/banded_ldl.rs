@@ -43,7 +43,7 @@ struct Factored<T> {
     far: Matrix<T>,
 }
 
-/// State of elimination: what the next row needs of the two before it.
+/// State of elimination: the results of two rows that the next one needs.
 struct Front<T> {
     /// Inverses of the pivots of rows i − 2 and i − 1.
     before: Symmetric<T>,

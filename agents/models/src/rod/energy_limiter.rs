@@ -8,8 +8,8 @@ use super::state::{RodMaterial, RodState};
 use super::sym3::Sym3;
 use glam::DVec3;
 
-/// Removes `excess` joules of kinetic energy, or all there is: of all motion where an end is held, else of what differs from
-/// the rigid motion with the same momentum.
+/// Removes `excess` joules of kinetic energy, or all there is: of all motion where an end is held, else of the motion
+/// beside the rigid motion with the same momentum.
 pub fn remove(excess: f64, state: &mut RodState, matter: &RodMaterial, division: &Discretization) {
     let held = matter.held[0] || matter.held[1];
     let rigid = if held { Rigid::default() } else { Rigid::of(state, matter, division) };

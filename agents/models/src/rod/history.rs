@@ -10,9 +10,9 @@ use glam::DVec3;
 /// Changes over the last substep, in slots.
 #[derive(Debug, Clone, Default, serde::Serialize, serde::Deserialize)]
 pub struct History {
-    /// Of node positions, metres, and of segment frames, radians in world axes.
+    /// Changes of node positions, metres, and of segment frames, radians in world axes.
     way: Vec<DVec3>,
-    /// Of velocities, m/s and rad/s.
+    /// Changes of velocities, m/s and rad/s.
     gain: Vec<DVec3>,
     /// The length of that substep, seconds; zero where there is no past.
     span_s: f64,

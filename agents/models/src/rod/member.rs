@@ -36,7 +36,7 @@ pub(super) struct Unknowns {
     /// Whether its free motion in the step begun is good in one piece: there is a factor, and its energy does not rise.
     is_whole: bool,
     quiet_before: bool,
-    /// What its attachments that may tear gave in the last step.
+    /// The forces of its attachments that may tear in the last step.
     attached: Vec<OwnAttachment>,
     kept: Kept,
 }
@@ -225,7 +225,7 @@ impl ClusterMember for Tube {
         let spins = v.iter().skip(1).step_by(2).map(|w| w.length_squared()).fold(0.0, f64::max).sqrt();
         let ends = v.iter().step_by(2).zip(v.iter().skip(2).step_by(2));
         let pulls = ends.zip(&self.division.length).map(|((a, b), length_m)| a.distance_squared(*b) / length_m.powi(2));
-        // what a segment turns or stretches by, as a share of it
+        // the turn or stretch of a segment, as a share of it
         let bent = spins.max(pulls.fold(0.0, f64::max).sqrt()) * h_s / TURN_MAX_RAD;
         let widened = fastest_m_s * h_s / reaches_m;
         if divides_itself {
@@ -352,7 +352,7 @@ impl Tube {
         (axes.conjugate() * outward).truncate().normalize_or_zero()
     }
 
-    /// Adds what the skin moves by where the sections of two nodes widen and flatten: in and out, and along itself, for it does not stretch
+    /// Adds the motion of the skin where the sections of two nodes widen and flatten: in and out, and along itself, for it does not stretch
     /// as it flattens (eq. 67).
     fn skin_side(&self, side: Side, nodes: [usize; 2], share: f64, outward: DVec3) -> Side {
         let mut terms = [SideTerm::weighted(0, 0.0); SIDE_TERMS_MAX];
@@ -388,7 +388,8 @@ impl Tube {
         !is_simple && self.substep_is_short(h_s)
     }
 
-    /// Notes what the attachments that may tear and never yield give at the end of a step: implicit Euler has given that all along it.
+    /// Notes the forces of attachments that may tear and never yield at the end of a step: implicit Euler has given
+    /// these all along it.
     fn note_attachments(&mut self) {
         let Self { spec, springs, now, unknowns, .. } = self;
         let attached = &mut unknowns.attached;
@@ -419,7 +420,7 @@ impl Tube {
             if rise_j > 0.0 {
                 energy_limiter::remove(rise_j, &mut stepper.next, setting.matter, setting.division);
             }
-            // what follows has no two steps of one kind before it
+            // the next step has no two steps of one kind before it
             stepper.past.forget();
             let finite = stepper.next.is_finite();
             if finite {
@@ -430,12 +431,12 @@ impl Tube {
     }
 }
 
-/// Those of its springs that never yield.
+/// Its springs that never yield.
 fn lasting(springs: &[NodeSpring]) -> &[NodeSpring] {
     &springs[..springs.partition_point(|spring| !spring.yields())]
 }
 
-/// A step of `h_s` seconds in one piece. Springs on the tube, and those of its own that yield, are rows of the cluster's problem.
+/// A step of `h_s` seconds in one piece. Springs on the tube, and its own springs that yield, are rows of the cluster's problem.
 fn whole_step<'a>(setting: &Setting<'a>, h_s: f64) -> SubstepProblem<'a> {
     let Setting { matter, division, integrator, .. } = *setting;
     let springs = lasting(setting.springs);

@@ -1,6 +1,6 @@
 //! A tube's pressure as a function of time: keys, and straight lines between them.
 //!
-//! In: keys by rising times, a time. Out: the pressure then. Never here: what a pressure does ([`super::wall`]).
+//! In: keys by rising times, a time. Out: the pressure then. Never here: the effect of a pressure ([`super::wall`]).
 
 /// A pressure at a time.
 #[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]

@@ -36,7 +36,7 @@ impl Tube {
     /// Takes the curve of another state: its sections stay as they are.
     ///
     /// # Errors
-    /// What does not fit; nothing is changed then.
+    /// The reason why the curve does not fit; nothing is changed then.
     pub(super) fn take_curve(&mut self, curve: &CurveState) -> Result<(), String> {
         let (last, held) = (self.now.x.len() - 1, self.matter.held);
         let is_held = |node: usize| node == 0 && held[0] || node == last && held[1];

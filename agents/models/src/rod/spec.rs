@@ -52,7 +52,7 @@ pub struct TubeSpec {
     pub self_contact: bool,
     /// Coulomb friction coefficient of its skin, ≥ 0; a pair takes the geometric mean.
     pub friction: f64,
-    /// What else it says about its contacts.
+    /// Its groups, combine rules, spin friction, and whether it is a sensor.
     pub traits: ContactTraits,
     /// Gravity, m/s².
     pub gravity: DVec3,
@@ -60,7 +60,7 @@ pub struct TubeSpec {
     pub sleep: bool,
 }
 
-/// What a tube's sections do.
+/// How a tube's sections behave.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
 pub enum WallModel {
     /// They stay round, and their radius is given: pressure and peristalsis widen and narrow them, and nothing else does.
@@ -111,7 +111,7 @@ pub struct Attachment {
     /// The force of the whole interval above which all of it tears off, N, > 0: the mean over a macro step of the tube's cluster. Infinite
     /// where it never does.
     pub tears_above_n: f64,
-    /// The most force that it gives in a cluster, N, > 0, spread evenly along the interval: each part of it slips by what would take more.
+    /// The most force that it gives in a cluster, N, > 0, spread evenly along the interval: each part of it slips under a greater load.
     /// Below the tearing force; infinite where it never yields.
     pub yields_above_n: f64,
 }

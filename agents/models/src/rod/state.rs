@@ -119,7 +119,7 @@ impl RodState {
 
     /// Whether every position, frame and velocity is finite. Needs [`RodState::strain`].
     pub fn is_finite(&self) -> bool {
-        // each energy contains every position, velocity or frame in squares or products: they are finite only if all of those are
+        // energies contain every position, velocity or frame in squares or products: where they are finite, all of these are
         (self.elastic_j + self.gravity_j + self.kinetic_j).is_finite()
     }
 

@@ -68,7 +68,7 @@ pub struct Stepper {
     pub(super) projector: Projector,
 }
 
-/// What may end a trial substep without a next state.
+/// The conditions that may end a trial substep without a next state.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Trial {
     /// Whether no segment may turn further than [`TURN_MAX_RAD`].

@@ -120,8 +120,8 @@ fn fill_joints(problem: &SubstepProblem<'_>, at: &RodState, rows: &mut [Row]) {
     }
 }
 
-/// What the softening of a section adds to its relative bend stiffness (eq. 62), in world axes, from the axes of the segment before it.
-/// Across the mean director it takes away no more than there is.
+/// The part that the softening of a section adds to its relative bend stiffness (eq. 62), in world axes, from the axes
+/// of the segment before it. Across the mean director it takes away no more than there is.
 fn softened(softening: &Softening, axes: DQuat, director: DVec3) -> Sym3 {
     let Softening { mean, oval } = *softening;
     let across = |v: DVec3| v - director * (director.dot(v) / director.length_squared().max(f64::MIN_POSITIVE));

@@ -1,6 +1,6 @@
 //! The tube: one divided rod, its attachments, its radius, its rest.
 //!
-//! In: a [`TubeSpec`], pressures. Out: what it is made of, its radius, its energy. Never here: its turns (`agent.rs`), how a step is solved
+//! In: a [`TubeSpec`], pressures. Out: its matter, its radius, its energy. Never here: its turns (`agent.rs`), how a step is solved
 //! ([`super::step`]), contact, the transfer of a state to another division ([`super::remesh`]). Theory: docs/theory/rod.md.
 
 mod agent;
@@ -54,7 +54,7 @@ pub struct Tube {
     /// Own time at which its wave and its pressure start, seconds.
     pub(super) script_from_s: f64,
     pub(super) steps: u64,
-    /// What it is in a contact cluster.
+    /// Its unknowns in a contact cluster.
     pub(super) unknowns: Unknowns,
 }
 
@@ -163,7 +163,7 @@ impl Tube {
     }
 
     /// Mechanical energy, joules: kinetic, elastic, attachments, and gravitational, zero at the origin; of a tube whose wall gives also
-    /// that of the wall and of what fills it, zero in the undeformed tube.
+    /// that of the wall and of its filling, zero in the undeformed tube.
     #[must_use]
     pub fn energy_j(&self) -> f64 {
         let rod_j = energy(&self.now, &self.springs);
@@ -176,8 +176,8 @@ impl Tube {
         self.spec.pressure_pa = wanted_pa.unwrap_or(self.spec.pressure_pa);
     }
 
-    /// Sets the pressure inside minus outside, Pa, while it runs, in place of one that follows keys; of a sealed tube that of its gas in the
-    /// undeformed tube, as if more had been let in.
+    /// Sets the pressure inside minus outside, Pa, while it runs, in place of a pressure that follows keys; of a sealed
+    /// tube the pressure of its gas in the undeformed tube, as if more had been let in.
     ///
     /// # Errors
     /// [`TubeError::OutOfRange`] for a pressure that a new tube would not take; it then keeps the one it has.
@@ -299,7 +299,7 @@ impl Tube {
 }
 
 impl Tube {
-    /// Begins from a state that it was set to, or divided anew: what steps before it said is of another.
+    /// Begins from a state that it was set to, or divided anew: the history of steps before is of another.
     pub(super) fn begin_anew(&mut self) {
         self.stepper.forget();
         self.present_velocities();

@@ -1,6 +1,6 @@
-//! What of a soft body is saved between steps, and read back into one of the same scene.
+//! The part of a soft body that is saved between steps, and read back into one of the same scene.
 //!
-//! In: an archive. Out: the nodes and the state on them, all to the bit. Never here: what a body is built from.
+//! In: an archive. Out: the nodes and the state on them, all to the bit. Never here: the specification of a body.
 
 use super::body::SoftBody;
 use super::division::{Division, form};
@@ -28,7 +28,7 @@ impl SoftBody {
         unknowns.archive(archive)
     }
 
-    /// Takes the nodes of another ε and the cells but for those that are `gone`, without a state on them. A skin from which nothing is gone
+    /// Takes the nodes of another ε and the cells but for those that are `gone`, without a state on them. A skin that has lost nothing
     /// before or after stays the same.
     fn divide_for(&mut self, eps_m: f64, gone: &[bool]) -> Result<(), ArchiveError> {
         if eps_m.to_bits() == self.eps_m.to_bits() && gone == self.gone {

@@ -22,11 +22,11 @@ pub struct SoftBody {
     pub(super) spec: SoftSpec,
     pub(super) mesh: FeMesh,
     pub(super) system: System,
-    /// What others see of it, where that is not its vertices.
+    /// Its skin as others see it, where that is not its vertices.
     pub(super) skin: Option<Skin>,
     /// For each cell that it was divided into, whether it was removed; empty while it has all of them.
     pub(super) gone: Vec<bool>,
-    /// What was removed since the start.
+    /// The matter removed since the start.
     pub(super) removed: Removed,
     /// The ε for which its cage or lattice was made, metres; no meaning where its vertices are its skin.
     pub(super) eps_m: f64,
@@ -36,7 +36,7 @@ pub struct SoftBody {
     pub(super) velocities: Vec<DVec3>,
     /// The velocities at the end of a substep without contact.
     pub(super) free: Vec<DVec3>,
-    /// The right side of eq. 1: the momenta of the vertices with what forces add in the substep, kg·m/s.
+    /// The right side of eq. 1: the momenta of the vertices with the impulses of forces in the substep, kg·m/s.
     pub(super) impulses: Vec<DVec3>,
     pub(super) form: Arc<CollisionShape>,
     /// The mean acceleration of the centre of mass in the last step, m/s².
@@ -44,7 +44,7 @@ pub struct SoftBody {
     pub(super) at_rest: bool,
     pub(super) quiet_s: f64,
     pub(super) steps: u64,
-    /// What it is in a contact cluster.
+    /// Its unknowns in a contact cluster.
     pub(super) unknowns: Unknowns,
 }
 
@@ -98,7 +98,7 @@ impl SoftBody {
         }
     }
 
-    /// Moves its skin on towards where its vertices carry it, by what goes in `h` seconds, and with them.
+    /// Moves its skin on towards where its vertices carry it, by the decay in `h` seconds, and with them.
     pub(super) fn ease(&mut self, h: f64) {
         self.skin.iter_mut().for_each(|skin| skin.ease(h));
         self.follow();
@@ -109,7 +109,7 @@ impl SoftBody {
         self.skin.as_ref().is_none_or(Skin::is_eased)
     }
 
-    /// Positions of its skin's vertices, metres: what others see of it.
+    /// Positions of its skin's vertices, metres: its shape as others see it.
     pub(super) fn seen(&self) -> &[DVec3] {
         self.skin.as_ref().map_or(&self.positions, |skin| &skin.positions)
     }
@@ -120,12 +120,12 @@ impl SoftBody {
         self.mesh.mass_kg.iter().filter(|mass| **mass > 0.0).count() as u32
     }
 
-    /// What carries a vertex of its skin.
+    /// The nodes that carry a vertex of its skin.
     pub(super) fn carried(&self, vertex: u32) -> Carried {
         self.skin.as_ref().map_or(Carried::by_node(vertex), |skin| skin.carried()[vertex as usize])
     }
 
-    /// Wakes it, and forgets what holds for steps before.
+    /// Wakes it, and forgets values of steps before.
     pub(super) fn woken(&mut self) {
         (self.quiet_s, self.at_rest) = (0.0, false);
         self.follow();
@@ -210,7 +210,7 @@ impl Agent for SoftBody {
             }
         };
         let Self { positions, velocities, mesh, skin, .. } = self;
-        // what is held stays where it is
+        // a held vertex stays where it is
         check_nodes(positions, [to, to_m_s], |_| false)?;
         for (at, (x, v)) in to.iter().zip(to_m_s).enumerate().filter(|(at, _)| !mesh.held[*at]) {
             (positions[at], velocities[at]) = (*x, *v);

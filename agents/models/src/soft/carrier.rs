@@ -1,4 +1,4 @@
-//! What carries a skin: the cage of a closed surface, or the lattice of a sheet or a rope.
+//! The carrier of a skin: the cage of a closed surface, or the lattice of a sheet or a rope.
 //!
 //! In: a specification and an ε. Out: nodes in material coordinates, the mesh between them, the nodes that carry any material point.
 //! Never here: where anything is now, when ε changes. Theory: docs/theory/soft.md, eq. 16, 17, 23.
@@ -11,13 +11,13 @@ use super::spec::{SoftShape, SoftSpec, VERTICES_MAX};
 use glam::{DQuat, DVec3};
 use metachron_geometry::{Cage, Carried, SurfaceShape, Triangles, cage_counts};
 
-/// What carries a skin.
+/// The carrier of a skin.
 pub(super) enum Carrier {
     Cage(Cage),
     Lattice(Lattice),
 }
 
-/// The points of a skin, as what carries them needs them.
+/// The points of a skin, as their carrier needs them.
 pub(super) struct SkinPoints {
     /// Positions at rest in the body's own axes, metres.
     pub rest: Vec<DVec3>,
@@ -30,7 +30,7 @@ pub(super) struct SkinPoints {
 }
 
 impl Carrier {
-    /// What carries the skin of `spec` with cells of at most `eps_m`; `None` where nothing can.
+    /// The carrier of the skin of `spec` with cells of at most `eps_m`; `None` where there can be none.
     pub fn new(spec: &SoftSpec, eps_m: f64) -> Option<Self> {
         match &spec.shape {
             SoftShape::Embedded { surface, .. } => Cage::new(surface, eps_m, VERTICES_MAX as usize).map(Self::Cage),
@@ -38,7 +38,7 @@ impl Carrier {
         }
     }
 
-    /// Whether it is what [`Self::new`] would make of this ε.
+    /// Whether [`Self::new`] would make the same of this ε.
     pub fn is_as_wanted(&self, spec: &SoftSpec, eps_m: f64) -> bool {
         match (self, &spec.shape) {
             (Self::Cage(cage), SoftShape::Embedded { surface, .. }) => cage.counts() == cage_counts(surface, eps_m),
@@ -63,8 +63,8 @@ impl Carrier {
         }
     }
 
-    /// The number of the cell that a point of the skin belongs to, on the side of the unit vector `inward`, among those that are left; `None`
-    /// where that of a lattice is gone.
+    /// The number of the cell that a point of the skin belongs to, on the side of the unit vector `inward`, among the
+    /// cells that are left; `None` where that of a lattice is gone.
     pub fn cell_under(&self, material_m: DVec3, inward: DVec3) -> Option<usize> {
         match self {
             Self::Cage(cage) => Some(cage.cell_under(material_m, inward)),
@@ -72,7 +72,7 @@ impl Carrier {
         }
     }
 
-    /// Takes cells away, by their numbers among those that are left: these are numbered anew in the same order.
+    /// Takes cells away, by their numbers among the cells that are left: these are numbered anew in the same order.
     pub fn remove(&mut self, is_gone: &[bool]) {
         match self {
             Self::Cage(cage) => cage.remove(is_gone),
@@ -104,7 +104,7 @@ impl Carrier {
         }
     }
 
-    /// What the nodes have, at a material point that may be beyond them: trilinear in the cells of a cage, linear past them.
+    /// The nodes' values at a material point that may be beyond them: trilinear in the cells of a cage, linear past them.
     pub fn spread(&self, material_m: DVec3, list: &[DVec3]) -> DVec3 {
         match self {
             Self::Cage(cage) => spread_in(cage, material_m, list),
@@ -137,8 +137,8 @@ fn spread_in(cage: &Cage, at_m: DVec3, list: &[DVec3]) -> DVec3 {
 }
 
 impl SkinPoints {
-    /// Those of a body whose skin does not change with its cells: of a closed surface its points, of a sheet or a rope the vertices of the
-    /// lattice that its shape names.
+    /// The points of a body whose skin does not change with its cells: of a closed surface its points, of a sheet or a
+    /// rope the vertices of the lattice that its shape names.
     pub fn of(spec: &SoftSpec) -> Self {
         if let SoftShape::Embedded { surface, .. } = &spec.shape {
             let inward = inward_of(surface);

@@ -1,4 +1,4 @@
-//! The deformation of an element: its rotation, its principal stretches, and what a material makes of them.
+//! The deformation of an element: its rotation, its principal stretches, and the response of a material.
 //!
 //! In: the gradient F. Out: stresses and stiffness. Never here: elements, material laws. Theory: docs/theory/soft.md, eq. 12, 28–30.
 
@@ -73,7 +73,7 @@ impl Deformation {
         self.left * DMat3::from_diagonal(DVec3::from_array(response.slope)) * self.right.transpose()
     }
 
-    /// The stiffness of a unit of volume: how much stress changes with F, without what is negative of it (eq. 29, 30).
+    /// The stiffness of a unit of volume: how much stress changes with F, without its negative part (eq. 29, 30).
     pub fn stiffness(&self, response: &StretchResponse) -> [Mode; 9] {
         let StretchResponse { slope, curvature, .. } = response;
         let [l, r] = [&self.left, &self.right];
@@ -109,7 +109,7 @@ pub(super) struct Mode {
     pub shape: DMat3,
 }
 
-/// An element whose F is the same all over: what a material makes of its vertices.
+/// An element whose F is the same all over: the forces and stiffness of a material at its vertices.
 pub(super) struct ConstantStrain<'a, const N: usize> {
     pub vertices: [u32; N],
     /// Gradient of each vertex's share, 1/m.
@@ -126,8 +126,8 @@ impl<const N: usize> ConstantStrain<'_, N> {
         terms.fold(DMat3::ZERO, |f, (vertex, g)| f + outer(positions[*vertex as usize] - origin, *g))
     }
 
-    /// Adds the forces and the stiffness of `material` at these positions, of which `turn` is the rotation; block by block with what `beside` adds
-    /// between two of its vertices, N/m.
+    /// Adds the forces and the stiffness of `material` at these positions, of which `turn` is the rotation; block by block with the stiffness
+    /// `beside` between two of its vertices, N/m.
     pub fn add(
         &self,
         material: &impl Material,

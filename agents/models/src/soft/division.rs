@@ -1,6 +1,6 @@
 //! A soft body as its specification and an ε divide it, with all of its cells.
 //!
-//! In: a specification. Out: elements between nodes, the skin that others touch, what carries it. Never here: states, cells removed.
+//! In: a specification. Out: elements between nodes, the skin that others touch, its carrier. Never here: states, cells removed.
 
 use super::carrier::{Carrier, SkinPoints};
 use super::fe_mesh::FeMesh;
@@ -14,7 +14,7 @@ pub(super) struct Division {
     pub mesh: FeMesh,
     /// Its skin as others touch it.
     pub surface: SurfaceShape,
-    /// What carries it, where that is not its vertices.
+    /// The skin on its carrier, where it is not the mesh's own vertices.
     pub skin: Option<Skin>,
 }
 
@@ -35,7 +35,7 @@ impl Division {
     }
 }
 
-/// A skin with what `spec` says of its contacts.
+/// A skin with its contact traits of `spec`.
 pub(super) fn form(spec: &SoftSpec, surface: SurfaceShape) -> Arc<CollisionShape> {
     let form = CollisionShape::new(ShapeKind::Surface(surface), spec.friction);
     Arc::new(CollisionShape { traits: spec.traits, ..form })

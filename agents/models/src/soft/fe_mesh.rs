@@ -40,7 +40,7 @@ pub(super) struct FeMesh {
     /// Three vertices in a row, and the distance of the middle one from the line at rest, metres.
     pub(super) rows: Vec<([u32; 3], f64)>,
     pub(super) triangles: Vec<[u32; 3]>,
-    /// The edges of its skin; of a cage those of its cells.
+    /// The edges of its skin; of a cage the edges of its cells.
     pub(super) edges: Vec<[u32; 2]>,
     /// Pairs of vertices whose distance says how far a step bends the body, where its edges do not say all.
     pub(super) stretched: Vec<[u32; 2]>,
@@ -83,7 +83,7 @@ impl FeMesh {
     }
 
     /// Holds the nodes on a side of a cage that the surface comes as near to as half the finest ε, whatever the present one is: a coarse cage
-    /// would else be held where what it encloses is not. Where there is none, all on that side.
+    /// would else be held where the surface in it is not. Where there is none, all on that side.
     fn hold_cage(&mut self, cage: &Cage, side: Side, shape: &SoftShape) {
         let SoftShape::Embedded { surface, range_m, .. } = shape else { return };
         let ((axis, last), near_m) = (side.place(), HELD_SHARE * range_m.0);
@@ -128,7 +128,7 @@ impl FeMesh {
         mesh
     }
 
-    /// Whether anything holds it: what has no mass any more does not count.
+    /// Whether anything holds it: vertices that have lost their mass do not count.
     pub fn is_held(&self) -> bool {
         self.held.iter().zip(&self.mass_kg).any(|(held, mass)| *held && *mass > 0.0)
     }
@@ -248,7 +248,7 @@ impl FeMesh {
         all.zip(turns).for_each(|(own, turn)| *own = *turn);
     }
 
-    /// Forgets the rotations of the cells: what is followed next depends on these positions alone.
+    /// Forgets the rotations of the cells: the next ones depend on these positions alone.
     pub fn begin_turns(&mut self, positions: &[DVec3]) {
         let Self { hexahedra, kinds, tetrahedra, .. } = self;
         hexahedra.iter_mut().for_each(|cell| cell.begin_turn(&kinds[cell.kind], positions));

@@ -1,4 +1,4 @@
-//! Conjugate gradients for large solids: what a factor would take N² for, some tens of products do.
+//! Conjugate gradients for large solids: some tens of products in place of a factor's N² operations.
 //!
 //! In: the lower half of a symmetric positive definite matrix in 3 × 3 blocks, a right side, a start. Out: a solution. Never here: elements.
 //! Theory: docs/theory/soft.md, eq. 2.
@@ -7,9 +7,9 @@ use super::system::{NOT_POSITIVE, UNENDED};
 use glam::{DMat3, DVec3};
 use metachron_contact::solve::{Block, multiply};
 
-/// What is left may change no vertex by itself by more than this, m/s: a hundredth of what contacts are solved to.
+/// The residual may change no vertex by itself by more than this, m/s: a hundredth of the tolerance of contacts.
 const LEFT_M_S: f64 = 5e-8;
-/// The most products of one solution: tens for soft tissue, thousands for what is stiff and has no factor.
+/// The most products of one solution: tens for soft tissue, thousands for a stiff body without a factor.
 const PRODUCTS_MAX: u32 = 20_000;
 
 /// The storage of conjugate gradients.
@@ -27,7 +27,7 @@ pub(super) struct Gradients {
 }
 
 impl Gradients {
-    /// Moves `x` as a whole, which is all that a free fall needs; returns what that leaves of the right side of A x = `right`.
+    /// Moves `x` as a whole, which is all that a free fall needs; returns the residual of A x = `right`.
     pub fn approach(&mut self, blocks: &[Block], right: &[DVec3], x: &mut [DVec3]) -> &[DVec3] {
         let Self { left, image, alike, products, .. } = self;
         image.resize(x.len(), DVec3::ZERO);
@@ -47,7 +47,7 @@ impl Gradients {
     /// Moves `x` to the solution of A x = `right`, where A has `blocks` with those of the diagonal at these places.
     ///
     /// # Errors
-    /// What is wrong where A is found not to be positive definite, or the solution not to end.
+    /// The reason why A is found not to be positive definite, or the solution not to end.
     pub fn solve(
         &mut self,
         blocks: &[Block],
@@ -95,14 +95,14 @@ impl Gradients {
     }
 }
 
-/// What a solution leaves of the right side.
+/// The residual of a solution.
 fn measure(blocks: &[Block], right: &[DVec3], x: &[DVec3], image: &mut [DVec3], left: &mut Vec<DVec3>) {
     multiply(blocks, x, image);
     left.clear();
     left.extend(right.iter().zip(&*image).map(|(right, image)| *right - *image));
 }
 
-/// Moves all vertices alike, so that what is `left` sums to nothing: momentum is kept to rounding.
+/// Moves all vertices alike, so that the residual `left` sums to nothing: momentum is kept to rounding.
 fn shift(x: &mut [DVec3], alike: DMat3, left: &[DVec3]) {
     let by = alike * left.iter().sum::<DVec3>();
     x.iter_mut().for_each(|x| *x += by);

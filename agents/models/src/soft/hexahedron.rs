@@ -119,8 +119,8 @@ impl HexahedronKind {
     }
 }
 
-/// The dilatation of a cell as far as it is linear in the cell's coordinates: what is bilinear of it in eight corners and their modes no mode
-/// can undo, and near ν = ½ it would lock the cell.
+/// The dilatation of a cell as far as it is linear in the cell's coordinates: no mode can undo its bilinear part in eight corners and
+/// their modes, and near ν = ½ that would lock the cell.
 struct Dilatation {
     volume: f64,
     /// Σ ξ w and Σ ξ ξᵀ w over the Gauss points.
@@ -274,6 +274,6 @@ impl Hexahedron {
 #[derive(Debug, Clone, Copy)]
 pub(super) struct MeanDeformation {
     f: DMat3,
-    /// What maps a change of F to a further rotation.
+    /// The map from a change of F to a further rotation.
     firm: DMat3,
 }

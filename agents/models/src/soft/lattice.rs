@@ -1,4 +1,4 @@
-//! The lattice of a sheet or a rope as what carries a skin: which nodes move a material point.
+//! The lattice of a sheet or a rope as the carrier of a skin: which nodes move a material point.
 //!
 //! In: a shape and a spacing. Out: nodes in material coordinates, and the nodes that carry any point: a triangle's three, a piece's two.
 //! Never here: masses, elements, where anything is now. Theory: docs/theory/soft.md, eq. 23.
@@ -54,7 +54,7 @@ pub(super) struct Lattice {
     /// Length of a cell along each axis, metres; 0 along the second of a rope.
     cell_m: DVec2,
     nodes_m: Vec<DVec3>,
-    /// The number of each triangle of a sheet among those that are left; `None` where it is gone.
+    /// The number of each triangle of a sheet among the triangles that are left; `None` where it is gone.
     triangles: Vec<Option<u32>>,
 }
 
@@ -117,7 +117,7 @@ impl Lattice {
         Carried { nodes, weights }
     }
 
-    /// The number of the triangle of a sheet that a material point is in among those that are left; `None` where it is gone.
+    /// The number of the triangle of a sheet that a material point is in among the triangles left; `None` where it is gone.
     pub fn triangle_at(&self, at_m: DVec3) -> Option<usize> {
         let [along, across, _] = self.grid.cells;
         let (x, y) = (Share::of(at_m.x, self.cell_m.x, along), Share::of(at_m.y, self.cell_m.y, across.max(1)));
@@ -126,7 +126,7 @@ impl Lattice {
         self.triangles.get(2 * (x.cell * across + y.cell) + half).copied().flatten().map(|number| number as usize)
     }
 
-    /// Takes triangles of a sheet away, by their numbers among those that are left: these are numbered anew in the same order.
+    /// Takes triangles of a sheet away, by their numbers among those left, which are numbered anew in the same order.
     pub fn remove(&mut self, is_gone: &[bool]) {
         let mut left = 0..;
         for number in &mut self.triangles {

@@ -4,7 +4,7 @@
 
 use super::spec::{MaterialLaw, SoftMatter};
 
-/// What a material does at three principal stretches.
+/// The response of a material to three principal stretches.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct StretchResponse {
     /// Energy of a unit of volume at rest, J/m³.
@@ -17,7 +17,7 @@ pub(super) struct StretchResponse {
 
 /// An isotropic elastic material.
 pub(super) trait Material {
-    /// What it does at these stretches; the least is negative where matter is turned inside out.
+    /// Its response to these stretches; the least is negative where matter is turned inside out.
     fn respond(&self, stretches: [f64; 3]) -> StretchResponse;
 }
 
@@ -78,7 +78,8 @@ impl Material for Lame {
     }
 }
 
-/// Ogden's law of one term for what may be compressed and turned inside out (eq. 26); with the exponent 2 the stable Neo-Hookean one.
+/// Ogden's law of one term for matter that may be compressed and turned inside out (eq. 26); with the exponent 2 the
+/// stable Neo-Hookean one.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Ogden {
     lame: Lame,

@@ -25,7 +25,7 @@ pub(super) struct Unknowns {
     now: Vec<DVec3>,
     /// Positions at the start of the step begun, of all vertices.
     start: Vec<DVec3>,
-    /// The velocity of all vertices that answers, in sum, what the step leaves unanswered, m/s.
+    /// The velocity of all vertices that answers, in sum, the momentum that the step leaves unanswered, m/s.
     owed_m_s: DVec3,
     kept: Kept,
 }
@@ -45,14 +45,14 @@ struct Kept {
 }
 
 impl Unknowns {
-    /// Writes or reads what is known of it between steps.
+    /// Writes or reads the velocities that are known between steps.
     pub(super) fn archive(&mut self, archive: &mut Archive<'_>) -> Result<(), ArchiveError> {
         archive.value(&mut self.now)
     }
 }
 
 impl SoftBody {
-    /// Places all vertices where they are `t_s` seconds after the start of the step begun, by the velocities of those that move.
+    /// Places all vertices where they are `t_s` seconds after the start of the step begun, by the velocities of moving ones.
     fn place_after(&mut self, v: &[DVec3], t_s: f64) {
         let Self { system, positions, unknowns, .. } = self;
         positions.clone_from(&unknowns.start);
@@ -63,7 +63,7 @@ impl SoftBody {
         }
     }
 
-    /// Adds what momentum is kept to rounding by to the velocities and places at the end of a step.
+    /// Adds the velocity that keeps momentum to rounding to the velocities and places at the end of a step.
     fn pay_owed(&mut self, h_s: f64) {
         let Self { system, positions, velocities, unknowns, .. } = self;
         let owed_m_s = std::mem::take(&mut unknowns.owed_m_s);
@@ -79,7 +79,7 @@ impl SoftBody {
         unknowns.now.iter_mut().for_each(|velocity| *velocity += owed_m_s);
     }
 
-    /// The side of what is carried so.
+    /// The side of a point that is carried so.
     fn carried_side(&self, carried: &Carried) -> Side {
         let rows = self.system.rows();
         let mut terms = [SideTerm::weighted(0, 0.0); 4];

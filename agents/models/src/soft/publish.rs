@@ -20,7 +20,7 @@ impl SoftBody {
         self.write_state(into.body.soft_mut());
     }
 
-    /// Writes its vertices, and what carries them.
+    /// Writes its vertices, and the nodes that carry them.
     fn write_state(&self, into: &mut SoftState) {
         let Some(skin) = &self.skin else {
             into.positions.clone_from(&self.positions);

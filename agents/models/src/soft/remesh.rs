@@ -21,7 +21,7 @@ const BALANCE_S: f64 = 0.1;
 const BALANCE_STEPS: u32 = 8;
 const BALANCED_M: f64 = 1e-7;
 
-/// What a change of nodes keeps.
+/// The quantities that a change of nodes keeps.
 #[derive(Debug, Clone, Copy)]
 struct Kept {
     energy_j: f64,
@@ -33,7 +33,7 @@ struct Kept {
 }
 
 impl SoftBody {
-    /// The resolution of what carries its skin; `None` where its vertices are its skin.
+    /// The resolution of its skin's carrier; `None` where its vertices are its skin.
     pub(super) fn present_resolution(&self) -> Option<Resolution> {
         let skin = self.skin.as_ref()?;
         Some(Resolution { eps_m: skin.carrier.cell_m(), n: self.level })
@@ -53,7 +53,7 @@ impl SoftBody {
         }
     }
 
-    /// Moves the state onto `carrier`; what it would do to energy is undone by rest and, at last, by slower deformation.
+    /// Moves the state onto `carrier`; a change of energy by that is undone by rest and, at last, by slower deformation.
     fn move_onto(&mut self, carrier: Carrier) {
         let before = self.kept();
         let mesh = carrier.mesh(&self.spec);
@@ -102,13 +102,14 @@ impl SoftBody {
         nodes.map(of).unzip()
     }
 
-    /// By how much elastic forces accelerate the present nodes, at the nodes of another carrier, m/s²: where it rests, what bears its weight.
+    /// By how much elastic forces accelerate the present nodes, at the nodes of another carrier, m/s²: at rest the
+    /// forces that bear its weight.
     fn elastic_m_s2_at(&mut self, carrier: &Carrier) -> Vec<DVec3> {
         let weight = std::mem::take(&mut self.spec.gravity);
         self.assemble(BALANCE_S);
         self.spec.gravity = weight;
         let nodes = self.system.forces.iter().zip(&self.mesh.mass_kg).zip(&self.mesh.held);
-        // what holds a node bears it as well
+        // the hold of a node bears its weight as well
         let of = |((force, mass), held): ((&DVec3, &f64), &bool)| if *held { -weight } else { *force / *mass };
         let elastic_m_s2: Vec<DVec3> = nodes.map(of).collect();
         let Some(skin) = &self.skin else { return vec![] };
@@ -146,11 +147,11 @@ impl SoftBody {
         }
     }
 
-    /// Moves the nodes that are not held so that linear momentum is what it was, and the centre of mass and angular momentum too where none is
-    /// (eq. 18).
+    /// Moves the nodes that are not held so that linear momentum is as it was, and, where none is held, the centre of mass and angular
+    /// momentum too (eq. 18).
     fn keep_momentum(&mut self, before: &Kept) {
         if self.mesh.held.contains(&true) {
-            // what holds it takes up the difference of the centre, and gives that of momentum
+            // the hold takes up the difference of the centre, and gives that of momentum
             let missing = before.momentum - self.linear_momentum();
             let moving: f64 = self.moving().map(|(_, mass)| mass).sum();
             let by = missing / moving;
@@ -165,7 +166,7 @@ impl SoftBody {
             *v += by.at(*x);
             *x += shift;
         }
-        // what rounding of the turn leaves
+        // the rest by rounding of the turn
         let rest = (before.momentum - self.linear_momentum()) / self.mass_kg();
         self.velocities.iter_mut().for_each(|v| *v += rest);
     }
@@ -177,7 +178,7 @@ impl SoftBody {
     }
 
     /// Steps from rest until there is no more energy than `most_j`, or a step gives up none: linearly implicit Euler moves towards
-    /// equilibrium, least of all what is slow, and keeps the centre of mass of what is free.
+    /// equilibrium, least of all in slow modes, and keeps the centre of mass of a free body.
     fn relax(&mut self, most_j: f64) {
         let mut span_s = RELAX_S;
         let mut energy_j = self.energy_j();
@@ -212,7 +213,7 @@ impl SoftBody {
         solved
     }
 
-    /// Slows what moves beside the motion of the whole, and then what moves beside its centre, until there is no more energy than `most_j`;
+    /// Slows the motion beside that of the whole, and then that beside its centre, until there is no more energy than `most_j`;
     /// where nodes are held, beside the mean of the others, and then all of it (eq. 19).
     fn slow(&mut self, most_j: f64) {
         let held = self.mesh.held.contains(&true);
@@ -241,8 +242,8 @@ impl SoftBody {
         RigidMotion { velocity: self.linear_momentum() / moving, ..RigidMotion::default() }
     }
 
-    /// The motion of the whole about its centre of mass with the same linear and angular momentum, and its inertia, kg·m²; none of what is
-    /// held.
+    /// The motion of the whole about its centre of mass with the same linear and angular momentum, and its inertia,
+    /// kg·m²; none of a body that is held.
     fn rigid_motion(&self, centre: DVec3) -> (RigidMotion, DMat3) {
         if self.mesh.held.contains(&true) {
             return (RigidMotion::default(), DMat3::IDENTITY);

@@ -1,6 +1,6 @@
-//! Removal of cells of a solid or a sheet while it runs: what cutting is built upon.
+//! Removal of cells of a solid or a sheet while it runs: the ground of cutting.
 //!
-//! In: a body and which of its cells. Out: the body without them, and what went with them. Never here: what cuts.
+//! In: a body and which of its cells. Out: the body without them, and the matter in them. Never here: the cutting tool.
 //! Theory: docs/theory/soft.md, section 11.
 
 use super::body::SoftBody;
@@ -33,7 +33,7 @@ impl FeMesh {
         solid.chain(sheet.map(|element| Cell { vertices: element.vertices(), mass_kg: element.mass_kg() }))
     }
 
-    /// Removes cells of a body of `shape`; what no cell has any more is held, without mass.
+    /// Removes cells of a body of `shape`; a vertex without any cell is held, without mass.
     fn remove(&mut self, is_gone: &[bool], shape: &SoftShape, matter: &SoftMatter) {
         let mut gone = is_gone.iter().copied();
         let mut is_left = || !gone.next().unwrap_or_default();
@@ -102,7 +102,7 @@ impl SoftBody {
     }
 
     /// Removes cells by their numbers between two steps, with the triangles of the skin in them; the cells that are left are numbered anew, in the
-    /// same order. What is left moves on as it was, in as many pieces as there are; a body that has lost cells keeps its ε.
+    /// same order. The rest moves on as it was, in as many pieces as there are; a body that has lost cells keeps its ε.
     ///
     /// # Errors
     /// [`SoftError::NoCell`] for a number without a cell, [`SoftError::AllCells`] where none would be left; nothing is changed then.
@@ -135,7 +135,7 @@ impl SoftBody {
         Ok(went)
     }
 
-    /// Takes cells out of the mesh and of the skin, by their numbers among those that are left.
+    /// Takes cells out of the mesh and of the skin, by their numbers among the cells that are left.
     pub(super) fn leave_out(&mut self, is_gone: &[bool]) {
         let Self { skin, mesh, form, spec, .. } = self;
         let shape = skin.as_ref().and_then(|skin| skin.carrier.lattice()).unwrap_or(&spec.shape);

@@ -1,4 +1,4 @@
-//! Division of a flat sheet: triangles on a grid, and what bends between them.
+//! Division of a flat sheet: triangles on a grid, and bending elements between them.
 //!
 //! In: a grid and a material. Out: elements of a [`FeMesh`]. Never here: the elements themselves, sheets of any other shape.
 //! Theory: docs/theory/soft.md, section 2.
@@ -102,7 +102,7 @@ impl FeMesh {
         self.bending = bending;
     }
 
-    /// Lists anew what bends, after triangles were taken away from a sheet of `shape`.
+    /// Lists the bending elements anew, after triangles were taken away from a sheet of `shape`.
     pub fn bend_anew(&mut self, shape: &SoftShape, matter: &SoftMatter) {
         match shape {
             SoftShape::Sheet { size_m, thickness_m, .. } => {

@@ -25,7 +25,8 @@ pub(super) struct ShellBending {
 #[derive(Debug, Clone, Copy)]
 struct Fold {
     angle: f64,
-    /// By the positions of both ends of the edge, of the corner on this side and of that across it, 1/m.
+    /// Gradients by the positions of both ends of the edge, of the corner on this side and of the corner across it,
+    /// 1/m.
     slopes: [DVec3; 4],
 }
 
@@ -42,7 +43,7 @@ fn fold([a, b, c, d]: [DVec3; 4]) -> Fold {
     let along = edge / length;
     let angle = libm::atan2(-here.cross(there).dot(along), here.dot(there));
     let (by_c, by_d) = (here * (length / area), there * (length / across));
-    // what the ends take follows from where the feet of both heights are
+    // the slopes at the ends follow from where the feet of both heights are
     let shares = |point: DVec3| (point - a).dot(along) / length;
     let (at_c, at_d) = (shares(c), shares(d));
     let by_b = -(by_c * at_c + by_d * at_d);

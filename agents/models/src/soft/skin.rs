@@ -1,6 +1,6 @@
 //! The skin of a soft body: a surface or a line that moves with the nodes that carry it, and stays the same when they change.
 //!
-//! In: points, what carries them, where its nodes are. Out: where the skin is, and which nodes carry a point of it. Never here: elements,
+//! In: points, their carrier, where its nodes are. Out: where the skin is, and which nodes carry a point of it. Never here: elements,
 //! steps. Theory: docs/theory/soft.md, eq. 16, 20, 23.
 
 use super::carrier::{Carrier, SkinPoints, into_body};
@@ -9,12 +9,12 @@ use glam::{DMat3, DQuat, DVec3};
 use metachron_core::{Archive, ArchiveError, archive_values};
 use metachron_geometry::Carried;
 
-/// In how long what other nodes would have moved it by is down to 1/e, seconds: at 60 pictures a second a ninetieth of it goes with each.
+/// The time in which the jump by other nodes is down to 1/e, seconds: at 60 pictures a second a ninetieth of it goes with each.
 const EASE_S: f64 = 1.5;
-/// What is less than this is gone, metres.
+/// An offset below this is gone, metres.
 const EASED_M: f64 = 1e-6;
 
-/// A skin on what carries it.
+/// A skin on its carrier.
 pub(super) struct Skin {
     /// Positions at rest, material coordinates and directions into the body of the points.
     rest: Vec<DVec3>,
@@ -31,7 +31,7 @@ pub(super) struct Skin {
     apart: Apart,
 }
 
-/// How far the points are from where their nodes carry them: what is left of what they would have jumped by.
+/// How far the points are from where their nodes carry them: the rest of a jump that a change of nodes would have made.
 #[derive(Debug, Default, serde::Serialize, serde::Deserialize)]
 pub(super) struct Apart {
     /// Of each point, turned back to how the body lay when it began, metres; empty where nothing is left.
@@ -78,8 +78,8 @@ impl Skin {
         self.nearest = most.into_iter().map(|(point, _)| point).collect();
     }
 
-    /// Takes cells away from what carries it, whose nodes with any cell are `is_left`; returns the triangles that are left: those whose middles were
-    /// in none of these cells, and that nodes with a cell carry. The nearest cell of a cage that is left carries what was in one that is gone.
+    /// Takes cells away from its carrier, whose nodes with any cell are `is_left`; returns the triangles that are left: those whose middles were
+    /// in none of these cells, and that nodes with a cell carry. The nearest cell of a cage that is left carries the points of one that is gone.
     pub fn without_cells(&mut self, is_gone: &[bool], is_left: &[bool], triangles: &[[u32; 3]]) -> Vec<[u32; 3]> {
         let Self { material, carrier, .. } = &*self;
         let is_kept = |corners: &[u32; 3]| {
@@ -95,7 +95,7 @@ impl Skin {
         kept
     }
 
-    /// Moves the skin to where these nodes carry it, but for what it is apart from that.
+    /// Moves the skin to where these nodes carry it, but for its distance from that.
     pub fn follow(&mut self, positions: &[DVec3], velocities: &[DVec3]) {
         for (at, carried) in self.carried.iter().enumerate() {
             self.positions[at] = carried.mean(positions);
@@ -121,7 +121,7 @@ impl Skin {
         self.apart = Apart::default();
     }
 
-    /// Moves it on to where its nodes carry it, by what goes in `h` seconds (eq. 20).
+    /// Moves it on to where its nodes carry it, by the decay in `h` seconds (eq. 20).
     pub fn ease(&mut self, h: f64) {
         let left = libm::exp(-h / EASE_S);
         self.apart.by.iter_mut().for_each(|apart| *apart *= left);
@@ -153,12 +153,12 @@ impl Skin {
         &self.rest
     }
 
-    /// What carries each point of the skin.
+    /// The nodes that carry each point of the skin.
     pub fn carried(&self) -> &[Carried] {
         &self.carried
     }
 
-    /// What carries the point of the skin with these shares of three of its points.
+    /// The nodes that carry the point of the skin with these shares of three of its points.
     pub fn carried_at(&self, vertices: [u32; 3], shares: [f64; 3]) -> Carried {
         let (material_m, inward) = self.material_at(vertices, shares);
         self.carrier.carry(material_m, inward)

@@ -29,7 +29,7 @@ pub struct SoftSpec {
     pub held: Vec<Side>,
     /// Coulomb friction coefficient of its skin, ≥ 0.
     pub friction: f64,
-    /// What else it says about its contacts.
+    /// Its groups, combine rules, spin friction, and whether it is a sensor.
     pub traits: ContactTraits,
     /// Gravity, m/s².
     pub gravity: DVec3,
@@ -115,8 +115,8 @@ pub enum SoftShape {
         /// Cells across it.
         segments: u32,
     },
-    /// What a closed surface encloses, divided into a cage of cells around it. The surface moves with the cage: it is what others touch, grasp
-    /// and draw, and it stays the same when the cage is made anew at another ε.
+    /// The inside of a closed surface, divided into a cage of cells around it. The surface moves with the cage: others touch, grasp
+    /// and draw it, and it stays the same when the cage is made anew at another ε.
     Embedded {
         /// The surface in the body's own axes, metres, its triangles counter-clockwise seen from outside.
         surface: Arc<Triangles>,
@@ -182,7 +182,7 @@ pub enum SoftError {
     /// A surface has no inside.
     #[error("the surface of the soft body {why}")]
     NoInside {
-        /// What is wrong with it.
+        /// The fault of the surface, as the rest of a sentence.
         why: &'static str,
     },
     /// Tetrahedra that make no solid.
@@ -191,7 +191,7 @@ pub enum SoftError {
     /// A surface that makes no sheet.
     #[error("the surface of the sheet {why}")]
     BadSheet {
-        /// What is wrong with it.
+        /// The fault of the surface, as the rest of a sentence.
         why: &'static str,
     },
     /// The law of Ogden with this exponent pushes back less the more it is compressed.
@@ -323,7 +323,7 @@ const SKIN_LATTICE_MAX: u64 = 1_000_000;
 
 impl SoftSpec {
     /// The same body with nodes that are spaced by its ε, finest and coarsest, metres, instead of by the cells of its lattice: it begins with the
-    /// finest, and its skin is as fine as that. A box or ball becomes what its skin encloses. `None` where the finest is too fine for its
+    /// finest, and its skin is as fine as that. A box or ball becomes the inside of its skin. `None` where the finest is too fine for its
     /// size; other shapes stay as they are.
     #[must_use]
     pub fn spaced(self, range_m: (f64, f64)) -> Option<Self> {
@@ -354,7 +354,7 @@ impl SoftSpec {
 }
 
 impl SoftShape {
-    /// What the skin of a box or ball encloses, about its middle, in a cage of cells within a range; `None` where its lattice is too fine, and
+    /// The inside of the skin of a box or ball, about its middle, in a cage of cells within a range; `None` where its lattice is too fine, and
     /// for other shapes.
     #[must_use]
     pub fn embedded(&self, range_m: (f64, f64)) -> Option<Self> {

@@ -16,7 +16,7 @@ const PER_BLOCK: f64 = 18.0;
 /// How many solutions a problem that the body shares with others takes by gradients, and by factors.
 const SHARED_SOLUTIONS: f64 = 3.0;
 const SHARED_FACTORS: f64 = 2.0;
-/// What fills a volume with more vertices than this gets no factor, however stiff: its storage grows as their number to the power 4/3.
+/// A volume with more vertices than this gets no factor, however stiff: its storage grows as their number to the power 4/3.
 const FACTOR_VERTICES_MAX: usize = 3000;
 
 /// Why a step has no solution.
@@ -28,11 +28,12 @@ pub(super) const UNENDED: &str = "conjugate gradients did not end: it is too sti
 pub(super) struct System {
     factor: SparseFactor,
     gradients: Gradients,
-    /// What a factor costs, multiplications, where the vertices fill a volume and gradients may cost less: infinite for too many of them.
+    /// The cost of a factor, multiplications, where the vertices fill a volume and gradients may cost less: infinite
+    /// for too many of them.
     factor_cost: Option<f64>,
     /// Whether the last solution was made by the factor.
     by_factor: bool,
-    /// What it leaves of the right side where it is left to others to find, moving vertices alone; else empty.
+    /// The residual of a solution that is left to others to find, moving vertices alone; else empty.
     unanswered: Vec<DVec3>,
     /// The row of each vertex; none for held ones. Rows rise with the vertices.
     rows: Vec<Option<u32>>,
@@ -56,7 +57,7 @@ pub(super) struct System {
     solution: Vec<DVec3>,
 }
 
-/// Who takes a solution.
+/// The user of a solution.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Purpose {
     /// The body alone.
@@ -120,7 +121,7 @@ impl System {
         self.diagonal.iter().zip(&self.inertia_kg).map(of).fold(1.0, f64::max)
     }
 
-    /// Begins a substep: no force, no stiffness; `square` is the factor of every stiffness, h² and what damping adds to it, s².
+    /// Begins a substep: no force, no stiffness; `square` is the factor of every stiffness, h² and the part of damping, s².
     pub fn begin(&mut self, square: f64) {
         self.blocks.iter_mut().for_each(|block| block.value = DMat3::ZERO);
         self.forces.fill(DVec3::ZERO);
@@ -161,7 +162,7 @@ impl System {
     /// where others find it; held vertices stay still.
     ///
     /// # Errors
-    /// What is wrong where there is no solution.
+    /// The reason why there is no solution.
     pub fn solve(&mut self, impulses: &[DVec3], x: &mut [DVec3], purpose: Purpose) -> Result<(), &'static str> {
         self.by_factor = self.takes_factor(purpose);
         let Self { factor, gradients, unanswered, rows, moving, blocks, diagonal, right, solution, .. } = self;
@@ -192,7 +193,7 @@ impl System {
         solved
     }
 
-    /// What the last solution leaves of the right side, moving vertices alone; empty where it was solved for.
+    /// The residual of the last solution, moving vertices alone; empty where it was solved for.
     pub fn unanswered(&self) -> &[DVec3] {
         &self.unanswered
     }
@@ -212,12 +213,12 @@ impl System {
         &self.blocks
     }
 
-    /// The row of each vertex among those that move; none for held ones.
+    /// The row of each vertex among the moving ones; none for held ones.
     pub fn rows(&self) -> &[Option<u32>] {
         &self.rows
     }
 
-    /// What the last solution cost, multiplications.
+    /// The cost of the last solution, multiplications.
     pub fn work(&self) -> f64 {
         let by_products = || PER_BLOCK * self.blocks.len() as f64 * f64::from(self.gradients.products.max(1));
         self.response().map_or_else(by_products, SparseFactor::cost)

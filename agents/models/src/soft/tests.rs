@@ -1,4 +1,4 @@
-//! What a soft body must do, against closed forms.
+//! The mechanics of a soft body, against closed forms.
 
 mod beam;
 mod embedded;
@@ -189,7 +189,7 @@ fn momentum_is_kept_and_energy_never_rises_while_it_shakes() {
         let mut energy_j = body.energy_j();
         for _ in 0..200 {
             run(&mut body, 0.002, 1);
-            // one linear solve a step: what is left of the forces' curvature is far below what the step takes
+            // one linear solve a step: the rest by the forces' curvature is far below the loss of a step
             assert!(body.energy_j() <= energy_j * (1.0 + 1e-7), "{} {energy_j}", body.energy_j());
             energy_j = body.energy_j();
         }

@@ -42,7 +42,7 @@ pub struct Tool {
     pub(super) speed_m_s: f64,
     pub(super) at_rest: bool,
     pub(super) steps: u64,
-    /// What it is in a contact cluster.
+    /// Its unknowns in a contact cluster.
     pub(super) unknowns: Unknowns,
 }
 
@@ -115,7 +115,7 @@ impl Tool {
         }
     }
 
-    /// Whether jaws led by a user would close on what is near.
+    /// Whether jaws led by a user would close on a body nearby.
     pub(super) fn may_catch(&self, context: &StepContext<'_>) -> bool {
         nearest(&self.spec, self.tool.tip, context).is_some_and(|near| near.gap_m < CATCH_SHARE * self.spec.reach_m)
     }
@@ -141,8 +141,8 @@ impl Tool {
         ToolState { tip, velocity, rotation, jaw: jaw.clamp(0.0, 1.0), ..self.tool }
     }
 
-    /// The agent that open jaws may grasp or have just released: the nearest of those that are near them, or may be within two steps of
-    /// `dt_s` seconds.
+    /// The agent that open jaws may grasp or have just released: the nearest of the agents that are near them, or may
+    /// be within two steps of `dt_s` seconds.
     pub(super) fn open_for(&self, context: &StepContext<'_>, dt_s: f64) -> Option<AgentId> {
         let reach_m = self.spec.reach_m + reach().2 + 2.0 * dt_s * self.speed_m_s;
         let nearest = || nearest_of(&self.spec, self.tool.tip, context, reach_m);

@@ -13,7 +13,7 @@ use metachron_core::Inertia;
 pub(super) struct Driven {
     pub commanded: PointMotion,
     pub tip: PointMotion,
-    /// What the drive gave the tip, N·s.
+    /// The impulse of the drive on the tip, N·s.
     pub impulse_n_s: DVec3,
 }
 

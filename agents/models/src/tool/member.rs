@@ -1,6 +1,6 @@
 //! A tool in a contact cluster: its tip is a mass on a drive that follows the commanded point; its turns and its jaws are led.
 //!
-//! In: what leads it, steps, the velocity of its tip. Out: the tip's mass, its drive, its skin. Never here: contacts, the path.
+//! In: its goal, steps, the velocity of its tip. Out: the tip's mass, its drive, its skin. Never here: contacts, the path.
 //! Theory: docs/theory/coupling.md, eq. 9d; docs/theory/clusters.md, section 9.
 
 use super::Tool;
@@ -17,7 +17,7 @@ use metachron_contact::{AnchorSpring, StepContext};
 use metachron_core::{AgentId, Anchor, Archive, ArchiveError, SimSpan, SimTime, StepError, ToolState, archive_values};
 use metachron_geometry::{ContactSide, Place, PlacedShape, ShapePose};
 
-/// What it is in a cluster.
+/// Its unknowns in a cluster.
 #[derive(Debug, Clone)]
 pub(super) struct Unknowns {
     time: SimTime,
@@ -34,7 +34,7 @@ pub(super) struct Unknowns {
     led_m_s: DVec3,
     led_rad_s: DVec3,
     jaw_per_s: f64,
-    /// What the macro step may begin again from.
+    /// The state from which the macro step may begin again.
     kept: Option<Kept>,
 }
 
@@ -54,7 +54,7 @@ struct Kept {
 }
 
 impl Unknowns {
-    /// Writes or reads what is known of it between steps.
+    /// Writes or reads the state that is known between steps.
     pub fn archive(&mut self, archive: &mut Archive<'_>) -> Result<(), ArchiveError> {
         archive_values!(archive, self.time, self.hand, self.is_near, self.jaw_before, self.free, self.now)?;
         archive_values!(archive, self.led, self.led_m_s, self.led_rad_s, self.jaw_per_s)
@@ -98,7 +98,7 @@ impl Tool {
 }
 
 impl Tool {
-    /// Takes over what leads it from the start of a macro step on.
+    /// Takes over its goal from the start of a macro step on.
     pub(super) fn begin_at(&mut self, context: &StepContext<'_>) {
         let hand = context.hands.first().copied();
         let is_near = hand.is_some() && self.may_catch(context);

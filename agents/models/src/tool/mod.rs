@@ -5,7 +5,7 @@
 //!
 //! `trajectory.rs` evaluates the keyframes, `drive.rs` computes how far the tip gets there against contact, `gripper.rs` the
 //! grasp, `pivot.rs` the
-//! point that the shaft of one in a trocar passes through, `agent.rs` is the agent, `member.rs` what it is in a contact cluster.
+//! point that the shaft of one in a trocar passes through, `agent.rs` is the agent, `member.rs` its part in a contact cluster.
 
 mod agent;
 mod drive;

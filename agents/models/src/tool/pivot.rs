@@ -1,7 +1,7 @@
 //! The remote centre of motion of a tool: a fixed point that its shaft passes through wherever its tip is, as through a trocar.
 //!
 //! In: a pivot, tips, rotations. Out: tips within reach of it, rotations that put the shaft through it, how points of the tool move with
-//! the tip. Never here: what leads the tip, contacts.
+//! the tip. Never here: the goal of the tip, contacts.
 //! Theory: docs/theory/coupling.md, eq. 9f to 9h.
 
 use super::{Keyframe, ToolError, ToolSpec};
@@ -54,8 +54,8 @@ impl Pivot {
         Err(ToolError::Unreachable { index, depth_m, least_m, most_m })
     }
 
-    /// The keyframes with their rotations turned so that the shaft passes through the pivot: what is left of them is the turn about the
-    /// shaft. A rotation repeated from the keyframe before means no turn about it.
+    /// The keyframes with their rotations turned so that the shaft passes through the pivot: only the turn about the
+    /// shaft is left of them. A rotation repeated from the keyframe before means no turn about it.
     pub fn thread(&self, keyframes: &[Keyframe]) -> Vec<Keyframe> {
         let mut given = None;
         let mut from = DQuat::IDENTITY;
@@ -121,7 +121,7 @@ impl Pivot {
         tip_m_s * (1.0 + reach_m / tip.distance(self.at_m))
     }
 
-    /// Where the tip has to be for the point `local_m` of the tool, in its own axes, to be at `wanted`: what is held behind the pivot moves
+    /// Where the tip has to be for the point `local_m` of the tool, in its own axes, to be at `wanted`: a point behind the pivot moves
     /// the tip the other way, as a handle does (eq. 9h).
     pub fn tip_for(&self, tool: &ToolState, local_m: DVec3, wanted: PointMotion) -> PointMotion {
         let depth_m = tool.tip.distance(self.at_m) + local_m.z;

@@ -29,7 +29,7 @@ pub struct ToolSpec {
     /// rotations of keyframes then only turn the tool about its shaft. The pivot is on the shaft ([`ToolSpec::insertion_m`]) in every
     /// keyframe; a tip led farther away, or nearer, stops there. `None` for a tool whose rotation is led.
     pub pivot_m: Option<DVec3>,
-    /// What else it says about its contacts.
+    /// Its groups, combine rules, spin friction, and whether it is a sensor.
     pub traits: ContactTraits,
     /// Offset of the tip's start from the first keyframe, metres: it approaches its path from there as after a user spring.
     pub starts_off_m: DVec3,

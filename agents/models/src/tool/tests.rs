@@ -1,4 +1,4 @@
-//! What a tool must do: follow its script, follow a hand, catch, hold and let go.
+//! The duties of a tool: follow its script, follow a hand, catch, hold and let go.
 
 use super::{Keyframe, Tool, ToolError, ToolSpec};
 use glam::{DQuat, DVec3};

@@ -31,7 +31,7 @@ pub struct Clocked {
     pairs: Pairs,
     remotes: Remotes,
     stepper: ClusterStepper,
-    /// What it allocated in its last step.
+    /// Its allocations in its last step.
     pub allocations: u64,
 }
 
@@ -42,7 +42,7 @@ pub struct Clocks {
     scene: ClusterScene,
     /// Whether a state is seen only when its time has come, as where a step takes as long as the time that it covers.
     pub due: bool,
-    /// What partners are told instead of a state, for comparison.
+    /// A change of the states that partners see, for comparison.
     pub tamper: Option<Tamper>,
 }
 
@@ -176,7 +176,7 @@ impl Clocks {
         state
     }
 
-    /// What is on its way to an agent, N·s.
+    /// The impulse in flight to an agent, N·s.
     pub fn in_flight(&self, to: usize) -> DVec3 {
         let mut sum = DVec3::ZERO;
         for (from, one) in self.all.iter().enumerate() {

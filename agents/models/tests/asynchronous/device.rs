@@ -110,7 +110,7 @@ fn own(agent: &mut dyn Agent, shown: &mut Snapshot) {
 #[test]
 fn a_device_on_a_local_model_is_steady() {
     for young_pa in [1e4, 1e5, 1e6] {
-        // both springs share what the tip is pressed by: at rest no clock matters
+        // both springs share the press on the tip: at rest no clock matters
         let wanted_n = press(young_pa, 500.0, false, None).mean_n;
         for rate_hz in [60.0, 30.0] {
             let felt = press(young_pa, rate_hz, false, None);

@@ -11,7 +11,7 @@ fn ball(position: DVec3, velocity: DVec3, mass_kg: f64, restitution: f64) -> Rig
     RigidBody::new(RigidSpec { velocity, restitution, gravity: DVec3::ZERO, ..spec }).unwrap()
 }
 
-/// Velocities of two balls after a blow at 1 m/s, and the largest error of momentum on the way, as a share of it.
+/// Velocities of two balls after an impact at 1 m/s, and the largest error of momentum on the way, as a share of it.
 fn collide(masses_kg: [f64; 2], rates_hz: [f64; 2], restitution: f64, due: bool) -> ([f64; 2], f64) {
     let mut clocks = Clocks::new(Law::Ledger, &[]);
     clocks.due = due;

@@ -66,7 +66,7 @@ fn a_line_comes_to_rest_at_its_length_and_keeps_momentum() {
         clocks.play(4.0, |_, _| ());
         let ends = [clocks.rigid(0), clocks.rigid(1)];
         let apart = ends[0].position.distance(ends[1].position);
-        // what moved before both ends had heard of the line
+        // the motion before both ends had seen the line
         assert!((apart - rest_m).abs() < 2e-3, "{rates:?}: {apart} m for {rest_m} m");
         let drift = (ends[0].velocity + ends[1].velocity).length() * 0.2;
         // eight newtons pulled at first

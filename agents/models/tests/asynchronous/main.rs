@@ -1,4 +1,4 @@
-//! Pairs whose sides keep clocks of their own: momentum, rest, links, who computes, devices.
+//! Pairs whose sides keep clocks of their own: momentum, rest, links, the choice of the computing side, devices.
 
 mod clocks;
 mod device;

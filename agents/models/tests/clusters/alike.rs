@@ -1,4 +1,5 @@
-//! One box on the floor rests as deep and drifts as little alone, beside what bends, and in a heap; and what sticks on a skin stays.
+//! One box on the floor rests as deep and drifts as little alone, beside deformables, and in a heap; and a box that
+//! sticks on a skin stays.
 
 use crate::bodies::{block, cube, leaning, rigid, rope, sheet, solid, tube};
 use crate::table::{Placed, Table, placed};

@@ -23,7 +23,7 @@ fn five_boxes() -> Solid {
     Solid::Compound { parts: std::iter::once(top).chain(legs).collect() }
 }
 
-/// How far the axes of five boxes are above what they stand on.
+/// How far the axes of five boxes are above their ground.
 const HEIGHT_M: f64 = 0.11;
 
 #[test]

@@ -1,4 +1,4 @@
-//! What members of a cluster say of the error of their steps, against closed forms and finer steps; and that saying it changes nothing.
+//! The members' estimates of the error of their steps, against closed forms and finer steps; and that estimating changes nothing.
 
 use crate::bodies::{block, cloth, cube, rigid, rope, slab, tube};
 use crate::table::{GRAVITY, Placed, Table, placed, plane, spring};
@@ -64,7 +64,7 @@ fn a_box_that_slides_says_how_far_its_steps_lead_it_wrong() {
     }
 }
 
-/// What each body of a table says on an average that its steps lead it wrong in a tenth of a second, and how far any point of it is by then
+/// The mean estimate of each body of a table for the error of its steps in a tenth of a second, and how far any point of it is by then
 /// from where steps of a thirty-second of theirs lead it, metres.
 fn said_and_true_m(table: impl Fn() -> Table, lead: impl Fn(&mut Table)) -> Vec<[f64; 2]> {
     let mut coarse = table();
@@ -128,7 +128,8 @@ fn what_is_linked_or_gripped_says_what_finer_steps_find_to_a_factor_of_three() {
     for [said_m, true_m] in linked.iter().chain(&gripped[..1]) {
         assert!((1.0 / 3.0..3.0).contains(&(said_m / true_m)), "{said_m} of {true_m} m");
     }
-    // stiff springs take an error back within a few steps, and what a finger says takes it to last: it says up to fifty times too much
+    // stiff springs take an error back within a few steps, and the estimate of a finger takes it to last: it is up to
+    // fifty times too much
     for [said_m, true_m] in &gripped[1..] {
         assert!((1.0..60.0).contains(&(said_m / true_m)), "a finger: {said_m} of {true_m} m");
     }

@@ -30,7 +30,7 @@ fn a_skin_of_many_triangles_has_no_more_contacts_than_its_cage_tells_apart_and_s
         assert!(found.rest_m < 2e-5 && found.gain_j < 1e-6 && (found.weight - 1.0).abs() < 5e-3, "{found:?}");
     }
     assert!(finer.contacts <= 2 * fine.contacts, "{fine:?} {finer:?}");
-    // its middle has come down by 11 mm; skins of edges of 5 and of 1 mm differ by what a sagitta of the coarse one is
+    // its middle has come down by 11 mm; skins of edges of 5 and of 1 mm differ by a sagitta of the coarse one
     let sunk_m = |found: Findings| RADIUS_M - found.lowest_m;
     assert!((sunk_m(finer) / sunk_m(coarse) - 1.0).abs() < 0.01, "{coarse:?} {finer:?}");
 }

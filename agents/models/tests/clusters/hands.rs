@@ -1,4 +1,5 @@
-//! Springs of the user on bodies in a cluster: where they lead them, what they carry, that no stiffness throws a body.
+//! Springs of the user on bodies in a cluster: where they lead them, the load they carry, that no stiffness throws a
+//! body.
 
 use crate::bodies::rigid;
 use crate::table::{GRAVITY, Table, placed, plane};

@@ -43,7 +43,7 @@ fn a_heap_of_a_thousand_contacts_rests_where_a_small_one_does() {
         let layer = (k / wide / wide) as f64;
         let at =
             DVec3::new(0.0605 * (k % wide) as f64, 0.0605 * (k / wide % wide) as f64, HALF_M * (1.0 + 2.0 * layer));
-        // a column of three sinks by what rapier3d allows
+        // a column of three sinks by as much as rapier3d allows
         assert!((place - at).length() < 2e-4 && velocity.length() < 1e-3, "box {k}: {place}, not {at}; {velocity} m/s");
     }
 }

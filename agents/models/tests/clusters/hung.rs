@@ -1,4 +1,4 @@
-//! A ball of 2 kg that hangs on everything that can hold it: what tears and what yields is asked of it.
+//! A ball of 2 kg that hangs on everything that can hold it: tests of tearing and of yielding.
 
 use crate::bodies::rigid;
 use crate::table::{GRAVITY, Table, placed, spring};
@@ -51,14 +51,14 @@ pub const ALL: [Held; 10] = [
     Held::Link { rest_m: 0.0 },
 ];
 
-/// The forces above which what holds tears and yields, N.
+/// The forces above which the hold tears and yields, N.
 #[derive(Debug, Clone, Copy)]
 pub struct Limits {
     pub tears_above_n: f64,
     pub yields_above_n: f64,
 }
 
-/// The ball, at rest in the origin with its spring stretched by its weight, held by what gives way above some force.
+/// The ball, at rest in the origin with its spring stretched by its weight, on a hold that gives way above some force.
 pub fn hung(held: Held, limits: Limits) -> Table {
     let Limits { tears_above_n, yields_above_n } = limits;
     let weight = ball(DVec3::ZERO, MASS_KG, GRAVITY);
@@ -98,8 +98,8 @@ pub fn check_hangs(limits: Limits) {
     }
 }
 
-/// A tube of 0.2 m that hangs along all of its length, begins at rest with its attachment slack by this much, and sags by 1 mm below that; what
-/// its attachment bears follows from its weight.
+/// A tube of 0.2 m that hangs along all of its length, begins at rest with its attachment slack by this much, and sags by 1 mm below that; the
+/// load of its attachment follows from its weight.
 pub fn mesentery(slack_m: f64, limits: impl Fn(f64) -> Limits) -> Table {
     let material = Material { young_pa: 1e6, poisson: 0.3, density_kg_m3: 1000.0, shear_factor: 0.9 };
     let section = Section::hollow(0.01, 0.01, material);

@@ -233,7 +233,7 @@ fn a_bracket_holds_a_weight_beside_it() {
         table.step();
     }
     let RigidState { position, rotation, .. } = state(&table, 0);
-    // it gives way by a fifth of what contacts rest in, as far as it turns at 0.1 m too
+    // it gives way by a fifth of the depth of contacts, as far as it turns at 0.1 m too
     assert!(position.distance(DVec3::X * 0.1) < 1e-5, "{position}");
     assert!(rotation.to_scaled_axis().length() < 1e-5, "{rotation}");
 }
@@ -293,7 +293,7 @@ fn a_body_on_a_slide_falls_along_it_and_stops_at_its_end() {
     let rotation = DQuat::from_rotation_y(slope);
     let axis = rotation * DVec3::X;
     let built = |range_m| {
-        // the world is b: it lies behind a by what a has slid, against a's own axis
+        // the world is b: it lies behind a by the way that a has slid, against a's own axis
         let kind = JointKind::Prismatic { axis: DVec3::NEG_X * 2.0, range_m, motor: None };
         let tilted = RigidSpec { rotation, ..block(DVec3::splat(0.1), DVec3::ZERO, 1.0) };
         party([tilted.clone()], [on_world(kind).at_rest_in(rotation, DQuat::IDENTITY)], 100.0)

@@ -74,7 +74,7 @@ fn a_light_rod_between_springs_that_pull_hard_does_not_begin_to_swing() {
         for step in 0..300 {
             table.step();
             let (linear, angular) = table.bodies[0].agent.momentum();
-            // what it began with: 3.3e-6 kg m²/s
+            // its start: 3.3e-6 kg m²/s
             let own = angular - table.middle(0).0.cross(linear);
             assert!(own.length() < 6e-6 && linear.length() < 1e-9, "rest {rest_m}, step {step}: {own} {linear}");
         }

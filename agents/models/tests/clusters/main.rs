@@ -1,4 +1,4 @@
-//! Contact clusters of real bodies: what rests on what, how deep, and what it weighs. Reference: exact weights, energy, docs/theory/clusters.md.
+//! Contact clusters of real bodies: their supports, depths and loads. Reference: exact weights, energy, docs/theory/clusters.md.
 
 mod alike;
 mod bodies;

@@ -39,7 +39,8 @@ fn a_motor_holds_a_level_rod_by_a_torque_that_is_its_weights_and_by_no_less() {
     for rate_hz in [60.0, 1000.0] {
         let mut held = level(hinge(MotorGoal::Velocity(0.0), 1.0001 * LEVEL_N_M), rate_hz);
         step_for(&mut held, 1.0, |_| {});
-        // what slips in the first step, whose load is new to it, comes back as fast as a ten-thousandth of the torque lifts it
+        // the slip in the first step, whose load is new to it, comes back as fast as a ten-thousandth of the torque
+        // lifts the rod
         assert!((angle(&held) - FRAC_PI_2).abs() < 5e-4, "{} rad at {rate_hz} Hz", angle(&held) - FRAC_PI_2);
         let short = 0.01;
         let mut falls = level(hinge(MotorGoal::Velocity(0.0), (1.0 - short) * LEVEL_N_M), rate_hz);
@@ -127,7 +128,7 @@ fn a_limit_stops_a_rod_with_no_energy_gained() {
         step_for(&mut table, 2.0, |table| {
             let energy = table.energy_j();
             assert!(energy < start + 1e-9, "{energy} J of {start} J");
-            // in flight a published energy is first order in the step: what is compared are rests
+            // in flight a published energy is first order in the step: rests are compared
             if state(table, 0).spin.length() < 1e-6 {
                 gained = gained.max(energy - least);
                 least = least.min(energy);

@@ -1,4 +1,4 @@
-//! The organ of the scene `organ` under a probe and a ball: how far its surface is from that of a finer cage, and what it says of that.
+//! The organ of the scene `organ` under a probe and a ball: how far its surface is from that of a finer cage, and its estimate of that.
 
 use crate::bodies::rigid;
 use crate::table::{GRAVITY, Table, placed};
@@ -11,7 +11,7 @@ use metachron_models::rigid::{RigidBody, RigidSpec};
 use metachron_models::soft::{MaterialLaw, Side, SoftBody, SoftMatter, SoftShape, SoftSpec};
 use std::sync::Arc;
 
-/// Where the probe presses and the ball lies, above the bed, metres.
+/// Where the probe presses and the ball rests, above the bed, metres.
 const PROBED: DVec3 = DVec3::new(0.06, -0.01, 0.042);
 const BALL: DVec3 = DVec3::new(-0.04, 0.0, 0.092);
 /// The finest cage of these tests, metres.
@@ -84,7 +84,7 @@ fn what_an_organ_says_of_its_error_is_what_its_surface_is_off_by_under_a_probe_a
         assert!(nodes >= 500, "ε {eps_m}: {nodes} nodes");
         for place in [PROBED, BALL] {
             let beside = |at: &DVec3| (*at - place).truncate().length();
-            // what is seen from above
+            // the part that is seen from above
             let above = fine.surface.iter().zip(&surface).filter(|(at, _)| at.z > 0.025);
             let (at, there) = above.min_by(|(a, _), (b, _)| beside(a).total_cmp(&beside(b))).unwrap();
             let off_m = at.distance(*there);

@@ -66,7 +66,7 @@ fn a_strip_that_folds_lies_on_itself_in_layers() {
 }
 
 /// A horseshoe of matter, its lower leg held, in a cage: a plate presses its legs together. Its slot is wider than the edges of its skin:
-/// what is nearer than one at rest counts as one.
+/// places nearer than one at rest count as one.
 #[test]
 fn the_legs_of_a_horseshoe_meet_and_bear() {
     let surface = slotted();

@@ -1,4 +1,4 @@
-//! What goes far in a step meets what is on its way, is not held by what is beside it, and does not pass through itself.
+//! A fast body meets the bodies on its way, is not held by those beside it, and does not pass through itself.
 
 use crate::bodies::{cloth, rigid, sheet, solid, tube};
 use crate::table::{GRAVITY, Placed, Table, placed};
@@ -27,7 +27,7 @@ fn lowest_m(table: &mut Table) -> f64 {
     places.iter().map(|at| at.z).fold(f64::INFINITY, f64::min)
 }
 
-/// Whether the bullet is still above what it flew at, 0.1 s later, at each pair of rates.
+/// Whether the bullet is still above its target, 0.1 s later, at each pair of rates.
 fn stays_above(name: &str, target: impl Fn() -> Placed, speed_m_s: f64) {
     for rates in [(30.0, 240.0), (240.0, 60.0), (60.0, 60.0), (240.0, 240.0), (1000.0, 1000.0)] {
         let mut table = Table::among(vec![target(), bullet(0.5, speed_m_s)], &[]).at_rates(rates.0, rates.1);

@@ -1,4 +1,4 @@
-//! A model of a user's own, by the contracts of agents and members alone: what it takes to be touched.
+//! A model of a user's own, by the contracts of agents and members alone: all that it needs to be touched.
 
 use glam::{DMat3, DQuat, DVec3};
 use metachron_contact::member::{ClusterMember, Role};
@@ -46,7 +46,8 @@ impl Plate {
         }
     }
 
-    /// What lies on a plate of this mass whose middle is at `height_m`, N: what its spring bears beyond its own weight.
+    /// The load on a plate of this mass whose middle is at `height_m`, N: the force of its spring beyond its own
+    /// weight.
     pub fn felt_n(height_m: f64, mass_kg: f64) -> f64 {
         -STIFFNESS_N_M * height_m - mass_kg * GRAVITY_M_S2
     }
@@ -125,7 +126,7 @@ impl Agent for Plate {
             velocity: self.velocity[0],
             ..RigidState::default()
         });
-        // where it may be met: without bounds nobody looks for it
+        // where it may be met: without bounds no search finds it
         let (low, high) = (self.start - self.half_m, self.start + self.half_m);
         into.bounds = Some(Bounds { low, high, speed_m_s: self.velocity[0].length() });
     }

@@ -1,4 +1,4 @@
-//! Balls that bounce, against the closed form: heights e²ⁿ h, speeds after a blow by momentum and restitution.
+//! Balls that bounce, against the closed form: heights e²ⁿ h, speeds after an impact by momentum and restitution.
 
 use crate::bodies::rigid;
 use crate::table::{GRAVITY, Table, placed};
@@ -21,7 +21,7 @@ fn tops(table: &mut Table, body: usize, count: usize) -> Vec<f64> {
         let (_, before) = table.middle(body);
         let (_, dt_s) = table.step();
         let (place, after) = table.middle(body);
-        // what a blow sends up may come down again within the step
+        // a body sent up by an impact may come down again within the step
         rising |= after.z > before.z + GRAVITY.z * dt_s + 1e-6;
         if rising && after.z <= 0.0 {
             // the top lies within the step: from the state at its end
@@ -91,7 +91,7 @@ fn a_ball_rebounds_off_a_box_that_lies_as_off_the_ground() {
             for (bounce, top_m) in (1..).zip(tops(&mut table, 1, 5)) {
                 let (top_m, exact_m) = (top_m - 2.0 * half_m, restitution.powi(2 * bounce) * HEIGHT_M);
                 if exact_m < 2e-3 {
-                    break; // what flies for little more than a step
+                    break; // it flies for little more than a step
                 }
                 let (off, here) = (top_m / exact_m - 1.0, format!("e {restitution}, {rate_hz} Hz, bounce {bounce}"));
                 // never above: box and ball give way by micrometres a second
@@ -196,7 +196,7 @@ fn a_pile_of_boxes_that_rebound_comes_to_rest() {
     let mut table = Table::among(boxes.collect(), &[floor(0.5)]);
     let found = table.play(3.0);
     assert!(found.steps < 16 * 180, "{found:?}");
-    // half a hundredth of what falls, 1.3 J: what came too deep for a moment is pushed out
+    // half a hundredth of the energy of the fall, 1.3 J: bodies that came too deep for a moment are pushed out
     assert!(found.gain_j < 6.5e-3, "{found:?}");
     assert!(found.rest_m < 5e-5 && found.lowest_m > 0.9 * half_m, "{found:?}");
     assert!((found.weight - 1.0).abs() < 1e-2, "{found:?}");
@@ -281,7 +281,7 @@ fn rough_boxes_that_collide_make_no_energy_and_keep_their_momentum() {
             deepest_m = deepest_m.max(report.depth_m);
             rebounds += u32::from(report.solves > 0);
             let now_j = table.energy_j();
-            // a push-out of what is in each other adds some
+            // a push-out of overlapping bodies adds some
             assert!(now_j < least_j + 1e-3 * least_j, "seed {seed}: {now_j} J after {least_j} J");
             least_j = least_j.min(now_j);
         }

@@ -122,7 +122,7 @@ const ROLLS: [&str; 4] = [
 /// How long each plays, seconds.
 pub const SECONDS: f64 = 1.5;
 
-/// What does not hold of what should: how deep bodies land and lie, what they weigh, how much energy they make.
+/// The faults of a run: in how deep bodies land and rest, in their weight, in the energy that they make.
 pub fn faults(name: &str, found: &Findings) -> Vec<&'static str> {
     let (is_blow, rolls) = (name.contains("1 m/s"), ROLLS.contains(&name));
     let landing_m = if is_blow { 4e-4 } else { 3.5e-4 };

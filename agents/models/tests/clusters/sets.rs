@@ -1,4 +1,4 @@
-//! Three sets of scenes in which nothing was chosen because it works: pairs, bodies that tip over what they lie on, piles of boxes.
+//! Three sets of scenes in which nothing was chosen because it works: pairs, bodies that tip over their ground, piles of boxes.
 
 use crate::bodies::{block, matter, rigid, rope, sheet, solid, tube, turned};
 use crate::stacks::{Draw, Outcome, play};
@@ -25,7 +25,8 @@ pub struct Verdict {
     /// The deepest overlap, and in the last tenth of a second, metres.
     pub deepest_m: f64,
     pub end_m: f64,
-    /// The energy above its running minimum, J, and above which of it some was made: 0.1 J and a hundredth of what was there.
+    /// The energy above its running minimum, J, and above which of it some was made: 0.1 J and a hundredth of the
+    /// energy at the start.
     pub gain_j: f64,
     allowed_j: f64,
     /// Whether a body is higher at the end than all of them on each other, or under the floor.

@@ -8,7 +8,7 @@ use metachron_models::rigid::{RigidBody, RigidSpec};
 use metachron_models::soft::{Side, SoftBody, SoftMatter, SoftSpec};
 
 const SLOPE_RAD: f64 = 0.21;
-/// How far all start above what they slide on, metres.
+/// How far all start above their slope, metres.
 const START_M: f64 = 1e-4;
 /// The friction of all bodies.
 const OWN: f64 = 0.5;

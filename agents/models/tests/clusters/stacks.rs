@@ -114,7 +114,7 @@ fn tilted(
     placed(RigidBody::new(RigidSpec { rotation, ..spec }).unwrap(), false)
 }
 
-/// What is wrong with a stack after two seconds.
+/// The faults of a stack after two seconds.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub struct Faults {
     /// Deeper than 8 mm ever, or than 4 mm in the last tenth of a second.

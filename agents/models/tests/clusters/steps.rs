@@ -1,4 +1,4 @@
-//! What the length of steps does: errors fall with it, and steps of changing length are harmless.
+//! The effect of the length of steps: errors fall with it, and steps of changing length are harmless.
 
 use crate::bodies::{block, cloth, cube, solid, tube};
 use crate::scenes::scene;
@@ -33,7 +33,7 @@ fn errors_fall_with_the_length_of_steps() {
         sum / pair[0].len() as f64
     };
     let changes: Vec<f64> = paths.windows(2).map(apart).collect();
-    // implicit Euler is of first order; what bounces on a soft block is a little off it (measured: order 0.84)
+    // implicit Euler is of first order; bounces on a soft block are a little off it (measured: order 0.84)
     assert!(changes.windows(2).all(|pair| pair[1] < pair[0] / 1.6), "{changes:?}");
 }
 
@@ -128,7 +128,7 @@ fn a_tube_that_nothing_touches_is_moved_by_its_own_integrator() {
         let mut table = Table::among(vec![placed(Tube::new(spec).unwrap(), true)], &[]).at_rates(240.0, 240.0);
         let start_j = table.energy_j();
         table.play(0.5);
-        // what it falls by, from level to hanging
+        // the height of its fall, from level to hanging
         (start_j - table.energy_j()) / (table.bodies[0].agent.mass_kg() * -GRAVITY.z * 0.1)
     };
     let (kept, damped) = (lost(Integrator::EnergyMomentum), lost(Integrator::ImplicitEuler));

@@ -1,4 +1,4 @@
-//! A table on which bodies are put and stepped as one cluster, and what is measured of them.
+//! A table on which bodies are put and stepped as one cluster, and measurements of them.
 
 use glam::{DQuat, DVec3};
 use metachron_contact::constraint::FailedAttachment;
@@ -37,7 +37,7 @@ pub struct Table {
     pub strangers: Vec<Neighbour>,
     /// How long the last macro step was, seconds.
     last_s: f64,
-    /// What the stepper allocated in it.
+    /// The stepper's allocations in it.
     pub allocations: u64,
     /// Repeats every step in halves, where there is one.
     pub doubling: Option<StepDoubling>,
@@ -46,7 +46,7 @@ pub struct Table {
     snapshot: Snapshot,
 }
 
-/// What a run showed.
+/// The results of a run.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct Findings {
     /// The deepest overlap before and within the last half second, metres.
@@ -54,7 +54,7 @@ pub struct Findings {
     pub rest_m: f64,
     /// The energy above its running minimum, J.
     pub gain_j: f64,
-    /// What the floor, or what is held, bears in the last half second, in weights of all that is free.
+    /// The load on the floor, or on held bodies, in the last half second, in weights of all free bodies.
     pub weight: f64,
     pub steps: u32,
     pub factors: u32,
@@ -140,22 +140,22 @@ impl Table {
         &self.bodies[body].grips
     }
 
-    /// What a body has sensed, or what has sensed it.
+    /// The touches of a sensor, or of a body with sensors.
     pub fn sensed(&self, body: usize) -> &[SensorTouch] {
         self.bodies[body].memory.sensed()
     }
 
-    /// What tore in the last macro step.
+    /// The attachments that tore in the last macro step.
     pub fn torn(&self) -> &[FailedAttachment] {
         self.stepper.torn()
     }
 
-    /// What began to yield in the last macro step.
+    /// The attachments that began to yield in the last macro step.
     pub fn yielded(&self) -> &[FailedAttachment] {
         self.stepper.yielded()
     }
 
-    /// What all bodies have published, as each other sees it.
+    /// The published states of all bodies, as each other sees them.
     fn published(&self) -> Vec<Neighbour> {
         let of = |(id, body): (u32, &Placed)| {
             let mut snapshot = Snapshot { time: self.time, ..Snapshot::default() };
@@ -283,7 +283,7 @@ impl Table {
         self.bodies[body].agent.member().unwrap().anchor(anchor).unwrap().position
     }
 
-    /// The upward impulse of the last macro step by the floor, or by what is held.
+    /// The upward impulse of the last macro step by the floor, or by held bodies.
     fn borne_n_s(&self) -> f64 {
         let holds = self.bodies.iter().any(|body| body.held);
         let of = |total: &PairTotal| {

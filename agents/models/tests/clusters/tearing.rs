@@ -12,7 +12,7 @@ use metachron_contact::{AnchorSpring, Link};
 use metachron_core::{AgentId, Anchor, Resolution};
 use metachron_models::rigid::RigidSpec;
 
-/// The ball held by what tears above some force.
+/// The ball on a hold that tears above some force.
 fn hung(held: Held, tears_above_n: f64) -> Table {
     hung::hung(held, Limits { tears_above_n, yields_above_n: f64::INFINITY })
 }
@@ -183,7 +183,7 @@ fn a_tube_hangs_by_its_attachment_below_the_tearing_force_and_falls_above_it() {
         assert!(table.time.as_secs_f64() < 1.0, "it holds");
     };
     assert_eq!((torn.member, torn.other, torn.partner), (0, None, Partner::Attachment(0)));
-    // its weight, and what slows it down
+    // its weight, and the force that slows it down
     assert!((torn.force_n - given_n).abs() < 1e-9 * weight_n, "{} N is not {given_n} N", torn.force_n);
     assert!(torn.force_n > 0.9 * weight_n && torn.force_n < 1.05 * weight_n, "{} of {weight_n} N", torn.force_n);
     // it falls from that moment on, and goes on falling once it is divided anew

@@ -1,4 +1,4 @@
-//! Tools and led bodies in clusters: what a drive presses with, what jaws hold, what a led body pushes.
+//! Tools and led bodies in clusters: the press of a drive, the hold of jaws, the push of a led body.
 
 use crate::bodies::{block, cube, rigid, sheet};
 use crate::table::{GRAVITY, Table, placed, spring};
@@ -265,7 +265,7 @@ fn a_led_body_pushes_a_box_at_exactly_its_speed() {
         let friction = -table.given_n_along(0, Partner::Static(0), DVec3::X);
         let [pressure, held] = [Partner::Static(0), Partner::Agent(AgentId(1))].map(|by| table.given_n(0, by));
         let weight = 0.3 * -GRAVITY.z;
-        // where it sticks to the pusher that may bear a part of the weight, or press it down: the blow decides
+        // where it sticks to the pusher that may bear a part of the weight, or press it down: the impact decides
         assert!((pressure + held - weight).abs() < 2e-3 * weight, "{rates:?}: {pressure} N and {held} N of {weight} N");
         assert!(
             (friction - 0.5 * pressure).abs() < 2e-3 * weight,

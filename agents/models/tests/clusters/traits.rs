@@ -1,4 +1,4 @@
-//! What bodies and static solids say about their contacts: groups, rules of pairs, sensors, friction about normals. Against closed forms.
+//! The contact traits of bodies and static solids: groups, rules of pairs, sensors, friction about normals. Against closed forms.
 
 use crate::bodies::{rigid, solid};
 use crate::joints::{G, state};
@@ -141,7 +141,7 @@ fn a_ball_rebounds_by_the_restitution_that_its_pairs_rule_makes() {
     }
 }
 
-/// What a body has sensed of one partner, after some seconds.
+/// The touch of a body with one partner that senses it or that it senses, after some seconds.
 fn sensed(table: &mut Table, body: usize, with: ContactPartner, seconds: f64) -> SensorTouch {
     table.play(seconds);
     let found: Vec<_> = table.sensed(body).iter().filter(|touch| touch.with == with).collect();
@@ -266,10 +266,10 @@ fn a_ball_that_rebounds_loses_spin_by_each_blow_and_none_in_flight() {
     };
     let mut table = at_rate(Table::among(vec![body(spec)], &[floor(ContactTraits::default())]), 240.0);
     let fall_s = (2.0 * height_m / G).sqrt();
-    // a blow of 2 m v has a torque of μ r of it
+    // an impact of 2 m v has a torque of μ r of it
     let by_blow = 0.5 * spin_radius_m * 2.0 * G * fall_s / (0.4 * radius_m * radius_m);
     for blows in 0..3 {
-        // in the middle of the flight before the next blow, and a little later
+        // in the middle of the flight before the next impact, and a little later
         for later_s in [0.0, 0.3 * fall_s] {
             table.play(2.0 * f64::from(blows) * fall_s + later_s);
             let (now, wanted) = (state(&table, 0).spin.z, spin - f64::from(blows) * by_blow);
@@ -282,7 +282,8 @@ fn a_ball_that_rebounds_loses_spin_by_each_blow_and_none_in_flight() {
 fn what_spins_on_a_plate_gives_it_all_the_spin_that_it_loses() {
     let traits = ContactTraits { spin_radius_m: 0.02, ..ContactTraits::default() };
     let disc = Solid::Cylinder { radius_m: 0.1, half_height_m: 0.01 };
-    // without gravity a ball that is pressed on nothing keeps its spin: here it lies on a plate that lies without friction
+    // without gravity a ball that is pressed on nothing keeps its spin: here it rests on a plate that rests without
+    // friction
     let plate = RigidSpec { friction: 0.5, ..rigid(disc, DVec3::Z * 0.01, 2.0) };
     let top = RigidSpec { spin: DVec3::Z * 10.0, traits, ..ball(0.05, DVec3::Z * 0.07) };
     let smooth = Obstacle { friction: 0.0, ..floor(ContactTraits::default()) };

@@ -56,7 +56,7 @@ fn slip_m([short_m, long_m]: [f64; 2], bar_m: f64, friction: f64) -> f64 {
     path_m.extend([DVec3::new(reach_m, 0.0, -0.5 * long_m), DVec3::new(reach_m, 0.0, -long_m)]);
     // damped, so that the jerk of a start without tension does not decide
     let mut spec = TubeSpec { damping_per_s: 20.0, ..spec(path_m, 80, friction) };
-    // limp: what it costs to bend onto the bar is a thousandth of its weight
+    // limp: the energy of its bend onto the bar is a thousandth of its weight's
     (spec.section.ei_n_m2, spec.section.gj_n_m2) = (1e-5, 1e-5);
     let end = Anchor::Arc(Tube::new(spec.clone()).unwrap().length_m());
     let mut table = table(spec, bar);

@@ -72,7 +72,8 @@ fn pressure_stiffens_a_tube_against_flattening() {
         / (1.0 - MATERIAL.poisson.powi(2))
         / (RADIUS_M - 0.5 * wall_m).powi(3);
     let [soft_m, _] = pressed(|x_m| giving(x_m, wall_m), mass_kg);
-    // what resists is 9π E'I/R³ + 3π p: as much again at the pressure 3 E'I/R³ that would collapse the ring from outside
+    // the resistance is 9π E'I/R³ + 3π p: as much again at the pressure 3 E'I/R³ that would collapse the ring from
+    // outside
     let pressure_pa = 2.0 * ring_pa;
     let [stiff_m, _] = pressed(|x_m| TubeSpec { pressure_pa, ..giving(x_m, wall_m) }, mass_kg);
     let widened_m =

@@ -11,7 +11,7 @@ use metachron_contact::{AnchorSpring, Link};
 use metachron_core::{AgentId, Anchor, Resolution, Snapshot};
 use metachron_models::rigid::RigidSpec;
 
-/// The ball held by what yields above some force.
+/// The ball on a hold that yields above some force.
 fn hung(held: Held, yields_above_n: f64) -> Table {
     hung::hung(held, Limits { yields_above_n, tears_above_n: f64::INFINITY })
 }
@@ -98,7 +98,8 @@ fn what_yields_keeps_momentum_and_turns_with_the_body_that_it_slipped_on() {
         table.step();
     }
     assert!(momentum(&table).distance(before) < 1e-9, "{} N s", momentum(&table) - before);
-    // m ω² r = 0.12 N below the bound: it goes round, farther out than it began by what 0.5 − 0.12 N take to stop it
+    // m ω² r = 0.12 N below the bound: it goes round, farther out than it began by the way in which 0.5 − 0.12 N stop
+    // it
     let (place, velocity) = table.middle(0);
     let (radius_m, out_m_s) = (place.length(), velocity.dot(place.normalize()));
     assert!(radius_m > 0.303 && radius_m < 0.312, "{radius_m} m");
@@ -171,7 +172,7 @@ fn a_tube_hangs_by_its_attachment_below_the_yield_force_and_slides_down_above_it
         let mut table = mesentery(1.1, slack_m);
         while table.time.as_secs_f64() < 2.0 {
             table.step();
-            // what falls on it slips a little before it hangs
+            // a tube that falls on it slips a little before it hangs
             assert!(slack_m > 0.0 || table.yielded().is_empty());
         }
         let z = table.middle(0).0.z;
@@ -206,7 +207,7 @@ fn an_attachment_that_yields_where_it_is_pulled_holds_beside_that() {
     let mut table = mesentery(1.5, 0.0);
     let weight_n = table.bodies[0].agent.mass_kg() * G;
     let start = table.middle(0).0;
-    // a hand takes one end down, with less than what would take all of it, and lets it go
+    // a hand takes one end down, with a force below the yield of the whole, and lets it go
     let (anchor, target) = (Anchor::Arc(0.2), DVec3::new(0.2, 0.0, -0.04));
     let hand = AnchorSpring {
         by: None,

@@ -29,7 +29,7 @@ pub struct Case {
     pub model: Model,
     pub agents: usize,
     pub priority: Priority,
-    /// Mean rate of an agent; far above what the machine can do where the case is unpaced.
+    /// Mean rate of an agent; far above the rate that the machine can hold where the case is unpaced.
     pub rate_hz: f64,
 }
 

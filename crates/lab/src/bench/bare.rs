@@ -1,7 +1,7 @@
 //! The same steps without agents around them: a lower bound for the cost of a step.
 //!
-//! In: a model, a number, a rate. Out: CPU time per step, of a loop that never sleeps, of one that sleeps to the same due times
-//! as the agents do, and of as many threads that each do. Never here: the runtime.
+//! In: a model, a number, a rate. Out: CPU time per step, of a loop that never sleeps, of a loop that sleeps to the
+//! same due times as the agents do, and of as many threads that each do. Never here: the runtime.
 
 use super::cast::{Model, agent, rate_hz};
 use super::machine::own_cpu;

@@ -26,7 +26,7 @@ use metachron_console::exit::Exit;
 /// Runs a benchmark.
 ///
 /// # Errors
-/// What kept it from ending: bad input, a file that cannot be written, an adapter that failed.
+/// Bad input, a file that cannot be written, an adapter that failed.
 pub fn command(args: &BenchArgs) -> anyhow::Result<Exit> {
     match args.subject {
         BenchSubject::Agents => subject::run::<shown::Agents>(args),

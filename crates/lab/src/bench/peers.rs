@@ -1,4 +1,4 @@
-//! What another engine takes for the same tests, as its script wrote it.
+//! The costs of another engine in the same tests, as its script wrote them.
 //!
 //! In: a JSON file (a script of `python/peers` writes one). Out: its rows. Never here: our own measurements, which numbers a row has.
 
@@ -38,7 +38,7 @@ impl<R: PeerRow> Peers<R> {
     /// Reads a file whose rows are for tests of these names.
     ///
     /// # Errors
-    /// A sentence that names the file, the place in it, and what was expected there.
+    /// A sentence that names the file, the place in it, and the value that was expected there.
     pub(super) fn read(path: &Path, tests: &[&str]) -> anyhow::Result<Self> {
         let shown = path.display();
         let file = std::fs::File::open(path).map_err(|error| BadInput(format!("{shown} cannot be read: {error}")))?;

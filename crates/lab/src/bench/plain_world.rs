@@ -11,7 +11,7 @@ use rapier3d::geometry::{ColliderBuilder, SharedShape};
 use rapier3d::parry::math::{Pose, Rotation, Vec3};
 use rapier3d::pipeline::PhysicsWorld;
 
-/// What a world is made with.
+/// The settings that a world is made with.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Frame {
     pub settings: Settings,
@@ -28,7 +28,7 @@ pub(super) struct Frame {
 pub(super) enum Settings {
     /// rapier3d's defaults; only the size of the bodies is set.
     Own,
-    /// Those by which columns of six boxes of 0.2 m sink by 0.1 mm instead of 8.7 (docs/throughput.md).
+    /// Settings by which columns of six boxes of 0.2 m sink by 0.1 mm instead of 8.7 (docs/throughput.md).
     Careful,
 }
 

@@ -1,4 +1,4 @@
-//! Bodies that are stepped as one cluster, step by step on this thread, and what their steps take.
+//! Bodies that are stepped as one cluster, step by step on this thread, and the cost of their steps.
 //!
 //! In: bodies, static solids, joints, the length of a step. Out: CPU time of each step, contacts, states. Never here: which bodies.
 
@@ -14,7 +14,7 @@ use metachron_core::{AgentId, Body, Grip, PlainLoop, SimSpan, SimTime, Snapshot}
 use metachron_geometry::Obstacle;
 use std::time::Duration;
 
-/// What a series of steps took.
+/// The cost of a series of steps.
 pub(super) struct Series {
     /// CPU milliseconds of each step, in rising order.
     ms: Vec<f64>,

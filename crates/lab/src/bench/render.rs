@@ -93,7 +93,7 @@ const fn name(shading: Shading) -> &'static str {
     }
 }
 
-/// What the objects of a picture are drawn as.
+/// The name of the primitive that the objects of a picture are drawn as.
 const fn drawn_as(drawn: &Drawn) -> &'static str {
     match drawn.strokes {
         Some(PieceKind::Leaf) => POINTS,

@@ -120,7 +120,7 @@ impl Subject for Scenes {
             let rounds = if at < EXPENSIVE_FROM { ROUNDS } else { 1 };
             match alternately(&programs, scene, rounds, args.seconds.unwrap_or(SECONDS)) {
                 Ok(reports) => rows.push(row(scene, &reports)),
-                // Ctrl-C ends what plays, too
+                // Ctrl-C ends the scene that plays, too
                 Err(_) if !progress.continues(done, String::new()) => break,
                 Err(error) if rows.is_empty() => return Err(error),
                 Err(error) => {

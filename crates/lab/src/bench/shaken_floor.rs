@@ -1,6 +1,6 @@
 //! A floor that is led to and fro, on which a body is shaken.
 //!
-//! In: time. Out: a box whose top is at z = 0 and whose acceleration is 0.3 g cos ω t along x. Never here: what lies on it.
+//! In: time. Out: a box whose top is at z = 0 and whose acceleration is 0.3 g cos ω t along x. Never here: the body on it.
 
 use super::super::chart::GRAVITY;
 use glam::{DQuat, DVec3};

@@ -1,6 +1,6 @@
 //! Agents stepped as one cluster without a runtime: contact and steps are measured alone, without clocks and threads.
 //!
-//! In: agents, their rates and springs, static solids. Out: the state of each after every macro step, and what pairs gave each other.
+//! In: agents, their rates and springs, static solids. Out: the state of each after every macro step, and the impulses of pairs.
 //! Never here: measurements.
 
 use glam::DVec3;
@@ -31,13 +31,13 @@ struct Actor {
     own: Snapshot,
     /// Springs from fixed points.
     hands: Vec<AnchorSpring>,
-    /// What it sees that is not in the harness.
+    /// Its neighbours that are not in the harness.
     neighbours: Vec<Neighbour>,
     memory: ContactMemory,
     grips: Vec<Grip>,
 }
 
-/// What the pairs of the last macro step were.
+/// Sums over the pairs of the last macro step.
 #[derive(Debug, Clone, Copy, Default)]
 pub(super) struct PairSums {
     /// The deepest overlap, metres.
@@ -76,14 +76,14 @@ impl StepHarness {
         Some(AgentId(self.actors.len() as u32 - 1))
     }
 
-    /// Attaches fixed springs to an agent, instead of those it had.
+    /// Attaches fixed springs to an agent, instead of the springs it had.
     pub(super) fn attach_springs(&mut self, id: AgentId, hands: impl IntoIterator<Item = AnchorSpring>) {
         let actor = &mut self.actors[id.0 as usize];
         actor.hands.clear();
         actor.hands.extend(hands);
     }
 
-    /// What an agent sees that is not in the harness.
+    /// Sets the neighbours of an agent that are not in the harness.
     pub(super) fn set_neighbours(&mut self, id: AgentId, neighbours: Vec<Neighbour>) {
         self.actors[id.0 as usize].neighbours = neighbours;
     }
@@ -123,7 +123,7 @@ impl StepHarness {
         &self.report
     }
 
-    /// What the pairs of agents were in the last macro step.
+    /// Sums over the pairs of agents in the last macro step.
     pub(super) fn pairs(&self) -> PairSums {
         let between = self.stepper.totals().iter().filter(|total| matches!(total.partner, Partner::Agent(_)));
         between.fold(PairSums::default(), |sum, total| PairSums {

@@ -17,7 +17,7 @@ pub trait Experiment: Sync {
 
     /// The name that `--only` takes; the files are called after it.
     const NAME: &'static str;
-    /// One sentence that says what it shows.
+    /// One sentence that says what the experiment shows.
     const TITLE: &'static str;
 
     /// Whether cases are measured one at a time, because they measure the time of this machine.

@@ -153,7 +153,7 @@ const POLICIES_LIVE: &[Entry] = &[
 /// Runs the experiments of a subject.
 ///
 /// # Errors
-/// What kept it from ending: bad input, a file that cannot be written, an adapter that failed.
+/// Bad input, a file that cannot be written, an adapter that failed.
 pub fn command(args: &ChartArgs) -> anyhow::Result<Exit> {
     let (subject, all) = match (args.subject, args.live) {
         (Subject::Accuracy, false) => ("accuracy", ACCURACY),

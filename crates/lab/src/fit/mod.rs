@@ -49,7 +49,7 @@ struct Fitted {
 /// Fits a scene.
 ///
 /// # Errors
-/// What kept it from ending: bad input, a file that cannot be written, an adapter that failed.
+/// Bad input, a file that cannot be written, an adapter that failed.
 pub fn command(args: &FitArgs) -> anyhow::Result<Exit> {
     if !(args.tolerance.is_finite() && args.tolerance > 0.0) {
         let what = format!("--tolerance is {} m; expected a length above zero, such as 1e-3", args.tolerance);

@@ -13,7 +13,7 @@ use metachron_world::Scene;
 use serde_json::{Value, json};
 use std::sync::atomic::{AtomicBool, Ordering};
 
-/// What was found of a scene's agents.
+/// The responses of a scene's agents, and the gains found for them.
 pub(super) struct AgentLoops {
     responses: Vec<AgentResponse>,
     tuning: Option<AgentTuning>,
@@ -37,7 +37,7 @@ pub(super) fn tune(args: &TuneArgs, scene: &Scene, stopped: &AtomicBool) -> anyh
     Ok(AgentLoops { responses: done.agents, tuning })
 }
 
-/// Of agents with the same limits the one of the median load; at most [`PLANTS_MAX`].
+/// For each set of limits the agent of the median load; at most [`PLANTS_MAX`].
 fn typical(responses: &[AgentResponse]) -> Vec<AgentPlant> {
     let mut kinds: Vec<Vec<&AgentPlant>> = Vec::new();
     for plant in responses.iter().filter_map(|response| response.plant.as_ref().ok()) {
@@ -71,7 +71,7 @@ impl AgentLoops {
         format!("\nagents' own loops\n{}{table}", self.plants())
     }
 
-    /// The extremes of what responds, and each agent that does not.
+    /// The extremes of the agents that respond, and each agent that does not.
     fn plants(&self) -> String {
         let plants: Vec<_> = self.responses.iter().filter_map(|response| response.plant.as_ref().ok()).collect();
         let range = |value: fn(&AgentPlant) -> f64| {

@@ -43,7 +43,7 @@ struct Identified {
 /// Tunes a scene, or explains given gains.
 ///
 /// # Errors
-/// What kept it from ending: bad input, a file that cannot be written, an adapter that failed.
+/// Bad input, a file that cannot be written, an adapter that failed.
 pub fn command(args: &TuneArgs) -> anyhow::Result<Exit> {
     let scene = scene(args)?;
     let given = args.analyse.as_deref().map(|text| gains::parse(text, scene.target.frame_hz)).transpose()?;

@@ -1,6 +1,8 @@
-//! A pass over the fronts whose numbers have changed: each is filled, takes what those below it left, and is eliminated.
+//! A pass over the fronts whose numbers have changed: each is filled, takes the updates of those below it, and is
+//! eliminated.
 //!
-//! In: where the numbers of fronts are, those of the matrix. Out: the factor's numbers. Never here: which fronts are stale, solutions.
+//! In: where the numbers of fronts are, the numbers of the matrix. Out: the factor's numbers. Never here: which fronts
+//! are stale, solutions.
 
 use super::super::fronts::Front;
 use super::super::tiles::{TILE, eliminate, triangle};
@@ -21,11 +23,11 @@ pub(super) struct Pass<'a> {
     /// For each front the first of the tree that ends with it.
     pub trees: &'a [usize],
     pub targets: &'a [Target],
-    /// The matrix without what `more` adds.
+    /// The matrix without the terms that `more` adds.
     pub base: &'a [f64],
     /// Which fronts are to be factored again.
     pub stale: &'a [bool],
-    /// What the stale fronts before each one cost together, in multiplications.
+    /// The cost of the stale fronts before each one together, in multiplications.
     pub costs: &'a [f64],
     /// Adds to the numbers of a front.
     pub more: &'a (dyn Fn(usize, &mut Entries<'_>) + Sync),
@@ -60,12 +62,13 @@ impl Pass<'_> {
         (top..end).try_for_each(|front| self.factor_front(front, part))
     }
 
-    /// What the fronts cost that are to be made.
+    /// The cost of the stale ones of these fronts.
     fn cost(&self, fronts: Range<usize>) -> f64 {
         self.costs[fronts.end] - self.costs[fronts.start]
     }
 
-    /// Where a tree begins such that those before it cost about as much as it does with those that follow; `None` of one tree or none.
+    /// Where a tree begins such that the trees before it cost about as much as it does with those that follow; `None`
+    /// of one tree or none.
     fn balanced_split(&self, fronts: Range<usize>) -> Option<usize> {
         let Range { start, end } = fronts;
         let off = |at: usize| (self.cost(start..at) - self.cost(at..end)).abs();
@@ -95,7 +98,7 @@ impl Pass<'_> {
         eliminate(self.level, lower, update, layout.columns).map_err(|at| self.fronts[front].first + at / 3)
     }
 
-    /// Adds what the fronts right below one have left for it; `of` is what begins with the numbers of a child.
+    /// Adds the updates of the fronts right below one; `of` gives numbers that begin with those of a child.
     fn gather<'b>(&self, front: usize, goal: Goal<'_>, of: impl Fn(usize) -> &'b [f64]) {
         let Goal { lower, update: own } = goal;
         own.fill(0.0);
@@ -122,7 +125,7 @@ impl Pass<'_> {
     }
 }
 
-/// The numbers of a front: its columns, and what it hands on.
+/// The numbers of a front: its columns, and the update that it hands on.
 struct Goal<'a> {
     lower: &'a mut [f64],
     update: &'a mut [f64],

@@ -1,4 +1,4 @@
-//! Bounds of impulses in interior points: each kind of row against its closed form, and what a solve that ends early still promises.
+//! Bounds of impulses in interior points: each kind of row against its closed form, and the promises of a solve that ends early.
 
 use super::random::{COUNT, distance, miss, random_case, solved, velocities};
 use super::{Case, Seeded, contact, is_open, rigid};

@@ -1,4 +1,4 @@
-//! Projections against what defines them, and the guard of passivity.
+//! Projections against their definitions, and the guard of passivity.
 
 use super::{Seeded, contact, diagonal};
 use crate::solve::cone::Law;
@@ -80,7 +80,7 @@ const FALL: [DVec3; 1] = [DVec3::new(0.0, 0.0, -1.0)];
 #[test]
 fn an_answer_that_makes_energy_is_shortened_to_one_that_does_not() {
     let mut iterate = falling(0.0);
-    // five times what stops it, so it leaves at four times its speed
+    // five times the impulse that stops it, so it leaves at four times its speed
     iterate.state.lambda[0] = DVec3::X * 5.0;
     iterate.state.change[0] = DVec3::Z * 5.0;
     iterate.update_velocities();

@@ -101,7 +101,7 @@ fn a_soft_lattice_of_a_thousand_nodes_takes_a_bounded_count_of_products() {
         assert!(scales < most / 2, "{scales}"); // nothing is given, so there is no step and no response
         let floor: DVec3 = cold.contacts_n_s[..100].iter().sum();
         let off = momentum_gained(&case, &cold, 1000).distance(floor);
-        // what responses may leave, over a thousand nodes
+        // the momentum that responses may leave, over a thousand nodes
         let blocks = case.bodies.iter().flat_map(|body| &body.blocks).filter(|block| block.row == block.column);
         let most = iterative().still_m_s * blocks.map(|block| block.value.x_axis.x).sum::<f64>();
         assert!(off < most, "{off} of {floor}, {most}");

@@ -9,7 +9,7 @@ const G: f64 = 9.81;
 /// The block of a rigid body's spin.
 const SPIN: usize = 1;
 
-/// Joints as hard as they become: they give way by a ten-millionth of what they hold.
+/// Joints as hard as they become: they give way by a ten-millionth of their load.
 fn hard(form: StepForm) -> Settings {
     Settings { tolerance_m_s: 1e-10, depth_m: 1e-12, form, still_m_s: 1e-12, ..Settings::default() }
 }
@@ -95,7 +95,7 @@ fn two_boxes_held_in_all_directions_are_one_body() {
     assert!(mean.distance(DVec3::Y * 1.5) < 1e-9);
 }
 
-/// What a motor of 2 N m leaves of a wheel's spin about z that it is to bring to 10 1/s.
+/// The spin that a motor of 2 N m leaves a wheel about z, which it is to bring to 10 1/s, and the motor's impulse.
 fn motor(start: f64) -> (f64, f64) {
     let mut wheel = rigid(2.0, DVec3::splat(0.1));
     wheel.free[SPIN] = DVec3::Z * start;
@@ -126,10 +126,10 @@ fn a_stop_lets_go_what_leaves_it_and_ends_what_comes() {
         let row = on_ground(Side::node(0, SPIN), Hold::pushing(-DVec3::Z)).with_gap(gap, H);
         solved(&[wheel], vec![row]).velocities(0)[SPIN].z
     };
-    assert!((stop(3.0, 0.02) - 2.0).abs() < 1e-6); // what is left of the way, in one step
+    assert!((stop(3.0, 0.02) - 2.0).abs() < 1e-6); // the way left, in one step
     assert_eq!(stop(1.0, 0.02), 1.0);
     assert_eq!(stop(-3.0, 0.0), -3.0);
-    assert!((stop(1.0, -0.01) + 0.2).abs() < 1e-6); // a fifth of what is passed
+    assert!((stop(1.0, -0.01) + 0.2).abs() < 1e-6); // a fifth of the way past the stop
 }
 
 #[test]

@@ -1,4 +1,4 @@
-//! Members that lend their own factor: the answers of those that do not, in both forms.
+//! Members that lend their own factor: the same answers as of members that do not, in both forms.
 
 use super::random::{COUNT, FINE, distance, random_case, velocities};
 use super::slow::Dense;

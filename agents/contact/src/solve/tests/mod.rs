@@ -53,7 +53,7 @@ impl Seeded {
 pub struct Body {
     pub blocks: Vec<Block>,
     pub free: Vec<DVec3>,
-    /// What these leave unanswered; empty for nothing.
+    /// The momentum that these leave unanswered; empty for none.
     pub unanswered: Vec<DVec3>,
 }
 

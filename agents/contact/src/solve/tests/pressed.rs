@@ -1,4 +1,4 @@
-//! Rows whose bound is what presses a contact: friction about its normal, in both forms, and in random piles.
+//! Rows bounded by the pressure of a contact: friction about its normal, in both forms, and in random piles.
 
 use super::{Body, Case, Seeded, contact, is_open, rigid};
 use crate::solve::{Hold, JointRow, Pressed, Settings, Side, Solver, StepForm};
@@ -32,7 +32,7 @@ fn a_body_on_one_point_loses_its_spin_by_reach_times_its_weight_in_both_forms() 
         });
         let most = reach_m * mass * G * H_S / inertia;
         let wanted = spin - spin.clamp(-most, most);
-        // what holds gives way by v_s, 4e-4 a second
+        // a row that holds gives way by v_s, 4e-4 a second
         assert!(
             (after - wanted).abs() < 5e-4 && !is_open(&report),
             "{spin}, {form:?}: {after}, {wanted} wanted, {report:?}"
@@ -108,7 +108,7 @@ fn in_random_piles_no_spin_gives_more_than_its_pressure_and_what_slips_gives_all
                     row.pressed.unwrap().reach_m * solution.contacts_n_s[k].dot(normal),
                 );
                 assert!(given.abs() <= most + 1e-7, "{seed}: {given} N m s of {most}");
-                // v_s of what holds, and a tolerance
+                // v_s of a row that holds, and a tolerance
                 let holds = slips.abs() < 1e-3;
                 assert!(
                     holds || (given + most * slips.signum()).abs() < 1e-6 + 1e-4 * most,

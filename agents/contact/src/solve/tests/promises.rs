@@ -1,4 +1,4 @@
-//! What the solver promises besides its answers: errors that name what is wrong, the same bits, no panic.
+//! The promises of the solver besides its answers: errors that name the fault, the same bits, no panic.
 
 use super::{Case, contact, is_open, rigid};
 use crate::solve::{Block, Hold, JointRow, ProblemError, SIDE_TERMS_MAX, Side, SideTerm, Solver};

@@ -125,7 +125,7 @@ fn the_laws_hold_in_random_problems_and_no_answer_makes_energy() {
         most = most.max(report.factors);
         assert!(!is_open(&report), "seed {seed}: {report:?}");
         let (miss, work) = (miss(&case, &solution), work(&case, &solution));
-        // twice the tolerance of the solve: impulses are what laws ask for, and their velocities may differ by as much again
+        // twice the tolerance of the solve: impulses obey the laws, and their velocities may differ by as much again
         assert!(miss < 1e-5, "seed {seed} misses by {miss}: {report:?}");
         worst = worst.max(miss);
         // rounding of sums of joules
@@ -150,14 +150,14 @@ fn a_finer_tolerance_is_met_as_finely() {
 #[derive(Default)]
 pub struct Comparison {
     pub compared: usize,
-    /// Of those that agree.
+    /// The greatest distance of two answers that agree.
     worst_m_s: f64,
     /// Problems with two answers that both obey the laws.
     pub ambiguous: usize,
 }
 
-/// Velocities that are further apart are those of two answers, m/s: the laws hold to 10⁻⁹ m/s, and what bends or is light moves by
-/// some thousand times that.
+/// Velocities that are further apart are those of two answers, m/s: the laws hold to 10⁻⁹ m/s, and a deformable or
+/// light body moves by some thousand times that.
 const AGREE_M_S: f64 = 1e-6;
 
 impl Comparison {

@@ -4,7 +4,7 @@ use super::{Body, Case, contact, is_open, rigid, side_velocity};
 use crate::solve::{Contact, Settings, Side, Solution, Solver};
 use glam::DVec3;
 
-/// Contacts as hard as they become, so that a blow gives way by a ten-millionth of its speed.
+/// Contacts as hard as they become, so that an impact gives way by a ten-millionth of its speed.
 const HARD: Settings = Settings {
     tolerance_m_s: 1e-10,
     depth_m: 1e-12,
@@ -78,7 +78,7 @@ fn three_balls_of_a_cradle_keep_momentum_and_gain_no_energy() {
         let case = row_of_balls(&[1.0; 3], &[1.0, 0.0, 0.0], restitution);
         let solution = solved(&case);
         let v = speeds(&solution, 3);
-        // one blow for all: the first parts at e, the others stay together
+        // one impact for all: the first parts at e, the others stay together
         let wanted = [(1.0 - 2.0 * restitution) / 3.0, (1.0 + restitution) / 3.0, (1.0 + restitution) / 3.0];
         assert!(v.iter().zip(wanted).all(|(v, w)| (v - w).abs() < 1e-6), "{restitution}: {v:?}");
         assert!(gained(&case, &solution) < 1e-7);

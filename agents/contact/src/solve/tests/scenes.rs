@@ -16,7 +16,7 @@ pub struct Stack {
     /// Displacement and turn of each box.
     pub places: Vec<[DVec3; 2]>,
     pub velocities: Vec<[DVec3; 2]>,
-    /// Of each of the four corners of each box: the impulse and the slip owed of the last step.
+    /// The impulse and the slip owed of the last step at each of the four corners of each box.
     impulses: Vec<DVec3>,
     owed: Vec<DVec3>,
     compliances: Vec<f64>,
@@ -106,7 +106,7 @@ impl Stack {
         self
     }
 
-    /// What the four contacts under a box carry, in shares of the weight above them.
+    /// The load of the four contacts under a box, in shares of the weight above them.
     pub fn carried(&self, body: usize) -> f64 {
         let force: DVec3 = self.impulses[4 * body..4 * body + 4].iter().sum();
         force.z / (self.masses[body..].iter().sum::<f64>() * G * self.h)
@@ -119,7 +119,7 @@ fn a_block_at_rest_is_carried_and_lies_as_deep_as_is_chosen() {
     let stack = Stack { h: 1.0 / 30.0, ..Stack::new(&[3.0]).exact() }.steps(120);
     assert!((stack.carried(0) - 1.0).abs() < 1e-6, "{}", stack.carried(0));
     let depth = -stack.places[0][0].z;
-    assert!((depth - 20e-6).abs() < 1e-9, "{depth}"); // what is left of the landing: 0.8 a step to the 120th
+    assert!((depth - 20e-6).abs() < 1e-9, "{depth}"); // the rest of the landing: 0.8 a step to the 120th
     let yields = 0.2 * 20e-6 / stack.h;
     for (r, impulse) in stack.compliances.iter().zip(&stack.impulses) {
         assert!((r * impulse.length() / yields - 1.0).abs() < 1e-4);
@@ -239,7 +239,7 @@ fn a_soft_block_between_a_plate_and_the_floor_keeps_momentum() {
     assert!(gained.distance(floor) < 1e-12, "{gained} is not {floor}"); // of a few N s, by stiffness a thousand times the mass
 }
 
-/// What the block and the plate have gained together.
+/// The momentum that the block and the plate have gained together.
 pub fn momentum_gained(case: &Case, solution: &Solution, nodes: usize) -> DVec3 {
     let soft_change: DVec3 = solution.velocities(0).iter().zip(&case.bodies[0].free).map(|(v, f)| *v - *f).sum();
     let plate_change = solution.velocities(1)[0] - case.bodies[1].free[0];

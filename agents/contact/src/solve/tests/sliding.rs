@@ -1,4 +1,5 @@
-//! Friction that follows its pressure within a Newton step: what slides and leans on itself by that is found in a few.
+//! Friction that follows its pressure within a Newton step: a sliding body that leans on itself by that is solved in a
+//! few.
 
 use super::{Body, Case, contact, rigid};
 use crate::solve::{Report, Settings, Side, Solver};
@@ -20,7 +21,7 @@ fn sliding(friction: f64) -> Case {
 }
 
 fn solved(case: &Case) -> (Vec<DVec3>, Report) {
-    // so hard that the front does not sink by what it bears more than the rear
+    // so hard that the front does not sink by its greater load
     let mut solver = Solver::new(Settings { depth_m: 1e-8, ..Settings::default() });
     case.with(|problem| {
         let solution = solver.solve(problem).unwrap();

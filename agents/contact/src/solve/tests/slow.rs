@@ -63,7 +63,7 @@ impl Dense {
     }
 }
 
-/// What the slow method found.
+/// The results of the slow method.
 pub struct Slow {
     /// Velocities of all blocks, by member.
     pub velocities: Vec<Vec<DVec3>>,

@@ -25,7 +25,7 @@ impl SelfPairs {
         self.rest == rest && asked_m + self.change_m(positions) <= self.within_m
     }
 
-    /// Drops what was found: what is nearer than `within_m` now is to follow.
+    /// Drops the pairs that were found: the pairs nearer than `within_m` now are to follow.
     pub fn clear(&mut self, rest: &[DVec3], positions: &[DVec3], within_m: f64) {
         self.within_m = within_m;
         rest.clone_into(&mut self.rest);

@@ -116,8 +116,8 @@ impl SurfaceQuery<'_> {
         (gap_m <= self.reach_m).then(|| Touch { key, normal, gap_m, on_a: here.spot.place(), on_b })
     }
 
-    /// A vertex over or under a face that looks against the skin: of several the one that it is least deep under. One that is deep has
-    /// come in sideways where that way out is much shorter.
+    /// A vertex over or under a face that looks against the skin: of several faces the one that it is least deep under.
+    /// A deep vertex has come in sideways where that way out is much shorter.
     fn vertex_on(&self, cuboid: &PlacedBox, vertex: u32, at: DVec3) -> Option<Touch> {
         let out = self.normals()[vertex as usize].try_normalize()?;
         let (local, rim_m) = (cuboid.local(at), LEAN_SHARE * self.surface.form.edge_m);
@@ -187,7 +187,7 @@ impl SurfaceQuery<'_> {
             let Some(out) = across.map(|across| self.out_toward(cuboid, bits, corners[0], across)) else { return };
             let gap_m = out.dot(at - corners[0]);
             let position = at - out * gap_m;
-            // of those as near as each other the lesser number counts
+            // of equally near ones the lesser number counts
             let is_near = nearest.is_none_or(|(least_m, _, _, first)| {
                 gap_m.abs() < least_m.abs() || (gap_m.abs() == least_m.abs() && number < first)
             });

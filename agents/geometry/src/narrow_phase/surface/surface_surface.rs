@@ -52,7 +52,7 @@ pub(super) struct SkinPair<'a> {
     /// Sum of both half thicknesses, and how deep the two may overlap (`deep_m`), metres.
     thick_m: f64,
     deep_m: f64,
-    /// Where both are one skin: what of it never touches.
+    /// Where both are one skin: its features that never touch.
     own: Option<OwnSkin<'a>>,
 }
 
@@ -92,9 +92,10 @@ impl<'a> SkinPair<'a> {
         Self { here, there, thick_m: a.radius_m + b.radius_m, deep_m, own: None }
     }
 
-    /// A skin with itself. A sheet bent to the radius of its own skin comes back to itself after π times its half thickness; what is nearer at
-    /// rest touches only through it. What is behind a closed skin within the search depth must not be its own other side: that is farther
-    /// at rest, and stays so unless it is crushed to a quarter.
+    /// A skin with itself. A sheet bent to the radius of its own skin comes back to itself after π times its half
+    /// thickness; features nearer at rest touch only through it. A feature within the search depth behind a closed skin
+    /// must not be on the skin's own other side: that is farther at rest, and stays so unless it is crushed to a
+    /// quarter.
     pub fn with_itself(query: &'a SurfaceQuery<'a>, rest: &'a [DVec3]) -> Self {
         let form = query.surface.form;
         let deep_m = if form.closed { OWN_DEEP_SHARE * form.edge_m } else { 0.0 };

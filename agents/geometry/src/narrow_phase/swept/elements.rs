@@ -37,7 +37,7 @@ pub(in super::super) struct Elements<'a> {
     known: &'a ShapeCache,
     /// Its pieces at the start.
     pieces: Pieces<'a>,
-    /// How a rigid body or tool moves; `None` for what deforms.
+    /// How a rigid body or tool moves; `None` for a deformable.
     rigid: Option<RigidWay>,
 }
 

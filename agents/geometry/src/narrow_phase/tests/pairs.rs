@@ -107,7 +107,7 @@ fn all_pairs_agree(scale: f64, origin: DVec3, gap_m: f64) {
                 tried += 1;
                 let pair = format!("{name} and {other} at {share}: {seen:?}");
                 assert!(!seen.is_empty(), "{pair}");
-                // a first touch is told up to a micrometre early
+                // a first touch is reported up to a micrometre early
                 let above_m = lowest(&seen).gap_m - gap_m;
                 assert!(above_m > -1e-9 && above_m < 1.1e-6 + slack([name, other]) * scale, "{above_m} {pair}");
                 assert!((lowest(&back).gap_m - lowest(&seen).gap_m).abs() < 1e-8, "{pair} {back:?}");

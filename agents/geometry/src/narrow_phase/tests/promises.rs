@@ -1,4 +1,5 @@
-//! What every pair of forms promises: both sides see the same, names last, motion is smooth, nothing breaks or allocates.
+//! The promises of every pair of shapes: both sides see the same, names last, motion is smooth, nothing breaks or
+//! allocates.
 
 use super::*;
 

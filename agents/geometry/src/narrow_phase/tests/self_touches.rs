@@ -1,4 +1,4 @@
-//! What deforms against itself: tubes, sheets and solids against closed forms and brute force.
+//! Deformables against themselves: tubes, sheets and solids against closed forms and brute force.
 
 use super::surfaces::skin_of;
 use super::*;
@@ -161,7 +161,7 @@ fn a_sheet_that_lies_flat_or_curls_gently_does_not_touch_itself_however_far_it_l
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(24))]
 
-    /// Of a crumpled sheet no contact is nearer than brute force finds, and a vertex whose nearest place is inside a triangle reports it.
+    /// No contact of a crumpled sheet is nearer than brute force finds, and a vertex whose nearest place is inside a triangle reports it.
     #[test]
     fn a_crumpled_sheet_touches_where_brute_force_finds_it(bumps in prop::collection::vec(vector(0.006), 91), apart_m in 0.004..0.012) {
         let radius_m = 5e-4;

@@ -124,7 +124,7 @@ fn gaps_over_a_mesh_stay_exact_far_from_its_origin_and_over_large_triangles() {
 
 #[test]
 fn an_open_static_mesh_is_a_sheet_and_no_hull() {
-    // two walls of a valley: what is in it touches neither
+    // two walls of a valley: a body in it touches neither
     let points_m = [(-1.0, 1.0), (0.0, 0.0), (1.0, 1.0)].map(|(x, z)| [-1.0, 1.0].map(|y| DVec3::new(x, y, z)));
     let triangles = [[0, 1, 3], [0, 3, 2], [2, 3, 5], [2, 5, 4]].map(|[a, b, c]| [a, c, b]);
     let valley = Solid::Mesh { points_m: points_m.concat().into(), triangles: triangles.into() };

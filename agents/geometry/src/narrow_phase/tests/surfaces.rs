@@ -110,7 +110,7 @@ proptest! {
             let position = DVec3::new(x, y, height + 1.5e-3);
             touches(&here, &at(&solid, position, rotation), 0.02, &mut scratch, &mut list);
             prop_assert!(!list.is_empty());
-            // what is beneath a face pushes along that
+            // a feature of the skin beneath a face pushes along that face's normal
             let face = rotation * DVec3::NEG_Z;
             // of a ball the slack of eq. 8 stays: a thousandth of a diagonal over its radius
             let off = if matches!(solid.kind, ShapeKind::Solid(SolidShape { solid: Solid::Ball { .. }, .. })) { 1.5e-3 * EDGE / 0.02 } else { 1e-9 };
@@ -222,7 +222,7 @@ fn a_ball_s_middle_behind_a_closed_skin_is_pushed_out_of_it() {
     }
 }
 
-/// A tetrahedron with a ridge along x at z = 0 from −1 m to 1 m, and what touches it.
+/// A tetrahedron with a ridge along x at z = 0 from −1 m to 1 m, and its touches with `there`.
 fn on_a_ridge(there: &PlacedShape<'_>) -> Vec<Touch> {
     let positions = [DVec3::NEG_X, DVec3::X, DVec3::new(0.0, 1.0, -1.0), DVec3::new(0.0, -1.0, -1.0)];
     let form = tetrahedron([[0, 1, 2], [1, 0, 3], [0, 2, 3], [1, 3, 2]]);

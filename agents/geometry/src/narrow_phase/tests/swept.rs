@@ -4,7 +4,7 @@ use super::surfaces::{block_skin, flat_sheet, skin_of};
 use super::*;
 use crate::{Obstacle, StaticSolid};
 
-/// As the search: a touch may be told this much early, metres.
+/// As the search: a touch may be reported this much early, metres.
 const EARLY_M: f64 = 1.1e-6;
 
 /// Contacts up to a tenth of a millimetre beyond.
@@ -100,10 +100,10 @@ proptest! {
 
 proptest! {
     // the same motions every time: in one of some forty an edge of a block comes first upon an edge of a closed skin, where no contact is
-    // told (docs/theory/contact.md, section 7)
+    // reported (docs/theory/contact.md, section 7)
     #![proptest_config(ProptestConfig { rng_seed: proptest::test_runner::RngSeed::Fixed(1), ..ProptestConfig::with_cases(6) })]
 
-    /// Of every pair of kinds in any motion: nothing overlaps before the first touch, and there it is that near.
+    /// For every pair of kinds in any motion: nothing overlaps before the first touch, and there it is that near.
     #[test]
     fn before_the_first_touch_nothing_overlaps(
         p in vector(0.15), q in vector(0.15), u in vector(0.3), v in vector(0.3), r in turn(), s in turn(),
@@ -133,7 +133,7 @@ proptest! {
                 let found = first(&a, &b, reach_m);
                 let until = found.as_ref().map_or(1.0, |(share, _)| *share);
                 let (mut room, mut other) = (Default::default(), Default::default());
-                // what starts in or through another is told at once, or, where it is deep inside, by nobody
+                // shapes that start through each other are reported at once, or, deep inside each other, not at all
                 let starts = all(&a.within(0.0, &mut room).unwrap(), &b.within(0.0, &mut other).unwrap(), reach_m);
                 if until == 0.0 || starts.iter().any(|touch| touch.gap_m <= reach_m) {
                     continue;

@@ -1,5 +1,5 @@
-//! Twisted tubes between two clamps buckle where theory says (`tests/reference/buckling.json`): below that twist what pushes
-//! them aside dies away, above it grows (docs/theory/rod.md, eq. 50–53).
+//! Twisted tubes between two clamps buckle where theory says (`tests/reference/buckling.json`): below that twist a push
+//! aside dies away, above it grows (docs/theory/rod.md, eq. 50–53).
 
 use super::*;
 use glam::DVec3;
@@ -24,7 +24,7 @@ struct Twisted {
 fn straight(segments: usize) -> Twisted {
     let critical_rad = reference()["tube"]["soft"]["twist_at_greenhill_clamped_rad"].as_f64().unwrap();
     let mut spec = reference_spec(1e6, segments);
-    // no shear; but stretch, for what bows out between walls is drawn taut, and a stiffer tube by more
+    // no shear; but stretch, for a tube that bows out between walls is drawn taut, and a stiffer one by more
     spec.section.ga_n *= 1e3;
     held(spec, DVec3::Z, critical_rad)
 }

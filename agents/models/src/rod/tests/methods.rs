@@ -16,7 +16,7 @@ fn swinging(integrator: Integrator, segments: usize, substeps: u32) -> Tube {
     Tube::new(spec).unwrap()
 }
 
-/// μ g L²/2, J: what a fall of the cable's middle by half its length gives.
+/// μ g L²/2, J: the energy of a fall of the cable's middle by half its length.
 fn scale_j(tube: &Tube) -> f64 {
     tube.mass_kg() * 9.81 * tube.length_m() / 2.0
 }
@@ -46,7 +46,7 @@ fn second_order_methods_follow_the_swinging_cable() {
         let (rms, least, most, substeps) = swing_error(&mut swinging(integrator, 32, 4));
         let name = integrator.name();
         println!("{name}: RMS {rms:e} m, energy {least:e} … {most:e}, {substeps} substeps a step");
-        // the wanted bounds; 4.4e-4 m is what 32 links leave of space alone (`link_chain_error_vs_extrapolated`)
+        // the wanted bounds; 4.4e-4 m is the error of 32 links in space alone (`link_chain_error_vs_extrapolated`)
         assert!(rms <= 5e-4, "{name}: {rms} m");
         assert!(least >= -loses && most <= 1e-6, "{name}: energy from {least} to {most}");
     }

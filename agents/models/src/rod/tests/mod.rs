@@ -1,4 +1,4 @@
-//! What the tube promises, against independent answers (`tests/reference/`).
+//! The promises of the tube, against independent answers (`tests/reference/`).
 
 mod buckling;
 mod methods;

@@ -1,4 +1,4 @@
-//! What a change of resolution keeps.
+//! The quantities that a change of resolution keeps.
 
 use super::*;
 use glam::DVec3;
@@ -61,7 +61,7 @@ fn retune_changes_angular_momentum_by_the_square_of_epsilon() {
     let spin = tube.momentum().1;
     let errors: Vec<f64> = [16, 32, 64, 128].map(|n| (retuned(&tube, n).momentum().1 - spin).length()).to_vec();
     let order = (errors[0] / errors[3]).log2() / 3.0;
-    assert!(order > 1.8, "order {order} of {errors:?}"); // second, less what the uneven division takes
+    assert!(order > 1.8, "order {order} of {errors:?}"); // second, less the loss by the uneven division
 }
 
 #[test]

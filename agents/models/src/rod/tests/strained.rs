@@ -14,7 +14,7 @@ fn a_twisted_tube_holds_the_energy_of_its_twist() {
     let wanted = 0.5 * spec.section.gj_n_m2 * 4.0;
     let mut tube = Tube::new(spec).unwrap();
     assert!((tube.energy_j() / wanted - 1.0).abs() < 1e-12, "{}", tube.energy_j());
-    // far below the twist at which it buckles, 13 rad: nothing moves, but for what rounding does
+    // far below the twist at which it buckles, 13 rad: nothing moves, but for rounding
     run(&mut tube, 10.0, 1.0);
     assert!((tube.energy_j() / wanted - 1.0).abs() < 1e-12, "{}", tube.energy_j());
 }

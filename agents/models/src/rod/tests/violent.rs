@@ -51,7 +51,7 @@ fn methods_of_second_order_never_have_more_energy_than_a_spin_began_with() {
             for step in 0..(2e3 / dt_ms) as u32 {
                 run(&mut tube, dt_ms, dt_ms * 1e-3);
                 let (now, name) = (tube.energy_j(), integrator.name());
-                // backward differences lose and find energy in turns; what an iteration leaves is 1e-9 of it a substep
+                // backward differences lose and find energy in turns; an iteration leaves 1e-9 of it a substep
                 assert!(
                     now <= start * (1.0 + 1e-6),
                     "{name}, E {young_pa:e}, dt {dt_ms} ms, step {step}: {start} -> {now} J"

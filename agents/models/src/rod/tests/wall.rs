@@ -133,7 +133,7 @@ fn a_sealed_tube_is_as_wide_as_its_gas_and_its_wall_agree() {
     run(&mut tube, 5.0, 2.0);
     let (a, b) = (RADIUS_M - wall_m, RADIUS_M);
     let widened_m = tube.radius_at_m(0.1) - RADIUS_M;
-    // p from Lamé's law for what it is widened by; the volume from the work that p does on it, dA/db = 2π a² b (2 − ν)/((1 − ν) b² + (1 + ν) a²)
+    // p from Lamé's law for this widening; the volume from the work that p does on it, dA/db = 2π a² b (2 − ν)/((1 − ν) b² + (1 + ν) a²)
     let held_pa = widened_m * YOUNG_PA * (b * b - a * a) / (a * a * b * (2.0 - POISSON));
     let slope_m = 2.0 * PI * a * a * b * (2.0 - POISSON) / ((1.0 - POISSON) * b * b + (1.0 + POISSON) * a * a);
     let product = (101_325.0 + held_pa) * (PI * a * a + slope_m * widened_m) / ((101_325.0 + pressure_pa) * PI * a * a);
@@ -162,7 +162,7 @@ fn pressure_that_follows_keys_widens_the_tube_by_lames_law_at_each_of_them() {
     let mut tube = Tube::new(TubeSpec { pressure_keys: keys, sleep: true, ..giving(1e-3, 8) }).unwrap();
     let per_pa_m = 0.009_f64.powi(2) * RADIUS_M * (2.0 - POISSON) / (YOUNG_PA * (0.01_f64.powi(2) - 0.009_f64.powi(2)));
     let mut until_s = 0.0;
-    // the tube does not sleep through what is still to come
+    // the tube does not sleep through later keys
     for (at_s, wanted_pa, share) in [(0.2, 0.0, 1e-9), (2.2, 300.0, 5e-3), (6.0, 100.0, 1e-4)] {
         run(&mut tube, 5.0, at_s - until_s);
         until_s = at_s;
@@ -171,7 +171,7 @@ fn pressure_that_follows_keys_widens_the_tube_by_lames_law_at_each_of_them() {
         assert!(off_m <= share * 300.0 * per_pa_m, "{widened_m} m at {at_s} s, not {} m", wanted_pa * per_pa_m);
         assert!((tube.pressure_pa() - wanted_pa).abs() < 1e-9 * 300.0, "{} Pa at {at_s} s", tube.pressure_pa());
     }
-    // what is set by hand stays
+    // a pressure set by hand stays
     tube.set_pressure_pa(50.0).unwrap();
     run(&mut tube, 5.0, 0.5);
     assert_eq!(tube.pressure_pa(), 50.0);
@@ -246,7 +246,7 @@ fn a_load_at_one_place_dents_as_much_of_the_tube_as_its_wall_can_reach() {
     let wall_m: f64 = 5e-4;
     let spec = giving(wall_m, 400);
     let mut tube = Tube::new(TubeSpec { damping_per_s: 0.0, ..spec }).unwrap();
-    // in a step of a thousand seconds nothing is left of inertia: what an impulse moves it by is what its force does
+    // in a step of a thousand seconds nothing is left of inertia: an impulse moves it as its force does
     let (h_s, load_n) = (1e3, 1e-3);
     tube.begin(h_s).unwrap();
     let first = tube.state().u.len();

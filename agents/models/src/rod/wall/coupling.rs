@@ -1,7 +1,7 @@
-//! A tube's wall and its centre line: what each takes of the other in a step.
+//! A tube's wall and its centre line: how each acts on the other in a step.
 //!
 //! In: a tube with the centre line of the step's end, impulses on the wall. Out: the sections then, and the bend they leave.
-//! Each moves with the other's coordinates held, so neither makes energy; what is lost between the two is taken back (eq. 66).
+//! Each moves with the other's coordinates held, so neither makes energy; energy lost between the two is taken back (eq. 66).
 //! Never here: how a wall is made ([`super::law`]), contacts. Theory: docs/theory/rod.md, section 15.
 
 use super::{Drive, Filling, WallProblem};
@@ -17,7 +17,7 @@ const SHARES: [f64; 6] = [1.0, 0.5, 0.25, 0.125, 0.0625, 0.0];
 const ENERGY_SLACK: f64 = 1e-9;
 
 impl Tube {
-    /// What fills it.
+    /// Its filling.
     pub(in crate::rod) fn filling(&self) -> Filling {
         Filling { pressure_pa: self.spec.pressure_pa, sealed: self.spec.sealed }
     }
@@ -58,7 +58,7 @@ impl Tube {
             let at_work: f64 = before.iter().chain(&after).map(|part| part.abs()).sum::<f64>() + work_j.abs();
             let rise_j =
                 after.iter().sum::<f64>() - before.iter().sum::<f64>() - work_j - ENERGY_SLACK * at_work - rounding_j;
-            // what its motion can give back, it does
+            // its motion gives back the energy that it can
             if rise_j <= 0.0 || wall.slow(rise_j, division) {
                 return;
             }

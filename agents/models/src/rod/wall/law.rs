@@ -1,4 +1,4 @@
-//! What a wall that gives is made of: how stiffly a section widens and flattens, and how it bends when it is flat.
+//! The law of a wall that gives: how stiffly a section widens and flattens, and how it bends when it is flat.
 //!
 //! In: a [`Section`]. Out: stiffnesses per length of tube, the softening of its bend. Never here: a state.
 //! Theory: docs/theory/rod.md, section 15.
@@ -56,7 +56,7 @@ pub struct Brazier {
 }
 
 impl Softening {
-    /// What a round section of this bend, in the section's axes, would have to be bent by for the same moment (eq. 62).
+    /// The bend that a round section would need for the same moment as this one, in the section's axes (eq. 62).
     #[inline(always)]
     pub fn of(&self, bend: DVec2) -> DVec2 {
         let Self { mean, oval } = *self;
@@ -113,7 +113,7 @@ impl WallLaw {
         Softening { mean: 0.5 * (low + high), oval: flat * (0.5 * (low - high) / f) }
     }
 
-    /// What a curvature, 1/m, in the section's axes does to its flattening (eq. 63).
+    /// The effect of a curvature, 1/m, in the section's axes on its flattening (eq. 63).
     pub fn brazier(&self, wall: DVec3, curvature: DVec2) -> Brazier {
         let flat = DVec2::new(wall.y, wall.z) / self.middle_m;
         let (f, k2) = (flat.length(), curvature.length_squared());

@@ -1,6 +1,6 @@
 //! A wall that gives: how the sections of a tube widen and flatten.
 //!
-//! In: the division, the curvature at its nodes, what fills the tube, the tension of its muscles. Out: the linear system of a step, its
+//! In: the division, the curvature at its nodes, the tube's filling, the tension of its muscles. Out: the linear system of a step, its
 //! free answer, the sections after it, and how they bend. Never here: the centre line's own motion, contacts.
 //! Unknowns are one vector for each node: the change of the outer radius, and the components of its flattening along cos 2φ and sin 2φ in the
 //! axes of the segment before the node, metres. Theory: docs/theory/rod.md, section 15.
@@ -24,7 +24,7 @@ const VOLUME_MIN: f64 = 1e-3;
 /// A section is nowhere thinner than this share of its radius at rest: loads beyond its law must not turn it inside out.
 const RADIUS_MIN: f64 = 0.01;
 
-/// What a tube is filled with.
+/// The filling of a tube.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Filling {
     /// Inside minus outside pressure, Pa; of a closed gas that in the undeformed tube.
@@ -36,13 +36,13 @@ pub struct Filling {
 /// The filling and the muscles' pull during a step.
 #[derive(Debug, Clone, Copy)]
 pub struct Drive<'a> {
-    /// What fills the tube.
+    /// The filling.
     pub filling: Filling,
     /// By how much the muscles alone would narrow each node, metres.
     pub squeeze_m: &'a [f64],
 }
 
-/// What the wall answers to in a step.
+/// The inputs of a wall's step.
 #[derive(Debug, Clone, Copy)]
 pub struct WallProblem<'a> {
     /// The division of the tube.
@@ -69,7 +69,7 @@ pub struct Sections {
 /// A wall that gives.
 #[derive(Debug, Clone)]
 pub struct Wall {
-    /// What it is made of.
+    /// Its law.
     pub law: WallLaw,
     /// Its state.
     pub now: Sections,
@@ -203,7 +203,7 @@ impl Wall {
         sum + filling.pressure(volume, rest).energy_j
     }
 
-    /// What the energy of the filling, a small difference of volumes, rounds by, J.
+    /// The rounding of the filling's energy, which is that of a small difference of volumes, J.
     pub fn rounding_j(&self, division: &Discretization, filling: Filling) -> f64 {
         let air_pa = if filling.sealed { AIR_PA } else { 0.0 };
         let rest_m3 = division.total_m() * self.law.lumen_m2(DVec3::ZERO);
@@ -264,7 +264,7 @@ impl Wall {
         self.join(division, h_s);
     }
 
-    /// Adds what joins a node to its neighbours (eq. 58).
+    /// Adds the coupling of a node to its neighbours (eq. 58).
     fn join(&mut self, division: &Discretization, h_s: f64) {
         let Self { law, now, rows, free, .. } = self;
         for node in 1..now.shape.len() - 1 {
@@ -284,7 +284,7 @@ impl Wall {
         }
     }
 
-    /// The work of what changes the rates of the step begun to `rates`, J: (v − free)ᵀ A v.
+    /// The work that changes the rates of the step begun to `rates`, J: (v − free)ᵀ A v.
     pub fn work_j(&self, rates: &[DVec3]) -> f64 {
         let of = |(at, v): (usize, &DVec3)| (*v - self.free[at]).dot(multiply(&self.rows, rates, at));
         rates.iter().enumerate().map(of).sum()

@@ -1,6 +1,7 @@
 //! Symmetric systems of numbers in which each row couples to the two before it: three at once, one in each component of a vector.
 //!
-//! In: rows. Out: the factor L D Lᵀ in O(N), answers A⁻¹ r in O(N). Never here: what the numbers mean. Theory: docs/theory/rod.md, eq. 16, 17.
+//! In: rows. Out: the factor L D Lᵀ in O(N), answers A⁻¹ r in O(N). Never here: the meaning of the numbers. Theory:
+//! docs/theory/rod.md, eq. 16, 17.
 
 use glam::DVec3;
 
@@ -9,9 +10,9 @@ use glam::DVec3;
 pub struct BandRow {
     /// The entries on the diagonal.
     pub diag: DVec3,
-    /// Those that couple the row to the one before it.
+    /// The entries that couple the row to the one before it.
     pub near: DVec3,
-    /// Those that couple it to the one before that.
+    /// The entries that couple it to the one before that.
     pub far: DVec3,
 }
 

@@ -1,4 +1,4 @@
-//! Embedded solids: what a closed surface encloses, in a cage of cells whose size may change.
+//! Embedded solids: the inside of a closed surface, in a cage of cells whose size may change.
 
 use super::*;
 use metachron_core::Resolution;

@@ -1,4 +1,4 @@
-//! Solids that are solved by conjugate gradients, against a factor and against what every step keeps.
+//! Solids that are solved by conjugate gradients, against a factor and against the quantities that every step keeps.
 
 use super::super::system::Purpose;
 use super::*;

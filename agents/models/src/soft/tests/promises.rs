@@ -1,4 +1,4 @@
-//! What every agent promises, held against soft bodies.
+//! The promises of every agent, held against soft bodies.
 
 use super::*;
 use crate::conformance::fall_deviation;

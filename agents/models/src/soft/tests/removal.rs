@@ -1,4 +1,4 @@
-//! Cells removed while a solid runs: what is left, and what went, are together what there was.
+//! Cells removed while a solid runs: the rest and the removed cells are together the whole.
 
 use super::*;
 use crate::soft::NodeSpacing;

@@ -1,4 +1,4 @@
-//! What a change of ε does to the picture: a skin stays where it is, and goes where its new nodes carry it too slowly to be seen to jump.
+//! A change of ε in the picture: a skin stays where it is, and goes where its new nodes carry it too slowly to be seen to jump.
 
 use super::*;
 use crate::soft::NodeSpacing;

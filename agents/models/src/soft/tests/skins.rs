@@ -9,7 +9,7 @@ use std::sync::Arc;
 /// How far the search looks, metres.
 const REACH_M: f64 = 1e-3;
 
-/// What contact.md, eq. 8, leaves: a thousandth of an edge, metres.
+/// The slack of contact.md, eq. 8: a thousandth of an edge, metres.
 const LEFT_M: f64 = 5e-5;
 /// The cosine of the same over the half thickness of a sheet.
 const STRAIGHT: f64 = 0.98;
@@ -35,7 +35,7 @@ fn met(a: &(Arc<CollisionShape>, Vec<DVec3>), b: &(Arc<CollisionShape>, Vec<DVec
     list
 }
 
-/// Whether three places or more push along `normal` with this gap, and nothing overlaps more: what stands a little way beside an edge
+/// Whether three places or more push along `normal` with this gap, and nothing overlaps more: a place a little way beside an edge
 /// may be near to that.
 fn agree(list: &[Touch], normal: DVec3, gap_m: f64) -> Result<(), TestCaseError> {
     let (along, aside): (Vec<&Touch>, Vec<&Touch>) = list.iter().partition(|touch| touch.normal.dot(normal) > STRAIGHT);
@@ -52,7 +52,7 @@ fn agree(list: &[Touch], normal: DVec3, gap_m: f64) -> Result<(), TestCaseError>
 
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(300))]
-    /// Edges of a side that cross those of the face below once told depths of half an edge, aside.
+    /// Edges of a side that cross edges of the face below once reported depths of half an edge, aside.
     #[test]
     fn a_face_on_a_face_has_its_gap_everywhere_and_pushes_straight(
         (x, y) in (-0.1_f64..0.1, -0.1_f64..0.1),
@@ -105,7 +105,7 @@ proptest! {
         let low = slab(DVec3::new(0.2, 0.2, 0.1), [6, 6, 3], (DVec3::NEG_Z * 0.05, 0.0));
         let list = met(&rope, &low);
         prop_assert!(list.len() >= 3, "{list:?}");
-        // what leans out of the skin by 60 degrees at most is twice as far from the axis as that is deep
+        // a normal that leans out of the skin by 60 degrees at most is twice as far from the axis as that is deep
         let deepest_m = if under_m > 0.0 { -radius_m - 2.0 * under_m } else { gap_m };
         for touch in &list {
             prop_assert!(touch.gap_m > deepest_m - LEFT_M, "{touch:?}, {under_m} m under");

@@ -126,14 +126,14 @@ fn held_under_gravity_no_change_of_spacing_leaves_more_energy_than_there_was_or_
             let (before, energy) = (body.momentum().0, body.energy_j());
             body.set_resolution(at(SHARES[change % 5] * length_m));
             assert!((body.mass_kg() / mass - 1.0).abs() < 1e-12);
-            // momentum goes to what holds it where nothing else is left to be slowed
+            // momentum goes to the hold where no deformation is left to be slowed
             let deforms = body.velocities.iter().zip(&body.mesh.held).filter(|(_, held)| !**held);
             let first = deforms.clone().next().unwrap().0;
             let deforms = deforms.map(|(v, _)| v.distance(*first)).fold(0.0, f64::max);
             let off = body.momentum().0.distance(before);
             assert!(off < 1e-11 * mass || deforms < 1e-12, "change {change}: momentum {off}, {deforms} m/s");
             let most = energy.max(rest_j[change % 5]);
-            // the last of ten steps from rest is half a second long: what it leaves of a swing of some hertz
+            // the last of ten steps from rest is half a second long: its rest of a swing of some hertz
             assert!(body.energy_j() <= most + 1e-7 * scale, "{change}: {} J of {most}", body.energy_j());
             run(&mut body, 1.0 / 120.0, 2);
         }
@@ -153,7 +153,7 @@ fn a_change_of_spacing_leaves_the_skin_where_it_is() {
             body.set_resolution(at(length_m / cells));
             let now = state(&body).positions;
             let off = now.iter().zip(&before).map(|(now, was)| now.distance(*was)).fold(0.0, f64::max);
-            // of second order in the spacing: the sag of a piece of what hangs
+            // of second order in the spacing: the sag of a piece of a hanging rope
             assert!(off < 0.5 * length_m / (cells * cells), "{} in {cells} cells: {off} m", body.model());
             assert!((body.resolution().unwrap().eps_m - length_m / cells).abs() < 1e-12);
         }

@@ -1,4 +1,5 @@
-//! A run of a scene of `bench contact`: what its steps take, how deep bodies get, how far they creep, what energy contacts make.
+//! A run of a scene of `bench contact`: the cost of its steps, how deep bodies get, how far they creep, the energy that
+//! contacts make.
 //!
 //! In: a cluster or a rapier3d world, a time. Out: a [`Course`]. Never here: which scenes there are, peers' files.
 
@@ -11,7 +12,7 @@ use rapier3d::pipeline::PhysicsWorld;
 /// The part of a run in which bodies are held to lie still, seconds before its end.
 const REST_S: f64 = 0.5;
 
-/// What a run was.
+/// The results of a run.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Course {
     pub bodies: usize,
@@ -34,7 +35,7 @@ pub(super) struct Course {
     /// The most energy above its least so far, and how much was lost, J.
     pub made_j: f64,
     pub lost_j: f64,
-    /// What energies are sums over: the least so far and the first.
+    /// The energies from which the two are found: the least so far and the first.
     pub least_j: f64,
     pub first_j: f64,
 }

@@ -69,7 +69,7 @@ pub(super) struct Row {
 struct Case {
     /// The name of the scene, for `--only`.
     scene: &'static str,
-    /// What follows it in the name of the test; empty for a scene of one case.
+    /// The end of the name of the test, after the scene; empty for a scene of one case.
     variant: String,
     seconds: f64,
     stage: Box<dyn Fn() -> anyhow::Result<Stage>>,
@@ -92,7 +92,7 @@ impl Case {
         Self { scene, variant: variant.into(), seconds, stage: Box::new(stage), levels: &LEVELS }
     }
 
-    /// The same without time for a solve: rapier3d steps what it can.
+    /// The same without time for a solve: rapier3d steps the bodies that it can step.
     fn hurried(self) -> Self {
         Self { levels: &HURRIED, ..self }
     }
@@ -157,7 +157,7 @@ fn cases(quick: bool) -> Vec<Case> {
     all
 }
 
-/// Those of large clusters by which ways of solving them were chosen.
+/// The cases of large clusters by which ways of solving them were chosen.
 fn from_prototype(quick: bool) -> Vec<Case> {
     let seconds = |full: f64| if quick { 0.3 } else { full };
     let of = |scene: &'static str, full_s: f64, stage: fn() -> Stage| {
@@ -180,7 +180,7 @@ fn from_prototype(quick: bool) -> Vec<Case> {
     all
 }
 
-/// Those of the cases that are asked for; all where none is named.
+/// The cases that are asked for; all where none is named.
 fn chosen(all: Vec<Case>, only: &[String]) -> anyhow::Result<Vec<Case>> {
     for name in only {
         if !all.iter().any(|case| case.scene == name) {

@@ -1,4 +1,4 @@
-//! What another engine takes for the scenes of `bench contact`, as its script wrote it.
+//! The costs of another engine in the scenes of `bench contact`, as its script wrote them.
 //!
 //! In: a row of a file that `python/peers/contact.py` writes. Out: the same with names. Never here: files, our own measurements.
 

@@ -1,4 +1,4 @@
-//! `bench soft`: the cost of a step of soft bodies, by number of nodes and by what they touch, beside another engine's.
+//! `bench soft`: the cost of a step of soft bodies, by number of nodes and by their contacts, beside another engine's.
 //!
 //! In: cubes of tissue held, lying, loaded and shaken, a sheet hung and folded, the demonstration's tube with both kinds of wall.
 //! Out: rows of CPU time a step on one core, and how far the cube sags. Never here: how a step is made, how peers are run.
@@ -90,9 +90,9 @@ pub(super) struct Row {
     pub steps: usize,
     pub ms_per_step_p50: f64,
     pub ms_per_step_p99: f64,
-    /// Ratio to the same body without what the test adds: held, hung, or with a prescribed wall; NaN without one.
+    /// Ratio to the same body without the addition of the test: held, hung, or with a prescribed wall; NaN without one.
     pub over_plain: f64,
-    /// Of the cost in the number of nodes, over the test's rows up to this one; NaN for fewer than two.
+    /// The exponent of the cost in the number of nodes, over the test's rows up to this one; NaN for fewer than two.
     pub exponent: f64,
     /// How far the cube's top has sunk at the end, its mean, metres; NaN of other bodies.
     pub sag_m: f64,

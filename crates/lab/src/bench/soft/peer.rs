@@ -1,4 +1,4 @@
-//! What another engine takes for the cubes of `bench soft`, as its script wrote it.
+//! The costs of another engine in the cubes of `bench soft`, as its script wrote them.
 //!
 //! In: a row of a file that `python/peers/soft.py` writes. Out: the same with names. Never here: files, our own measurements.
 

@@ -30,7 +30,7 @@ fn a_plate_presses_the_lying_cube_down_and_a_shaken_floor_takes_it_along() {
     let more_m = loaded.sag_m - lying.sag_m;
     assert!((more_m / pressed_m - 1.0).abs() < 0.2, "{more_m} m, not {pressed_m} m");
     let contacts = [lying.contacts, loaded.contacts, shaken.contacts];
-    // its lower vertices, and those that the plate presses
+    // its lower vertices, and those under the plate
     assert!(contacts[0] == 16 && contacts[1] > 16 && contacts[2] > 16, "{contacts:?}");
     // 0.3 g is below friction: in half a second the floor has gone all of its way, and the cube with it
     let mut play = Play::new(vec![boxed(bodies::cube(3)).unwrap(), Box::new(ShakenFloor::new().unwrap())], &[], STEP_S);

@@ -66,14 +66,14 @@ struct Actor {
     /// Springs from fixed points.
     hands: Vec<AnchorSpring>,
     links: Vec<Link>,
-    /// What an audit needs to know.
+    /// Its weight, for an audit.
     weight: Weight,
     /// Length of its last step, seconds.
     last_s: f64,
     cluster: Cluster,
 }
 
-/// What an audit needs to know of an agent.
+/// The weight of an agent, as an audit needs it.
 #[derive(Debug, Clone, Copy, Default)]
 pub(in super::super) struct Weight {
     /// Of a tube, kg/m.
@@ -269,7 +269,7 @@ impl Cluster {
     }
 }
 
-/// What an agent sees, and the law of its pairs.
+/// An agent's step context, and the law of its pairs.
 #[derive(Clone, Copy)]
 struct Around<'a> {
     context: StepContext<'a>,

@@ -1,4 +1,4 @@
-//! What the charts of asynchronous pairs are measured with: agents on clocks of their own, without a runtime.
+//! The harness of the charts of asynchronous pairs: agents on clocks of their own, without a runtime.
 //!
 //! In: agents, laws, faults. Out: their published states and sums at a common time. Never here: figures.
 

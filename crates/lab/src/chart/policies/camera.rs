@@ -35,7 +35,7 @@ impl Path {
         let from = self.keys[after.saturating_sub(1)];
         let to = self.keys[after.min(self.keys.len() - 1)];
         let span = to.frame.saturating_sub(from.frame);
-        // exact at a key: a camera that does not move must not tremble by rounding
+        // exact at a key: a camera that does not move must not jitter by rounding
         let part = if span > 0 { frame.saturating_sub(from.frame) as f64 / span as f64 } else { 0.0 };
         let between = |a: f64, b: f64| a + (b - a) * part;
         let (yaw, pitch) = (between(from.yaw_deg, to.yaw_deg), between(from.pitch_deg, to.pitch_deg));

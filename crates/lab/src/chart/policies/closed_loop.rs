@@ -39,10 +39,10 @@ pub(super) struct Frame {
     pub(super) gap: f64,
     /// Benefit over the bound at the true costs.
     pub(super) quality: f64,
-    /// Things in view, and those of them that were left out.
+    /// Things in view, and the things among them that were left out.
     pub(super) objects: usize,
     pub(super) holes: usize,
-    /// Levels that changed, and those that changed back within three frames.
+    /// Changes of level, and changes that were reversed within three frames.
     pub(super) changes: usize,
     pub(super) reversals: usize,
     /// Polygons that were drawn.

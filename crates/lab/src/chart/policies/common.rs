@@ -7,7 +7,7 @@ use super::chooser::Policy;
 use super::closed_loop::Show;
 use super::metrics::Row;
 
-/// Polygons of each of an object's five levels, as fractions of those at full detail.
+/// Polygons of each of an object's five levels, as fractions of the polygons at full detail.
 pub(super) const LEVEL_PARTS: [f64; 5] = [0.02, 0.06, 0.18, 0.45, 1.0];
 
 /// A setting and a policy.

@@ -64,7 +64,7 @@ pub(in super::super) struct Row {
     frames: usize,
     /// Share of struts that are drawn neither as prisms nor by a ball.
     holes: f64,
-    /// Wrong pixels, as a share of those that the struts cover.
+    /// Wrong pixels, as a share of the pixels under the struts.
     error: f64,
     /// Changes of level from frame to frame, per strut.
     changes: f64,
@@ -222,8 +222,8 @@ fn pictures(pixels: f64) -> [Entry; 6] {
     SIDES.map(|sides| Entry::new(sides, (BENEFIT * pixels * (1.0 - geodesic::prism_error(sides as f64))) as u64))
 }
 
-/// Wrong pixels, as a share of those that struts cover: for a prism the part that it lacks of the circle, for a ball the part that it
-/// fills between the struts, for a hole all of them.
+/// Wrong pixels, as a share of the pixels under the struts: for a prism the part that it lacks of the circle, for a
+/// ball the part that it fills between the struts, for a hole all of them.
 fn error(shown: &[StrutForm], pixels: &[f64]) -> f64 {
     let wrong = |(shown, px): (&StrutForm, &f64)| match shown {
         StrutForm::Hole => *px,

@@ -144,7 +144,7 @@ pub(super) fn deviation95(times: &[f64]) -> f64 {
     within(&times.iter().map(|time| (time / middle - 1.0).abs()).collect::<Vec<_>>(), 0.95)
 }
 
-/// Error of 19 of 20 predictions over what is allowed: a tenth (FS93, §4), or 1.2 times the spread of one and the same picture if that is
+/// Error of 19 of 20 predictions over the allowed one: a tenth (FS93, §4), or 1.2 times the spread of one and the same picture if that is
 /// more, since no prediction can err by less; NaN where one of the two is.
 pub(super) fn error_over_allowed(error95: f64, spread95: f64) -> f64 {
     if spread95.is_nan() { f64::NAN } else { error95 / (1.2 * spread95).max(0.1) }

@@ -1,4 +1,4 @@
-//! What the eye sees of a building from above: rooms that it reaches through portals, and the objects that remain in view (FS93, §2.1).
+//! The eye's view of a building from above: rooms that it reaches through portals, and the objects that remain in view (FS93, §2.1).
 //!
 //! In: the built-in scene `auditorium` at three places of its walk. Out: counts, and a plan for each place. Never here: a policy.
 
@@ -28,7 +28,7 @@ pub(in super::super) struct Row {
     place: String,
     /// All objects of the scene.
     objects: u64,
-    /// Those in the frustum, as if nothing hid them.
+    /// Objects in the frustum, as if nothing hid them.
     in_frustum: u64,
     potentially_visible: u64,
     visible: u64,
@@ -41,7 +41,7 @@ struct Spot {
     visible: bool,
 }
 
-/// What is seen from a place.
+/// The view from a place.
 struct Plan {
     eye_m: DVec3,
     /// Ends of the borders of the view, on the ground.

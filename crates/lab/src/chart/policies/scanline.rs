@@ -1,6 +1,6 @@
 //! The intensity along a scan line of a cylinder: ideal, and drawn as prisms that are flat or Gouraud shaded (FS93, §5, fig. 5).
 //!
-//! A diffuse cylinder under one directional light, in an orthographic projection: what the printed accuracy of a level stands for.
+//! A diffuse cylinder under one directional light, in an orthographic projection: the meaning of the printed accuracy of a level.
 
 use super::super::experiment::{Experiment, Finding};
 use super::super::figure::{Axis, Colour, Figure, Layer, Mark, Panel};

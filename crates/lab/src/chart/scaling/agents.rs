@@ -15,7 +15,7 @@ const EXECUTORS: [Executor; 3] = [Executor::Threads, Executor::Pool, Executor::L
 const THREADS_MAX: u32 = 100;
 /// How long each case runs; its bare steps run half as long.
 const SPAN: Duration = Duration::from_millis(1500);
-/// Steps of all agents per second: what one core can carry.
+/// Steps of all agents per second that one core can carry.
 const STEPS_PER_S: f64 = 1e5;
 const RATE_MAX_HZ: f64 = 198.0;
 

@@ -54,7 +54,7 @@ pub(in super::super) struct Case {
 /// The cost of a size.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(in super::super) struct Cost {
-    /// The actual number of what is counted.
+    /// The actual number of the things counted.
     pub(super) count: f64,
     pub(super) us: f64,
     pub(super) floor_us: f64,

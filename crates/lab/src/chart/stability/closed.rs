@@ -3,7 +3,8 @@
 //! `plates`: two heavy plates close in on a ball and two tubes. The tubes take the ball's energy within seconds; from then on
 //! there is no impact until the plates reach the tubes, after three quarters of the run. `ring`: three balls and two tubes, each on
 //! a spring to the next. Without external forces momentum is constant and energy may only fall. Both are sampled when all five
-//! clocks show the same time, with every given impulse delivered; and also as published, to measure what is in flight.
+//! clocks show the same time, with every given impulse delivered; and also as published, to measure the impulses in
+//! flight.
 
 use super::super::asynchronous::play::Play;
 use super::super::experiment::{Experiment, Finding, worst};
@@ -63,7 +64,7 @@ pub(in super::super) struct Row {
     raw_drift: f64,
     in_flight: f64,
     beyond: f64,
-    /// Number of samples at which all clocks agreed, and number of those with an impact since the previous one.
+    /// Number of samples at which all clocks agreed, and number of such samples with an impact since the previous one.
     looks: u32,
     blows: u32,
     /// The longest time without an impact, seconds.

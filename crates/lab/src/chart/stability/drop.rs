@@ -37,7 +37,7 @@ const JITTER: f64 = 0.2;
 const SEEDS: u64 = 20;
 const QUICK_SEEDS: u64 = 2;
 
-/// Masses of the mounted body and of the one that falls, kg, and the rate of the mounted one.
+/// Masses of the mounted and of the falling body, kg, and the rate of the mounted one.
 pub(super) const MOUNTED_KG: f64 = 0.1;
 pub(super) const FALLING_KG: f64 = 0.05;
 const MOUNTED_HZ: f64 = 1000.0;

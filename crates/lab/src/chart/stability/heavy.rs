@@ -33,7 +33,7 @@ const LOOK_S: f64 = 1.0 / 60.0;
 const SINK_MAX_M: f64 = 0.1;
 const ASIDE_MAX_M: f64 = 0.25;
 /// A chain holds that is never stretched by more than this share of its length, and whose energy never exceeds that of the start
-/// by more than this share of what its fall can give.
+/// by more than this share of the energy that its fall can give.
 const STRETCH_MAX: f64 = 1e-3;
 const GAIN_MAX: f64 = 0.01;
 /// Half the length of a link, metres.
@@ -58,7 +58,7 @@ pub(in super::super) struct Row {
     value: f64,
     /// Greatest sideways displacement of a box, metres.
     aside_m: f64,
-    /// Greatest energy above that of the start, as a share of what the fall can give.
+    /// Greatest energy above that of the start, as a share of the energy that the fall can give.
     gain: f64,
     holds: bool,
     /// Number of agents led by another one, in a cluster.

@@ -33,7 +33,7 @@ const DAMPING_PER_S: f64 = 6.0;
 const SECONDS: f64 = 6.0;
 /// A tip farther off than this share of the length counts as wrong.
 const WRONG: f64 = 0.05;
-/// A motion has blown up past this rise of energy, in multiples of what the fall can give.
+/// A motion has blown up past this rise of energy, in multiples of the energy that the fall can give.
 const BLOWN_UP: f64 = 10.0;
 /// Past this stretch the sections of a soft tube tilt (docs/theory/rod.md).
 const TILT: f64 = 1.5;
@@ -55,7 +55,8 @@ pub(in super::super) struct Row {
     verdict: Verdict,
     /// Distance of the tip from its rest position, as a share of the length; empty where it blew up.
     tip_error: Option<f64>,
-    /// The greatest rise of the mechanical energy above that of the start, as a share of what the fall can give.
+    /// The greatest rise of the mechanical energy above that of the start, as a share of the energy that the fall can
+    /// give.
     energy_rise: f64,
     /// The greatest stretch on the way.
     stretch: f64,

@@ -1,8 +1,8 @@
 //! Whether frames are in time on this machine: scenes played at 30 Hz through the program's own loop, alone and beside busy threads.
 //!
-//! In: a scene, a policy, threads that compete. Out: late frames, the work of a frame, what an empty picture costs beside the same threads,
-//! how much the time of one and the same picture varies. Never here: a declared machine, a window.
-//! Policies and loads take turns, round by round, so that what the machine does meanwhile meets all of them.
+//! In: a scene, a policy, threads that compete. Out: late frames, the work of a frame, the cost of an empty picture
+//! beside the same threads, how much the time of one and the same picture varies. Never here: a declared machine, a
+//! window. Policies and loads take turns, round by round, so that other work of the machine meets all of them.
 
 use super::super::super::experiment::{Experiment, Finding, worst};
 use super::super::super::figure::{Axis, Colour, Figure, Layer, Mark, Panel};
@@ -31,7 +31,7 @@ const SIZE: Size = Size { width: 1280, height: 720 };
 const TARGET_HZ: f64 = 30.0;
 /// Rounds in full and in the quick run.
 const ROUNDS: [usize; 2] = [5, 1];
-/// Seconds of a play before frames count, and of those that count, in full and in the quick run.
+/// Seconds of a play before frames count, and seconds in which they count, in full and in the quick run.
 const SETTLE_S: [f64; 2] = [3.0, 2.0];
 const COUNT_S: [f64; 2] = [5.0, 2.0];
 /// How often an empty picture and the last picture are drawn.
@@ -79,7 +79,7 @@ pub(in super::super::super) struct Row {
     scale: f64,
     /// Value of the choice over its bound; NaN for feedback.
     value: f64,
-    /// What the controller rests on at the end.
+    /// The limit on which the controller rests at the end, or why nothing was measured; empty for none.
     said: String,
 }
 
@@ -374,7 +374,7 @@ impl Experiment for Held {
 }
 
 impl Row {
-    /// Error of 19 of 20 predictions over what is allowed.
+    /// Error of 19 of 20 predictions over the allowed one.
     fn error(&self) -> f64 {
         error_over_allowed(self.error95, self.spread95)
     }

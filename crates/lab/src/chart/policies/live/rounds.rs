@@ -11,7 +11,7 @@ use metachron_lod::control::Policy;
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct OverRounds {
     median: f64,
-    /// Half of the range: what a median may differ by for no reason.
+    /// Half of the range: a difference of medians up to this has no cause.
     spread: f64,
 }
 
@@ -60,13 +60,13 @@ impl Numbers {
     }
 }
 
-/// Error of 19 of 20 predictions over what is allowed.
+/// Error of 19 of 20 predictions over the allowed one.
 fn error(row: &Row) -> f64 {
     error_over_allowed(row.model_error95, row.spread95)
 }
 
-/// Whether the default has the fewest late frames of the policies of as high a value, the highest value of those as few frames of which are
-/// late, and predicts its frames.
+/// Whether the default has the fewest late frames of the policies of as high a value, the highest value of the policies with as few late
+/// frames, and predicts its frames.
 ///
 /// A difference counts where it is greater than the spread over the rounds of both; in a single round there is none. A policy whose value is
 /// not known competes by its late frames alone.

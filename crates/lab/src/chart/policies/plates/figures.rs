@@ -95,7 +95,7 @@ impl Panel {
     }
 }
 
-/// All of them; those that are drawn on the present adapter too come first.
+/// All plates; first the ones that are drawn on the present adapter too.
 pub(super) const PLATES: [Plate; 8] = [
     Plate {
         name: "fs93-10",

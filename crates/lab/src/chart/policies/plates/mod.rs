@@ -52,7 +52,7 @@ pub(in super::super) struct Row {
     psnr_db: f64,
 }
 
-/// What a picture was played with: figure, panel (none: full detail), frames, whether live.
+/// The play behind a picture: figure, panel (none: full detail), frames, whether live.
 type Played = (&'static str, Option<&'static str>, usize, bool);
 
 /// The pictures of this run of the program.

@@ -49,7 +49,7 @@ fn mean(picture: &PictureFile, x: u32, y: u32) -> [u8; 4] {
     })
 }
 
-/// What a picture lacks of another one of its size, brightened.
+/// The difference of a picture from another one of its size, brightened.
 pub(super) fn difference(picture: &PictureFile, full: &PictureFile) -> PictureFile {
     PictureFile::from_fn(picture.width(), picture.height(), |x, y| {
         let wanted = full.get_pixel_checked(x, y).map_or([0; 4], |pixel| pixel.0);

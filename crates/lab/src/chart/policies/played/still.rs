@@ -9,14 +9,14 @@ use metachron_lod::control::Policy;
 use metachron_render::{Camera, Colouring, PictureFile, Style};
 use metachron_session::FlyThrough;
 
-/// What a picture shows.
+/// The subject of a picture.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(in super::super) enum Sight {
-    /// What the camera of the path sees.
+    /// The view of the path's camera.
     Eye,
     /// The same, every object in the shade of its level: the darker, the finer.
     Levels,
-    /// These shades seen from above, of what the camera of the path sees.
+    /// These shades seen from above, of the objects in view of the path's camera.
     Above(Above),
     /// The difference of [`Sight::Eye`] from full detail, brightened; nothing of its own is drawn for it.
     Difference,
@@ -59,7 +59,7 @@ pub(in super::super) struct Still {
     pub(in super::super) holes: u32,
     /// Groups that are drawn as one.
     pub(in super::super) impostors: usize,
-    /// Those that were asked for; none where nothing draws.
+    /// The pictures that were asked for; none where nothing draws.
     pub(in super::super) pictures: Vec<(Sight, PictureFile)>,
 }
 

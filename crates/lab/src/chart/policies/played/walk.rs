@@ -26,7 +26,7 @@ pub(in super::super) enum Times {
 }
 
 /// A machine whose frame times follow the objects and their shading, with the noise of `docs/theory/budget.md`, section 10. The time
-/// for choosing is what one core was measured to take with the default policy (`chart policies`, selection).
+/// for choosing is that measured on one core with the default policy (`chart policies`, selection).
 const DECLARED: [(&str, &str); 12] = [
     ("executor", "lockstep"),
     ("machine.draw_setup_ms", "0.1"),
