@@ -6,8 +6,8 @@ use super::{ClusterReport, ClusterStepper};
 use crate::agent::{Agent, Stepping};
 use crate::detect::ClusterScene;
 use crate::member::{ClusterMember, ContactMemory, Participant};
-use crate::{Neighbour, StepContext};
-use metachron_core::{Archive, ArchiveError, Grip, PlainLoop, SimSpan, StepError, StepReport};
+use crate::{Law, StepContext};
+use metachron_core::{AgentId, Archive, ArchiveError, Grip, PlainLoop, SimSpan, StepError, StepReport};
 
 /// Steps one agent, and remembers what it touches between steps.
 #[derive(Default)]
@@ -17,6 +17,7 @@ pub struct LoneStepper {
     stepper: ClusterStepper,
     memory: ContactMemory,
     grips: Vec<Grip>,
+    laws: Vec<(AgentId, Law)>,
     report: ClusterReport,
 }
 
@@ -35,14 +36,15 @@ impl LoneStepper {
             Stepping::Own(own) => return own.step(dt, &context),
             Stepping::Cluster(member) => member,
         };
-        let Self { scene, stepper, memory, grips, report } = self;
+        let Self { scene, stepper, memory, grips, laws, report } = self;
         let id = context.me;
-        let laws: Vec<_> = context.neighbours.iter().map(|Neighbour { id, law, .. }| (*id, *law)).collect();
+        laws.clear();
+        laws.extend(context.neighbours.iter().map(|other| (other.id, other.law)));
         let mut all = [Participant {
             id,
             member: member.into(),
             context,
-            laws: &laws,
+            laws,
             memory,
             parts: 1,
             alone_s: dt.as_secs_f64(),

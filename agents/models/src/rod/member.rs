@@ -110,7 +110,7 @@ impl ClusterMember for Tube {
             if stepper.energy_rise(now, &problem) <= 0.0 {
                 return Ok(true);
             }
-            let rise_j = stepper.follow(now, &problem, &[]);
+            let rise_j = stepper.follow(now, &problem);
             // the cluster's problem is about the state that the step starts from
             stepper.solve(now, &problem, true)?;
             Ok(rise_j <= 0.0)
@@ -276,10 +276,14 @@ impl ClusterMember for Tube {
         let before = self.momentum().0;
         let integrates_freely = self.integrates_free_motion(h_s);
         let unknowns = std::mem::take(&mut self.unknowns);
-        let is_free = !touched && unknowns.are_free(v) && integrates_freely;
+        let is_free = unknowns.are_free(v);
         let (of_rod, of_wall) = v.split_at(self.now.u.len());
         let finite = self.wall_stays_finite(of_wall, h_s)
-            && if is_free { self.advance_freely(h_s) } else { self.advance_with(of_rod, h_s, &unknowns) };
+            && if is_free && !touched && integrates_freely {
+                self.step_by(h_s, Stepper::step).is_ok()
+            } else {
+                self.advance_with([of_rod, &unknowns.free], h_s, is_free)
+            };
         self.unknowns = unknowns;
         if !finite {
             return Err(self.diverged(Divergence { slot: None }, h_s));
@@ -407,16 +411,11 @@ impl Tube {
         }
     }
 
-    /// Makes the step begun by its own integrator; whether its state is finite then.
-    fn advance_freely(&mut self, h_s: f64) -> bool {
-        self.step_by(h_s, Stepper::step).is_ok()
-    }
-
-    /// Ends the step begun with the velocities `v`; whether its state is finite then.
-    fn advance_with(&mut self, v: &[DVec3], h_s: f64, unknowns: &Unknowns) -> bool {
+    /// Ends the step begun with the velocities `v`, which are the free ones where it `is_free`; whether its state is finite then.
+    fn advance_with(&mut self, velocities: [&[DVec3]; 2], h_s: f64, is_free: bool) -> bool {
         self.step_by(h_s, |stepper, now, setting| {
             let problem = whole_step(setting, h_s);
-            let rise_j = stepper.follow_cluster(now, &problem, [v, &unknowns.free[..v.len()]]);
+            let rise_j = stepper.follow_cluster(now, &problem, velocities, is_free);
             if rise_j > 0.0 {
                 energy_limiter::remove(rise_j, &mut stepper.next, setting.matter, setting.division);
             }

@@ -60,8 +60,6 @@ pub struct Stepper {
     pub(super) factor: Factor,
     pub(super) rhs: Vec<DVec3>,
     pub(super) next: RodState,
-    /// Impulses of a cluster on its slots in the step begun, N·s and N·m·s.
-    given: Vec<DVec3>,
     /// Changes of the previous substep, and an extrapolated start state for rules that need one.
     pub(super) past: History,
     pub(super) ahead: RodState,
@@ -164,7 +162,7 @@ impl Stepper {
         if trial.bounds_turns && self.fastest_spin() * problem.h > TURN_MAX_RAD {
             return Ok(Verdict::TooFar);
         }
-        let rise = self.follow(now, problem, &[]);
+        let rise = self.follow(now, problem);
         let finite = self.next.is_finite();
         if trial.may_divide && (rise > 0.0 || !finite) {
             return Ok(Verdict::TooFar);
@@ -175,48 +173,39 @@ impl Stepper {
         if finite && self.next.is_finite() { Ok(Verdict::Good) } else { Err(Divergence { slot: None }) }
     }
 
-    /// Moves along the solution of the first system in `rhs`; while the energy rises by more than the impulses `given` to its slots work, moves
-    /// along the solutions about the states that these lead to. The rise that is left, J. No impulses at all where `given` is empty.
-    pub(super) fn follow(&mut self, now: &RodState, problem: &SubstepProblem<'_>, given: &[DVec3]) -> f64 {
+    /// Moves along the solution of the first system in `rhs`, and along those about where that leads while the energy rises. The rise that is
+    /// left, J.
+    pub(super) fn follow(&mut self, now: &RodState, problem: &SubstepProblem<'_>) -> f64 {
         self.advance(now, problem, true);
-        let rise_j = |stepper: &Self| {
-            let work_j: f64 = given.iter().zip(&stepper.next.u).map(|(given, v)| given.dot(*v)).sum();
-            stepper.energy_rise(now, problem) - work_j
-        };
-        let mut risen_j = rise_j(self);
+        let mut rise_j = self.energy_rise(now, problem);
         for _ in 0..ITERATIONS_MORE {
-            if risen_j <= 0.0 || !self.next.is_finite() {
-                break;
-            }
-            assemble(problem, &Iterate { start: now, at: &self.next, first: false }, &mut self.rows, &mut self.rhs);
-            self.rhs.iter_mut().zip(given).for_each(|(rhs, given)| *rhs += *given);
             // a state far out may have no next iterate: then the best so far is judged
-            if self.factor_and_solve().is_err() {
+            if rise_j <= 0.0 || !self.next.is_finite() || self.solve(now, problem, false).is_err() {
                 break;
             }
             self.advance(now, problem, false);
-            risen_j = rise_j(self);
+            rise_j = self.energy_rise(now, problem);
         }
-        risen_j
+        rise_j
     }
 
-    /// The same from the velocities `v` of a cluster, which give the tube the impulses A (v − free).
+    /// Moves by the velocities `v` that a cluster has made of the free ones: its impulses A (v − free) act on the tube. The rise of the energy
+    /// beyond their work, J.
     pub(super) fn follow_cluster(
         &mut self,
         now: &RodState,
         problem: &SubstepProblem<'_>,
         [v, free]: [&[DVec3]; 2],
+        is_free: bool,
     ) -> f64 {
-        let mut given = std::mem::take(&mut self.given);
-        given.clear();
-        if v != free {
-            given.extend((0..v.len()).map(|row| product(&self.rows, row, |at| v[at] - free[at])));
-        }
         self.rhs.clear();
         self.rhs.extend_from_slice(v);
-        let rise_j = self.follow(now, problem, &given);
-        self.given = given;
-        rise_j
+        if is_free {
+            return self.follow(now, problem);
+        }
+        self.advance(now, problem, true);
+        let work = |row: usize| product(&self.rows, row, |at| v[at] - free[at]).dot(v[row]);
+        self.energy_rise(now, problem) - (0..v.len()).map(work).sum::<f64>()
     }
 
     /// Builds and solves the system about the iterate; leaves the change of velocities in `rhs` (eq. 11).

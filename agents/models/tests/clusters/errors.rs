@@ -162,3 +162,38 @@ fn a_repeated_step_leaves_no_trace() {
         }
     }
 }
+
+#[test]
+fn a_deformable_that_is_let_go_says_what_finer_steps_find_to_a_factor_of_three() {
+    type Made = fn() -> Placed;
+    let end = DVec3::Z - DVec3::X * 0.1;
+    let cases: [(Made, DVec3); 3] = [
+        (|| tube(DVec3::Z, DVec3::X * 0.1, 0.005), end),
+        (|| rope(DVec3::Z, DVec3::X * 0.1, 0.006, 1e5), end),
+        (|| cloth(DVec3::Z, 0.2, 6), end - DVec3::Y * 0.1),
+    ];
+    for (number, (made, target)) in cases.into_iter().enumerate() {
+        for rate_hz in [120.0, 240.0] {
+            let held = || {
+                let mut table = Table::among(vec![made()], &[]).at_rates(rate_hz, rate_hz);
+                let anchor = if number == 0 { Anchor::Arc(0.0) } else { Anchor::Vertex(0) };
+                table.bodies[0].hands = vec![AnchorSpring {
+                    by: None,
+                    anchor,
+                    target,
+                    target_velocity: DVec3::ZERO,
+                    stiffness_n_m: 20.0,
+                    damping_n_s_m: 0.1,
+                }];
+                table
+            };
+            for [said_m, true_m] in said_and_true_m(held, |_| ()) {
+                println!("{number} at {rate_hz} Hz: {said_m} of {true_m} m");
+                assert!(
+                    (1.0 / 3.0..3.0).contains(&(said_m / true_m)),
+                    "{number} at {rate_hz} Hz: {said_m} of {true_m} m"
+                );
+            }
+        }
+    }
+}
