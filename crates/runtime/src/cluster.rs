@@ -27,12 +27,12 @@ pub(super) use solve_budget::SolveBound;
 use solve_budget::{FactorPrice, Solved};
 pub(super) use turn::Leap;
 
-use super::agent_runner::{AgentRunner, StepOutcome, contained};
-use super::broad_phase::PlannedStep;
-use super::handle::Shared;
-use super::helpers::Helped;
-use super::loads::{Acting, Loads};
-use super::observation::{Observer, newest};
+use crate::agent::handle::Shared;
+use crate::commands::loads::{Acting, Loads};
+use crate::neighbours::broad_phase::PlannedStep;
+use crate::neighbours::observation::{Observer, newest};
+use crate::turn::agent_runner::{AgentRunner, StepOutcome, contained};
+use crate::turn::helpers::Helped;
 use metachron_contact::detect::ClusterScene;
 use metachron_contact::member::{ClusterMember, ContactMemory, Participant, Role};
 use metachron_contact::remote::{Pairs, Remotes};

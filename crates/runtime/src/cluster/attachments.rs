@@ -3,8 +3,8 @@
 //! In: an agent's joints and links, its memory of what has torn, what yielded and tore in a step. Out: agents that belong together, entries in the states
 //! of those that tell of it. Never here: forces, when something yields or tears ([`metachron_contact::step`]).
 
-use super::super::events::{AgentEvent, EventKind};
 use super::AgentRunner;
+use crate::records::events::{AgentEvent, EventKind};
 use metachron_contact::constraint::FailedAttachment;
 use metachron_contact::member::{ContactMemory, Partner};
 use metachron_contact::step::ClusterStepper;

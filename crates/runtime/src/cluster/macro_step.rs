@@ -1,12 +1,12 @@
 //! One macro step of a cluster: all members as one problem, or none of them where one fails.
 //!
 //! In: the members at the leader's time, their plan. Out: the members a macro step later; after a failure they are where they were, and those whose
-//! fault it is are known by their models ([`super::super::model`]). Never here: what becomes of these ([`super::exclusion`]), who is a member.
+//! fault it is are known by their models ([`crate::turn::model`]). Never here: what becomes of these ([`super::exclusion`]), who is a member.
 
-use super::super::agent_runner::{AgentRunner, StepOutcome, contained};
-use super::super::helpers::Helped;
-use super::super::loads::Acting;
 use super::{ClusterSeat, NO_SEAT, Wish, prepared};
+use crate::commands::loads::Acting;
+use crate::turn::agent_runner::{AgentRunner, StepOutcome, contained};
+use crate::turn::helpers::Helped;
 use metachron_contact::StepContext;
 use metachron_contact::detect::ClusterScene;
 use metachron_contact::member::{ClusterMember, Participant};

@@ -1,7 +1,7 @@
 //! How far the solves of a cluster may go: as many factors as fit into the time of its macro step, by what factors have taken so far.
 //!
 //! In: how long its turns took, and how many solves and factors they made. Out: the most factors of each solve of the next one.
-//! Never here: a clock, what a turn takes ([`super::super::turns::Took`] is measured on threads and in pools and declared in lockstep), the solve.
+//! Never here: a clock, what a turn takes ([`crate::records::turns::Took`] is measured on threads and in pools and declared in lockstep), the solve.
 
 use metachron_contact::detect::LEAST_STEPS_RANGE;
 use metachron_contact::step::{ClusterReport, FACTORS_SAFE};
