@@ -47,8 +47,11 @@ const ABSENT: [(&str, &[&str]); 8] = [
 ];
 
 /// Where a crate that otherwise knows no file has one: what the program itself has written, and reads again.
-const OWN_FILES: [&str; 3] =
-    ["crates/world/src/checkpoint.rs", "crates/world/src/recording.rs", "crates/world/src/recording_file.rs"];
+const OWN_FILES: [&str; 3] = [
+    "crates/world/src/history/checkpoint.rs",
+    "crates/world/src/history/recording.rs",
+    "crates/world/src/history/recording_file.rs",
+];
 
 /// Modules of the numbers that need neither the standard library nor a type of the engine.
 const NO_STD: [&str; 7] = ["adaptive", "cost", "grisoni", "hysteresis", "log_law", "select", "share"];
