@@ -4,9 +4,9 @@
 
 use super::shape_cache::{ShapeCache, ToolSolid};
 use super::skin;
-use super::skin_tree::PlacedSkin;
-use crate::capsule_chain::foot;
-use crate::signed_distance::{Ball, Field};
+use super::skins::skin_tree::PlacedSkin;
+use crate::solids::capsule_chain::foot;
+use crate::solids::signed_distance::{Ball, Field};
 use crate::{Aabb, Place, PlacedShape, ShapeKind, ShapePose, SolidShape, SurfaceShape};
 use crate::{CompoundPart, Solid, ToolShape};
 use glam::{DQuat, DVec3};
