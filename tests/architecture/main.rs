@@ -102,7 +102,7 @@ const RINGS: [(&str, usize); 18] = [
     ("crates/export", 0),
     ("crates/bevy", 5),
     ("crates/import", 3),
-    ("crates/lod", 9),
+    ("crates/lod", 5),
     ("crates/render", 12),
     ("crates/session", 3),
     ("crates/viewer", 2),
