@@ -1,6 +1,6 @@
 //! Joints as rows, each against its closed form: held points and turns, slides, motors, stops, ropes.
 
-use super::{Body, Case, is_open, rigid};
+use crate::solve::tests::{Body, Case, is_open, rigid};
 use crate::solve::{Hold, JointRow, Settings, Side, Solution, Solver, Spring, StepForm};
 use glam::DVec3;
 

@@ -15,7 +15,7 @@ const SLACK: f64 = 1e-6;
 ///
 /// # Errors
 /// The first fault of a problem, with its place.
-pub(super) fn validate(problem: &Problem<'_>) -> Result<(), ProblemError> {
+pub(crate) fn validate(problem: &Problem<'_>) -> Result<(), ProblemError> {
     let h_s = problem.h_s;
     if !(h_s.is_finite() && h_s > 0.0) {
         return Err(ProblemError::Step { h_s });

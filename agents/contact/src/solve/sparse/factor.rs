@@ -8,9 +8,9 @@ mod pass;
 
 use super::fronts::{Front, Fronts};
 use super::order::minimum_degree;
-use super::problem::Block;
 use super::tiles::{TILE, TILE_SIZE, filled, solve_down, solve_up, triangle};
 use crate::lists::refill;
+use crate::solve::statement::problem::Block;
 use fearless_simd::{Level, dispatch};
 use glam::{DMat3, DVec3};
 use metachron_core::{Archive, ArchiveError, ParallelFor, archive_values};
@@ -18,7 +18,7 @@ use pass::{Part, Pass};
 
 /// Two blocks that are coupled, in either order; a block with itself is its diagonal.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) struct Pair {
+pub(crate) struct Pair {
     pub row: usize,
     pub column: usize,
 }
@@ -31,7 +31,7 @@ impl Pair {
 
 /// Where a block is stored, and whether as its transpose.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
-pub(super) struct Place {
+pub(crate) struct Place {
     /// The front.
     pub front: usize,
     /// Its row and column of numbers within the front.
@@ -42,7 +42,7 @@ pub(super) struct Place {
 
 /// The numbers of one front's columns, to which blocks are added.
 #[derive(Debug)]
-pub(super) struct Entries<'a> {
+pub(crate) struct Entries<'a> {
     values: &'a mut [f64],
     /// From one chunk of rows to the next.
     chunk: usize,
@@ -78,7 +78,7 @@ struct Target {
 
 /// A matrix with its factor.
 #[derive(Debug, Clone, Default)]
-pub(super) struct Cholesky {
+pub(crate) struct Cholesky {
     /// The order as it was made, and what its factor and the changes of it cost then.
     order: Vec<usize>,
     fresh_cost: f64,

@@ -3,10 +3,10 @@
 //! In: a problem. Out: products with J and Jᵀ, and what each row needs for its law, in its own frame (x along the normal).
 //! Never here: matrices of members, impulses. Theory: `docs/theory/clusters.md`, eq. 1–6.
 
-use super::cone::{Law, Projection, tangential};
-use super::joint::{Hold, JointRow, Pressed};
-use super::problem::{Contact, Problem, SLIP_SHARE};
-use super::side::Side;
+use crate::solve::cones::cone::{Law, Projection, tangential};
+use crate::solve::statement::joint::{Hold, JointRow, Pressed};
+use crate::solve::statement::problem::{Contact, Problem, SLIP_SHARE};
+use crate::solve::statement::side::Side;
 use glam::{DMat3, DVec3};
 use std::ops::Range;
 
@@ -20,7 +20,7 @@ const SCALE_MIN: f64 = 1e-12;
 
 /// The share of one block in the velocity of a row.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Term {
+pub(crate) struct Term {
     /// The block, counted over all members.
     pub block: usize,
     /// From the block's velocity to the row's frame.
@@ -29,7 +29,7 @@ pub(super) struct Term {
 
 /// One contact or row of a joint.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Row {
+pub(crate) struct Row {
     pub law: Law,
     /// Columns in world axes.
     pub frame: DMat3,
@@ -55,14 +55,14 @@ pub(super) struct Row {
 
 /// An impulse of a row, and its velocity with all impulses.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Point {
+pub(crate) struct Point {
     pub impulse: DVec3,
     pub velocity: DVec3,
 }
 
 /// All rows, contacts first.
 #[derive(Debug, Clone, Default)]
-pub(super) struct Rows {
+pub(crate) struct Rows {
     pub rows: Vec<Row>,
     /// How many of them are contacts.
     pub contacts: usize,

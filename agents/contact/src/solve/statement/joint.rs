@@ -3,9 +3,9 @@
 //! In: sides, directions, bounds. Out: the same with names. Never here: which rows make up a joint of a model, its state.
 //! Theory: `docs/theory/clusters.md`, section 2.
 
-use super::cone::STICK_SHARE;
 use super::side::Side;
 use crate::push_out::push_out_m_s;
+use crate::solve::cones::cone::STICK_SHARE;
 use glam::{DMat3, DVec3};
 
 /// The directions in which a row holds, and the impulses by which it may.
@@ -146,7 +146,7 @@ impl Hold {
     }
 
     /// Orthonormal columns, the axis first.
-    pub(super) fn frame(&self) -> DMat3 {
+    pub(crate) fn frame(&self) -> DMat3 {
         match *self {
             Self::All { .. } => DMat3::IDENTITY,
             Self::Across { axis, .. } | Self::Along { axis, .. } => {
@@ -157,7 +157,7 @@ impl Hold {
     }
 
     /// 1 for each direction of the frame in which the row holds, else 0.
-    pub(super) fn held(&self) -> DVec3 {
+    pub(crate) fn held(&self) -> DVec3 {
         match self {
             Self::All { .. } => DVec3::ONE,
             Self::Across { .. } => DVec3::new(0.0, 1.0, 1.0),

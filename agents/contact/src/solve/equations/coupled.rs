@@ -3,12 +3,12 @@
 //! In: members, which of their blocks are whole in it, rows, a gain of each row. Out: solutions. Never here: which parts are wanted, laws of
 //! contact. Theory: `docs/theory/clusters.md`, eq. 8.
 
-use super::factor::{Cholesky, Pair, Place};
 use super::gradients::Stiffness;
 use super::members::Members;
-use super::problem::Block;
 use super::rows::Rows;
 use crate::lists::{refill, reset};
+use crate::solve::sparse::factor::{Cholesky, Pair, Place};
+use crate::solve::statement::problem::Block;
 use glam::{DMat3, DVec3};
 use metachron_core::{Archive, ArchiveError};
 

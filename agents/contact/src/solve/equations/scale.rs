@@ -5,10 +5,10 @@
 
 use super::gradients::Task;
 use super::members::Members;
-use super::problem::Member;
 use super::rows::{Rows, Term};
 use super::system::System;
 use crate::lists::reset;
+use crate::solve::statement::problem::Member;
 use glam::{DMat3, DVec3};
 use std::ops::Range;
 

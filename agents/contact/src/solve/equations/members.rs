@@ -2,8 +2,8 @@
 //!
 //! In: members. Out: products and sizes. Never here: contacts, solutions. Theory: `docs/theory/clusters.md`, eq. 1 and 15.
 
-use super::problem::{Block, Problem};
 use crate::lists::reset;
+use crate::solve::statement::problem::{Block, Problem};
 use glam::{DMat3, DVec3};
 
 /// A member of no more blocks than a rigid body's.
@@ -11,7 +11,7 @@ const RIGID_BLOCKS: usize = 2;
 
 /// ⊕ A/f, blocks counted over all members.
 #[derive(Debug, Clone, Default)]
-pub(super) struct Members {
+pub(crate) struct Members {
     /// The lower half.
     pub blocks: Vec<Block>,
     /// The member of each block.
@@ -26,7 +26,7 @@ pub(super) struct Members {
 
 /// How large impulses on blocks are.
 #[derive(Debug, Clone, Copy, Default)]
-pub(super) struct Size {
+pub(crate) struct Size {
     /// ‖r‖², J (eq. 15).
     pub squared: f64,
     /// The largest velocity that they would give to blocks by themselves, m/s.
@@ -72,7 +72,7 @@ impl Members {
 
     /// out ← ⊕ A/f x.
     pub fn multiply(&self, x: &[DVec3], out: &mut [DVec3]) {
-        super::problem::multiply(&self.blocks, x, out);
+        crate::solve::statement::problem::multiply(&self.blocks, x, out);
     }
 
     /// How large impulses on all blocks are.
@@ -88,6 +88,6 @@ impl Members {
 }
 
 /// The larger of two sizes; one that is not a number stays.
-pub(super) fn worse(a: f64, b: f64) -> f64 {
+pub(crate) fn worse(a: f64, b: f64) -> f64 {
     if b > a || b.is_nan() { b } else { a }
 }

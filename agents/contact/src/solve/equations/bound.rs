@@ -3,9 +3,9 @@
 //! In: the law of a row, impulses and velocities in its frame. Out: points of the cone, gains, steps. Never here: other rows, matrices.
 //! Theory: `docs/theory/clusters.md`, eq. C1–C5.
 
-use super::cone::{Law, outer};
-use super::lorentz::{Lorentz, Scaling};
 use super::rows::{Point, Row};
+use crate::solve::cones::cone::{Law, outer};
+use crate::solve::cones::lorentz::{Lorentz, Scaling};
 use glam::{DMat3, DVec3};
 
 /// How an impulse λ lies in a second-order cone: l = (h·λ + l₀, T λ + l̄).
@@ -13,7 +13,7 @@ use glam::{DMat3, DVec3};
 /// Of Coulomb's cone the head is the radius of its disc, of one bound what is left to it, of two bounds or a ball half of what lies
 /// between, which no impulse changes.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Chart {
+pub(crate) struct Chart {
     head: DVec3,
     /// The diagonal of T.
     tail: DVec3,
@@ -22,7 +22,7 @@ pub(super) struct Chart {
 
 /// What bounds a row's impulse.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub(super) enum Bound {
+pub(crate) enum Bound {
     /// It gives nothing.
     #[default]
     Idle,
@@ -33,7 +33,7 @@ pub(super) enum Bound {
 
 /// A row on its way.
 #[derive(Debug, Clone, Copy, Default)]
-pub(super) struct Inside {
+pub(crate) struct Inside {
     pub bound: Bound,
     /// The compliance that it began with: under load it is harder, never softer.
     pub compliance: f64,

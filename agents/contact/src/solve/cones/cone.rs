@@ -6,11 +6,11 @@
 use glam::{DMat3, DVec3};
 
 /// A contact sticks while its friction is below this share of the most that Coulomb allows, a row while its impulse is of the most it may give.
-pub(super) const STICK_SHARE: f64 = 0.999;
+pub(crate) const STICK_SHARE: f64 = 0.999;
 
 /// What impulses a row may give.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) enum Law {
+pub(crate) enum Law {
     /// Those of Coulomb's cone: no pull, and friction up to μ times the push.
     Coulomb {
         /// The coefficient μ.
@@ -36,7 +36,7 @@ pub(super) enum Law {
 ///
 /// Of the disc the slope leaves out how the radius grows with the pressure, so that it is symmetric.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Projection {
+pub(crate) struct Projection {
     pub value: DVec3,
     /// Orthonormal columns.
     pub axes: DMat3,
@@ -76,7 +76,7 @@ impl Projection {
 }
 
 /// a bᵀ.
-pub(super) fn outer(a: DVec3, b: DVec3) -> DMat3 {
+pub(crate) fn outer(a: DVec3, b: DVec3) -> DMat3 {
     DMat3::from_cols(a * b.x, a * b.y, a * b.z)
 }
 
@@ -115,7 +115,7 @@ fn ball(limit: f64, z: DVec3) -> Projection {
 }
 
 /// The length of what is not along the normal.
-pub(super) fn tangential(z: DVec3) -> f64 {
+pub(crate) fn tangential(z: DVec3) -> f64 {
     let square = z.y * z.y + z.z * z.z;
     // `hypot` takes four times as long, and is needed where squares overflow alone
     if square.is_finite() { square.sqrt() } else { z.y.hypot(z.z) }

@@ -3,16 +3,16 @@
 //! In: what members and contacts are at the start of a step. Out: the same with names. Never here: joints (`joint.rs`), search for
 //! contacts, state between steps, the solve. Theory: `docs/theory/clusters.md`, section 2.
 
-use super::cone::STICK_SHARE;
 use super::joint::JointRow;
 use super::side::Side;
 use crate::push_out::push_out_m_s;
+use crate::solve::cones::cone::STICK_SHARE;
 use glam::{DMat3, DVec3};
 use metachron_core::ParallelFor;
 use std::fmt;
 
 /// The share of the slip owed that one step takes back.
-pub(super) const SLIP_SHARE: f64 = 0.2;
+pub(crate) const SLIP_SHARE: f64 = 0.2;
 
 /// A 3 × 3 block of a member's matrix, in or below its diagonal.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -4,12 +4,12 @@
 //! iteration. Theory: `docs/theory/clusters.md`, eq. 8 and section 6.
 
 use super::coupled::Coupled;
-use super::error::ProblemError;
 use super::gradients::{Direction, End, Gradients, Operator, Residuals, Stiffness, Task};
 use super::members::Members;
-use super::problem::{Member, Problem};
 use super::rows::Rows;
 use super::scale::Scales;
+use crate::solve::statement::error::ProblemError;
+use crate::solve::statement::problem::{Member, Problem};
 use glam::DVec3;
 use metachron_core::{Archive, ArchiveError};
 use std::ops::Range;
@@ -31,7 +31,7 @@ const FOLLOWED: End = End { directions: 30, share: 0.1 };
 
 /// ⊕ A/f and ⊕ A/f + Jᵀ G J, and how equations with them are solved.
 #[derive(Debug, Clone, Default)]
-pub(super) struct System {
+pub(crate) struct System {
     /// The form in which the next members are taken up.
     pub form: StepForm,
     /// The velocity by which what is left unanswered may change a block by itself, m/s (eq. 17).

@@ -2,7 +2,7 @@
 //!
 //! In: nothing. Out: one enum of errors. Never here: the checks themselves (`validate.rs`).
 
-use super::SIDE_TERMS_MAX;
+use crate::solve::SIDE_TERMS_MAX;
 
 /// Why a problem was refused. The solver keeps its state; the next problem may be solved with it.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]

@@ -1,8 +1,8 @@
 //! Bounds of impulses in interior points: each kind of row against its closed form, and what a solve that ends early still promises.
 
-use super::random::{COUNT, distance, miss, random_case, solved, velocities};
-use super::{Case, Seeded, contact, is_open, rigid};
-use crate::solve::lorentz::{Lorentz, Scaling};
+use crate::solve::cones::lorentz::{Lorentz, Scaling};
+use crate::solve::tests::random::{COUNT, distance, miss, random_case, solved, velocities};
+use crate::solve::tests::{Case, Seeded, contact, is_open, rigid};
 use crate::solve::{Hold, JointRow, Settings, Side, Solution};
 use glam::DVec3;
 use metachron_core::SolveLevel;

@@ -4,11 +4,11 @@
 //! In: the last problem of a solver. Out: velocities of blocks per impulse on them; impulses of contacts against a motion. Never here: the solve,
 //! who asks. Theory: `docs/theory/coupling.md`, eq. 7m and 7s.
 
-use super::gradients::{Stiffness, Task};
 use super::iterate::Iterate;
 use super::newton::linearise;
-use super::solver::Solver;
 use crate::lists::reset;
+use crate::solve::equations::gradients::{Stiffness, Task};
+use crate::solve::solver::Solver;
 use glam::{DMat3, DVec3};
 use metachron_core::PlainLoop;
 
@@ -19,7 +19,7 @@ const LEFT_BY_CONTACTS: f64 = 1e-9;
 
 /// Storage of right sides and their solutions, and what contacts resist with.
 #[derive(Debug, Clone, Default)]
-pub(super) struct Held {
+pub(crate) struct Held {
     right: Vec<DVec3>,
     x: Vec<DVec3>,
     left: Vec<DVec3>,

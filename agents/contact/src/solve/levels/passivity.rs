@@ -4,7 +4,7 @@
 //! Theory: `docs/theory/clusters.md`, eq. 12 and 18.
 
 use super::iterate::Iterate;
-use super::problem::Member;
+use crate::solve::statement::problem::Member;
 use glam::DVec3;
 
 /// Work below which an answer is passive but for rounding, J.
@@ -12,7 +12,7 @@ const ROUNDING_J: f64 = 1e-12;
 
 /// What the guard found.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Ray {
+pub(crate) struct Ray {
     /// D of the impulses as they are left, J, or a bound of it.
     pub work_j: f64,
     /// What they were multiplied by; 1 where they were passive.
@@ -22,7 +22,7 @@ pub(super) struct Ray {
 /// Shortens all impulses, and what they made, by one factor if their work on members of these free velocities is above zero. The work
 /// is that of the velocities as they are: momentum that an inexact solve leaves is neither given nor paid for. A shorter impulse is in
 /// every cone and ball that the longer is in.
-pub(super) fn guard(iterate: &mut Iterate, members: &[Member<'_>], free_m_s: &[DVec3]) -> Ray {
+pub(crate) fn guard(iterate: &mut Iterate, members: &[Member<'_>], free_m_s: &[DVec3]) -> Ray {
     if !iterate.unanswered.is_empty() {
         // what impulses alone change velocities by is not known; but D is less than their work on velocities as they become
         let most = work_at_the_end(iterate, free_m_s);

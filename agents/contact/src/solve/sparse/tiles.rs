@@ -15,7 +15,7 @@ pub(super) const TILE_SIZE: usize = TILE * TILE;
 type Tile = [f64; TILE_SIZE];
 
 /// Where the tiles of a row of tiles start in a lower triangle of tiles, and how many numbers so many rows hold.
-pub(super) fn triangle(tiles: usize) -> usize {
+pub(crate) fn triangle(tiles: usize) -> usize {
     TILE_SIZE * (tiles * (tiles + 1) / 2)
 }
 
@@ -29,7 +29,7 @@ pub(super) fn filled(size: usize) -> usize {
 ///
 /// # Errors
 /// The column at which the matrix is not positive definite.
-pub(super) fn eliminate(level: Level, lower: &mut [f64], update: &mut [f64], columns: usize) -> Result<(), usize> {
+pub(crate) fn eliminate(level: Level, lower: &mut [f64], update: &mut [f64], columns: usize) -> Result<(), usize> {
     dispatch!(level, _ => eliminate_by(lower, update, columns))
 }
 

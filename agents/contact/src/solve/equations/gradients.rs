@@ -25,7 +25,7 @@ const SHARE_OF_GOAL: f64 = 0.5;
 
 /// One system of linear equations.
 #[derive(Debug)]
-pub(super) struct Task<'a> {
+pub(crate) struct Task<'a> {
     /// The right side.
     pub right: &'a [DVec3],
     /// Where to start, then the solution; a factor needs no start.
@@ -47,7 +47,7 @@ pub(super) struct Operator<'a> {
 
 /// Jᵀ (G + S) J.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Stiffness<'a> {
+pub(crate) struct Stiffness<'a> {
     pub rows: &'a Rows,
     pub gains: &'a [DMat3],
     /// S, the part of each row that no factor holds; empty where there is none.
@@ -236,7 +236,7 @@ pub(super) struct Direction {
 
 /// When a round ends: after so many directions, or at this share of its goal.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct End {
+pub(crate) struct End {
     pub directions: usize,
     pub share: f64,
 }

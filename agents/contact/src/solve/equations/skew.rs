@@ -3,13 +3,13 @@
 //! In: a row and where it is. Out: a matrix of rank one. Never here: equations, and how they are solved (`gradients.rs`).
 //! Theory: `docs/theory/clusters.md`, eq. 8b and C3.
 
-use super::cone::{Law, Projection};
 use super::rows::{Point, Row};
+use crate::solve::cones::cone::{Law, Projection};
 use glam::{DMat3, DVec3};
 
 /// By how much the impulse of a row changes beyond its symmetric gain: by `gives` for each unit of the velocity along `sees`.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Skew {
+pub(crate) struct Skew {
     /// In the row's frame.
     pub gives: DVec3,
     /// In the row's frame, 1/kg times the reciprocal unit of `gives`.
@@ -17,7 +17,7 @@ pub(super) struct Skew {
 }
 
 /// The part of a row's exact slope beyond its symmetric gain.
-pub(super) struct Followed {
+pub(crate) struct Followed {
     pub skew: Skew,
     pub more: DVec3,
 }
@@ -32,7 +32,7 @@ impl Skew {
 }
 
 /// How the friction of a sliding contact follows its pressure, of a row with this image; `None` for all else.
-pub(super) fn follow_pressure(row: &Row, image: &Projection, pulled: DVec3) -> Option<Followed> {
+pub(crate) fn follow_pressure(row: &Row, image: &Projection, pulled: DVec3) -> Option<Followed> {
     let Law::Coulomb { friction } = row.law else { return None };
     let slides = image.slopes.x == 1.0 && image.slopes.y == 0.0 && friction > 0.0;
     let (w, r) = (row.scale, row.compliance);
@@ -41,7 +41,7 @@ pub(super) fn follow_pressure(row: &Row, image: &Projection, pulled: DVec3) -> O
 }
 
 /// How the shift of a contact follows its slip, of a row of this gain; `pulled` is the change of its impulse if no velocity changed.
-pub(super) fn follow_slip(row: &Row, at: Point, gain: DMat3, pulled: DVec3) -> Option<Followed> {
+pub(crate) fn follow_slip(row: &Row, at: Point, gain: DMat3, pulled: DVec3) -> Option<Followed> {
     let Law::Coulomb { friction } = row.law else { return None };
     let r = row.compliance;
     let slip = (at.velocity + at.impulse * r).with_x(0.0).try_normalize()?;

@@ -3,11 +3,11 @@
 //! In: an iterate. Out: the same nearer to where all laws hold, its impulses inside of what each law allows after every step.
 //! Never here: when to stop, the last digits (`newton.rs`), cones themselves. Theory: `docs/theory/clusters.md`, eq. C1–C5.
 
-use super::bound::{Bound, Inside};
 use super::iterate::{Iterate, Kept};
-use super::lorentz::Lorentz;
 use super::newton::Aim;
 use crate::lists::refill;
+use crate::solve::cones::lorentz::Lorentz;
+use crate::solve::equations::bound::{Bound, Inside};
 
 /// How far inside their cones impulses and dual points start, in means of what laws and momentum miss, √J, so that λ·y is the same for all
 /// rows and none moves another by more than its own share; and the least of it, m/s.
@@ -28,7 +28,7 @@ const LEAVE: f64 = 1e-3;
 
 /// Storage of the way.
 #[derive(Debug, Clone, Default)]
-pub(super) struct Interior {
+pub(crate) struct Interior {
     rows: Vec<Inside>,
     /// How often it was stuck, the best place of these, and what that misses, √J.
     stuck: u32,

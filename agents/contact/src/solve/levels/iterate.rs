@@ -5,19 +5,19 @@
 //! Never here: when to stop, how far to step.
 //! Theory: `docs/theory/clusters.md`, eq. 8 and 15–17.
 
-use super::cone::Projection;
-use super::gradients::{Stiffness, Task};
-use super::problem::Member;
-use super::rows::{Point, Rows};
-use super::skew::{Followed, Skew, follow_pressure, follow_slip};
-use super::system::{StepForm, System};
 use crate::lists::{refill, reset};
+use crate::solve::cones::cone::Projection;
+use crate::solve::equations::gradients::{Stiffness, Task};
+use crate::solve::equations::rows::{Point, Rows};
+use crate::solve::equations::skew::{Followed, Skew, follow_pressure, follow_slip};
+use crate::solve::equations::system::{StepForm, System};
+use crate::solve::statement::problem::Member;
 use glam::{DMat3, DVec3};
 use metachron_core::ParallelFor;
 
 /// Impulses λ of all rows, the change of velocity of all blocks, and the velocity u of all rows.
 #[derive(Debug, Clone, Default)]
-pub(super) struct State {
+pub(crate) struct State {
     pub lambda: Vec<DVec3>,
     pub change: Vec<DVec3>,
     pub velocity: Vec<DVec3>,
@@ -27,7 +27,7 @@ pub(super) struct State {
 
 /// A problem on its way to a solution.
 #[derive(Debug, Clone, Default)]
-pub(super) struct Iterate {
+pub(crate) struct Iterate {
     pub rows: Rows,
     pub system: System,
     pub state: State,
@@ -50,14 +50,14 @@ pub(super) struct Iterate {
 
 /// A state and compliances to which an iterate can go back.
 #[derive(Debug, Clone, Default)]
-pub(super) struct Kept {
+pub(crate) struct Kept {
     state: State,
     compliances: Vec<f64>,
 }
 
 /// What became of impulses when they were made those that laws ask for.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) enum Refined {
+pub(crate) enum Refined {
     /// None changed.
     Kept,
     /// Some changed, and velocities answer them.

@@ -3,8 +3,8 @@
 //! In: blocks of a symmetric positive definite matrix. Out: A⁻¹ of impulses. Never here: contacts, other bodies.
 
 use super::factor::{Cholesky, Pair};
-use super::problem::{Block, Response};
 use crate::lists::refill;
+use crate::solve::statement::problem::{Block, Response};
 use glam::DVec3;
 use metachron_core::ParallelFor;
 use std::sync::{Mutex, PoisonError};

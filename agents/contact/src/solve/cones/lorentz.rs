@@ -10,7 +10,7 @@ const DET_MIN: f64 = 1e-300;
 
 /// A point (x₀, x̄); of the cone where x₀ ≥ |x̄|, which is its own dual.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub(super) struct Lorentz {
+pub(crate) struct Lorentz {
     /// x₀.
     pub head: f64,
     /// x̄.
@@ -19,7 +19,7 @@ pub(super) struct Lorentz {
 
 /// The scaling of a pair of points of the cone, l and y: W with W l = W⁻¹ y = ν.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub(super) struct Scaling {
+pub(crate) struct Scaling {
     /// P = W² = t (2 w wᵀ − J), J = diag(1, −1, −1, −1).
     pub t: f64,
     pub w: Lorentz,

@@ -4,8 +4,8 @@
 //! Never here: what to do then. Theory: `docs/theory/clusters.md`, eq. 5, 7–9, 16.
 
 use super::iterate::{Iterate, Refined};
-use super::members::worse;
-use super::problem::Member;
+use crate::solve::equations::members::worse;
+use crate::solve::statement::problem::Member;
 use metachron_core::ParallelFor;
 
 /// What is left of what is missed by a step that is worth another.
@@ -18,7 +18,7 @@ const LEAVE_LESS: f64 = 0.1;
 
 /// What the way needs to know besides the problem.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Aim<'a> {
+pub(crate) struct Aim<'a> {
     /// The members, whose responses velocities follow from.
     pub members: &'a [Member<'a>],
     /// The miss at which all laws hold, m/s.
@@ -31,7 +31,7 @@ pub(super) struct Aim<'a> {
 
 /// How many steps are worth their price.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Patience {
+pub(crate) struct Patience {
     /// The most of all.
     pub steps: usize,
     /// The most in a row that do not come to this share of what was missed at least: which contacts stick and slide is found in whole steps, on
@@ -41,7 +41,7 @@ pub(super) struct Patience {
 }
 
 /// Takes whole steps until all laws hold; `false` where patience ends, the iterate being of no use then.
-pub(super) fn solve(iterate: &mut Iterate, aim: &Aim<'_>, patience: Patience) -> bool {
+pub(crate) fn solve(iterate: &mut Iterate, aim: &Aim<'_>, patience: Patience) -> bool {
     let (mut least, mut stale, mut last, mut leave) = (f64::INFINITY, 0, f64::INFINITY, LEAVE_MOST);
     for step in 0..=patience.steps {
         iterate.press();
@@ -86,7 +86,7 @@ pub(super) fn solve(iterate: &mut Iterate, aim: &Aim<'_>, patience: Patience) ->
 }
 
 /// The most that laws and momentum miss, m/s (eq. 9); infinite where it is no number.
-pub(super) fn miss_m_s(iterate: &mut Iterate) -> f64 {
+pub(crate) fn miss_m_s(iterate: &mut Iterate) -> f64 {
     iterate.press();
     let of_momentum = iterate.system.members.measure(&iterate.state.left).fastest_m_s;
     let misses = iterate.rows.rows.iter().enumerate().map(|(k, row)| {
