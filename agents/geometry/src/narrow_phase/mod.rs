@@ -22,7 +22,6 @@ mod touch_key;
 #[cfg(test)]
 use crate::solids::collision_shape::{CollisionShape, ShapeKind};
 use crate::solids::collision_shape::{PlacedShape, ShapePose, Touch};
-use crate::solids::signed_distance::Ball;
 use blocks::convex_convex::ConvexScratch;
 use glam::DVec3;
 use primitives::{Piece, Pieces};
@@ -209,9 +208,4 @@ pub fn gap(
         }
     }
     nearest.filter(|&(_, gap_m)| gap_m <= reach_m)
-}
-
-/// The point of a ball's surface opposite to `normal`.
-fn skin(ball: Ball, normal: DVec3) -> DVec3 {
-    ball.centre - normal * ball.radius_m
 }

@@ -3,7 +3,6 @@
 //! In: a form and its place. Out: its pieces with bounds. Never here: contacts.
 
 use super::shape_cache::{ShapeCache, ToolSolid};
-use super::skin;
 use super::skins::skin_tree::PlacedSkin;
 use crate::solids::capsule_chain::foot;
 use crate::solids::signed_distance::{Ball, Field};
@@ -341,4 +340,9 @@ impl Block<'_> {
     pub fn inward(&self, ball: Ball) -> Ball {
         Ball { centre: self.rotation.conjugate() * (ball.centre - self.origin), ..ball }
     }
+}
+
+/// The point of a ball's surface opposite to `normal`.
+fn skin(ball: Ball, normal: DVec3) -> DVec3 {
+    ball.centre - normal * ball.radius_m
 }
