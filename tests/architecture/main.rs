@@ -96,7 +96,7 @@ const RINGS: [(&str, usize); 18] = [
     ("agents/contact", 2),
     ("agents/models", 17),
     ("crates/runtime", 15),
-    ("crates/world", 20),
+    ("crates/world", 6),
     ("crates/scene", 30),
     ("crates/devices", 0),
     ("crates/export", 0),

@@ -5,5 +5,7 @@
 pub mod builder;
 pub mod couplings;
 pub mod kinds;
+pub mod placement;
 pub mod scene;
+pub mod sensor;
 pub mod spec;

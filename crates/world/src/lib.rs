@@ -37,10 +37,12 @@ pub use control::pace::Pace;
 pub use description::builder::{
     Custom, Part, Rigid, SceneBuildError, SceneBuilder, SensorOn, Soft, Tube, static_solid,
 };
+pub use description::placement::{Moved, Overlap};
 pub use description::scene::{
     Appearance, Camera, Factors, GROUP_LEVELS_MAX, Gains, Group, Machine, Member, NamedCamera, ObjectCost, PaceWish,
     Probe, RENDER_SCALE, Scene, Scenery, Spec, Target, View,
 };
+pub use description::sensor::{Sensor, SensorKind, Site};
 pub use description::spec::Division;
 pub use description::{couplings, kinds};
 pub use error::WorldError;
@@ -54,8 +56,6 @@ pub use reading::frames::{Frame, Frames};
 pub use reading::joint_states::JointState;
 pub use reading::object::{Object, Touched};
 pub use reading::queries::{Cast, ContactNow, Hit};
-pub use reading::sensors::{JointRef, ListedJoint, Reading, Sensor, SensorKind, Site};
+pub use reading::sensors::{JointRef, ListedJoint, Reading};
 pub use start::assemble::{Govern, machine};
-pub use start::initial_overlap::Moved;
-pub use start::overlap::Overlap;
 pub use world::World;

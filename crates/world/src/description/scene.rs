@@ -8,9 +8,8 @@ use super::couplings::{Coupling, Faults};
 use super::kinds::{
     EnvironmentKind, ExecutorKind, LawKind, Material, PolicyKind, PriorityKind, ShadingKind, StatesKind, ValueKind,
 };
-use crate::reading::sensors::Sensor;
-use crate::start::initial_overlap::Moved;
-use crate::start::overlap::Overlap;
+use super::placement::{Moved, Overlap};
+use super::sensor::Sensor;
 use glam::DVec3;
 #[cfg(doc)]
 use metachron_contact::detect::DEPTH_RANGE_M;

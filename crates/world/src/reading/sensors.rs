@@ -4,85 +4,16 @@
 
 use super::object::Object;
 use crate::description::scene::{Scene, Spec};
+use crate::description::sensor::{Sensor, SensorKind, Site};
 use crate::error::WorldError;
 use crate::world::World;
 use glam::{DQuat, DVec3};
 use metachron_contact::joint::{Joint, JointKind, Motor};
 use metachron_contact::member::Pose;
-use metachron_core::{AgentId, Anchor, Body, ContactPartner, RigidState, SimTime, Snapshot};
+use metachron_core::{AgentId, Anchor, Body, RigidState, SimTime, Snapshot};
 use metachron_geometry::ShapeKind;
 use metachron_runtime::{AgentHandle, Command};
 use std::sync::Arc;
-
-/// A sensor of a scene.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Sensor {
-    /// Its name, unique among those of sensors.
-    pub name: String,
-    /// What it reads.
-    pub kind: SensorKind,
-}
-
-/// What a sensor reads.
-#[derive(Debug, Clone, Copy, PartialEq)]
-#[non_exhaustive]
-pub enum SensorKind {
-    /// How far the second body of a joint has moved from the first, from its zero: rad of a hinge within −π … π, metres of a slide, the
-    /// distance of the anchors of a spring or rope. One number.
-    JointPosition(u32),
-    /// How fast, rad/s or m/s. One number.
-    JointVelocity(u32),
-    /// What its motor and its stops give the second body together, N·m of a hinge, N of a slide: the mean of the last step. One number.
-    JointEffort(u32),
-    /// What touches an object gives it, world axes, N: the mean of the last step. Three numbers.
-    ContactForce {
-        /// The object.
-        object: AgentId,
-        /// Whose contacts count; `None` for all.
-        with: Option<ContactPartner>,
-    },
-    /// What an accelerometer on a rigid body reads, the acceleration of the matter there less that of gravity, m/s², then a gyroscope, rad/s, both
-    /// in the axes of its site. Accelerations are the mean of the last step, spins those at its end. Six numbers.
-    Imu {
-        /// The body.
-        object: AgentId,
-        /// The gravity on it, m/s².
-        gravity_m_s2: DVec3,
-        /// Where on the body it is.
-        site: Site,
-    },
-    /// Where a point of a rigid body is, metres, and the rotation of its shape's axes as a unit quaternion x, y, z, w. Seven numbers.
-    Pose {
-        /// The body.
-        object: AgentId,
-        /// The point, metres in the axes of its shape.
-        at_m: DVec3,
-    },
-}
-
-/// Where on a rigid body a sensor sits, and how it is turned there: by default in the centre of mass, in the axes of the shape.
-#[derive(Debug, Clone, Copy, PartialEq, Default, serde::Serialize, serde::Deserialize)]
-pub struct Site {
-    /// Its place, metres in the axes of the body's shape; `None` for the centre of mass.
-    pub at_m: Option<DVec3>,
-    /// The rotation from its own axes to those of the shape, of length 1.
-    pub rotation: DQuat,
-}
-
-impl SensorKind {
-    /// What it is called in scene files and reports.
-    #[must_use]
-    pub const fn name(&self) -> &'static str {
-        match self {
-            Self::JointPosition(_) => "joint-position",
-            Self::JointVelocity(_) => "joint-velocity",
-            Self::JointEffort(_) => "joint-effort",
-            Self::ContactForce { .. } => "contact-force",
-            Self::Imu { .. } => "imu",
-            Self::Pose { .. } => "pose",
-        }
-    }
-}
 
 /// What a sensor read.
 #[derive(Debug, Clone, PartialEq)]

@@ -12,21 +12,13 @@
 use super::initial_shape::{StartShape, shape};
 use super::overlap::{Container, OVERLAP_MIN_M};
 use crate::description::couplings::{Coupling, CouplingKind};
+use crate::description::placement::Moved;
 use crate::description::scene::{Scene, Spec};
 use glam::DVec3;
 use metachron_core::AgentId;
 use metachron_geometry::Touch;
 use metachron_geometry::narrow_phase::{NarrowPhaseScratch, touches};
 use std::collections::BTreeSet;
-
-/// An agent that starts elsewhere than the scene puts it, because there it would be inside another object.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Moved {
-    /// Its name.
-    pub object: String,
-    /// From the position in the scene to the position at start, metres.
-    pub by_m: DVec3,
-}
 
 /// A later direction must be shorter than the best so far by more than this, metres: of equal ones the first is taken.
 const TIE_M: f64 = 1e-6;

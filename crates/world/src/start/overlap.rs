@@ -5,6 +5,7 @@
 
 use super::initial_shape::{StartShape, shape};
 use crate::description::couplings::CouplingKind;
+use crate::description::placement::Overlap;
 use crate::description::scene::{Scene, Spec};
 use metachron_contact::Law;
 use metachron_core::AgentId;
@@ -14,17 +15,6 @@ use std::collections::BTreeSet;
 
 /// Less than this is rounding, not overlap, metres: shapes are in single precision.
 pub(super) const OVERLAP_MIN_M: f64 = 2e-5;
-
-/// An agent that starts inside another agent or inside a static solid.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Overlap {
-    /// Name of the agent; of two agents the one with the lower id.
-    pub a: String,
-    /// Name of the other.
-    pub b: String,
-    /// Depth at the deepest point, metres.
-    pub depth_m: f64,
-}
 
 /// The object that an agent starts inside of.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]

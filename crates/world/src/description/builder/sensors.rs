@@ -4,7 +4,7 @@
 
 use super::SceneBuildError;
 use crate::description::scene::{Member, Spec};
-use crate::reading::sensors::{Sensor, SensorKind, Site};
+use crate::description::sensor::{Sensor, SensorKind, Site};
 use metachron_core::{ContactPartner, unit_rotation};
 use metachron_geometry::Obstacle;
 
