@@ -94,7 +94,7 @@ const RINGS: [(&str, usize); 18] = [
     ("agents/core", 0),
     ("agents/geometry", 5),
     ("agents/contact", 2),
-    ("agents/models", 17),
+    ("agents/models", 5),
     ("crates/runtime", 15),
     ("crates/world", 6),
     ("crates/scene", 30),

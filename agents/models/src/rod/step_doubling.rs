@@ -6,7 +6,7 @@
 use super::anchor_springs::Tie;
 use super::banded_ldl::Factor;
 use super::history::History;
-use super::method::Integrator;
+use super::spec::Integrator;
 use super::state::RodState;
 use super::step::{Setting, Stepper};
 use metachron_core::step_doubling::{DoublingSchedule, farthest};
