@@ -103,7 +103,7 @@ const RINGS: [(&str, usize); 18] = [
     ("crates/bevy", 5),
     ("crates/import", 3),
     ("crates/lod", 5),
-    ("crates/render", 12),
+    ("crates/render", 7),
     ("crates/session", 3),
     ("crates/viewer", 2),
     ("crates/console", 0),

@@ -29,10 +29,9 @@ mod states;
 pub use composition::compose::Hand;
 pub use composition::environment::{Environment, EnvironmentLight};
 pub use composition::forces::ToolForce;
-pub use composition::picture::{
-    Colouring, FloorDraw, MeshCorner, MeshKey, Picture, SkinSample, SolidInstance, SolidKind, Style,
-};
-pub use composition::skin::{SkinRun, Skins};
+pub use composition::mesh_corner::MeshCorner;
+pub use composition::picture::{Colouring, FloorDraw, MeshKey, Picture, SkinSample, SolidInstance, SolidKind, Style};
+pub use composition::skin::{SkinForm, SkinRun, Skins};
 pub use composition::tessellation::skin_divisions;
 #[cfg(feature = "gpu")]
 pub use gpu::benchmark::{Drawn, benchmark, benchmark_left};
@@ -53,4 +52,4 @@ pub use seen::pick::Hit;
 pub use seen::view::{Camera, Frustum, Ray, Size};
 pub use seen::visibility::{Visibility, VisibleCounts};
 pub use states::membership::History;
-pub use states::scene_view::{Actor, Appearance, Form, Material, SceneView, SkinForm, States, StaticObject};
+pub use states::scene_view::{Actor, Appearance, Form, Material, SceneView, States, StaticObject};

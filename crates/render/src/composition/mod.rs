@@ -8,6 +8,7 @@ pub mod forces;
 mod instances;
 pub mod light_volume;
 pub mod lod_transition;
+pub mod mesh_corner;
 pub mod picture;
 pub mod skin;
 pub mod tessellation;

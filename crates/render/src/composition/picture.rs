@@ -9,7 +9,7 @@ use crate::seen::level::Shading;
 use bytemuck::{Pod, Zeroable};
 use glam::DVec3;
 use metachron_core::Resolution;
-use metachron_geometry::{Cut, Model, Primitive, PrimitiveMesh, PrimitiveVertex, Texture, patch};
+use metachron_geometry::{Cut, Model, Primitive, PrimitiveMesh, Texture, patch};
 use std::sync::Arc;
 
 /// Meaning of the colours.
@@ -87,29 +87,6 @@ pub struct SolidInstance {
     pub tint: [u8; 4],
     /// Repeats per metre of a texture projected on sides, 0 for one with texture coordinates; the second is unused.
     pub wrap: [f32; 2],
-}
-
-/// One corner of a mesh, in the GPU's layout: 32 bytes.
-#[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
-#[repr(C)]
-pub struct MeshCorner {
-    /// Position on the core.
-    pub core: [f32; 3],
-    /// Unit normal.
-    pub normal: [f32; 3],
-    /// Texture coordinates.
-    pub uv: [f32; 2],
-}
-
-impl MeshCorner {
-    /// A corner without a place, for a mesh that has none.
-    pub(super) const NOWHERE: Self = Self { core: [0.0; 3], normal: [0.0, 0.0, 1.0], uv: [0.0; 2] };
-}
-
-impl From<&PrimitiveVertex> for MeshCorner {
-    fn from(v: &PrimitiveVertex) -> Self {
-        Self { core: v.core.to_array(), normal: v.normal.to_array(), uv: v.uv.to_array() }
-    }
 }
 
 /// The mesh of a run of solids.

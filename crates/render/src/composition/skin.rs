@@ -3,13 +3,13 @@
 //! In: the displayed vertices, their connectivity, a level. Out: corners with normals for one mesh of the frame, smooth except at the sharp
 //! edges of solids; a framed curve. Never here: the choice of levels, the GPU. Nothing is allocated once sizes settle.
 
-use super::picture::MeshCorner;
-use super::tessellation::{CoarseSkin, FineSkin, RestPoint, SkinPoint, skin_divisions};
+use super::mesh_corner::MeshCorner;
+use super::tessellation::{CoarseSkin, FineSkin, RestPoint, SkinEdges, SkinPoint, skin_divisions};
 use crate::seen::level::Shading;
-use crate::states::scene_view::SkinForm;
 use glam::{DQuat, DVec3};
 use metachron_core::{CurveState, SoftState};
 use metachron_geometry::SurfaceShape;
+use std::sync::Arc;
 
 /// Least drawn thickness of a sheet, as a fraction of its edges: below, the depths of its two faces cannot be told apart.
 const THIN_SHARE: f64 = 0.01;
@@ -17,6 +17,60 @@ const THIN_SHARE: f64 = 0.01;
 /// Triangles of a solid that share a vertex are shaded as one surface where the cosine between them is at least this, 60°: the bends of a
 /// soft body stay smooth, the edges of its shape stay sharp.
 const SMOOTH_COS: f64 = 0.5;
+
+/// The skin of a sheet or soft solid.
+#[derive(Debug, Clone)]
+pub struct SkinForm {
+    /// Its triangles.
+    pub surface: SurfaceShape,
+    /// Its vertices at rest, in the body's own axes: tissue's texture keeps to them.
+    pub(crate) rest: Arc<[MeshCorner]>,
+    /// Their mean distance from their middle, metres.
+    pub(crate) mean_radius_m: f64,
+    pub(crate) edges: SkinEdges,
+}
+
+impl SkinForm {
+    /// A skin of these triangles, whose vertices are at `rest_m` when nothing bends it, metres.
+    #[must_use]
+    pub fn new(surface: SurfaceShape, rest_m: &[DVec3]) -> Self {
+        let mut normals = vec![DVec3::ZERO; rest_m.len()];
+        for triangle in surface.triangles.iter() {
+            let corner = |k: usize| rest_m.get(triangle[k] as usize).copied().unwrap_or_default();
+            let normal = (corner(1) - corner(0)).cross(corner(2) - corner(0));
+            for vertex in triangle {
+                if let Some(sum) = normals.get_mut(*vertex as usize) {
+                    *sum += normal;
+                }
+            }
+        }
+        let corner = |(at, normal): (&DVec3, &DVec3)| MeshCorner {
+            core: at.as_vec3().to_array(),
+            normal: normal.normalize_or(DVec3::Z).as_vec3().to_array(),
+            uv: [0.0; 2],
+        };
+        let count = rest_m.len().max(1) as f64;
+        let middle = rest_m.iter().sum::<DVec3>() / count;
+        let mean_radius_m = rest_m.iter().map(|at| at.distance(middle)).sum::<f64>() / count;
+        Self {
+            rest: rest_m.iter().zip(&normals).map(corner).collect(),
+            mean_radius_m: mean_radius_m.max(1e-6),
+            edges: SkinEdges::of(&surface.triangles),
+            surface,
+        }
+    }
+
+    /// Takes other triangles between the same vertices.
+    pub(crate) fn set_surface(&mut self, surface: &SurfaceShape) {
+        if Arc::ptr_eq(&self.surface.triangles, &surface.triangles) {
+            return;
+        }
+        if self.surface.triangles != surface.triangles {
+            self.edges = SkinEdges::of(&surface.triangles);
+        }
+        self.surface = surface.clone();
+    }
+}
 
 /// The corners and triangles of all skins of a frame.
 #[derive(Debug, Clone, Default)]

@@ -6,7 +6,7 @@
 //! Both triangles at an edge take its points from one cubic, also where it is sharp and their normals differ: no gap opens.
 //! Nothing is allocated once sizes settle.
 
-use super::picture::MeshCorner;
+use super::mesh_corner::MeshCorner;
 use glam::{DVec3, Vec3};
 
 /// No triangle on this side of an edge.

@@ -155,7 +155,8 @@ fn hit_mesh(mesh: &PrimitiveMesh, size: Rounding, ray: Ray) -> Option<f64> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::states::scene_view::{Actor, Appearance, Material, SkinForm, States};
+    use crate::composition::skin::SkinForm;
+    use crate::states::scene_view::{Actor, Appearance, Material, States};
     use metachron_core::{RigidState, SimTime, Snapshot};
     use metachron_geometry::{CollisionShape, ShapeKind};
     use std::sync::Arc;

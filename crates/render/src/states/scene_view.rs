@@ -9,14 +9,14 @@ use super::impostor_fit::ImpostorFit;
 use super::pose;
 use crate::composition::environment::Environment;
 use crate::composition::lod_transition::Geomorph;
-use crate::composition::picture::{MeshCorner, Picture};
-use crate::composition::tessellation::SkinEdges;
+use crate::composition::picture::Picture;
+use crate::composition::skin::SkinForm;
 use crate::composition::texturing::Painting;
 use crate::seen::view::{Camera, Size};
 use crate::seen::visibility::{Survey, Visibility};
 use glam::DVec3;
 use metachron_core::{AgentId, Body, CurveState, RigidState, SimTime, Snapshot};
-use metachron_geometry::{CollisionShape, ShapeKind, SurfaceShape};
+use metachron_geometry::{CollisionShape, ShapeKind};
 use metachron_geometry::{Model, Motion, Obstacle, Placement, PrimitiveMesh, Skeleton, Solid, ToolShape};
 pub(crate) use shapes::{BodyShape, Bounds, Models, StaticShape};
 use std::sync::Arc;
@@ -76,60 +76,6 @@ pub enum Form {
         /// Its radius, metres.
         radius_m: f64,
     },
-}
-
-/// The skin of a sheet or soft solid.
-#[derive(Debug, Clone)]
-pub struct SkinForm {
-    /// Its triangles.
-    pub surface: SurfaceShape,
-    /// Its vertices at rest, in the body's own axes: tissue's texture keeps to them.
-    pub(crate) rest: Arc<[MeshCorner]>,
-    /// Their mean distance from their middle, metres.
-    pub(crate) mean_radius_m: f64,
-    pub(crate) edges: SkinEdges,
-}
-
-impl SkinForm {
-    /// A skin of these triangles, whose vertices are at `rest_m` when nothing bends it, metres.
-    #[must_use]
-    pub fn new(surface: SurfaceShape, rest_m: &[DVec3]) -> Self {
-        let mut normals = vec![DVec3::ZERO; rest_m.len()];
-        for triangle in surface.triangles.iter() {
-            let corner = |k: usize| rest_m.get(triangle[k] as usize).copied().unwrap_or_default();
-            let normal = (corner(1) - corner(0)).cross(corner(2) - corner(0));
-            for vertex in triangle {
-                if let Some(sum) = normals.get_mut(*vertex as usize) {
-                    *sum += normal;
-                }
-            }
-        }
-        let corner = |(at, normal): (&DVec3, &DVec3)| MeshCorner {
-            core: at.as_vec3().to_array(),
-            normal: normal.normalize_or(DVec3::Z).as_vec3().to_array(),
-            uv: [0.0; 2],
-        };
-        let count = rest_m.len().max(1) as f64;
-        let middle = rest_m.iter().sum::<DVec3>() / count;
-        let mean_radius_m = rest_m.iter().map(|at| at.distance(middle)).sum::<f64>() / count;
-        Self {
-            rest: rest_m.iter().zip(&normals).map(corner).collect(),
-            mean_radius_m: mean_radius_m.max(1e-6),
-            edges: SkinEdges::of(&surface.triangles),
-            surface,
-        }
-    }
-
-    /// Takes other triangles between the same vertices.
-    fn set_surface(&mut self, surface: &SurfaceShape) {
-        if Arc::ptr_eq(&self.surface.triangles, &surface.triangles) {
-            return;
-        }
-        if self.surface.triangles != surface.triangles {
-            self.edges = SkinEdges::of(&surface.triangles);
-        }
-        self.surface = surface.clone();
-    }
 }
 
 /// An agent to be drawn.

@@ -4,7 +4,8 @@
 //! Triangles of cuts are stored one after another in one buffer, and so are the end vertices of geomorphs from one cut to a coarser one. A
 //! new item is appended; when the buffer is full, all items are dropped and those that the picture uses are written anew.
 
-use crate::composition::picture::{MeshCorner, MeshKey, Picture};
+use crate::composition::mesh_corner::MeshCorner;
+use crate::composition::picture::{MeshKey, Picture};
 use metachron_geometry::{Cut, Model, ProgressiveMesh};
 use std::collections::HashMap;
 use std::hash::Hash;

@@ -2,7 +2,8 @@
 //!
 //! In: levels that a picture uses. Out: vertex and index buffers. Never here: instances.
 
-use crate::composition::picture::{MeshCorner, MeshKey, Picture};
+use crate::composition::mesh_corner::MeshCorner;
+use crate::composition::picture::{MeshKey, Picture};
 use glam::Vec3;
 use metachron_core::N_MAX;
 use metachron_geometry::{Foliage, Model, PieceKind, PrimitiveMesh, PrimitiveVertex, Stroke, patch};

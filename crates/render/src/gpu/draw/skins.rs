@@ -3,7 +3,7 @@
 //! In: corners and triangles. Out: draws. Never here: pipelines, instances.
 
 use super::resources::buffers::Growing;
-use crate::composition::picture::MeshCorner;
+use crate::composition::mesh_corner::MeshCorner;
 use crate::composition::skin::{SkinRun, Skins};
 
 /// Corners, triangles and sides of all skins.
