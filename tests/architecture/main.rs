@@ -95,7 +95,7 @@ const RINGS: [(&str, usize); 18] = [
     ("agents/geometry", 5),
     ("agents/contact", 2),
     ("agents/models", 5),
-    ("crates/runtime", 15),
+    ("crates/runtime", 8),
     ("crates/world", 6),
     ("crates/scene", 30),
     ("crates/devices", 0),

@@ -3,6 +3,7 @@
 //! In: agents with their rates and links. Out: handles with the newest states. Never here: how a turn is made.
 
 pub mod agent_record;
+pub mod agent_spawn;
 pub mod agents;
 mod form_slot;
 pub mod handle;

@@ -4,7 +4,6 @@
 //! Numbers are never used again: of one whose agent has left this is all that there is. Never here: what an agent shows ([`super::handle`]).
 
 use super::handle::Shared;
-use super::removed_agent::nothing;
 use crate::lock_free::slot::LatestSlot;
 use arc_swap::{ArcSwapOption, Guard};
 use metachron_core::{AgentId, Snapshot};
@@ -13,7 +12,13 @@ use std::sync::atomic::{
     AtomicBool,
     Ordering::{Acquire, Release},
 };
-use std::sync::{Arc, OnceLock};
+use std::sync::{Arc, LazyLock, OnceLock};
+
+/// Its state, the same of all that have left: no matter, no time.
+pub(super) fn nothing() -> Arc<Snapshot> {
+    static NOTHING: LazyLock<Arc<Snapshot>> = LazyLock::new(Arc::default);
+    Arc::clone(&NOTHING)
+}
 
 /// A number of a run.
 #[derive(Debug)]

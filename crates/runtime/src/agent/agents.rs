@@ -4,6 +4,7 @@
 
 use super::handle::AgentHandle;
 use crate::lock_free::sleep::SleepRegistry;
+use crate::neighbours::observation::Peers;
 use metachron_core::AgentId;
 use std::iter::Map;
 use std::ops::Index;
@@ -14,6 +15,14 @@ use std::sync::Arc;
 pub struct Agents {
     all: Arc<boxcar::Vec<AgentHandle>>,
     pub(crate) sleep: Arc<SleepRegistry>,
+}
+
+/// What all agents of a run share, and those that join it.
+#[derive(Debug, Clone)]
+pub(crate) struct RunAgents {
+    pub handles: Agents,
+    pub sleep: Arc<SleepRegistry>,
+    pub peers: Arc<Peers>,
 }
 
 impl Agents {

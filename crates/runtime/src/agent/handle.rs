@@ -3,9 +3,8 @@
 //! Out: snapshots and numbers, without ever waiting for the agent. In: commands. Never here: the agent itself.
 
 use super::agent_record::{AgentRecord, Live};
+use super::agent_spawn::AgentSpawn;
 use super::form_slot::FormSlot;
-use super::removed_agent::REMOVED;
-use super::spawn::AgentSpawn;
 use crate::cluster::Handover;
 use crate::commands::mailbox::{AwaitedMotion, Command, Keyed, Mailbox, SendError};
 use crate::lock_free::ring::{Ring, RingEntry};
@@ -13,7 +12,8 @@ use crate::lock_free::sleep::SleepRegistry;
 use crate::lock_free::slot::LatestSlot;
 use crate::records::events::{AgentEvent, EventKind};
 use crate::records::histogram::Histogram;
-use crate::records::metrics::{AgentState, AgentStats, Metrics, Spread};
+use crate::records::histogram::Spread;
+use crate::records::metrics::{AgentState, AgentStats, Metrics, REMOVED};
 use crate::records::probe::{Sample, Trace};
 use crate::records::streams::{EventStreams, Heard, Rings};
 use crate::records::turns::Turn;

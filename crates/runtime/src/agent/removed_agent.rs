@@ -3,24 +3,14 @@
 //! In: its runner, which makes no more turns. Out: the same where the run began with it, else nothing: what joined the run is made again
 //! from what it joined as ([`crate::executors::archive`]). Never here: when an agent leaves.
 
-use super::agent_record::AgentRecord;
-use super::spawn::RunAgents;
+use super::agent_record::{AgentRecord, nothing};
+use super::agents::RunAgents;
 use crate::cluster::Led;
 use crate::commands::mailbox::SendError;
 use crate::records::events::EventKind;
 use crate::records::metrics::{AgentState, STALLED_FOR_GOOD};
 use crate::turn::agent_runner::AgentRunner;
-use metachron_core::{AgentId, Snapshot};
-use std::sync::{Arc, LazyLock};
-
-/// The model of a number of which nothing else is known.
-pub(crate) const REMOVED: &str = "removed";
-
-/// Its state, the same of all that have left: no matter, no time.
-pub(super) fn nothing() -> Arc<Snapshot> {
-    static NOTHING: LazyLock<Arc<Snapshot>> = LazyLock::new(Arc::default);
-    Arc::clone(&NOTHING)
-}
+use metachron_core::AgentId;
 
 impl RunAgents {
     /// Takes an agent out: at its next turn, or at once where it makes no more. `home` has its runner where that makes turns of its own, or none any

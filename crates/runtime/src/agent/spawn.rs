@@ -4,7 +4,8 @@
 //! Never here: threads, time passing.
 
 use super::agent_record::AgentRecord;
-use super::agents::Agents;
+use super::agent_spawn::{AgentSpawn, RATE_MAX_HZ};
+use super::agents::{Agents, RunAgents};
 use super::form_slot::FormSlot;
 use super::handle::{AgentHandle, Identity, Shared};
 use crate::cluster::{ClusterSeat, JointedTo, Led, assign_leaders};
@@ -12,80 +13,19 @@ use crate::commands::mailbox::Mailbox;
 use crate::lock_free::sleep::SleepRegistry;
 use crate::lock_free::slot::SlotWriter;
 use crate::neighbours::observation::{BroadPhaseSlot, Peers};
-use crate::records::governor::Governor;
 use crate::records::metrics::{Metrics, MetricsWriter};
-use crate::records::probe::{Trace, WatchedPoint};
+use crate::records::probe::Trace;
 use crate::records::streams::EventStreams;
 use crate::time::agent_clock::AgentClock;
 use crate::time::faults::Faults;
 use crate::turn::agent_runner::{AgentRunner, TurnPeriod};
 use crate::turn::helpers::Helpers;
 use crate::turn::model::{Model, Traits};
-use metachron_contact::Agent;
-use metachron_contact::detect::ClusterScene;
 use metachron_contact::member::CallMark;
 use metachron_contact::{Law, Link};
-use metachron_core::{AgentId, DT_MAX_S, ResolutionRange, SimSpan, SimTime, Snapshot};
+use metachron_core::{AgentId, DT_MAX_S, SimSpan, SimTime, Snapshot};
 use std::sync::atomic::{AtomicBool, Ordering::Relaxed};
 use std::sync::{Arc, Mutex};
-
-/// Description of an agent to be started.
-pub struct AgentSpawn {
-    /// Its name in the scene.
-    pub name: String,
-    /// The agent.
-    pub agent: Box<dyn Agent>,
-    /// Requested steps per simulated second, `0 < rate <=` [`RATE_MAX_HZ`].
-    pub rate_hz: f64,
-    /// The length of its first step; clamped to `dt_range`.
-    pub dt: SimSpan,
-    /// The shortest and the longest allowed step; `0 < shortest <= longest <=` [`DT_MAX_S`].
-    pub dt_range: (SimSpan, SimSpan),
-    /// The allowed resolutions; `None` for an agent that is never retuned.
-    pub range: Option<ResolutionRange>,
-    /// Agents whose newest states it always sees. Its own number and repeats are ignored.
-    pub links: Vec<AgentId>,
-    /// Laws between it and its peers, where not [`Law::Cluster`]. Given by one side; if both give one, that of the lower number counts.
-    pub laws: Vec<(AgentId, Law)>,
-    /// Permanent links to peers. Given by one side; the peer is informed, and both always see each other.
-    pub attached: Vec<Link>,
-    /// The surroundings of the clusters in which it is stepped; without effect for an agent that is no member
-    /// ([`metachron_contact::Agent::member`]).
-    pub scene: Arc<ClusterScene>,
-    /// Faults injected on purpose; in clusters only into agents that have asynchronous pairs.
-    pub faults: Faults,
-    /// Points of it that are recorded ([`AgentHandle::samples`]).
-    pub watches: Vec<WatchedPoint>,
-    /// Governor of its rate; `None` for an agent with fixed settings.
-    pub governor: Option<Box<dyn Governor>>,
-}
-
-impl AgentSpawn {
-    /// An agent that steps `rate_hz` times a second with a fixed step, without surroundings, links and a governor.
-    #[must_use]
-    pub fn alone(name: impl Into<String>, agent: Box<dyn Agent>, rate_hz: f64) -> Self {
-        // an invalid rate is reported when the run begins
-        let dt = SimSpan::from_secs_f64(1.0 / rate_hz).unwrap_or(SimSpan::ZERO);
-        Self {
-            name: name.into(),
-            agent,
-            rate_hz,
-            dt,
-            dt_range: (dt, dt),
-            range: None,
-            links: Vec::new(),
-            laws: Vec::new(),
-            attached: Vec::new(),
-            scene: Arc::default(),
-            faults: Faults::default(),
-            watches: Vec::new(),
-            governor: None,
-        }
-    }
-}
-
-/// The highest allowed rate: a step of a microsecond is less than a thread needs to wake.
-pub const RATE_MAX_HZ: f64 = 1e6;
 
 /// Reason why a run did not start. No agent has made a step.
 #[derive(Debug, thiserror::Error)]
@@ -158,14 +98,6 @@ pub(crate) struct AssembledRun {
     /// Agents with turns of their own; an agent that is led from the start belongs to its leader.
     pub actors: Vec<Option<Box<AgentRunner>>>,
     pub all: RunAgents,
-}
-
-/// What all agents of a run share, and those that join it.
-#[derive(Debug, Clone)]
-pub(crate) struct RunAgents {
-    pub handles: Agents,
-    pub sleep: Arc<SleepRegistry>,
-    pub peers: Arc<Peers>,
 }
 
 /// Assembles all agents; `helpers` help with the turns of their large clusters. Each has published its initial state, at simulated time zero.

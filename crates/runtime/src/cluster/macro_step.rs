@@ -5,8 +5,9 @@
 
 use super::{ClusterSeat, NO_SEAT, Wish, prepared};
 use crate::commands::loads::Acting;
-use crate::turn::agent_runner::{AgentRunner, StepOutcome, contained};
+use crate::turn::agent_runner::{AgentRunner, StepOutcome};
 use crate::turn::helpers::Helped;
+use crate::turn::model::contained;
 use metachron_contact::StepContext;
 use metachron_contact::detect::ClusterScene;
 use metachron_contact::member::{ClusterMember, Participant};

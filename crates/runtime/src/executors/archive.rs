@@ -6,8 +6,9 @@
 
 mod state;
 
+use crate::agent::agent_spawn::AgentSpawn;
+use crate::agent::agents::RunAgents;
 use crate::agent::handle::AgentHandle;
-use crate::agent::spawn::{AgentSpawn, RunAgents};
 use crate::cluster::{Place, Placed};
 use crate::records::events::EventKind;
 use crate::time::agent_clock::Timeline;

@@ -9,9 +9,11 @@ mod cores;
 
 use super::archive::{Absent, Cut};
 use crate::Run;
+use crate::agent::agent_spawn::AgentSpawn;
 use crate::agent::agents::Agents;
+use crate::agent::agents::RunAgents;
 use crate::agent::handle::AgentHandle;
-use crate::agent::spawn::{AgentSpawn, AssembledRun, RunAgents, RunError, assemble};
+use crate::agent::spawn::{AssembledRun, RunError, assemble};
 use crate::cluster::{Place, Placed, close_remaining, hand_over, put_back, take_apart};
 use crate::commands::mailbox::SendError;
 use crate::records::metrics::AgentStats;

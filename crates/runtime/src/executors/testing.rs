@@ -2,7 +2,7 @@
 //! it moves as it is led.
 
 use super::pool::Pool;
-use crate::agent::spawn::AgentSpawn;
+use crate::agent::agent_spawn::AgentSpawn;
 use crate::turn::watchdog::StallLimit;
 use crate::{AgentHandle, Clock, Priority, Run, SystemClock, Threads, TimelineCommand};
 use glam::{DQuat, DVec3};

@@ -5,7 +5,6 @@
 //! whose smallest takes 9 kB); a page is a cache line. When a counter is full, all are halved: earlier times then count for half. Never
 //! here: clocks, locks.
 
-use super::metrics::Spread;
 use std::time::Duration;
 
 /// The longest time distinguished from longer ones, microseconds: 16.8 seconds.
@@ -19,6 +18,17 @@ const PAGES: usize = 20;
 
 /// Pages allocated with the first time.
 const PAGES_AT_ONCE: usize = 2;
+
+/// Two percentiles and the maximum of a set of times, seconds.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Spread {
+    /// The median, to 2 %.
+    pub p50_s: f64,
+    /// The 99th percentile, to 2 %.
+    pub p99_s: f64,
+    /// The maximum; longer times than 16.8 s count as 16.8 s.
+    pub max_s: f64,
+}
 
 /// Times of up to [`LONGEST_US`], counted to 2 %.
 #[derive(Debug, Default)]

@@ -3,14 +3,16 @@
 //! In: turns, from the thread that makes them. Out: [`AgentStats`]. Each number is one atomic word: consistent in itself, and as new as the
 //! last turn. Never here: locks on the agent's side, printing.
 
-use super::histogram::Histogram;
-use crate::agent::removed_agent::REMOVED;
+use super::histogram::{Histogram, Spread};
 use crate::time::agent_clock::AgentClock;
 use arc_swap::ArcSwapOption;
 use metachron_core::{AgentId, Archive, ArchiveError, Resolution, SimSpan, SimTime, archive_values};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU8, AtomicU32, AtomicU64, Ordering::Relaxed};
 use std::time::Duration;
+
+/// The model of a number of which nothing else is known.
+pub(crate) const REMOVED: &str = "removed";
 
 /// State of an agent's execution.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -25,17 +27,6 @@ pub enum AgentState {
     Parked(String),
     /// It was taken out of the run.
     Gone,
-}
-
-/// Two percentiles and the maximum of a set of times, seconds.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub struct Spread {
-    /// The median, to 2 %.
-    pub p50_s: f64,
-    /// The 99th percentile, to 2 %.
-    pub p99_s: f64,
-    /// The maximum; longer times than 16.8 s count as 16.8 s.
-    pub max_s: f64,
 }
 
 /// Statistics of an agent so far; of one that joined the run and has left nothing but its name.

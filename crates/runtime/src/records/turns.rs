@@ -3,7 +3,6 @@
 //! In: turns, from the thread that makes them. Out: the same to each reader ([`crate::lock_free::ring`]). Never here: statistics ([`super::metrics`]).
 
 use crate::lock_free::ring::{RingEntry, WORDS};
-use crate::turn::agent_runner::{AgentRunner, PendingTurn};
 use metachron_core::{AgentId, SimSpan, SimTime};
 use std::time::Duration;
 
@@ -71,37 +70,6 @@ impl RingEntry for Turn {
 pub(crate) struct Took {
     pub begun: Duration,
     pub ended: Duration,
-}
-
-impl AgentRunner {
-    /// Tells readers of its turns of the step that is `open`, made in a turn of `led_by`.
-    pub(crate) fn tell_turn(&mut self, open: &PendingTurn, led_by: AgentId, took: Took) {
-        let Self { shared, model, pace, .. } = self;
-        shared.streams.turn(|| Turn {
-            begun: took.begun,
-            ended: took.ended,
-            time: pace.time(),
-            dt: open.dt,
-            eps_m: model.call(|agent| agent.resolution()).ok().flatten().map(|held| held.eps_m),
-            led_by,
-            late: open.start.late,
-            dropped: open.start.dropped,
-        });
-    }
-
-    /// Tells readers of its turns that it waits, with all it leads.
-    pub(crate) fn tell_wait(&self, took: Took) {
-        self.shared.streams.turn(|| Turn {
-            begun: took.begun,
-            ended: took.ended,
-            time: self.pace.time(),
-            dt: SimSpan::ZERO,
-            eps_m: None,
-            led_by: self.id(),
-            late: Duration::ZERO,
-            dropped: SimSpan::ZERO,
-        });
-    }
 }
 
 #[cfg(test)]

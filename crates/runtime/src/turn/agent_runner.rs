@@ -9,7 +9,7 @@
 //! leads ([`crate::cluster`]).
 
 use super::helpers::Helped;
-use super::model::Model;
+use super::model::{Model, contained};
 use crate::agent::handle::Shared;
 use crate::cluster::{ClusterSeat, Led};
 use crate::commands::loads::Loads;
@@ -21,10 +21,8 @@ use crate::records::metrics::{MetricsWriter, SMOOTHING};
 use crate::records::turns::Took;
 use crate::time::agent_clock::{AgentClock, Start, Timeline};
 use crate::time::faults::Faults;
-use metachron_contact::member::BadAnswer;
 use metachron_contact::{Carving, Link};
 use metachron_core::{AgentId, Resolution, ResolutionRange, SimSpan, SimTime, Snapshot, StepReport};
-use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::Arc;
 use std::sync::atomic::Ordering::Relaxed;
 use std::time::Duration;
@@ -425,20 +423,3 @@ impl AgentRunner {
 
 /// Why an agent makes no more turns that has left.
 const GONE: &str = "it has left";
-
-/// Runs `part` of a turn; an error or a panic in it is the reason to park.
-pub(crate) fn contained<T>(part: impl FnOnce() -> Result<T, String>) -> Result<T, String> {
-    // a model is not called again after a panic, so its broken invariants have no effect
-    match catch_unwind(AssertUnwindSafe(part)) {
-        Ok(result) => result,
-        Err(payload) => {
-            if let Some(BadAnswer(what)) = payload.downcast_ref() {
-                return Err(format!("answered {what}, which no step can go on with"));
-            }
-            let text = payload.downcast_ref::<&str>().copied().map(str::to_owned);
-            let text = text.or_else(|| payload.downcast_ref::<String>().cloned()).unwrap_or_default();
-            // an agent of somebody's own may panic, too
-            Err(format!("panicked, which is a bug of its model or of metachron: {text}"))
-        }
-    }
-}

@@ -3,9 +3,8 @@
 //! In: calls. Out: their answers; from a model that has panicked, in this call or one before, the reason, and no code of it runs any more. What
 //! runs is marked, so that others can see whose code that is ([`CallMark`]). Never here: what becomes of the agent.
 
-use super::agent_runner::contained;
 use crate::agent::handle::Shared;
-use metachron_contact::member::{CallMark, GuardedMember};
+use metachron_contact::member::{BadAnswer, CallMark, GuardedMember};
 use metachron_contact::{Agent, Inputs, StepContext};
 use metachron_core::SimSpan;
 use metachron_core::{Archive, ArchiveError, Snapshot, StepError, StepReport};
@@ -13,6 +12,23 @@ use metachron_geometry::CollisionShape;
 use std::hint::black_box;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::Arc;
+
+/// Runs `part` of a turn; an error or a panic in it is the reason to park.
+pub(crate) fn contained<T>(part: impl FnOnce() -> Result<T, String>) -> Result<T, String> {
+    // a model is not called again after a panic, so its broken invariants have no effect
+    match catch_unwind(AssertUnwindSafe(part)) {
+        Ok(result) => result,
+        Err(payload) => {
+            if let Some(BadAnswer(what)) = payload.downcast_ref() {
+                return Err(format!("answered {what}, which no step can go on with"));
+            }
+            let text = payload.downcast_ref::<&str>().copied().map(str::to_owned);
+            let text = text.or_else(|| payload.downcast_ref::<String>().cloned()).unwrap_or_default();
+            // an agent of somebody's own may panic, too
+            Err(format!("panicked, which is a bug of its model or of metachron: {text}"))
+        }
+    }
+}
 
 /// A model, with what is known of its code.
 pub(crate) struct Model {

@@ -6,8 +6,9 @@
 use super::agent_runner::{AgentRunner, PendingTurn};
 use crate::records::metrics::Entry;
 use crate::records::probe::Trace;
+use crate::records::turns::{Took, Turn};
 use crate::time::agent_clock::Timeline;
-use metachron_core::{PairKind, SimTime};
+use metachron_core::{AgentId, PairKind, SimSpan, SimTime};
 use std::sync::atomic::Ordering::Relaxed;
 use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::thread;
@@ -131,6 +132,37 @@ impl AgentRunner {
                 sleep.wake(ledger.with);
             }
         }
+    }
+}
+
+impl AgentRunner {
+    /// Tells readers of its turns of the step that is `open`, made in a turn of `led_by`.
+    pub(crate) fn tell_turn(&mut self, open: &PendingTurn, led_by: AgentId, took: Took) {
+        let Self { shared, model, pace, .. } = self;
+        shared.streams.turn(|| Turn {
+            begun: took.begun,
+            ended: took.ended,
+            time: pace.time(),
+            dt: open.dt,
+            eps_m: model.call(|agent| agent.resolution()).ok().flatten().map(|held| held.eps_m),
+            led_by,
+            late: open.start.late,
+            dropped: open.start.dropped,
+        });
+    }
+
+    /// Tells readers of its turns that it waits, with all it leads.
+    pub(crate) fn tell_wait(&self, took: Took) {
+        self.shared.streams.turn(|| Turn {
+            begun: took.begun,
+            ended: took.ended,
+            time: self.pace.time(),
+            dt: SimSpan::ZERO,
+            eps_m: None,
+            led_by: self.id(),
+            late: Duration::ZERO,
+            dropped: SimSpan::ZERO,
+        });
     }
 }
 

@@ -7,7 +7,8 @@
 //! [`AgentRunner::begin`] makes all three. A run that is recorded makes the outer two in one order with those of all others
 //! ([`super::turn_order`]), and the steps side by side. Never here: the end of a turn ([`super::agent_runner`]).
 
-use super::agent_runner::{AgentRunner, Effort, PendingTurn, StepOutcome, contained};
+use super::agent_runner::{AgentRunner, Effort, PendingTurn, StepOutcome};
+use super::model::contained;
 use super::turn_order::Held;
 use crate::cluster::{Leap, SolveBound, Span, StepPlan};
 use crate::records::events::EventKind;

@@ -3,7 +3,7 @@
 //! In: agents that make no turns. Out: the same in an archive; from one, values that were checked, and that nobody has been shown. Never here:
 //! when they are shown ([`super::Cut`]), what models save of themselves ([`metachron_contact::Agent::archive`]).
 
-use crate::agent::spawn::RunAgents;
+use crate::agent::agents::RunAgents;
 use crate::cluster::{Place, Placed, Steppers, check_places};
 use crate::commands::loads::Loads;
 use crate::commands::mailbox::PendingCommands;
@@ -13,7 +13,8 @@ use crate::neighbours::observation::Seen;
 use crate::records::metrics::MetricsValues;
 use crate::time::agent_clock::Timeline;
 use crate::time::virtual_events::VirtualEvents;
-use crate::turn::agent_runner::{AgentRunner, contained};
+use crate::turn::agent_runner::AgentRunner;
+use crate::turn::model::contained;
 use metachron_core::{Archive, ArchiveError, Snapshot, archive_values};
 use std::sync::Arc;
 use std::time::Duration;

@@ -174,7 +174,8 @@ impl<T> Ord for Place<T> {
 mod tests {
     use super::super::super::testing::Dummy;
     use super::*;
-    use crate::agent::spawn::{AgentSpawn, assemble};
+    use crate::agent::agent_spawn::AgentSpawn;
+    use crate::agent::spawn::assemble;
     use crate::time::agent_clock::TimelineCommand;
     use crate::turn::helpers::Helpers;
 

@@ -214,7 +214,8 @@ impl Worker {
 mod tests {
     use super::super::super::testing::Dummy;
     use super::*;
-    use crate::agent::spawn::{AssembledRun, RunAgents, assemble};
+    use crate::agent::agents::RunAgents;
+    use crate::agent::spawn::{AssembledRun, assemble};
     use crate::time::agent_clock::TimelineCommand;
     use crate::turn::helpers::Helpers;
     use crate::turn::watchdog::StallLimit;

@@ -1,7 +1,8 @@
 //! Whom agents see, when, and what of it reaches them.
 
 use super::*;
-use crate::agent::spawn::{AgentSpawn, assemble};
+use crate::agent::agent_spawn::AgentSpawn;
+use crate::agent::spawn::assemble;
 use crate::cluster::Span;
 use crate::executors::lockstep::Lockstep;
 use crate::executors::testing::{Dummy, Log, RecordedStep, eventually, on_every_executor, system};
