@@ -6,6 +6,7 @@
 
 use super::parry_shapes::Triangles;
 use super::signed_distance::{Ball, Touch, Touches};
+use crate::solids::signed_distance;
 use crate::space::closest_points::{near_segments, near_triangle};
 use glam::{DVec3, Vec3};
 use rapier3d::parry::bounding_volume::Aabb;
@@ -117,7 +118,7 @@ impl MeshField {
 
     /// Every wall within `reach_m` of `centre`, nearest first (eq. 2).
     pub fn touches(&self, centre: DVec3, reach_m: f64, found: &mut Touches) {
-        let mut planes = [(DVec3::ZERO, DVec3::ZERO); crate::solids::signed_distance::TOUCHES_MAX];
+        let mut planes = [(DVec3::ZERO, DVec3::ZERO); signed_distance::TOUCHES_MAX];
         let mut count = 0;
         while !found.is_full() {
             let Some(place) = self.nearest(centre, reach_m, &planes[..count], None) else { return };

@@ -1,6 +1,7 @@
 //! Distances against each other: primitives, the same as triangles, and sampling.
 
 use super::signed_distance::{Ball, Field};
+use crate::solids::signed_distance;
 use crate::space::closest_points::{near_segments, near_triangle};
 use crate::{Aabb, Obstacle, Solid};
 
@@ -37,7 +38,7 @@ fn vector(size: f64) -> impl Strategy<Value = DVec3> {
     [-size..size, -size..size, -size..size].prop_map(DVec3::from_array)
 }
 
-fn first(field: &Field, point: DVec3) -> crate::solids::signed_distance::Touch {
+fn first(field: &Field, point: DVec3) -> signed_distance::Touch {
     field.touches(point, 10.0).iter().next().expect("everything is within 10 m")
 }
 

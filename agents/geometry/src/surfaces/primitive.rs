@@ -6,6 +6,7 @@
 
 use super::patch::sides;
 use crate::Solid;
+use crate::solids::tool;
 use glam::{Vec2, Vec3};
 use std::f64::consts::FRAC_PI_4;
 
@@ -123,7 +124,7 @@ impl Primitive {
                 12 * m * m + 8 * m
             }
             Self::Cylinder => sides(n) * (4 + 4 * bevel_divisions(n)),
-            Self::Jaw => crate::solids::tool::jaw_triangles(n),
+            Self::Jaw => tool::jaw_triangles(n),
         }
     }
 
@@ -145,7 +146,7 @@ impl Primitive {
                 swept_box(&[&round, &round, &split_lines(m / 2)])
             }
             Self::Cylinder => cylinder(sides(n), bevel_divisions(n)),
-            Self::Jaw => crate::solids::tool::jaw(n),
+            Self::Jaw => tool::jaw(n),
         }
     }
 }

@@ -7,6 +7,7 @@ mod shapes;
 
 use super::impostor_fit::ImpostorFit;
 use super::pose;
+use crate::composition::compose;
 use crate::composition::environment::Environment;
 use crate::composition::lod_transition::Geomorph;
 use crate::composition::picture::Picture;
@@ -106,7 +107,7 @@ pub struct SceneView {
     pub(crate) tracks: Vec<Track>,
     pub(crate) statics: Vec<StaticShape>,
     pub(crate) picture: Picture,
-    pub(crate) scratch: crate::composition::compose::Scratch,
+    pub(crate) scratch: compose::Scratch,
     pub(crate) survey: Survey,
     /// How many of the last actors are drawn in place of groups of others, and those of them that move.
     pub(crate) impostors: usize,

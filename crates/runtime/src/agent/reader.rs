@@ -115,6 +115,7 @@ impl Reader {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::executors::testing;
     use crate::executors::testing::Dummy;
     use crate::{Command, Lockstep, Machine, Run};
     use metachron_core::AgentId;
@@ -124,7 +125,7 @@ mod tests {
     fn run() -> Box<Lockstep> {
         let mut spawns: Vec<_> = [30.0, 7.0, 2.0, 1.0].map(|hz| Dummy::new(1.0).at(hz)).into();
         spawns.push(Dummy { rest_from: Some(5), ..Dummy::new(1.0) }.at(10.0));
-        spawns.push(Dummy { fault: Some((4, crate::executors::testing::Fault::Diverged)), ..Dummy::new(1.0) }.at(10.0));
+        spawns.push(Dummy { fault: Some((4, testing::Fault::Diverged)), ..Dummy::new(1.0) }.at(10.0));
         Box::new(Lockstep::start(spawns, Machine::two_cores_software()).unwrap())
     }
 

@@ -23,6 +23,7 @@ use crate::commands::mailbox::SendError;
 use crate::lock_free::sleep::Halt;
 use crate::records::metrics::AgentStats;
 use crate::time::agent_clock::{Timeline, TimelineCommand};
+use crate::time::clock;
 use crate::time::clock::Clock;
 use crate::turn::helpers::Helpers;
 use crate::turn::turn_order::TurnOrder;
@@ -168,7 +169,7 @@ impl Run for Pool {
     }
 
     fn wait_until(&mut self, until: Duration) {
-        crate::time::clock::wait_until(&*self.state.clock, until);
+        clock::wait_until(&*self.state.clock, until);
     }
 
     fn spend(&mut self, _work: Duration) {}

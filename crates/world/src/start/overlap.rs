@@ -4,6 +4,7 @@
 //! Never here: the response to it.
 
 use super::initial_shape::{StartShape, shape};
+use crate::description::couplings;
 use crate::description::couplings::CouplingKind;
 use crate::description::placement::Overlap;
 use crate::description::scene::{Scene, Spec};
@@ -114,9 +115,8 @@ impl Scene {
 
     /// Pairs whose contact differs from the scene's `contacts`: where that is true those that do not collide, else those that do.
     pub(super) fn pairs_apart(&self) -> BTreeSet<(AgentId, AgentId)> {
-        let contact = |c: &&crate::description::couplings::Coupling| {
-            c.kind == CouplingKind::Contact && (c.law == Law::Off) == self.contacts
-        };
+        let contact =
+            |c: &&couplings::Coupling| c.kind == CouplingKind::Contact && (c.law == Law::Off) == self.contacts;
         let coupled = self.couplings.iter().filter(contact).map(|c| (c.a, c.b));
         let jointed = self.joints.iter().filter(|j| !j.collide && self.contacts).filter_map(|j| Some((j.a, j.b?)));
         coupled.chain(jointed).map(|(a, b)| (a.min(b), a.max(b))).collect()

@@ -2,6 +2,7 @@
 //!
 //! In: a [`Scene`]. Out: for each agent its laws, links and faults. Never here: forces.
 
+use crate::description::couplings;
 use crate::description::couplings::{Coupling, CouplingKind};
 use crate::{Scene, Spec};
 use metachron_contact::{Law, Link};
@@ -42,8 +43,8 @@ impl Ties {
 }
 
 /// Converts injected faults to the runtime's type.
-pub const fn faults(faults: crate::description::couplings::Faults) -> Faults {
-    let crate::description::couplings::Faults { jitter, loss, seed } = faults;
+pub const fn faults(faults: couplings::Faults) -> Faults {
+    let couplings::Faults { jitter, loss, seed } = faults;
     Faults { jitter, loss, seed }
 }
 

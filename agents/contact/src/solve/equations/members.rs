@@ -3,6 +3,7 @@
 //! In: members. Out: products and sizes. Never here: contacts, solutions. Theory: `docs/theory/clusters.md`, eq. 1 and 15.
 
 use crate::lists::reset;
+use crate::solve::statement::problem;
 use crate::solve::statement::problem::{Block, Problem};
 use glam::{DMat3, DVec3};
 
@@ -72,7 +73,7 @@ impl Members {
 
     /// out ← ⊕ A/f x.
     pub fn multiply(&self, x: &[DVec3], out: &mut [DVec3]) {
-        crate::solve::statement::problem::multiply(&self.blocks, x, out);
+        problem::multiply(&self.blocks, x, out);
     }
 
     /// How large impulses on all blocks are.

@@ -1,5 +1,6 @@
 //! Rows whose bound is what presses a contact: friction about its normal, in both forms, and in random piles.
 
+use crate::solve::tests;
 use crate::solve::tests::{Body, Case, Seeded, contact, is_open, rigid};
 use crate::solve::{Hold, JointRow, Pressed, Settings, Side, Solver, StepForm};
 use glam::DVec3;
@@ -79,7 +80,7 @@ fn pile(seed: u64) -> Case {
             let friction = random.between(0.1, 0.8);
             let reach_m = friction * random.between(0.005, 0.1);
             rows.push(spin_of(contacts.len(), [Side::node(k, SPIN), under], normal, reach_m));
-            contacts.push(crate::solve::tests::Contact { friction, ..contact([Side::rigid(k, at), below], normal) });
+            contacts.push(tests::Contact { friction, ..contact([Side::rigid(k, at), below], normal) });
         }
     }
     Case { h_s: H_S, bodies, contacts, rows }

@@ -5,6 +5,7 @@ use crate::chart::figure::{Axis, Colour, Figure, Layer, Mark, Panel};
 use crate::chart::policies::numeric::camera::{Path, key};
 use crate::chart::policies::numeric::chooser::Policy;
 use crate::chart::policies::numeric::closed_loop::Show;
+use crate::chart::policies::numeric::common;
 use crate::chart::policies::numeric::common::{Case, at_least, curves, figure};
 use crate::chart::policies::numeric::machine::{Fault, RandomSource};
 use crate::chart::policies::numeric::metrics::Row;
@@ -122,8 +123,7 @@ impl Experiment for Library {
     }
 
     fn findings(rows: &[Row]) -> Vec<Finding> {
-        let of =
-            |t: &str, what: fn(&Row) -> f64| crate::chart::policies::numeric::common::number(rows, t, "adaptive", what);
+        let of = |t: &str, what: fn(&Row) -> f64| common::number(rows, t, "adaptive", what);
         let mut findings = Vec::new();
         for (name, ..) in TARGETS {
             findings.push(Finding::at_most(format!("adaptive, {name}: longest frame / T"), of(name, |r| r.max), 1.15));

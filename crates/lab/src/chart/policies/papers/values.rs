@@ -2,6 +2,7 @@
 
 use crate::chart::experiment::{Experiment, Finding};
 use crate::chart::figure::{Axis, Colour, Figure, Layer, Mark, Panel};
+use crate::chart::policies::numeric::chooser;
 use crate::chart::policies::numeric::chooser::Policy;
 use crate::chart::policies::numeric::common::{at_least, figure};
 use crate::chart::policies::numeric::forest;
@@ -48,7 +49,7 @@ fn drawn(value: Value) -> (Vec<(f64, f64)>, f64) {
     let mut parts = Vec::new();
     let frames = show.watch(Policy::RobinHood(value), 1, &mut |frame, seen, choice| {
         if frame == FRAME {
-            let of = |p: &crate::chart::policies::numeric::chooser::Pick| if p.level.is_some() { p.part } else { 0.0 };
+            let of = |p: &chooser::Pick| if p.level.is_some() { p.part } else { 0.0 };
             parts.extend(seen.iter().zip(&choice.picks).map(|(s, p)| (s.depth_m, of(p))));
         }
     });
