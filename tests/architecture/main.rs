@@ -97,7 +97,7 @@ const RINGS: [(&str, usize); 18] = [
     ("agents/models", 5),
     ("crates/runtime", 8),
     ("crates/world", 6),
-    ("crates/scene", 30),
+    ("crates/scene", 6),
     ("crates/devices", 0),
     ("crates/export", 0),
     ("crates/bevy", 5),

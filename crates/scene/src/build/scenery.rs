@@ -3,9 +3,9 @@
 //! In: entries of these models. Out: [`Scenery`], copies sharing one model. Never here: groups, drawing.
 
 use super::common::{appearance, levels, pace, painted_appearance, parse_colour};
+use super::common::{point_or_zero, rotation};
 use super::contact;
-use super::object::{Entry, ModelFile};
-use super::rigid::{point_or_zero, rotation};
+use super::objects::{Entry, ModelFile};
 use super::texture;
 use super::texture::Textures;
 use super::{POSITION_MAX_M, ROTATION_MAX_DEG, SCALE, SPEED_MAX, mesh};

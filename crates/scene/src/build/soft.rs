@@ -1,8 +1,8 @@
 //! Reads a sheet, solid or rope of a scene file as a [`SoftSpec`].
 
+use super::common::rotation;
 use super::mesh::{self, Mesh};
-use super::object::ModelContext;
-use super::rigid::rotation;
+use super::objects::ModelContext;
 use super::scenery::{SurfaceSource, generator, surface_source};
 use super::soft_mesh;
 use super::{FRICTION, LENGTH, POSITION_MAX_M, ROTATION_MAX_DEG, SCALE, SPEED_MAX};

@@ -3,7 +3,7 @@
 //! In: `texture` of a mesh, any bytes. Out: a [`Texture`], equal ones shared, or what is wrong with the image. Never here: drawing.
 
 use super::glb;
-use super::object::Entry;
+use super::objects::Entry;
 use super::scenery::Parts;
 use crate::check::{Checker, allowed};
 use crate::demand::{Cost, FileHead};
