@@ -1,7 +1,8 @@
 //! Sheets, solids and ropes as users write them: what loads, what an error shows, and what the scenes with them do.
 
 use crate::play::{Folder, agent, lockstep, number, point};
-use metachron_geometry::{Generator, Triangles, generate_surface};
+use metachron_drawable::{Generator, generate_surface};
+use metachron_geometry::Triangles;
 use metachron_models::soft::Side;
 use metachron_models::soft::SoftShape;
 use metachron_scene::{SceneError, Source, load};

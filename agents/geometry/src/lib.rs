@@ -1,7 +1,7 @@
-//! Shapes without physics: solids, skeleton curves, meshes and their levels, and the contact points between collision shapes.
+//! Shapes without physics: solids, meshes and their levels, and the contact points between collision shapes.
 //!
-//! In: solids, curves and meshes in their poses. Out: gaps and contact points, signed distances, closest points, triangles,
-//! progressive meshes. Never here: motion, forces, agents, a file, the GPU. Theory: `docs/theory/contact.md`, eq. 1–12.
+//! In: solids, curves and meshes in their poses. Out: gaps and contact points, signed distances, closest points, triangles.
+//! Never here: motion, forces, agents, a file, the GPU. Theory: `docs/theory/contact.md`, eq. 1–12.
 //!
 //! ```
 //! use glam::{DQuat, DVec3};
@@ -20,21 +20,11 @@
 //! assert!((normal - DVec3::X).length() < 1e-6); // from the box towards the ball
 //! ```
 
-mod drawing;
 pub mod narrow_phase;
 mod solids;
 mod space;
 mod surfaces;
 
-pub use drawing::foliage::{Foliage, FoliageCut, PieceKind, Stroke, TreeSpec, tree};
-pub use drawing::generate::{Generator, generate, generate_surface};
-pub use drawing::geodesic::geodesic_edges;
-pub use drawing::model::{Extent, Model, Placement, proxy};
-pub use drawing::motion::Motion;
-pub use drawing::progressive_mesh::{Cut, ProgressiveMesh, ProgressiveMeshError};
-pub use drawing::render_curve::{INTERVALS_MAX, Skeleton, SkinFrame, hermite, hermite_slope, intervals};
-pub use drawing::texture::{Pattern, Texture, Wrap};
-pub use drawing::{foliage, furniture, generate, geodesic, model, motion, progressive_mesh, render_curve, texture};
 pub use narrow_phase::{StaticSolid, StaticSolidError, TouchKey, TouchKind};
 pub use solids::collision_shape::{
     CollisionShape, ContactSide, Place, PlacedShape, ShapeKind, ShapePose, SolidShape, SurfaceShape, Touch,

@@ -34,14 +34,17 @@ mod start;
 mod world;
 
 pub use control::pace::Pace;
+pub use description::appearance::Appearance;
 pub use description::builder::{
     Custom, Part, Rigid, SceneBuildError, SceneBuilder, SensorOn, Soft, Tube, static_solid,
 };
 pub use description::placement::{Moved, Overlap};
 pub use description::scene::{
-    Appearance, Camera, Factors, GROUP_LEVELS_MAX, Gains, Group, Machine, Member, NamedCamera, ObjectCost, PaceWish,
-    Probe, RENDER_SCALE, Scene, Scenery, Spec, Target, View,
+    Camera, Factors, Gains, Machine, Member, NamedCamera, ObjectCost, PaceWish, Probe, RENDER_SCALE, Scene, Spec,
+    Target, View,
 };
+#[cfg(feature = "scenery")]
+pub use description::scenery::{GROUP_LEVELS_MAX, Group, Scenery};
 pub use description::sensor::{Sensor, SensorKind, Site};
 pub use description::spec::Division;
 pub use description::{couplings, kinds};

@@ -1,7 +1,7 @@
 //! The cylinder patch that is bent over one interval of a tube, at every level n.
 //!
 //! In: the level n. Out: vertices as (u along, angle around) and triangles; counts as const functions for cost models.
-//! Never here: positions in space: the renderer bends the patch between two [`crate::SkinFrame`]s.
+//! Never here: positions in space: the renderer bends the patch between two `SkinFrame`s of `metachron-drawable`.
 //! Level n has 6·2^⌈n/2⌉ sides and 2^⌊n/2⌋ rings, so 12·2ⁿ triangles: the O(2ⁿ) of (GDC04).
 
 /// One vertex of a patch.

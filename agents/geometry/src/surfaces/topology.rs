@@ -162,8 +162,7 @@ fn sides(points: &[DVec3], place: &[u32], triangles: &[[u32; 3]], object_of: imp
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::drawing::generate::generate;
-    use crate::{Generator, hull_triangles};
+    use crate::hull_triangles;
 
     /// The branch of triangles that all belong to one object.
     fn branch(points: &[DVec3], triangles: &[[u32; 3]]) -> Option<Branch> {
@@ -216,16 +215,5 @@ mod tests {
         let apart = doubled(&fin);
         let found = branch(&apart.points, &apart.triangles).unwrap();
         assert_eq!((found.triangle, found.corners, found.sharing), (12, [36, 37], 3));
-    }
-
-    #[test]
-    fn no_generated_mesh_branches() {
-        for kind in Generator::ALL {
-            for triangles in [12, 700, 5000] {
-                let mesh = generate(kind, 3, triangles);
-                let points: Vec<DVec3> = mesh.vertices.iter().map(|v| v.core.as_dvec3()).collect();
-                assert_eq!(branch(&points, &mesh.triangles), None, "{kind:?} {triangles}");
-            }
-        }
     }
 }

@@ -15,7 +15,8 @@ use crate::seen::view::Camera;
 use crate::states::scene_view::{Appearance, Form, Material, SceneView, StaticShape, Track};
 use glam::{DQuat, DVec2, DVec3, Vec3};
 use metachron_core::{AgentId, Anchor, Body, Resolution};
-use metachron_geometry::{Primitive, Rounding, SkinFrame};
+use metachron_drawable::SkinFrame;
+use metachron_geometry::{Primitive, Rounding};
 use std::f64::consts::TAU;
 
 /// Repeats of the skin's texture around a tube; the shader uses the same number.

@@ -10,7 +10,8 @@ use crate::seen::view::{Camera, Size};
 use crate::states::scene_view::{Actor, Appearance, Form, Material, SceneView, StaticShape, Track};
 use glam::{DVec3, Vec3};
 use metachron_core::{Body, ToolState};
-use metachron_geometry::{Cut, Foliage, Model, Primitive, Rounding, Solid, ToolShape};
+use metachron_drawable::{Cut, Foliage, Model};
+use metachron_geometry::{Primitive, Rounding, Solid, ToolShape};
 
 /// Level at which fixed solids are drawn.
 const STATIC_LEVEL: u8 = 4;

@@ -7,7 +7,7 @@
 //! more triangles than requested until its morph ends, as long as the frame's allowance lasts; without allowance it jumps.
 
 use super::picture::MeshKey;
-use metachron_geometry::{Cut, ProgressiveMesh};
+use metachron_drawable::{Cut, ProgressiveMesh};
 
 /// Limits on morphs in a frame.
 #[derive(Debug, Clone, Copy)]
@@ -87,7 +87,7 @@ impl Geomorph {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use metachron_geometry::{Generator, generate};
+    use metachron_drawable::{Generator, generate};
 
     fn progressive() -> ProgressiveMesh {
         ProgressiveMesh::new(&generate(Generator::Blob, 1, 2000)).unwrap()

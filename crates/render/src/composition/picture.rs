@@ -9,7 +9,8 @@ use crate::seen::level::Shading;
 use bytemuck::{Pod, Zeroable};
 use glam::DVec3;
 use metachron_core::Resolution;
-use metachron_geometry::{Cut, Model, Primitive, PrimitiveMesh, Texture, patch};
+use metachron_drawable::{Cut, Model, Texture};
+use metachron_geometry::{Primitive, PrimitiveMesh, patch};
 use std::sync::Arc;
 
 /// Meaning of the colours.

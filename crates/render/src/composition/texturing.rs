@@ -6,7 +6,7 @@ use super::compose::Paint;
 use crate::seen::level::Shading;
 use crate::states::scene_view::SceneView;
 use metachron_core::AgentId;
-use metachron_geometry::{Texture, Wrap};
+use metachron_drawable::{Texture, Wrap};
 use std::sync::Arc;
 
 /// The texture of one actor.

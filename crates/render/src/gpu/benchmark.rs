@@ -15,7 +15,7 @@ use crate::seen::view::{Camera, Size};
 use crate::states::scene_view::{Actor, Appearance, Form, Material, SceneView, States};
 use glam::{DQuat, DVec3};
 use metachron_core::{AgentId, Resolution, SimTime};
-use metachron_geometry::{Generator, Model, Pattern, PieceKind, Placement, ProgressiveMesh, TreeSpec, generate, tree};
+use metachron_drawable::{Generator, Model, Pattern, PieceKind, Placement, ProgressiveMesh, TreeSpec, generate, tree};
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 

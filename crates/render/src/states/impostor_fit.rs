@@ -7,7 +7,7 @@
 use super::scene_view::{BodyShape, Bounds, Form, SceneView, Track};
 use glam::{DMat3, DQuat, DVec3};
 use metachron_core::{Body, RigidState};
-use metachron_geometry::Placement;
+use metachron_drawable::Placement;
 
 /// Passes of the search for the nearest rotation; it starts at that of the frame before.
 const PASSES: usize = 20;
@@ -178,7 +178,8 @@ mod tests {
     use super::super::scene_view::{Actor, Appearance, Material, States};
     use super::*;
     use metachron_core::{AgentId, SimTime, Snapshot};
-    use metachron_geometry::{Generator, Model, ProgressiveMesh, Solid, generate};
+    use metachron_drawable::{Generator, Model, ProgressiveMesh, generate};
+    use metachron_geometry::Solid;
     use std::sync::Arc;
 
     /// Balls and the impostor of all of them; at the start it is where it is given.

@@ -80,7 +80,8 @@ mod tests {
     use crate::{Camera, Ray, Size};
     use glam::{DQuat, DVec3};
     use metachron_core::{RigidState, SimTime};
-    use metachron_geometry::{Generator, Model, Placement, ProgressiveMesh, Solid, generate};
+    use metachron_drawable::{Generator, Model, Placement, ProgressiveMesh, generate};
+    use metachron_geometry::Solid;
 
     #[test]
     fn a_newcomer_stands_before_the_scenery_and_is_picked_until_it_leaves() {

@@ -17,8 +17,9 @@ use crate::seen::view::{Camera, Size};
 use crate::seen::visibility::{Survey, Visibility};
 use glam::DVec3;
 use metachron_core::{AgentId, Body, CurveState, RigidState, SimTime, Snapshot};
+use metachron_drawable::{Model, Motion, Placement, Skeleton};
 use metachron_geometry::{CollisionShape, ShapeKind};
-use metachron_geometry::{Model, Motion, Obstacle, Placement, PrimitiveMesh, Skeleton, Solid, ToolShape};
+use metachron_geometry::{Obstacle, PrimitiveMesh, Solid, ToolShape};
 pub(crate) use shapes::{BodyShape, Bounds, Models, StaticShape};
 use std::sync::Arc;
 

@@ -12,7 +12,8 @@ use crate::format::{
 use crate::source::Source;
 use glam::DVec3;
 use metachron_core::AgentId;
-use metachron_geometry::{ContactTraits, Obstacle, geodesic_edges};
+use metachron_drawable::geodesic_edges;
+use metachron_geometry::{ContactTraits, Obstacle};
 use metachron_world::{Appearance, Member, Scenery};
 use std::collections::BTreeMap;
 use std::sync::Arc;

@@ -12,9 +12,8 @@ use crate::demand::Cost;
 use crate::format::{Axis, GeneratorKind, PartFile, Point, RigidFile, Shape};
 use crate::source::Source;
 use glam::{DQuat, DVec3};
-use metachron_geometry::{
-    Aabb, COMPOUND_PARTS_MAX, CompoundPart, ContactTraits, Obstacle, Solid, generate_surface, hull_corners,
-};
+use metachron_drawable::generate_surface;
+use metachron_geometry::{Aabb, COMPOUND_PARTS_MAX, CompoundPart, ContactTraits, Obstacle, Solid, hull_corners};
 use metachron_models::rigid::{Keyframe, Led, Restraint, RigidSpec};
 use std::sync::Arc;
 

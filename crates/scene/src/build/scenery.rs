@@ -14,9 +14,10 @@ use crate::demand::Cost;
 use crate::format::{GeneratorKind, MeshFile, MotionFile, Point, TreeFile, TreeLod};
 use crate::source::Source;
 use glam::{DQuat, DVec3};
-use metachron_geometry::{
-    Generator, Model, Motion, Placement, ProgressiveMesh, TreeSpec, generate, geodesic_edges, painted_mesh, tree,
+use metachron_drawable::{
+    Generator, Model, Motion, Placement, ProgressiveMesh, TreeSpec, generate, geodesic_edges, tree,
 };
+use metachron_geometry::painted_mesh;
 use metachron_world::kinds::Material;
 use metachron_world::{Appearance, Scenery};
 use std::collections::BTreeMap;

@@ -12,7 +12,7 @@ use crate::source::Source;
 use glam::Vec2;
 #[cfg(feature = "images")]
 use image::{ImageFormat, ImageReader, Limits};
-use metachron_geometry::{Model, Pattern, Texture, Wrap};
+use metachron_drawable::{Model, Pattern, Texture, Wrap};
 use metachron_world::Appearance;
 use metachron_world::kinds::ShadingKind;
 use std::collections::BTreeMap;

@@ -8,11 +8,12 @@ mod sensors;
 mod soft;
 mod tube;
 
+use super::appearance::Appearance;
 use super::couplings::Faults;
 use super::kinds::{
     EnvironmentKind, ExecutorKind, LawKind, Material, PolicyKind, PriorityKind, ShadingKind, StatesKind, ValueKind,
 };
-use super::scene::{Appearance, Factors, Gains, Machine, Member, PaceWish, RENDER_SCALE, Scene, Spec, Target};
+use super::scene::{Factors, Gains, Machine, Member, PaceWish, RENDER_SCALE, Scene, Spec, Target};
 use glam::{DQuat, DVec3};
 use metachron_contact::Agent;
 use metachron_contact::detect::SolveBudget;
@@ -337,7 +338,9 @@ impl SceneBuilder {
             agents,
             obstacle_appearances: obstacles.iter().map(|_| DEFAULT_APPEARANCE).collect(),
             obstacles,
+            #[cfg(feature = "scenery")]
             scenery: Vec::new(),
+            #[cfg(feature = "scenery")]
             groups: Vec::new(),
             cells: Cells::default(),
             walls: 0..0,

@@ -3,19 +3,20 @@
 //! In: built in code ([`Scene::builder`]) or by `metachron-scene`. Out: plain data that the frame loop turns into agents, obstacles, a camera and a target.
 //! Never here: the file's text, running agents.
 
+use super::appearance::Appearance;
 use super::builder::{Custom, SceneBuilder};
 use super::couplings::{Coupling, Faults};
-use super::kinds::{
-    EnvironmentKind, ExecutorKind, LawKind, Material, PolicyKind, PriorityKind, ShadingKind, StatesKind, ValueKind,
-};
+use super::kinds::{EnvironmentKind, ExecutorKind, LawKind, PolicyKind, PriorityKind, StatesKind, ValueKind};
 use super::placement::{Moved, Overlap};
+#[cfg(feature = "scenery")]
+use super::scenery::{Group, Scenery};
 use super::sensor::Sensor;
 use glam::DVec3;
 #[cfg(doc)]
 use metachron_contact::detect::DEPTH_RANGE_M;
 use metachron_contact::detect::SolveBudget;
 use metachron_core::{AgentId, Resolution, ResolutionRange, SimSpan};
-use metachron_geometry::{Cells, Model, Motion, Obstacle, Placement, Texture};
+use metachron_geometry::{Cells, Obstacle};
 use metachron_models::rigid::Joint;
 use metachron_models::rigid::RigidSpec;
 use metachron_models::rod::TubeSpec;
@@ -60,8 +61,10 @@ pub struct Scene {
     /// Looks of the obstacles, in their order.
     pub obstacle_appearances: Vec<Appearance>,
     /// Objects that are only drawn; the members of a group are adjacent.
+    #[cfg(feature = "scenery")]
     pub scenery: Vec<Scenery>,
     /// Objects that may be drawn as one mesh; a group comes after the groups in it.
+    #[cfg(feature = "scenery")]
     pub groups: Vec<Group>,
     /// Rooms and the openings between them.
     pub cells: Cells,
@@ -275,41 +278,6 @@ pub struct Member {
     pub faults: Faults,
 }
 
-/// An object that is only drawn: nothing collides with it, and it moves as is declared, if at all.
-#[derive(Debug, Clone)]
-pub struct Scenery {
-    /// Its name, unique in the scene.
-    pub name: String,
-    /// Its mesh or foliage.
-    pub model: Model,
-    /// Its pose and scale.
-    pub at: Placement,
-    /// How it looks.
-    pub appearance: Appearance,
-    /// Its texture.
-    pub texture: Option<Arc<Texture>>,
-    /// How it moves; `None` where it never does.
-    pub motion: Option<Motion>,
-}
-
-/// Most levels of a group.
-pub const GROUP_LEVELS_MAX: usize = 8;
-
-/// Objects that may be drawn as one mesh, which moves as they do.
-#[derive(Debug, Clone)]
-pub struct Group {
-    /// The mesh that replaces all of it, with the group's name.
-    pub proxy: Scenery,
-    /// Triangles of its impostors: 1 … [`GROUP_LEVELS_MAX`] rising numbers, each a cut of the mesh.
-    pub levels: Vec<u32>,
-    /// All agents in it and in its groups.
-    pub agents: Vec<AgentId>,
-    /// All scenery in it and in its groups, a range of [`Scene::scenery`].
-    pub members: Range<usize>,
-    /// All groups in it and in those, a range of [`Scene::groups`] that ends before it.
-    pub groups: Range<usize>,
-}
-
 /// Rate and steps that an agent requests.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct PaceWish {
@@ -351,21 +319,6 @@ impl Spec {
             Self::Custom(_) => "custom",
         }
     }
-}
-
-/// How an object looks.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Appearance {
-    /// Red, green, blue (sRGB).
-    pub colour: [u8; 3],
-    /// Its material.
-    pub material: Material,
-    /// Weight of its picture relative to that of others, 0.001 … 1000.
-    pub importance: f64,
-    /// Whether it may be left out of the picture; `None`: as [`Target::may_vanish`] says.
-    pub may_vanish: Option<bool>,
-    /// Its shading.
-    pub shading: ShadingKind,
 }
 
 /// A material point whose state is reported.

@@ -6,7 +6,7 @@
 
 use crate::composition::mesh_corner::MeshCorner;
 use crate::composition::picture::{MeshKey, Picture};
-use metachron_geometry::{Cut, Model, ProgressiveMesh};
+use metachron_drawable::{Cut, Model, ProgressiveMesh};
 use std::collections::HashMap;
 use std::hash::Hash;
 use std::ops::Range;

@@ -4,7 +4,8 @@
 
 use super::{Appearance, StaticObject};
 use glam::{DQuat, DVec3};
-use metachron_geometry::{Aabb, Extent, Model, Obstacle, Placement, PrimitiveMesh, Solid};
+use metachron_drawable::{Extent, Model, Placement};
+use metachron_geometry::{Aabb, Obstacle, PrimitiveMesh, Solid};
 use metachron_geometry::{compound_mesh, creased_mesh, hull_mesh};
 
 /// Width added around static solids in tests of what is seen, metres.

@@ -5,7 +5,7 @@
 
 use super::scene::SCREEN;
 use glam::{DQuat, DVec3};
-use metachron_geometry::geodesic_edges;
+use metachron_drawable::geodesic_edges;
 use metachron_render::Camera;
 
 /// Domes, and struts of each.

@@ -3,7 +3,7 @@
 //! In: the textures of a picture. Out: bind groups of the painted pipeline. Never here: texture coordinates.
 
 use crate::composition::picture::Picture;
-use metachron_geometry::Texture;
+use metachron_drawable::Texture;
 use std::sync::Arc;
 use wgpu::util::DeviceExt;
 

@@ -3,8 +3,8 @@
 //! In: an ordered mesh. Out: a table of counts and errors, monotone. Never here: estimates.
 
 use super::ProgressiveMesh;
-use crate::near_triangle;
 use glam::DVec3;
+use metachron_geometry::near_triangle;
 use rapier3d::parry::bounding_volume::Aabb;
 use rapier3d::parry::partitioning::{Bvh, BvhBuildStrategy, TraversalAction};
 

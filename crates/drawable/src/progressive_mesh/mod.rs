@@ -17,7 +17,7 @@ mod weld;
 #[cfg(test)]
 mod tests;
 
-use crate::{PrimitiveMesh, PrimitiveVertex};
+use metachron_geometry::{PrimitiveMesh, PrimitiveVertex};
 pub use weld::ProgressiveMeshError;
 
 /// Flag in the substitute of a vertex at the same position as the one before it (a crease).

@@ -2,8 +2,8 @@
 //!
 //! In: a mesh as given. Out: positions, wedges, triangles with an area. Never here: order.
 
-use crate::{PrimitiveMesh, PrimitiveVertex};
 use glam::Vec3;
+use metachron_geometry::{PrimitiveMesh, PrimitiveVertex};
 use std::collections::BTreeMap;
 
 /// Reasons why a mesh cannot be ordered.

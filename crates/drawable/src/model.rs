@@ -3,8 +3,9 @@
 //! In: meshes and foliage with their placements. Out: counts, a bounding ball of each, a coarse mesh of all. Never here: appearance, the
 //! GPU.
 
-use crate::{Foliage, PrimitiveMesh, PrimitiveVertex, ProgressiveMesh, ProgressiveMeshError, hull_mesh};
+use crate::{Foliage, ProgressiveMesh, ProgressiveMeshError};
 use glam::{DQuat, DVec3};
+use metachron_geometry::{PrimitiveMesh, PrimitiveVertex, hull_mesh};
 use std::sync::Arc;
 
 /// Geometry drawn with any number of triangles; copies share it.
@@ -141,7 +142,7 @@ pub fn proxy(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::drawing::generate::generate;
+    use crate::generate;
     use crate::{Generator, TreeSpec, tree};
 
     fn ball() -> Model {

@@ -7,7 +7,7 @@ use std::sync::LazyLock;
 /// Mapping of a texture onto a mesh.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Wrap {
-    /// Where the mesh's corners say ([`crate::PrimitiveVertex::uv`]).
+    /// Where the mesh's corners say ([`metachron_geometry::PrimitiveVertex::uv`]).
     Corners,
     /// Projected onto each side along the axis nearest to the normal: one repeat per this many metres, finite, > 0.
     Sides(f32),

@@ -1,9 +1,10 @@
 //! What a totally ordered mesh must keep, against the mesh it was made of and brute force.
 
 use super::{Cut, ProgressiveMesh, ProgressiveMeshError};
-use crate::drawing::generate::generate;
-use crate::{Generator, PrimitiveMesh, PrimitiveVertex, creased_mesh, near_triangle};
+use crate::Generator;
+use crate::generate;
 use glam::{DVec3, Vec3};
+use metachron_geometry::{PrimitiveMesh, PrimitiveVertex, creased_mesh, near_triangle};
 use proptest::prelude::*;
 use std::collections::{BTreeMap, BTreeSet};
 

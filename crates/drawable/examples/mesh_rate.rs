@@ -1,8 +1,8 @@
 //! How fast are the triangles of a multiresolution mesh found, against how many there are? Prints CSV.
 //!
-//! `cargo run --release -p metachron-geometry --example mesh_rate [triangles]`
+//! `cargo run --release -p metachron-drawable --example mesh_rate [triangles]`
 
-use metachron_geometry::{Generator, ProgressiveMesh, generate};
+use metachron_drawable::{Generator, ProgressiveMesh, generate};
 use std::error::Error;
 use std::hint::black_box;
 use std::time::Instant;

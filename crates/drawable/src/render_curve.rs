@@ -1,7 +1,7 @@
 //! The skeleton of a tube's picture: a C¹ curve through its nodes, cut into intervals ε with rotation-minimising frames.
 //!
 //! In: a [`CurveState`] and the interval ε. Out: one [`SkinFrame`] at each end of an interval, between which a cylinder patch
-//! ([`crate::surfaces::patch`]) is bent. Never here: triangles, the GPU, allocation once the sizes settle.
+//! ([`metachron_geometry::patch`]) is bent. Never here: triangles, the GPU, allocation once the sizes settle.
 //! Between nodes the curve is the cubic of Hermite with the tangents of the parabola through three nodes, so it is C¹ and reproduces
 //! parabolas; frames follow by double reflection (WJZL08, §4), whose error is O(ε⁴).
 

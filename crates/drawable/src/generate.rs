@@ -4,9 +4,9 @@
 
 use super::furniture;
 use super::furniture::Part;
-use crate::surfaces::mesh::creased_mesh;
-use crate::{PrimitiveMesh, Triangles};
 use glam::{DVec2, DVec3};
+use metachron_geometry::creased_mesh;
+use metachron_geometry::{PrimitiveMesh, Triangles};
 
 /// Shape of a generated mesh.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
