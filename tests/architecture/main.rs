@@ -3,7 +3,7 @@
 mod imports;
 
 use imports::{CrateFiles, ring};
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
 use std::path::{Path, PathBuf};
 
@@ -375,6 +375,29 @@ fn rooms_of_contact_use_those_before_them_alone() {
     assert!(upward.is_empty(), "{upward:#?}");
     let entered = arrows.keys().filter_map(|file| room(file)).collect::<BTreeSet<_>>();
     assert_eq!(entered.len(), CONTACT_ROOMS.len(), "a room has no file");
+}
+
+/// Crates whose folders have a dozen files at most, each folder named by the question that it answers.
+const IN_ROOMS: [&str; 8] = [
+    "agents/geometry",
+    "agents/contact",
+    "crates/runtime",
+    "crates/world",
+    "crates/drawable",
+    "crates/render",
+    "crates/lod",
+    "crates/lab",
+];
+
+#[test]
+fn folders_have_a_dozen_files_at_most() {
+    let files = IN_ROOMS.iter().flat_map(|folder| files_below(&root().join(folder), "rs"));
+    let mut counts: BTreeMap<String, usize> = BTreeMap::new();
+    for file in files {
+        *counts.entry(relative(file.parent().unwrap())).or_default() += 1;
+    }
+    let crowded: Vec<_> = counts.iter().filter(|(_, count)| **count > 12).collect();
+    assert!(counts.len() > IN_ROOMS.len() && crowded.is_empty(), "{crowded:#?}");
 }
 
 #[test]
