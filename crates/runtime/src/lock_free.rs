@@ -1,4 +1,4 @@
-//! How threads meet without waiting for each other: the parts that `tests/loom` runs through every order of steps.
+//! How threads meet without waiting for each other: all of it but `ring` is run through every order of steps by `tests/loom`.
 //!
 //! In: what one thread writes, rests and wakes. Out: the newest of it, whole, to any thread. Never here: what the values mean, agents, clocks.
 
