@@ -25,6 +25,8 @@ pub use metachron_contact as contact;
 pub use metachron_core as core;
 #[cfg(feature = "devices")]
 pub use metachron_devices as devices;
+#[cfg(feature = "scene")]
+pub use metachron_drawable as drawable;
 #[cfg(feature = "export")]
 pub use metachron_export as export;
 pub use metachron_geometry as geometry;

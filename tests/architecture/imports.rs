@@ -97,7 +97,7 @@ impl CrateFiles {
 
 impl Module {
     fn new(file: String, text: &str) -> Self {
-        let text = text.split("#[cfg(test)]\nmod tests {").next().unwrap();
+        let text = text.split("\nmod tests {").next().unwrap();
         let kept: Vec<_> = text.lines().filter(|line| !line.trim_start().starts_with("//")).collect();
         let (mut code, mut imports) = (String::new(), Vec::new());
         for statement in kept.join("\n").split_inclusive(';') {

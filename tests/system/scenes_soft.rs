@@ -2,7 +2,8 @@
 //! scenes.
 
 use crate::play::{Folder, agent, lockstep, number, point};
-use metachron_geometry::{Generator, Triangles, generate_surface};
+use metachron_drawable::{Generator, generate_surface};
+use metachron_geometry::Triangles;
 use metachron_models::soft::Side;
 use metachron_models::soft::SoftShape;
 use metachron_scene::{SceneError, Source, load};

@@ -20,62 +20,36 @@
 //! let expected = 240.0 / (5.0 * 0.35_f64.tan());
 //! assert!((camera.pixels_per_metre(5.0, size) - expected).abs() < 1e-6);
 //! ```
+mod composition;
 #[cfg(feature = "gpu")]
-mod benchmark;
-mod bounds_tree;
-mod compose;
-#[cfg(feature = "gpu")]
-mod depth_image;
-#[cfg(feature = "gpu")]
-mod draw;
-mod environment;
-mod forces;
-#[cfg(feature = "gpu")]
-mod full_screen;
-#[cfg(feature = "gpu")]
-mod image_metrics;
-mod impostor_fit;
-mod instances;
-mod level;
-mod light_volume;
-mod lod_transition;
-mod membership;
-#[cfg(feature = "gpu")]
-pub mod offscreen;
-mod pick;
-mod picture;
-mod portals;
-mod pose;
-mod scene_view;
-mod skin;
-mod tessellation;
-mod texturing;
-#[cfg(feature = "gpu")]
-mod upscale;
-mod view;
-mod visibility;
+mod gpu;
+mod seen;
+mod states;
 
+pub use composition::compose::Hand;
+pub use composition::environment::{Environment, EnvironmentLight};
+pub use composition::forces::ToolForce;
+pub use composition::mesh_corner::MeshCorner;
+pub use composition::picture::{Colouring, FloorDraw, MeshKey, Picture, SkinSample, SolidInstance, SolidKind, Style};
+pub use composition::skin::{SkinForm, SkinRun, Skins};
+pub use composition::tessellation::skin_divisions;
 #[cfg(feature = "gpu")]
-pub use benchmark::{Drawn, benchmark, benchmark_left};
-pub use compose::Hand;
+pub use gpu::benchmark::{Drawn, benchmark, benchmark_left};
 #[cfg(feature = "gpu")]
-pub use depth_image::DepthImage;
+pub use gpu::depth_image::DepthImage;
 #[cfg(feature = "gpu")]
-pub use draw::{DrawError, DrawTimes, Renderer, RendererOptions, Target};
-pub use environment::{Environment, EnvironmentLight};
-pub use forces::ToolForce;
+pub use gpu::draw::{DrawError, DrawTimes, Renderer, RendererOptions, Target};
 #[cfg(feature = "gpu")]
-pub use image_metrics::{psnr_db, ssim};
-pub use level::{Level, Shading};
-pub use membership::History;
+pub use gpu::image_metrics::{psnr_db, ssim};
 #[cfg(feature = "gpu")]
-pub use offscreen::{DeviceLoss, Gpu, GpuError, Offscreen, PictureFile};
-pub use pick::Hit;
-pub use picture::{Colouring, FloorDraw, MeshCorner, MeshKey, Picture, SkinSample, SolidInstance, SolidKind, Style};
-pub use scene_view::{Actor, Appearance, Form, Material, SceneView, SkinForm, States, StaticObject};
-pub use skin::{SkinRun, Skins};
-pub use tessellation::skin_divisions;
+pub use gpu::offscreen;
 #[cfg(feature = "gpu")]
-pub use upscale::{Upscaled, Upscaler};
-pub use view::{Camera, Frustum, Ray, Size};
-pub use visibility::{Visibility, VisibleCounts};
+pub use gpu::offscreen::{DeviceLoss, Gpu, GpuError, Offscreen, PictureFile};
+#[cfg(feature = "gpu")]
+pub use gpu::upscale::{Upscaled, Upscaler};
+pub use seen::level::{Level, Shading};
+pub use seen::pick::Hit;
+pub use seen::view::{Camera, Frustum, Ray, Size};
+pub use seen::visibility::{Visibility, VisibleCounts};
+pub use states::membership::History;
+pub use states::scene_view::{Actor, Appearance, Form, Material, SceneView, States, StaticObject};

@@ -9,7 +9,7 @@ use super::error_control::ErrorStatus;
 use super::governor::{ErrorGovernor, RateGovernor};
 use glam::DVec3;
 use metachron_core::{AgentId, N_MAX, ResolutionRange};
-use metachron_geometry::{Model, PieceKind};
+use metachron_drawable::{Model, PieceKind};
 use metachron_lod::control;
 use metachron_lod::control::{
     ErrorControl, ErrorLimits, GivenSliders, Kind, Law, LevelDemand, ObjectView, PRIMITIVE_LEVELS, PictureControl,

@@ -3,7 +3,7 @@
 //! In: an adapter. Out: prices for control. Never here: a fit (control has it), drawing (the renderer has it).
 //! A cache file that is missing, unreadable, of another version or of another adapter is silently measured anew.
 
-use metachron_geometry::PieceKind;
+use metachron_drawable::PieceKind;
 use metachron_lod::control::{AREAS_PX, Areas, Measured, Misses, Prices, Shading, Stages, Stroke};
 use metachron_render::{Drawn, Gpu, GpuError, RendererOptions};
 use serde::{Deserialize, Serialize};

@@ -1,6 +1,6 @@
 //! Why a world could not be started, or refuses something.
 
-use super::builder::SceneBuildError;
+use crate::description::builder::SceneBuildError;
 use metachron_core::{AgentId, Anchor, ArchiveError};
 use metachron_runtime::{RunError, SendError};
 use std::time::Duration;

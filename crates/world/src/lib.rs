@@ -6,7 +6,7 @@
 //! ```
 //! use metachron_core::SimSpan;
 //! use metachron_geometry::Solid;
-//! use metachron_world::{Rigid, Scene, Tube, World, kinds::ExecutorKind};
+//! use metachron_world::{Rigid, Scene, Tube, World, description::kinds::ExecutorKind};
 //!
 //! let ball = Rigid::ball(0.05).mass_kg(0.2).at([0.0, 0.0, 0.5]).restitution(0.0);
 //! let tube = Tube::along(&[[-0.2, 1.0, 0.3], [0.2, 1.0, 0.3]]).radius_m(0.01).clamp([true, true]);
@@ -25,58 +25,40 @@
 //! assert_eq!(world.hash(), end); // it did the same again
 //! ```
 
-mod assemble;
-mod builder;
-mod call_lock;
-mod checkpoint;
-mod commands;
-pub mod couplings;
+mod control;
+mod description;
 mod error;
-mod events;
-mod frames;
-mod initial_overlap;
-mod initial_shape;
-mod joined;
-mod joint_states;
-pub mod kinds;
-mod log;
-mod membership;
-mod object;
-mod overlap;
-mod pace;
-mod queries;
-mod recorded;
-mod recording;
-mod recording_file;
-mod replay;
-mod saved;
-mod scene;
-mod sensors;
-mod set_state;
-mod spec;
-mod ties;
+mod history;
+mod reading;
+mod start;
 mod world;
 
-pub use assemble::{Govern, machine};
-pub use builder::{Custom, Part, Rigid, SceneBuildError, SceneBuilder, SensorOn, Soft, Tube, static_solid};
-pub use checkpoint::{BadCheckpoint, Checkpoint, CheckpointError};
+pub use control::pace::Pace;
+pub use description::appearance::Appearance;
+pub use description::builder::{
+    Custom, Part, Rigid, SceneBuildError, SceneBuilder, SensorOn, Soft, Tube, static_solid,
+};
+pub use description::placement::{Moved, Overlap};
+pub use description::scene::{
+    Camera, Factors, Gains, Machine, Member, NamedCamera, ObjectCost, PaceWish, Probe, RENDER_SCALE, Scene, Spec,
+    Target, View,
+};
+#[cfg(feature = "scenery")]
+pub use description::scenery::{GROUP_LEVELS_MAX, Group, Scenery};
+pub use description::sensor::{Sensor, SensorKind, Site};
+pub use description::spec::Division;
+pub use description::{couplings, kinds};
 pub use error::WorldError;
-pub use events::{Contact, Event, EventFilter, Events, Happening};
-pub use frames::{Frame, Frames};
-pub use initial_overlap::Moved;
-pub use joint_states::JointState;
+pub use history::checkpoint::{BadCheckpoint, Checkpoint, CheckpointError};
+pub use history::recording::{BadRecording, RecordError, Recording, SceneText};
+pub use history::recording_file::RecordingFile;
 pub use metachron_contact::detect::SolveBudget;
 pub use metachron_runtime::{Command, FACTOR};
-pub use object::{Object, Touched};
-pub use overlap::Overlap;
-pub use pace::Pace;
-pub use queries::{Cast, ContactNow, Hit};
-pub use recording::{BadRecording, RecordError, Recording, SceneText};
-pub use recording_file::RecordingFile;
-pub use scene::{
-    Appearance, Camera, Factors, GROUP_LEVELS_MAX, Gains, Group, Machine, Member, NamedCamera, ObjectCost, PaceWish,
-    Probe, RENDER_SCALE, Scene, Scenery, Spec, Target, View,
-};
-pub use sensors::{JointRef, ListedJoint, Reading, Sensor, SensorKind, Site};
-pub use spec::Division;
+pub use reading::events::{Contact, Event, EventFilter, Events, Happening};
+pub use reading::frames::{Frame, Frames};
+pub use reading::joint_states::JointState;
+pub use reading::object::{Object, Touched};
+pub use reading::queries::{Cast, ContactNow, Hit};
+pub use reading::sensors::{JointRef, ListedJoint, Reading};
+pub use start::assemble::{Govern, machine};
 pub use world::World;

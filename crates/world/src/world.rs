@@ -4,19 +4,19 @@
 //! Never here: a file, a picture, a law of control.
 
 use super::Scene;
-use super::assemble;
-use super::assemble::Govern;
-use super::call_lock::{CallGuard, CallLock};
-use super::checkpoint::SceneIdentity;
 use super::error::{Waited, WorldError};
-use super::events::{EventFilter, Events};
-use super::frames::{Frame, Frames};
-use super::joined::JoinedTable;
-use super::kinds::ExecutorKind;
-use super::log::{Log, Mode, logged};
-use super::object::{Object, Touched, WorldTag};
-use super::recording::{Entry, RecordError};
-use super::sensors::Instruments;
+use crate::control::call_lock::{CallGuard, CallLock};
+use crate::description::kinds::ExecutorKind;
+use crate::history::checkpoint::SceneIdentity;
+use crate::history::log::{Log, Mode, logged};
+use crate::history::recording::{Entry, RecordError};
+use crate::reading::events::{EventFilter, Events};
+use crate::reading::frames::{Frame, Frames};
+use crate::reading::object::{Object, Touched, WorldTag};
+use crate::reading::sensors::Instruments;
+use crate::start::assemble;
+use crate::start::assemble::Govern;
+use crate::start::joined::JoinedTable;
 use glam::DVec3;
 use metachron_contact::detect::ClusterScene;
 use metachron_core::{AgentId, SimTime, Snapshot};

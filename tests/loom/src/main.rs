@@ -24,26 +24,26 @@ mod sync {
 
 /// The runtime's own.
 #[cfg(feature = "threads")]
-#[path = "../../../crates/runtime/src/sync.rs"]
+#[path = "../../../crates/runtime/src/lock_free/sync.rs"]
 mod sync;
 
-#[path = "../../../crates/runtime/src/callers_turn.rs"]
+#[path = "../../../crates/runtime/src/lock_free/callers_turn.rs"]
 #[expect(dead_code, reason = "a model uses what it needs")]
 mod callers_turn;
-#[path = "../../../crates/runtime/src/worker_wakeup.rs"]
+#[path = "../../../crates/runtime/src/lock_free/worker_wakeup.rs"]
 mod worker_wakeup;
-#[path = "../../../crates/runtime/src/dirty_set.rs"]
+#[path = "../../../crates/runtime/src/lock_free/dirty_set.rs"]
 mod dirty_set;
-#[path = "../../../crates/runtime/src/seqlock.rs"]
+#[path = "../../../crates/runtime/src/lock_free/seqlock.rs"]
 #[expect(dead_code, reason = "a model uses what it needs")]
 mod seqlock;
-#[path = "../../../crates/runtime/src/slot.rs"]
+#[path = "../../../crates/runtime/src/lock_free/slot.rs"]
 #[expect(dead_code, reason = "a model uses what it needs")]
 mod slot;
-#[path = "../../../crates/runtime/src/sleep.rs"]
+#[path = "../../../crates/runtime/src/lock_free/sleep.rs"]
 #[expect(dead_code, reason = "a model uses what it needs")]
 mod sleep;
-#[path = "../../../crates/runtime/src/table.rs"]
+#[path = "../../../crates/runtime/src/lock_free/table.rs"]
 mod table;
 #[path = "../../../agents/core/src/time.rs"]
 mod time;

@@ -41,40 +41,20 @@
 //! # Ok::<(), metachron_contact::solve::ProblemError>(())
 //! ```
 
-mod bound;
-mod cone;
-mod coupled;
-mod error;
-mod factor;
-mod fronts;
-mod gradients;
-mod held;
-mod interior;
-mod iterate;
-mod joint;
-mod lorentz;
-mod members;
-mod newton;
-mod order;
-mod passivity;
-mod problem;
-mod rows;
-mod scale;
-mod side;
-mod skew;
+mod cones;
+mod equations;
+mod levels;
 mod solver;
-mod sparse_factor;
-mod system;
-mod tiles;
-mod validate;
+mod sparse;
+mod statement;
 
-pub use error::ProblemError;
-pub use joint::{Hold, JointRow, Pressed, Spring};
-pub use problem::{Block, Contact, Member, Problem, Response, multiply};
-pub use side::{SIDE_TERMS_MAX, Side, SideTerm};
+pub use equations::system::StepForm;
 pub use solver::{DEPTH_DEFAULT_M, Report, Settings, Solution, Solver};
-pub use sparse_factor::SparseFactor;
-pub use system::StepForm;
+pub use sparse::sparse_factor::SparseFactor;
+pub use statement::error::ProblemError;
+pub use statement::joint::{Hold, JointRow, Pressed, Spring};
+pub use statement::problem::{Block, Contact, Member, Problem, Response, multiply};
+pub use statement::side::{SIDE_TERMS_MAX, Side, SideTerm};
 
 #[cfg(test)]
 mod tests;

@@ -3,15 +3,15 @@
 //! In: a problem, with the impulses of the last step in it. Out: impulses, velocities and a report. Never here: search for contacts,
 //! keys, steps of members. Theory: `docs/theory/clusters.md`, sections 3 to 5.
 
-use super::error::ProblemError;
-use super::held::Held;
-use super::interior::Interior;
-use super::iterate::{Iterate, Kept, State};
-use super::newton::{self, Aim, Patience};
-use super::passivity;
-use super::problem::{Member, Problem};
-use super::system::StepForm;
-use super::validate::validate;
+use super::equations::system::StepForm;
+use super::levels::held::Held;
+use super::levels::interior::Interior;
+use super::levels::iterate::{Iterate, Kept, State};
+use super::levels::newton::{self, Aim, Patience};
+use super::levels::passivity;
+use super::statement::error::ProblemError;
+use super::statement::problem::{Member, Problem};
+use super::statement::validate::validate;
 use crate::push_out::PUSH_OUT_SHARE;
 use glam::DVec3;
 use metachron_core::{Archive, ArchiveError, SolveLevel};

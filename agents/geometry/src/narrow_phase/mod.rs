@@ -8,40 +8,32 @@
 //! All gaps are found in double precision; where blocks rest on blocks the corners and edges are clipped by parry.
 //! A half space belongs to the static solids: blocks ignore it here, strands do not.
 
-mod chain_chain;
-mod chain_convex;
-mod convex_convex;
-mod epa;
-mod gjk;
-mod mesh_convex;
+mod blocks;
 mod primitives;
-mod self_chain;
 mod shape_cache;
-mod skin_tree;
+mod skins;
 mod static_solid;
-mod surface;
+mod strands;
 mod swept;
 #[cfg(test)]
 mod tests;
 mod touch_key;
-mod voronoi_regions;
 
 #[cfg(test)]
-use super::collision_shape::{CollisionShape, ShapeKind};
-use super::collision_shape::{PlacedShape, ShapePose, Touch};
-use crate::signed_distance::Ball;
-use chain_chain::ChainScratch;
-use convex_convex::ConvexScratch;
+use crate::solids::collision_shape::{CollisionShape, ShapeKind};
+use crate::solids::collision_shape::{PlacedShape, ShapePose, Touch};
+use blocks::convex_convex::ConvexScratch;
 use glam::DVec3;
 use primitives::{Piece, Pieces};
-pub use self_chain::{FacingPoints, PLACES, RestedChain, SegmentPairs};
 use shape_cache::ShapeCache;
+use skins::surface::SurfaceScratch;
+pub use skins::voronoi_regions::VoronoiRegions;
 pub use static_solid::{StaticSolid, StaticSolidError};
-use surface::SurfaceScratch;
+use strands::chain_chain::ChainScratch;
+pub use strands::self_chain::{FacingPoints, PLACES, RestedChain, SegmentPairs};
 use swept::SweptScratch;
 pub use swept::{SweptReach, SweptShape, first_touch};
 pub use touch_key::{TouchKey, TouchKind};
-pub use voronoi_regions::VoronoiRegions;
 
 /// Reusable storage for contact searches: one for each agent.
 #[derive(Default)]
@@ -94,9 +86,9 @@ impl Searches {
         let from = into.len();
         match (piece, other) {
             (Piece::Strand(a), Piece::Strand(b)) => chains.touches(a, b, reach_m, into),
-            (Piece::Strand(a), Piece::Block(b)) => chain_convex::touches(a, b, reach_m, into),
+            (Piece::Strand(a), Piece::Block(b)) => strands::chain_convex::touches(a, b, reach_m, into),
             (Piece::Block(a), Piece::Strand(b)) => {
-                chain_convex::touches(b, a, reach_m, into);
+                strands::chain_convex::touches(b, a, reach_m, into);
                 into[from..].iter_mut().for_each(|touch| *touch = flipped(*touch));
             }
             // clipping depends on the order: the larger block is first, whichever agent calls
@@ -122,11 +114,13 @@ impl Searches {
         }
         match (piece, other) {
             (Piece::Strand(a), Piece::Strand(b)) => chains.gap(a, b, reach_m),
-            (Piece::Strand(a), Piece::Block(b)) => chain_convex::gap(a, b, reach_m),
-            (Piece::Block(a), Piece::Strand(b)) => chain_convex::gap(b, a, reach_m).map(|(n, gap_m)| (-n, gap_m)),
+            (Piece::Strand(a), Piece::Block(b)) => strands::chain_convex::gap(a, b, reach_m),
+            (Piece::Block(a), Piece::Strand(b)) => {
+                strands::chain_convex::gap(b, a, reach_m).map(|(n, gap_m)| (-n, gap_m))
+            }
             (Piece::Block(a), Piece::Block(b)) => blocks.gap(a, b, reach_m),
-            (Piece::Surface(a), other) => Some(surface::gap(a, other)),
-            (other, Piece::Surface(b)) => Some(surface::gap(b, other)).map(|(n, gap_m)| (-n, gap_m)),
+            (Piece::Surface(a), other) => Some(skins::surface::gap(a, other)),
+            (other, Piece::Surface(b)) => Some(skins::surface::gap(b, other)).map(|(n, gap_m)| (-n, gap_m)),
         }
     }
 }
@@ -214,9 +208,4 @@ pub fn gap(
         }
     }
     nearest.filter(|&(_, gap_m)| gap_m <= reach_m)
-}
-
-/// The point of a ball's surface opposite to `normal`.
-fn skin(ball: Ball, normal: DVec3) -> DVec3 {
-    ball.centre - normal * ball.radius_m
 }

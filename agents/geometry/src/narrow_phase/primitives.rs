@@ -3,10 +3,9 @@
 //! In: a form and its place. Out: its pieces with bounds. Never here: contacts.
 
 use super::shape_cache::{ShapeCache, ToolSolid};
-use super::skin;
-use super::skin_tree::PlacedSkin;
-use crate::capsule_chain::foot;
-use crate::signed_distance::{Ball, Field};
+use super::skins::skin_tree::PlacedSkin;
+use crate::solids::capsule_chain::foot;
+use crate::solids::signed_distance::{Ball, Field};
 use crate::{Aabb, Place, PlacedShape, ShapeKind, ShapePose, SolidShape, SurfaceShape};
 use crate::{CompoundPart, Solid, ToolShape};
 use glam::{DQuat, DVec3};
@@ -341,4 +340,9 @@ impl Block<'_> {
     pub fn inward(&self, ball: Ball) -> Ball {
         Ball { centre: self.rotation.conjugate() * (ball.centre - self.origin), ..ball }
     }
+}
+
+/// The point of a ball's surface opposite to `normal`.
+fn skin(ball: Ball, normal: DVec3) -> DVec3 {
+    ball.centre - normal * ball.radius_m
 }

@@ -2,8 +2,8 @@
 //!
 //! In: forms at their places. Out: fields and parts in their own axes, and skins in the world's. Never here: contacts.
 
-use super::skin_tree::SkinCache;
-use crate::signed_distance::{Ball, Field};
+use super::skins::skin_tree::SkinCache;
+use crate::solids::signed_distance::{Ball, Field};
 use crate::{Aabb, PlacedShape, ShapeKind, ShapePose, SolidShape};
 use crate::{CompoundPart, Primitive, ShapeError, Solid, ToolPart, ToolShape, is_closed, mesh_triangles};
 use glam::DVec3;

@@ -7,11 +7,11 @@
 //! as on any face. A deformable meets the plane itself. A mesh is its triangles, an open one too: balls, capsules,
 //! tubes and skins meet its distance field, other shapes each triangle near them.
 
-use super::mesh_convex::PlacedMesh;
+use super::blocks::mesh_convex::PlacedMesh;
 use super::primitives::{Block, Piece, Pieces};
 use super::swept::{Element, ElementPair, Elements, NEAR_M, SweptScratch, first_share};
 use super::{NarrowPhaseScratch, SweptReach, SweptShape, finish, touches};
-use crate::signed_distance::{Ball, Field};
+use crate::solids::signed_distance::{Ball, Field};
 use crate::{
     Aabb, CollisionShape, CompoundPart, Obstacle, PlacedShape, ShapeError, ShapeKind, ShapePose, Solid, SolidShape,
 };

@@ -10,8 +10,8 @@
 
 mod elements;
 
-use super::epa::Hull;
-use super::gjk::Difference;
+use super::blocks::epa::Hull;
+use super::blocks::gjk::Difference;
 use super::shape_cache::ShapeCache;
 use super::{NarrowPhaseScratch, touches};
 use crate::{Aabb, BoxGrid, PlacedShape, ShapePose, Touch};

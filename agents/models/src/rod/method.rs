@@ -4,25 +4,9 @@
 //! steps ([`super::step`]). Theory: docs/theory/rod.md, 3 and 13.
 
 use super::discretization::Discretization;
+use super::spec::Integrator;
 use super::state::RodMaterial;
 use super::tube::Tube;
-
-/// Time integration of a tube.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
-pub enum Integrator {
-    /// Explicit, of first order: no elastic stiffness in the matrix; stable below [`Tube::longest_substep_s`] only.
-    SymplecticEuler,
-    /// Compliant constraints, projected forth and back once per substep (MMC16): never unstable, but bends too softly where
-    /// substeps are longer than [`Tube::longest_substep_s`].
-    Xpbd,
-    /// Linearly implicit Euler, usually one Newton step: stable at any step, exact at rest, damps motion.
-    #[default]
-    ImplicitEuler,
-    /// Backward differences of second order: little damping, stable at any step.
-    Bdf2,
-    /// Mean forces that conserve energy and momentum: no damping at all.
-    EnergyMomentum,
-}
 
 /// Share by which bending may be too soft because of substep length (XPBD).
 const SOFTER: f64 = 0.1;
@@ -30,22 +14,6 @@ const SOFTER: f64 = 0.1;
 const PROJECTED: f64 = 0.8;
 
 impl Integrator {
-    /// All integrators, the cheapest step first.
-    pub const ALL: [Self; 5] =
-        [Self::SymplecticEuler, Self::Xpbd, Self::ImplicitEuler, Self::Bdf2, Self::EnergyMomentum];
-
-    /// Its name in scenes.
-    #[must_use]
-    pub const fn name(self) -> &'static str {
-        match self {
-            Self::SymplecticEuler => "symplectic-euler",
-            Self::Xpbd => "xpbd",
-            Self::ImplicitEuler => "implicit-euler",
-            Self::Bdf2 => "bdf2",
-            Self::EnergyMomentum => "energy-momentum",
-        }
-    }
-
     /// The longest substep for a valid result while nothing is stretched, seconds; `None` where any length
     /// is allowed (eq. 38, 39).
     pub(super) fn longest_substep_s(self, matter: &RodMaterial, division: &Discretization) -> Option<f64> {

@@ -5,8 +5,8 @@
 //! Never here: implicit Euler itself ([`super::step`]). Theory: docs/theory/rod.md, eq. 43–48.
 
 use super::energy_momentum::fill_mean;
-use super::method::Integrator;
 use super::rotation::{cayley, exp, unit};
+use super::spec::Integrator;
 use super::state::{RodMaterial, RodState};
 use super::step::{Divergence, Stepper, TURN_MAX_RAD, Trial, Verdict};
 use super::system::{Iterate, SubstepProblem, assemble, fill_matrix, hold_ends};

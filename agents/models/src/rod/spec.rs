@@ -1,6 +1,6 @@
 //! The specification of a tube: material, section, supports and options, as a scene gives them.
 
-use super::{Integrator, PressureKey};
+use super::PressureKey;
 use glam::DVec3;
 use metachron_core::{Resolution, ResolutionRange};
 use metachron_geometry::ContactTraits;
@@ -195,6 +195,41 @@ impl Section {
             gj_n_m2: shear_pa * 2.0 * second_moment,
             mass_per_length_kg_m: density_kg_m3 * area,
             rotary_kg_m: density_kg_m3 * second_moment,
+        }
+    }
+}
+
+/// Time integration of a tube.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
+pub enum Integrator {
+    /// Explicit, of first order: no elastic stiffness in the matrix; stable below [`Tube::longest_substep_s`](super::Tube::longest_substep_s) only.
+    SymplecticEuler,
+    /// Compliant constraints, projected forth and back once per substep (MMC16): never unstable, but bends too softly where
+    /// substeps are longer than [`Tube::longest_substep_s`](super::Tube::longest_substep_s).
+    Xpbd,
+    /// Linearly implicit Euler, usually one Newton step: stable at any step, exact at rest, damps motion.
+    #[default]
+    ImplicitEuler,
+    /// Backward differences of second order: little damping, stable at any step.
+    Bdf2,
+    /// Mean forces that conserve energy and momentum: no damping at all.
+    EnergyMomentum,
+}
+
+impl Integrator {
+    /// All integrators, the cheapest step first.
+    pub const ALL: [Self; 5] =
+        [Self::SymplecticEuler, Self::Xpbd, Self::ImplicitEuler, Self::Bdf2, Self::EnergyMomentum];
+
+    /// Its name in scenes.
+    #[must_use]
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::SymplecticEuler => "symplectic-euler",
+            Self::Xpbd => "xpbd",
+            Self::ImplicitEuler => "implicit-euler",
+            Self::Bdf2 => "bdf2",
+            Self::EnergyMomentum => "energy-momentum",
         }
     }
 }

@@ -6,7 +6,7 @@
 use super::anchor_springs::NodeSpring;
 use super::banded_ldl::Row;
 use super::discretization::Discretization;
-use super::method::Integrator;
+use super::spec::Integrator;
 use super::state::{RodMaterial, RodState};
 use super::sym3::Sym3;
 use super::wall::Softening;

@@ -334,8 +334,16 @@ pub(super) fn closed_surface(surface: &Triangles) -> SurfaceShape {
     }
 }
 
+impl SoftShape {
+    /// The skin of a box or a ball in its own axes, as finely divided as its lattice; `None` for other shapes.
+    #[must_use]
+    pub fn skin(&self) -> Option<Triangles> {
+        skin_of(self)
+    }
+}
+
 /// The skin of a box or a ball at rest, in its own axes; `None` for other shapes.
-pub(super) fn skin_of(shape: &SoftShape) -> Option<Triangles> {
+fn skin_of(shape: &SoftShape) -> Option<Triangles> {
     let grid = Grid::of(shape);
     let mut mesh = FeMesh { rest: vec![DVec3::ZERO; grid.count()], ..FeMesh::default() };
     match shape {

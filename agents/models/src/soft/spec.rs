@@ -249,12 +249,6 @@ impl SoftShape {
         }
     }
 
-    /// The skin of a box or a ball in its own axes, as finely divided as its lattice; `None` for other shapes.
-    #[must_use]
-    pub fn skin(&self) -> Option<Triangles> {
-        super::fe_mesh::skin_of(self)
-    }
-
     /// How many vertices its lattice has; for a cage, of a box around it.
     #[must_use]
     pub fn vertices(&self) -> u64 {

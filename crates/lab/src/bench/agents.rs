@@ -3,9 +3,9 @@
 //! In: executor, model, number and rate. Out: a row: CPU per step next to the bare loops of the same run, ages as a reader at 60 Hz
 //! finds them, lateness, dropped time, memory, thread switches. Never here: files, tables.
 
-use super::bare;
-use super::cast::{Model, agent, spawn};
-use super::machine::{others_cpu, own_cpu, resident_bytes, switches};
+use super::rig::bare;
+use super::rig::cast::{Model, agent, spawn};
+use super::rig::machine::{others_cpu, own_cpu, resident_bytes, switches};
 use metachron_runtime::{
     AgentStats, Lockstep, Machine, Pool, Priority, Reader, Run, SystemClock, Threads, TimelineCommand,
 };

@@ -3,19 +3,13 @@
 //! In: what to measure, which folder. Out: files, a table. Never here: what is measured (each subject is a file).
 
 pub(super) mod agents;
-mod bare;
-pub(super) mod cast;
 pub(super) mod contact;
-mod machine;
-mod peers;
 mod pile;
-mod plain_world;
-mod play;
 mod render;
+pub(super) mod rig;
 mod rod;
 mod scenes;
 mod select;
-mod shaken_floor;
 mod shown;
 mod soft;
 mod subject;

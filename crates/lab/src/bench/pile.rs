@@ -9,8 +9,8 @@
 use super::super::args::BenchArgs;
 use super::super::chart::figure::{Axis, Colour, Figure, Layer, Mark, Panel};
 use super::super::chart::table::Table;
-use super::machine::{others_cpu, own_cpu};
-use super::plain_world::{Frame, Settings, world_of};
+use super::rig::machine::{others_cpu, own_cpu};
+use super::rig::plain_world::{Frame, Settings, world_of};
 use super::subject::{Progress, Subject};
 use anyhow::bail;
 use metachron_render::{Size, Style};

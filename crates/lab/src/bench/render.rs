@@ -7,7 +7,7 @@ use super::super::chart::figure::{Axis, Colour, Figure, Layer, Mark, Panel, span
 use super::super::chart::table::Table;
 use super::subject::{Progress, Subject};
 use anyhow::Context;
-use metachron_geometry::PieceKind;
+use metachron_drawable::PieceKind;
 use metachron_lod::control::AREAS_PX;
 use metachron_render::{Drawn, Gpu, RendererOptions, Shading, benchmark};
 use serde::{Deserialize, Serialize};

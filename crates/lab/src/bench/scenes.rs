@@ -5,7 +5,7 @@
 use super::super::args::BenchArgs;
 use super::super::chart::figure::{Axis, Colour, Figure, Layer, Mark, Panel, span};
 use super::super::chart::table::Table;
-use super::machine::processor;
+use super::rig::machine::processor;
 use super::subject::{Progress, Subject};
 use anyhow::Context;
 use metachron_console::output::{BadInput, message};

@@ -7,7 +7,7 @@ use super::super::chart::figure::{Axis, Colour, Figure, Layer, Mark, Panel, span
 use super::super::chart::power::exponent;
 use super::super::chart::table::Table;
 use super::agents::{Case, Executor, Row, TENTH_HZ, UNPACED_HZ, cases, measure};
-use super::cast::Model;
+use super::rig::cast::Model;
 use super::subject::{Progress, Subject};
 use metachron_console::output::{BadInput, message};
 use metachron_runtime::Priority;

@@ -40,7 +40,7 @@ use std::sync::atomic::{AtomicBool, AtomicU32, Ordering};
 use table::{Cell, Table};
 
 pub(super) use experiment::{Experiment, Finding, worst};
-pub(super) use policies::selection::Selection;
+pub(super) use policies::compared::selection::Selection;
 
 /// Settings that the experiments of a command share.
 struct Setting<'a> {
@@ -74,29 +74,29 @@ const fn entry<E: Experiment>() -> Entry {
 }
 
 const STABILITY: &[Entry] = &[
-    entry::<stability::drop::Drop>(),
-    entry::<stability::penalty_limit::PenaltyLimit>(),
+    entry::<stability::clocks::drop::Drop>(),
+    entry::<stability::clocks::penalty_limit::PenaltyLimit>(),
     entry::<stability::pairs::Pairs>(),
     entry::<stability::heavy::Heavy>(),
-    entry::<stability::closed::Closed>(),
+    entry::<stability::clocks::closed::Closed>(),
     entry::<stability::tube_map::TubeMap>(),
     entry::<stability::capstan::Capstan>(),
     entry::<stability::incline::Incline>(),
-    entry::<stability::impact::Impact>(),
+    entry::<stability::clocks::impact::Impact>(),
 ];
 
 const ACCURACY: &[Entry] = &[
-    entry::<Diagram<accuracy::cantilever::Cantilever>>(),
-    entry::<Diagram<accuracy::elastica::Elastica>>(),
-    entry::<Diagram<accuracy::catenary::Catenary>>(),
-    entry::<Diagram<accuracy::four_point::FourPoint>>(),
-    entry::<Diagram<accuracy::end_moment::EndMoment>>(),
-    entry::<Diagram<accuracy::helix::Helix>>(),
-    entry::<Diagram<accuracy::frequencies::Frequencies>>(),
-    entry::<Diagram<accuracy::swing::Swing>>(),
-    entry::<Diagram<accuracy::buckling::TwistBuckling>>(),
-    entry::<Diagram<accuracy::buckling::MichellRing>>(),
-    entry::<Diagram<accuracy::inflation::Inflation>>(),
+    entry::<Diagram<accuracy::tubes::cantilever::Cantilever>>(),
+    entry::<Diagram<accuracy::tubes::elastica::Elastica>>(),
+    entry::<Diagram<accuracy::tubes::catenary::Catenary>>(),
+    entry::<Diagram<accuracy::tubes::four_point::FourPoint>>(),
+    entry::<Diagram<accuracy::tubes::end_moment::EndMoment>>(),
+    entry::<Diagram<accuracy::tubes::helix::Helix>>(),
+    entry::<Diagram<accuracy::tubes::frequencies::Frequencies>>(),
+    entry::<Diagram<accuracy::tubes::swing::Swing>>(),
+    entry::<Diagram<accuracy::tubes::buckling::TwistBuckling>>(),
+    entry::<Diagram<accuracy::tubes::buckling::MichellRing>>(),
+    entry::<Diagram<accuracy::tubes::inflation::Inflation>>(),
     entry::<Diagram<accuracy::sheet::Sheet>>(),
     entry::<Diagram<accuracy::beam::SolidBeam>>(),
 ];
@@ -113,20 +113,20 @@ const COUPLING: &[Entry] = &[entry::<coupling::error::CouplingError>()];
 const CONTACT: &[Entry] = &[entry::<super::bench::contact::SolveLevels>()];
 
 const POLICIES: &[Entry] = &[
-    entry::<policies::auditorium::Auditorium>(),
-    entry::<policies::grove::Grove>(),
-    entry::<policies::values::Values>(),
-    entry::<policies::domes::Domes>(),
-    entry::<policies::library::Library>(),
-    entry::<policies::walkthrough::Walkthrough>(),
-    entry::<policies::disturbed::Disturbed>(),
-    entry::<policies::levels::Levels>(),
-    entry::<policies::still::Still>(),
-    entry::<policies::selection::Selection>(),
-    entry::<policies::bound::Bound>(),
-    entry::<policies::scanline::Scanline>(),
-    entry::<policies::rooms::Rooms>(),
-    entry::<policies::every::Every>(),
+    entry::<policies::papers::auditorium::Auditorium>(),
+    entry::<policies::papers::grove::Grove>(),
+    entry::<policies::papers::values::Values>(),
+    entry::<policies::papers::domes::Domes>(),
+    entry::<policies::papers::library::Library>(),
+    entry::<policies::papers::walkthrough::Walkthrough>(),
+    entry::<policies::compared::disturbed::Disturbed>(),
+    entry::<policies::papers::levels::Levels>(),
+    entry::<policies::compared::still::Still>(),
+    entry::<policies::compared::selection::Selection>(),
+    entry::<policies::compared::bound::Bound>(),
+    entry::<policies::papers::scanline::Scanline>(),
+    entry::<policies::papers::rooms::Rooms>(),
+    entry::<policies::compared::every::Every>(),
     entry::<Figures<0, false>>(),
     entry::<Figures<1, false>>(),
     entry::<Figures<2, false>>(),

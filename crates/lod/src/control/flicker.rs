@@ -2,7 +2,7 @@
 //!
 //! In: the levels of every frame. Out: counts. Never here: a choice.
 
-use super::plan::{LevelDemand, SizedView};
+use super::demand::plan::{LevelDemand, SizedView};
 use metachron_core::AgentId;
 
 /// A level that returns within this many frames is a reversal.
@@ -47,8 +47,8 @@ impl Changes {
 
 #[cfg(test)]
 mod tests {
-    use super::super::view::{Kind, ObjectView, Shading};
     use super::*;
+    use crate::control::demand::view::{Kind, ObjectView, Shading};
     use metachron_core::{Resolution, ResolutionRange};
 
     #[test]

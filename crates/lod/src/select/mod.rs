@@ -7,30 +7,16 @@
 //! Every order is total: by exact ratio, then cost, then the object's id, then its level. So no answer depends on the order in which
 //! objects were pushed, and equal inputs give bit-identical results.
 
-pub mod barrier;
-mod exact;
-pub mod funkhouser;
-pub mod gobbetti;
-pub mod half;
-mod hull;
-pub mod incremental;
-mod linear;
-pub mod maciel;
-pub mod marginal;
-pub mod mason;
-pub mod mason_flat;
-mod passes;
-mod problem;
-pub mod rates;
-mod ratio;
-pub mod robin_hood;
-pub mod threshold;
-pub mod tree;
-pub mod tree_exact;
-pub mod water;
+mod continuous;
+mod groups;
+mod separate;
+mod statement;
 
-pub use exact::{TooHard, exact};
-pub use hull::{Hulls, Step};
-pub use linear::{Linear, linear};
-pub use problem::{Entry, Level, Mode, Problem, Selection};
-pub use ratio::Ratio;
+pub use continuous::{barrier, gobbetti, rates, water};
+pub use groups::{half, maciel, mason, mason_flat, tree, tree_exact};
+pub use separate::{funkhouser, incremental, marginal, robin_hood, threshold};
+pub use statement::exact::{TooHard, exact};
+pub use statement::hull::{Hulls, Step};
+pub use statement::linear::{Linear, linear};
+pub use statement::problem::{Entry, Level, Mode, Problem, Selection};
+pub use statement::ratio::Ratio;

@@ -7,40 +7,28 @@
 //! agents, drawing, files.
 //! Theory: `docs/theory/control.md`, section 8.
 
-mod agent_plant;
-mod agent_tuning;
-mod candidate;
-mod disturbance;
-mod equilibria;
-mod explain;
-mod margins;
-mod measures;
-mod plant;
-mod play;
-mod relay;
-mod robust_fit;
-mod search;
-mod trials;
-mod tuning;
+mod agents;
+mod gains;
+mod loops;
 
 #[cfg(test)]
 mod tests;
 
-pub use agent_plant::{AgentIdentifyError, AgentPlant, AgentWindow};
-pub use agent_tuning::{AgentTuning, AgentVerdict, judge_agents, tune_agents};
-pub use candidate::Candidate;
-pub use disturbance::Disturbance;
-pub use equilibria::{FixedPoint, fixed_points};
-pub use explain::{Explanation, explain, refusal};
-pub use margins::Loop;
-pub use measures::{BAND, Cycle, LATE, Measures, settled_after};
-pub use plant::{IdentifyError, Observed, Plant, TimeRange};
-pub use play::{Start, Trial, TrialFrame, play};
-pub use relay::relay_gains;
-pub use robust_fit::Line;
-pub use search::{Family, Search, SearchResult, search};
-pub use trials::{Extent, Margins, Verdict, judge, measure, speeds_in_reach};
-pub use tuning::{NORMALISED, Origin, Row, Tuning, tune};
+pub use agents::agent_plant::{AgentIdentifyError, AgentPlant, AgentWindow};
+pub use agents::agent_tuning::{AgentTuning, AgentVerdict, judge_agents, tune_agents};
+pub use gains::explain::{Explanation, explain, refusal};
+pub use gains::relay::relay_gains;
+pub use gains::search::{Family, Search, SearchResult, search};
+pub use gains::trials::{Extent, Margins, Verdict, judge, measure, speeds_in_reach};
+pub use gains::tuning::{NORMALISED, Origin, Row, Tuning, tune};
+pub use loops::candidate::Candidate;
+pub use loops::disturbance::Disturbance;
+pub use loops::equilibria::{FixedPoint, fixed_points};
+pub use loops::margins::Loop;
+pub use loops::measures::{BAND, Cycle, LATE, Measures, settled_after};
+pub use loops::plant::{IdentifyError, Observed, Plant, TimeRange};
+pub use loops::play::{Start, Trial, TrialFrame, play};
+pub use loops::robust_fit::Line;
 
 /// The law accepts all gains that scenes, the window and the search allow.
 const _: () = {

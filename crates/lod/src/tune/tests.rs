@@ -1,9 +1,9 @@
 //! Every law on a plant of one tube, against the same law worked out by hand: a few lines of arithmetic instead of the controller.
 
-use super::measures::Measures;
-use super::plant::Plant;
-use super::plant::tests::{plant_of, tube_alone};
-use super::play::{Start, Trial, TrialFrame, play};
+use super::loops::measures::Measures;
+use super::loops::plant::Plant;
+use super::loops::plant::tests::{plant_of, tube_alone};
+use super::loops::play::{Start, Trial, TrialFrame, play};
 use super::{Candidate, Disturbance, Loop};
 use crate::control::Law;
 

@@ -4,7 +4,7 @@ use crate::adapter::gpu;
 use glam::{DQuat, DVec3};
 use image::{ImageFormat, Rgba, RgbaImage};
 use metachron_core::{AgentId, Resolution};
-use metachron_geometry::{Generator, Model, Pattern, Placement, ProgressiveMesh, Texture, Wrap, generate};
+use metachron_drawable::{Generator, Model, Pattern, Placement, ProgressiveMesh, Texture, Wrap, generate};
 use metachron_render::{
     Actor, Appearance, Camera, Form, Gpu, Level, Material, Offscreen, RendererOptions, SceneView, Shading, Size, Style,
 };

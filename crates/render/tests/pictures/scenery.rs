@@ -4,7 +4,7 @@ use crate::adapter::gpu;
 use glam::{DQuat, DVec3};
 use image::RgbaImage;
 use metachron_core::{AgentId, Body, CurveState, Resolution, SimTime, Snapshot};
-use metachron_geometry::{Generator, Model, Placement, ProgressiveMesh, TreeSpec, generate, tree};
+use metachron_drawable::{Generator, Model, Placement, ProgressiveMesh, TreeSpec, generate, tree};
 use metachron_render::{
     Actor, Appearance, Camera, Form, Level, Material, MeshKey, Offscreen, RendererOptions, SceneView, Shading, Size,
     States, Style,

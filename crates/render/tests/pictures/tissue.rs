@@ -4,7 +4,8 @@ use crate::adapter::gpu;
 use glam::DVec3;
 use image::RgbaImage;
 use metachron_core::{AgentId, Body, Resolution, SimTime, Snapshot, SoftState};
-use metachron_geometry::{CollisionShape, Generator, ShapeKind, SurfaceShape, generate_surface};
+use metachron_drawable::{Generator, generate_surface};
+use metachron_geometry::{CollisionShape, ShapeKind, SurfaceShape};
 use metachron_render::{
     Actor, Appearance, Camera, Environment, Form, Gpu, Level, Material, Offscreen, RendererOptions, SceneView, Shading,
     Size, SkinForm, States, Style,

@@ -3,12 +3,12 @@
 //! In: which agents are near, and how far behind each of them is. Out: whether an agent waits for others, and the time
 //! that it takes for its own: a newcomer takes the time of the agents that it comes near, and an agent that is alone
 //! again that of the scene.
-//! Never here: how late an agent is ([`super::super::agent_clock`]), steps. Theory: docs/theory/clusters.md, section 9.
+//! Never here: how late an agent is ([`crate::time::agent_clock`]), steps. Theory: docs/theory/clusters.md, section 9.
 
-use super::super::agent_runner::AgentRunner;
-use super::super::broad_phase::PlannedStep;
 use super::holds;
 use super::membership::Membership;
+use crate::neighbours::broad_phase::PlannedStep;
+use crate::turn::agent_runner::AgentRunner;
 use metachron_contact::Neighbour;
 use metachron_core::{AgentId, SimSpan, SimTime};
 use std::sync::atomic::Ordering::Relaxed;

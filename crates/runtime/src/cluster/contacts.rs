@@ -4,8 +4,8 @@
 //! begins at its end, and ends with the next. Never here: contacts that only sense.
 
 use super::ClusterSeat;
-use crate::events::{AgentEvent, ContactEvent, EventKind};
-use crate::streams::EventStreams;
+use crate::records::events::{AgentEvent, ContactEvent, EventKind};
+use crate::records::streams::EventStreams;
 use metachron_contact::member::Partner;
 use metachron_contact::step::PairTotal;
 use metachron_core::{ContactPartner, ContactState, SimSpan, SimTime};

@@ -4,8 +4,8 @@
 //! One whose code has panicked is parked; one that has refused steps by itself, to fail alone or not at all. Never here: the step
 //! ([`super::macro_step`]), agents that lose touch ([`super::seats`]).
 
-use super::super::agent_runner::{AgentRunner, StepOutcome};
 use super::Span;
+use crate::turn::agent_runner::{AgentRunner, StepOutcome};
 use metachron_core::SimSpan;
 
 impl AgentRunner {

@@ -1,13 +1,14 @@
 //! One macro step of a cluster: all members as one problem, or none of them where one fails.
 //!
 //! In: the members at the leader's time, their plan. Out: the members a macro step later; after a failure they are
-//! where they were, and the models of the members to blame know it ([`super::super::model`]). Never here: what becomes
+//! where they were, and the models of the members to blame know it ([`crate::turn::model`]). Never here: what becomes
 //! of these ([`super::exclusion`]), who is a member.
 
-use super::super::agent_runner::{AgentRunner, StepOutcome, contained};
-use super::super::helpers::Helped;
-use super::super::loads::Acting;
 use super::{ClusterSeat, NO_SEAT, Wish, prepared};
+use crate::commands::loads::Acting;
+use crate::turn::agent_runner::{AgentRunner, StepOutcome};
+use crate::turn::helpers::Helped;
+use crate::turn::model::contained;
 use metachron_contact::StepContext;
 use metachron_contact::detect::ClusterScene;
 use metachron_contact::member::{ClusterMember, Participant};

@@ -6,10 +6,15 @@
 use super::attachments::held_by_links;
 use super::solve_budget::Solved;
 use super::{AgentRunner, ClusterSeat};
+use crate::records::events::{AgentEvent, EventKind};
+use metachron_contact::constraint::FailedAttachment;
 use metachron_contact::member::Partner;
 use metachron_contact::step::{ClusterReport, ClusterStepper, PairTotal, StepDoubling};
 use metachron_core::step_doubling::drift_m;
-use metachron_core::{AgentId, ClusterState, JointEffort, PairKind, PairState, SimSpan, SimTime};
+use metachron_core::{
+    AgentId, AttachmentEvent, AttachmentEventKind, AttachmentId, ClusterState, JointEffort, PairKind, PairState,
+    SimSpan, SimTime,
+};
 
 impl ClusterSeat {
     /// Notes the impulses between it and `with` in a step of `dt_s` seconds: by contact, or by one of the links between
@@ -127,5 +132,34 @@ impl AgentRunner {
         if let Some(seat) = &mut self.cluster {
             (seat.groups, seat.ids) = (groups, ids);
         }
+    }
+}
+
+impl AgentRunner {
+    /// Hands the attachments that yielded and tore in the last step, of `dt`, to the members that report them.
+    pub(super) fn note_events(&mut self, stepper: &ClusterStepper, dt: SimSpan) {
+        if stepper.held_fast() {
+            return;
+        }
+        let (at, mut ids) = (self.pace.scene_time() + dt, Vec::new());
+        self.each_member(|actor| ids.push(actor.shared.id));
+        let mut places = 0..;
+        self.each_member(|actor| {
+            let (Some(place), Some(seat)) = (places.next(), &mut actor.cluster) else { return };
+            let yielded = stepper.yielded().iter().map(|one| (one, AttachmentEventKind::Yielded));
+            let all = yielded.chain(stepper.torn().iter().map(|one| (one, AttachmentEventKind::Tore)));
+            for (failed, kind) in all.filter(|(one, _)| one.member == place) {
+                let FailedAttachment { other, partner, force_n, .. } = *failed;
+                let attachment = match partner {
+                    Partner::Link(number) => AttachmentId::Coupling(number),
+                    Partner::Joint(number) => AttachmentId::Joint(number),
+                    Partner::Attachment(number) => AttachmentId::Part(number),
+                    _ => continue,
+                };
+                let with = other.map(|other| ids[other]);
+                seat.events.push(AttachmentEvent { attachment, kind, with, at, force_n });
+                actor.shared.streams.event(&AgentEvent { at: actor.pace.time() + dt, kind: EventKind::AttachmentGave });
+            }
+        });
     }
 }

@@ -3,10 +3,10 @@
 //! In: the places of a run between events. Out: all runners, by their numbers, each with its place; and the same again from that.
 //! Never here: why an agent is led ([`super::seats`]).
 
-use super::super::agent_runner::AgentRunner;
-use super::super::agents::Agents;
-use super::super::handle::AgentHandle;
 use super::seats::Seat;
+use crate::agent::agents::Agents;
+use crate::agent::handle::AgentHandle;
+use crate::turn::agent_runner::AgentRunner;
 use metachron_core::{AgentId, ArchiveError};
 use std::sync::PoisonError;
 

@@ -5,13 +5,13 @@
 //! unseen. An agent that makes no more turns is closed: its arrivals return.
 //! Never here: steps.
 
-use super::super::agent_clock::Timeline;
-use super::super::agent_runner::AgentRunner;
-use super::super::agents::Agents;
-use super::super::events::EventKind;
-use super::super::handle::{AgentHandle, Shared};
-use super::super::turns::Took;
 use super::membership::Membership;
+use crate::agent::agents::Agents;
+use crate::agent::handle::{AgentHandle, Shared};
+use crate::records::events::EventKind;
+use crate::records::turns::Took;
+use crate::time::agent_clock::Timeline;
+use crate::turn::agent_runner::AgentRunner;
 use crossbeam::atomic::AtomicCell;
 use metachron_core::{AgentId, Archive, ArchiveError, DisjointSets, SimTime};
 use std::sync::{Arc, Mutex, PoisonError};

@@ -2,7 +2,7 @@
 //! price of a factor.
 //!
 //! In: how long its turns took, and how many solves and factors they made. Out: the most factors of each solve of the next one.
-//! Never here: a clock, the time of a turn ([`super::super::turns::Took`] is measured on threads and in pools and
+//! Never here: a clock, the time of a turn ([`crate::records::turns::Took`] is measured on threads and in pools and
 //! declared in lockstep), the solve.
 
 use metachron_contact::detect::LEAST_STEPS_RANGE;

@@ -1,8 +1,10 @@
 //! Agents that are led lose no step and make none twice, wherever they are.
 
-use super::super::lockstep::Lockstep;
-use super::super::testing::{Dummy, Fault, Log, RecordedStep, Swing, eventually, holders, on_every_executor, system};
 use super::super::{AgentHandle, AgentSpawn, AgentState, AgentStats, Command, Machine, Run, WatchedPoint, state_hash};
+use crate::executors::lockstep::Lockstep;
+use crate::executors::testing::{
+    Dummy, Fault, Log, RecordedStep, Swing, eventually, holders, on_every_executor, system,
+};
 use metachron_contact::detect::ClusterScene;
 use metachron_contact::joint::{Joint, JointKind};
 use metachron_core::{AgentId, Resolution, SimSpan, SimTime};

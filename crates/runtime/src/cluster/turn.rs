@@ -10,12 +10,13 @@
 //!
 //! The leader has the lowest number. Never here: which agents touch, threads, events.
 
-use super::super::agent_clock::{Start, Timeline};
-use super::super::agent_runner::{AgentRunner, PendingTurn, StepOutcome, contained};
-use super::super::metrics::Entry;
-use super::super::turns::Took;
 use super::Span;
 use super::solve_budget::Solved;
+use crate::records::metrics::Entry;
+use crate::records::turns::Took;
+use crate::time::agent_clock::{Start, Timeline};
+use crate::turn::agent_runner::{AgentRunner, PendingTurn, StepOutcome};
+use crate::turn::model::contained;
 use metachron_contact::detect::SolveBudget;
 use metachron_core::{DT_MAX_S, SimSpan, SimTime};
 use std::time::Duration;

@@ -4,7 +4,7 @@
 
 use super::POSITION_MAX_M;
 use super::common::parse_colour;
-use super::object::{OBSTACLES_MAX, Objects, too_many};
+use super::objects::{OBSTACLES_MAX, Objects, too_many};
 use crate::check::{Allowed, Checker, Place, allowed};
 use crate::format::{CellFile, Point, PortalFile, SideKind};
 use glam::{DQuat, DVec3};

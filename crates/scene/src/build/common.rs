@@ -1,7 +1,8 @@
-//! Keys that objects of every model share: time, primitive levels, appearance.
+//! Keys that objects of every model share: time, primitive levels, appearance, points and rotations.
 
 use crate::check::{Allowed, Checker, Place, allowed};
-use crate::format::{CommonFile, FaultsFile, HoldKind, OneOrRange};
+use crate::format::{CommonFile, FaultsFile, HoldKind, OneOrRange, Point};
+use glam::{DQuat, DVec3, EulerRot};
 use metachron_core::{N_MAX, ResolutionRange, SimSpan};
 use metachron_world::couplings::Faults;
 use metachron_world::kinds::{Material, ShadingKind};
@@ -20,6 +21,22 @@ const IMPORTANCE: Allowed = allowed(0.001..=1000.0, "");
 const TOLERANCE: Allowed = allowed(1e-9..=1e3, "m");
 const JITTER: Allowed = allowed(0.0..=0.5, "");
 const LOSS: Allowed = allowed(0.0..=0.9, "");
+
+/// Rotation by angles about the world's x, then y, then z axis, in degrees.
+pub(super) fn rotation(degrees: DVec3) -> DQuat {
+    let turn = degrees * (std::f64::consts::PI / 180.0);
+    DQuat::from_euler(EulerRot::ZYX, turn.z, turn.y, turn.x)
+}
+
+pub(super) fn point_or_zero(
+    c: &mut Checker<'_, '_>,
+    place: &Place,
+    key: &str,
+    value: Option<Point>,
+    most: f64,
+) -> DVec3 {
+    value.map_or(DVec3::ZERO, |value| c.point(place, key, value, most))
+}
 
 /// Rate and step: either gives the other; both together must agree.
 pub(super) fn pace(c: &mut Checker<'_, '_>, place: &Place, file: &CommonFile) -> PaceWish {

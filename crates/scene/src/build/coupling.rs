@@ -4,7 +4,7 @@
 //! Never here: forces.
 
 use super::force_limits::{ForceLimits, ForceLimitsFile};
-use super::object::{NamedObject, Objects};
+use super::objects::{NamedObject, Objects};
 use super::soft;
 use super::{DAMPING, POSITION_MAX_M, STIFFNESS};
 use crate::check::{Allowed, Checker, Place, allowed};

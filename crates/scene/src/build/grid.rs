@@ -3,7 +3,7 @@
 //! In: the common keys of one object. Out: [`Copies`]. Never here: the kind of object.
 
 use super::POSITION_MAX_M;
-use super::rigid::rotation;
+use super::common::rotation;
 use crate::check::{Allowed, Checker, Place, allowed};
 use crate::format::{CommonFile, OneOrEach};
 use glam::{DQuat, DVec3};

@@ -5,7 +5,7 @@
 //! Never here: the mesh that replaces them, and when it is drawn.
 
 use super::impostors::{GroupMembers, impostors};
-use super::object::{NamedObject, Objects};
+use super::objects::{NamedObject, Objects};
 use super::scenery::mesh_model;
 use crate::check::{Checker, Place};
 use crate::format::GroupFile;

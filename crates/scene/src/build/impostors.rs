@@ -8,7 +8,7 @@ use crate::check::{Checker, Place, allowed};
 use crate::format::GroupFile;
 use crate::source::Source;
 use glam::{DQuat, DVec3};
-use metachron_geometry::{Model, Placement, ProgressiveMesh, proxy};
+use metachron_drawable::{Model, Placement, ProgressiveMesh, proxy};
 use metachron_world::{Appearance, GROUP_LEVELS_MAX, Member, Scenery};
 use std::sync::Arc;
 

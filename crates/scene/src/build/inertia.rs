@@ -3,7 +3,7 @@
 //! In: a [`RigidFile`]. Out: a [`GivenInertia`], problems to the [`Checker`]. Never here: the mass, the shape.
 
 use super::POSITION_MAX_M;
-use super::rigid::point_or_zero;
+use super::common::point_or_zero;
 use crate::check::{Checker, Place};
 use crate::format::RigidFile;
 use glam::{DMat3, DVec3};

@@ -7,7 +7,7 @@ use super::POSITION_MAX_M;
 use super::force_limits::{ForceLimits, ForceLimitsFile};
 use super::joint_keys::{FreeMotion, free_motion};
 use super::joint_rules::{PlacedJoint, check_start, contradictions};
-use super::object::{NamedObject, Objects};
+use super::objects::{NamedObject, Objects};
 use crate::check::{Checker, Place};
 use crate::format::{JointFile, JointKind as Kind, Point};
 use glam::{DQuat, DVec3};

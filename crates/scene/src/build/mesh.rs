@@ -129,7 +129,8 @@ fn check(points: &[DVec3], triangles: &[[u32; 3]]) -> Result<(), String> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use metachron_geometry::{Generator, PrimitiveVertex, generate};
+    use metachron_drawable::{Generator, generate};
+    use metachron_geometry::PrimitiveVertex;
     use proptest::prelude::*;
 
     const TETRAHEDRON: &str = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 2 3 4\nf 3 1 4\n";

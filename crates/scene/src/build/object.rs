@@ -2,20 +2,19 @@
 
 use super::common::{appearance, faults, levels, pace, refuse_tolerance, tolerance};
 use super::contact::{self, GroupNames};
-use super::grid::{Copies, Repeats, copies};
+use super::grid::{Copies, copies};
 use super::joint::WORLD;
+use super::objects::{
+    AGENTS_MAX, Entry, ModelContext, ModelFile, NamedObject, Names, OBSTACLES_MAX, Objects, SceneContext, too_many,
+};
 use super::{rigid, scenery, soft, synthetic, tool, tube};
 use crate::check::{Checker, Place};
 use crate::demand::Cost;
 use crate::diagnostic::{Problem, did_you_mean};
-use crate::format::{
-    COMMON_KEYS, CommonFile, FaultsFile, MODELS, MeshFile, RigidFile, RopeFile, SheetFile, SolidFile, SyntheticFile,
-    ToolFile, TreeFile, TubeFile, model_named,
-};
+use crate::format::{COMMON_KEYS, CommonFile, MODELS, model_named};
 use crate::source::Source;
-use glam::DVec3;
 use metachron_core::{AgentId, Resolution, ResolutionRange};
-use metachron_geometry::{ContactTraits, Obstacle, geodesic_edges};
+use metachron_geometry::Obstacle;
 use metachron_models::rigid::{KinematicBody, RigidBody};
 use metachron_models::rod::Tube;
 use metachron_models::rod::TubeError;
@@ -23,7 +22,7 @@ use metachron_models::soft::SoftBody;
 use metachron_models::synthetic::Synthetic;
 use metachron_models::tool::Tool;
 use metachron_world::kinds::Material;
-use metachron_world::{Appearance, Member, Scenery, Spec};
+use metachron_world::{Appearance, Member, Spec};
 use serde::de::DeserializeOwned;
 use std::collections::BTreeMap;
 use std::ops::Range;
@@ -31,160 +30,13 @@ use std::sync::Arc;
 use toml::Spanned;
 use toml::de::{DeTable, DeValue};
 
-/// Most agents of a scene: each agent that can be touched stores something for every other one.
-pub(crate) const AGENTS_MAX: usize = 10_000;
-/// Most fixed objects of a scene.
-pub(super) const OBSTACLES_MAX: usize = 10_000;
 /// Longest name, in characters.
 const NAME_MAX: usize = 64;
-
-/// All objects of a scene.
-#[derive(Debug, Default)]
-pub(crate) struct Objects {
-    pub(crate) agents: Vec<Member>,
-    pub(crate) obstacles: Arc<[Obstacle]>,
-    pub(crate) obstacle_appearances: Vec<Appearance>,
-    pub(crate) scenery: Vec<Scenery>,
-    /// Names of fixed objects and of agents.
-    pub(crate) names: Names,
-}
-
-/// The context of the reader of a model, beside the model's own table.
-pub(super) struct ModelContext<'a> {
-    pub(super) place: &'a Place,
-    pub(super) source: &'a Source,
-    pub(super) gravity: DVec3,
-    pub(super) levels: (u8, u8),
-    pub(super) sleep: bool,
-    pub(super) traits: ContactTraits,
-}
 
 /// Names that an object may refer to.
 struct Known<'a> {
     names: &'a Names,
     groups: &'a GroupNames,
-}
-
-/// Names, and the object that each denotes.
-#[derive(Debug, Default)]
-pub(crate) struct Names(BTreeMap<String, NamedObject>);
-
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) enum NamedObject {
-    /// A fixed object.
-    Fixed,
-    /// A mesh or tree, which is only drawn.
-    Scenery,
-    /// A rigid object that moves.
-    Rigid(AgentId),
-    /// A driven tool.
-    Tool(AgentId),
-    /// An agent without matter.
-    Synthetic(AgentId),
-    /// A tube.
-    Tube(AgentId),
-    /// A sheet, solid or rope.
-    Soft(AgentId),
-}
-
-impl NamedObject {
-    /// The id of an object that jaws can grasp if a scene allows it: one that has matter and moves freely.
-    pub(super) const fn graspable(self) -> Option<AgentId> {
-        match self {
-            Self::Rigid(id) | Self::Tube(id) | Self::Soft(id) => Some(id),
-            Self::Fixed | Self::Scenery | Self::Tool(_) | Self::Synthetic(_) => None,
-        }
-    }
-
-    /// The id of an object that is an agent.
-    pub(crate) const fn agent(self) -> Option<AgentId> {
-        match self {
-            Self::Fixed | Self::Scenery => None,
-            Self::Rigid(id) | Self::Tool(id) | Self::Synthetic(id) | Self::Tube(id) | Self::Soft(id) => Some(id),
-        }
-    }
-}
-
-impl Names {
-    pub(crate) fn get(&self, name: &str) -> Option<NamedObject> {
-        self.0.get(name).copied()
-    }
-
-    pub(crate) fn agents(&self) -> impl Iterator<Item = &str> + Clone {
-        self.0.iter().filter(|(_, n)| n.agent().is_some()).map(|(name, _)| name.as_str())
-    }
-
-    /// The names of the objects that `wanted` accepts.
-    pub(super) fn only(&self, wanted: impl Fn(NamedObject) -> bool + Clone) -> impl Iterator<Item = &str> + Clone {
-        self.0.iter().filter(move |(_, n)| wanted(**n)).map(|(name, _)| name.as_str())
-    }
-
-    pub(super) fn tubes(&self) -> impl Iterator<Item = (&str, AgentId)> + Clone {
-        self.0
-            .iter()
-            .filter_map(|(name, n)| if let NamedObject::Tube(id) = n { Some((name.as_str(), *id)) } else { None })
-    }
-
-    pub(super) fn is_known(&self, name: &str) -> bool {
-        self.0.contains_key(name)
-    }
-
-    pub(super) fn len(&self) -> usize {
-        self.0.len()
-    }
-}
-
-/// An object as the file has it.
-pub(super) struct Entry {
-    pub(super) place: Place,
-    pub(super) common: CommonFile,
-    pub(super) model: ModelFile,
-    fixed: bool,
-    pub(super) copies: Copies,
-}
-
-pub(super) enum ModelFile {
-    Tube(TubeFile),
-    Rigid(RigidFile),
-    Sheet(SheetFile),
-    Solid(SolidFile),
-    Rope(RopeFile),
-    Tool(ToolFile),
-    Synthetic(SyntheticFile),
-    Mesh(MeshFile),
-    Tree(TreeFile),
-}
-
-impl ModelFile {
-    /// Whether it is only drawn.
-    const fn is_scenery(&self) -> bool {
-        matches!(self, Self::Mesh(_) | Self::Tree(_))
-    }
-
-    /// How many objects of the picture one of it is.
-    fn parts(&self) -> usize {
-        match self {
-            Self::Mesh(MeshFile { dome_m: Some(_), .. }) => geodesic_edges().len(),
-            Self::Tree(_) => 2,
-            _ => 1,
-        }
-    }
-
-    /// The way in which a grid can repeat it.
-    const fn repeats(&self) -> Repeats {
-        match self {
-            Self::Tool(_) | Self::Synthetic(_) => Repeats::Nothing,
-            Self::Rigid(_) => Repeats::MovedAndTurned,
-            _ => Repeats::Moved,
-        }
-    }
-}
-
-/// Input that all objects of a scene share.
-pub(crate) struct SceneContext<'a> {
-    pub(crate) source: &'a Source,
-    pub(crate) gravity: DVec3,
-    pub(crate) faults: Option<&'a FaultsFile>,
 }
 
 /// Reads every `[[object]]`.
@@ -363,12 +215,6 @@ fn fixed_objects(
         }
     }
     found
-}
-
-/// Reports that the scene has `found` up to the table at `path`, which is more than `most`.
-pub(super) fn too_many(c: &mut Checker<'_, '_>, path: &str, found: &str, most: usize) {
-    let span = c.document().locate(path);
-    c.push(Problem::new(span, format!("the scene has {found}")).expecting(format!("expected at most {most}")));
 }
 
 fn agents(c: &mut Checker<'_, '_>, entries: &[Entry], known: &Known<'_>, context: &SceneContext<'_>) -> Vec<Member> {

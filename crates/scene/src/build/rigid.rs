@@ -1,19 +1,19 @@
 //! A rigid object of the file as a [`RigidSpec`], or as an [`Obstacle`] where it is fixed.
 
+use super::common::{point_or_zero, rotation};
 use super::inertia::inertia;
 use super::mesh;
 use super::mesh::Mesh;
-use super::object::ModelContext;
+use super::objects::ModelContext;
 use super::scenery::{SurfaceSource, generator, surface_source};
 use super::{FRICTION, KEYFRAMES_MAX, LENGTH, POSITION_MAX_M, ROTATION_MAX_DEG, SCALE, SPEED_MAX, TIME};
 use crate::check::{Allowed, Checker, Place, allowed};
 use crate::demand::Cost;
 use crate::format::{Axis, GeneratorKind, PartFile, Point, RigidFile, Shape};
 use crate::source::Source;
-use glam::{DQuat, DVec3, EulerRot};
-use metachron_geometry::{
-    Aabb, COMPOUND_PARTS_MAX, CompoundPart, ContactTraits, Obstacle, Solid, generate_surface, hull_corners,
-};
+use glam::{DQuat, DVec3};
+use metachron_drawable::generate_surface;
+use metachron_geometry::{Aabb, COMPOUND_PARTS_MAX, CompoundPart, ContactTraits, Obstacle, Solid, hull_corners};
 use metachron_models::rigid::{Keyframe, Led, Restraint, RigidSpec};
 use std::sync::Arc;
 
@@ -32,12 +32,6 @@ const HULL_SHARE: f64 = 1e-3;
 const DENSITY: Allowed = allowed(1e-3..=1e6, "kg/m³");
 
 const MASS: Allowed = allowed(1e-9..=1e9, "kg");
-
-/// Rotation by angles about the world's x, then y, then z axis, in degrees.
-pub(super) fn rotation(degrees: DVec3) -> DQuat {
-    let turn = degrees * (std::f64::consts::PI / 180.0);
-    DQuat::from_euler(EulerRot::ZYX, turn.z, turn.y, turn.x)
-}
 
 /// Whether the object never moves; reports a plane with `fixed = false`.
 pub(super) fn is_fixed(c: &mut Checker<'_, '_>, place: &Place, file: &RigidFile) -> bool {
@@ -188,16 +182,6 @@ fn keyframes(c: &mut Checker<'_, '_>, place: &Place, file: &RigidFile, rotation:
         keys.push(Keyframe { at_s, tip_m, rotation: turned.map_or(start, self::rotation), jaw: 0.0 });
     }
     keys
-}
-
-pub(super) fn point_or_zero(
-    c: &mut Checker<'_, '_>,
-    place: &Place,
-    key: &str,
-    value: Option<Point>,
-    most: f64,
-) -> DVec3 {
-    value.map_or(DVec3::ZERO, |value| c.point(place, key, value, most))
 }
 
 fn pose(c: &mut Checker<'_, '_>, place: &Place, file: &RigidFile) -> (DVec3, DQuat) {

@@ -3,9 +3,9 @@
 //! In: entries of these models. Out: [`Scenery`], copies sharing one model. Never here: groups, drawing.
 
 use super::common::{appearance, levels, pace, painted_appearance, parse_colour};
+use super::common::{point_or_zero, rotation};
 use super::contact;
-use super::object::{Entry, ModelFile};
-use super::rigid::{point_or_zero, rotation};
+use super::objects::{Entry, ModelFile};
 use super::texture;
 use super::texture::Textures;
 use super::{POSITION_MAX_M, ROTATION_MAX_DEG, SCALE, SPEED_MAX, mesh};
@@ -14,9 +14,10 @@ use crate::demand::Cost;
 use crate::format::{GeneratorKind, MeshFile, MotionFile, Point, TreeFile, TreeLod};
 use crate::source::Source;
 use glam::{DQuat, DVec3};
-use metachron_geometry::{
-    Generator, Model, Motion, Placement, ProgressiveMesh, TreeSpec, generate, geodesic_edges, painted_mesh, tree,
+use metachron_drawable::{
+    Generator, Model, Motion, Placement, ProgressiveMesh, TreeSpec, generate, geodesic_edges, tree,
 };
+use metachron_geometry::painted_mesh;
 use metachron_world::kinds::Material;
 use metachron_world::{Appearance, Scenery};
 use std::collections::BTreeMap;

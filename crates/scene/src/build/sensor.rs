@@ -3,8 +3,8 @@
 //! In: [`SensorFile`]s, the objects and joints of the scene. Out: [`Sensor`]s; problems to the [`Checker`]. Never here:
 //! readings.
 
-use super::object::{NamedObject, Objects};
-use super::rigid::{point_or_zero, rotation};
+use super::common::{point_or_zero, rotation};
+use super::objects::{NamedObject, Objects};
 use super::{POSITION_MAX_M, ROTATION_MAX_DEG};
 use crate::check::{Checker, Place};
 use crate::format::{JointFile, SensorFile, SensorFileKind as Kind};

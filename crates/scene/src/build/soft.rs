@@ -1,8 +1,8 @@
 //! Reads a sheet, solid or rope of a scene file as a [`SoftSpec`].
 
+use super::common::rotation;
 use super::mesh::{self, Mesh};
-use super::object::ModelContext;
-use super::rigid::rotation;
+use super::objects::ModelContext;
 use super::scenery::{SurfaceSource, generator, surface_source};
 use super::soft_mesh;
 use super::{FRICTION, LENGTH, POSITION_MAX_M, ROTATION_MAX_DEG, SCALE, SPEED_MAX};
@@ -11,7 +11,8 @@ use crate::demand::Cost;
 use crate::format::{OneOrRange, Point, RopeEnd, RopeFile, SheetFile, SheetSide, SoftShapeKind, SolidFile, SolidSide};
 use glam::{DQuat, DVec3};
 use metachron_core::{Anchor, Body};
-use metachron_geometry::{Aabb, Cage, Triangles, generate_surface, open_edge, subdivided};
+use metachron_drawable::generate_surface;
+use metachron_geometry::{Aabb, Cage, Triangles, open_edge, subdivided};
 use metachron_models::soft::Side;
 use metachron_models::soft::SoftBody;
 use metachron_models::soft::{MaterialLaw, SoftMatter, SoftShape, SoftSpec, VERTICES_MAX};

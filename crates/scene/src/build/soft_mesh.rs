@@ -4,7 +4,7 @@
 //! In: the bytes of a file. Out: shapes of soft bodies, every fault reported with its key. Never here: closed surfaces in cages ([`super::soft`]).
 
 use super::mesh;
-use super::object::ModelContext;
+use super::objects::ModelContext;
 use super::soft::{DENSITY, POISSON, YOUNG, too_large};
 use super::{LENGTH, SCALE, tetrahedra};
 use crate::check::{Checker, Place, allowed};

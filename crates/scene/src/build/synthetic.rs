@@ -1,6 +1,6 @@
 //! Reads a synthetic agent of a scene file as a [`SyntheticSpec`].
 
-use super::object::ModelContext;
+use super::objects::ModelContext;
 use crate::check::{Checker, allowed};
 use crate::format::SyntheticFile;
 use metachron_core::ResolutionRange;

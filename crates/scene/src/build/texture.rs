@@ -4,7 +4,7 @@
 //! drawing.
 
 use super::glb;
-use super::object::Entry;
+use super::objects::Entry;
 use super::scenery::Parts;
 use crate::check::{Checker, allowed};
 use crate::demand::{Cost, FileHead};
@@ -13,7 +13,7 @@ use crate::source::Source;
 use glam::Vec2;
 #[cfg(feature = "images")]
 use image::{ImageFormat, ImageReader, Limits};
-use metachron_geometry::{Model, Pattern, Texture, Wrap};
+use metachron_drawable::{Model, Pattern, Texture, Wrap};
 use metachron_world::Appearance;
 use metachron_world::kinds::ShadingKind;
 use std::collections::BTreeMap;

@@ -1,8 +1,8 @@
 //! Reads a tool of a scene file as a [`ToolSpec`].
 
+use super::common::rotation;
 use super::common::rounded;
-use super::object::{ModelContext, NamedObject, Names};
-use super::rigid::rotation;
+use super::objects::{ModelContext, NamedObject, Names};
 use super::{KEYFRAMES_MAX, POSITION_MAX_M, ROTATION_MAX_DEG, TIME};
 use crate::check::{Checker, Place, allowed};
 use crate::format::{KeyframeFile, Point, ToolFile};

@@ -1,7 +1,7 @@
 //! Reads a tube of a scene file as a [`TubeSpec`].
 
 use super::force_limits::{ForceLimits, ForceLimitsFile};
-use super::object::ModelContext;
+use super::objects::ModelContext;
 use super::{FRICTION, POSITION_MAX_M, TIME};
 use crate::check::{Allowed, Checker, Place, allowed};
 use crate::format::{AttachFile, End, Integrator as Method, PeristalsisFile, PressureFile, TubeFile, Wall};

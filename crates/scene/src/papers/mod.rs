@@ -86,7 +86,7 @@ const FLOOR: &str = "\n[[object]]\nname = \"floor\"\nmodel = \"rigid\"\nshape = 
 mod tests {
     use super::*;
     use crate::{Source, load};
-    use metachron_geometry::Model;
+    use metachron_drawable::Model;
     use metachron_world::Scene;
 
     fn scene(paper: Paper, choices: &Choices) -> Scene {

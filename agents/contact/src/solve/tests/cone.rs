@@ -1,9 +1,9 @@
 //! Projections against their definitions, and the guard of passivity.
 
 use super::{Seeded, contact, diagonal};
-use crate::solve::cone::Law;
-use crate::solve::iterate::Iterate;
-use crate::solve::passivity::guard;
+use crate::solve::cones::cone::Law;
+use crate::solve::levels::iterate::Iterate;
+use crate::solve::levels::passivity::guard;
 use crate::solve::{Contact, Member, Problem, Side};
 use glam::{DMat3, DVec3};
 use metachron_core::PlainLoop;

@@ -3,8 +3,8 @@
 use super::Seeded;
 use super::slow::Dense;
 use crate::solve::Block;
-use crate::solve::factor::{Cholesky, Pair};
-use crate::solve::tiles::eliminate;
+use crate::solve::sparse::factor::{Cholesky, Pair};
+use crate::solve::sparse::tiles::eliminate;
 use fearless_simd::Level;
 use glam::{DMat3, DVec3};
 use metachron_core::{ParallelFor, PlainLoop};

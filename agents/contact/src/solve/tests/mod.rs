@@ -1,12 +1,10 @@
 //! Tests of the solver of a cluster: laws with closed forms, random problems against a slow method, the factor, promises.
 
-mod bounds;
 mod cone;
+mod constraints;
 mod factor;
 mod iterative;
-mod joints;
 mod lent;
-mod pressed;
 mod promises;
 mod random;
 mod rebounds;

@@ -3,10 +3,11 @@
 //! In: a shape at the start and at the end of a motion. Out: its elements, boxes around their whole ways, cores at a moment with the least
 //! extents along a direction. Never here: a second shape, the search.
 
-use super::super::gjk::{Convex, Part, Rounded};
 use super::super::primitives::{Piece, Pieces};
 use super::super::shape_cache::ShapeCache;
 use super::SweptShape;
+use crate::narrow_phase::blocks::convex_convex;
+use crate::narrow_phase::blocks::gjk::{Convex, Part, Rounded};
 use crate::{Aabb, ShapePose};
 use glam::{DQuat, DVec3};
 
@@ -215,7 +216,7 @@ impl Piece<'_> {
             Self::Strand(strand) => strand.spans(),
             Self::Surface(surface) if surface.form.triangles.is_empty() => surface.form.edges.len(),
             Self::Surface(surface) => surface.form.triangles.len(),
-            Self::Block(block) => super::super::convex_convex::parts(block).count(),
+            Self::Block(block) => convex_convex::parts(block).count(),
         }
     }
 
@@ -248,7 +249,7 @@ impl<'a> Element<'a> {
                         Some(Moment::rounded([a.centre, b.centre, b.centre], radii_m))
                     }
                     Piece::Block(block) => {
-                        let part = super::super::convex_convex::parts(block).nth(part)?;
+                        let part = convex_convex::parts(block).nth(part)?;
                         Some(Moment { core: Core::Part(part), radius_m: 0.0 })
                     }
                     Piece::Surface(_) => None,

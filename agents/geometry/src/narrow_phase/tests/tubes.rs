@@ -2,7 +2,7 @@
 
 use super::*;
 use crate::near_segments;
-use crate::signed_distance::Field;
+use crate::solids::signed_distance::Field;
 
 const RADII: [f64; 12] = [8e-3, 8.1e-3, 8.2e-3, 8.1e-3, 8e-3, 7.9e-3, 7.8e-3, 7.9e-3, 8e-3, 8.1e-3, 8.2e-3, 8.1e-3];
 

@@ -3,7 +3,7 @@
 use super::*;
 use crate::soft::NodeSpacing;
 use metachron_core::Resolution;
-use metachron_geometry::{Generator, generate_surface};
+use metachron_drawable::{Generator, generate_surface};
 
 const FRAME_S: f64 = 1.0 / 60.0;
 

@@ -3,8 +3,8 @@
 //!
 //! In: a cluster or a rapier3d world, a time. Out: a [`Course`]. Never here: which scenes there are, peers' files.
 
-use super::super::machine::own_cpu;
-use super::super::play::Play;
+use crate::bench::rig::machine::own_cpu;
+use crate::bench::rig::play::Play;
 use glam::DVec3;
 use metachron_contact::step::ClusterReport;
 use rapier3d::pipeline::PhysicsWorld;

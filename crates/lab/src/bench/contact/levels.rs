@@ -6,11 +6,11 @@
 use super::super::super::chart::figure::{Axis, Colour, Figure, Layer, Mark, Panel, span};
 use super::super::super::chart::table::Table;
 use super::super::super::chart::{Experiment, Finding, worst};
-use super::super::peers::Peers;
 use super::course::Course;
 use super::peer::PeerRun;
 use super::stage::Stage;
 use super::{Case as BenchCase, Row as BenchRow, cases, peer_row, row};
+use crate::bench::rig::peers::Peers;
 use anyhow::Context;
 use metachron_console::output::message;
 use serde::{Deserialize, Serialize};

@@ -2,7 +2,7 @@
 //!
 //! In: a row of a file that `python/peers/contact.py` writes. Out: the same with names. Never here: files, our own measurements.
 
-use super::super::peers::{PeerRow, Peers};
+use crate::bench::rig::peers::{PeerRow, Peers};
 use serde::Deserialize;
 
 /// A run of another engine.

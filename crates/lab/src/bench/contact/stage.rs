@@ -3,9 +3,9 @@
 //! In: specifications. Out: a cluster to step, or one rapier3d world of the same bodies. Never here: which scenes there are, measurements.
 
 use super::super::super::chart::GRAVITY;
-use super::super::plain_world::{Frame, Settings, world_of};
-use super::super::play::Play;
-use super::super::shaken_floor::ShakenFloor;
+use crate::bench::rig::plain_world::{Frame, Settings, world_of};
+use crate::bench::rig::play::Play;
+use crate::bench::rig::shaken_floor::ShakenFloor;
 use anyhow::Context;
 use glam::{DQuat, DVec3};
 use metachron_contact::Agent;

@@ -1,9 +1,9 @@
 //! The cost of a round of all agents by their number, on threads, in a pool and in lockstep, compared with the bare steps.
 
 use super::super::super::bench::agents::{Case as Run, Executor, measure};
-use super::super::super::bench::cast::Model;
 use super::super::experiment::Finding;
 use super::growth::{Case, Cost, Growth, Row};
+use crate::bench::rig::cast::Model;
 use metachron_runtime::Priority;
 use std::time::Duration;
 

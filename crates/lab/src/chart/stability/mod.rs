@@ -1,14 +1,10 @@
 //! `chart stability`: where methods fail, and whether this program's methods do.
 
 pub(super) mod capstan;
-pub(super) mod closed;
-mod closed_system;
+pub(super) mod clocks;
 pub(super) mod common;
-pub(super) mod drop;
 pub(super) mod hanging;
 pub(super) mod heavy;
-pub(super) mod impact;
 pub(super) mod incline;
 pub(super) mod pairs;
-pub(super) mod penalty_limit;
 pub(super) mod tube_map;

@@ -4,12 +4,12 @@
 //! here: the drawing in between.
 //! Theory: `docs/theory/control.md`, section 6.
 
-use super::super::feedback::unseen;
-use super::super::plan::{LevelDemand, SizedView};
-use super::super::policy::Policy;
-use super::super::query::{Promise, demand};
-use super::super::view::ObjectView;
 use super::PictureControl;
+use crate::control::choice::feedback::unseen;
+use crate::control::demand::plan::{LevelDemand, SizedView};
+use crate::control::demand::policy::Policy;
+use crate::control::demand::query::{Promise, demand};
+use crate::control::demand::view::ObjectView;
 
 /// A choice that is not drawn yet.
 #[derive(Debug, Clone, Default)]

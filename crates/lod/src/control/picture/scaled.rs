@@ -3,13 +3,13 @@
 //! In: the frame that was measured, its plan, prices. Out: the next picture's scale. Never here: the law ([`super::super::render_scale`]).
 //! Theory: `docs/theory/control.md`, section 11.
 
-use super::super::ladder::Rung;
-use super::super::plan::{LevelDemand, SizedView, steers};
-use super::super::policy::Policy;
-use super::super::price::{Backdrop, Prices};
 use super::super::render_scale::{PictureRung, ScaledFrame};
-use super::super::view::{Pieces, Shading};
 use super::PictureControl;
+use crate::control::demand::plan::{LevelDemand, SizedView, steers};
+use crate::control::demand::policy::Policy;
+use crate::control::demand::view::{Pieces, Shading};
+use crate::control::prices::ladder::Rung;
+use crate::control::prices::price::{Backdrop, Prices};
 
 /// Levels that take less than this part of a frame above their least are as good as at their coarsest.
 const LEVELS_LEAST: f64 = 0.05;

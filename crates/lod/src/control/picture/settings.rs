@@ -2,11 +2,11 @@
 //!
 //! In: policies, laws, rates, prices, bounds. Out: a [`PictureControl`] that obeys them from the next frame on. Never here: a choice.
 
-use super::super::policy::{Law, Policy};
-use super::super::price::{Backdrop, Prices};
-use super::super::quality_boost::QualityBoost;
 use super::super::render_scale::PictureRung;
 use super::PictureControl;
+use crate::control::choice::quality_boost::QualityBoost;
+use crate::control::demand::policy::{Law, Policy};
+use crate::control::prices::price::{Backdrop, Prices};
 use crate::cost::benefit::{GivenSliders, Sliders};
 use crate::cost::pipeline::Pipeline;
 use crate::cost::value::Value;

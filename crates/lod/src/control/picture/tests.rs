@@ -7,9 +7,9 @@ mod policies;
 mod scaled;
 mod vanishing;
 
-use super::super::view::{Kind, Shading};
 use super::*;
 use crate::Bound;
+use crate::control::demand::view::{Kind, Shading};
 use metachron_core::ResolutionRange;
 use proptest::prelude::*;
 use std::time::Duration;

@@ -7,7 +7,7 @@
 use super::super::super::experiment::{Experiment, Finding, worst};
 use super::super::super::figure::{Axis, Colour, Figure, Layer, Mark, Panel};
 use super::super::super::table::Table;
-use super::super::metrics::{deviation95, error_over_allowed, mean, predicts, within};
+use crate::chart::policies::numeric::metrics::{deviation95, error_over_allowed, mean, predicts, within};
 use anyhow::Context;
 use metachron_lod::control::Policy;
 use metachron_render::{Camera, Gpu, Offscreen, RendererOptions, SceneView, Size, Style};

@@ -11,7 +11,7 @@ pub(in super::super) mod traversal;
 use super::super::experiment::{Experiment, Finding, worst};
 use super::super::figure::Figure;
 use super::super::table::Table;
-use super::metrics::Row;
+use super::numeric::metrics::Row;
 use super::played::{Case, PLAYS, Times, curves};
 use rounds::{median_of, summary, verdict};
 

@@ -7,10 +7,10 @@
 use super::super::super::experiment::{Experiment, Finding, worst};
 use super::super::super::figure::{Axis, Colour, Figure, Layer, Mark, Panel, span};
 use super::super::super::table::Table;
-use super::super::machine::RandomSource;
-use super::super::metrics::within;
 use super::super::played::walk;
 use super::super::played::walk::{PathPoint, Predicted};
+use crate::chart::policies::numeric::machine::RandomSource;
+use crate::chart::policies::numeric::metrics::within;
 use metachron_lod::control::Policy;
 use metachron_scene::papers::Paper;
 use serde::{Deserialize, Serialize};

@@ -4,7 +4,7 @@
 
 use super::super::super::experiment::Finding;
 use super::super::super::table::Table;
-use super::super::metrics::{Row, error_over_allowed, predicts, within};
+use crate::chart::policies::numeric::metrics::{Row, error_over_allowed, predicts, within};
 use metachron_lod::control::Policy;
 
 /// A number of a policy over the rounds.

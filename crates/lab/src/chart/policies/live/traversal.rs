@@ -6,7 +6,7 @@
 use super::super::super::experiment::{Experiment, Finding, worst};
 use super::super::super::figure::{Axis, Colour, Figure, Layer, Mark, Panel, span};
 use super::super::super::table::Table;
-use metachron_geometry::{Generator, ProgressiveMesh, generate};
+use metachron_drawable::{Generator, ProgressiveMesh, generate};
 use serde::{Deserialize, Serialize};
 use std::sync::OnceLock;
 use std::time::Instant;

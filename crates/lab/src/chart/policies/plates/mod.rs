@@ -9,7 +9,7 @@ mod sheet;
 use super::super::experiment::{Experiment, Finding, worst};
 use super::super::figure::{Axis, Colour, Figure, Layer, Mark, Panel as Axes};
 use super::super::table::Table;
-use super::common::at_least;
+use super::numeric::common::at_least;
 use super::played::still::{Approach, Sight, Still, StillRequest, still};
 use super::played::walk::{ALIKE_DB, Opening, Times};
 use figures::{Changes, Limit, PLATES, Panel, Plate};

@@ -8,7 +8,7 @@ pub(super) mod walk;
 
 use super::super::figure::{Axis, Colour, Layer, Mark, Panel};
 use super::super::table::Table;
-use super::metrics::Row;
+use super::numeric::metrics::Row;
 use metachron_lod::control::Policy;
 use metachron_scene::papers::{Choices, Paper};
 pub(super) use walk::{Shown, Times};
@@ -34,7 +34,7 @@ pub(super) const PLAYS: [Play; 5] = [
 
 /// A policy on a scene, of so many frames, in one of some equal rounds.
 #[derive(Debug, Clone, PartialEq)]
-pub(in super::super) struct Case {
+pub(crate) struct Case {
     pub(super) scene: String,
     pub(super) policy: String,
     pub(super) frames: usize,

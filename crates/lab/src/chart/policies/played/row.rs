@@ -1,10 +1,10 @@
 //! The metrics of a policy's frames in a session.
 //!
-//! In: records of frames, times of full detail, likenesses. Out: a row, by the definitions of [`super::super::metrics`].
+//! In: records of frames, times of full detail, likenesses. Out: a row, by the definitions of [`crate::chart::policies::numeric::metrics`].
 
 use super::super::super::table::{Cell, Table};
-use super::super::closed_loop::Frame;
-use super::super::metrics::{Row, deviation95, mean};
+use crate::chart::policies::numeric::closed_loop::Frame;
+use crate::chart::policies::numeric::metrics::{Row, deviation95, mean};
 use metachron_session::FrameRecord;
 
 /// The data of a row.

@@ -4,9 +4,9 @@
 //! draw. Never here: figures.
 //! Full detail is played once for all policies of a scene: its times set the target, and its pictures are the reference for the others.
 
-use super::super::metrics::Row;
 use super::Case;
 use super::row::Played;
+use crate::chart::policies::numeric::metrics::Row;
 use anyhow::Context;
 use metachron_lod::control::Policy;
 use metachron_render::{Gpu, Offscreen, PictureFile, RendererOptions, Size, psnr_db, ssim};

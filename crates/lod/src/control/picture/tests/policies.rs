@@ -1,7 +1,7 @@
 //! Policies that choose by cost, on a machine whose prices are given correctly or wrongly.
 
 use super::*;
-use crate::control::level::Span;
+use crate::control::demand::level::Span;
 use crate::cost::benefit::Sliders;
 use proptest::prelude::*;
 

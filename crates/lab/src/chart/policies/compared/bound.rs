@@ -1,0 +1,176 @@
+//! Benefit of each policy over the bound of the linear relaxation.
+
+use crate::chart::experiment::{Experiment, Finding};
+use crate::chart::figure::{Axis, Colour, Figure, Layer, Mark, Panel};
+use crate::chart::policies::numeric::common::{LEVEL_PARTS, at_least, figure};
+use crate::chart::policies::numeric::machine::RandomSource;
+use crate::chart::policies::numeric::metrics::mean;
+use crate::chart::table::Table;
+use metachron_lod::adaptive::{Adaptive, Offer, Settings, Time};
+use metachron_lod::select::{Entry, Mode, Problem, funkhouser, incremental, linear, marginal};
+use serde::{Deserialize, Serialize};
+
+/// The experiment.
+pub(crate) struct Bound;
+
+const OBJECTS: [usize; 4] = [10, 100, 1000, 10_000];
+const INSTANCES: usize = 40;
+const QUICK_INSTANCES: usize = 8;
+/// An instance that is bad for greedy, budget 1000: {(1, 500), (510, 511)} and twice {(499, 499)} (`docs/theory/budget.md`, section 3).
+const COUNTER_EXAMPLE: &str = "counter-example";
+
+type Choose = fn(&Problem) -> u64;
+
+const POLICIES: [(&str, Choose); 7] = [
+    ("greedy", |p| funkhouser::greedy(p, funkhouser::Scan::Skip).value),
+    ("greedy-repaired", |p| funkhouser::repaired(p).value),
+    ("greedy-incremental", |p| incremental::incremental(p, &[], incremental::Keep::Last).selection.value),
+    ("marginal-stop", |p| marginal::marginal(p, marginal::Fit::Stop).value),
+    ("marginal-fill", |p| marginal::marginal(p, marginal::Fit::Fill).value),
+    ("marginal-repaired", |p| marginal::repaired(p).value),
+    ("adaptive", ours),
+];
+
+/// Some problems and a policy.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct Case {
+    set: String,
+    objects: usize,
+    instances: usize,
+    policy: String,
+}
+
+/// Benefits of a policy over some problems.
+#[derive(Debug, Clone, Serialize, Deserialize)]
+pub(crate) struct Row {
+    set: String,
+    objects: usize,
+    instances: usize,
+    policy: String,
+    /// Benefit over the bound, the mean and the least.
+    mean: f64,
+    least: f64,
+}
+
+impl Experiment for Bound {
+    type Case = Case;
+    type Row = Row;
+    const NAME: &'static str = "bound";
+    const TITLE: &'static str = "benefit over the bound of the linear relaxation, which no selection can exceed";
+
+    fn cases(quick: bool) -> Vec<Case> {
+        let instances = if quick { QUICK_INSTANCES } else { INSTANCES };
+        let counts = if quick { &OBJECTS[..3] } else { &OBJECTS[..] };
+        let case = |set: &str, objects, instances, policy: &str| Case {
+            set: set.to_owned(),
+            objects,
+            instances,
+            policy: policy.to_owned(),
+        };
+        let random = counts.iter().flat_map(|&n| POLICIES.map(|(policy, _)| case("random", n, instances, policy)));
+        random.chain(POLICIES.map(|(policy, _)| case(COUNTER_EXAMPLE, 3, 1, policy))).collect()
+    }
+
+    fn measure(case: &Case) -> Row {
+        let Case { set, objects, instances, policy } = case.clone();
+        let choose = POLICIES.iter().find(|p| p.0 == policy).map_or(POLICIES[0].1, |p| p.1);
+        let problem = |k| if set == COUNTER_EXAMPLE { counter_example() } else { random(objects, k) };
+        let part = |k: usize| {
+            let problem = problem(k);
+            linear(&problem).map_or(f64::NAN, |bound| choose(&problem) as f64 / bound.value)
+        };
+        let parts: Vec<f64> = (0..instances).map(part).collect();
+        let least = parts.iter().copied().fold(f64::INFINITY, f64::min);
+        Row { set, objects, instances, policy, mean: mean(&parts), least }
+    }
+
+    fn case_of(row: &Row) -> Case {
+        let Row { set, objects, instances, policy, .. } = row.clone();
+        Case { set, objects, instances, policy }
+    }
+
+    fn figure(rows: &[Row]) -> Figure {
+        let line = |((name, _), colour): (&(&str, Choose), Colour)| {
+            let here = rows.iter().filter(|r| r.set == "random" && r.policy == *name);
+            let lost = here.map(|r| (r.objects as f64, (1.0 - r.mean).max(1e-7))).collect();
+            Layer { label: (*name).to_owned(), colour, mark: Mark::Line(lost) }
+        };
+        let colours = Colour::LINES.into_iter().chain([Colour::Grey]);
+        let layers = POLICIES.iter().zip(colours).map(line).collect();
+        let (x, y) = (Axis::log("objects", 8.0, 12_000.0), Axis::log("1 − benefit / bound, mean", 1e-7, 1.0));
+        figure("Greatest possible loss of a selection", vec![Panel { title: String::new(), x, y, layers }], 1)
+    }
+
+    fn table(rows: &[Row]) -> Table {
+        let mut table = Table::new(&["set", "objects", "policy", "mean", "least"]);
+        table.rows.extend(rows.iter().map(|r| {
+            let counts = (r.objects as f64, 0);
+            vec![r.set.clone().into(), counts.into(), r.policy.clone().into(), (r.mean, 5).into(), (r.least, 5).into()]
+        }));
+        table
+    }
+
+    fn findings(rows: &[Row]) -> Vec<Finding> {
+        let of = |set: &str, objects: usize, policy: &str, what: fn(&Row) -> f64| {
+            let row = rows.iter().find(|r| (r.set.as_str(), r.objects, r.policy.as_str()) == (set, objects, policy));
+            row.map_or(f64::NAN, what)
+        };
+        vec![
+            at_least(
+                "adaptive, 100 objects: least benefit over the bound",
+                of("random", 100, "adaptive", |r| r.least),
+                0.99,
+            ),
+            at_least(
+                "adaptive, 1000 objects: least benefit over the bound",
+                of("random", 1000, "adaptive", |r| r.least),
+                0.99,
+            ),
+            Finding::at_most(
+                "greedy on the counter-example: benefit falls below half of the optimum",
+                of(COUNTER_EXAMPLE, 3, "greedy", |r| r.mean),
+                0.5,
+            ),
+        ]
+    }
+}
+
+/// Objects of five levels, polygons log-normal over two decades, accuracy as of flat shading; the budget is a third of the full cost.
+fn random(objects: usize, seed: usize) -> Problem {
+    let mut noise = RandomSource::new(1 + seed as u64);
+    let of = |_| {
+        let polygons = 300.0 * libm::exp(noise.normal());
+        let pixels = 1000.0 * libm::exp(noise.normal());
+        LEVEL_PARTS.map(|part| {
+            let drawn = (part * polygons).max(2.0);
+            Entry::new((2000.0 + 1350.0 * drawn) as u64, (1e4 * pixels * (1.0 - 0.5 / drawn)) as u64)
+        })
+    };
+    let menus: Vec<[Entry; 5]> = (0..objects).map(of).collect();
+    let all: u64 = menus.iter().map(|m| m[4].cost).sum();
+    let mut problem = Problem::new(Mode::ExactlyOne, (all / 3) as i64);
+    (0..).zip(&menus).for_each(|(id, menu)| problem.push(id, menu));
+    problem
+}
+
+fn counter_example() -> Problem {
+    let mut problem = Problem::new(Mode::AtMostOne, 1000);
+    problem.push(0, &[Entry::new(1, 500), Entry::new(510, 511)]);
+    problem.push(1, &[Entry::new(499, 499)]);
+    problem.push(2, &[Entry::new(499, 499)]);
+    problem
+}
+
+/// Benefit of the default policy on a problem, without a margin for prediction errors; zero where it exceeds the budget.
+fn ours(problem: &Problem) -> u64 {
+    let mut adaptive = Adaptive::new(Settings { margin: 0.0, late: 1.0, ..Settings::default() });
+    let droppable = problem.mode() == Mode::AtMostOne;
+    for object in 0..problem.len() {
+        let offer = |e: &Entry| Offer { cost: e.cost as f64, gain: e.benefit as f64 };
+        let offers: Vec<_> = problem.levels(object).iter().map(offer).collect();
+        adaptive.set(object as u64, 0, droppable, &offers);
+    }
+    adaptive.choose(0, Time { target: problem.budget() as f64, fixed: 0.0, reserved: 0.0 });
+    let levels: Vec<_> = (0..problem.len()).map(|i| adaptive.level(i as u64)).collect();
+    if problem.cost(&levels) > problem.budget() { 0 } else { problem.value(&levels) }
+}

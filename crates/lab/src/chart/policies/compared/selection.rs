@@ -1,0 +1,165 @@
+//! Wall time of a choice, from 100 objects to 100,000: the only experiment here that reads a clock.
+
+use crate::chart::experiment::{Experiment, Finding};
+use crate::chart::figure::{Axis, Colour, Figure, Layer, Mark, Panel};
+use crate::chart::policies::numeric::common::{LEVEL_PARTS, figure};
+use crate::chart::table::Table;
+use metachron_lod::adaptive::{Adaptive, Offer, Settings, Time};
+use metachron_lod::select::{Entry, Level, Mode, Problem, funkhouser, incremental, marginal};
+use serde::{Deserialize, Serialize};
+use std::sync::{Mutex, PoisonError};
+use std::time::Instant;
+
+/// The experiment.
+pub struct Selection;
+
+const OBJECTS: [usize; 7] = [100, 300, 1000, 3000, 10_000, 30_000, 100_000];
+const QUICK_OBJECTS: [usize; 2] = [100, 1000];
+/// Choices that are timed, one per frame with new weights.
+const FRAMES: usize = 51;
+/// A frame at 60 Hz, and the greatest share of it for choosing among 10,000 objects.
+const FRAME_MS: f64 = 1e3 / 60.0;
+const SHARE: f64 = 0.01;
+const GOAL_OBJECTS: usize = 10_000;
+/// One measurement at a time: others would slow it down.
+static ALONE: Mutex<()> = Mutex::new(());
+
+type Time1 = fn(usize) -> Vec<f64>;
+
+const POLICIES: [(&str, Time1); 4] = [
+    ("greedy", |n| papers(n, |p, _| funkhouser::greedy(p, funkhouser::Scan::Skip).levels)),
+    ("greedy-incremental", |n| {
+        papers(n, |p, last| incremental::incremental(p, last, incremental::Keep::Last).selection.levels)
+    }),
+    ("marginal-stop", |n| papers(n, |p, _| marginal::marginal(p, marginal::Fit::Stop).levels)),
+    ("adaptive", ours),
+];
+
+/// A number of objects, and a policy.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Case {
+    objects: usize,
+    policy: String,
+}
+
+/// Wall time of a choice.
+#[derive(Debug, Clone, Serialize, Deserialize)]
+pub struct Row {
+    objects: usize,
+    policy: String,
+    median_ms: f64,
+    least_ms: f64,
+}
+
+impl Experiment for Selection {
+    type Case = Case;
+    type Row = Row;
+    const NAME: &'static str = "selection";
+    const TITLE: &'static str = "wall time of one selection, five levels per object, new weights in every frame";
+
+    fn cases(quick: bool) -> Vec<Case> {
+        let counts = if quick { &QUICK_OBJECTS[..] } else { &OBJECTS[..] };
+        let of = |&objects: &usize| POLICIES.map(|(policy, _)| Case { objects, policy: policy.to_owned() });
+        counts.iter().flat_map(of).collect()
+    }
+
+    fn measure(case: &Case) -> Row {
+        let time = POLICIES.iter().find(|p| p.0 == case.policy).map_or(POLICIES[0].1, |p| p.1);
+        let _alone = ALONE.lock().unwrap_or_else(PoisonError::into_inner);
+        let mut times = time(case.objects);
+        times.sort_by(f64::total_cmp);
+        let Case { objects, policy } = case.clone();
+        Row { objects, policy, median_ms: times[times.len() / 2], least_ms: times[0] }
+    }
+
+    fn case_of(row: &Row) -> Case {
+        Case { objects: row.objects, policy: row.policy.clone() }
+    }
+
+    fn figure(rows: &[Row]) -> Figure {
+        let line = |((name, _), colour): (&(&str, Time1), Colour)| {
+            let here = rows.iter().filter(|r| r.policy == *name);
+            let points = here.map(|r| (r.objects as f64, r.least_ms)).collect();
+            Layer { label: (*name).to_owned(), colour, mark: Mark::Line(points) }
+        };
+        let mut layers: Vec<_> = POLICIES.iter().zip(Colour::LINES).map(line).collect();
+        let share = vec![(100.0, SHARE * FRAME_MS), (1e5, SHARE * FRAME_MS)];
+        layers.push(Layer { label: "1 % of 1/60 s".to_owned(), colour: Colour::Grey, mark: Mark::Dashed(share) });
+        let (x, y) = (Axis::log("objects", 100.0, 1e5), Axis::log("least selection time, ms", 1e-3, 1e3));
+        figure("Selection time", vec![Panel { title: String::new(), x, y, layers }], 1)
+    }
+
+    fn table(rows: &[Row]) -> Table {
+        let mut table = Table::new(&["objects", "policy", "median_ms", "least_ms", "share_of_60_hz"]);
+        table.rows.extend(rows.iter().map(|r| {
+            let (median, least) = ((r.median_ms, 4), (r.least_ms, 4));
+            let share = (r.least_ms / FRAME_MS, 4);
+            vec![(r.objects as f64, 0).into(), r.policy.clone().into(), median.into(), least.into(), share.into()]
+        }));
+        table
+    }
+
+    fn findings(rows: &[Row]) -> Vec<Finding> {
+        let goal = rows.iter().find(|r| r.objects == GOAL_OBJECTS && r.policy == "adaptive");
+        let share = goal.map(|r| r.least_ms / FRAME_MS);
+        share
+            .map(|s| Finding::at_most("adaptive, 10,000 objects: least time over 1/60 s", s, SHARE))
+            .into_iter()
+            .collect()
+    }
+}
+
+/// Cost in ticks and gain of an object's level.
+fn level(id: usize, part: f64) -> (f64, f64) {
+    let polygons = part * (100.0 + (id * 7919 % 900) as f64);
+    (20.0 + 13.5 * polygons, 1.0 - 0.5 / polygons.max(2.0))
+}
+
+/// Half of the cost of all objects at their finest level, ticks.
+fn target(objects: usize) -> f64 {
+    objects as f64 * 0.5 * 13.5 * 550.0
+}
+
+fn weight(id: usize, frame: usize) -> f64 {
+    1.0 + ((id * 31 + frame * 7) % 997) as f64
+}
+
+fn timed<T>(choose: impl FnOnce() -> T) -> (T, f64) {
+    let start = Instant::now();
+    let chosen = choose();
+    (chosen, start.elapsed().as_secs_f64() * 1e3)
+}
+
+fn ours(objects: usize) -> Vec<f64> {
+    let mut adaptive = Adaptive::new(Settings::default());
+    for id in 0..objects {
+        let offers = LEVEL_PARTS.map(|part| level(id, part)).map(|(cost, gain)| Offer { cost, gain });
+        adaptive.set(id as u64, 0, false, &offers);
+    }
+    let one = |frame: usize| {
+        (0..objects).for_each(|id| _ = adaptive.weigh(id as u64, weight(id, frame)));
+        let (plan, took) =
+            timed(|| adaptive.choose(frame as u64, Time { target: target(objects), fixed: 0.0, reserved: 0.0 }));
+        adaptive.observe(frame as u64, 0, plan.predicted);
+        took
+    };
+    (0..FRAMES).map(one).collect()
+}
+
+fn papers(objects: usize, choose: fn(&Problem, &[Level]) -> Vec<Level>) -> Vec<f64> {
+    let mut last = Vec::new();
+    let one = |frame: usize| {
+        let mut problem = Problem::new(Mode::ExactlyOne, target(objects) as i64);
+        for id in 0..objects {
+            let entries = LEVEL_PARTS
+                .map(|part| level(id, part))
+                .map(|(cost, gain)| Entry::new(cost as u64, (1e6 * gain * weight(id, frame)) as u64));
+            problem.push(id as u64, &entries);
+        }
+        let (levels, took) = timed(|| choose(&problem, &last));
+        last = levels;
+        took
+    };
+    // the papers' algorithms take longer, and fewer frames suffice
+    (0..FRAMES / 5).map(one).collect()
+}

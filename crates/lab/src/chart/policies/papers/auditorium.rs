@@ -1,0 +1,87 @@
+//! The walk through the auditorium under every policy (FS93, §8, table 1 and fig. 7).
+
+use crate::chart::experiment::{Experiment, Finding};
+use crate::chart::figure::Figure;
+use crate::chart::policies::numeric::auditorium_model::{LAP, show};
+use crate::chart::policies::numeric::chooser::Policy;
+use crate::chart::policies::numeric::common::{Case, at_least, curves, figure, number, table};
+use crate::chart::policies::numeric::machine::Fault;
+use crate::chart::policies::numeric::metrics::Row;
+use crate::chart::table::Table;
+use metachron_lod::cost::value::Value;
+
+/// The experiment.
+pub(crate) struct Auditorium;
+
+const POLICIES: [Policy; 9] = [
+    Policy::Full,
+    Policy::Static,
+    Policy::StaticFine,
+    Policy::Threshold,
+    Policy::RobinHood(Value::Steep),
+    Policy::Convex,
+    Policy::Greedy,
+    Policy::MarginalFill,
+    Policy::Adaptive,
+];
+const SEEDS: usize = 5;
+const SETTING: &str = "walk";
+
+impl Experiment for Auditorium {
+    type Case = Case;
+    type Row = Row;
+    const NAME: &'static str = "auditorium";
+    const TITLE: &'static str = "frame-time control on a walkthrough of 384 seats with half a turn in six frames";
+
+    fn cases(quick: bool) -> Vec<Case> {
+        let seeds = if quick { 1 } else { SEEDS };
+        POLICIES.map(|policy| Case::new(SETTING, policy, seeds, LAP)).to_vec()
+    }
+
+    fn measure(case: &Case) -> Row {
+        case.measure(&show(Fault::NONE, LAP, 1), &POLICIES)
+    }
+
+    fn case_of(row: &Row) -> Case {
+        Case::of(row)
+    }
+
+    fn figure(_: &[Row]) -> Figure {
+        let show = show(Fault::NONE, LAP, 1);
+        let panels = vec![
+            curves("no choice (four times the scale)", &show, &[Policy::Full], 12.0),
+            curves("by size", &show, &[Policy::StaticFine, Policy::Threshold], 3.0),
+            curves("by prediction", &show, &[Policy::Greedy, Policy::Adaptive], 3.0),
+        ];
+        figure("Walkthrough of the auditorium (FS93, fig. 7)", panels, 1)
+    }
+
+    fn table(rows: &[Row]) -> Table {
+        table(rows)
+    }
+
+    fn findings(rows: &[Row]) -> Vec<Finding> {
+        let of = |policy: &str, what: fn(&Row) -> f64| number(rows, SETTING, policy, what);
+        let spread = |policy: &str| of(policy, |r| r.binding_stddev);
+        let (greedy, ours) = (spread("greedy"), spread("adaptive"));
+        let by_size = spread("static-64-px").min(spread("threshold"));
+        vec![
+            at_least(
+                "binding stddev, none over the greater by size: > 1",
+                spread("full") / spread("static-64-px").max(spread("threshold")),
+                1.0,
+            ),
+            Finding::at_most(
+                "binding stddev, greedy over the least of the first three: < 1/3",
+                greedy / by_size.min(spread("full")),
+                1.0 / 3.0,
+            ),
+            Finding::at_most("binding stddev, adaptive over greedy: < 1", ours / greedy, 1.0),
+            Finding::at_most("adaptive: longest frame / T", of("adaptive", |r| r.max), 1.15),
+            Finding::at_most("adaptive: binding stddev", ours, 0.035),
+            Finding::at_most("adaptive: frames past 1.05 T", of("adaptive", |r| r.misses), 0.01),
+            at_least("adaptive: benefit over the bound", of("adaptive", |r| r.value_over_bound), 0.99),
+            Finding::at_most("adaptive: reversals per object and frame", of("adaptive", |r| r.reversals), 0.002),
+        ]
+    }
+}

@@ -1,0 +1,71 @@
+//! The time of a frame that logic beside the drawing takes: agents that step, the next choice (RH05, §4.2 and 5.3).
+//!
+//! In: measured frames. Out: seconds that are not left for drawing. Never here: logic before the drawing, which is measured as such.
+//! Theory: `docs/theory/budget.md`, eq. 50 … 53.
+//!
+//! How much of it drawing hides follows from frames: z = 0 where a graphics processor draws, 1 where one core does both.
+
+use crate::cost::overlap::{Overlap, OverlapFit};
+
+/// The part of the estimate that a new frame replaces: about twenty frames of memory.
+const NEWS: f64 = 0.05;
+
+/// Greatest part of a frame that logic is taken to be: a frame is planned to take no less than its logic (RH05, §5.3).
+const MOST: f64 = 0.95;
+
+/// Logic beside the drawing.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub(crate) struct Logic {
+    /// In a frame, seconds, smoothed.
+    beside_s: Option<f64>,
+    fit: OverlapFit,
+}
+
+impl Logic {
+    /// Reports a frame that was drawn in `drawn_s`, of which the prices expected `priced_s`, with `beside_s` of logic meanwhile.
+    pub fn observe(&mut self, beside_s: f64, priced_s: f64, drawn_s: f64) {
+        self.beside_s = Some(self.beside_s.map_or(beside_s, |held| held + NEWS * (beside_s - held)));
+        self.fit.fade(1.0 - NEWS);
+        self.fit.add(beside_s, priced_s, drawn_s);
+    }
+
+    /// Seconds of `frame_s` that are lost for drawing.
+    pub fn lost_s(&self, frame_s: f64) -> f64 {
+        match self.beside_s {
+            Some(beside_s) if beside_s > 0.0 && frame_s > 0.0 => {
+                let overlap: Overlap = self.fit.overlap();
+                (frame_s - overlap.drawing(frame_s, beside_s.min(MOST * frame_s))).max(0.0)
+            }
+            _ => 0.0,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Seconds lost of a frame of 20 ms once frames of a machine with this z were drawn, 10 ms by the prices.
+    fn lost_s(serial: f64, beside_s: f64) -> f64 {
+        let mut logic = Logic::default();
+        for k in 0..100 {
+            let priced_s = 10e-3 * (1.0 + 0.1 * f64::from(k % 3));
+            logic.observe(beside_s, priced_s, Overlap::frame(serial, beside_s, priced_s));
+        }
+        logic.lost_s(20e-3)
+    }
+
+    #[test]
+    fn logic_that_drawing_hides_takes_nothing_and_logic_on_its_core_takes_all_of_it() {
+        assert_eq!(Logic::default().lost_s(20e-3), 0.0);
+        assert!(lost_s(0.0, 6e-3).abs() < 1e-9);
+        assert!((lost_s(0.5, 6e-3) - 3e-3).abs() < 1e-9);
+        assert!((lost_s(1.0, 6e-3) - 6e-3).abs() < 1e-9);
+    }
+
+    #[test]
+    fn logic_longer_than_the_frame_leaves_a_little_for_drawing() {
+        let lost = lost_s(1.0, 50e-3);
+        assert!((lost - 19e-3).abs() < 1e-9, "{lost}");
+    }
+}

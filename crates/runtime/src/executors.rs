@@ -1,0 +1,16 @@
+//! Who makes turns, and when: threads, a pool of workers, one thread in virtual time, one that follows a recorded order.
+//!
+//! In: agents that were introduced to each other. Out: runs, saved and read back. Never here: what a turn does.
+
+pub mod archive;
+#[cfg(test)]
+mod executor_tests;
+pub mod follower;
+#[cfg(test)]
+mod live_tests;
+pub mod lockstep;
+pub mod pool;
+pub mod priority;
+#[cfg(test)]
+pub mod testing;
+pub mod threads;
