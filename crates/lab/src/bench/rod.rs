@@ -6,12 +6,13 @@ use super::super::args::BenchArgs;
 use super::super::chart::figure::{Axis, Colour, Figure, Layer, Mark, Panel, span};
 use super::super::chart::power::exponent;
 use super::super::chart::table::Table;
-use super::rig::bare::step;
 use super::rig::cast::{ROD_SEGMENTS, rod};
 use super::rig::machine::own_cpu;
 use super::subject::{Progress, Subject};
 use glam::DVec3;
-use metachron_core::SimSpan;
+use metachron_contact::StepContext;
+use metachron_contact::step::LoneStepper;
+use metachron_core::{AgentId, SimSpan, SimTime};
 use serde::{Deserialize, Serialize};
 use std::time::Duration;
 
@@ -89,12 +90,14 @@ impl Subject for Rod {
 }
 
 fn measure(segments: usize, self_contact: bool, span: Duration) -> anyhow::Result<Row> {
-    let mut tube = rod(DVec3::ZERO, segments, self_contact)?;
+    let (mut tube, mut stepper) = (rod(DVec3::ZERO, segments, self_contact)?, LoneStepper::default());
+    let alone = StepContext::alone(AgentId(0), SimTime::ZERO);
+    let mut batch = || (0..BATCH).try_for_each(|_| stepper.step(&mut tube, DT, alone).map(drop));
     // fills caches and sizes buffers
-    (0..BATCH).try_for_each(|_| step(&mut tube, DT))?;
+    batch()?;
     let (from, mut steps) = (own_cpu(), 0_u32);
     while own_cpu() - from < span {
-        (0..BATCH).try_for_each(|_| step(&mut tube, DT))?;
+        batch()?;
         steps += BATCH;
     }
     let step_s = (own_cpu() - from).as_secs_f64() / f64::from(steps.max(1));
