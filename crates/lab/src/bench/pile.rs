@@ -7,11 +7,10 @@
 //! Never here: how agents form clusters.
 
 use super::super::args::BenchArgs;
-use super::super::chart::figure::{Axis, Colour, Figure, Layer, Mark, Panel};
-use super::super::chart::table::Table;
 use super::rig::machine::{others_cpu, own_cpu};
 use super::rig::plain_world::{Frame, Settings, world_of};
 use super::subject::{Progress, Subject};
+use crate::chart::{Axis, Colour, Column, Figure, Layer};
 use anyhow::bail;
 use metachron_render::{Size, Style};
 use metachron_runtime::AgentStats;
@@ -50,29 +49,44 @@ pub(super) struct Row {
     pub share: f64,
 }
 
+impl Row {
+    /// A number of this run; NaN where it was measured elsewhere.
+    const fn if_here(&self, value: f64) -> f64 {
+        if self.here { value } else { f64::NAN }
+    }
+}
+
 /// CPU seconds that the plain world has used after each of its steps.
 type Spent = Vec<f64>;
 
 impl Subject for Pile {
     type Row = Row;
     const NAME: &'static str = "pile";
+    const COLUMNS: &'static [Column<Row>] = &[
+        ("who", |row| (&row.who).into()),
+        ("here", |row| if row.here { "yes" } else { "no" }.into()),
+        ("boxes", |row| (row.boxes as f64, 0).into()),
+        ("sim_s", |row| (row.if_here(row.sim_s), 1).into()),
+        ("dropped_s", |row| (row.if_here(row.dropped_s), 2).into()),
+        ("cpu_s", |row| (row.if_here(row.cpu_s), 2).into()),
+        ("steps_per_cpu_s", |row| (row.steps_per_cpu_s, 1).into()),
+        ("share", |row| (row.share, 2).into()),
+    ];
 
     fn measure(args: &BenchArgs, progress: &Progress) -> anyhow::Result<Vec<Row>> {
         let sim_s = args.seconds.unwrap_or(SECONDS[usize::from(args.quick)]);
         let scene = load(&Source::open("pile")?, &[])?;
         let mut spent = Spent::new();
-        let cases: [(&str, &mut dyn FnMut() -> anyhow::Result<Row>); 4] = [
-            ("one rapier3d world", &mut || plain(&scene, sim_s, Settings::Own, &mut spent)),
-            ("one rapier3d world, careful settings", &mut || {
-                plain(&scene, sim_s, Settings::Careful, &mut Spent::new())
-            }),
-            ("agents in virtual time", &mut || agents(&scene, ExecutorKind::Lockstep, sim_s)),
-            ("agents in a pool", &mut || agents(&scene, ExecutorKind::Pool, sim_s)),
+        let cases: Vec<(&str, Box<dyn FnOnce() -> anyhow::Result<Row> + '_>)> = vec![
+            ("one rapier3d world", Box::new(|| plain(&scene, sim_s, Settings::Own, &mut spent))),
+            (
+                "one rapier3d world, careful settings",
+                Box::new(|| plain(&scene, sim_s, Settings::Careful, &mut Spent::new())),
+            ),
+            ("agents in virtual time", Box::new(|| agents(&scene, ExecutorKind::Lockstep, sim_s))),
+            ("agents in a pool", Box::new(|| agents(&scene, ExecutorKind::Pool, sim_s))),
         ];
-        let cases_in_order = cases.into_iter().zip(0_u32..);
-        let wanted =
-            cases_in_order.take_while(|((words, _), at)| progress.continues(0.2 * f64::from(*at), (*words).to_owned()));
-        let rows = wanted.map(|((_, measured), _)| measured()).collect::<anyhow::Result<Vec<_>>>()?;
+        let rows = progress.rows(cases, |(words, _)| (*words).to_owned(), |(_, measured)| measured())?;
         let Some(plain) = rows.first().cloned() else { return Ok(rows) };
         let others = OTHERS.map(|(who, steps)| Row {
             who: who.to_owned(),
@@ -86,39 +100,15 @@ impl Subject for Pile {
         Ok(here.chain(others.map(|row| held(row, f64::INFINITY))).collect())
     }
 
-    fn table(rows: &[Row]) -> Table {
-        let mut table =
-            Table::new(&["who", "here", "boxes", "sim_s", "dropped_s", "cpu_s", "steps_per_cpu_s", "share"]);
-        table.rows.extend(rows.iter().map(|row| {
-            let number = |value: f64, digits| if row.here { (value, digits) } else { (f64::NAN, digits) };
-            vec![
-                row.who.clone().into(),
-                if row.here { "yes" } else { "no" }.into(),
-                (row.boxes as f64, 0).into(),
-                number(row.sim_s, 1).into(),
-                number(row.dropped_s, 2).into(),
-                number(row.cpu_s, 2).into(),
-                (row.steps_per_cpu_s, 1).into(),
-                (row.share, 2).into(),
-            ]
-        }));
-        table
-    }
-
     fn figure(rows: &[Row]) -> Figure {
         let most = rows.iter().map(|row| row.steps_per_cpu_s).fold(1.0, f64::max);
-        let bar = |(at, row): (usize, &Row)| Layer {
-            label: row.who.clone(),
-            colour: if row.here { Colour::LINES[at % Colour::LINES.len()] } else { Colour::Grey },
-            mark: Mark::Cells(vec![[at as f64 + 0.1, at as f64 + 0.9, 0.0, row.steps_per_cpu_s]]),
+        let bar = |(at, row): (usize, &Row)| {
+            let colour = if row.here { Colour::LINES[at % Colour::LINES.len()] } else { Colour::Grey };
+            Layer::cells(&row.who, colour, [[at as f64 + 0.1, at as f64 + 0.9, 0.0, row.steps_per_cpu_s]])
         };
-        let panel = Panel {
-            title: String::new(),
-            x: Axis::linear("", 0.0, rows.len().max(1) as f64),
-            y: Axis::linear("whole steps per second of CPU time", 0.0, 1.1 * most),
-            layers: rows.iter().enumerate().map(bar).collect(),
-        };
-        Figure { title: "A thousand boxes".to_owned(), panels: vec![panel], columns: 1 }
+        let x = Axis::linear("", 0.0, rows.len().max(1) as f64);
+        let y = Axis::linear("whole steps per second of CPU time", 0.0, 1.1 * most);
+        Figure::single("A thousand boxes", x, y, rows.iter().enumerate().map(bar))
     }
 }
 

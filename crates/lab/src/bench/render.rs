@@ -3,9 +3,8 @@
 //! In: an adapter. Out: rows of wall time per picture, the least of a few drawings. Never here: a fit of costs to them.
 
 use super::super::args::BenchArgs;
-use super::super::chart::figure::{Axis, Colour, Figure, Layer, Mark, Panel, span};
-use super::super::chart::table::Table;
 use super::subject::{Progress, Subject};
+use crate::chart::{Axis, Colour, Column, Figure, Layer, Panel, span};
 use anyhow::Context;
 use metachron_drawable::PieceKind;
 use metachron_lod::control::AREAS_PX;
@@ -33,6 +32,15 @@ pub(super) struct Row {
 impl Subject for Render {
     type Row = Row;
     const NAME: &'static str = "render";
+    const COLUMNS: &'static [Column<Row>] = &[
+        ("picture_px", |row| (row.picture_px, 0).into()),
+        ("objects", |row| (f64::from(row.objects), 0).into()),
+        ("shading", |row| (&row.shading).into()),
+        ("triangles", |row| (row.triangles, 0).into()),
+        ("pixels", |row| (row.pixels, 0).into()),
+        ("picture_ms", |row| (row.picture_ms, 3).into()),
+        ("ns_per_triangle", |row| (row.ns_per_triangle, 1).into()),
+    ];
 
     fn measure(_args: &BenchArgs, progress: &Progress) -> anyhow::Result<Vec<Row>> {
         let gpu = Gpu::headless().context("what drawing costs cannot be measured")?;
@@ -44,23 +52,6 @@ impl Subject for Render {
         Ok(plain.map(|drawn| row(&gpu.describe(), drawn)).collect())
     }
 
-    fn table(rows: &[Row]) -> Table {
-        let columns = ["picture_px", "objects", "shading", "triangles", "pixels", "picture_ms", "ns_per_triangle"];
-        let mut table = Table::new(&columns);
-        table.rows.extend(rows.iter().map(|row| {
-            vec![
-                (row.picture_px, 0).into(),
-                (f64::from(row.objects), 0).into(),
-                row.shading.clone().into(),
-                (row.triangles, 0).into(),
-                (row.pixels, 0).into(),
-                (row.picture_ms, 3).into(),
-                (row.ns_per_triangle, 1).into(),
-            ]
-        }));
-        table
-    }
-
     fn figure(rows: &[Row]) -> Figure {
         let drawn: Vec<&Row> = rows.iter().filter(|row| row.objects > 0).collect();
         let (low, high) = span(drawn.iter().map(|row| row.triangles), true);
@@ -68,13 +59,11 @@ impl Subject for Render {
         let names = SHADINGS.map(name).into_iter().chain([POINTS, LINES]);
         let layers = names.zip(Colour::LINES).map(|(name, colour)| {
             let here = drawn.iter().filter(|row| row.shading == name);
-            let points = here.map(|row| (row.triangles, row.picture_ms)).collect();
-            Layer { label: name.to_owned(), colour, mark: Mark::Dots(points) }
+            Layer::dots(name, colour, here.map(|row| (row.triangles, row.picture_ms)))
         });
         let (x, y) = (Axis::log("triangles", low, high), Axis::log("ms per picture", least, most));
-        let title = rows.first().map_or_else(String::new, |row| row.adapter.clone());
-        let panel = Panel { title, x, y, layers: layers.collect() };
-        Figure { title: "Drawing time of pictures".to_owned(), panels: vec![panel], columns: 1 }
+        let adapter = rows.first().map_or("", |row| &row.adapter);
+        Figure::new("Drawing time of pictures", 1, vec![Panel::new(adapter, x, y, layers)])
     }
 }
 

@@ -3,12 +3,10 @@
 //! In: numbers of segments. Out: rows of CPU time per step. Never here: agents, threads.
 
 use super::super::args::BenchArgs;
-use super::super::chart::figure::{Axis, Colour, Figure, Layer, Mark, Panel, span};
-use super::super::chart::power::exponent;
-use super::super::chart::table::Table;
 use super::rig::cast::{ROD_SEGMENTS, rod};
 use super::rig::machine::own_cpu;
 use super::subject::{Progress, Subject};
+use crate::chart::{Axis, Colour, Column, Figure, Layer, exponent, span};
 use glam::DVec3;
 use metachron_contact::StepContext;
 use metachron_contact::step::LoneStepper;
@@ -43,30 +41,19 @@ pub(super) struct Row {
 impl Subject for Rod {
     type Row = Row;
     const NAME: &'static str = "rod";
+    const COLUMNS: &'static [Column<Row>] = &[
+        ("segments", |row| (row.segments as f64, 0).into()),
+        ("self_contact", |row| if row.self_contact { "yes" } else { "no" }.into()),
+        ("us_per_step", |row| (row.us_per_step, 2).into()),
+        ("ns_per_segment", |row| (row.ns_per_segment, 0).into()),
+        ("steps_per_s", |row| (row.steps_per_s, 0).into()),
+    ];
 
     fn measure(args: &BenchArgs, progress: &Progress) -> anyhow::Result<Vec<Row>> {
         let span = Duration::from_secs_f64(args.seconds.unwrap_or(SPANS_S[usize::from(args.quick)]));
         let cases = [false, true].into_iter().flat_map(|contact| SEGMENTS.map(|segments| (segments, contact)));
-        let cases: Vec<_> = cases.collect();
-        let total = cases.len() as f64;
-        let cases_in_order = cases.into_iter().enumerate();
-        let wanted = cases_in_order
-            .take_while(|(at, case)| progress.continues(*at as f64 / total, format!("{} segments", case.0)));
-        wanted.map(|(_, (segments, self_contact))| measure(segments, self_contact, span)).collect()
-    }
-
-    fn table(rows: &[Row]) -> Table {
-        let mut table = Table::new(&["segments", "self_contact", "us_per_step", "ns_per_segment", "steps_per_s"]);
-        table.rows.extend(rows.iter().map(|row| {
-            vec![
-                (row.segments as f64, 0).into(),
-                if row.self_contact { "yes" } else { "no" }.into(),
-                (row.us_per_step, 2).into(),
-                (row.ns_per_segment, 0).into(),
-                (row.steps_per_s, 0).into(),
-            ]
-        }));
-        table
+        let words = |(segments, _): &(usize, bool)| format!("{segments} segments");
+        progress.rows(cases.collect(), words, |(segments, contact)| measure(segments, contact, span))
     }
 
     fn figure(rows: &[Row]) -> Figure {
@@ -81,11 +68,10 @@ impl Subject for Rod {
         let layers = lines.map(|((label, contact), colour)| {
             let points = points(contact);
             let label = format!("{label}: segments^{:.2}", exponent(&points).unwrap_or(f64::NAN));
-            Layer { label, colour, mark: Mark::Line(points) }
+            Layer::line(label, colour, points)
         });
         let (x, y) = (Axis::log("segments", low, high), Axis::log("CPU time per step, µs", least, most));
-        let panel = Panel { title: String::new(), x, y, layers: layers.collect() };
-        Figure { title: "Cost of a tube's step".to_owned(), panels: vec![panel], columns: 1 }
+        Figure::single("Cost of a tube's step", x, y, layers)
     }
 }
 

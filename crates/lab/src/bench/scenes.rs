@@ -3,10 +3,9 @@
 //! In: programs, each of which plays a scene by itself. Out: rows of CPU time a scene. Never here: how a scene is played.
 
 use super::super::args::BenchArgs;
-use super::super::chart::figure::{Axis, Colour, Figure, Layer, Mark, Panel, span};
-use super::super::chart::table::Table;
 use super::rig::machine::processor;
 use super::subject::{Progress, Subject};
+use crate::chart::{Axis, Colour, Column, Figure, Layer, Panel, median, span};
 use anyhow::Context;
 use metachron_console::output::{BadInput, message};
 use serde::{Deserialize, Serialize};
@@ -88,14 +87,9 @@ fn alternately(programs: &[&Path], scene: &str, rounds: usize, seconds: f64) -> 
     Ok(reports)
 }
 
-fn median_s(reports: &[Report]) -> f64 {
-    let mut times: Vec<_> = reports.iter().map(|report| report.cpu_s).collect();
-    times.sort_by(f64::total_cmp);
-    times.get(times.len() / 2).copied().unwrap_or(f64::NAN)
-}
-
 fn row(scene: &str, reports: &[Vec<Report>]) -> Row {
-    let [cpu_s, other_cpu_s] = [0, 1].map(|at| reports.get(at).map_or(f64::NAN, |reports| median_s(reports)));
+    let times = |at: usize| reports.get(at).into_iter().flatten().map(|report| report.cpu_s).collect();
+    let [cpu_s, other_cpu_s] = [0, 1].map(|at| median(times(at)));
     let mut states: Vec<_> = reports.iter().flatten().map(|report| &report.state_hash).collect();
     states.dedup();
     let same_state = reports.get(1).map(|_| states.len() == 1);
@@ -106,6 +100,13 @@ fn row(scene: &str, reports: &[Vec<Report>]) -> Row {
 impl Subject for Scenes {
     type Row = Row;
     const NAME: &'static str = "scenes";
+    const COLUMNS: &'static [Column<Row>] = &[
+        ("scene", |row| (&row.scene).into()),
+        ("cpu_s", |row| (row.cpu_s, 2).into()),
+        ("other_cpu_s", |row| (row.other_cpu_s, 2).into()),
+        ("over_other", |row| (row.over_other, 2).into()),
+        ("same_state", |row| row.same_state.map_or("–", |same| if same { "yes" } else { "no" }).into()),
+    ];
 
     fn measure(args: &BenchArgs, progress: &Progress) -> anyhow::Result<Vec<Row>> {
         let own = std::env::current_exe().context("this program's own file")?;
@@ -132,37 +133,21 @@ impl Subject for Scenes {
         Ok(rows)
     }
 
-    fn table(rows: &[Row]) -> Table {
-        let mut table = Table::new(&["scene", "cpu_s", "other_cpu_s", "over_other", "same_state"]);
-        table.rows.extend(rows.iter().map(|row| {
-            vec![
-                row.scene.clone().into(),
-                (row.cpu_s, 2).into(),
-                (row.other_cpu_s, 2).into(),
-                (row.over_other, 2).into(),
-                row.same_state.map_or("–", |same| if same { "yes" } else { "no" }).into(),
-            ]
-        }));
-        table
-    }
-
     fn figure(rows: &[Row]) -> Figure {
         let times = || rows.iter().flat_map(|row| [row.cpu_s, row.other_cpu_s]).filter(|time| time.is_finite());
         let (least, most) = span(times(), true);
         let bars = |of: fn(&Row) -> f64, from: f64| {
             let bar = |(at, row): (usize, &Row)| [at as f64 + from, at as f64 + from + 0.4, least, of(row)];
-            Mark::Cells(rows.iter().enumerate().map(bar).filter(|cell| cell[3].is_finite()).collect())
+            rows.iter().enumerate().map(bar).filter(|cell| cell[3].is_finite()).collect::<Vec<_>>()
         };
-        let layer = |(label, mark): (&str, Mark), colour| Layer { label: label.to_owned(), colour, mark };
         let names: Vec<_> = rows.iter().map(|row| row.scene.as_str()).collect();
-        let layers = [("this build", bars(|row| row.cpu_s, 0.1)), ("other build", bars(|row| row.other_cpu_s, 0.5))];
-        let panel = Panel {
-            title: names.join(", "),
-            x: Axis::linear("", 0.0, rows.len().max(1) as f64),
-            y: Axis::log("CPU time, s", least, most),
-            layers: layers.into_iter().zip(Colour::LINES).map(|(bars, colour)| layer(bars, colour)).collect(),
-        };
-        Figure { title: "Built-in scenes in lockstep".to_owned(), panels: vec![panel], columns: 1 }
+        let layers = [
+            Layer::cells("this build", Colour::LINES[0], bars(|row| row.cpu_s, 0.1)),
+            Layer::cells("other build", Colour::LINES[1], bars(|row| row.other_cpu_s, 0.5)),
+        ];
+        let x = Axis::linear("", 0.0, rows.len().max(1) as f64);
+        let panel = Panel::new(names.join(", "), x, Axis::log("CPU time, s", least, most), layers);
+        Figure::new("Built-in scenes in lockstep", 1, vec![panel])
     }
 }
 

@@ -3,10 +3,8 @@
 //! In: the experiment of `chart policies --only selection`. Out: its rows in the form of a benchmark. Never here: a policy.
 
 use super::super::args::BenchArgs;
-use super::super::chart::figure::Figure;
-use super::super::chart::table::Table;
-use super::super::chart::{Experiment, Selection};
 use super::subject::{Progress, Subject};
+use crate::chart::{Column, Experiment, Figure, Selection};
 
 /// The subject.
 pub(super) struct Select;
@@ -14,17 +12,10 @@ pub(super) struct Select;
 impl Subject for Select {
     type Row = <Selection as Experiment>::Row;
     const NAME: &'static str = "select";
+    const COLUMNS: &'static [Column<Self::Row>] = Selection::COLUMNS;
 
     fn measure(args: &BenchArgs, progress: &Progress) -> anyhow::Result<Vec<Self::Row>> {
-        let cases = Selection::cases(args.quick);
-        let total = cases.len() as f64;
-        let wanted =
-            cases.iter().enumerate().take_while(|(at, _)| progress.continues(*at as f64 / total, String::new()));
-        Ok(wanted.map(|(_, case)| Selection::measure(case)).collect())
-    }
-
-    fn table(rows: &[Self::Row]) -> Table {
-        Selection::table(rows)
+        progress.rows(Selection::cases(args.quick), |_| String::new(), |case| Ok(Selection::measure(&case)))
     }
 
     fn figure(rows: &[Self::Row]) -> Figure {

@@ -3,12 +3,10 @@
 //! In: the arguments. Out: rows, a table, a figure. Never here: what a case measures ([`super::agents`]).
 
 use super::super::args::BenchArgs;
-use super::super::chart::figure::{Axis, Colour, Figure, Layer, Mark, Panel, span};
-use super::super::chart::power::exponent;
-use super::super::chart::table::Table;
 use super::agents::{Case, Executor, Row, TENTH_HZ, UNPACED_HZ, cases, measure};
 use super::rig::cast::Model;
 use super::subject::{Progress, Subject};
+use crate::chart::{Axis, Colour, Column, Figure, Layer, Panel, exponent, span};
 use metachron_console::output::{BadInput, message};
 use metachron_runtime::Priority;
 use std::time::Duration;
@@ -22,6 +20,7 @@ const SPANS: [Duration; 2] = [Duration::from_secs(4), Duration::from_secs(1)];
 impl Subject for Agents {
     type Row = Row;
     const NAME: &'static str = "agents";
+    const COLUMNS: &'static [Column<Row>] = &COLUMNS;
 
     fn measure(args: &BenchArgs, progress: &Progress) -> anyhow::Result<Vec<Row>> {
         let granted = Priority::Realtime.ask();
@@ -33,24 +32,14 @@ impl Subject for Agents {
             return Err(BadInput(why.to_owned()).into());
         }
         let span = args.seconds.map_or(SPANS[usize::from(args.quick)], Duration::from_secs_f64);
-        let mut rows = Vec::with_capacity(chosen.len());
-        for (at, case) in chosen.iter().enumerate() {
-            let words = format!("{} {} {}", case.agents, case.model.name(), case.executor.name());
-            if !progress.continues(at as f64 / chosen.len() as f64, words) {
-                break;
-            }
-            rows.push(measure(case, span)?);
-        }
+        let words = |case: &Case| format!("{} {} {}", case.agents, case.model.name(), case.executor.name());
+        let rows = progress.rows(chosen, words, |case| measure(&case, span))?;
         if let Err(refused) = granted
             && !args.quiet
         {
             message(&format!("note: {refused}; the case was skipped"));
         }
         Ok(rows)
-    }
-
-    fn table(rows: &[Row]) -> Table {
-        table(rows)
     }
 
     fn figure(rows: &[Row]) -> Figure {
@@ -65,60 +54,36 @@ fn is_selected(args: &BenchArgs, case: &Case) -> bool {
         && args.agents.is_none_or(|agents| case.agents <= agents)
 }
 
-fn table(rows: &[Row]) -> Table {
-    let mut table = Table::new(&[
-        "executor",
-        "model",
-        "priority",
-        "agents",
-        "rate_hz",
-        "cpu_us",
-        "cores",
-        "bare_us",
-        "sleeping_us",
-        "thread_us",
-        "over_thread",
-        "steps_per_s",
-        "age_p99_ms",
-        "late_p50_ms",
-        "late_p99_ms",
-        "dropped_ms",
-        "bytes",
-        "switches",
-        "frame_p99_ms",
-        "read_ns",
-        "start_ms",
-        "end_ms",
-    ]);
-    for row in rows {
-        let or_nan = |number: Option<f64>| number.unwrap_or(f64::NAN);
-        table.rows.push(vec![
-            row.executor.name().into(),
-            row.model.name().into(),
-            if row.realtime { "realtime" } else { "normal" }.into(),
-            (row.agents as f64, 0).into(),
-            (row.rate_hz, 1).into(),
-            (row.cpu_us_per_step, 2).into(),
-            (row.cores, 3).into(),
-            (row.bare_us_per_step, 2).into(),
-            (row.sleeping_us_per_step, 2).into(),
-            (or_nan(row.thread_us_per_step), 2).into(),
-            (or_nan(row.over_thread), 2).into(),
-            (row.steps_per_s, 0).into(),
-            (row.age_ms_p99, 2).into(),
-            (row.late_ms_p50, 2).into(),
-            (row.late_ms_p99, 2).into(),
-            (row.dropped_ms, 1).into(),
-            (or_nan(row.bytes_per_agent), 0).into(),
-            (or_nan(row.switches_per_step), 2).into(),
-            (row.frame_late_ms_p99, 2).into(),
-            (row.read_ns_per_agent, 0).into(),
-            (row.start_ms, 1).into(),
-            (row.shutdown_ms, 1).into(),
-        ]);
-    }
-    table
+/// A number, or NaN for none.
+fn or_nan(number: Option<f64>) -> f64 {
+    number.unwrap_or(f64::NAN)
 }
+
+/// The columns of the table.
+const COLUMNS: [Column<Row>; 22] = [
+    ("executor", |row| row.executor.name().into()),
+    ("model", |row| row.model.name().into()),
+    ("priority", |row| if row.realtime { "realtime" } else { "normal" }.into()),
+    ("agents", |row| (row.agents as f64, 0).into()),
+    ("rate_hz", |row| (row.rate_hz, 1).into()),
+    ("cpu_us", |row| (row.cpu_us_per_step, 2).into()),
+    ("cores", |row| (row.cores, 3).into()),
+    ("bare_us", |row| (row.bare_us_per_step, 2).into()),
+    ("sleeping_us", |row| (row.sleeping_us_per_step, 2).into()),
+    ("thread_us", |row| (or_nan(row.thread_us_per_step), 2).into()),
+    ("over_thread", |row| (or_nan(row.over_thread), 2).into()),
+    ("steps_per_s", |row| (row.steps_per_s, 0).into()),
+    ("age_p99_ms", |row| (row.age_ms_p99, 2).into()),
+    ("late_p50_ms", |row| (row.late_ms_p50, 2).into()),
+    ("late_p99_ms", |row| (row.late_ms_p99, 2).into()),
+    ("dropped_ms", |row| (row.dropped_ms, 1).into()),
+    ("bytes", |row| (or_nan(row.bytes_per_agent), 0).into()),
+    ("switches", |row| (or_nan(row.switches_per_step), 2).into()),
+    ("frame_p99_ms", |row| (row.frame_late_ms_p99, 2).into()),
+    ("read_ns", |row| (row.read_ns_per_agent, 0).into()),
+    ("start_ms", |row| (row.start_ms, 1).into()),
+    ("end_ms", |row| (row.shutdown_ms, 1).into()),
+];
 
 /// CPU per step and lateness over the number of agents, and the cost of a round where agents are unpaced.
 fn figure_of(all: &[Row]) -> Figure {
@@ -129,30 +94,19 @@ fn figure_of(all: &[Row]) -> Figure {
     };
     let panel = |title: &str, label: &'static str, y: fn(&Row) -> f64, bare: Option<fn(&Row) -> f64>| {
         let executors = [Executor::Threads, Executor::Pool, Executor::Lockstep];
-        let mut layers: Vec<Layer> = executors
-            .into_iter()
-            .zip(Colour::LINES)
-            .map(|(executor, colour)| Layer {
-                label: executor.name().to_owned(),
-                colour,
-                mark: Mark::Line(of(executor, y)),
-            })
-            .collect();
-        layers.extend(bare.map(|bare| Layer {
-            label: "bare loop".to_owned(),
-            colour: Colour::Grey,
-            mark: Mark::Dashed(of(Executor::Pool, bare)),
-        }));
+        let line = |(executor, colour): (Executor, Colour)| Layer::line(executor.name(), colour, of(executor, y));
+        let floor = bare.map(|bare| Layer::dashed("bare loop", Colour::Grey, of(Executor::Pool, bare)));
+        let layers = executors.into_iter().zip(Colour::LINES).map(line).chain(floor);
         let (low, high) = span(rows.iter().map(|row| row.agents as f64), true);
         let (least, most) = span(rows.iter().flat_map(|row| [Some(y(row)), bare.map(|b| b(row))]).flatten(), true);
-        Panel { title: title.to_owned(), x: Axis::log("agents", low, high), y: Axis::log(label, least, most), layers }
+        Panel::new(title, Axis::log("agents", low, high), Axis::log(label, least, most), layers)
     };
     let mut panels = vec![
         panel("CPU time per step", "µs", |row| row.cpu_us_per_step, Some(|row| row.bare_us_per_step)),
         panel("lateness, 99th percentile", "ms", |row| row.late_ms_p99.max(1e-3), None),
     ];
     panels.extend((free.len() > 1).then(|| growth(&free)));
-    Figure { title: "Overhead per agent".to_owned(), panels, columns: 2 }
+    Figure::new("Overhead per agent", 2, panels)
 }
 
 /// CPU time of a round (one step of every agent), where agents step as fast as they can.
@@ -162,11 +116,8 @@ fn growth(rows: &[&Row]) -> Panel {
     let (low, high) = span(ours.iter().map(|(x, _)| *x), true);
     let (least, most) = span(ours.iter().chain(&bare).map(|(_, y)| *y), true);
     let title = format!("unpaced: a round costs agents^{:.2}", exponent(&ours).unwrap_or(f64::NAN));
-    let layers = vec![
-        Layer { label: "pool".to_owned(), colour: Colour::LINES[1], mark: Mark::Line(ours) },
-        Layer { label: "bare loop".to_owned(), colour: Colour::Grey, mark: Mark::Dashed(bare) },
-    ];
-    Panel { title, x: Axis::log("agents", low, high), y: Axis::log("µs per round", least, most), layers }
+    let layers = [Layer::line("pool", Colour::LINES[1], ours), Layer::dashed("bare loop", Colour::Grey, bare)];
+    Panel::new(title, Axis::log("agents", low, high), Axis::log("µs per round", least, most), layers)
 }
 
 #[cfg(test)]

@@ -4,9 +4,7 @@
 
 use super::super::args::BenchArgs;
 use super::super::chart::figure;
-use super::super::chart::figure::Figure;
-use super::super::chart::table::Table;
-use super::super::chart::{prepared, stopper};
+use crate::chart::{Column, Figure, Table, prepared, stopper};
 use anyhow::Context;
 use metachron_console::exit::Exit;
 use metachron_console::output::{data, message};
@@ -19,15 +17,15 @@ use std::sync::atomic::{AtomicBool, Ordering};
 /// Something that can be measured.
 pub(super) trait Subject {
     /// One line of the CSV file; a pair of fields that end in `_p50` and `_p99` is one field of two in JSON.
-    type Row: Serialize;
+    type Row: Serialize + 'static;
     /// Its name on the command line; the files are called after it.
     const NAME: &'static str;
 
+    /// The columns of the table that is printed.
+    const COLUMNS: &'static [Column<Self::Row>];
+
     /// Measures the requested cases one by one while `progress` says to go on; returns the finished rows.
     fn measure(args: &BenchArgs, progress: &Progress) -> anyhow::Result<Vec<Self::Row>>;
-
-    /// The table that is printed.
-    fn table(rows: &[Self::Row]) -> Table;
 
     /// The picture of the rows.
     fn figure(rows: &[Self::Row]) -> Figure;
@@ -44,6 +42,18 @@ impl Progress {
     pub(super) fn continues(&self, done: f64, words: String) -> bool {
         self.bar.set(done, words);
         !self.stopped.load(Ordering::Relaxed)
+    }
+
+    /// Measures cases one by one, each reported with its description, while they go on.
+    pub(super) fn rows<C, R>(
+        &self,
+        cases: Vec<C>,
+        words: impl Fn(&C) -> String,
+        mut measure: impl FnMut(C) -> anyhow::Result<R>,
+    ) -> anyhow::Result<Vec<R>> {
+        let total = cases.len() as f64;
+        let continues = |(at, case): &(usize, C)| self.continues(*at as f64 / total, words(case));
+        cases.into_iter().enumerate().take_while(continues).map(|(_, case)| measure(case)).collect()
     }
 }
 
@@ -63,7 +73,7 @@ pub(super) fn run<S: Subject>(args: &BenchArgs) -> anyhow::Result<Exit> {
     if args.json {
         data(&format!("{}\n", json::<S>(&rows)?))?;
     } else if !args.quiet {
-        data(&S::table(&rows).text())?;
+        data(&Table::of(&rows, S::COLUMNS).text())?;
     }
     if interrupted {
         message("interrupted: the finished rows are written");
@@ -94,8 +104,14 @@ fn json<S: Subject>(rows: &[S::Row]) -> anyhow::Result<String> {
     Ok(serde_json::to_string_pretty(&serde_json::json!({ "bench": S::NAME, "rows": rows }))?)
 }
 
-/// The row with each pair of percentiles under one name.
-fn paired(mut row: serde_json::Value) -> serde_json::Value {
+/// The row with each pair of percentiles under one name; one of a case and its measurements as one object.
+fn paired(row: serde_json::Value) -> serde_json::Value {
+    let mut row = match row {
+        serde_json::Value::Array(parts) => {
+            parts.into_iter().filter_map(|part| part.as_object().cloned()).flatten().collect()
+        }
+        row => row,
+    };
     let Some(fields) = row.as_object_mut() else { return row };
     let names: Vec<String> = fields.keys().filter_map(|key| Some(key.strip_suffix("_p50")?.to_owned())).collect();
     for name in names {

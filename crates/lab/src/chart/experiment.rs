@@ -3,22 +3,27 @@
 //! In: whether to be quick. Out: cases, rows, a figure, a table, findings. Never here: files, threads, drawing.
 
 use super::figure::Figure;
-use super::table::Table;
+use super::table::{Column, Table};
+use csv::StringRecord;
 use metachron_render::PictureFile;
-use serde::Serialize;
 use serde::de::DeserializeOwned;
+use serde::{Serialize, Serializer};
+use std::ops::Deref;
 
 /// One measurement, made for many cases.
 pub trait Experiment: Sync {
     /// Identifies a row: rows of the same case are the same measurement.
     type Case: PartialEq + Sync;
-    /// A case with its measurements; its fields are the columns of the CSV file.
-    type Row: Serialize + DeserializeOwned + Clone + Send + Sync;
+    /// A case with its measurements: [`Row`], where the fields of a case are the first columns.
+    type Row: Record<Self::Case> + 'static;
 
     /// The name that `--only` takes; the files are called after it.
     const NAME: &'static str;
     /// One sentence that says what the experiment shows.
     const TITLE: &'static str;
+
+    /// The columns of the table that is printed; none where a line is no row.
+    const COLUMNS: &'static [Column<Self::Row>] = &[];
 
     /// Whether cases are measured one at a time, because they measure the time of this machine.
     const ALONE: bool = false;
@@ -28,9 +33,6 @@ pub trait Experiment: Sync {
 
     /// Measures one case. The same case gives the same row, whenever and on whichever thread, except for times of this machine.
     fn measure(case: &Self::Case) -> Self::Row;
-
-    /// The case that a row is of.
-    fn case_of(row: &Self::Row) -> Self::Case;
 
     /// The picture of the rows so far.
     fn figure(rows: &[Self::Row]) -> Figure;
@@ -44,10 +46,61 @@ pub trait Experiment: Sync {
     }
 
     /// The table that is printed.
-    fn table(rows: &[Self::Row]) -> Table;
+    fn table(rows: &[Self::Row]) -> Table {
+        Table::of(rows, Self::COLUMNS)
+    }
 
     /// The claims and their measured values.
     fn findings(rows: &[Self::Row]) -> Vec<Finding>;
+}
+
+/// A line of the CSV file of an experiment.
+pub trait Record<C>: Serialize + Clone + Send + Sync {
+    /// The case that was measured.
+    fn case(&self) -> C;
+
+    /// The same from a line of the file.
+    ///
+    /// # Errors
+    /// A line without a column, or with a value of another kind.
+    fn read(names: &StringRecord, line: &StringRecord) -> csv::Result<Self>;
+}
+
+/// A case and its measurements; the fields of both are the columns of the CSV file.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Row<C, M> {
+    /// The case.
+    pub case: C,
+    /// Its measurements.
+    pub found: M,
+}
+
+impl<C, M> Deref for Row<C, M> {
+    type Target = M;
+
+    fn deref(&self) -> &M {
+        &self.found
+    }
+}
+
+impl<C: Serialize, M: Serialize> Serialize for Row<C, M> {
+    fn serialize<S: Serializer>(&self, out: S) -> Result<S::Ok, S::Error> {
+        (&self.case, &self.found).serialize(out)
+    }
+}
+
+impl<C, M> Record<C> for Row<C, M>
+where
+    C: Serialize + DeserializeOwned + Clone + Send + Sync,
+    M: Serialize + DeserializeOwned + Clone + Send + Sync,
+{
+    fn case(&self) -> C {
+        self.case.clone()
+    }
+
+    fn read(names: &StringRecord, line: &StringRecord) -> csv::Result<Self> {
+        Ok(Self { case: line.deserialize(Some(names))?, found: line.deserialize(Some(names))? })
+    }
 }
 
 /// A claim compared with the rows.
@@ -67,6 +120,11 @@ impl Finding {
     /// Holds where `measured` is at most `limit`; does not hold for NaN.
     pub fn at_most(claim: impl Into<String>, measured: f64, limit: f64) -> Self {
         Self { claim: claim.into(), measured, limit, holds: Some(measured <= limit) }
+    }
+
+    /// Holds where `measured` is at least `limit`; does not hold for NaN.
+    pub fn at_least(claim: impl Into<String>, measured: f64, limit: f64) -> Self {
+        Self { claim: claim.into(), measured, limit, holds: Some(measured >= limit) }
     }
 
     /// The same for an incomplete set of `rows` rows: a claim that needs missing rows neither holds nor fails.

@@ -7,17 +7,17 @@ mod asynchronous;
 mod bench;
 mod coupling;
 mod energy_bench;
-mod experiment;
+pub(super) mod experiment;
 pub(super) mod figure;
 mod lockstep_run;
 mod policies;
-pub(super) mod power;
+mod power;
 mod rows;
 mod scaling;
 mod scenes;
 mod stability;
 mod sweep;
-pub(super) mod table;
+mod table;
 mod timing;
 
 pub(crate) use stability::common::GRAVITY;
@@ -37,10 +37,13 @@ use serde::Serialize;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicU32, Ordering};
-use table::{Cell, Table};
 
-pub(super) use experiment::{Experiment, Finding, worst};
+pub(super) use experiment::{Experiment, Finding, Record, worst};
+pub(super) use figure::{Axis, Colour, Figure, Layer, Mark, Panel, lines, span};
 pub(super) use policies::compared::selection::Selection;
+pub(super) use power::exponent;
+pub(super) use table::{Cell, Column, Table};
+pub(super) use timing::{calibration_us, floor_us, least_us, median, pace_for_goals};
 
 /// Settings that the experiments of a command share.
 struct Setting<'a> {

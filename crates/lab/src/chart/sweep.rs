@@ -3,7 +3,7 @@
 //! In: cases, rows that exist already, a flag that stops it. Out: rows in the order of the cases, each in the file as soon
 //! as it is measured. The core that measures a case is left to chance; the rows do not depend on it. Never here: measurements.
 
-use super::experiment::Experiment;
+use super::experiment::{Experiment, Record};
 use super::rows::RowFile;
 use anyhow::Context;
 use std::panic::{AssertUnwindSafe, catch_unwind};
@@ -33,7 +33,7 @@ pub(super) fn sweep<E: Experiment>(
 ) -> anyhow::Result<Swept<E::Row>> {
     let mut rows: Vec<Option<E::Row>> = cases.iter().map(|_| None).collect();
     for row in kept {
-        let case = E::case_of(&row);
+        let case = row.case();
         if let Some(k) = cases.iter().position(|c| *c == case) {
             rows[k] = Some(row);
         }

@@ -13,6 +13,9 @@ pub enum Cell {
     Number(f64, usize),
 }
 
+/// A column: its name, and its cell in a row.
+pub type Column<R> = (&'static str, fn(&R) -> Cell);
+
 /// Rows of cells under column names.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Table {
@@ -26,6 +29,26 @@ impl Table {
     /// An empty table.
     pub fn new(columns: &[&str]) -> Self {
         Self { columns: columns.iter().map(|&c| c.to_owned()).collect(), rows: Vec::new() }
+    }
+
+    /// A line for each row, with the cells of the columns.
+    pub fn of<'a, R: 'a>(rows: impl IntoIterator<Item = &'a R>, columns: &[Column<R>]) -> Self {
+        let line = |row: &R| columns.iter().map(|(_, cell)| cell(row)).collect();
+        Self {
+            columns: columns.iter().map(|(name, _)| (*name).to_owned()).collect(),
+            rows: rows.into_iter().map(line).collect(),
+        }
+    }
+
+    /// Lines of cells with the names of their columns, the same in every line.
+    pub fn named(lines: impl IntoIterator<Item = Vec<(&'static str, Cell)>>) -> Self {
+        let mut table = Self::new(&[]);
+        for line in lines {
+            let (names, cells): (Vec<_>, _) = line.into_iter().unzip();
+            table.columns = names.into_iter().map(str::to_owned).collect();
+            table.rows.push(cells);
+        }
+        table
     }
 
     /// The table as lines, columns two spaces apart.
@@ -74,6 +97,12 @@ fn readable(value: f64, digits: usize) -> String {
 impl From<&str> for Cell {
     fn from(text: &str) -> Self {
         Self::Text(text.to_owned())
+    }
+}
+
+impl From<&String> for Cell {
+    fn from(text: &String) -> Self {
+        Self::Text(text.clone())
     }
 }
 

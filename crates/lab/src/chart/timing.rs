@@ -39,6 +39,12 @@ pub fn floor_us(bytes: usize, span: Duration) -> Option<f64> {
     })
 }
 
+/// The median, the upper one of an even number; NaN of none.
+pub fn median(mut numbers: Vec<f64>) -> f64 {
+    numbers.sort_by(f64::total_cmp);
+    numbers.get(numbers.len() / 2).copied().unwrap_or(f64::NAN)
+}
+
 /// [`calibration_us`] on the machine for which goals were set, two cores of a virtual AMD EPYC, microseconds.
 const GOALS_US: f64 = 0.88;
 

@@ -3,7 +3,7 @@
 //! In: settings and costs, present and needed. Out: text. Never here: where it is printed.
 
 use super::super::args::FitArgs;
-use super::super::chart::table::{Cell, Table};
+use super::super::chart::{Cell, Table};
 use super::task::Task;
 use super::{Fitted, Simpler, length};
 use metachron_models::rod::Integrator;

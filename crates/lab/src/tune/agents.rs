@@ -4,7 +4,7 @@
 //! ([`metachron_lod::tune`] does), the experiment's turns ([`metachron_session`] makes them).
 
 use super::super::args::TuneArgs;
-use super::super::chart::table::{Cell, Table};
+use super::super::chart::{Cell, Table};
 use metachron_console::progress::Bar;
 use metachron_lod::control::RateGains;
 use metachron_lod::tune::{AgentPlant, AgentTuning, AgentVerdict, tune_agents};

@@ -28,7 +28,7 @@ const SPEEDS: [f64; 9] = [0.25, 0.35, 0.5, 0.71, 1.0, 1.41, 2.0, 2.83, 4.0];
 pub(super) fn write(folder: &Path, stem: &str, on: &Identified, tuned: &Tuning) -> anyhow::Result<[PathBuf; 2]> {
     let panels = vec![fit(&on.plant), responses(on, tuned), map(on, tuned), late_frames(on, tuned)];
     let title = format!("{} at {} Hz on {}", on.scene.name, on.target_hz, on.machine);
-    let figure = Figure { title, panels, columns: 2 };
+    let figure = Figure::new(title, 2, panels);
     let (svg, png) = (figure::svg(&figure)?, figure::png(&figure)?);
     let paths = ["svg", "png"].map(|kind| folder.join(format!("tune-{stem}.{kind}")));
     for (path, bytes) in paths.iter().zip([svg.as_bytes(), &png]) {
@@ -47,15 +47,13 @@ fn fit(plant: &Plant) -> Panel {
     let x = span(points.iter().map(|p| p.0).chain([0.0]), false);
     let y = span(points.iter().map(|p| p.1).chain([0.0]), false);
     let at = |thousands: f64| (thousands, 1e3 * plant.line.at(1e3 * thousands));
-    Panel {
-        title: "plant: measured frames and fitted line".to_owned(),
-        x: Axis::linear("polygons, thousands", x.0.max(0.0), x.1),
-        y: Axis::linear("frame time, ms", y.0.max(0.0), y.1),
-        layers: vec![
-            layer("frames", Colour::Sky, Mark::Dots(points)),
-            layer("fit", Colour::Grey, Mark::Dashed(vec![at(x.0.max(0.0)), at(x.1)])),
-        ],
-    }
+    let layers = [
+        layer("frames", Colour::Sky, Mark::Dots(points)),
+        layer("fit", Colour::Grey, Mark::Dashed(vec![at(x.0.max(0.0)), at(x.1)])),
+    ];
+    let (x, y) =
+        (Axis::linear("polygons, thousands", x.0.max(0.0), x.1), Axis::linear("frame time, ms", y.0.max(0.0), y.1));
+    Panel::new("plant: measured frames and fitted line", x, y, layers)
 }
 
 fn undisturbed_trial(on: &Identified, candidate: impl Into<Candidate>, rate: f64, seconds: f64) -> Trial {
@@ -83,12 +81,8 @@ fn responses(on: &Identified, tuned: &Tuning) -> Panel {
             layers.push(layer(if k == 0 { origin_name(row.origin) } else { "" }, colour, mark(line)));
         }
     }
-    Panel {
-        title: "step responses from 0.4 and from 2.5 times the rate".to_owned(),
-        x: Axis::linear("time, s", 0.0, SHOWN_S),
-        y: Axis::log("frame time / target", 0.2, 4.0),
-        layers,
-    }
+    let (x, y) = (Axis::linear("time, s", 0.0, SHOWN_S), Axis::log("frame time / target", 0.2, 4.0));
+    Panel::new("step responses from 0.4 and from 2.5 times the rate", x, y, layers)
 }
 
 /// The plant on the machine on which the gains were judged.
@@ -123,17 +117,14 @@ fn map(on: &Identified, tuned: &Tuning) -> Panel {
     let kinds: Vec<usize> = measured.chunks(STARTS.len()).map(kind).collect();
     let of = |kind: usize| cells.iter().zip(&kinds).filter(|(_, k)| **k == kind).map(|(cell, _)| *cell).collect();
     let [good, slow, swings] = [0, 1, 2].map(of);
-    Panel {
-        title: "stability map of the printed law".to_owned(),
-        x: Axis::log("α", alphas.0, alphas.1),
-        y: Axis::log("β", betas.0, betas.1),
-        layers: vec![
-            layer("settles within 1 s", Colour::Green, Mark::Cells(good)),
-            layer("settles later or elsewhere", Colour::Sky, Mark::Cells(slow)),
-            layer("limit cycle", Colour::Red, Mark::Cells(swings)),
-            layer("chosen", Colour::Blue, Mark::Dots(found)),
-        ],
-    }
+    let (x, y) = (Axis::log("α", alphas.0, alphas.1), Axis::log("β", betas.0, betas.1));
+    let layers = [
+        layer("settles within 1 s", Colour::Green, Mark::Cells(good)),
+        layer("settles later or elsewhere", Colour::Sky, Mark::Cells(slow)),
+        layer("limit cycle", Colour::Red, Mark::Cells(swings)),
+        layer("chosen", Colour::Blue, Mark::Dots(found)),
+    ];
+    Panel::new("stability map of the printed law", x, y, layers)
 }
 
 /// A range extended to contain these values, with half a decade of room around each.
@@ -170,12 +161,11 @@ fn late_frames(on: &Identified, tuned: &Tuning) -> Panel {
     });
     let layers: Vec<_> = lines.collect();
     let high = 100.0 * measured.iter().map(|m| m.miss_share).fold(0.01, f64::max);
-    Panel {
-        title: "gains tuned at speed 1, on machines of other speeds, load + 40 %".to_owned(),
-        x: Axis::log("speed of the machine", SPEEDS[0], SPEEDS[SPEEDS.len() - 1]),
-        y: Axis::linear("late frames, %", 0.0, 1.05 * high),
-        layers,
-    }
+    let (x, y) = (
+        Axis::log("speed of the machine", SPEEDS[0], SPEEDS[SPEEDS.len() - 1]),
+        Axis::linear("late frames, %", 0.0, 1.05 * high),
+    );
+    Panel::new("gains tuned at speed 1, on machines of other speeds, load + 40 %", x, y, layers)
 }
 
 #[cfg(test)]

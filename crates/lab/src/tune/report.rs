@@ -2,7 +2,7 @@
 //!
 //! In: a plant, verdicts, an explanation. Out: text. Never here: where it is printed.
 
-use super::super::chart::table::{Cell, Table};
+use super::super::chart::{Cell, Table};
 use super::agents::AgentLoops;
 use super::checked::Checked;
 use super::{Identified, origin_name};

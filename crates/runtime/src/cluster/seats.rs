@@ -12,7 +12,7 @@ use crate::records::events::EventKind;
 use crate::records::turns::Took;
 use crate::time::agent_clock::Timeline;
 use crate::turn::agent_runner::AgentRunner;
-use crossbeam::atomic::AtomicCell;
+use crossbeam_utils::atomic::AtomicCell;
 use metachron_core::{AgentId, Archive, ArchiveError, DisjointSets, SimTime};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Duration;

@@ -4,7 +4,7 @@
 //! takes as little time as reading one agent with news. Never here: the states themselves.
 
 use super::sync::atomic::{AtomicU64, Ordering};
-use crossbeam::utils::CachePadded;
+use crossbeam_utils::CachePadded;
 use metachron_core::AgentId;
 
 /// One bit per agent. Words are padded: agents of one word mostly share a worker, and workers must not disturb each other.

@@ -3,14 +3,12 @@
 //! In: scenes of `bench contact`, the most factors of a solve, files of peers. Out: rows of CPU time, depth, drift and energy made, in one chart.
 //! Never here: how a scene is stepped and measured.
 
-use super::super::super::chart::figure::{Axis, Colour, Figure, Layer, Mark, Panel, span};
-use super::super::super::chart::table::Table;
-use super::super::super::chart::{Experiment, Finding, worst};
 use super::course::Course;
 use super::peer::PeerRun;
 use super::stage::Stage;
 use super::{Case as BenchCase, Row as BenchRow, cases, peer_row, row};
 use crate::bench::rig::peers::Peers;
+use crate::chart::{Axis, Column, Experiment, Figure, Finding, Mark, Panel, experiment, lines, span, worst};
 use anyhow::Context;
 use metachron_console::output::message;
 use serde::{Deserialize, Serialize};
@@ -68,20 +66,17 @@ const SHOWN: [Shown; 6] = [
 ];
 
 /// A scene stepped by an engine at one of its levels.
-#[derive(Debug, Clone, PartialEq)]
-pub(crate) struct Case {
-    test: String,
-    engine: String,
-    level: String,
-}
-
-/// The same with its measurements.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub(crate) struct Row {
+pub(crate) struct Case {
     test: String,
     engine: String,
     /// Our factors or rapier3d's iterations, "exact", or "default settings".
     level: String,
+}
+
+/// Its measurements.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub(crate) struct Found {
     /// CPU milliseconds a simulated second.
     cpu_ms_per_s: f64,
     /// Median and 99th percentile of a step, CPU milliseconds.
@@ -99,8 +94,22 @@ pub(crate) struct Row {
     lost_j: f64,
 }
 
-impl Row {
-    fn of(case: &Case, run: &BenchRow, seconds: f64) -> Self {
+type Row = experiment::Row<Case, Found>;
+
+impl Found {
+    const UNKNOWN: Self = Self {
+        cpu_ms_per_s: f64::NAN,
+        ms_p50: f64::NAN,
+        ms_p99: f64::NAN,
+        landing_mm: f64::NAN,
+        rest_mm: f64::NAN,
+        drift_mm: f64::NAN,
+        sank_mm: f64::NAN,
+        made_j: f64::NAN,
+        lost_j: f64::NAN,
+    };
+
+    fn of(run: &BenchRow, seconds: f64) -> Self {
         Self {
             cpu_ms_per_s: run.cpu_s * 1e3 / seconds,
             ms_p50: run.ms_per_step_p50,
@@ -111,26 +120,6 @@ impl Row {
             sank_mm: run.sank_m * 1e3,
             made_j: run.made_j,
             lost_j: run.lost_j,
-            ..Self::unknown(case)
-        }
-    }
-
-    fn unknown(case: &Case) -> Self {
-        let Case { test, engine, level } = case.clone();
-        let none = f64::NAN;
-        Self {
-            test,
-            engine,
-            level,
-            cpu_ms_per_s: none,
-            ms_p50: none,
-            ms_p99: none,
-            landing_mm: none,
-            rest_mm: none,
-            drift_mm: none,
-            sank_mm: none,
-            made_j: none,
-            lost_j: none,
         }
     }
 
@@ -153,10 +142,10 @@ fn peers() -> impl Iterator<Item = Peers<PeerRun>> {
     PEERS.iter().map(|text| serde_json::from_str(text).expect("a file that the tests have read"))
 }
 
-fn measured(case: &Case) -> anyhow::Result<Row> {
+fn measured(case: &Case) -> anyhow::Result<Found> {
     let BenchCase { seconds, stage, .. } = scene(&case.test).context("no such scene")?;
     if let Some(peer) = peers().find(|peer| name(peer) == case.engine) {
-        return Ok(Row::of(case, &peer_row(&peer, peer.of(&case.test).context("no such run of it")?), seconds));
+        return Ok(Found::of(&peer_row(&peer, peer.of(&case.test).context("no such run of it")?), seconds));
     }
     let stage: Stage = stage()?;
     let course = if case.engine == RAPIER {
@@ -166,7 +155,7 @@ fn measured(case: &Case) -> anyhow::Result<Row> {
     } else {
         Course::of_cluster(&mut stage.play()?.within(case.level.parse().ok()), seconds)?
     };
-    Ok(Row::of(case, &row(case.test.clone(), &case.engine, &course), seconds))
+    Ok(Found::of(&row(case.test.clone(), &case.engine, &course), seconds))
 }
 
 /// An engine and the processor that it ran on.
@@ -180,6 +169,19 @@ impl Experiment for SolveLevels {
     const NAME: &'static str = "levels";
     const TITLE: &'static str = "Error of contacts over their cost, by levels of the solve";
     const ALONE: bool = true;
+    const COLUMNS: &'static [Column<Row>] = &[
+        ("test", |row| (&row.case.test).into()),
+        ("engine", |row| (&row.case.engine).into()),
+        ("level", |row| (&row.case.level).into()),
+        ("ms_per_s", |row| (row.cpu_ms_per_s, 1).into()),
+        ("p50_ms", |row| (row.ms_p50, 3).into()),
+        ("p99_ms", |row| (row.ms_p99, 3).into()),
+        ("landing_mm", |row| (row.landing_mm, 3).into()),
+        ("rest_mm", |row| (row.rest_mm, 3).into()),
+        ("drift_mm", |row| (row.drift_mm, 4).into()),
+        ("sank_mm", |row| (row.sank_mm, 2).into()),
+        ("made_j", |row| (row.made_j, 5).into()),
+    ];
 
     fn cases(quick: bool) -> Vec<Case> {
         let mut all = Vec::new();
@@ -201,86 +203,43 @@ impl Experiment for SolveLevels {
     }
 
     fn measure(case: &Case) -> Row {
-        measured(case).unwrap_or_else(|error| {
+        let found = measured(case).unwrap_or_else(|error| {
             message(&format!("{}, {} at {}: {error:#}", case.test, case.engine, case.level));
-            Row::unknown(case)
-        })
-    }
-
-    fn case_of(row: &Row) -> Case {
-        Case { test: row.test.clone(), engine: row.engine.clone(), level: row.level.clone() }
+            Found::UNKNOWN
+        });
+        Row { case: case.clone(), found }
     }
 
     fn figure(rows: &[Row]) -> Figure {
         let mut engines: Vec<&str> = Vec::new();
         for row in rows {
-            if !engines.contains(&row.engine.as_str()) {
-                engines.push(&row.engine);
+            if !engines.contains(&row.case.engine.as_str()) {
+                engines.push(&row.case.engine);
             }
         }
         let panel = |Shown { test, title, measure }: &Shown| {
-            let here: Vec<_> = rows.iter().filter(|row| row.test == *test).collect();
+            let here: Vec<_> = rows.iter().filter(|row| row.case.test == *test).collect();
             let error = |row: &Row| if row.error(*measure) < LEAST { LEAST } else { row.error(*measure) };
             let (least, most) = span(here.iter().map(|row| error(row)), true);
             let (low, high) = span(here.iter().map(|row| row.cpu_ms_per_s), true);
             let points = |engine: &str| {
-                let own = here.iter().filter(|row| row.engine == engine);
-                own.map(|row| (row.cpu_ms_per_s, error(row))).filter(|(x, y)| x.is_finite() && y.is_finite()).collect()
+                let own = here.iter().filter(|row| row.case.engine == engine);
+                let points = own.map(|row| (row.cpu_ms_per_s, error(row)));
+                points.filter(|(x, y)| x.is_finite() && y.is_finite()).collect::<Vec<_>>()
             };
-            let layers = engines.iter().zip(Colour::LINES).map(|(engine, colour)| Layer {
-                label: (*engine).to_owned(),
-                colour,
-                mark: Mark::Line(points(engine)),
-            });
-            Panel {
-                title: (*title).to_owned(),
-                x: Axis::log("CPU time a simulated second, ms", low, high),
-                y: Axis::log("", least, most),
-                layers: layers
-                    .filter(|layer| !matches!(&layer.mark, Mark::Line(points) if points.is_empty()))
-                    .collect(),
-            }
+            let layers = lines(engines.iter().copied(), points);
+            let layers = layers.filter(|layer| !matches!(&layer.mark, Mark::Line(points) if points.is_empty()));
+            let x = Axis::log("CPU time a simulated second, ms", low, high);
+            Panel::new(*title, x, Axis::log("", least, most), layers)
         };
-        let measured = |shown: &&Shown| rows.iter().any(|row| row.test == shown.test);
+        let measured = |shown: &&Shown| rows.iter().any(|row| row.case.test == shown.test);
         let panels: Vec<_> = SHOWN.iter().filter(measured).map(panel).collect();
-        Figure { title: Self::TITLE.to_owned(), columns: panels.len().clamp(1, 3), panels }
-    }
-
-    fn table(rows: &[Row]) -> Table {
-        let mut table = Table::new(&[
-            "test",
-            "engine",
-            "level",
-            "ms_per_s",
-            "p50_ms",
-            "p99_ms",
-            "landing_mm",
-            "rest_mm",
-            "drift_mm",
-            "sank_mm",
-            "made_j",
-        ]);
-        table.rows.extend(rows.iter().map(|row| {
-            vec![
-                row.test.clone().into(),
-                row.engine.clone().into(),
-                row.level.clone().into(),
-                (row.cpu_ms_per_s, 1).into(),
-                (row.ms_p50, 3).into(),
-                (row.ms_p99, 3).into(),
-                (row.landing_mm, 3).into(),
-                (row.rest_mm, 3).into(),
-                (row.drift_mm, 4).into(),
-                (row.sank_mm, 2).into(),
-                (row.made_j, 5).into(),
-            ]
-        }));
-        table
+        Figure::new(Self::TITLE, panels.len().clamp(1, 3), panels)
     }
 
     fn findings(rows: &[Row]) -> Vec<Finding> {
-        let towers = rows.iter().filter(|row| row.test == SHOWN[0].test && row.engine == OURS);
-        let from_five = |row: &&Row| row.level == EXACT || row.level.parse().is_ok_and(|most: u32| most >= 5);
+        let towers = rows.iter().filter(|row| row.case.test == SHOWN[0].test && row.case.engine == OURS);
+        let from_five = |row: &&Row| row.case.level == EXACT || row.case.level.parse().is_ok_and(|most: u32| most >= 5);
         let from_five: Vec<_> = towers.filter(from_five).collect();
         let most = |of: fn(&Row) -> f64| worst(from_five.iter().map(|row| of(row)));
         vec![

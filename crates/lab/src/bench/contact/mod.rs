@@ -11,11 +11,10 @@ mod soft_scenes;
 mod stage;
 
 use super::super::args::BenchArgs;
-use super::super::chart::figure::{Axis, Colour, Figure, Layer, Mark, Panel, span};
-use super::super::chart::table::Table;
 use super::rig::machine::processor;
 use super::rig::peers::Peers;
 use super::subject::{Progress, Subject};
+use crate::chart::{Axis, Colour, Column, Figure, Layer, span};
 use anyhow::Context;
 use course::Course;
 pub(crate) use levels::SolveLevels;
@@ -263,6 +262,26 @@ fn peer_row(peers: &Peers<PeerRun>, run: &PeerRun) -> Row {
 impl Subject for Contact {
     type Row = Row;
     const NAME: &'static str = "contact";
+    const COLUMNS: &'static [Column<Row>] = &[
+        ("test", |row| (&row.test).into()),
+        ("engine", |row| (&row.engine).into()),
+        ("p50_ms", |row| (row.ms_per_step_p50, 3).into()),
+        ("p99_ms", |row| (row.ms_per_step_p99, 3).into()),
+        ("most_ms", |row| (row.ms_most, 2).into()),
+        ("cpu_s", |row| (row.cpu_s, 3).into()),
+        ("over_peer", |row| (row.over_peer, 2).into()),
+        ("fine", |row| (row.fine_steps, 2).into()),
+        ("solves", |row| (row.solves, 2).into()),
+        ("factors", |row| (row.factors, 2).into()),
+        ("products", |row| (row.products, 1).into()),
+        ("unfinished", |row| (f64::from(row.unfinished), 0).into()),
+        ("landing_mm", |row| (row.landing_m * 1e3, 3).into()),
+        ("rest_mm", |row| (row.rest_m * 1e3, 3).into()),
+        ("drift_mm", |row| (row.drift_mean_m * 1e3, 3).into()),
+        ("most_mm", |row| (row.drift_most_m * 1e3, 3).into()),
+        ("sank_mm", |row| (row.sank_m * 1e3, 2).into()),
+        ("made_j", |row| (row.made_j, 5).into()),
+    ];
 
     fn measure(args: &BenchArgs, progress: &Progress) -> anyhow::Result<Vec<Row>> {
         let names: Vec<_> = cases(false).iter().map(Case::name).collect();
@@ -272,83 +291,26 @@ impl Subject for Contact {
             message(&format!("beside {engine} on {machine}"));
         }
         let cases = chosen(cases(args.quick), &args.only)?;
-        let total = cases.len() as f64;
-        let mut rows = Vec::new();
-        for (at, case) in cases.into_iter().enumerate() {
-            if !progress.continues(at as f64 / total, case.name()) {
-                break;
-            }
+        let measured = |case: Case| {
             let case = Case { seconds: args.seconds.unwrap_or(case.seconds), ..case };
             let found = case.measure().with_context(|| case.name())?;
             // a shorter run is none that the peer's can be held against
-            let peers = peers.as_ref().filter(|_| !args.quick && args.seconds.is_none());
-            rows.extend(beside(found, peers));
-        }
-        Ok(rows)
-    }
-
-    fn table(rows: &[Row]) -> Table {
-        let mut table = Table::new(&[
-            "test",
-            "engine",
-            "p50_ms",
-            "p99_ms",
-            "most_ms",
-            "cpu_s",
-            "over_peer",
-            "fine",
-            "solves",
-            "factors",
-            "products",
-            "unfinished",
-            "landing_mm",
-            "rest_mm",
-            "drift_mm",
-            "most_mm",
-            "sank_mm",
-            "made_j",
-        ]);
-        table.rows.extend(rows.iter().map(|row| {
-            vec![
-                row.test.clone().into(),
-                row.engine.clone().into(),
-                (row.ms_per_step_p50, 3).into(),
-                (row.ms_per_step_p99, 3).into(),
-                (row.ms_most, 2).into(),
-                (row.cpu_s, 3).into(),
-                (row.over_peer, 2).into(),
-                (row.fine_steps, 2).into(),
-                (row.solves, 2).into(),
-                (row.factors, 2).into(),
-                (row.products, 1).into(),
-                (f64::from(row.unfinished), 0).into(),
-                (row.landing_m * 1e3, 3).into(),
-                (row.rest_m * 1e3, 3).into(),
-                (row.drift_mean_m * 1e3, 3).into(),
-                (row.drift_most_m * 1e3, 3).into(),
-                (row.sank_m * 1e3, 2).into(),
-                (row.made_j, 5).into(),
-            ]
-        }));
-        table
+            Ok(beside(found, peers.as_ref().filter(|_| !args.quick && args.seconds.is_none())))
+        };
+        Ok(progress.rows(cases, Case::name, measured)?.into_iter().flatten().collect())
     }
 
     fn figure(rows: &[Row]) -> Figure {
         let ours: Vec<_> = rows.iter().filter(|row| row.engine == "metachron").collect();
         let times = || ours.iter().flat_map(|row| [row.ms_per_step_p50, row.ms_per_step_p99]);
         let (least, most) = span(times(), true);
-        let bar = |(at, row): (usize, &&Row)| Layer {
-            label: row.test.clone(),
-            colour: Colour::LINES[at % Colour::LINES.len()],
-            mark: Mark::Cells(vec![[at as f64 + 0.1, at as f64 + 0.9, row.ms_per_step_p50, row.ms_per_step_p99]]),
+        let bar = |(at, row): (usize, &&Row)| {
+            let cell = [at as f64 + 0.1, at as f64 + 0.9, row.ms_per_step_p50, row.ms_per_step_p99];
+            Layer::cells(&row.test, Colour::LINES[at % Colour::LINES.len()], [cell])
         };
-        let panel = Panel {
-            title: String::new(),
-            x: Axis::linear("", 0.0, ours.len().max(1) as f64),
-            y: Axis::log("CPU time per step, ms: the median and the 99th percentile", least, most),
-            layers: ours.iter().enumerate().map(bar).collect(),
-        };
-        Figure { title: "Steps in which contact decides".to_owned(), panels: vec![panel], columns: 1 }
+        let x = Axis::linear("", 0.0, ours.len().max(1) as f64);
+        let y = Axis::log("CPU time per step, ms: the median and the 99th percentile", least, most);
+        Figure::single("Steps in which contact decides", x, y, ours.iter().enumerate().map(bar))
     }
 }
 

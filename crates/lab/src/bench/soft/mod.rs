@@ -7,14 +7,12 @@ pub(super) mod bodies;
 mod peer;
 
 use super::super::args::BenchArgs;
-use super::super::chart::figure::{Axis, Colour, Figure, Layer, Mark, Panel, span};
-use super::super::chart::power::exponent;
-use super::super::chart::table::Table;
 use super::rig::machine::processor;
 use super::rig::peers::Peers;
 use super::rig::play::{Bound, Play, Series};
 use super::rig::shaken_floor::ShakenFloor;
 use super::subject::{Progress, Subject};
+use crate::chart::{Axis, Colour, Column, Figure, Layer, exponent, span};
 use anyhow::Context;
 use bodies::{CUBE_M, DemoTube};
 use glam::DVec3;
@@ -109,6 +107,19 @@ pub(super) struct Row {
 impl Subject for Soft {
     type Row = Row;
     const NAME: &'static str = "soft";
+    const COLUMNS: &'static [Column<Row>] = &[
+        ("test", |row| (&row.test).into()),
+        ("nodes", |row| (row.nodes as f64, 0).into()),
+        ("contacts", |row| (f64::from(row.contacts), 0).into()),
+        ("ms_per_step_p50", |row| (row.ms_per_step_p50, 3).into()),
+        ("ms_per_step_p99", |row| (row.ms_per_step_p99, 3).into()),
+        ("over_plain", |row| (row.over_plain, 2).into()),
+        ("exponent", |row| (row.exponent, 2).into()),
+        ("sag_mm", |row| (row.sag_m * 1e3, 3).into()),
+        ("shape_error", |row| (row.shape_error, 5).into()),
+        ("peer_ms", |row| (row.peer_ms_per_step, 2).into()),
+        ("peer_sag_mm", |row| (row.peer_sag_m * 1e3, 3).into()),
+    ];
 
     fn measure(args: &BenchArgs, progress: &Progress) -> anyhow::Result<Vec<Row>> {
         let peers = args.peers.as_deref().map(|path| Peers::<Cube>::read(path, &TESTS)).transpose()?;
@@ -128,73 +139,26 @@ impl Subject for Soft {
         Ok(rows)
     }
 
-    fn table(rows: &[Row]) -> Table {
-        let mut table = Table::new(&[
-            "test",
-            "nodes",
-            "contacts",
-            "ms_per_step_p50",
-            "ms_per_step_p99",
-            "over_plain",
-            "exponent",
-            "sag_mm",
-            "shape_error",
-            "peer_ms",
-            "peer_sag_mm",
-        ]);
-        table.rows.extend(rows.iter().map(|row| {
-            vec![
-                row.test.clone().into(),
-                (row.nodes as f64, 0).into(),
-                (f64::from(row.contacts), 0).into(),
-                (row.ms_per_step_p50, 3).into(),
-                (row.ms_per_step_p99, 3).into(),
-                (row.over_plain, 2).into(),
-                (row.exponent, 2).into(),
-                (row.sag_m * 1e3, 3).into(),
-                (row.shape_error, 5).into(),
-                (row.peer_ms_per_step, 2).into(),
-                (row.peer_sag_m * 1e3, 3).into(),
-            ]
-        }));
-        table
-    }
-
     fn figure(rows: &[Row]) -> Figure {
         let of = |test: &str, value: fn(&Row) -> f64| -> Vec<(f64, f64)> {
             let here = rows.iter().filter(|row| row.test == test);
             here.map(|row| (row.nodes as f64, value(row))).filter(|(_, ms)| ms.is_finite()).collect()
         };
-        let curve = |name: &str, points: Vec<(f64, f64)>| Curve { name: name.to_owned(), points };
         let curves = [
-            curve("held", of(HELD, |row| row.ms_per_step_p50)),
-            curve("on the floor", of(LYING, |row| row.ms_per_step_p50)),
-            curve("peer, held", of(HELD, |row| row.peer_ms_per_step)),
+            ("held", of(HELD, |row| row.ms_per_step_p50)),
+            ("on the floor", of(LYING, |row| row.ms_per_step_p50)),
+            ("peer, held", of(HELD, |row| row.peer_ms_per_step)),
         ];
-        let all = || curves.iter().flat_map(|curve| &curve.points);
+        let all = || curves.iter().flat_map(|(_, points)| points);
         let (low, high) = span(all().map(|(nodes, _)| *nodes), true);
         let (least, most) = span(all().map(|(_, ms)| *ms), true);
-        let drawn = curves.into_iter().zip(Colour::LINES).filter(|(curve, _)| !curve.points.is_empty());
-        let layers = drawn.map(|(curve, colour)| curve.layer(colour));
+        let drawn = curves.into_iter().zip(Colour::LINES).filter(|((_, points), _)| !points.is_empty());
+        let layers = drawn.map(|((name, points), colour)| {
+            let power = exponent(&points).map(|power| format!(": nodes^{power:.2}"));
+            Layer::line(name.to_owned() + &power.unwrap_or_default(), colour, points)
+        });
         let (x, y) = (Axis::log("nodes", low, high), Axis::log("CPU time per step, ms", least, most));
-        let panel = Panel { title: String::new(), x, y, layers: layers.collect() };
-        Figure { title: "Cost of a soft cube's step".to_owned(), panels: vec![panel], columns: 1 }
-    }
-}
-
-/// Milliseconds by numbers of nodes.
-struct Curve {
-    name: String,
-    points: Vec<(f64, f64)>,
-}
-
-impl Curve {
-    fn layer(self, colour: Colour) -> Layer {
-        let label = match exponent(&self.points) {
-            Some(power) => format!("{}: nodes^{power:.2}", self.name),
-            None => self.name,
-        };
-        Layer { label, colour, mark: Mark::Line(self.points) }
+        Figure::single("Cost of a soft cube's step", x, y, layers)
     }
 }
 

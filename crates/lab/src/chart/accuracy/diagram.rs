@@ -2,14 +2,13 @@
 //!
 //! In: a [`Benchmark`]. Out: an experiment. Never here: what a benchmark is.
 
-use super::super::experiment::{Experiment, Finding};
-use super::super::figure::{Axis, Colour, Figure, Layer, Mark, Panel, span};
-use super::super::power::exponent;
-use super::super::table::{Cell, Table};
-use super::super::timing::{calibration_us, pace_for_goals};
 use super::front::front;
 use super::peers;
 use super::play::Play;
+use crate::chart::{
+    Axis, Cell, Colour, Experiment, Figure, Finding, Layer, Panel, Table, calibration_us, experiment, exponent, lines,
+    pace_for_goals, span,
+};
 use metachron_models::rod::Integrator;
 use serde::{Deserialize, Serialize};
 use std::marker::PhantomData;
@@ -36,7 +35,7 @@ pub(in super::super) trait Benchmark: Send + Sync + 'static {
 }
 
 /// One run of a benchmark.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub(in super::super) struct Case {
     /// Which problem of the benchmark.
     pub(super) case: String,
@@ -81,7 +80,7 @@ impl Goal {
     /// Compares the goal with the rows; `None` where no row is of its case.
     fn finding(self, rows: &[Row]) -> Option<Finding> {
         let Self { case, segments, error, cpu_ms_per_s } = self;
-        let asked = || rows.iter().filter(|r| r.case == case && (segments == 0 || r.segments == segments));
+        let asked = || rows.iter().filter(|r| r.case.case == case && (segments == 0 || r.case.segments == segments));
         asked().next()?;
         let size = if segments == 0 { String::new() } else { format!(", {segments} segments") };
         let claim =
@@ -91,14 +90,9 @@ impl Goal {
     }
 }
 
-/// A run with its results.
+/// The results of a run.
 #[derive(Debug, Clone, Serialize, Deserialize)]
-pub(in super::super) struct Row {
-    case: String,
-    method: String,
-    segments: u32,
-    dt_ms: f64,
-    substeps: u32,
+pub(in super::super) struct Found {
     substeps_per_step: f64,
     /// Empty where the tube was lost.
     error: Option<f64>,
@@ -106,6 +100,8 @@ pub(in super::super) struct Row {
     /// The calibration measured right after it ([`calibration_us`]).
     calibration_us: Option<f64>,
 }
+
+pub(in super::super) type Row = experiment::Row<Case, Found>;
 
 /// The diagram of a benchmark.
 pub(in super::super) struct Diagram<B>(PhantomData<B>);
@@ -126,31 +122,25 @@ impl<B: Benchmark> Experiment for Diagram<B> {
         let cpu_ms_per_s = played.as_ref().map_or(0.0, |(play, _)| cost::<B>(case, play));
         let substeps_per_step = played.as_ref().map_or(0.0, |(play, _)| play.substeps_per_step());
         let error = played.map(|(_, error)| error).filter(|error| error.is_finite());
-        let Case { case, method, segments, dt_ms, substeps } = case.clone();
-        let calibration_us = calibration_us();
-        Row { case, method, segments, dt_ms, substeps, substeps_per_step, error, cpu_ms_per_s, calibration_us }
-    }
-
-    fn case_of(row: &Row) -> Case {
-        let Row { case, method, segments, dt_ms, substeps, .. } = row.clone();
-        Case { case, method, segments, dt_ms, substeps }
+        let found = Found { substeps_per_step, error, cpu_ms_per_s, calibration_us: calibration_us() };
+        Row { case: case.clone(), found }
     }
 
     fn figure(rows: &[Row]) -> Figure {
-        let panels: Vec<Panel> = names(rows, |r| &r.case).into_iter().map(|case| panel::<B>(case, rows)).collect();
+        let panels: Vec<Panel> = names(rows, |r| &r.case.case).into_iter().map(|case| panel::<B>(case, rows)).collect();
         let columns = panels.len().clamp(1, 3);
         let others =
             if peers::of(B::NAME).is_empty() { String::new() } else { format!(" (others: {})", peers::MACHINE) };
-        Figure { title: format!("{}{others}", B::TITLE), panels, columns }
+        Figure::new(format!("{}{others}", B::TITLE), columns, panels)
     }
 
     fn table(rows: &[Row]) -> Table {
         let columns =
             ["case", "method", "order in dt", "order in segments", "best error", "ms/s to 1e-3", "ms/s to 1e-4"];
         let mut table = Table::new(&columns);
-        for case in names(rows, |r| &r.case) {
-            for method in names(rows, |r| &r.method) {
-                let here: Vec<&Row> = rows.iter().filter(|r| r.case == case && r.method == method).collect();
+        for case in names(rows, |r| &r.case.case) {
+            for method in names(rows, |r| &r.case.method) {
+                let here: Vec<&Row> = rows.iter().filter(|r| r.case.case == case && r.case.method == method).collect();
                 if here.is_empty() {
                     continue;
                 }
@@ -207,24 +197,24 @@ fn cheapest<'a>(rows: impl Iterator<Item = &'a Row>, error: f64) -> Option<f64> 
 
 /// The power of the substep with which errors fall, at the greatest number of segments.
 fn dt_order(rows: &[&Row]) -> Option<f64> {
-    let most = rows.iter().map(|r| r.segments).max()?;
-    let points = rows.iter().filter(|r| r.segments == most && r.substeps_per_step > 0.0);
-    exponent(&points.filter_map(|r| Some((r.dt_ms / r.substeps_per_step, r.error?))).collect::<Vec<_>>())
+    let most = rows.iter().map(|r| r.case.segments).max()?;
+    let points = rows.iter().filter(|r| r.case.segments == most && r.substeps_per_step > 0.0);
+    exponent(&points.filter_map(|r| Some((r.case.dt_ms / r.substeps_per_step, r.error?))).collect::<Vec<_>>())
 }
 
 /// The power of the segment length with which errors fall, at the shortest substeps.
 fn segment_order(rows: &[&Row]) -> Option<f64> {
-    let least = |r: &&&Row| r.dt_ms / f64::from(r.substeps);
+    let least = |r: &&&Row| r.case.dt_ms / f64::from(r.case.substeps);
     let shortest = rows.iter().map(|r| least(&r)).min_by(f64::total_cmp)?;
     let points = rows.iter().filter(|r| least(r) == shortest);
-    exponent(&points.filter_map(|r| Some((1.0 / f64::from(r.segments), r.error?))).collect::<Vec<_>>())
+    exponent(&points.filter_map(|r| Some((1.0 / f64::from(r.case.segments), r.error?))).collect::<Vec<_>>())
 }
 
 /// One problem of the benchmark: methods as lines, other engines as dots, the front of all as a dashed line.
 fn panel<B: Benchmark>(case: &str, rows: &[Row]) -> Panel {
-    let here = || rows.iter().filter(|r| r.case == case);
+    let here = || rows.iter().filter(|r| r.case.case == case);
     let ours = |method: &str| {
-        let of = here().filter(|r| r.method == method);
+        let of = here().filter(|r| r.case.method == method);
         front(of.filter_map(|r| Some((r.cpu_ms_per_s, r.error?))))
     };
     let others: Vec<_> = peers::of(B::NAME).into_iter().filter(|peer| peer.case == case).collect();
@@ -232,21 +222,13 @@ fn panel<B: Benchmark>(case: &str, rows: &[Row]) -> Panel {
     let all = || here().filter_map(|r| Some((r.cpu_ms_per_s, r.error?))).chain(theirs());
     let mut engines: Vec<&str> = others.iter().map(|peer| peer.peer.as_str()).collect();
     engines.dedup();
-    let dots = engines.iter().enumerate().map(|(k, engine)| Layer {
-        label: (*engine).to_owned(),
-        colour: Colour::behind(k),
-        mark: Mark::Dots(
-            others.iter().filter(|peer| peer.peer == *engine).map(|peer| (peer.cpu_ms_per_s, peer.error)).collect(),
-        ),
+    let dots = engines.iter().enumerate().map(|(k, engine)| {
+        let here = others.iter().filter(|peer| peer.peer == *engine);
+        Layer::dots(*engine, Colour::behind(k), here.map(|peer| (peer.cpu_ms_per_s, peer.error)))
     });
-    let lines = names(rows, |r| &r.method).into_iter().zip(Colour::LINES).map(|(method, colour)| Layer {
-        label: method.to_owned(),
-        colour,
-        mark: Mark::Line(ours(method)),
-    });
-    let best = Layer { label: "front".to_owned(), colour: Colour::Grey, mark: Mark::Dashed(front(all())) };
-    let layers = dots.chain(lines).chain([best]).collect();
+    let methods = lines(names(rows, |r| &r.case.method), ours);
+    let layers = dots.chain(methods).chain([Layer::dashed("front", Colour::Grey, front(all()))]);
     let ((left, right), (low, high)) = (span(all().map(|p| p.0), true), span(all().map(|p| p.1), true));
     let (x, y) = (Axis::log("CPU ms per simulated second", left, right), Axis::log(B::ERROR, low, high));
-    Panel { title: case.to_owned(), x, y, layers }
+    Panel::new(case, x, y, layers)
 }

@@ -4,10 +4,8 @@
 //! of 1 there is little else.
 
 use super::super::energy_bench::Play;
-use super::super::experiment::{Experiment, Finding, worst};
-use super::super::figure::{Axis, Colour, Figure, Layer, Mark, Panel, span};
 use super::super::scenes::{Scene, scene};
-use super::super::table::Table;
+use crate::chart::{Axis, Colour, Column, Experiment, Figure, Finding, Layer, Panel, experiment, span, worst};
 use glam::DVec3;
 use metachron_core::{AgentId, Anchor};
 use serde::{Deserialize, Serialize};
@@ -30,7 +28,7 @@ const MOMENTUM_MAX: f64 = 0.005;
 const REST_MAX_M: f64 = 2e-3;
 
 /// A scene, the ratio of the steps, and which agent has the short one.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub(in super::super) struct Case {
     scene: String,
     ratio: u32,
@@ -40,11 +38,7 @@ pub(in super::super) struct Case {
 
 /// The difference of the two runs.
 #[derive(Debug, Clone, Serialize, Deserialize)]
-pub(in super::super) struct Row {
-    scene: String,
-    ratio: u32,
-    first_is_fast: bool,
-    seconds: f64,
+pub(in super::super) struct Found {
     /// The number of comparisons of both runs.
     looks: usize,
     /// Positions of the followed points: root mean square and greatest distance, metres.
@@ -56,11 +50,30 @@ pub(in super::super) struct Row {
     impulse: f64,
 }
 
+impl Default for Found {
+    fn default() -> Self {
+        let none = f64::NAN;
+        Self { looks: 0, position_rms_m: none, position_max_m: none, momentum: none, impulse: none }
+    }
+}
+
+type Row = experiment::Row<Case, Found>;
+
 impl Experiment for CouplingError {
     type Case = Case;
     type Row = Row;
     const NAME: &'static str = "error";
     const TITLE: &'static str = "coupling error: the same scene with unequal steps and with very fine ones for all";
+    const COLUMNS: &'static [Column<Row>] = &[
+        ("scene", |r| (&r.case.scene).into()),
+        ("ratio", |r| (f64::from(r.case.ratio), 0).into()),
+        ("first", |r| if r.case.first_is_fast { "fast" } else { "slow" }.into()),
+        ("looks", |r| (r.looks as f64, 0).into()),
+        ("rms_mm", |r| (1e3 * r.position_rms_m, 4).into()),
+        ("max_mm", |r| (1e3 * r.position_max_m, 4).into()),
+        ("momentum_error", |r| (r.momentum, 6).into()),
+        ("impulse_error", |r| (r.impulse, 6).into()),
+    ];
 
     fn cases(quick: bool) -> Vec<Case> {
         let (ratios, seconds) = if quick { (&QUICK_RATIOS[..], QUICK_SECONDS) } else { (&RATIOS[..], SECONDS) };
@@ -76,14 +89,7 @@ impl Experiment for CouplingError {
     }
 
     fn measure(case: &Case) -> Row {
-        let Case { scene, ratio, first_is_fast, seconds } = case.clone();
-        let RunDifference { samples, position_rms_m, position_max_m, momentum, impulse } =
-            apart(case).unwrap_or_default();
-        Row { scene, ratio, first_is_fast, seconds, looks: samples, position_rms_m, position_max_m, momentum, impulse }
-    }
-
-    fn case_of(row: &Row) -> Case {
-        Case { scene: row.scene.clone(), ratio: row.ratio, first_is_fast: row.first_is_fast, seconds: row.seconds }
+        Row { case: case.clone(), found: apart(case).unwrap_or_default() }
     }
 
     fn figure(rows: &[Row]) -> Figure {
@@ -91,30 +97,12 @@ impl Experiment for CouplingError {
             panel(rows, "position", "position, rms over the run, mm", |r| 1e3 * r.position_rms_m),
             panel(rows, "impulse", "impulse error / impulse with fine steps", |r| r.impulse),
         ];
-        Figure { title: "Coupling error against steps of 4 kHz for all".to_owned(), panels, columns: 2 }
-    }
-
-    fn table(rows: &[Row]) -> Table {
-        let mut table =
-            Table::new(&["scene", "ratio", "first", "looks", "rms_mm", "max_mm", "momentum_error", "impulse_error"]);
-        table.rows.extend(rows.iter().map(|r| {
-            vec![
-                r.scene.clone().into(),
-                (f64::from(r.ratio), 0).into(),
-                if r.first_is_fast { "fast" } else { "slow" }.into(),
-                (r.looks as f64, 0).into(),
-                (1e3 * r.position_rms_m, 4).into(),
-                (1e3 * r.position_max_m, 4).into(),
-                (r.momentum, 6).into(),
-                (r.impulse, 6).into(),
-            ]
-        }));
-        table
+        Figure::new("Coupling error against steps of 4 kHz for all", 2, panels)
     }
 
     fn findings(rows: &[Row]) -> Vec<Finding> {
         let lost = rows.iter().filter(|r| !r.position_rms_m.is_finite()).count() as f64;
-        let of = |scene: &str, get: fn(&Row) -> f64| worst(rows.iter().filter(|r| r.scene == scene).map(get));
+        let of = |scene: &str, get: fn(&Row) -> f64| worst(rows.iter().filter(|r| r.case.scene == scene).map(get));
         vec![
             Finding::at_most("runs that stopped early", lost, 0.0),
             Finding::at_most(
@@ -133,33 +121,16 @@ fn panel(rows: &[Row], title: &str, label: &'static str, get: fn(&Row) -> f64) -
     let least = |v: f64| if v < 1e-9 { 1e-9 } else { v };
     let mut layers = Vec::new();
     for (name, colour) in SCENES.into_iter().zip(Colour::LINES) {
-        for way in [true, false] {
-            let here = rows.iter().filter(|r| r.scene == name && (r.first_is_fast == way || r.ratio == 1));
-            let points: Vec<_> = here.map(|r| (f64::from(r.ratio), least(get(r)))).collect();
-            let mark = if way { Mark::Line(points) } else { Mark::Dashed(points) };
-            let label = if way { name.to_owned() } else { format!("{name}, first slow") };
-            layers.push(Layer { label, colour, mark });
-        }
+        let points = |way: bool| {
+            let there = move |r: &&Row| r.case.scene == name && (r.case.first_is_fast == way || r.case.ratio == 1);
+            rows.iter().filter(there).map(|r| (f64::from(r.case.ratio), least(get(r))))
+        };
+        layers.push(Layer::line(name, colour, points(true)));
+        layers.push(Layer::dashed(format!("{name}, first slow"), colour, points(false)));
     }
     let (low, high) = span(rows.iter().map(|r| least(get(r))), true);
     let x = Axis::log("ratio of step rates", 0.8, 125.0);
-    Panel { title: title.to_owned(), x, y: Axis::log(label, low, 30.0 * high), layers }
-}
-
-/// The difference of two runs.
-struct RunDifference {
-    samples: usize,
-    position_rms_m: f64,
-    position_max_m: f64,
-    momentum: f64,
-    impulse: f64,
-}
-
-impl Default for RunDifference {
-    fn default() -> Self {
-        let none = f64::NAN;
-        Self { samples: 0, position_rms_m: none, position_max_m: none, momentum: none, impulse: none }
-    }
+    Panel::new(title, x, Axis::log(label, low, 30.0 * high), layers)
 }
 
 /// The record of one run: positions at every comparison, momentum and impulse at the last one.
@@ -170,7 +141,7 @@ struct Trail {
     impulse_n_s: f64,
 }
 
-fn apart(case: &Case) -> Option<RunDifference> {
+fn apart(case: &Case) -> Option<Found> {
     let slow_ns = FAST_NS * u64::from(case.ratio);
     let steps_ns = if case.first_is_fast { [FAST_NS, slow_ns] } else { [slow_ns, FAST_NS] };
     let coupled = trail(case, slow_ns, steps_ns)?;
@@ -178,8 +149,8 @@ fn apart(case: &Case) -> Option<RunDifference> {
     let pairs = coupled.samples.iter().flatten().zip(oracle.samples.iter().flatten());
     let squares: Vec<f64> = pairs.map(|(a, b)| a.distance_squared(*b)).collect();
     let mean = squares.iter().sum::<f64>() / squares.len() as f64;
-    Some(RunDifference {
-        samples: coupled.samples.len(),
+    Some(Found {
+        looks: coupled.samples.len(),
         position_rms_m: mean.sqrt(),
         position_max_m: worst(squares).sqrt(),
         momentum: coupled.momentum.distance(oracle.momentum) / oracle.impulse_n_s,

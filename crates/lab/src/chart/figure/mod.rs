@@ -19,6 +19,18 @@ pub struct Figure {
     pub columns: usize,
 }
 
+impl Figure {
+    /// Panels under a title, so many in a row.
+    pub fn new(title: impl Into<String>, columns: usize, panels: Vec<Panel>) -> Self {
+        Self { title: title.into(), panels, columns }
+    }
+
+    /// A single pair of axes under a title.
+    pub fn single(title: impl Into<String>, x: Axis, y: Axis, layers: impl IntoIterator<Item = Layer>) -> Self {
+        Self::new(title, 1, vec![Panel::new("", x, y, layers)])
+    }
+}
+
 /// A pair of axes with the layers drawn in it.
 #[derive(Debug, Clone)]
 pub struct Panel {
@@ -30,6 +42,13 @@ pub struct Panel {
     pub y: Axis,
     /// The layers, the first at the back.
     pub layers: Vec<Layer>,
+}
+
+impl Panel {
+    /// Layers in a pair of axes.
+    pub fn new(title: impl Into<String>, x: Axis, y: Axis, layers: impl IntoIterator<Item = Layer>) -> Self {
+        Self { title: title.into(), x, y, layers: layers.into_iter().collect() }
+    }
 }
 
 /// An axis.
@@ -72,6 +91,41 @@ pub struct Layer {
     pub colour: Colour,
     /// The shape.
     pub mark: Mark,
+}
+
+impl Layer {
+    /// A line through points: measurements.
+    pub fn line(label: impl Into<String>, colour: Colour, points: impl IntoIterator<Item = (f64, f64)>) -> Self {
+        Self { label: label.into(), colour, mark: Mark::Line(points.into_iter().collect()) }
+    }
+
+    /// A dashed line through points: theory.
+    pub fn dashed(label: impl Into<String>, colour: Colour, points: impl IntoIterator<Item = (f64, f64)>) -> Self {
+        Self { label: label.into(), colour, mark: Mark::Dashed(points.into_iter().collect()) }
+    }
+
+    /// Points.
+    pub fn dots(label: impl Into<String>, colour: Colour, points: impl IntoIterator<Item = (f64, f64)>) -> Self {
+        Self { label: label.into(), colour, mark: Mark::Dots(points.into_iter().collect()) }
+    }
+
+    /// Rectangles [x from, x to, y from, y to].
+    pub fn cells(label: impl Into<String>, colour: Colour, cells: impl IntoIterator<Item = [f64; 4]>) -> Self {
+        Self { label: label.into(), colour, mark: Mark::Cells(cells.into_iter().collect()) }
+    }
+
+    /// A limit: a dashed grey line at a height.
+    pub fn limit(label: impl Into<String>, ends: [f64; 2], at: f64) -> Self {
+        Self::dashed(label, Colour::Grey, ends.map(|x| (x, at)))
+    }
+}
+
+/// A line for each name, in the colours of lines.
+pub fn lines<'a, P: IntoIterator<Item = (f64, f64)>>(
+    names: impl IntoIterator<Item = &'a str>,
+    points: impl Fn(&'a str) -> P,
+) -> impl Iterator<Item = Layer> {
+    names.into_iter().zip(Colour::LINES).map(move |(name, colour)| Layer::line(name, colour, points(name)))
 }
 
 /// The shape of a layer. Values outside the axes are drawn at the border, with an arrow; values that are not finite are left out.

@@ -1,9 +1,8 @@
 //! The cost of a step of a tube folded on itself by its contacts, free and held by a tool.
 
-use super::super::experiment::Finding;
-use super::super::timing::{floor_us, least_us};
 use super::growth::{Case, Cost, Growth, Row, pace};
 use super::tubes::{TUBE, folded, grasp, on_ground};
+use crate::chart::{Finding, floor_us, least_us};
 use std::time::Duration;
 
 /// The experiment.
@@ -54,7 +53,7 @@ impl Growth for Contacts {
 
     fn findings(rows: &[Row]) -> Vec<Finding> {
         let us = |case: &str, size: u32| {
-            let row = rows.iter().find(|row| row.case == case && row.size == size);
+            let row = rows.iter().find(|row| row.case.case == case && row.case.size == size);
             pace(rows) * row.map_or(f64::NAN, |row| row.point().1)
         };
         let mut list = vec![Finding::at_most(
@@ -62,7 +61,7 @@ impl Growth for Contacts {
             us(FREE, 100),
             300.0,
         )];
-        if rows.iter().any(|row| row.size == 400) {
+        if rows.iter().any(|row| row.case.size == 400) {
             let claim = "400 segments in self-contact and in a grasp: µs per step of 1 ms by calibration";
             list.push(Finding::at_most(claim, us(HELD, 400), 5000.0));
         }

@@ -2,11 +2,10 @@
 //!
 //! In: a [`Growth`]. Out: an experiment whose cases are measured one at a time. Never here: what is counted.
 
-use super::super::experiment::{Experiment, Finding};
-use super::super::figure::{Axis, Colour, Figure, Layer, Mark, Panel, span};
-use super::super::power::exponent;
-use super::super::table::Table;
-use super::super::timing::{calibration_us, pace_for_goals};
+use crate::chart::{
+    Axis, Colour, Experiment, Figure, Finding, Layer, Panel, Table, calibration_us, experiment, exponent, lines,
+    pace_for_goals, span,
+};
 use serde::{Deserialize, Serialize};
 use std::marker::PhantomData;
 use std::ops::RangeInclusive;
@@ -43,7 +42,7 @@ pub(in super::super) trait Growth: Send + Sync + 'static {
 }
 
 /// One size of one kind.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub(in super::super) struct Case {
     /// The kind.
     pub(super) case: String,
@@ -60,11 +59,9 @@ pub(in super::super) struct Cost {
     pub(super) floor_us: f64,
 }
 
-/// A case with its measurements.
+/// The measurements of a case.
 #[derive(Debug, Clone, Serialize, Deserialize)]
-pub(in super::super) struct Row {
-    pub(super) case: String,
-    pub(super) size: u32,
+pub(in super::super) struct Found {
     /// Empty, like the numbers after it, where the case could not be carried out.
     pub(super) count: Option<f64>,
     pub(super) us: Option<f64>,
@@ -73,7 +70,9 @@ pub(in super::super) struct Row {
     pub(super) calibration_us: Option<f64>,
 }
 
-impl Row {
+pub(in super::super) type Row = experiment::Row<Case, Found>;
+
+impl Found {
     /// Count and microseconds; NaN where there are none.
     pub(super) fn point(&self) -> (f64, f64) {
         (self.count.unwrap_or(f64::NAN), self.us.unwrap_or(f64::NAN))
@@ -117,17 +116,13 @@ impl<G: Growth> Experiment for Scaling<G> {
     fn measure(case: &Case) -> Row {
         let cost = G::measure(case);
         let number = |of: fn(&Cost) -> f64| cost.as_ref().map(of).filter(|number| number.is_finite());
-        let Case { case, size } = case.clone();
         let (count, us, floor_us) = (number(|c| c.count), number(|c| c.us), number(|c| c.floor_us));
-        Row { case, size, count, us, floor_us, calibration_us: calibration_us() }
-    }
-
-    fn case_of(row: &Row) -> Case {
-        Case { case: row.case.clone(), size: row.size }
+        let found = Found { count, us, floor_us, calibration_us: calibration_us() };
+        Row { case: case.clone(), found }
     }
 
     fn figure(rows: &[Row]) -> Figure {
-        Figure { title: G::TITLE.to_owned(), panels: vec![whole::<G>(rows), each::<G>(rows)], columns: 2 }
+        Figure::new(G::TITLE, 2, vec![whole::<G>(rows), each::<G>(rows)])
     }
 
     fn table(rows: &[Row]) -> Table {
@@ -137,14 +132,14 @@ impl<G: Growth> Experiment for Scaling<G> {
             let (count, us) = row.point();
             let floor_us = row.floor().1;
             table.rows.push(vec![
-                row.case.as_str().into(),
-                (f64::from(row.size), 0).into(),
+                (&row.case.case).into(),
+                (f64::from(row.case.size), 0).into(),
                 (count, 0).into(),
                 (us, 2).into(),
                 (row.ns_each(), 1).into(),
                 (floor_us * 1e3 / count, 1).into(),
                 (row.times_floor(), 2).into(),
-                (power(rows, &row.case, ANY_COUNT), 3).into(),
+                (power(rows, &row.case.case, ANY_COUNT), 3).into(),
             ]);
         }
         table
@@ -157,51 +152,51 @@ impl<G: Growth> Experiment for Scaling<G> {
 
 /// The power of the count with which the cost of a case grows, over a range of counts.
 pub(super) fn power(rows: &[Row], case: &str, counts: RangeInclusive<f64>) -> f64 {
-    let inside = |row: &&Row| row.case == case && row.count.is_some_and(|n| counts.contains(&n));
-    let points: Vec<_> = rows.iter().filter(inside).map(Row::point).collect();
+    let inside = |row: &&Row| row.case.case == case && row.count.is_some_and(|n| counts.contains(&n));
+    let points: Vec<_> = rows.iter().filter(inside).map(|row| row.point()).collect();
     exponent(&points).unwrap_or(f64::NAN)
 }
 
 /// The distinct cases, in the order of the rows.
 fn names(rows: &[Row]) -> Vec<&str> {
-    let mut list: Vec<&str> = rows.iter().map(|row| row.case.as_str()).collect();
+    let mut list: Vec<&str> = rows.iter().map(|row| row.case.case.as_str()).collect();
     list.dedup();
     list
 }
 
 /// Cost against count, the floor as a dashed line, other engines as dots.
 fn whole<G: Growth>(rows: &[Row]) -> Panel {
-    let of = |case: &str, y: fn(&Row) -> (f64, f64)| rows.iter().filter(|r| r.case == case).map(y).collect::<Vec<_>>();
+    let of = |case: &'_ str, y: fn(&Found) -> (f64, f64)| -> Vec<_> {
+        rows.iter().filter(|r| r.case.case == case).map(|r| y(r)).collect()
+    };
     let mut layers = Vec::new();
     let peers = G::peers();
     let mut engines: Vec<&str> = peers.iter().map(|peer| peer.0.as_str()).collect();
     engines.dedup();
     for (k, engine) in engines.iter().enumerate() {
-        let points = peers.iter().filter(|peer| peer.0 == *engine).map(|peer| (peer.1, peer.2)).collect();
-        let colour = Colour::behind(k);
-        layers.push(Layer { label: (*engine).to_owned(), colour, mark: Mark::Dots(points) });
+        let points = peers.iter().filter(|peer| peer.0 == *engine).map(|peer| (peer.1, peer.2));
+        layers.push(Layer::dots(*engine, Colour::behind(k), points));
     }
     for (case, colour) in names(rows).into_iter().zip(Colour::LINES) {
         let label = format!("{case}: ^{:.2}", power(rows, case, ANY_COUNT));
-        layers.push(Layer { label, colour, mark: Mark::Line(of(case, Row::point)) });
-        layers.push(Layer { label: String::new(), colour, mark: Mark::Dashed(of(case, Row::floor)) });
+        layers.push(Layer::line(label, colour, of(case, Found::point)));
+        layers.push(Layer::dashed("", colour, of(case, Found::floor)));
     }
-    layers.push(Layer { label: G::FLOOR.to_owned(), colour: Colour::Grey, mark: Mark::Dashed(Vec::new()) });
+    layers.push(Layer::dashed(G::FLOOR, Colour::Grey, []));
     let all = || rows.iter().flat_map(|row| [row.point(), row.floor()]).chain(peers.iter().map(|p| (p.1, p.2)));
     let ((left, right), (low, high)) = (span(all().map(|p| p.0), true), span(all().map(|p| p.1), true));
     let (x, y) = (Axis::log(G::COUNTED, left, right), Axis::log(G::COST, low, high));
-    Panel { title: "total".to_owned(), x, y, layers }
+    Panel::new("total", x, y, layers)
 }
 
 /// Cost of each item against count.
 fn each<G: Growth>(rows: &[Row]) -> Panel {
-    let of = |case: &str| rows.iter().filter(|r| r.case == case).map(|r| (r.point().0, r.ns_each())).collect();
-    let lines = names(rows).into_iter().zip(Colour::LINES);
-    let layers = lines.map(|(case, colour)| Layer { label: String::new(), colour, mark: Mark::Line(of(case)) });
+    let of = |case| rows.iter().filter(move |r| r.case.case == case).map(|r| (r.point().0, r.ns_each()));
+    let layers = lines(names(rows), of).map(|line| Layer { label: String::new(), ..line });
     let ((left, right), (low, high)) =
-        (span(rows.iter().map(|r| r.point().0), true), span(rows.iter().map(Row::ns_each), true));
+        (span(rows.iter().map(|r| r.point().0), true), span(rows.iter().map(|r| r.ns_each()), true));
     let (x, y) = (Axis::log(G::COUNTED, left, right), Axis::log("ns each", low, high));
-    Panel { title: "per item".to_owned(), x, y, layers: layers.collect() }
+    Panel::new("per item", x, y, layers)
 }
 
 #[cfg(test)]
@@ -211,12 +206,8 @@ mod tests {
     #[test]
     fn the_power_is_fitted_between_two_counts() {
         let row = |size: u32, us: f64| Row {
-            case: "a".to_owned(),
-            size,
-            count: Some(f64::from(size)),
-            us: Some(us),
-            floor_us: Some(1.0),
-            calibration_us: None,
+            case: Case { case: "a".to_owned(), size },
+            found: Found { count: Some(f64::from(size)), us: Some(us), floor_us: Some(1.0), calibration_us: None },
         };
         // a fixed cost below 100, proportional from there on
         let rows = [row(1, 50.0), row(10, 50.0), row(100, 100.0), row(1000, 1000.0)];

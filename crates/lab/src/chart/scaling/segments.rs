@@ -1,10 +1,9 @@
 //! The cost of a step of a tube by its segments: alone, searching for self-contact, and also held by a tool.
 
 use super::super::accuracy::peers;
-use super::super::experiment::{Finding, worst};
-use super::super::timing::{floor_us, least_us};
 use super::growth::{Case, Cost, Growth, Row, pace, power};
 use super::tubes::{grasp, hanging, straight};
+use crate::chart::{Finding, floor_us, least_us, worst};
 use std::ops::RangeInclusive;
 use std::time::Duration;
 
@@ -57,8 +56,8 @@ impl Growth for Segments {
     }
 
     fn findings(rows: &[Row]) -> Vec<Finding> {
-        let inside = |row: &&Row| row.case == ALONE && CLAIMED.contains(&f64::from(row.size));
-        let slowest = pace(rows) * worst(rows.iter().filter(inside).map(Row::ns_each));
+        let inside = |row: &&Row| row.case.case == ALONE && CLAIMED.contains(&f64::from(row.case.size));
+        let slowest = pace(rows) * worst(rows.iter().filter(inside).map(|row| row.ns_each()));
         let range = format!("{} … {} segments", CLAIMED.start(), CLAIMED.end());
         vec![
             Finding::at_most(format!("ns per segment and step by calibration, {range}, alone"), slowest, CLAIMED_NS),

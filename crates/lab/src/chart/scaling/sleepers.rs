@@ -1,8 +1,8 @@
 //! The cost that objects at rest add for ten that move: ten swinging tubes, alone and together with up to a thousand boxes or tubes at
 //! rest out of sight.
 
-use super::super::experiment::Finding;
 use super::growth::{Case, Cost, Growth, Row};
+use crate::chart::{Finding, median};
 use cpu_time::ThreadTime;
 use metachron_render::{Size, Style};
 use metachron_runtime::AgentState;
@@ -65,9 +65,9 @@ impl Growth for Sleepers {
     }
 
     fn findings(rows: &[Row]) -> Vec<Finding> {
-        let most = rows.iter().filter(|row| row.size == 1000);
+        let most = rows.iter().filter(|row| row.case.size == 1000);
         let claim = |row: &Row| {
-            let claim = format!("{}: a thousand asleep and ten awake, over the ten alone", row.case);
+            let claim = format!("{}: a thousand asleep and ten awake, over the ten alone", row.case.case);
             Finding::at_most(claim, row.times_floor(), LIMIT)
         };
         most.map(claim).collect()
@@ -117,11 +117,6 @@ impl Play {
             self.session.finish(started, Finished::default());
         }
     }
-}
-
-fn median(mut times_us: Vec<f64>) -> f64 {
-    times_us.sort_by(f64::total_cmp);
-    times_us[times_us.len() / 2]
 }
 
 const AWAKE: usize = 10;

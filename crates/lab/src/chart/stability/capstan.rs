@@ -5,10 +5,8 @@
 //! surface (docs/theory/contact.md, eq. 14, gives the difference for thicker tubes).
 
 use super::super::bench::StepHarness;
-use super::super::experiment::{Experiment, Finding, worst};
-use super::super::figure::{Axis, Colour, Figure, Layer, Mark, Panel};
-use super::super::table::Table;
 use super::common::{dead_load, plain_tube};
+use crate::chart::{Axis, Colour, Column, Experiment, Figure, Finding, Layer, experiment, worst};
 use glam::{DQuat, DVec3};
 use metachron_geometry::{Obstacle, Solid};
 use metachron_models::rod::Tube;
@@ -46,24 +44,24 @@ const SETTLE_S: f64 = 0.5;
 const SLIP_M: f64 = 5e-4;
 
 /// An angle and a coefficient.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub(in super::super) struct Case {
-    wrap_rad: f64,
     friction: f64,
+    wrap_rad: f64,
 }
 
 /// The result of a case.
 #[derive(Debug, Clone, Serialize, Deserialize)]
-pub(in super::super) struct Row {
-    friction: f64,
-    wrap_rad: f64,
+pub(in super::super) struct Found {
     /// exp(μφ).
     theory: f64,
     /// T₂/T₁ at which the tube slipped; empty if it never did.
     ratio: Option<f64>,
 }
 
-impl Row {
+type Row = experiment::Row<Case, Found>;
+
+impl Found {
     fn error(&self) -> f64 {
         self.ratio.map_or(f64::NAN, |ratio| (ratio / self.theory - 1.0).abs())
     }
@@ -74,6 +72,13 @@ impl Experiment for Capstan {
     type Row = Row;
     const NAME: &'static str = "capstan";
     const TITLE: &'static str = "capstan: tension ratio at which a tube around a fixed cylinder slips";
+    const COLUMNS: &'static [Column<Row>] = &[
+        ("friction", |r| (r.case.friction, 1).into()),
+        ("wrap_rad", |r| (r.case.wrap_rad, 4).into()),
+        ("exp(μφ)", |r| (r.theory, 4).into()),
+        ("ratio", |r| (r.ratio.unwrap_or(f64::NAN), 4).into()),
+        ("error", |r| (r.error(), 4).into()),
+    ];
 
     fn cases(quick: bool) -> Vec<Case> {
         let frictions = if quick { &[CLAIMED_FRICTION][..] } else { &FRICTIONS[..] };
@@ -83,52 +88,28 @@ impl Experiment for Capstan {
     }
 
     fn measure(case: &Case) -> Row {
-        let Case { wrap_rad, friction } = *case;
-        Row { friction, wrap_rad, theory: libm::exp(friction * wrap_rad), ratio: slip_ratio(case) }
-    }
-
-    fn case_of(row: &Row) -> Case {
-        Case { wrap_rad: row.wrap_rad, friction: row.friction }
+        let theory = libm::exp(case.friction * case.wrap_rad);
+        Row { case: case.clone(), found: Found { theory, ratio: slip_ratio(case) } }
     }
 
     fn figure(rows: &[Row]) -> Figure {
         let top = rows.iter().flat_map(|r| [r.theory, r.ratio.unwrap_or(1.0)]).fold(2.0, f64::max) * 1.2;
         let mut layers = Vec::new();
         for (friction, colour) in FRICTIONS.into_iter().zip(Colour::LINES) {
-            let here: Vec<&Row> = rows.iter().filter(|r| r.friction == friction).collect();
-            let Some(far) = here.iter().map(|r| r.wrap_rad).reduce(f64::max) else { continue };
+            let here: Vec<&Row> = rows.iter().filter(|r| r.case.friction == friction).collect();
+            let Some(far) = here.iter().map(|r| r.case.wrap_rad).reduce(f64::max) else { continue };
             let theory = (0..=60).map(|k| far * f64::from(k) / 60.0).map(|phi| (phi, libm::exp(friction * phi)));
-            let dots = here.iter().filter_map(|r| Some((r.wrap_rad, r.ratio?))).collect();
-            layers.push(Layer {
-                label: format!("exp(μφ), μ = {friction}"),
-                colour,
-                mark: Mark::Dashed(theory.collect()),
-            });
-            layers.push(Layer { label: format!("measured, μ = {friction}"), colour, mark: Mark::Dots(dots) });
+            let dots = here.iter().filter_map(|r| Some((r.case.wrap_rad, r.ratio?)));
+            layers.push(Layer::dashed(format!("exp(μφ), μ = {friction}"), colour, theory));
+            layers.push(Layer::dots(format!("measured, μ = {friction}"), colour, dots));
         }
         let (x, y) = (Axis::linear("angle of wrap φ, rad", 0.0, 8.0), Axis::log("T₂/T₁ at which it slips", 1.0, top));
-        let panel = Panel { title: String::new(), x, y, layers };
-        Figure { title: "Capstan: slip of a tube around a fixed cylinder".to_owned(), panels: vec![panel], columns: 1 }
-    }
-
-    fn table(rows: &[Row]) -> Table {
-        let mut table = Table::new(&["friction", "wrap_rad", "exp(μφ)", "ratio", "error"]);
-        table.rows.extend(rows.iter().map(|r| {
-            let ratio = r.ratio.unwrap_or(f64::NAN);
-            vec![
-                (r.friction, 1).into(),
-                (r.wrap_rad, 4).into(),
-                (r.theory, 4).into(),
-                (ratio, 4).into(),
-                (r.error(), 4).into(),
-            ]
-        }));
-        table
+        Figure::single("Capstan: slip of a tube around a fixed cylinder", x, y, layers)
     }
 
     fn findings(rows: &[Row]) -> Vec<Finding> {
-        let claimed = |r: &&Row| r.friction == CLAIMED_FRICTION && CLAIMED_WRAPS.contains(&r.wrap_rad);
-        let greatest = worst(rows.iter().filter(claimed).map(Row::error));
+        let claimed = |r: &&Row| r.case.friction == CLAIMED_FRICTION && CLAIMED_WRAPS.contains(&r.case.wrap_rad);
+        let greatest = worst(rows.iter().filter(claimed).map(|r| r.error()));
         vec![Finding::at_most(
             "T₂/T₁ at slip against exp(μφ), μ = 0.3, φ = π/2, π: relative error",
             greatest,

@@ -3,11 +3,9 @@
 //! Cubes of 1 m on a floor, each an agent; twenty links on ball joints. Measurements of the other engines, made once, are in
 //! `docs/reference/peers_w4.json`: for each engine the best of its variants at this mass ratio and step.
 
-use super::super::experiment::{Experiment, Finding, worst};
-use super::super::figure::{Axis, Colour, Figure, Layer, Mark, Panel};
 use super::super::lockstep_run::LockstepRun;
-use super::super::table::Table;
 use super::common::{GRAVITY, plain_body};
+use crate::chart::{Axis, Colour, Column, Experiment, Figure, Finding, Layer, Panel, experiment, worst};
 use glam::{DQuat, DVec3};
 use metachron_contact::detect::ClusterScene;
 use metachron_core::{AgentId, Body, RigidState, Snapshot};
@@ -41,7 +39,7 @@ const HALF_LINK_M: f64 = 0.1;
 const LINKS: u32 = 20;
 
 /// A test.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub(in super::super) struct Case {
     test: String,
     ratio: f64,
@@ -50,10 +48,7 @@ pub(in super::super) struct Case {
 
 /// The results of a test.
 #[derive(Debug, Clone, Serialize, Deserialize)]
-pub(in super::super) struct Row {
-    test: String,
-    ratio: f64,
-    rate_hz: f64,
+pub(in super::super) struct Found {
     /// Sink of the top, metres, or greatest stretch of the chain as a share of its length.
     value: f64,
     /// Greatest sideways displacement of a box, metres.
@@ -67,6 +62,8 @@ pub(in super::super) struct Row {
     best_peer_value: Option<f64>,
     best_peer: String,
 }
+
+type Row = experiment::Row<Case, Found>;
 
 /// One measurement of another engine.
 #[derive(Debug, Clone, Deserialize)]
@@ -103,6 +100,17 @@ impl Experiment for Heavy {
     type Row = Row;
     const NAME: &'static str = "heavy-on-light";
     const TITLE: &'static str = "stacks and chains with a heavy end: sink and stretch, compared with other engines";
+    const COLUMNS: &'static [Column<Row>] = &[
+        ("test", |r| (&r.case.test).into()),
+        ("ratio", |r| (r.case.ratio, 0).into()),
+        ("rate_hz", |r| (r.case.rate_hz, 0).into()),
+        ("value", |r| (r.value, 6).into()),
+        ("aside_m", |r| (r.aside_m, 6).into()),
+        ("gain", |r| (r.gain, 6).into()),
+        ("verdict", |r| if r.holds { "holds" } else { "FAILS" }.into()),
+        ("best peer", |r| (r.best_peer_value.unwrap_or(f64::NAN), 6).into()),
+        ("peer", |r| if r.best_peer.is_empty() { "none holds" } else { &r.best_peer }.into()),
+    ];
 
     fn cases(quick: bool) -> Vec<Case> {
         let (tests, ratios) = if quick { (&TESTS[..], &RATIOS[2..]) } else { (&TESTS[..], &RATIOS[..]) };
@@ -117,11 +125,11 @@ impl Experiment for Heavy {
     }
 
     fn measure(case: &Case) -> Row {
-        let Case { test, ratio, rate_hz } = case.clone();
-        let result = if test.starts_with("stack") { cube_stack(case) } else { hanging_chain(case) };
+        let is_stack = case.test.starts_with("stack");
+        let result = if is_stack { cube_stack(case) } else { hanging_chain(case) };
         let MassRatioResult { value, aside_m, gain, led } =
             result.unwrap_or(MassRatioResult { value: f64::NAN, aside_m: 0.0, gain: 0.0, led: 0 });
-        let holds = if test.starts_with("stack") {
+        let holds = if is_stack {
             value.abs() <= SINK_MAX_M && aside_m <= ASIDE_MAX_M
         } else {
             value <= STRETCH_MAX && gain <= GAIN_MAX
@@ -129,35 +137,12 @@ impl Experiment for Heavy {
         let peer = best_peer(case);
         let best_peer_value = peer.as_ref().and_then(|p| p.value);
         let best_peer = peer.map_or_else(String::new, |p| format!("{} {}", p.peer, p.variant));
-        Row { test, ratio, rate_hz, value, aside_m, gain, holds, led, best_peer_value, best_peer }
-    }
-
-    fn case_of(row: &Row) -> Case {
-        Case { test: row.test.clone(), ratio: row.ratio, rate_hz: row.rate_hz }
+        Row { case: case.clone(), found: Found { value, aside_m, gain, holds, led, best_peer_value, best_peer } }
     }
 
     fn figure(rows: &[Row]) -> Figure {
         let panels = TESTS.into_iter().map(|test| panel(test, rows)).collect();
-        Figure { title: "Heavy on light, steps of 1/60 s (large) and 1/240 s".to_owned(), panels, columns: 2 }
-    }
-
-    fn table(rows: &[Row]) -> Table {
-        let mut table =
-            Table::new(&["test", "ratio", "rate_hz", "value", "aside_m", "gain", "verdict", "best peer", "peer"]);
-        table.rows.extend(rows.iter().map(|r| {
-            vec![
-                r.test.clone().into(),
-                (r.ratio, 0).into(),
-                (r.rate_hz, 0).into(),
-                (r.value, 6).into(),
-                (r.aside_m, 6).into(),
-                (r.gain, 6).into(),
-                if r.holds { "holds" } else { "FAILS" }.into(),
-                (r.best_peer_value.unwrap_or(f64::NAN), 6).into(),
-                if r.best_peer.is_empty() { "none holds" } else { &r.best_peer }.into(),
-            ]
-        }));
-        table
+        Figure::new("Heavy on light, steps of 1/60 s (large) and 1/240 s", 2, panels)
     }
 
     fn findings(rows: &[Row]) -> Vec<Finding> {
@@ -277,9 +262,9 @@ fn panel(test: &str, rows: &[Row]) -> Panel {
     const FLOOR: f64 = 1e-9;
     let mut layers = Vec::new();
     for (rate_hz, colour) in RATES_HZ.into_iter().zip([Colour::Blue, Colour::Sky]) {
-        let here = rows.iter().filter(|r| r.test == test && r.rate_hz == rate_hz);
-        let points = here.map(|r| (r.ratio, r.value.abs().max(FLOOR))).collect();
-        layers.push(Layer { label: format!("metachron, {rate_hz} Hz"), colour, mark: Mark::Line(points) });
+        let here = rows.iter().filter(|r| r.case.test == test && r.case.rate_hz == rate_hz);
+        let points = here.map(|r| (r.case.ratio, r.value.abs().max(FLOOR)));
+        layers.push(Layer::line(format!("metachron, {rate_hz} Hz"), colour, points));
     }
     let others = [("mujoco 4.0.0", Colour::Red), ("pybullet 3.2.7", Colour::Orange), ("rapier3d 0.36", Colour::Green)];
     let all = peers();
@@ -287,11 +272,11 @@ fn panel(test: &str, rows: &[Row]) -> Panel {
         let here = all.iter().filter(|p| p.test == test && p.peer == name && p.status == "holds");
         let points: Vec<_> = here.filter_map(|p| Some((p.ratio, p.value?.max(FLOOR)))).collect();
         if !points.is_empty() {
-            layers.push(Layer { label: name.to_owned(), colour, mark: Mark::Dots(points) });
+            layers.push(Layer::dots(name, colour, points));
         }
     }
     let what = if test.starts_with("stack") { "sink, m" } else { "stretch / length" };
-    Panel { title: test.to_owned(), x: Axis::log("mass ratio", 0.7, 1500.0), y: Axis::log(what, FLOOR, 100.0), layers }
+    Panel::new(test, Axis::log("mass ratio", 0.7, 1500.0), Axis::log(what, FLOOR, 100.0), layers)
 }
 
 #[cfg(test)]

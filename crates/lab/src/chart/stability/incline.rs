@@ -1,10 +1,8 @@
 //! Incline: a box and a tube on a slope stick below tan(angle) = μ and slide above, as far as Coulomb's law predicts.
 
 use super::super::bench::StepHarness;
-use super::super::experiment::{Experiment, Finding, worst};
-use super::super::figure::{Axis, Colour, Figure, Layer, Mark, Panel, span};
-use super::super::table::Table;
 use super::common::{GRAVITY, plain_body, plain_tube};
+use crate::chart::{Axis, Colour, Column, Experiment, Figure, Finding, Layer, experiment, span, worst};
 use glam::{DQuat, DVec3};
 use metachron_contact::Agent;
 use metachron_core::{Body, Snapshot};
@@ -31,29 +29,35 @@ const SECONDS: f64 = 1.0;
 const DT_S: f64 = 0.004;
 
 /// A body on a slope.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub(in super::super) struct Case {
     body: String,
+    /// tan(angle)/μ.
     slope: f64,
 }
 
 /// The result of a case.
 #[derive(Debug, Clone, Serialize, Deserialize)]
-pub(in super::super) struct Row {
-    body: String,
-    /// tan(angle)/μ.
-    slope: f64,
+pub(in super::super) struct Found {
     /// Distance slid in a second, metres.
     slid_m: Option<f64>,
     /// Distance by Coulomb's law.
     theory_m: f64,
 }
 
+type Row = experiment::Row<Case, Found>;
+
 impl Experiment for Incline {
     type Case = Case;
     type Row = Row;
     const NAME: &'static str = "incline";
     const TITLE: &'static str = "box and tube on a slope: angle at which sliding begins, μ = 0.3";
+    const COLUMNS: &'static [Column<Row>] = &[
+        ("body", |r| (&r.case.body).into()),
+        ("tan/μ", |r| (r.case.slope, 2).into()),
+        ("slid_mm", |r| (1e3 * r.slid_m.unwrap_or(f64::NAN), 3).into()),
+        ("Coulomb_mm", |r| (1e3 * r.theory_m, 3).into()),
+    ];
 
     fn cases(quick: bool) -> Vec<Case> {
         let slopes = if quick { &QUICK_SLOPES[..] } else { &SLOPES[..] };
@@ -64,45 +68,30 @@ impl Experiment for Incline {
     fn measure(case: &Case) -> Row {
         let angle = libm::atan(case.slope * FRICTION);
         let pull = GRAVITY * (libm::sin(angle) - FRICTION * libm::cos(angle));
-        let Case { body, slope } = case.clone();
-        Row { body, slope, slid_m: slid(case, angle), theory_m: 0.5 * pull.max(0.0) * SECONDS * SECONDS }
-    }
-
-    fn case_of(row: &Row) -> Case {
-        Case { body: row.body.clone(), slope: row.slope }
+        let theory_m = 0.5 * pull.max(0.0) * SECONDS * SECONDS;
+        Row { case: case.clone(), found: Found { slid_m: slid(case, angle), theory_m } }
     }
 
     fn figure(rows: &[Row]) -> Figure {
-        let mut theory: Vec<_> = rows.iter().map(|r| (r.slope, 1e3 * r.theory_m)).collect();
+        let mut theory: Vec<_> = rows.iter().map(|r| (r.case.slope, 1e3 * r.theory_m)).collect();
         theory.sort_by(|a, b| a.0.total_cmp(&b.0));
-        let mut layers =
-            vec![Layer { label: "Coulomb".to_owned(), colour: Colour::Grey, mark: Mark::Dashed(theory.clone()) }];
-        for (body, colour) in BODIES.into_iter().zip(Colour::LINES) {
-            let points = rows.iter().filter(|r| r.body == body).filter_map(|r| Some((r.slope, 1e3 * r.slid_m?)));
-            layers.push(Layer { label: body.to_owned(), colour, mark: Mark::Dots(points.collect()) });
-        }
         let (low, high) = span(theory.iter().map(|p| p.1), false);
+        let mut layers = vec![Layer::dashed("Coulomb", Colour::Grey, theory)];
+        for (body, colour) in BODIES.into_iter().zip(Colour::LINES) {
+            let here = rows.iter().filter(|r| r.case.body == body);
+            layers.push(Layer::dots(body, colour, here.filter_map(|r| Some((r.case.slope, 1e3 * r.slid_m?)))));
+        }
         let (x, y) =
             (Axis::linear("tan(angle)/μ", 0.89, 1.11), Axis::linear("displacement in the first second, mm", low, high));
-        let panel = Panel { title: String::new(), x, y, layers };
-        Figure { title: "On a slope, μ = 0.3".to_owned(), panels: vec![panel], columns: 1 }
-    }
-
-    fn table(rows: &[Row]) -> Table {
-        let mut table = Table::new(&["body", "tan/μ", "slid_mm", "Coulomb_mm"]);
-        table.rows.extend(rows.iter().map(|r| {
-            let slid = 1e3 * r.slid_m.unwrap_or(f64::NAN);
-            vec![r.body.clone().into(), (r.slope, 2).into(), (slid, 3).into(), (1e3 * r.theory_m, 3).into()]
-        }));
-        table
+        Figure::single("On a slope, μ = 0.3", x, y, layers)
     }
 
     fn findings(rows: &[Row]) -> Vec<Finding> {
         let of = |body: &str| {
-            let here = || rows.iter().filter(|r| r.body == body);
+            let here = || rows.iter().filter(|r| r.case.body == body);
             let slides = |r: &&Row| r.slid_m.is_none_or(|slid| slid.abs() > STICKS_M);
-            let slid_below = here().filter(slides).map(|r| 1.0 - r.slope);
-            let stuck_above = here().filter(|r| !slides(r)).map(|r| r.slope - 1.0);
+            let slid_below = here().filter(slides).map(|r| 1.0 - r.case.slope);
+            let stuck_above = here().filter(|r| !slides(r)).map(|r| r.case.slope - 1.0);
             let off = worst(slid_below.chain(stuck_above).chain([0.0]));
             Finding::at_most(
                 format!("{body}: transition from stick to slip at tan(angle) = μ, relative error"),

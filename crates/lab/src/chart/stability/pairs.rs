@@ -1,11 +1,9 @@
 //! Tubes in contact at two rates: on a bar, between two fingers, across another tube, rates 1:1 to 1:100 in both directions.
 
 use super::super::energy_bench::Play;
-use super::super::experiment::{Experiment, Finding, worst};
-use super::super::figure::{Axis, Colour, Figure, Layer, Mark, Panel};
 use super::super::scenes::{Scene, WITH_TUBES, scene};
-use super::super::table::Table;
 use super::common::COMMON_ENERGY_MAX;
+use crate::chart::{Axis, Colour, Column, Experiment, Figure, Finding, Layer, Panel, experiment, worst};
 use glam::DVec3;
 use metachron_core::{AgentId, Anchor};
 use serde::{Deserialize, Serialize};
@@ -21,20 +19,17 @@ const REST_S: f64 = 2.0;
 const DEPTH_MAX_M: f64 = 0.005;
 
 /// A scene, the ratio of its rates, and which agent has the fast one.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub(in super::super) struct Case {
     scene: String,
     ratio: f64,
+    /// Whether the tube (of two tubes the one clamped at both ends) has the fast rate.
     first_is_fast: bool,
 }
 
 /// The results of a case.
 #[derive(Debug, Clone, Serialize, Deserialize)]
-pub(in super::super) struct Row {
-    scene: String,
-    ratio: f64,
-    /// Whether the tube (of two tubes the one clamped at both ends) has the fast rate.
-    first_is_fast: bool,
+pub(in super::super) struct Found {
     slow_hz: f64,
     /// Peak of the energy above that at rest, as a multiple of the start's.
     peak: f64,
@@ -45,11 +40,22 @@ pub(in super::super) struct Row {
     contacts: u32,
 }
 
+type Row = experiment::Row<Case, Found>;
+
 impl Experiment for Pairs {
     type Case = Case;
     type Row = Row;
     const NAME: &'static str = "tubes";
     const TITLE: &'static str = "tubes on a bar, in a gripper and across each other, step rates 1:1 to 1:100";
+    const COLUMNS: &'static [Column<Row>] = &[
+        ("scene", |r| (&r.case.scene).into()),
+        ("ratio", |r| (r.case.ratio, 0).into()),
+        ("tube", |r| if r.case.first_is_fast { "fast" } else { "slow" }.into()),
+        ("peak", |r| (r.peak, 4).into()),
+        ("depth_mm", |r| (1e3 * r.depth_m, 4).into()),
+        ("creep_mm_s", |r| (1e3 * r.creep_m_s, 4).into()),
+        ("contacts", |r| (f64::from(r.contacts), 0).into()),
+    ];
 
     fn cases(quick: bool) -> Vec<Case> {
         let ratios = if quick { &RATIOS[3..4] } else { &RATIOS[..] };
@@ -65,59 +71,29 @@ impl Experiment for Pairs {
     }
 
     fn measure(case: &Case) -> Row {
-        let Case { scene, ratio, first_is_fast } = case.clone();
-        let slow_hz = FAST_HZ / ratio;
-        let [peak, depth_m, creep_m_s, contacts] = settle_pair(case, slow_hz).unwrap_or([f64::NAN; 4]);
-        Row { scene, ratio, first_is_fast, slow_hz, peak, depth_m, creep_m_s, contacts: contacts as u32 }
-    }
-
-    fn case_of(row: &Row) -> Case {
-        Case { scene: row.scene.clone(), ratio: row.ratio, first_is_fast: row.first_is_fast }
+        let slow_hz = FAST_HZ / case.ratio;
+        let lost = Found { slow_hz, peak: f64::NAN, depth_m: f64::NAN, creep_m_s: f64::NAN, contacts: 0 };
+        Row { case: case.clone(), found: settle_pair(case, slow_hz).unwrap_or(lost) }
     }
 
     fn figure(rows: &[Row]) -> Figure {
         let panel = |label, (low, high), limit: f64, get: fn(&Row) -> f64| {
             let mut layers = Vec::new();
             for (name, colour) in WITH_TUBES.into_iter().zip(Colour::LINES) {
-                for way in [true, false] {
-                    let here = rows.iter().filter(|r| r.scene == name && r.first_is_fast == way);
-                    let points: Vec<_> = here.map(|r| (r.ratio, get(r).max(low))).collect();
-                    let mark = if way { Mark::Line(points) } else { Mark::Dots(points) };
-                    let label = if way { format!("{name}, tube fast") } else { format!("{name}, tube slow") };
-                    layers.push(Layer { label, colour, mark });
-                }
+                let here = |way| rows.iter().filter(move |r| r.case.scene == name && r.case.first_is_fast == way);
+                let points = |way| here(way).map(|r| (r.case.ratio, get(r).max(low)));
+                layers.push(Layer::line(format!("{name}, tube fast"), colour, points(true)));
+                layers.push(Layer::dots(format!("{name}, tube slow"), colour, points(false)));
             }
-            let ends = vec![(0.8, limit), (125.0, limit)];
-            layers.push(Layer { label: "limit".to_owned(), colour: Colour::Grey, mark: Mark::Dashed(ends) });
-            Panel {
-                title: String::new(),
-                x: Axis::log("ratio of step rates", 0.8, 125.0),
-                y: Axis::log(label, low, high),
-                layers,
-            }
+            layers.push(Layer::limit("limit", [0.8, 125.0], limit));
+            Panel::new("", Axis::log("ratio of step rates", 0.8, 125.0), Axis::log(label, low, high), layers)
         };
         let panels = vec![
             panel("peak energy / start", (0.5, 100.0), COMMON_ENERGY_MAX, |r| r.peak),
             panel("overlap at rest, m", (1e-7, 0.1), DEPTH_MAX_M, |r| r.depth_m),
             panel("creep at rest, m/s", (1e-7, 1.0), 1e-3, |r| r.creep_m_s),
         ];
-        Figure { title: "Tubes in contact at two rates, the faster of 1 kHz".to_owned(), panels, columns: 3 }
-    }
-
-    fn table(rows: &[Row]) -> Table {
-        let mut table = Table::new(&["scene", "ratio", "tube", "peak", "depth_mm", "creep_mm_s", "contacts"]);
-        table.rows.extend(rows.iter().map(|r| {
-            vec![
-                r.scene.clone().into(),
-                (r.ratio, 0).into(),
-                if r.first_is_fast { "fast" } else { "slow" }.into(),
-                (r.peak, 4).into(),
-                (1e3 * r.depth_m, 4).into(),
-                (1e3 * r.creep_m_s, 4).into(),
-                (f64::from(r.contacts), 0).into(),
-            ]
-        }));
-        table
+        Figure::new("Tubes in contact at two rates, the faster of 1 kHz", 3, panels)
     }
 
     fn findings(rows: &[Row]) -> Vec<Finding> {
@@ -131,8 +107,7 @@ impl Experiment for Pairs {
     }
 }
 
-/// Peak, depth, creep, contacts.
-fn settle_pair(case: &Case, slow_hz: f64) -> Option<[f64; 4]> {
+fn settle_pair(case: &Case, slow_hz: f64) -> Option<Found> {
     let rates_hz = if case.first_is_fast { [FAST_HZ, slow_hz] } else { [slow_hz, FAST_HZ] };
     let Scene { mut play, points, zero_j } = scene(&case.scene, rates_hz)?;
     let start_j = play.energy_j() - zero_j;
@@ -155,5 +130,5 @@ fn settle_pair(case: &Case, slow_hz: f64) -> Option<[f64; 4]> {
     let (from_s, before) = since?;
     let span_s = play.stage.time().as_secs_f64() - from_s;
     let creep = before.iter().zip(places(&play)).map(|(a, b)| a.distance(b) / span_s);
-    Some([peak, depth_m, worst(creep), f64::from(contacts)])
+    Some(Found { slow_hz, peak, depth_m, creep_m_s: worst(creep), contacts })
 }

@@ -4,11 +4,9 @@
 //! that is too long may end in non-finite numbers; it may also end at a wrong place, so the tip is compared with the rest
 //! shape of an independent computation ([`super::hanging`]).
 
-use super::super::experiment::{Experiment, Finding};
-use super::super::figure::{Axis, Colour, Figure, Layer, Mark, Panel};
-use super::super::table::Table;
 use super::common::{GRAVITY, plain_tube};
 use super::hanging::Hanging;
+use crate::chart::{Axis, Colour, Experiment, Figure, Finding, Layer, Panel, Table, experiment};
 use glam::DVec3;
 use metachron_contact::step::LoneStepper;
 use metachron_contact::{Agent, StepContext};
@@ -39,7 +37,7 @@ const BLOWN_UP: f64 = 10.0;
 const TILT: f64 = 1.5;
 
 /// A square of the map.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub(in super::super) struct Case {
     integrator: String,
     young_pa: f64,
@@ -48,10 +46,7 @@ pub(in super::super) struct Case {
 
 /// The result of a case.
 #[derive(Debug, Clone, Serialize, Deserialize)]
-pub(in super::super) struct Row {
-    integrator: String,
-    young_pa: f64,
-    dt_ms: f64,
+pub(in super::super) struct Found {
     verdict: Verdict,
     /// Distance of the tip from its rest position, as a share of the length; empty where it blew up.
     tip_error: Option<f64>,
@@ -62,6 +57,8 @@ pub(in super::super) struct Row {
     stretch: f64,
     substeps_per_step: f64,
 }
+
+type Row = experiment::Row<Case, Found>;
 
 /// The verdicts on a case.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
@@ -99,60 +96,48 @@ impl Experiment for TubeMap {
             Some(error) if error <= WRONG => Verdict::Stable,
             Some(_) => Verdict::Wrong,
         };
-        let Case { integrator, young_pa, dt_ms } = case.clone();
         let Fall { energy_rise, stretch, substeps_per_step, .. } = fall;
-        Row { integrator, young_pa, dt_ms, verdict, tip_error, energy_rise, stretch, substeps_per_step }
-    }
-
-    fn case_of(row: &Row) -> Case {
-        Case { integrator: row.integrator.clone(), young_pa: row.young_pa, dt_ms: row.dt_ms }
+        Row { case: case.clone(), found: Found { verdict, tip_error, energy_rise, stretch, substeps_per_step } }
     }
 
     fn figure(rows: &[Row]) -> Figure {
         let panels = Integrator::ALL.into_iter().map(|integrator| panel(integrator.name(), rows)).collect();
-        Figure { title: "Clamped tube released from the horizontal, 6 s".to_owned(), panels, columns: 3 }
+        Figure::new("Clamped tube released from the horizontal, 6 s", 3, panels)
     }
 
     fn table(rows: &[Row]) -> Table {
-        let mut table = Table::new(&[
-            "integrator",
-            "young_pa",
-            "stable to dt_ms",
-            "refused",
-            "wrong",
-            "blown up",
-            "worst tip error",
-            "most substeps",
-            "stretch",
-        ]);
-        for integrator in Integrator::ALL.map(Integrator::name) {
-            for young_pa in moduli(rows) {
-                let here = || rows.iter().filter(move |r| r.integrator == integrator && r.young_pa == young_pa);
-                let count = |verdict| here().filter(|r| r.verdict == verdict).count() as f64;
-                let bad =
-                    here().filter(|r| r.verdict != Verdict::Stable).map(|r| r.dt_ms).fold(f64::INFINITY, f64::min);
-                let stable_ms = here().map(|r| r.dt_ms).filter(|dt| *dt < bad).fold(0.0, f64::max);
-                let ran = || here().filter(|r| r.verdict != Verdict::Refused);
-                let greatest = |of: fn(&Row) -> f64| ran().map(of).fold(0.0, f64::max);
-                table.rows.push(vec![
-                    integrator.into(),
-                    (young_pa, 0).into(),
-                    (stable_ms, 1).into(),
-                    (count(Verdict::Refused), 0).into(),
-                    (count(Verdict::Wrong), 0).into(),
-                    (count(Verdict::BlownUp), 0).into(),
-                    (greatest(|r| r.tip_error.unwrap_or(f64::INFINITY)), 4).into(),
-                    (greatest(|r| r.substeps_per_step), 1).into(),
-                    (greatest(|r| r.stretch), 2).into(),
-                ]);
-            }
-        }
-        table
+        let line = |(integrator, young_pa): (&'static str, f64)| {
+            let here = || {
+                let same = move |r: &&Row| r.case.integrator == integrator && r.case.young_pa == young_pa;
+                rows.iter().filter(same)
+            };
+            let count = |verdict| (here().filter(|r| r.verdict == verdict).count() as f64, 0).into();
+            let bad =
+                here().filter(|r| r.verdict != Verdict::Stable).map(|r| r.case.dt_ms).fold(f64::INFINITY, f64::min);
+            let stable_ms = here().map(|r| r.case.dt_ms).filter(|dt| *dt < bad).fold(0.0, f64::max);
+            let ran = || here().filter(|r| r.verdict != Verdict::Refused);
+            let greatest = |of: fn(&Row) -> f64| ran().map(of).fold(0.0, f64::max);
+            vec![
+                ("integrator", integrator.into()),
+                ("young_pa", (young_pa, 0).into()),
+                ("stable to dt_ms", (stable_ms, 1).into()),
+                ("refused", count(Verdict::Refused)),
+                ("wrong", count(Verdict::Wrong)),
+                ("blown up", count(Verdict::BlownUp)),
+                ("worst tip error", (greatest(|r| r.tip_error.unwrap_or(f64::INFINITY)), 4).into()),
+                ("most substeps", (greatest(|r| r.substeps_per_step), 1).into()),
+                ("stretch", (greatest(|r| r.stretch), 2).into()),
+            ]
+        };
+        let moduli = moduli(rows);
+        let of = |integrator: Integrator| moduli.iter().map(move |young_pa| (integrator.name(), *young_pa));
+        Table::named(Integrator::ALL.into_iter().flat_map(of).map(line))
     }
 
     fn findings(rows: &[Row]) -> Vec<Finding> {
         let implicit = [Integrator::ImplicitEuler, Integrator::Bdf2, Integrator::EnergyMomentum].map(Integrator::name);
-        let bad = rows.iter().filter(|r| implicit.contains(&r.integrator.as_str()) && r.verdict != Verdict::Stable);
+        let bad =
+            rows.iter().filter(|r| implicit.contains(&r.case.integrator.as_str()) && r.verdict != Verdict::Stable);
         let unsaid = rows.iter().filter(|r| matches!(r.verdict, Verdict::Wrong | Verdict::BlownUp));
         vec![
             Finding::at_most("implicit methods: cells of the map that are not stable", bad.count() as f64, 0.0),
@@ -167,7 +152,7 @@ impl Experiment for TubeMap {
 
 /// The moduli in the rows, rising.
 fn moduli(rows: &[Row]) -> Vec<f64> {
-    YOUNG_PA.into_iter().filter(|young| rows.iter().any(|r| r.young_pa == *young)).collect()
+    YOUNG_PA.into_iter().filter(|young| rows.iter().any(|r| r.case.young_pa == *young)).collect()
 }
 
 /// The reference tube along +x.
@@ -233,30 +218,28 @@ fn fall(case: &Case) -> Fall {
 
 /// The map of one integrator.
 fn panel(integrator: &str, rows: &[Row]) -> Panel {
-    let here: Vec<&Row> = rows.iter().filter(|r| r.integrator == integrator).collect();
+    let here: Vec<&Row> = rows.iter().filter(|r| r.case.integrator == integrator).collect();
     let edges = |of: fn(&Row) -> f64| {
         let mut values: Vec<f64> = here.iter().map(|r| of(r)).collect();
         values.sort_by(f64::total_cmp);
         values.dedup();
         values
     };
-    let (young, dt) = (edges(|r| r.young_pa), edges(|r| r.dt_ms));
+    let (young, dt) = (edges(|r| r.case.young_pa), edges(|r| r.case.dt_ms));
     let cell = |r: &Row| {
-        let ([a, b], [c, d]) = (cell_bounds(&young, r.young_pa), cell_bounds(&dt, r.dt_ms));
+        let ([a, b], [c, d]) = (cell_bounds(&young, r.case.young_pa), cell_bounds(&dt, r.case.dt_ms));
         [a, b, c, d]
     };
-    let squares = |label: &str, colour, verdict| Layer {
-        label: label.to_owned(),
-        colour,
-        mark: Mark::Cells(here.iter().filter(|r| r.verdict == verdict).map(|r| cell(r)).collect()),
+    let squares = |label: &str, colour, verdict| {
+        Layer::cells(label, colour, here.iter().filter(|r| r.verdict == verdict).map(|r| cell(r)))
     };
-    let tilted = here.iter().filter(|r| r.stretch > TILT).map(|r| (r.young_pa, r.dt_ms)).collect();
+    let tilted = here.iter().filter(|r| r.stretch > TILT).map(|r| (r.case.young_pa, r.case.dt_ms));
     let layers = vec![
         squares("stable", Colour::Sky, Verdict::Stable),
         squares("bounded but wrong", Colour::Orange, Verdict::Wrong),
         squares("blown up", Colour::Red, Verdict::BlownUp),
         squares("refused beforehand", Colour::Grey, Verdict::Refused),
-        Layer { label: format!("stretched past {TILT}"), colour: Colour::Blue, mark: Mark::Dots(tilted) },
+        Layer::dots(format!("stretched past {TILT}"), Colour::Blue, tilted),
     ];
     let axis = |label, values: &[f64]| {
         let ends = |v: Option<&f64>| v.copied().unwrap_or(1.0);
@@ -264,7 +247,7 @@ fn panel(integrator: &str, rows: &[Row]) -> Panel {
             (cell_bounds(values, ends(values.first())), cell_bounds(values, ends(values.last())));
         Axis::log(label, low, high)
     };
-    Panel { title: integrator.to_owned(), x: axis("Young's modulus, Pa", &young), y: axis("dt, ms", &dt), layers }
+    Panel::new(integrator, axis("Young's modulus, Pa", &young), axis("dt, ms", &dt), layers)
 }
 
 /// The range of a value's square: half way to its neighbours, in ratios.

@@ -8,10 +8,8 @@ use crate::adaptive::MARGIN_MAX;
 use crate::control::Law;
 use crate::tune::loops::candidate::Candidate;
 use crate::tune::loops::plant::Plant;
-use argmin::core::{CostFunction, Error, Executor};
-use argmin::solver::neldermead::NelderMead;
 use metachron_core::gains;
-use std::cell::RefCell;
+use std::cmp::Ordering;
 
 /// A search.
 pub struct Search<'a> {
@@ -55,6 +53,8 @@ pub enum Family {
 const TRIES: f64 = 2.0;
 /// Spread of the first simplex.
 const SPREAD: f64 = 0.35;
+/// The simplex ends where the standard deviation of its costs is less.
+const SPREAD_MIN: f64 = 1e-5;
 /// A simplex of logarithms cannot start from a margin or a λ of 0, nor leave one near it: it starts no nearer than this.
 const MARGIN_LEAST: f64 = 1e-3;
 const LEAD_LEAST: f64 = 0.05;
@@ -128,7 +128,7 @@ impl Family {
     }
 }
 
-/// The state of a search, shared with the solver's cost function.
+/// The state of a search.
 struct SearchState<'a, 'b> {
     search: &'b mut Search<'a>,
     family: Family,
@@ -179,43 +179,76 @@ pub fn search(search: &mut Search<'_>, family: Family, starts: &[Candidate]) -> 
     let expected = count as f64 + TRIES * family.iterations() as f64;
     let mut state = SearchState { search, family, best: None, tried: Vec::new(), expected, interrupted: false };
     let corner = state.best_corner(starts);
-    let state = RefCell::new(state);
-    if let Some(corner) = corner.filter(|_| !state.borrow().interrupted) {
-        // a search that is stopped ends as an error of its cost function; the best so far is stored in the state
-        let _ = run_simplex(&state, corner);
+    if let Some(corner) = corner.filter(|_| !state.interrupted) {
+        run_simplex(&mut state, corner);
     }
-    let SearchState { best, tried, interrupted, .. } = state.into_inner();
+    let SearchState { best, tried, interrupted, .. } = state;
     let starts = tried.iter().take(starts.len()).cloned().collect();
     let tried = tried.iter().map(|verdict| (verdict.candidate, verdict.objective)).collect();
     Some(SearchResult { best: best?, starts, tried, interrupted })
 }
 
-/// Nelder and Mead's simplex from the best of the grid.
-fn run_simplex(state: &RefCell<SearchState<'_, '_>>, corner: Vec<f64>) -> Result<(), Error> {
-    let iterations = state.borrow().family.iterations();
+/// Nelder and Mead's simplex from the best of the grid; `None` once the search was stopped.
+fn run_simplex(state: &mut SearchState<'_, '_>, corner: Vec<f64>) -> Option<()> {
+    let iterations = state.family.iterations();
+    let mut cost = |at: Vec<f64>| {
+        let rank = state.judge(state.family.candidate(&at))?;
+        Some((at, rank))
+    };
     let aside = (0..corner.len()).map(|axis| {
         let mut aside = corner.clone();
         aside[axis] += SPREAD;
         aside
     });
-    let simplex = std::iter::once(corner.clone()).chain(aside).collect();
-    let solver = NelderMead::new(simplex).with_sd_tolerance(1e-5)?;
-    Executor::new(Cost(state), solver).configure(|state| state.max_iters(iterations)).run()?;
-    Ok(())
+    let mut simplex = std::iter::once(corner.clone()).chain(aside).map(&mut cost).collect::<Option<Vec<Vertex>>>()?;
+    let by_cost = |a: &Vertex, b: &Vertex| a.1.partial_cmp(&b.1).unwrap_or(Ordering::Equal);
+    simplex.sort_by(by_cost);
+    for _ in 0..iterations {
+        if spread(&simplex) < SPREAD_MIN {
+            break;
+        }
+        let last = simplex.len() - 1;
+        let (best, second, worst) = (simplex[0].1, simplex[last - 1].1, simplex[last].clone());
+        let centroid: Vec<f64> = (0..corner.len())
+            .map(|axis| simplex[..last].iter().map(|(at, _)| at[axis]).sum::<f64>() * (1.0 / last as f64))
+            .collect();
+        let reflected = cost(between(&centroid, &worst.0, -1.0))?;
+        let next = if reflected.1 < best {
+            let expanded = cost(between(&centroid, &reflected.0, 2.0))?;
+            Some(if expanded.1 < reflected.1 { expanded } else { reflected })
+        } else if reflected.1 < second {
+            Some(reflected)
+        } else if reflected.1 < worst.1 {
+            Some(cost(between(&centroid, &reflected.0, 0.5))?).filter(|(_, cost)| *cost <= reflected.1)
+        } else {
+            Some(cost(between(&centroid, &worst.0, 0.5))?).filter(|(_, cost)| *cost < worst.1)
+        };
+        if let Some(next) = next {
+            simplex[last] = next;
+        } else {
+            // shrink towards the best
+            for vertex in 1..=last {
+                simplex[vertex] = cost(between(&simplex[0].0, &simplex[vertex].0, 0.5))?;
+            }
+        }
+        simplex.sort_by(by_cost);
+    }
+    Some(())
 }
 
-/// The cost function as the solver needs it.
-struct Cost<'a, 'b, 'c>(&'c RefCell<SearchState<'a, 'b>>);
+/// A corner of a simplex, and its cost.
+type Vertex = (Vec<f64>, f64);
 
-impl CostFunction for Cost<'_, '_, '_> {
-    type Param = Vec<f64>;
-    type Output = f64;
+/// `from` + `share` (`to` − `from`).
+fn between(from: &[f64], to: &[f64], share: f64) -> Vec<f64> {
+    from.iter().zip(to).map(|(from, to)| from + (to - from) * share).collect()
+}
 
-    fn cost(&self, at: &Self::Param) -> Result<f64, Error> {
-        let mut state = self.0.borrow_mut();
-        let candidate = state.family.candidate(at);
-        state.judge(candidate).ok_or_else(|| Error::msg("stopped"))
-    }
+/// The standard deviation of the costs.
+fn spread(simplex: &[Vertex]) -> f64 {
+    let count = simplex.len() as f64;
+    let mean = simplex.iter().map(|(_, cost)| cost).sum::<f64>() / count;
+    libm::sqrt(1.0 / (count - 1.0) * simplex.iter().map(|(_, cost)| (cost - mean) * (cost - mean)).sum::<f64>())
 }
 
 #[cfg(test)]

@@ -13,7 +13,7 @@ use crate::turn::agent_runner::{AgentRunner, Next};
 use crate::turn::turn_order::{Held, PartKind, TurnOrder, in_force};
 use crate::turn::turn_parts::Begun;
 use crate::turn::watchdog::{Watchdog, WatchdogWord};
-use crossbeam::atomic::AtomicCell;
+use crossbeam_utils::atomic::AtomicCell;
 use metachron_core::AgentId;
 use std::sync::Arc;
 use std::thread;

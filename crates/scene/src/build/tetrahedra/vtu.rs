@@ -8,8 +8,7 @@ use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
 use flate2::read::ZlibDecoder;
 use metachron_geometry::Tetrahedra;
-use quick_xml::Reader;
-use quick_xml::events::{BytesStart, Event};
+use roxmltree::{Document, Node};
 use std::io::Read;
 
 pub(super) fn is_vtu(bytes: &[u8]) -> bool {
@@ -21,7 +20,7 @@ pub(super) fn is_vtu(bytes: &[u8]) -> bool {
 const BYTES_MAX: usize = 8 * NUMBERS_MAX;
 
 /// The coding of all data of the file.
-#[derive(Debug, Clone, Copy, Default)]
+#[derive(Debug, Clone, Copy)]
 struct Coding {
     is_big_endian: bool,
     /// Headers count with eight bytes, not with four.
@@ -35,82 +34,42 @@ struct Appended<'a> {
     is_base64: bool,
 }
 
-/// An array that has begun.
-struct Array {
-    /// The element around it: `Points`, `Cells`, `CellData` or another.
-    section: String,
-    name: String,
-    kind: String,
-    format: String,
-    offset: Option<usize>,
-    /// How many numbers a point or a cell has.
-    width: usize,
-}
-
-/// The contents read so far.
+/// The properties that all arrays of a file share.
 struct File<'a> {
     coding: Coding,
     appended: Option<Appended<'a>>,
-    /// The elements that have begun, outermost first.
-    open: Vec<String>,
-    array: Option<Array>,
-    text: String,
-    pieces: usize,
-    /// How many points and cells the piece says that it has.
-    points: usize,
-    cells: usize,
-    grid: Grid,
 }
 
 pub(super) fn read(bytes: &[u8]) -> Result<Tetrahedra, String> {
     // appended data is no XML
     let end = bytes.windows(13).position(|window| window == b"<AppendedData").unwrap_or(bytes.len());
-    let head = str::from_utf8(&bytes[..end]).map_err(|_| "its XML is no text".to_owned())?;
-    let mut file = File {
-        coding: Coding::default(),
-        appended: appended(&bytes[end..]),
-        open: vec![],
-        array: None,
-        text: String::new(),
-        pieces: 0,
-        points: 0,
-        cells: 0,
-        grid: Grid { offsets: vec![0], ..Grid::default() },
+    let mut head = str::from_utf8(&bytes[..end]).map_err(|_| "its XML is no text".to_owned())?.to_owned();
+    let appended = appended(&bytes[end..]);
+    if appended.is_some() {
+        // they stand within the outermost element
+        head.push_str("</VTKFile>");
+    }
+    let document = Document::parse(&head).map_err(|why| format!("it is no XML: {why}"))?;
+    let file = File { coding: Coding::of(document.root_element())?, appended };
+    let mut pieces = document.descendants().filter(|node| node.has_tag_name("Piece"));
+    let piece = match (pieces.next(), pieces.count()) {
+        (Some(piece), 0) => piece,
+        (first, more) => return Err(format!("it has {} pieces: expected one", usize::from(first.is_some()) + more)),
     };
-    let mut reader = Reader::from_str(head);
-    reader.config_mut().check_end_names = false;
-    loop {
-        let event = reader.read_event().map_err(|why| format!("byte {}: {why}", reader.error_position()))?;
-        match event {
-            Event::Start(tag) => file.begin(&tag)?,
-            Event::Empty(tag) => {
-                file.begin(&tag)?;
-                file.end()?;
-            }
-            // information about an array stands in elements within it
-            Event::Text(text) if file.open.last().is_some_and(|name| name == "DataArray") => {
-                file.text.push_str(&String::from_utf8_lossy(&text));
-            }
-            Event::End(_) => file.end()?,
-            Event::Eof => break,
-            _ => {}
-        }
-    }
-    // appended data stand within the outermost element
-    if file.open.len() > usize::from(file.appended.is_some()) {
-        return Err(format!("it ends within `{}`", file.open.join("/")));
-    }
-    if file.pieces != 1 {
-        return Err(format!("it has {} pieces: expected one", file.pieces));
-    }
-    let (points, cells) = (file.grid.coordinates.len(), file.grid.kinds.len());
-    if points != 3 * file.points || cells != file.cells {
-        let (said, of) = (file.points, file.cells);
+    let grid = file.grid(piece)?;
+    let number = |key: &str| {
+        let found = piece.attribute(key).unwrap_or_default().parse();
+        found.map_err(|_| format!("expected a number as `{key}`"))
+    };
+    let said = counted("points", number("NumberOfPoints")?)?;
+    let of = counted("cells", number("NumberOfCells")?)?;
+    let (points, cells) = (grid.coordinates.len(), grid.kinds.len());
+    if points != 3 * said || cells != of {
         return Err(format!(
             "it has {points} coordinates for {said} points, and says of {cells} cells of {of} what they are"
         ));
     }
-    file.grid.tetrahedra()
+    grid.tetrahedra()
 }
 
 /// The appended data, which begin after an underscore.
@@ -121,100 +80,72 @@ fn appended(rest: &[u8]) -> Option<Appended<'_>> {
     Some(Appended { bytes: &rest[start..], is_base64 })
 }
 
-fn attribute(tag: &BytesStart<'_>, name: &str) -> Option<String> {
-    let found = tag.try_get_attribute(name).ok()??;
-    Some(String::from_utf8_lossy(&found.value).into_owned())
-}
-
 impl File<'_> {
-    fn begin(&mut self, tag: &BytesStart<'_>) -> Result<(), String> {
-        let name = String::from_utf8_lossy(tag.name().as_ref()).into_owned();
-        let of = |key: &str| attribute(tag, key).unwrap_or_default();
-        match name.as_str() {
-            "VTKFile" => {
-                let kind = attribute(tag, "type").unwrap_or_default();
-                if kind != "UnstructuredGrid" {
-                    return Err(format!("its type is `{kind}`: expected UnstructuredGrid"));
+    fn grid(&self, piece: Node<'_, '_>) -> Result<Grid, String> {
+        let mut grid = Grid { offsets: vec![0], ..Grid::default() };
+        for array in piece.descendants().filter(|node| node.has_tag_name("DataArray")) {
+            let section = array.parent_element().map_or("", |parent| parent.tag_name().name());
+            if !matches!(section, "Points" | "Cells" | "CellData") {
+                continue;
+            }
+            let name = array.attribute("Name").unwrap_or_default();
+            let values = self.values(array).map_err(|why| format!("the array `{name}` of {section}: {why}"))?;
+            match (section, name) {
+                ("Points", _) => grid.coordinates = values,
+                ("Cells", "connectivity") => grid.connectivity = whole("connectivity", &values)?,
+                ("Cells", "offsets") => grid.offsets.extend(whole("offsets", &values)?),
+                ("Cells", "types") => grid.kinds = whole("types", &values)?,
+                ("CellData", _) => {
+                    let width = array.attribute("NumberOfComponents").and_then(|width| width.parse().ok());
+                    grid.data.push(CellData { name: name.to_owned(), width: width.unwrap_or(1), values });
                 }
-                let compressor = attribute(tag, "compressor");
-                if compressor.as_ref().is_some_and(|name| name != "vtkZLibDataCompressor") {
-                    let name = compressor.unwrap_or_default();
-                    return Err(format!("it is compressed by {name}: expected vtkZLibDataCompressor or none"));
-                }
-                self.coding = Coding {
-                    is_big_endian: attribute(tag, "byte_order").is_some_and(|order| order == "BigEndian"),
-                    has_long_headers: attribute(tag, "header_type").is_some_and(|kind| kind == "UInt64"),
-                    is_compressed: compressor.is_some(),
-                };
+                _ => {}
             }
-            "Piece" => {
-                self.pieces += 1;
-                let number = |key: &str| of(key).parse().map_err(|_| format!("expected a number as `{key}`"));
-                self.points = counted("points", number("NumberOfPoints")?)?;
-                self.cells = counted("cells", number("NumberOfCells")?)?;
-            }
-            "DataArray" => {
-                self.array = Some(Array {
-                    section: self.open.last().cloned().unwrap_or_default(),
-                    name: of("Name"),
-                    kind: of("type"),
-                    format: of("format"),
-                    offset: of("offset").parse().ok(),
-                    width: of("NumberOfComponents").parse().unwrap_or(1),
-                });
-                self.text.clear();
-            }
-            _ => {}
         }
-        self.open.push(name);
-        Ok(())
+        Ok(grid)
     }
 
-    fn end(&mut self) -> Result<(), String> {
-        if self.open.pop().is_none_or(|name| name != "DataArray") {
-            return Ok(());
-        }
-        let Some(array) = self.array.take() else { return Ok(()) };
-        let is_wanted = matches!(array.section.as_str(), "Points" | "Cells" | "CellData");
-        if !is_wanted {
-            return Ok(());
-        }
-        let wrong = |why: String| format!("the array `{}` of {}: {why}", array.name, array.section);
-        let values = self.values(&array).map_err(wrong)?;
-        let grid = &mut self.grid;
-        match (array.section.as_str(), array.name.as_str()) {
-            ("Points", _) => grid.coordinates = values,
-            ("Cells", "connectivity") => grid.connectivity = whole("connectivity", &values)?,
-            ("Cells", "offsets") => grid.offsets.extend(whole("offsets", &values)?),
-            ("Cells", "types") => grid.kinds = whole("types", &values)?,
-            ("CellData", _) => grid.data.push(CellData { name: array.name, width: array.width, values }),
-            _ => {}
-        }
-        Ok(())
-    }
-
-    fn values(&self, array: &Array) -> Result<Vec<f64>, String> {
-        let bytes = match array.format.as_str() {
+    fn values(&self, array: Node<'_, '_>) -> Result<Vec<f64>, String> {
+        // information about an array stands in elements within it
+        let text: String = array.children().filter(Node::is_text).filter_map(|node| node.text()).collect();
+        let bytes = match array.attribute("format").unwrap_or_default() {
             "ascii" => {
                 let number = |word: &str| word.parse().map_err(|_| format!("expected a number, found `{word}`"));
-                return self.text.split_ascii_whitespace().map(number).collect();
+                return text.split_ascii_whitespace().map(number).collect();
             }
-            "binary" => self.coding.decoded(self.text.trim().as_bytes())?,
+            "binary" => self.coding.decoded(text.trim().as_bytes())?,
             "appended" => {
                 let Some(Appended { bytes, is_base64 }) = &self.appended else {
                     return Err("there are no appended data".to_owned());
                 };
-                let offset = array.offset.ok_or("it says no offset where it begins")?;
+                let offset: Option<usize> = array.attribute("offset").and_then(|offset| offset.parse().ok());
+                let offset = offset.ok_or("it says no offset where it begins")?;
                 let from = bytes.get(offset..).ok_or("it begins beyond the end of the file")?;
                 if *is_base64 { self.coding.decoded(from)? } else { self.coding.unpacked(from)? }
             }
             other => return Err(format!("its format is `{other}`: expected ascii, binary or appended")),
         };
-        self.coding.numbers(&array.kind, &bytes)
+        self.coding.numbers(array.attribute("type").unwrap_or_default(), &bytes)
     }
 }
 
 impl Coding {
+    fn of(root: Node<'_, '_>) -> Result<Self, String> {
+        let kind = root.attribute("type").unwrap_or_default();
+        if !root.has_tag_name("VTKFile") || kind != "UnstructuredGrid" {
+            return Err(format!("its type is `{kind}`: expected UnstructuredGrid"));
+        }
+        let compressor = root.attribute("compressor");
+        if let Some(name) = compressor.filter(|name| *name != "vtkZLibDataCompressor") {
+            return Err(format!("it is compressed by {name}: expected vtkZLibDataCompressor or none"));
+        }
+        Ok(Self {
+            is_big_endian: root.attribute("byte_order") == Some("BigEndian"),
+            has_long_headers: root.attribute("header_type") == Some("UInt64"),
+            is_compressed: compressor.is_some(),
+        })
+    }
+
     const fn word(self) -> usize {
         if self.has_long_headers { 8 } else { 4 }
     }

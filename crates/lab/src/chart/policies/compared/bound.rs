@@ -1,11 +1,9 @@
 //! Benefit of each policy over the bound of the linear relaxation.
 
-use crate::chart::experiment::{Experiment, Finding};
-use crate::chart::figure::{Axis, Colour, Figure, Layer, Mark, Panel};
-use crate::chart::policies::numeric::common::{LEVEL_PARTS, at_least, figure};
+use crate::chart::policies::numeric::common::LEVEL_PARTS;
 use crate::chart::policies::numeric::machine::RandomSource;
 use crate::chart::policies::numeric::metrics::mean;
-use crate::chart::table::Table;
+use crate::chart::{Axis, Colour, Column, Experiment, Figure, Finding, Layer, experiment};
 use metachron_lod::adaptive::{Adaptive, Offer, Settings, Time};
 use metachron_lod::select::{Entry, Mode, Problem, funkhouser, incremental, linear, marginal};
 use serde::{Deserialize, Serialize};
@@ -32,7 +30,7 @@ const POLICIES: [(&str, Choose); 7] = [
 ];
 
 /// Some problems and a policy.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub(crate) struct Case {
     set: String,
     objects: usize,
@@ -42,21 +40,26 @@ pub(crate) struct Case {
 
 /// Benefits of a policy over some problems.
 #[derive(Debug, Clone, Serialize, Deserialize)]
-pub(crate) struct Row {
-    set: String,
-    objects: usize,
-    instances: usize,
-    policy: String,
+pub(crate) struct Found {
     /// Benefit over the bound, the mean and the least.
     mean: f64,
     least: f64,
 }
+
+type Row = experiment::Row<Case, Found>;
 
 impl Experiment for Bound {
     type Case = Case;
     type Row = Row;
     const NAME: &'static str = "bound";
     const TITLE: &'static str = "benefit over the bound of the linear relaxation, which no selection can exceed";
+    const COLUMNS: &'static [Column<Row>] = &[
+        ("set", |r| (&r.case.set).into()),
+        ("objects", |r| (r.case.objects as f64, 0).into()),
+        ("policy", |r| (&r.case.policy).into()),
+        ("mean", |r| (r.mean, 5).into()),
+        ("least", |r| (r.least, 5).into()),
+    ];
 
     fn cases(quick: bool) -> Vec<Case> {
         let instances = if quick { QUICK_INSTANCES } else { INSTANCES };
@@ -72,56 +75,41 @@ impl Experiment for Bound {
     }
 
     fn measure(case: &Case) -> Row {
-        let Case { set, objects, instances, policy } = case.clone();
-        let choose = POLICIES.iter().find(|p| p.0 == policy).map_or(POLICIES[0].1, |p| p.1);
-        let problem = |k| if set == COUNTER_EXAMPLE { counter_example() } else { random(objects, k) };
+        let choose = POLICIES.iter().find(|p| p.0 == case.policy).map_or(POLICIES[0].1, |p| p.1);
+        let problem = |k| if case.set == COUNTER_EXAMPLE { counter_example() } else { random(case.objects, k) };
         let part = |k: usize| {
             let problem = problem(k);
             linear(&problem).map_or(f64::NAN, |bound| choose(&problem) as f64 / bound.value)
         };
-        let parts: Vec<f64> = (0..instances).map(part).collect();
+        let parts: Vec<f64> = (0..case.instances).map(part).collect();
         let least = parts.iter().copied().fold(f64::INFINITY, f64::min);
-        Row { set, objects, instances, policy, mean: mean(&parts), least }
-    }
-
-    fn case_of(row: &Row) -> Case {
-        let Row { set, objects, instances, policy, .. } = row.clone();
-        Case { set, objects, instances, policy }
+        Row { case: case.clone(), found: Found { mean: mean(&parts), least } }
     }
 
     fn figure(rows: &[Row]) -> Figure {
         let line = |((name, _), colour): (&(&str, Choose), Colour)| {
-            let here = rows.iter().filter(|r| r.set == "random" && r.policy == *name);
-            let lost = here.map(|r| (r.objects as f64, (1.0 - r.mean).max(1e-7))).collect();
-            Layer { label: (*name).to_owned(), colour, mark: Mark::Line(lost) }
+            let here = rows.iter().filter(|r| r.case.set == "random" && r.case.policy == *name);
+            Layer::line(*name, colour, here.map(|r| (r.case.objects as f64, (1.0 - r.mean).max(1e-7))))
         };
-        let colours = Colour::LINES.into_iter().chain([Colour::Grey]);
-        let layers = POLICIES.iter().zip(colours).map(line).collect();
+        let layers = POLICIES.iter().zip(Colour::LINES.into_iter().chain([Colour::Grey])).map(line);
         let (x, y) = (Axis::log("objects", 8.0, 12_000.0), Axis::log("1 − benefit / bound, mean", 1e-7, 1.0));
-        figure("Greatest possible loss of a selection", vec![Panel { title: String::new(), x, y, layers }], 1)
-    }
-
-    fn table(rows: &[Row]) -> Table {
-        let mut table = Table::new(&["set", "objects", "policy", "mean", "least"]);
-        table.rows.extend(rows.iter().map(|r| {
-            let counts = (r.objects as f64, 0);
-            vec![r.set.clone().into(), counts.into(), r.policy.clone().into(), (r.mean, 5).into(), (r.least, 5).into()]
-        }));
-        table
+        Figure::single("Greatest possible loss of a selection", x, y, layers)
     }
 
     fn findings(rows: &[Row]) -> Vec<Finding> {
         let of = |set: &str, objects: usize, policy: &str, what: fn(&Row) -> f64| {
-            let row = rows.iter().find(|r| (r.set.as_str(), r.objects, r.policy.as_str()) == (set, objects, policy));
+            let row = rows
+                .iter()
+                .find(|r| (r.case.set.as_str(), r.case.objects, r.case.policy.as_str()) == (set, objects, policy));
             row.map_or(f64::NAN, what)
         };
         vec![
-            at_least(
+            Finding::at_least(
                 "adaptive, 100 objects: least benefit over the bound",
                 of("random", 100, "adaptive", |r| r.least),
                 0.99,
             ),
-            at_least(
+            Finding::at_least(
                 "adaptive, 1000 objects: least benefit over the bound",
                 of("random", 1000, "adaptive", |r| r.least),
                 0.99,

@@ -1,14 +1,12 @@
 //! The same walk on a machine that is a quarter slower than its table, has 40 % more load for a while, and stalls.
 
-use crate::chart::experiment::{Experiment, Finding, worst};
-use crate::chart::figure::Figure;
 use crate::chart::policies::numeric::auditorium_model::{LAP, show};
 use crate::chart::policies::numeric::chooser::Policy;
 use crate::chart::policies::numeric::closed_loop::{Frame, Show};
-use crate::chart::policies::numeric::common::{Case, at_least, curves, figure, number, table};
+use crate::chart::policies::numeric::common::{COLUMNS, Case, curves, number};
 use crate::chart::policies::numeric::machine::Fault;
 use crate::chart::policies::numeric::metrics::{Row, overshoot, settled};
-use crate::chart::table::{Cell, Table};
+use crate::chart::{Experiment, Figure, Finding, Table, worst};
 
 /// The experiment.
 pub(crate) struct Disturbed;
@@ -59,20 +57,13 @@ impl Experiment for Disturbed {
         }
     }
 
-    fn case_of(row: &Row) -> Case {
-        Case::of(row)
-    }
-
     fn figure(_: &[Row]) -> Figure {
         let panels = POLICIES.map(|policy| curves(policy.name(), &disturbed(SPIKES), &[policy], 2.5));
-        figure("Cost table too low, load step, stalls", panels.to_vec(), 3)
+        Figure::new("Cost table too low, load step, stalls", 3, panels.to_vec())
     }
 
     fn table(rows: &[Row]) -> Table {
-        let mut table = table(rows);
-        table.columns.push("settled".to_owned());
-        table.rows.iter_mut().zip(rows).for_each(|(line, row)| line.push(Cell::Number(row.settled, 0)));
-        table
+        Table::of(rows, &[&COLUMNS[..], &[("settled", |r| (r.settled, 0).into())]].concat())
     }
 
     fn findings(rows: &[Row]) -> Vec<Finding> {
@@ -84,7 +75,7 @@ impl Experiment for Disturbed {
                 of("adaptive", |r| r.settled),
                 15.0,
             ),
-            at_least("greedy (no learning): frames past 1.05 T", of("greedy", |r| r.misses), 0.9),
+            Finding::at_least("greedy (no learning): frames past 1.05 T", of("greedy", |r| r.misses), 0.9),
         ]
     }
 }

@@ -3,12 +3,10 @@
 //! In: nothing. Out: a row for each pair, with the metrics common to all. Never here: how frames are played
 //! ([`crate::chart::policies::played`]), a model of a scene. Without an adapter everything but the likeness of pictures is measured.
 
-use crate::chart::experiment::{Experiment, Finding};
-use crate::chart::figure::Figure;
-use crate::chart::policies::numeric::common::{at_least, number};
+use crate::chart::policies::numeric::common::number;
 use crate::chart::policies::numeric::metrics::Row;
 use crate::chart::policies::played::{Case, PLAYS, Times, curves, table};
-use crate::chart::table::Table;
+use crate::chart::{Experiment, Figure, Finding, Table};
 
 /// The experiment.
 pub(crate) struct Every;
@@ -30,17 +28,13 @@ impl Experiment for Every {
         case.measure(Times::Declared)
     }
 
-    fn case_of(row: &Row) -> Case {
-        Case::of(row)
-    }
-
     fn figure(rows: &[Row]) -> Figure {
         let panel = |scene: &str| {
             let shown = |row: &&Row| row.setting == scene && SHOWN.contains(&row.policy.as_str());
             curves(scene, rows.iter().filter(shown))
         };
         let panels = PLAYS.iter().map(|play| panel(play.paper.name())).collect();
-        Figure { title: "The papers' scenes in lockstep".to_owned(), panels, columns: 2 }
+        Figure::new("The papers' scenes in lockstep", 2, panels)
     }
 
     fn table(rows: &[Row]) -> Table {
@@ -58,7 +52,7 @@ impl Experiment for Every {
                 Finding::at_most(claim("binding stddev"), of(|r| r.binding_stddev), 0.035),
                 Finding::at_most(claim("frames past 1.05 T"), of(|r| r.misses), 0.01),
                 Finding::at_most(claim("reversals per object and frame"), of(|r| r.reversals), 0.002),
-                at_least(claim("benefit over the bound"), of(|r| r.value_over_bound), 0.99),
+                Finding::at_least(claim("benefit over the bound"), of(|r| r.value_over_bound), 0.99),
                 Finding::at_most(claim("objects left out per object and frame"), of(|r| r.holes), 0.0),
             ]);
         }

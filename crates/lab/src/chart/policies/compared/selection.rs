@@ -1,9 +1,7 @@
 //! Wall time of a choice, from 100 objects to 100,000: the only experiment here that reads a clock.
 
-use crate::chart::experiment::{Experiment, Finding};
-use crate::chart::figure::{Axis, Colour, Figure, Layer, Mark, Panel};
-use crate::chart::policies::numeric::common::{LEVEL_PARTS, figure};
-use crate::chart::table::Table;
+use crate::chart::policies::numeric::common::LEVEL_PARTS;
+use crate::chart::{Axis, Column, Experiment, Figure, Finding, Layer, experiment, lines, median};
 use metachron_lod::adaptive::{Adaptive, Offer, Settings, Time};
 use metachron_lod::select::{Entry, Level, Mode, Problem, funkhouser, incremental, marginal};
 use serde::{Deserialize, Serialize};
@@ -36,7 +34,7 @@ const POLICIES: [(&str, Time1); 4] = [
 ];
 
 /// A number of objects, and a policy.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Case {
     objects: usize,
     policy: String,
@@ -44,18 +42,25 @@ pub struct Case {
 
 /// Wall time of a choice.
 #[derive(Debug, Clone, Serialize, Deserialize)]
-pub struct Row {
-    objects: usize,
-    policy: String,
+pub struct Found {
     median_ms: f64,
     least_ms: f64,
 }
+
+type Row = experiment::Row<Case, Found>;
 
 impl Experiment for Selection {
     type Case = Case;
     type Row = Row;
     const NAME: &'static str = "selection";
     const TITLE: &'static str = "wall time of one selection, five levels per object, new weights in every frame";
+    const COLUMNS: &'static [Column<Row>] = &[
+        ("objects", |r| (r.case.objects as f64, 0).into()),
+        ("policy", |r| (&r.case.policy).into()),
+        ("median_ms", |r| (r.median_ms, 4).into()),
+        ("least_ms", |r| (r.least_ms, 4).into()),
+        ("share_of_60_hz", |r| (r.least_ms / FRAME_MS, 4).into()),
+    ];
 
     fn cases(quick: bool) -> Vec<Case> {
         let counts = if quick { &QUICK_OBJECTS[..] } else { &OBJECTS[..] };
@@ -66,46 +71,26 @@ impl Experiment for Selection {
     fn measure(case: &Case) -> Row {
         let time = POLICIES.iter().find(|p| p.0 == case.policy).map_or(POLICIES[0].1, |p| p.1);
         let _alone = ALONE.lock().unwrap_or_else(PoisonError::into_inner);
-        let mut times = time(case.objects);
-        times.sort_by(f64::total_cmp);
-        let Case { objects, policy } = case.clone();
-        Row { objects, policy, median_ms: times[times.len() / 2], least_ms: times[0] }
-    }
-
-    fn case_of(row: &Row) -> Case {
-        Case { objects: row.objects, policy: row.policy.clone() }
+        let times = time(case.objects);
+        let least_ms = times.iter().copied().fold(f64::INFINITY, f64::min);
+        Row { case: case.clone(), found: Found { median_ms: median(times), least_ms } }
     }
 
     fn figure(rows: &[Row]) -> Figure {
-        let line = |((name, _), colour): (&(&str, Time1), Colour)| {
-            let here = rows.iter().filter(|r| r.policy == *name);
-            let points = here.map(|r| (r.objects as f64, r.least_ms)).collect();
-            Layer { label: (*name).to_owned(), colour, mark: Mark::Line(points) }
+        let points = |name| {
+            let here = rows.iter().filter(move |r| r.case.policy == name);
+            here.map(|r| (r.case.objects as f64, r.least_ms))
         };
-        let mut layers: Vec<_> = POLICIES.iter().zip(Colour::LINES).map(line).collect();
-        let share = vec![(100.0, SHARE * FRAME_MS), (1e5, SHARE * FRAME_MS)];
-        layers.push(Layer { label: "1 % of 1/60 s".to_owned(), colour: Colour::Grey, mark: Mark::Dashed(share) });
+        let layers = lines(POLICIES.map(|(name, _)| name), points);
+        let layers = layers.chain([Layer::limit("1 % of 1/60 s", [100.0, 1e5], SHARE * FRAME_MS)]);
         let (x, y) = (Axis::log("objects", 100.0, 1e5), Axis::log("least selection time, ms", 1e-3, 1e3));
-        figure("Selection time", vec![Panel { title: String::new(), x, y, layers }], 1)
-    }
-
-    fn table(rows: &[Row]) -> Table {
-        let mut table = Table::new(&["objects", "policy", "median_ms", "least_ms", "share_of_60_hz"]);
-        table.rows.extend(rows.iter().map(|r| {
-            let (median, least) = ((r.median_ms, 4), (r.least_ms, 4));
-            let share = (r.least_ms / FRAME_MS, 4);
-            vec![(r.objects as f64, 0).into(), r.policy.clone().into(), median.into(), least.into(), share.into()]
-        }));
-        table
+        Figure::single("Selection time", x, y, layers)
     }
 
     fn findings(rows: &[Row]) -> Vec<Finding> {
-        let goal = rows.iter().find(|r| r.objects == GOAL_OBJECTS && r.policy == "adaptive");
-        let share = goal.map(|r| r.least_ms / FRAME_MS);
-        share
-            .map(|s| Finding::at_most("adaptive, 10,000 objects: least time over 1/60 s", s, SHARE))
-            .into_iter()
-            .collect()
+        let goal = rows.iter().find(|r| r.case.objects == GOAL_OBJECTS && r.case.policy == "adaptive");
+        let claim = "adaptive, 10,000 objects: least time over 1/60 s";
+        goal.map(|r| Finding::at_most(claim, r.least_ms / FRAME_MS, SHARE)).into_iter().collect()
     }
 }
 

@@ -1,15 +1,13 @@
 //! A fixed camera in front of a scene in which nothing moves: no level may change.
 
-use crate::chart::experiment::{Experiment, Finding};
-use crate::chart::figure::Figure;
 use crate::chart::policies::numeric::auditorium_model;
 use crate::chart::policies::numeric::camera::{Path, key};
 use crate::chart::policies::numeric::chooser::Policy;
 use crate::chart::policies::numeric::closed_loop::Show;
-use crate::chart::policies::numeric::common::{Case, curves, figure, number, table};
+use crate::chart::policies::numeric::common::{COLUMNS, Case, curves, number};
 use crate::chart::policies::numeric::machine::Fault;
 use crate::chart::policies::numeric::metrics::Row;
-use crate::chart::table::Table;
+use crate::chart::{Column, Experiment, Figure, Finding};
 
 /// The experiment.
 pub(crate) struct Still;
@@ -39,6 +37,7 @@ impl Experiment for Still {
     type Row = Row;
     const NAME: &'static str = "still";
     const TITLE: &'static str = "static scene: changes of level by policy";
+    const COLUMNS: &'static [Column<Row>] = &COLUMNS;
 
     fn cases(quick: bool) -> Vec<Case> {
         let seeds = if quick { 1 } else { SEEDS };
@@ -54,17 +53,9 @@ impl Experiment for Still {
         Row::of(&case.setting, &case.policy, &runs)
     }
 
-    fn case_of(row: &Row) -> Case {
-        Case::of(row)
-    }
-
     fn figure(_: &[Row]) -> Figure {
         let panels = SETTINGS.iter().map(|s| curves(s.0, &still(s.0), &POLICIES, 1.5)).collect();
-        figure("A static scene", panels, 3)
-    }
-
-    fn table(rows: &[Row]) -> Table {
-        table(rows)
+        Figure::new("A static scene", 3, panels)
     }
 
     fn findings(rows: &[Row]) -> Vec<Finding> {

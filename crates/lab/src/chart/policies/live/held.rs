@@ -4,10 +4,8 @@
 //! beside the same threads, how much the time of one and the same picture varies. Never here: a declared machine, a
 //! window. Policies and loads take turns, round by round, so that other work of the machine meets all of them.
 
-use super::super::super::experiment::{Experiment, Finding, worst};
-use super::super::super::figure::{Axis, Colour, Figure, Layer, Mark, Panel};
-use super::super::super::table::Table;
 use crate::chart::policies::numeric::metrics::{deviation95, error_over_allowed, mean, predicts, within};
+use crate::chart::{Axis, Colour, Column, Experiment, Figure, Finding, Layer, Panel, experiment, worst};
 use anyhow::Context;
 use metachron_lod::control::Policy;
 use metachron_render::{Camera, Gpu, Offscreen, RendererOptions, SceneView, Size, Style};
@@ -42,10 +40,11 @@ const LATE: f64 = 0.02;
 const OVER: f64 = 1.1;
 
 /// A play.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub(in super::super::super) struct Case {
     scene: String,
     policy: String,
+    /// Threads that compete.
     busy: usize,
     round: usize,
     quick: bool,
@@ -53,13 +52,7 @@ pub(in super::super::super) struct Case {
 
 /// A play, measured; NaN where no adapter draws.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub(in super::super::super) struct Row {
-    scene: String,
-    policy: String,
-    /// Threads that compete.
-    busy: usize,
-    round: usize,
-    quick: bool,
+pub(in super::super::super) struct Found {
     adapter: String,
     /// Frames that count.
     frames: usize,
@@ -82,6 +75,8 @@ pub(in super::super::super) struct Row {
     /// The limit on which the controller rests at the end, or why nothing was measured; empty for none.
     said: String,
 }
+
+type Row = experiment::Row<Case, Found>;
 
 /// Threads that do nothing but compute, until they are dropped.
 struct Busy {
@@ -190,15 +185,10 @@ fn empty(gpu: &Gpu) -> anyhow::Result<Vec<f64>> {
     times(|| Ok(screen.render(&picture, &camera).map(drop)?))
 }
 
-impl Row {
-    fn blank(case: &Case) -> Self {
-        let Case { scene, policy, busy, round, quick } = case.clone();
+impl Found {
+    /// Nothing measured, for a reason.
+    fn blank(said: String) -> Self {
         Self {
-            scene,
-            policy,
-            busy,
-            round,
-            quick,
             adapter: String::new(),
             frames: 0,
             late: f64::NAN,
@@ -210,7 +200,7 @@ impl Row {
             triangles: f64::NAN,
             scale: f64::NAN,
             value: f64::NAN,
-            said: String::new(),
+            said,
         }
     }
 
@@ -242,7 +232,6 @@ impl Row {
             scale: mean(&of(|row| row.render_scale)),
             value: mean(&known(|row| row.value_over_bound)),
             said,
-            ..Self::blank(case)
         })
     }
 }
@@ -253,6 +242,22 @@ impl Experiment for Held {
     const NAME: &'static str = "held";
     const TITLE: &'static str = "late frames at 30 Hz and 1280 x 720 on this adapter, alone and beside busy threads";
     const ALONE: bool = true;
+    const COLUMNS: &'static [Column<Row>] = &[
+        ("scene", |r| (&r.case.scene).into()),
+        ("policy", |r| (&r.case.policy).into()),
+        ("busy", |r| (r.case.busy as f64, 0).into()),
+        ("round", |r| (r.case.round as f64, 0).into()),
+        ("late_%", |r| (100.0 * r.late, 1).into()),
+        ("work_ms", |r| (r.work_ms, 1).into()),
+        ("work95_ms", |r| (r.work95_ms, 1).into()),
+        ("empty_ms", |r| (r.empty_ms, 1).into()),
+        ("spread95", |r| (r.spread95, 2).into()),
+        ("error95", |r| (r.error95, 2).into()),
+        ("error", |r| (r.error(), 2).into()),
+        ("triangles", |r| (r.triangles, 0).into()),
+        ("scale", |r| (r.scale, 2).into()),
+        ("value", |r| (r.value, 3).into()),
+    ];
 
     fn cases(quick: bool) -> Vec<Case> {
         let scenes = if quick { &SCENES[..1] } else { &SCENES[..] };
@@ -274,83 +279,40 @@ impl Experiment for Held {
     }
 
     fn measure(case: &Case) -> Row {
-        Row::measured(case).unwrap_or_else(|why| Row { said: why.to_string(), ..Row::blank(case) })
-    }
-
-    fn case_of(row: &Row) -> Case {
-        let Row { scene, policy, busy, round, quick, .. } = row.clone();
-        Case { scene, policy, busy, round, quick }
+        let found = Found::measured(case).unwrap_or_else(|why| Found::blank(why.to_string()));
+        Row { case: case.clone(), found }
     }
 
     fn figure(rows: &[Row]) -> Figure {
         let panel = |busy: usize| {
-            let layers = POLICIES.into_iter().zip(Colour::LINES).map(|(policy, colour)| {
+            let dots = |(policy, colour): (Policy, Colour)| {
                 let here = |(at, scene): (usize, &&str)| {
-                    let late = median(rows, |row| row.late, |row| row.matches(scene, policy, busy));
+                    let late = median(rows, |row| row.late, |row| row.case.matches(scene, policy, busy));
                     late.is_finite().then_some((at as f64, 100.0 * late))
                 };
-                let dots = SCENES.iter().enumerate().filter_map(here).collect();
-                Layer { label: policy.name().to_owned(), colour, mark: Mark::Dots(dots) }
-            });
+                Layer::dots(policy.name(), colour, SCENES.iter().enumerate().filter_map(here))
+            };
             let (x, y) = (
                 Axis::linear("tube, cavity, library, auditorium, grove, walkthrough", -0.5, 5.5),
                 Axis::linear("late frames, %", 0.0, 100.0),
             );
-            Panel { title: format!("{busy} busy threads"), x, y, layers: layers.collect() }
+            Panel::new(format!("{busy} busy threads"), x, y, POLICIES.into_iter().zip(Colour::LINES).map(dots))
         };
         let adapter = rows.first().map_or("", |row| &row.adapter);
-        Figure { title: format!("{} ({adapter})", Self::TITLE), panels: BUSY.map(panel).to_vec(), columns: 2 }
-    }
-
-    fn table(rows: &[Row]) -> Table {
-        let mut table = Table::new(&[
-            "scene",
-            "policy",
-            "busy",
-            "round",
-            "late_%",
-            "work_ms",
-            "work95_ms",
-            "empty_ms",
-            "spread95",
-            "error95",
-            "error",
-            "triangles",
-            "scale",
-            "value",
-        ]);
-        table.rows.extend(rows.iter().map(|r| {
-            vec![
-                r.scene.clone().into(),
-                r.policy.clone().into(),
-                (r.busy as f64, 0).into(),
-                (r.round as f64, 0).into(),
-                (100.0 * r.late, 1).into(),
-                (r.work_ms, 1).into(),
-                (r.work95_ms, 1).into(),
-                (r.empty_ms, 1).into(),
-                (r.spread95, 2).into(),
-                (r.error95, 2).into(),
-                (r.error(), 2).into(),
-                (r.triangles, 0).into(),
-                (r.scale, 2).into(),
-                (r.value, 3).into(),
-            ]
-        }));
-        table
+        Figure::new(format!("{} ({adapter})", Self::TITLE), 2, BUSY.map(panel).to_vec())
     }
 
     fn findings(rows: &[Row]) -> Vec<Finding> {
         let period_ms = 1e3 / TARGET_HZ;
         let of = |policy: Policy, busy: usize, value: &dyn Fn(&Row) -> f64| {
-            SCENES.map(|scene| median(rows, value, |row| row.matches(scene, policy, busy)))
+            SCENES.map(|scene| median(rows, value, |row| row.case.matches(scene, policy, busy)))
         };
         // a quick run plays one of the scenes
         let known = |all: [f64; SCENES.len()]| worst(all.into_iter().filter(|x| !x.is_nan()));
         let late = |policy| of(policy, 0, &|row: &Row| row.late);
         let more = late(Policy::Adaptive).into_iter().zip(late(Policy::Feedback)).map(|(a, b)| a - b);
         let over = of(Policy::Adaptive, BUSY[1], &|row| row.work_ms / row.empty_ms.max(period_ms));
-        let errors = of(Policy::Adaptive, 0, &Row::error);
+        let errors = of(Policy::Adaptive, 0, &|row| row.error());
         let mut findings = vec![
             Finding::at_most(
                 "adaptive, once settled: share of late frames in any scene",
@@ -373,12 +335,14 @@ impl Experiment for Held {
     }
 }
 
-impl Row {
+impl Found {
     /// Error of 19 of 20 predictions over the allowed one.
     fn error(&self) -> f64 {
         error_over_allowed(self.error95, self.spread95)
     }
+}
 
+impl Case {
     fn matches(&self, scene: &str, policy: Policy, busy: usize) -> bool {
         (self.scene.as_str(), self.policy.as_str(), self.busy) == (scene, policy.name(), busy)
     }
@@ -396,18 +360,15 @@ mod tests {
     #[test]
     fn rounds_are_medians_and_a_scene_that_was_not_played_neither_holds_nor_fails() {
         let row = |policy: Policy, busy, round, late| Row {
-            late,
-            work_ms: 40.0,
-            empty_ms: 20.0,
-            spread95: 0.2,
-            error95: 0.18,
-            ..Row::blank(&Case {
-                scene: "tube".to_owned(),
-                policy: policy.name().to_owned(),
-                busy,
-                round,
-                quick: false,
-            })
+            case: Case { scene: "tube".to_owned(), policy: policy.name().to_owned(), busy, round, quick: false },
+            found: Found {
+                late,
+                work_ms: 40.0,
+                empty_ms: 20.0,
+                spread95: 0.2,
+                error95: 0.18,
+                ..Found::blank(String::new())
+            },
         };
         let rows: Vec<_> = [0.0, 0.5, 0.01]
             .into_iter()

@@ -8,11 +8,9 @@ pub(in super::super) mod prediction;
 mod rounds;
 pub(in super::super) mod traversal;
 
-use super::super::experiment::{Experiment, Finding, worst};
-use super::super::figure::Figure;
-use super::super::table::Table;
 use super::numeric::metrics::Row;
 use super::played::{Case, PLAYS, Times, curves};
+use crate::chart::{Experiment, Figure, Finding, Table, worst};
 use rounds::{median_of, summary, verdict};
 
 /// The experiment on play number `P`.
@@ -48,17 +46,13 @@ impl<const P: usize> Experiment for Live<P> {
         case.measure(Times::Measured)
     }
 
-    fn case_of(row: &Row) -> Case {
-        Case::of(row)
-    }
-
     fn figure(rows: &[Row]) -> Figure {
         let adapter = rows.first().map_or("", |row| &row.adapter);
         let title = format!("{} on {adapter}", Self::NAME);
         let panel = |(title, policies): (&str, &[&str])| {
             curves(title, rows.iter().filter(|row| row.round == 0 && policies.contains(&row.policy.as_str())))
         };
-        Figure { title, panels: KINDS.map(panel).to_vec(), columns: 2 }
+        Figure::new(title, 2, KINDS.map(panel).to_vec())
     }
 
     fn table(rows: &[Row]) -> Table {

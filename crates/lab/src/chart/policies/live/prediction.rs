@@ -4,13 +4,12 @@
 //! prices are those of the adapter's benchmark, which draws none of these objects; nothing is learnt during the run.
 //! Each picture is drawn several times: no prices can predict the scatter of these times.
 
-use super::super::super::experiment::{Experiment, Finding, worst};
-use super::super::super::figure::{Axis, Colour, Figure, Layer, Mark, Panel, span};
-use super::super::super::table::Table;
 use super::super::played::walk;
 use super::super::played::walk::{PathPoint, Predicted};
 use crate::chart::policies::numeric::machine::RandomSource;
 use crate::chart::policies::numeric::metrics::within;
+use crate::chart::{Axis, Colour, Column, Experiment, Figure, Finding, Layer, Panel, Record, span, worst};
+use csv::StringRecord;
 use metachron_lod::control::Policy;
 use metachron_scene::papers::Paper;
 use serde::{Deserialize, Serialize};
@@ -55,6 +54,16 @@ pub(in super::super::super) struct Row {
     scatter95: f64,
     /// Predicted and measured, milliseconds, with a colon between the two and spaces between pictures.
     pairs: String,
+}
+
+impl Record<Case> for Row {
+    fn case(&self) -> Case {
+        Case { scene: self.scene.clone(), prices: self.prices.clone(), pictures: self.pictures }
+    }
+
+    fn read(names: &StringRecord, line: &StringRecord) -> csv::Result<Self> {
+        line.deserialize(Some(names))
+    }
 }
 
 impl Row {
@@ -104,6 +113,16 @@ impl Experiment for Prediction {
     const NAME: &'static str = "prediction";
     const TITLE: &'static str = "predicted and measured drawing times, by the adapter's cost model";
     const ALONE: bool = true;
+    const COLUMNS: &'static [Column<Row>] = &[
+        ("scene", |r| (&r.scene).into()),
+        ("prices", |r| (&r.prices).into()),
+        ("pictures", |r| (r.pictures as f64, 0).into()),
+        ("error", |r| (r.error, 3).into()),
+        ("error95", |r| (r.error95, 3).into()),
+        ("factor", |r| (r.factor, 3).into()),
+        ("scaled95", |r| (r.scaled_error95, 3).into()),
+        ("scatter95", |r| (r.scatter95, 3).into()),
+    ];
 
     fn cases(quick: bool) -> Vec<Case> {
         let pictures = PICTURES[usize::from(quick)];
@@ -126,47 +145,20 @@ impl Experiment for Prediction {
         Row::of(case, adapter, &pictures)
     }
 
-    fn case_of(row: &Row) -> Case {
-        Case { scene: row.scene.clone(), prices: row.prices.clone(), pictures: row.pictures }
-    }
-
     fn figure(rows: &[Row]) -> Figure {
         let adapter = rows.first().map_or("", |row| &row.adapter);
         let (low, high) =
             span(rows.iter().flat_map(Row::pairs).flat_map(|(predicted, measured)| [predicted, measured]), true);
-        let line = |by: f64| Mark::Dashed(vec![(low, by * low), (high, by * high)]);
-        let grey = |label: &str, by| Layer { label: label.to_owned(), colour: Colour::Grey, mark: line(by) };
+        let grey = |label: &str, by: f64| Layer::dashed(label, Colour::Grey, [low, high].map(|ms| (ms, by * ms)));
         let panel = |prices: &str| {
             let mut layers = vec![grey("exact, and 10 % off", 1.0), grey("", 1.0 - WANTED), grey("", 1.0 + WANTED)];
-            let here = rows.iter().filter(|row| row.prices == prices);
-            layers.extend(here.zip(Colour::LINES.into_iter().cycle()).map(|(row, colour)| Layer {
-                label: row.scene.clone(),
-                colour,
-                mark: Mark::Dots(row.pairs()),
-            }));
+            let here = rows.iter().filter(|row| row.prices == prices).zip(Colour::LINES.into_iter().cycle());
+            layers.extend(here.map(|(row, colour)| Layer::dots(&row.scene, colour, row.pairs())));
             let (x, y) = (Axis::log("predicted, ms", low, high), Axis::log("measured, ms", low, high));
-            Panel { title: format!("cost model: {prices}"), x, y, layers }
+            Panel::new(format!("cost model: {prices}"), x, y, layers)
         };
         let title = format!("Predicted and measured on {adapter} (FS93, fig. 3)");
-        Figure { title, panels: PRICES.map(|(prices, _)| panel(prices)).to_vec(), columns: 2 }
-    }
-
-    fn table(rows: &[Row]) -> Table {
-        let mut table =
-            Table::new(&["scene", "prices", "pictures", "error", "error95", "factor", "scaled95", "scatter95"]);
-        table.rows.extend(rows.iter().map(|r| {
-            vec![
-                r.scene.clone().into(),
-                r.prices.clone().into(),
-                (r.pictures as f64, 0).into(),
-                (r.error, 3).into(),
-                (r.error95, 3).into(),
-                (r.factor, 3).into(),
-                (r.scaled_error95, 3).into(),
-                (r.scatter95, 3).into(),
-            ]
-        }));
-        table
+        Figure::new(title, 2, PRICES.map(|(prices, _)| panel(prices)).to_vec())
     }
 
     fn findings(rows: &[Row]) -> Vec<Finding> {

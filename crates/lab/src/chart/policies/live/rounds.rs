@@ -2,9 +2,8 @@
 //!
 //! In: the rows of one scene, round by round. Out: a table of policies, findings. Never here: how a row is measured.
 
-use super::super::super::experiment::Finding;
-use super::super::super::table::Table;
 use crate::chart::policies::numeric::metrics::{Row, error_over_allowed, predicts, within};
+use crate::chart::{Cell, Finding, Table};
 use metachron_lod::control::Policy;
 
 /// A number of a policy over the rounds.
@@ -101,54 +100,33 @@ fn worst_of(claim: String, differences: impl Iterator<Item = Difference>, none: 
 
 /// One line for each policy: medians over the rounds, and half of the range of its late frames.
 pub(super) fn summary(rows: &[Row]) -> Table {
-    let mut table = Table::new(&[
-        "scene",
-        "policy",
-        "rounds",
-        "T_ms",
-        "frames",
-        "mean",
-        "p95",
-        "max",
-        "late_%",
-        "spread_%",
-        "value",
-        "error95",
-        "spread95",
-        "error",
-        "reversals",
-        "triangles",
-        "ssim",
-        "ssim_least",
-        "holes",
-    ]);
     let played = |policy: &str| rows.iter().filter(|row| row.policy == policy).count();
-    for policy in Policy::ALL.iter().map(|policy| policy.name()).filter(|policy| played(policy) > 0) {
-        let of = |what: fn(&Row) -> f64| median_of(rows, policy, what);
+    let line = |policy: &str| {
+        let of = |what: fn(&Row) -> f64, digits| Cell::Number(median_of(rows, policy, what), digits);
         let late = OverRounds::of(rows, policy, |row| row.misses);
-        table.rows.push(vec![
-            rows[0].setting.clone().into(),
-            policy.to_owned().into(),
-            (played(policy) as f64, 0).into(),
-            (of(|row| row.target_ms), 2).into(),
-            (of(|row| row.frames as f64), 0).into(),
-            (of(|row| row.mean), 3).into(),
-            (of(|row| row.p95), 3).into(),
-            (of(|row| row.max), 2).into(),
-            (100.0 * late.median, 1).into(),
-            (100.0 * late.spread, 1).into(),
-            (of(|row| row.value_over_bound), 4).into(),
-            (of(|row| row.model_error95), 3).into(),
-            (of(|row| row.spread95), 3).into(),
-            (of(error), 2).into(),
-            (of(|row| row.reversals), 5).into(),
-            (of(|row| row.polygons), 0).into(),
-            (of(|row| row.ssim), 4).into(),
-            (of(|row| row.ssim_least), 4).into(),
-            (of(|row| row.holes), 4).into(),
-        ]);
-    }
-    table
+        vec![
+            ("scene", (&rows[0].setting).into()),
+            ("policy", policy.into()),
+            ("rounds", (played(policy) as f64, 0).into()),
+            ("T_ms", of(|row| row.target_ms, 2)),
+            ("frames", of(|row| row.frames as f64, 0)),
+            ("mean", of(|row| row.mean, 3)),
+            ("p95", of(|row| row.p95, 3)),
+            ("max", of(|row| row.max, 2)),
+            ("late_%", (100.0 * late.median, 1).into()),
+            ("spread_%", (100.0 * late.spread, 1).into()),
+            ("value", of(|row| row.value_over_bound, 4)),
+            ("error95", of(|row| row.model_error95, 3)),
+            ("spread95", of(|row| row.spread95, 3)),
+            ("error", of(error, 2)),
+            ("reversals", of(|row| row.reversals, 5)),
+            ("triangles", of(|row| row.polygons, 0)),
+            ("ssim", of(|row| row.ssim, 4)),
+            ("ssim_least", of(|row| row.ssim_least, 4)),
+            ("holes", of(|row| row.holes, 4)),
+        ]
+    };
+    Table::named(Policy::ALL.iter().map(|policy| policy.name()).filter(|policy| played(policy) > 0).map(line))
 }
 
 #[cfg(test)]

@@ -3,9 +3,7 @@
 //!
 //! In: a mesh of 100,000 triangles. Out: triangles per second at each resolution. Never here: drawing.
 
-use super::super::super::experiment::{Experiment, Finding, worst};
-use super::super::super::figure::{Axis, Colour, Figure, Layer, Mark, Panel, span};
-use super::super::super::table::Table;
+use crate::chart::{Axis, Colour, Column, Experiment, Figure, Finding, Layer, Panel, experiment, span, worst};
 use metachron_drawable::{Generator, ProgressiveMesh, generate};
 use serde::{Deserialize, Serialize};
 use std::sync::OnceLock;
@@ -21,19 +19,22 @@ const HALVINGS: u32 = 10;
 const ROUNDS: usize = 15;
 
 /// Triangles of a cut.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(in super::super::super) struct Case(u32);
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub(in super::super::super) struct Case {
+    asked: u32,
+}
 
 /// A cut and its time.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub(in super::super::super) struct Row {
-    asked: u32,
+pub(in super::super::super) struct Found {
     triangles: u32,
     /// The least time of some rounds, microseconds.
     micros: f64,
     /// Millions of triangles per second.
     rate: f64,
 }
+
+type Row = experiment::Row<Case, Found>;
 
 fn mesh() -> Option<&'static ProgressiveMesh> {
     static MESH: OnceLock<Option<ProgressiveMesh>> = OnceLock::new();
@@ -46,9 +47,14 @@ impl Experiment for Traversal {
     const NAME: &'static str = "traversal";
     const TITLE: &'static str = "traversal speed of a cut's triangles, by resolution";
     const ALONE: bool = true;
+    const COLUMNS: &'static [Column<Row>] = &[
+        ("triangles", |r| (f64::from(r.triangles), 0).into()),
+        ("micros", |r| (r.micros, 2).into()),
+        ("million_a_second", |r| (r.rate, 1).into()),
+    ];
 
     fn cases(_: bool) -> Vec<Case> {
-        (0..=HALVINGS).rev().map(|k| Case(TRIANGLES >> k)).collect()
+        (0..=HALVINGS).rev().map(|k| Case { asked: TRIANGLES >> k }).collect()
     }
 
     fn measure(case: &Case) -> Row {
@@ -57,42 +63,30 @@ impl Experiment for Traversal {
             let Some(tom) = mesh() else { break };
             corners.clear();
             let started = Instant::now();
-            let cut = tom.cut(case.0);
+            let cut = tom.cut(case.asked);
             tom.resolve(cut, &mut corners);
             least = least.min(started.elapsed().as_secs_f64());
             triangles = cut.triangles;
         }
-        Row { asked: case.0, triangles, micros: 1e6 * least, rate: 1e-6 * f64::from(triangles) / least }
-    }
-
-    fn case_of(row: &Row) -> Case {
-        Case(row.asked)
+        let found = Found { triangles, micros: 1e6 * least, rate: 1e-6 * f64::from(triangles) / least };
+        Row { case: case.clone(), found }
     }
 
     fn figure(rows: &[Row]) -> Figure {
         let line: Vec<_> = rows.iter().map(|r| (f64::from(r.triangles) / f64::from(TRIANGLES), r.rate)).collect();
         let (low, high) = span(line.iter().map(|p| p.0), true);
         let (least, most) = span(line.iter().map(|p| p.1), true);
-        let layers = vec![Layer { label: String::new(), colour: Colour::Blue, mark: Mark::Line(line) }];
         let (x, y) = (
             Axis::log("triangles of the cut / all", low, high),
             Axis::log("millions of triangles per second", least, most),
         );
-        let title = "Traversal of a mesh of 100,000 triangles (GB99)".to_owned();
-        let of = "the whole mesh, at 1, is a plain list".to_owned();
-        Figure { title, panels: vec![Panel { title: of, x, y, layers }], columns: 1 }
-    }
-
-    fn table(rows: &[Row]) -> Table {
-        let mut table = Table::new(&["triangles", "micros", "million_a_second"]);
-        let cells = |r: &Row| vec![(f64::from(r.triangles), 0).into(), (r.micros, 2).into(), (r.rate, 1).into()];
-        table.rows.extend(rows.iter().map(cells));
-        table
+        let panel = Panel::new("the whole mesh, at 1, is a plain list", x, y, [Layer::line("", Colour::Blue, line)]);
+        Figure::new("Traversal of a mesh of 100,000 triangles (GB99)", 1, vec![panel])
     }
 
     fn findings(rows: &[Row]) -> Vec<Finding> {
         // in the full mesh no vertex is replaced by a substitute
-        let cuts = || rows.iter().filter(|row| row.asked < TRIANGLES).map(|row| row.rate);
+        let cuts = || rows.iter().filter(|row| row.case.asked < TRIANGLES).map(|row| row.rate);
         let spread = worst(cuts()) / cuts().reduce(f64::min).unwrap_or(f64::NAN);
         vec![Finding::at_most("triangles per second, fastest over slowest cut, without the full mesh", spread, 4.0)]
     }

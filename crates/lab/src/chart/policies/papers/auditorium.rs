@@ -1,13 +1,11 @@
 //! The walk through the auditorium under every policy (FS93, §8, table 1 and fig. 7).
 
-use crate::chart::experiment::{Experiment, Finding};
-use crate::chart::figure::Figure;
 use crate::chart::policies::numeric::auditorium_model::{LAP, show};
 use crate::chart::policies::numeric::chooser::Policy;
-use crate::chart::policies::numeric::common::{Case, at_least, curves, figure, number, table};
+use crate::chart::policies::numeric::common::{COLUMNS, Case, curves, number};
 use crate::chart::policies::numeric::machine::Fault;
 use crate::chart::policies::numeric::metrics::Row;
-use crate::chart::table::Table;
+use crate::chart::{Column, Experiment, Figure, Finding};
 use metachron_lod::cost::value::Value;
 
 /// The experiment.
@@ -32,6 +30,7 @@ impl Experiment for Auditorium {
     type Row = Row;
     const NAME: &'static str = "auditorium";
     const TITLE: &'static str = "frame-time control on a walkthrough of 384 seats with half a turn in six frames";
+    const COLUMNS: &'static [Column<Row>] = &COLUMNS;
 
     fn cases(quick: bool) -> Vec<Case> {
         let seeds = if quick { 1 } else { SEEDS };
@@ -42,10 +41,6 @@ impl Experiment for Auditorium {
         case.measure(&show(Fault::NONE, LAP, 1), &POLICIES)
     }
 
-    fn case_of(row: &Row) -> Case {
-        Case::of(row)
-    }
-
     fn figure(_: &[Row]) -> Figure {
         let show = show(Fault::NONE, LAP, 1);
         let panels = vec![
@@ -53,11 +48,7 @@ impl Experiment for Auditorium {
             curves("by size", &show, &[Policy::StaticFine, Policy::Threshold], 3.0),
             curves("by prediction", &show, &[Policy::Greedy, Policy::Adaptive], 3.0),
         ];
-        figure("Walkthrough of the auditorium (FS93, fig. 7)", panels, 1)
-    }
-
-    fn table(rows: &[Row]) -> Table {
-        table(rows)
+        Figure::new("Walkthrough of the auditorium (FS93, fig. 7)", 1, panels)
     }
 
     fn findings(rows: &[Row]) -> Vec<Finding> {
@@ -66,7 +57,7 @@ impl Experiment for Auditorium {
         let (greedy, ours) = (spread("greedy"), spread("adaptive"));
         let by_size = spread("static-64-px").min(spread("threshold"));
         vec![
-            at_least(
+            Finding::at_least(
                 "binding stddev, none over the greater by size: > 1",
                 spread("full") / spread("static-64-px").max(spread("threshold")),
                 1.0,
@@ -80,7 +71,7 @@ impl Experiment for Auditorium {
             Finding::at_most("adaptive: longest frame / T", of("adaptive", |r| r.max), 1.15),
             Finding::at_most("adaptive: binding stddev", ours, 0.035),
             Finding::at_most("adaptive: frames past 1.05 T", of("adaptive", |r| r.misses), 0.01),
-            at_least("adaptive: benefit over the bound", of("adaptive", |r| r.value_over_bound), 0.99),
+            Finding::at_least("adaptive: benefit over the bound", of("adaptive", |r| r.value_over_bound), 0.99),
             Finding::at_most("adaptive: reversals per object and frame", of("adaptive", |r| r.reversals), 0.002),
         ]
     }

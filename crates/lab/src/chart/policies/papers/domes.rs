@@ -1,12 +1,9 @@
 //! Domes of struts that turn, approach and recede, with or without a coarse ball for a group (MB97, §8).
 
-use crate::chart::experiment::{Experiment, Finding};
-use crate::chart::figure::{Axis, Colour, Figure, Layer, Mark, Panel};
-use crate::chart::policies::numeric::common::figure;
 use crate::chart::policies::numeric::geodesic;
 use crate::chart::policies::numeric::geodesic::{DOMES, STRUTS};
 use crate::chart::policies::numeric::metrics::mean;
-use crate::chart::table::Table;
+use crate::chart::{Axis, Column, Experiment, Figure, Finding, Panel, experiment, lines};
 use metachron_lod::select::incremental::Keep;
 use metachron_lod::select::tree::{Node, Tree};
 use metachron_lod::select::{Entry, Level, Mode, Problem, funkhouser, mason, mason_flat, tree_exact};
@@ -49,7 +46,7 @@ const POLICIES: [(&str, Algorithm); 4] = [
 ];
 
 /// A limit and a policy.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub(crate) struct Case {
     limit: i64,
     policy: String,
@@ -58,10 +55,7 @@ pub(crate) struct Case {
 
 /// Results of a limit and a policy, means over the frames.
 #[derive(Debug, Clone, Serialize, Deserialize)]
-pub(crate) struct Row {
-    limit: i64,
-    policy: String,
-    frames: usize,
+pub(crate) struct Found {
     /// Share of struts that are drawn neither as prisms nor by a ball.
     holes: f64,
     /// Wrong pixels, as a share of the pixels under the struts.
@@ -73,12 +67,23 @@ pub(crate) struct Row {
     balls: f64,
 }
 
+type Row = experiment::Row<Case, Found>;
+
 impl Experiment for Domes {
     type Case = Case;
     type Row = Row;
     const NAME: &'static str = "domes";
     const TITLE: &'static str =
         "eight domes of 120 struts at half, one and two times the nominal cost: groups or holes";
+    const COLUMNS: &'static [Column<Row>] = &[
+        ("limit", |r| (r.case.limit as f64, 0).into()),
+        ("policy", |r| (&r.case.policy).into()),
+        ("holes", |r| (r.holes, 4).into()),
+        ("error", |r| (r.error, 4).into()),
+        ("balls", |r| (r.balls, 4).into()),
+        ("changes", |r| (r.changes, 4).into()),
+        ("spent", |r| (r.spent, 4).into()),
+    ];
 
     fn cases(quick: bool) -> Vec<Case> {
         let frames = if quick { QUICK_FRAMES } else { FRAMES };
@@ -106,53 +111,28 @@ impl Experiment for Domes {
             shown = now;
         }
         let [holes, error, changes, spent, balls] = sums.map(|s| mean(&s));
-        let Case { limit, policy, frames } = case.clone();
-        Row { limit, policy, frames, holes, error, changes, spent, balls }
-    }
-
-    fn case_of(row: &Row) -> Case {
-        Case { limit: row.limit, policy: row.policy.clone(), frames: row.frames }
+        Row { case: case.clone(), found: Found { holes, error, changes, spent, balls } }
     }
 
     fn figure(rows: &[Row]) -> Figure {
         let panel = |title: &str, label, of: fn(&Row) -> f64| {
-            let line = |((name, _), colour): (&(&str, Algorithm), Colour)| {
-                let here = rows.iter().filter(|r| r.policy == *name);
-                let points = here.map(|r| (r.limit as f64, of(r))).collect();
-                Layer { label: (*name).to_owned(), colour, mark: Mark::Line(points) }
+            let points = |name| {
+                let here = rows.iter().filter(move |r| r.case.policy == name);
+                here.map(move |r| (r.case.limit as f64, of(r)))
             };
-            let layers = POLICIES.iter().zip(Colour::LINES).map(line).collect();
             let x = Axis::log("limit of cost", 1500.0, 10_000.0);
-            Panel { title: title.to_owned(), x, y: Axis::linear(label, 0.0, 1.0), layers }
+            Panel::new(title, x, Axis::linear(label, 0.0, 1.0), lines(POLICIES.map(|(name, _)| name), points))
         };
         let panels = vec![
             panel("holes", "fraction of struts not drawn", |r| r.holes),
             panel("image error", "wrong pixels / pixels of struts", |r| r.error),
         ];
-        figure("Domes of struts (MB97, fig. 7)", panels, 2)
-    }
-
-    fn table(rows: &[Row]) -> Table {
-        let mut table = Table::new(&["limit", "policy", "holes", "error", "balls", "changes", "spent"]);
-        table.rows.extend(rows.iter().map(|r| {
-            let part = |x: f64| (x, 4).into();
-            let limit = (r.limit as f64, 0).into();
-            vec![
-                limit,
-                r.policy.clone().into(),
-                part(r.holes),
-                part(r.error),
-                part(r.balls),
-                part(r.changes),
-                part(r.spent),
-            ]
-        }));
-        table
+        Figure::new("Domes of struts (MB97, fig. 7)", 2, panels)
     }
 
     fn findings(rows: &[Row]) -> Vec<Finding> {
         let of = |limit: i64, policy: &str, what: fn(&Row) -> f64| {
-            rows.iter().find(|r| r.limit == limit && r.policy == policy).map_or(f64::NAN, what)
+            rows.iter().find(|r| r.case.limit == limit && r.case.policy == policy).map_or(f64::NAN, what)
         };
         let mut findings = Vec::new();
         for limit in LIMITS {

@@ -1,14 +1,12 @@
 //! Walks through the grove: how close to its target time every policy stays (RH05, tables 2 and 3).
 
-use crate::chart::experiment::{Experiment, Finding};
-use crate::chart::figure::{Axis, Colour, Figure, Layer, Mark, Panel, span};
 use crate::chart::policies::numeric::chooser::Policy;
 use crate::chart::policies::numeric::closed_loop::Show;
-use crate::chart::policies::numeric::common::{Case, at_least, curves, figure, number, table};
+use crate::chart::policies::numeric::common::{COLUMNS, Case, curves, number};
 use crate::chart::policies::numeric::forest;
 use crate::chart::policies::numeric::forest::{CameraPath, Forms};
 use crate::chart::policies::numeric::metrics::Row;
-use crate::chart::table::{Cell, Table};
+use crate::chart::{Axis, Colour, Experiment, Figure, Finding, Layer, Panel, Table, span};
 use metachron_lod::cost::value::Value;
 
 /// The experiment.
@@ -99,10 +97,6 @@ impl Experiment for Grove {
         case.measure(&setting.show(case.policy_of(&policies), case.frames), &policies)
     }
 
-    fn case_of(row: &Row) -> Case {
-        Case::of(row)
-    }
-
     fn figure(_: &[Row]) -> Figure {
         let frames = FRAMES[0] / QUICK_PART;
         let panel = |s: &Setting, policy: Policy| {
@@ -120,17 +114,11 @@ impl Experiment for Grove {
             primitives(&levels.show(hood, frames), hood),
             primitives(&levels.show(ours, frames), ours),
         ];
-        figure("Fly-throughs of the grove (RH05, fig. 3, 6 and 7)", panels, 2)
+        Figure::new("Fly-throughs of the grove (RH05, fig. 3, 6 and 7)", 2, panels)
     }
 
     fn table(rows: &[Row]) -> Table {
-        let mut table = table(rows);
-        table.columns.push("paper_avg_err".to_owned());
-        for (line, row) in table.rows.iter_mut().zip(rows) {
-            let paper = SETTINGS.iter().find(|s| s.name == row.setting).map_or(f64::NAN, |s| s.paper);
-            line.push(Cell::Number(paper, 4));
-        }
-        table
+        Table::of(rows, &[&COLUMNS[..], &[("paper_avg_err", |r| (paper_error(r), 4).into())]].concat())
     }
 
     fn findings(rows: &[Row]) -> Vec<Finding> {
@@ -139,7 +127,7 @@ impl Experiment for Grove {
         let claims = |s: &Setting| {
             [
                 Finding::at_most(format!("adaptive, {}: AvgErr", s.name), of(s, |r| r.avg_err), s.limit),
-                at_least(
+                Finding::at_least(
                     format!("adaptive, {}: benefit over the bound", s.name),
                     of(s, |r| r.value_over_bound),
                     VALUE_WANTED,
@@ -148,6 +136,11 @@ impl Experiment for Grove {
         };
         there.flat_map(claims).collect()
     }
+}
+
+/// The paper's mean |t − T|/T of a row's walk.
+fn paper_error(row: &Row) -> f64 {
+    SETTINGS.iter().find(|s| s.name == row.setting).map_or(f64::NAN, |s| s.paper)
 }
 
 /// Triangles, lines and points of every frame (RH05, fig. 6).
@@ -164,9 +157,8 @@ fn primitives(show: &Show, policy: Policy) -> Panel {
     });
     let (low, high) = span(counts.iter().flatten().map(|c| c.1), false);
     let named = ["triangles", "lines", "points"].into_iter().zip(Colour::LINES).zip(counts);
-    let layers = named.map(|((name, colour), c)| Layer { label: name.to_owned(), colour, mark: Mark::Line(c) });
+    let layers = named.map(|((name, colour), points)| Layer::line(name, colour, points));
     let x = Axis::linear("frame", 0.0, show.frames as f64);
-    let (title, y) =
-        (format!("primitives, {}", policy.name()), Axis::linear("primitives per frame", low.max(0.0), high));
-    Panel { title, x, y, layers: layers.collect() }
+    let y = Axis::linear("primitives per frame", low.max(0.0), high);
+    Panel::new(format!("primitives, {}", policy.name()), x, y, layers)
 }

@@ -3,12 +3,10 @@
 //! In: nothing. Out: a row for each setting and policy, all against full detail of the same trees, in lockstep on the declared machine.
 //! Never here: how frames are played ([`crate::chart::policies::played`]). Without an adapter everything but the likeness of pictures is measured.
 
-use crate::chart::experiment::{Experiment, Finding};
-use crate::chart::figure::Figure;
-use crate::chart::policies::numeric::common::{at_least, number};
+use crate::chart::policies::numeric::common::number;
 use crate::chart::policies::numeric::metrics::Row;
 use crate::chart::policies::played::{Case, Shown, Times, curves, table, walk};
-use crate::chart::table::Table;
+use crate::chart::{Experiment, Figure, Finding, Table};
 use metachron_lod::control::Policy;
 use std::fmt::Write;
 
@@ -93,10 +91,6 @@ impl Experiment for Levels {
         walk::measure(&Shown { name: "woods", text: &text(levels), times_over }, case, Times::Declared)
     }
 
-    fn case_of(row: &Row) -> Case {
-        Case::of(row)
-    }
-
     fn figure(rows: &[Row]) -> Figure {
         let panel = |over: f64| {
             let here = LEVELS.map(|(name, _)| setting(name, over));
@@ -105,7 +99,7 @@ impl Experiment for Levels {
                 rows.iter().filter(|row| row.policy == "adaptive" && here.contains(&row.setting)),
             )
         };
-        Figure { title: "Levels of groups".to_owned(), panels: TIMES_OVER.map(panel).to_vec(), columns: 3 }
+        Figure::new("Levels of groups", 3, TIMES_OVER.map(panel).to_vec())
     }
 
     fn table(rows: &[Row]) -> Table {
@@ -122,7 +116,11 @@ impl Experiment for Levels {
             [
                 Finding::at_most(claim("frames past 1.05 T"), of(3, over, |row| row.misses), 0.01),
                 Finding::at_most(claim("objects left out"), of(3, over, |row| row.holes), 0.0),
-                at_least(claim("SSIM minus the better single level's"), of(3, over, |row| row.ssim) - single, -0.01),
+                Finding::at_least(
+                    claim("SSIM minus the better single level's"),
+                    of(3, over, |row| row.ssim) - single,
+                    -0.01,
+                ),
             ]
         });
         claims.collect()

@@ -1,16 +1,14 @@
 //! A textured room in which the shading is chosen as well (FS93, fig. 11): levels with flat, Gouraud and textured shading.
 
-use crate::chart::experiment::{Experiment, Finding};
-use crate::chart::figure::{Axis, Colour, Figure, Layer, Mark, Panel};
 use crate::chart::policies::numeric::camera::{Path, key};
 use crate::chart::policies::numeric::chooser::Policy;
 use crate::chart::policies::numeric::closed_loop::Show;
 use crate::chart::policies::numeric::common;
-use crate::chart::policies::numeric::common::{Case, at_least, curves, figure};
+use crate::chart::policies::numeric::common::{Case, curves};
 use crate::chart::policies::numeric::machine::{Fault, RandomSource};
 use crate::chart::policies::numeric::metrics::Row;
 use crate::chart::policies::numeric::scene::{BenefitModel, ObjectLevel, Scene, SceneObject};
-use crate::chart::table::Table;
+use crate::chart::{Axis, Colour, Column, Experiment, Figure, Finding, Layer, Panel};
 use glam::DVec3;
 use metachron_lod::cost::stages::Stages;
 
@@ -82,6 +80,17 @@ impl Experiment for Library {
     type Row = Row;
     const NAME: &'static str = "library";
     const TITLE: &'static str = "textured room of about 20,000 polygons: levels and shading chosen together";
+    const COLUMNS: &'static [Column<Row>] = &[
+        ("target", |r| (&r.setting).into()),
+        ("policy", |r| (&r.policy).into()),
+        ("mean", |r| (r.mean, 3).into()),
+        ("max", |r| (r.max, 3).into()),
+        ("miss", |r| (r.misses, 4).into()),
+        ("polygons", |r| (r.polygons, 0).into()),
+        ("paper", |r| (paper_polygons(r), 0).into()),
+        ("value", |r| (r.value_over_bound, 4).into()),
+        ("proven", |r| (r.certified, 3).into()),
+    ];
 
     fn cases(_: bool) -> Vec<Case> {
         TARGETS.iter().flat_map(|t| POLICIES.map(|policy| Case::new(t.0, policy, 1, FRAMES))).collect()
@@ -92,34 +101,10 @@ impl Experiment for Library {
         case.measure(&show(target), &POLICIES)
     }
 
-    fn case_of(row: &Row) -> Case {
-        Case::of(row)
-    }
-
     fn figure(_: &[Row]) -> Figure {
         let mut panels: Vec<Panel> = TARGETS.iter().map(|t| shares(t.0, &show(t.1))).collect();
         panels.extend(TARGETS.iter().map(|t| curves(t.0, &show(t.1), &[Policy::Greedy, Policy::Adaptive], 1.5)));
-        figure("The library: shading of the drawn objects (FS93, fig. 11)", panels, 2)
-    }
-
-    fn table(rows: &[Row]) -> Table {
-        let mut table =
-            Table::new(&["target", "policy", "mean", "max", "miss", "polygons", "paper", "value", "proven"]);
-        table.rows.extend(rows.iter().map(|r| {
-            let paper = TARGETS.iter().find(|t| t.0 == r.setting).map_or(f64::NAN, |t| t.2);
-            vec![
-                r.setting.clone().into(),
-                r.policy.clone().into(),
-                (r.mean, 3).into(),
-                (r.max, 3).into(),
-                (r.misses, 4).into(),
-                (r.polygons, 0).into(),
-                (if r.policy == "full" { 19_821.0 } else { paper }, 0).into(),
-                (r.value_over_bound, 4).into(),
-                (r.certified, 3).into(),
-            ]
-        }));
-        table
+        Figure::new("The library: shading of the drawn objects (FS93, fig. 11)", 2, panels)
     }
 
     fn findings(rows: &[Row]) -> Vec<Finding> {
@@ -127,7 +112,7 @@ impl Experiment for Library {
         let mut findings = Vec::new();
         for (name, ..) in TARGETS {
             findings.push(Finding::at_most(format!("adaptive, {name}: longest frame / T"), of(name, |r| r.max), 1.15));
-            findings.push(at_least(
+            findings.push(Finding::at_least(
                 format!("adaptive, {name}: benefit over the bound"),
                 of(name, |r| r.value_over_bound),
                 0.99,
@@ -135,6 +120,12 @@ impl Experiment for Library {
         }
         findings
     }
+}
+
+/// The paper's number of polygons for a row.
+fn paper_polygons(row: &Row) -> f64 {
+    let of_target = || TARGETS.iter().find(|t| t.0 == row.setting).map_or(f64::NAN, |t| t.2);
+    if row.policy == "full" { 19_821.0 } else { of_target() }
 }
 
 /// Number of things drawn with each shading, along the path.
@@ -150,10 +141,9 @@ fn shares(title: &str, show: &Show) -> Panel {
         counts.iter_mut().zip(sums).for_each(|(line, sum)| line.push((frame as f64, sum)));
     });
     let named = ["flat", "Gouraud", "textured"].into_iter().zip(Colour::LINES).zip(counts);
-    let layers =
-        named.map(|((name, colour), c)| Layer { label: name.to_owned(), colour, mark: Mark::Line(c) }).collect();
+    let layers = named.map(|((name, colour), points)| Layer::line(name, colour, points));
     let (x, y) = (Axis::linear("frame", 0.0, FRAMES as f64), Axis::linear("objects drawn", 0.0, 170.0));
-    Panel { title: format!("{title}, adaptive"), x, y, layers }
+    Panel::new(format!("{title}, adaptive"), x, y, layers)
 }
 
 #[cfg(test)]

@@ -2,10 +2,7 @@
 //!
 //! In: the built-in scene `auditorium` at three places of its walk. Out: counts, and a plan for each place. Never here: a policy.
 
-use crate::chart::experiment::{Experiment, Finding};
-use crate::chart::figure::{Axis, Colour, Figure, Layer, Mark, Panel};
-use crate::chart::policies::numeric::common::{at_least, figure};
-use crate::chart::table::Table;
+use crate::chart::{Axis, Colour, Column, Experiment, Figure, Finding, Layer, Mark, Panel, experiment};
 use glam::DVec3;
 use metachron_geometry::Cell;
 use metachron_render::{Size, VisibleCounts};
@@ -22,10 +19,15 @@ const PLACES: [(&str, f64); 3] =
     [("A, seats across the view", 4.0), ("B, from the foyer", 13.0), ("C, after the turn", 18.4)];
 const SIZE: Size = Size { width: 1280, height: 720 };
 
-/// The counts at a place.
-#[derive(Debug, Clone, Serialize, Deserialize)]
-pub(crate) struct Row {
+/// A place.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub(crate) struct Case {
     place: String,
+}
+
+/// The counts at a place.
+#[derive(Debug, Clone, Default, Serialize, Deserialize)]
+pub(crate) struct Found {
     /// All objects of the scene.
     objects: u64,
     /// Objects in the frustum, as if nothing hid them.
@@ -106,67 +108,60 @@ impl Plan {
             layer("", Colour::Red, border(self.borders_m[1])),
         ];
         let (x, y) = (Axis::linear("x, m", -20.0, 22.0), Axis::linear("y, m", -20.0, 12.0));
-        Panel { title: title.to_owned(), x, y, layers }
+        Panel::new(title, x, y, layers)
     }
 }
 
+type Row = experiment::Row<Case, Found>;
+
 impl Experiment for Rooms {
-    type Case = String;
+    type Case = Case;
     type Row = Row;
     const NAME: &'static str = "rooms";
     const TITLE: &'static str = "the auditorium from above: rooms that the eye reaches and objects that are in view";
+    const COLUMNS: &'static [Column<Row>] = &[
+        ("place", |r| (&r.case.place).into()),
+        ("objects", |r| (r.objects as f64, 0).into()),
+        ("in the frustum", |r| (r.in_frustum as f64, 0).into()),
+        ("potentially visible", |r| (r.potentially_visible as f64, 0).into()),
+        ("visible", |r| (r.visible as f64, 0).into()),
+    ];
 
-    fn cases(_: bool) -> Vec<String> {
-        PLACES.map(|(name, _)| name.to_owned()).to_vec()
+    fn cases(_: bool) -> Vec<Case> {
+        PLACES.map(|(name, _)| Case { place: name.to_owned() }).to_vec()
     }
 
-    fn measure(case: &String) -> Row {
-        let at_s = PLACES.iter().find(|(name, _)| name == case).map_or(0.0, |(_, at_s)| *at_s);
-        let Some(plan) = auditorium().map(|mut session| plan(&mut session, at_s)) else {
-            return Row { place: case.clone(), objects: 0, in_frustum: 0, potentially_visible: 0, visible: 0 };
-        };
-        Row {
-            place: case.clone(),
+    fn measure(case: &Case) -> Row {
+        let at_s = PLACES.iter().find(|(name, _)| *name == case.place).map_or(0.0, |(_, at_s)| *at_s);
+        let plan = auditorium().map(|mut session| plan(&mut session, at_s));
+        let found = plan.map(|plan| Found {
             objects: plan.spots.len() as u64,
             in_frustum: plan.spots.iter().filter(|spot| spot.in_frustum).count() as u64,
             potentially_visible: plan.counts.potentially_visible,
             visible: plan.counts.visible,
-        }
-    }
-
-    fn case_of(row: &Row) -> String {
-        row.place.clone()
+        });
+        Row { case: case.clone(), found: found.unwrap_or_default() }
     }
 
     fn figure(_: &[Row]) -> Figure {
         let panels = auditorium().map(|mut session| {
             PLACES.iter().map(|(name, at_s)| plan(&mut session, *at_s).panel(name)).collect::<Vec<_>>()
         });
-        figure("The auditorium from above", panels.unwrap_or_default(), 3)
-    }
-
-    fn table(rows: &[Row]) -> Table {
-        let mut table = Table::new(&["place", "objects", "in the frustum", "potentially visible", "visible"]);
-        table.rows.extend(rows.iter().map(|r| {
-            let count = |n: u64| (n as f64, 0).into();
-            let (all, seen) = (count(r.objects), count(r.visible));
-            vec![r.place.clone().into(), all, count(r.in_frustum), count(r.potentially_visible), seen]
-        }));
-        table
+        Figure::new("The auditorium from above", 3, panels.unwrap_or_default())
     }
 
     fn findings(rows: &[Row]) -> Vec<Finding> {
         let of = |k: usize, what: fn(&Row) -> u64| {
-            rows.iter().find(|r| r.place == PLACES[k].0).map_or(f64::NAN, |r| what(r) as f64)
+            rows.iter().find(|r| r.case.place == PLACES[k].0).map_or(f64::NAN, |r| what(r) as f64)
         };
         vec![
-            at_least("A: objects in view", of(0, |r| r.visible), 100.0),
+            Finding::at_least("A: objects in view", of(0, |r| r.visible), 100.0),
             Finding::at_most(
                 "B: objects in view, of those in the frustum",
                 of(1, |r| r.visible) / of(1, |r| r.in_frustum),
                 0.5,
             ),
-            at_least("C: objects in view", of(2, |r| r.visible), 100.0),
+            Finding::at_least("C: objects in view", of(2, |r| r.visible), 100.0),
         ]
     }
 }

@@ -2,10 +2,7 @@
 //!
 //! A diffuse cylinder under one directional light, in an orthographic projection: the meaning of the printed accuracy of a level.
 
-use crate::chart::experiment::{Experiment, Finding};
-use crate::chart::figure::{Axis, Colour, Figure, Layer, Mark, Panel};
-use crate::chart::policies::numeric::common::figure;
-use crate::chart::table::Table;
+use crate::chart::{Axis, Colour, Column, Experiment, Figure, Finding, Layer, Panel, experiment};
 use serde::{Deserialize, Serialize};
 use std::f64::consts::PI;
 
@@ -35,10 +32,15 @@ const PICTURES: [(&str, Shading); 4] = [
     ("Gouraud, 16 faces", Shading::Gouraud(16)),
 ];
 
+/// A picture.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub(crate) struct Case {
+    picture: String,
+}
+
 /// Error of a picture.
 #[derive(Debug, Clone, Serialize, Deserialize)]
-pub(crate) struct Row {
-    picture: String,
+pub(crate) struct Found {
     /// Distinct intensities among the pixels.
     colours: usize,
     /// Root mean square and greatest difference from the ideal intensity, of which the brightest is 1.
@@ -84,62 +86,54 @@ impl Shading {
     }
 }
 
+type Row = experiment::Row<Case, Found>;
+
 impl Experiment for Scanline {
-    type Case = String;
+    type Case = Case;
     type Row = Row;
     const NAME: &'static str = "scanline";
     const TITLE: &'static str = "intensity along a scan line of a cylinder: flat and Gouraud shaded prisms";
+    const COLUMNS: &'static [Column<Row>] = &[
+        ("picture", |r| (&r.case.picture).into()),
+        ("colours", |r| (r.colours as f64, 0).into()),
+        ("rms error", |r| (r.rms, 4).into()),
+        ("greatest error", |r| (r.greatest, 4).into()),
+    ];
 
-    fn cases(_: bool) -> Vec<String> {
-        PICTURES.map(|(name, _)| name.to_owned()).to_vec()
+    fn cases(_: bool) -> Vec<Case> {
+        PICTURES.map(|(name, _)| Case { picture: name.to_owned() }).to_vec()
     }
 
-    fn measure(case: &String) -> Row {
-        let shading = PICTURES.iter().find(|(name, _)| name == case).map_or(Shading::Ideal, |(_, shading)| *shading);
+    fn measure(case: &Case) -> Row {
+        let named = PICTURES.iter().find(|(name, _)| *name == case.picture);
+        let shading = named.map_or(Shading::Ideal, |(_, shading)| *shading);
         let line = shading.line();
         let off: Vec<f64> =
             line.iter().map(|(x, intensity)| (intensity - Shading::Ideal.intensity(*x)).abs()).collect();
         let mut colours: Vec<u64> = line.iter().map(|(_, intensity)| (intensity * 1e9).round() as u64).collect();
         colours.sort_unstable();
         colours.dedup();
-        Row {
-            picture: case.clone(),
-            colours: colours.len(),
-            rms: (off.iter().map(|d| d * d).sum::<f64>() / f64::from(PIXELS)).sqrt(),
-            greatest: off.iter().copied().fold(0.0, f64::max),
-        }
-    }
-
-    fn case_of(row: &Row) -> String {
-        row.picture.clone()
+        let rms = (off.iter().map(|d| d * d).sum::<f64>() / f64::from(PIXELS)).sqrt();
+        let greatest = off.iter().copied().fold(0.0, f64::max);
+        Row { case: case.clone(), found: Found { colours: colours.len(), rms, greatest } }
     }
 
     fn figure(_: &[Row]) -> Figure {
         let panel = |(name, shading): &(&str, Shading)| {
-            let layer = |label: &str, colour, mark| Layer { label: label.to_owned(), colour, mark };
-            let mut layers = vec![layer("", Colour::Blue, Mark::Line(shading.line()))];
-            if *shading != Shading::Ideal {
-                layers.insert(0, layer("ideal", Colour::Grey, Mark::Dashed(Shading::Ideal.line())));
-            }
+            let ideal = Layer::dashed("ideal", Colour::Grey, Shading::Ideal.line());
+            let beside = (*shading != Shading::Ideal).then_some(ideal);
+            let layers = beside.into_iter().chain([Layer::line("", Colour::Blue, shading.line())]);
             let (x, y) =
                 (Axis::linear("position across the cylinder", -1.0, 1.0), Axis::linear("intensity", 0.0, 1.05));
-            Panel { title: (*name).to_owned(), x, y, layers }
+            Panel::new(*name, x, y, layers)
         };
-        figure("A scan line of a cylinder (FS93, fig. 5)", PICTURES.iter().map(panel).collect(), 2)
-    }
-
-    fn table(rows: &[Row]) -> Table {
-        let mut table = Table::new(&["picture", "colours", "rms error", "greatest error"]);
-        table.rows.extend(rows.iter().map(|r| {
-            vec![r.picture.clone().into(), (r.colours as f64, 0).into(), (r.rms, 4).into(), (r.greatest, 4).into()]
-        }));
-        table
+        Figure::new("A scan line of a cylinder (FS93, fig. 5)", 2, PICTURES.iter().map(panel).collect())
     }
 
     fn findings(rows: &[Row]) -> Vec<Finding> {
-        let rms = |k: usize| rows.iter().find(|r| r.picture == PICTURES[k].0).map_or(f64::NAN, |r| r.rms);
-        let colours =
-            |k: usize| rows.iter().find(|r| r.picture == PICTURES[k].0).map_or(f64::NAN, |r| r.colours as f64);
+        let row = |k: usize| rows.iter().find(|r| r.case.picture == PICTURES[k].0);
+        let rms = |k: usize| row(k).map_or(f64::NAN, |r| r.rms);
+        let colours = |k: usize| row(k).map_or(f64::NAN, |r| r.colours as f64);
         vec![
             Finding::at_most("colours of the flat prism of 8 faces", colours(1), 4.0),
             Finding::at_most("colours of the flat prism of 16 faces", colours(2), 8.0),

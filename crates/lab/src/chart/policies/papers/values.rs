@@ -1,15 +1,12 @@
 //! Shares that the value functions of (RH05) give to near and far trees, side by side (fig. 1).
 
-use crate::chart::experiment::{Experiment, Finding};
-use crate::chart::figure::{Axis, Colour, Figure, Layer, Mark, Panel};
 use crate::chart::policies::numeric::chooser;
 use crate::chart::policies::numeric::chooser::Policy;
-use crate::chart::policies::numeric::common::{at_least, figure};
 use crate::chart::policies::numeric::forest;
 use crate::chart::policies::numeric::forest::{CameraPath, Forms};
 use crate::chart::policies::numeric::machine::Fault;
 use crate::chart::policies::numeric::metrics::mean;
-use crate::chart::table::Table;
+use crate::chart::{Axis, Colour, Column, Experiment, Figure, Finding, Layer, Panel, experiment};
 use metachron_lod::cost::value::Value;
 use serde::{Deserialize, Serialize};
 
@@ -30,10 +27,15 @@ const FRAMES: usize = 2;
 /// Depth limits of near and of far trees, metres.
 const NEAR_FAR_M: [f64; 2] = [60.0, 180.0];
 
+/// A value function.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub(crate) struct Case {
+    value: String,
+}
+
 /// The result of a value function.
 #[derive(Debug, Clone, Serialize, Deserialize)]
-pub(crate) struct Row {
-    value: String,
+pub(crate) struct Found {
     /// Mean share of its triangles that a tree is drawn with: near, between, far.
     near: f64,
     between: f64,
@@ -56,60 +58,59 @@ fn drawn(value: Value) -> (Vec<(f64, f64)>, f64) {
     (parts, frames[FRAME].time)
 }
 
+type Row = experiment::Row<Case, Found>;
+
 impl Experiment for Values {
-    type Case = String;
+    type Case = Case;
     type Row = Row;
     const NAME: &'static str = "values";
     const TITLE: &'static str = "Robin Hood's value functions: detail of near and far trees";
+    const COLUMNS: &'static [Column<Row>] = &[
+        ("value", |r| (&r.case.value).into()),
+        ("near", |r| (r.near, 3).into()),
+        ("between", |r| (r.between, 3).into()),
+        ("far", |r| (r.far, 3).into()),
+        ("spent", |r| (r.spent, 3).into()),
+    ];
 
-    fn cases(_: bool) -> Vec<String> {
-        VALUES.map(|v| v.0.to_owned()).to_vec()
+    fn cases(_: bool) -> Vec<Case> {
+        VALUES.map(|v| Case { value: v.0.to_owned() }).to_vec()
     }
 
-    fn measure(case: &String) -> Row {
-        let value = VALUES.iter().find(|v| v.0 == case).map_or(Value::Gentle, |v| v.1);
+    fn measure(case: &Case) -> Row {
+        let value = VALUES.iter().find(|v| v.0 == case.value).map_or(Value::Gentle, |v| v.1);
         let (parts, spent) = drawn(value);
         let between = |from: f64, to: f64| {
             let here = parts.iter().filter(|(depth, _)| (from..to).contains(depth)).map(|(_, part)| *part);
             mean(&here.collect::<Vec<_>>())
         };
         let [near, far] = NEAR_FAR_M;
-        Row {
-            value: case.clone(),
-            near: between(0.0, near),
-            between: between(near, far),
-            far: between(far, f64::INFINITY),
-            spent,
-        }
-    }
-
-    fn case_of(row: &Row) -> String {
-        row.value.clone()
+        let (near, between, far) = (between(0.0, near), between(near, far), between(far, f64::INFINITY));
+        Row { case: case.clone(), found: Found { near, between, far, spent } }
     }
 
     fn figure(_: &[Row]) -> Figure {
         let panel = |(name, value): &(&str, Value)| {
-            let layer = Layer { label: String::new(), colour: Colour::Blue, mark: Mark::Dots(drawn(*value).0) };
             let (x, y) = (Axis::linear("depth, m", 0.0, 320.0), Axis::linear("fraction of its triangles", 0.0, 1.05));
-            Panel { title: (*name).to_owned(), x, y, layers: vec![layer] }
+            Panel::new(*name, x, y, [Layer::dots("", Colour::Blue, drawn(*value).0)])
         };
-        figure("One frame of 50 ms by each value function (RH05, fig. 1)", VALUES.iter().map(panel).collect(), 3)
-    }
-
-    fn table(rows: &[Row]) -> Table {
-        let mut table = Table::new(&["value", "near", "between", "far", "spent"]);
-        table.rows.extend(rows.iter().map(|r| {
-            let part = |x: f64| (x, 3).into();
-            vec![r.value.clone().into(), part(r.near), part(r.between), part(r.far), part(r.spent)]
-        }));
-        table
+        Figure::new("One frame of 50 ms by each value function (RH05, fig. 1)", 3, VALUES.iter().map(panel).collect())
     }
 
     fn findings(rows: &[Row]) -> Vec<Finding> {
-        let of = |k: usize, what: fn(&Row) -> f64| rows.iter().find(|r| r.value == VALUES[k].0).map_or(f64::NAN, what);
+        let of =
+            |k: usize, what: fn(&Row) -> f64| rows.iter().find(|r| r.case.value == VALUES[k].0).map_or(f64::NAN, what);
         vec![
-            at_least("near trees get more triangles by a/z² than by a/√z", of(2, |r| r.near) - of(0, |r| r.near), 0.0),
-            at_least("far trees get fewer triangles by a/z² than by a/√z", of(0, |r| r.far) - of(2, |r| r.far), 0.0),
+            Finding::at_least(
+                "near trees get more triangles by a/z² than by a/√z",
+                of(2, |r| r.near) - of(0, |r| r.near),
+                0.0,
+            ),
+            Finding::at_least(
+                "far trees get fewer triangles by a/z² than by a/√z",
+                of(0, |r| r.far) - of(2, |r| r.far),
+                0.0,
+            ),
         ]
     }
 }

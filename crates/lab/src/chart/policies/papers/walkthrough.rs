@@ -1,15 +1,13 @@
 //! A walk among 200 meshes of any resolution with a sudden turn (GB99): accuracy of the prediction, and proof of the choice.
 
-use crate::chart::experiment::{Experiment, Finding};
-use crate::chart::figure::Figure;
 use crate::chart::policies::numeric::camera::{Path, key};
 use crate::chart::policies::numeric::chooser::Policy;
 use crate::chart::policies::numeric::closed_loop::Show;
-use crate::chart::policies::numeric::common::{Case, at_least, curves, figure, number, table};
+use crate::chart::policies::numeric::common::{COLUMNS, Case, curves, number};
 use crate::chart::policies::numeric::machine::{Fault, RandomSource};
 use crate::chart::policies::numeric::metrics::Row;
 use crate::chart::policies::numeric::scene::{BenefitModel, ObjectLevel, Scene, SceneObject};
-use crate::chart::table::Table;
+use crate::chart::{Column, Experiment, Figure, Finding};
 use glam::DVec3;
 use metachron_lod::cost::stages::Stages;
 
@@ -73,6 +71,7 @@ impl Experiment for Walkthrough {
     const NAME: &'static str = "walkthrough";
     const TITLE: &'static str =
         "200 meshes of 1.5 million triangles and a sudden turn: prediction, measurement and certificate";
+    const COLUMNS: &'static [Column<Row>] = &COLUMNS;
 
     fn cases(quick: bool) -> Vec<Case> {
         let frames = FRAMES / if quick { QUICK_PART } else { 1 };
@@ -83,29 +82,21 @@ impl Experiment for Walkthrough {
         case.measure(&show(case.frames), &POLICIES)
     }
 
-    fn case_of(row: &Row) -> Case {
-        Case::of(row)
-    }
-
     fn figure(_: &[Row]) -> Figure {
         let show = show(FRAMES);
         let panels = vec![
             curves("no choice", &show, &[Policy::Full], 15.0),
             curves("meshes of any resolution", &show, &[Policy::Convex, Policy::Adaptive], 1.5),
         ];
-        figure("A walkthrough of 200 meshes", panels, 2)
-    }
-
-    fn table(rows: &[Row]) -> Table {
-        table(rows)
+        Figure::new("A walkthrough of 200 meshes", 2, panels)
     }
 
     fn findings(rows: &[Row]) -> Vec<Finding> {
         let of = |what: fn(&Row) -> f64| number(rows, SETTING, "adaptive", what);
         vec![
             Finding::at_most("adaptive: mean error of the prediction", of(|r| r.model_error), 0.05),
-            at_least("adaptive: frames whose certificate is within 1 %", of(|r| r.certified), 0.95),
-            at_least("adaptive: benefit over the bound", of(|r| r.value_over_bound), 0.99),
+            Finding::at_least("adaptive: frames whose certificate is within 1 %", of(|r| r.certified), 0.95),
+            Finding::at_least("adaptive: benefit over the bound", of(|r| r.value_over_bound), 0.99),
         ]
     }
 }

@@ -6,17 +6,15 @@
 mod figures;
 mod sheet;
 
-use super::super::experiment::{Experiment, Finding, worst};
-use super::super::figure::{Axis, Colour, Figure, Layer, Mark, Panel as Axes};
-use super::super::table::Table;
-use super::numeric::common::at_least;
 use super::played::still::{Approach, Sight, Still, StillRequest, still};
 use super::played::walk::{ALIKE_DB, Opening, Times};
+use crate::chart::{Axis, Colour, Column, Experiment, Figure, Finding, Layer, Record, worst};
+use csv::StringRecord;
 use figures::{Changes, Limit, PLATES, Panel, Plate};
 use metachron_lod::control::Policy;
 use metachron_render::{PictureFile, psnr_db, ssim};
 use serde::{Deserialize, Serialize};
-use sheet::{Column, difference, sheet};
+use sheet::{difference, sheet};
 use std::sync::{Arc, Mutex, PoisonError};
 
 /// The experiment on figure number `F`, drawn and timed on the present adapter if `LIVE`.
@@ -50,6 +48,16 @@ pub(in super::super) struct Row {
     /// Likeness to full detail; NaN without an adapter.
     ssim: f64,
     psnr_db: f64,
+}
+
+impl Record<Case> for Row {
+    fn case(&self) -> Case {
+        Case { panel: self.panel.clone(), frames: self.frames }
+    }
+
+    fn read(names: &StringRecord, line: &StringRecord) -> csv::Result<Self> {
+        line.deserialize(Some(names))
+    }
 }
 
 /// The play behind a picture: figure, panel (none: full detail), frames, whether live.
@@ -107,6 +115,18 @@ impl<const F: usize, const LIVE: bool> Experiment for Figures<F, LIVE> {
     const TITLE: &'static str = PLATES[F].title;
     // full detail is played once for all of them
     const ALONE: bool = true;
+    const COLUMNS: &'static [Column<Row>] = &[
+        ("panel", |r| (&r.panel).into()),
+        ("policy", |r| (&r.policy).into()),
+        ("T_ms", |r| (r.target_ms, 3).into()),
+        ("frame_ms", |r| (r.frame_ms, 3).into()),
+        ("triangles", |r| (r.triangles as f64, 0).into()),
+        ("paper", |r| (r.paper_triangles, 0).into()),
+        ("left_out", |r| (f64::from(r.holes), 0).into()),
+        ("impostors", |r| (r.impostors as f64, 0).into()),
+        ("ssim", |r| (r.ssim, 4).into()),
+        ("psnr_db", |r| (r.psnr_db, 1).into()),
+    ];
 
     fn cases(quick: bool) -> Vec<Case> {
         let frames = PLATES[F].approach(quick).frames;
@@ -140,73 +160,36 @@ impl<const F: usize, const LIVE: bool> Experiment for Figures<F, LIVE> {
         row
     }
 
-    fn case_of(row: &Row) -> Case {
-        Case { panel: row.panel.clone(), frames: row.frames }
-    }
-
     fn figure(rows: &[Row]) -> Figure {
         let most = rows.iter().map(|row| row.triangles as f64).fold(1.0, f64::max);
         let slowest = rows.iter().map(|row| row.frame_ms / row.target_ms).fold(1.2, f64::max);
-        let dots = rows.iter().zip(Colour::LINES.into_iter().cycle()).map(|(row, colour)| Layer {
-            label: row.panel.clone(),
-            colour,
-            mark: Mark::Dots(vec![(row.triangles as f64, row.frame_ms / row.target_ms)]),
+        let dots = rows.iter().zip(Colour::LINES.into_iter().cycle()).map(|(row, colour)| {
+            Layer::dots(&row.panel, colour, [(row.triangles as f64, row.frame_ms / row.target_ms)])
         });
         let (x, y) = (
             Axis::log("triangles", 100.0, 1.2 * most.max(100.0)),
             Axis::linear("time of the frame / target", 0.0, 1.05 * slowest),
         );
-        let axes = Axes { title: String::new(), x, y, layers: dots.collect() };
-        Figure { title: PLATES[F].title.to_owned(), panels: vec![axes], columns: 1 }
+        Figure::single(PLATES[F].title, x, y, dots)
     }
 
     fn pictures(rows: &[Row]) -> anyhow::Result<Vec<(String, PictureFile)>> {
         let plate = &PLATES[F];
         let column = |row: &Row| {
-            let (full, own, _) = plate.pair(&Self::case_of(row), LIVE)?;
+            let (full, own, _) = plate.pair(&row.case(), LIVE)?;
             let (eye, full) = (own.picture(Sight::Eye)?, full.picture(Sight::Eye)?);
             let shown = |sight: &Sight| match sight {
                 Sight::Difference => Some(difference(eye, full)),
                 drawn => own.picture(*drawn).cloned(),
             };
             let pictures = plate.sights.iter().filter_map(shown).collect();
-            Some(Column {
+            Some(sheet::Column {
                 name: format!("{}: {} triangles, {:.2} ms", row.panel, row.triangles, row.frame_ms),
                 pictures,
             })
         };
-        let columns: Vec<Column> = rows.iter().filter_map(column).collect();
+        let columns: Vec<sheet::Column> = rows.iter().filter_map(column).collect();
         Ok(if columns.is_empty() { Vec::new() } else { vec![("pictures".to_owned(), sheet(&columns)?)] })
-    }
-
-    fn table(rows: &[Row]) -> Table {
-        let mut table = Table::new(&[
-            "panel",
-            "policy",
-            "T_ms",
-            "frame_ms",
-            "triangles",
-            "paper",
-            "left_out",
-            "impostors",
-            "ssim",
-            "psnr_db",
-        ]);
-        table.rows.extend(rows.iter().map(|r| {
-            vec![
-                r.panel.clone().into(),
-                r.policy.clone().into(),
-                (r.target_ms, 3).into(),
-                (r.frame_ms, 3).into(),
-                (r.triangles as f64, 0).into(),
-                (r.paper_triangles, 0).into(),
-                (f64::from(r.holes), 0).into(),
-                (r.impostors as f64, 0).into(),
-                (r.ssim, 4).into(),
-                (r.psnr_db, 1).into(),
-            ]
-        }));
-        table
     }
 
     fn findings(rows: &[Row]) -> Vec<Finding> {
@@ -218,7 +201,7 @@ impl<const F: usize, const LIVE: bool> Experiment for Figures<F, LIVE> {
             let out = worst(rows.iter().filter(with_groups).map(|row| f64::from(row.holes)));
             findings.push(Finding::at_most("objects left out where groups may be drawn as one", out, 0.0));
             let flat = worst(rows.iter().filter(|row| row.policy == "greedy").map(|row| f64::from(row.holes)));
-            findings.push(at_least("objects left out where they may not", flat, 1.0));
+            findings.push(Finding::at_least("objects left out where they may not", flat, 1.0));
         }
         findings
     }

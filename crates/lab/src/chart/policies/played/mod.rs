@@ -6,11 +6,12 @@ mod row;
 pub(super) mod still;
 pub(super) mod walk;
 
-use super::super::figure::{Axis, Colour, Layer, Mark, Panel};
-use super::super::table::Table;
 use super::numeric::metrics::Row;
+use crate::chart::{Axis, Colour, Layer, Panel, Record};
+use csv::StringRecord;
 use metachron_lod::control::Policy;
 use metachron_scene::papers::{Choices, Paper};
+pub(super) use row::table;
 pub(super) use walk::{Shown, Times};
 
 /// A scene, its frames, and the ratio of full detail's time to the target.
@@ -41,12 +42,17 @@ pub(crate) struct Case {
     pub(super) round: usize,
 }
 
-impl Case {
-    /// The case of a row.
-    pub(super) fn of(row: &Row) -> Self {
-        Self { scene: row.setting.clone(), policy: row.policy.clone(), frames: row.asked, round: row.round }
+impl Record<Case> for Row {
+    fn case(&self) -> Case {
+        Case { scene: self.setting.clone(), policy: self.policy.clone(), frames: self.asked, round: self.round }
     }
 
+    fn read(names: &StringRecord, line: &StringRecord) -> csv::Result<Self> {
+        line.deserialize(Some(names))
+    }
+}
+
+impl Case {
     /// Measures the row; one without frames where the case could not be played.
     pub(super) fn measure(&self, times: Times) -> Row {
         let play = PLAYS.iter().find(|play| play.paper.name() == self.scene);
@@ -73,23 +79,16 @@ impl Play {
     }
 }
 
-/// The table of all numbers of all rows.
-pub(super) fn table(rows: &[Row]) -> Table {
-    row::table(rows)
-}
-
 /// The time of every frame, for some of a scene's rows.
 pub(super) fn curves<'a>(title: &str, rows: impl Iterator<Item = &'a Row> + Clone) -> Panel {
     let frames = rows.clone().map(|row| row.frames).max().unwrap_or(1) as f64;
     let greatest = rows.clone().map(|row| row.max).fold(1.5, f64::max);
-    let target = Mark::Dashed(vec![(0.0, 1.0), (frames, 1.0)]);
-    let mut layers = vec![Layer { label: "target".to_owned(), colour: Colour::Grey, mark: target }];
-    layers.extend(rows.zip(Colour::LINES.into_iter().cycle()).map(|(row, colour)| {
-        let line = row::times(row).into_iter().enumerate().map(|(k, time)| (k as f64, time)).collect();
-        Layer { label: row.policy.clone(), colour, mark: Mark::Line(line) }
-    }));
+    let line = |(row, colour): (&'a Row, Colour)| {
+        Layer::line(&row.policy, colour, row::times(row).into_iter().enumerate().map(|(k, time)| (k as f64, time)))
+    };
+    let drawn = rows.zip(Colour::LINES.into_iter().cycle()).map(line);
     let (x, y) = (Axis::linear("frame", 0.0, frames), Axis::linear("time of a frame / target", 0.0, 1.05 * greatest));
-    Panel { title: title.to_owned(), x, y, layers }
+    Panel::new(title, x, y, [Layer::limit("target", [0.0, frames], 1.0)].into_iter().chain(drawn))
 }
 
 #[cfg(test)]

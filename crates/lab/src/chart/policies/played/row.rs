@@ -102,7 +102,7 @@ pub(super) const COLUMNS: [Column; 30] = [
 ];
 
 /// The table of all numbers of all rows.
-pub(super) fn table(rows: &[Row]) -> Table {
+pub(in super::super) fn table(rows: &[Row]) -> Table {
     let names: Vec<_> = ["scene", "policy"].into_iter().chain(COLUMNS.map(|column| column.0)).collect();
     let mut table = Table::new(&names);
     table.rows.extend(rows.iter().map(|row| {

@@ -8,10 +8,8 @@
 
 use super::closed_system::{ROOM_M, SYSTEMS, system};
 use crate::chart::asynchronous::play::Play;
-use crate::chart::experiment::{Experiment, Finding, worst};
-use crate::chart::figure::{Axis, Colour, Figure, Layer, Mark, Panel, span};
 use crate::chart::stability::common::COMMON_ENERGY_MAX;
-use crate::chart::table::Table;
+use crate::chart::{Axis, Colour, Column, Experiment, Figure, Finding, Layer, Panel, experiment, span, worst};
 use glam::DVec3;
 use metachron_contact::audit::{Audit, audit};
 use metachron_core::{AgentId, SimTime};
@@ -35,9 +33,10 @@ const ROUNDING: f64 = 1e-9;
 const BLOWS_MIN: u32 = 5;
 
 /// A system, the shift of its rates, its seed and its length.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub(crate) struct Case {
     system: String,
+    /// The rates are shifted cyclically by so many places.
     turn: usize,
     seed: u64,
     seconds: f64,
@@ -45,12 +44,7 @@ pub(crate) struct Case {
 
 /// The results of a case.
 #[derive(Debug, Clone, Serialize, Deserialize)]
-pub(crate) struct Row {
-    system: String,
-    /// The rates are shifted cyclically by so many places.
-    turn: usize,
-    seed: u64,
-    seconds: f64,
+pub(crate) struct Found {
     /// Peak of the energy at a common time, as a multiple of that of the start.
     energy_peak: f64,
     energy_end: f64,
@@ -76,12 +70,29 @@ pub(crate) struct Row {
     in_flight_of_second: String,
 }
 
+type Row = experiment::Row<Case, Found>;
+
 impl Experiment for Closed {
     type Case = Case;
     type Row = Row;
     const NAME: &'static str = "closed";
     const TITLE: &'static str =
         "closed system of three rigid bodies and two tubes on five clocks: momentum and energy at a common time";
+    const COLUMNS: &'static [Column<Row>] = &[
+        ("system", |r| (&r.case.system).into()),
+        ("turn", |r| (r.case.turn as f64, 0).into()),
+        ("seed", |r| (r.case.seed as f64, 0).into()),
+        ("seconds", |r| (r.case.seconds, 0).into()),
+        ("energy peak", |r| (r.energy_peak, 4).into()),
+        ("energy end", |r| (r.energy_end, 4).into()),
+        ("raw peak", |r| (r.raw_peak, 4).into()),
+        ("drift", |r| (r.drift, 4).into()),
+        ("angular", |r| (r.angular_drift, 4).into()),
+        ("raw drift", |r| (r.raw_drift, 4).into()),
+        ("in flight", |r| (r.in_flight, 4).into()),
+        ("blows", |r| (f64::from(r.blows), 0).into()),
+        ("pause_s", |r| (r.pause_s, 1).into()),
+    ];
 
     fn cases(quick: bool) -> Vec<Case> {
         let (turns, seeds, seconds) =
@@ -99,13 +110,8 @@ impl Experiment for Closed {
         let (extremes, whole) = play(case).unwrap_or_default();
         let [energy_peak, energy_end, raw_peak, drift, angular_drift, raw_drift, in_flight, beyond] =
             if whole { extremes.numbers() } else { [f64::NAN; 8] };
-        let Case { system, turn, seed, seconds } = case.clone();
         let [energy_of_second, told_of_second, in_flight_of_second] = [0, 1, 2].map(|k| extremes.of_second(k));
-        Row {
-            system,
-            turn,
-            seed,
-            seconds,
+        let found = Found {
             energy_peak,
             energy_end,
             raw_peak,
@@ -116,96 +122,39 @@ impl Experiment for Closed {
             beyond,
             looks: extremes.looks,
             blows: extremes.blows,
-            pause_s: extremes.pause_s.max(seconds - extremes.last_blow_s),
+            pause_s: extremes.pause_s.max(case.seconds - extremes.last_blow_s),
             energy_of_second,
             told_of_second,
             in_flight_of_second,
-        }
-    }
-
-    fn case_of(row: &Row) -> Case {
-        Case { system: row.system.clone(), turn: row.turn, seed: row.seed, seconds: row.seconds }
+        };
+        Row { case: case.clone(), found }
     }
 
     fn figure(rows: &[Row]) -> Figure {
-        let seconds = rows.iter().map(|r| r.seconds).fold(1.0, f64::max);
+        let seconds = rows.iter().map(|r| r.case.seconds).fold(1.0, f64::max);
         let x = || Axis::linear("time, s", 0.0, seconds);
         let energies = rows.iter().flat_map(|r| read(&r.energy_of_second)).map(|p| p.1).chain([1.0, COMMON_ENERGY_MAX]);
         let (low, high) = span(energies, false);
-        let limit = Layer {
-            label: "start + 1 %".to_owned(),
-            colour: Colour::Grey,
-            mark: Mark::Dashed(vec![(0.0, COMMON_ENERGY_MAX), (seconds, COMMON_ENERGY_MAX)]),
-        };
         let lines = rows.iter().map(|r| {
-            let colour = Colour::LINES[r.turn % Colour::LINES.len()];
-            let first = r.seed == SEEDS[0] && r.system == SYSTEMS[0];
-            let label = if first { format!("rates shifted by {}", r.turn) } else { String::new() };
-            Layer { label, colour, mark: Mark::Line(read(&r.energy_of_second)) }
+            let Case { system, turn, seed, .. } = &r.case;
+            let first = *seed == SEEDS[0] && system == SYSTEMS[0];
+            let label = if first { format!("rates shifted by {turn}") } else { String::new() };
+            Layer::line(label, Colour::LINES[turn % Colour::LINES.len()], read(&r.energy_of_second))
         });
-        let energy = Panel {
-            title: "energy at a common time".to_owned(),
-            x: x(),
-            y: Axis::linear("energy / energy at the start", low, high),
-            layers: [limit].into_iter().chain(lines).collect(),
-        };
-        let dots = |label: &str, colour, get: fn(&Row) -> &str| Layer {
-            label: label.to_owned(),
-            colour,
-            mark: Mark::Dots(rows.iter().flat_map(|r| read(get(r))).map(|(t, v)| (t, v.max(FLOOR))).collect()),
+        let layers = [Layer::limit("start + 1 %", [0.0, seconds], COMMON_ENERGY_MAX)].into_iter().chain(lines);
+        let y = Axis::linear("energy / energy at the start", low, high);
+        let energy = Panel::new("energy at a common time", x(), y, layers);
+        let dots = |label: &str, colour, get: fn(&Row) -> &str| {
+            Layer::dots(label, colour, rows.iter().flat_map(|r| read(get(r))).map(|(t, v)| (t, v.max(FLOOR))))
         };
         let delivered = rows.iter().map(|r| r.drift).fold(FLOOR, f64::max);
-        let momentum = Panel {
-            title: "momentum".to_owned(),
-            x: x(),
-            y: Axis::log("change / momenta at the start", FLOOR, 10.0),
-            layers: vec![
-                dots("in flight", Colour::Orange, |r| &r.in_flight_of_second),
-                dots("change as published", Colour::Red, |r| &r.told_of_second),
-                Layer {
-                    label: "greatest change, delivered".to_owned(),
-                    colour: Colour::Blue,
-                    mark: Mark::Line(vec![(0.0, delivered), (seconds, delivered)]),
-                },
-            ],
-        };
-        Figure { title: "A closed system of five clocks".to_owned(), panels: vec![energy, momentum], columns: 2 }
-    }
-
-    fn table(rows: &[Row]) -> Table {
-        let mut table = Table::new(&[
-            "system",
-            "turn",
-            "seed",
-            "seconds",
-            "energy peak",
-            "energy end",
-            "raw peak",
-            "drift",
-            "angular",
-            "raw drift",
-            "in flight",
-            "blows",
-            "pause_s",
-        ]);
-        table.rows.extend(rows.iter().map(|r| {
-            vec![
-                r.system.clone().into(),
-                (r.turn as f64, 0).into(),
-                (r.seed as f64, 0).into(),
-                (r.seconds, 0).into(),
-                (r.energy_peak, 4).into(),
-                (r.energy_end, 4).into(),
-                (r.raw_peak, 4).into(),
-                (r.drift, 4).into(),
-                (r.angular_drift, 4).into(),
-                (r.raw_drift, 4).into(),
-                (r.in_flight, 4).into(),
-                (f64::from(r.blows), 0).into(),
-                (r.pause_s, 1).into(),
-            ]
-        }));
-        table
+        let layers = [
+            dots("in flight", Colour::Orange, |r| &r.in_flight_of_second),
+            dots("change as published", Colour::Red, |r| &r.told_of_second),
+            Layer::line("greatest change, delivered", Colour::Blue, [0.0, seconds].map(|t| (t, delivered))),
+        ];
+        let momentum = Panel::new("momentum", x(), Axis::log("change / momenta at the start", FLOOR, 10.0), layers);
+        Figure::new("A closed system of five clocks", 2, vec![energy, momentum])
     }
 
     fn findings(rows: &[Row]) -> Vec<Finding> {

@@ -5,10 +5,8 @@
 
 use crate::chart::asynchronous::bench::{Faults, PairLaw};
 use crate::chart::asynchronous::play::{ContactImpulse, Play};
-use crate::chart::experiment::{Experiment, Finding, worst};
-use crate::chart::figure::{Axis, Colour, Figure, Layer, Mark, Panel};
 use crate::chart::stability::common::{COMMON_ENERGY_MAX, GRAVITY, plain_body};
-use crate::chart::table::Table;
+use crate::chart::{Axis, Colour, Experiment, Figure, Finding, Layer, Panel, Table, experiment, worst};
 use glam::{DQuat, DVec3};
 use metachron_contact::AnchorSpring;
 use metachron_contact::Law;
@@ -61,19 +59,8 @@ const MOMENTUM_MAX: f64 = 0.005;
 const DEPTH_MAX_M: f64 = 0.002;
 
 /// A law, the number of dimensions, the slow rate, the share of lost states.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub(crate) struct Case {
-    law: String,
-    stiffness_n_m: f64,
-    space: String,
-    rate_hz: f64,
-    loss: f64,
-    seeds: u64,
-}
-
-/// The worst over all seeds.
-#[derive(Debug, Clone, Serialize, Deserialize)]
-pub(crate) struct Row {
     law: String,
     stiffness_n_m: f64,
     space: String,
@@ -81,6 +68,11 @@ pub(crate) struct Row {
     jitter: f64,
     loss: f64,
     seeds: u64,
+}
+
+/// The worst over all seeds.
+#[derive(Debug, Clone, Serialize, Deserialize)]
+pub(crate) struct Found {
     /// Peak of the energies added over two clocks, as a multiple of that of the start.
     raw_peak: f64,
     /// The same at a common time, with all impulses delivered.
@@ -90,6 +82,8 @@ pub(crate) struct Row {
     /// The deepest overlap at rest, at a common time.
     depth_m: f64,
 }
+
+type Row = experiment::Row<Case, Found>;
 
 impl Experiment for Drop {
     type Case = Case;
@@ -109,6 +103,7 @@ impl Experiment for Drop {
                         stiffness_n_m,
                         space: space.to_owned(),
                         rate_hz,
+                        jitter: JITTER,
                         loss,
                         seeds,
                     };
@@ -120,27 +115,15 @@ impl Experiment for Drop {
     }
 
     fn measure(case: &Case) -> Row {
-        let falls: Vec<Fall> = (1..=case.seeds).map(|seed| fall(case, seed).unwrap_or(Fall::BROKEN)).collect();
-        let greatest = |of: fn(&Fall) -> f64| worst(falls.iter().map(of));
-        let Case { law, stiffness_n_m, space, rate_hz, loss, seeds } = case.clone();
-        Row {
-            law,
-            stiffness_n_m,
-            space,
-            rate_hz,
-            jitter: JITTER,
-            loss,
-            seeds,
-            raw_peak: greatest(|f| f.raw),
-            common_peak: greatest(|f| f.common),
+        let falls: Vec<Found> = (1..=case.seeds).map(|seed| fall(case, seed).unwrap_or(Found::BROKEN)).collect();
+        let greatest = |of: fn(&Found) -> f64| worst(falls.iter().map(of));
+        let found = Found {
+            raw_peak: greatest(|f| f.raw_peak),
+            common_peak: greatest(|f| f.common_peak),
             momentum_error: greatest(|f| f.momentum_error),
             depth_m: greatest(|f| f.depth_m),
-        }
-    }
-
-    fn case_of(row: &Row) -> Case {
-        let Row { law, stiffness_n_m, space, rate_hz, loss, seeds, .. } = row.clone();
-        Case { law, stiffness_n_m, space, rate_hz, loss, seeds }
+        };
+        Row { case: case.clone(), found }
     }
 
     fn figure(rows: &[Row]) -> Figure {
@@ -150,11 +133,7 @@ impl Experiment for Drop {
         let rests = |r: &Row| if r.common_peak < 2.0 { r.depth_m } else { f64::NAN };
         let depth = |space| panel(space, rows, Axis::log("overlap at rest, m", 1e-7, 0.1), rests);
         let panels = SPACES.into_iter().flat_map(|space| [peak(space), depth(space)]).collect();
-        Figure {
-            title: format!("50 g fall on 100 g on springs; the worst of {SEEDS} seeds and all loss rates"),
-            panels,
-            columns: 2,
-        }
+        Figure::new(format!("50 g fall on 100 g on springs; the worst of {SEEDS} seeds and all loss rates"), 2, panels)
     }
 
     fn table(rows: &[Row]) -> Table {
@@ -163,9 +142,7 @@ impl Experiment for Drop {
         for (law, k) in LAWS {
             for space in SPACES {
                 for rate_hz in RATES_HZ {
-                    let same =
-                        |r: &&Row| r.law == law && r.stiffness_n_m == k && r.space == space && r.rate_hz == rate_hz;
-                    let here: Vec<&Row> = rows.iter().filter(same).collect();
+                    let here: Vec<&Row> = rows.iter().filter(|r| r.case.matches(law, k, space, rate_hz)).collect();
                     if here.is_empty() {
                         continue;
                     }
@@ -187,8 +164,8 @@ impl Experiment for Drop {
     }
 
     fn findings(rows: &[Row]) -> Vec<Finding> {
-        let ours = || rows.iter().filter(|r| r.law == "ledger");
-        let at_60 = ours().filter(|r| r.rate_hz == 60.0).map(|r| r.depth_m);
+        let ours = || rows.iter().filter(|r| r.case.law == "ledger");
+        let at_60 = ours().filter(|r| r.case.rate_hz == 60.0).map(|r| r.depth_m);
         vec![
             Finding::at_most("ledger: peak of the sum over two clocks", worst(ours().map(|r| r.raw_peak)), RAW_MAX),
             Finding::at_most("ledger: peak at a common time", worst(ours().map(|r| r.common_peak)), COMMON_ENERGY_MAX),
@@ -198,16 +175,16 @@ impl Experiment for Drop {
     }
 }
 
-/// The results of one fall.
-struct Fall {
-    raw: f64,
-    common: f64,
-    momentum_error: f64,
-    depth_m: f64,
+impl Found {
+    const BROKEN: Self =
+        Self { raw_peak: f64::NAN, common_peak: f64::NAN, momentum_error: f64::NAN, depth_m: f64::NAN };
 }
 
-impl Fall {
-    const BROKEN: Self = Self { raw: f64::NAN, common: f64::NAN, momentum_error: f64::NAN, depth_m: f64::NAN };
+impl Case {
+    fn matches(&self, law: &str, stiffness_n_m: f64, space: &str, rate_hz: f64) -> bool {
+        (self.law.as_str(), self.stiffness_n_m, self.space.as_str(), self.rate_hz)
+            == (law, stiffness_n_m, space, rate_hz)
+    }
 }
 
 /// The law with a name.
@@ -279,19 +256,19 @@ pub(crate) fn pair(space: &str, law: PairLaw, rate_hz: f64, faults: Faults, fall
     Some(Pair { play, mounted, falling, zero_j: zero_j + own })
 }
 
-fn fall(case: &Case, seed: u64) -> Option<Fall> {
-    let faults = Faults { jitter: JITTER, loss: case.loss, seed, due: false };
+fn fall(case: &Case, seed: u64) -> Option<Found> {
+    let faults = Faults { jitter: case.jitter, loss: case.loss, seed, due: false };
     let law = law(&case.law, case.stiffness_n_m, DAMPING_RATIO);
     let Pair { play, mounted, falling, zero_j } = pair(&case.space, law, case.rate_hz, faults, FALL_M)?;
     let start_j = play.raw_j() - zero_j;
-    let mut out = Fall { raw: 1.0, common: 1.0, momentum_error: 0.0, depth_m: 0.0 };
+    let mut out = Found { raw_peak: 1.0, common_peak: 1.0, momentum_error: 0.0, depth_m: 0.0 };
     let mut contact = [ContactImpulse::default(); 2];
     let (mut room, mut pages) = (NarrowPhaseScratch::default(), 0_u32);
     let gravity = DVec3::NEG_Z * GRAVITY;
     let ended = play.run(SECONDS, |play, id| {
         let at = play.time();
-        out.raw = worst([out.raw, (play.raw_j() - zero_j) / start_j]);
-        out.common = worst([out.common, (play.common(at).energy_j - zero_j) / start_j]);
+        out.raw_peak = worst([out.raw_peak, (play.raw_j() - zero_j) / start_j]);
+        out.common_peak = worst([out.common_peak, (play.common(at).energy_j - zero_j) / start_j]);
         let side = usize::from(id == falling);
         let mass = [MOUNTED_KG, FALLING_KG][side];
         contact[side].add(play.stage.own(id), mass, gravity, play.stage.last_s(id));
@@ -299,7 +276,7 @@ fn fall(case: &Case, seed: u64) -> Option<Fall> {
         if at.as_secs_f64() > REST_S && pages.is_multiple_of(8) {
             out.depth_m = out.depth_m.max(play.depth_m([mounted, falling], at, &mut room));
         }
-        out.raw < BLOWN_UP
+        out.raw_peak < BLOWN_UP
     });
     let flying: DVec3 = [mounted, falling].iter().map(|id| ended.in_flight(*id)).sum();
     let exchanged = contact[1].size + ended.in_flight(falling).length();
@@ -309,22 +286,17 @@ fn fall(case: &Case, seed: u64) -> Option<Fall> {
 
 /// A quantity over the slow body's rate, one line per law.
 fn panel(space: &str, rows: &[Row], y: Axis, get: fn(&Row) -> f64) -> Panel {
-    let mut layers: Vec<Layer> = LAWS
-        .into_iter()
-        .zip(Colour::LINES)
-        .map(|((law, k), colour)| {
-            let at = |rate_hz: f64| {
-                let same = |r: &&Row| r.law == law && r.stiffness_n_m == k && r.space == space && r.rate_hz == rate_hz;
-                let worst = worst(rows.iter().filter(same).map(get));
-                (rate_hz, worst.max(y.low) + 0.0 * worst)
-            };
-            let label = if k > 0.0 { format!("{law}, {k} N/m") } else { law.to_owned() };
-            Layer { label, colour, mark: Mark::Line(RATES_HZ.into_iter().map(at).collect()) }
-        })
-        .collect();
+    let line = |((law, k), colour): ((&str, f64), Colour)| {
+        let at = |rate_hz: f64| {
+            let worst = worst(rows.iter().filter(|r| r.case.matches(law, k, space, rate_hz)).map(get));
+            (rate_hz, worst.max(y.low) + 0.0 * worst)
+        };
+        let label = if k > 0.0 { format!("{law}, {k} N/m") } else { law.to_owned() };
+        Layer::line(label, colour, RATES_HZ.into_iter().map(at))
+    };
+    let mut layers: Vec<Layer> = LAWS.into_iter().zip(Colour::LINES).map(line).collect();
     let limit = if y.high > 1.0 { COMMON_ENERGY_MAX } else { DEPTH_MAX_M };
-    let ends = vec![(8.0, limit), (300.0, limit)];
-    layers.push(Layer { label: "limit".to_owned(), colour: Colour::Grey, mark: Mark::Dashed(ends) });
+    layers.push(Layer::limit("limit", [8.0, 300.0], limit));
     let x = Axis::log("rate of the slow body, Hz", 8.0, 300.0);
-    Panel { title: format!("{space}: {}", y.label), x, y, layers }
+    Panel::new(format!("{space}: {}", y.label), x, y, layers)
 }

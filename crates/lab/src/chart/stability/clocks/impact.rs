@@ -1,10 +1,8 @@
 //! Two balls with different clocks collide once: against the closed form, through the impulse ledger and not in one cluster.
 
-use crate::chart::experiment::{Experiment, Finding, worst};
-use crate::chart::figure::{Axis, Colour, Figure, Layer, Mark, Panel, span};
 use crate::chart::lockstep_run::{LockstepRun, members};
 use crate::chart::stability::common::plain_body;
-use crate::chart::table::Table;
+use crate::chart::{Axis, Colour, Experiment, Figure, Finding, Layer, Panel, Table, experiment, span, worst};
 use glam::DVec3;
 use metachron_contact::Law;
 use metachron_contact::audit::settled;
@@ -31,21 +29,18 @@ const SECONDS: f64 = 0.6;
 const TOLERANCE: f64 = 0.01;
 
 /// A pair.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub(crate) struct Case {
-    restitution: f64,
-    mass_ratio: f64,
-    rates_hz: [f64; 2],
-}
-
-/// The results of a pair.
-#[derive(Debug, Clone, Serialize, Deserialize)]
-pub(crate) struct Row {
     restitution: f64,
     /// Mass of the ball that is hit over that of the ball that flies.
     mass_ratio: f64,
     rate_hitting_hz: f64,
     rate_hit_hz: f64,
+}
+
+/// The results of a pair.
+#[derive(Debug, Clone, Serialize, Deserialize)]
+pub(crate) struct Found {
     /// The greater error of the two velocities after the impact, as a share of the closing speed.
     error: f64,
     /// Change of the total momentum, as a share of it.
@@ -57,6 +52,15 @@ pub(crate) struct Row {
     /// Whether one of them was led by the other, in one cluster, at the end.
     led: bool,
 }
+
+impl Default for Found {
+    fn default() -> Self {
+        let (error, momentum_error) = (f64::NAN, f64::NAN);
+        Self { error, momentum_error, kind: String::new(), steps_hitting: 0, steps_hit: 0, led: false }
+    }
+}
+
+type Row = experiment::Row<Case, Found>;
 
 impl Experiment for Impact {
     type Case = Case;
@@ -70,63 +74,47 @@ impl Experiment for Impact {
         let mut cases = Vec::new();
         for restitution in RESTITUTIONS {
             for &mass_ratio in ratios {
-                cases.extend(rates.iter().map(|&rates_hz| Case { restitution, mass_ratio, rates_hz }));
+                let case = |&[rate_hitting_hz, rate_hit_hz]: &[f64; 2]| Case {
+                    restitution,
+                    mass_ratio,
+                    rate_hitting_hz,
+                    rate_hit_hz,
+                };
+                cases.extend(rates.iter().map(case));
             }
         }
         cases
     }
 
     fn measure(case: &Case) -> Row {
-        let result = collide(case).unwrap_or_default();
-        let Case { restitution, mass_ratio, rates_hz: [rate_hitting_hz, rate_hit_hz] } = *case;
-        let ImpactResult { error, momentum_error, kind, steps: [steps_hitting, steps_hit], led } = result;
-        Row {
-            restitution,
-            mass_ratio,
-            rate_hitting_hz,
-            rate_hit_hz,
-            error,
-            momentum_error,
-            kind,
-            steps_hitting,
-            steps_hit,
-            led,
-        }
-    }
-
-    fn case_of(row: &Row) -> Case {
-        let rates_hz = [row.rate_hitting_hz, row.rate_hit_hz];
-        Case { restitution: row.restitution, mass_ratio: row.mass_ratio, rates_hz }
+        Row { case: case.clone(), found: collide(case).unwrap_or_default() }
     }
 
     fn figure(rows: &[Row]) -> Figure {
         let least = |v: f64| v.max(1e-16);
         let (low, high) = span(rows.iter().map(|r| least(r.error)).chain([TOLERANCE]), true);
         let panels = RESTITUTIONS.into_iter().map(|e| {
-            let mut layers: Vec<Layer> = RATES_HZ
-                .into_iter()
-                .zip(Colour::LINES)
-                .map(|([a, b], colour)| {
-                    let here =
-                        rows.iter().filter(|r| r.restitution == e && [r.rate_hitting_hz, r.rate_hit_hz] == [a, b]);
-                    let points = here.map(|r| (r.mass_ratio, least(r.error))).collect();
-                    Layer { label: format!("{a} Hz on {b} Hz"), colour, mark: Mark::Line(points) }
-                })
-                .collect();
-            let limit = vec![(MASS_RATIOS[0], TOLERANCE), (MASS_RATIOS[5], TOLERANCE)];
-            layers.push(Layer { label: "1 %".to_owned(), colour: Colour::Grey, mark: Mark::Dashed(limit) });
-            let x = Axis::log("mass hit / mass that flies", MASS_RATIOS[0], MASS_RATIOS[5]);
+            let line = |(rates_hz, colour): ([f64; 2], Colour)| {
+                let rates = |r: &Row| [r.case.rate_hitting_hz, r.case.rate_hit_hz];
+                let here = rows.iter().filter(|r| r.case.restitution == e && rates(r) == rates_hz);
+                let label = format!("{} Hz on {} Hz", rates_hz[0], rates_hz[1]);
+                Layer::line(label, colour, here.map(|r| (r.case.mass_ratio, least(r.error))))
+            };
+            let lines = RATES_HZ.into_iter().zip(Colour::LINES).map(line);
+            let ends = [MASS_RATIOS[0], MASS_RATIOS[5]];
+            let x = Axis::log("mass hit / mass that flies", ends[0], ends[1]);
             let y = Axis::log("error of the velocity / closing speed", low, high);
-            Panel { title: format!("e = {e}"), x, y, layers }
+            Panel::new(format!("e = {e}"), x, y, lines.chain([Layer::limit("1 %", ends, TOLERANCE)]))
         });
-        Figure { title: "Impact of two balls on two clocks".to_owned(), panels: panels.collect(), columns: 3 }
+        Figure::new("Impact of two balls on two clocks", 3, panels.collect())
     }
 
     fn table(rows: &[Row]) -> Table {
         let mut table = Table::new(&["e", "mass_ratio", "worst error", "worst momentum error", "kinds"]);
         for e in RESTITUTIONS {
             for ratio in MASS_RATIOS {
-                let here: Vec<&Row> = rows.iter().filter(|r| r.restitution == e && r.mass_ratio == ratio).collect();
+                let same = |r: &&Row| r.case.restitution == e && r.case.mass_ratio == ratio;
+                let here: Vec<&Row> = rows.iter().filter(same).collect();
                 if here.is_empty() {
                     continue;
                 }
@@ -158,22 +146,7 @@ impl Experiment for Impact {
     }
 }
 
-/// The results of a pair.
-struct ImpactResult {
-    error: f64,
-    momentum_error: f64,
-    kind: String,
-    steps: [u64; 2],
-    led: bool,
-}
-
-impl Default for ImpactResult {
-    fn default() -> Self {
-        Self { error: f64::NAN, momentum_error: f64::NAN, kind: String::new(), steps: [0; 2], led: false }
-    }
-}
-
-fn collide(case: &Case) -> Option<ImpactResult> {
+fn collide(case: &Case) -> Option<Found> {
     let masses = [0.1, 0.1 * case.mass_ratio];
     let ball = |x: f64, speed: f64, mass: f64| {
         let plain = plain_body(Solid::Ball { radius_m: RADIUS_M }, DVec3::X * x, mass);
@@ -181,11 +154,10 @@ fn collide(case: &Case) -> Option<ImpactResult> {
     };
     let far = GAP_M + 2.0 * RADIUS_M;
     let (hitting, hit) = (ball(0.0, CLOSING_M_S, masses[0])?, ball(far, 0.0, masses[1])?);
-    let [rate_hitting, rate_hit] = case.rates_hz;
     let alone = |name: &str, ball: RigidBody, rate_hz: f64| AgentSpawn::alone(name, Box::new(ball), rate_hz);
-    let mut hitting = alone("hitting", hitting, rate_hitting);
+    let mut hitting = alone("hitting", hitting, case.rate_hitting_hz);
     hitting.laws = vec![(AgentId(1), Law::Ledger)];
-    let spawns = vec![hitting, alone("hit", hit, rate_hit)];
+    let spawns = vec![hitting, alone("hit", hit, case.rate_hit_hz)];
     let mut run = LockstepRun::start(spawns).ok()?;
     run.run_to(SECONDS);
     let snapshots = run.snapshots();
@@ -198,11 +170,12 @@ fn collide(case: &Case) -> Option<ImpactResult> {
     let momentum = speeds[0] * masses[0] + speeds[1] * masses[1];
     let pair = snapshots.iter().flat_map(|s| &s.pairs).next();
     let steps = run.steps();
-    Some(ImpactResult {
+    Some(Found {
         error: worst(error),
         momentum_error: momentum.distance(DVec3::X * (masses[0] * CLOSING_M_S)) / (masses[0] * CLOSING_M_S),
         kind: pair.map_or_else(String::new, |pair| pair.kind.name().to_owned()),
-        steps: [steps.first()?.0, steps.get(1)?.0],
+        steps_hitting: steps.first()?.0,
+        steps_hit: steps.get(1)?.0,
         led: steps.iter().any(|(_, leader)| leader.is_some()),
     })
 }

@@ -9,9 +9,7 @@
 
 use super::drop::{FALLING_KG, MOUNTED_KG, Pair, law, pair};
 use crate::chart::asynchronous::bench::Faults;
-use crate::chart::experiment::{Experiment, Finding, worst};
-use crate::chart::figure::{Axis, Colour, Figure, Layer, Mark, Panel};
-use crate::chart::table::Table;
+use crate::chart::{Axis, Colour, Column, Experiment, Figure, Finding, Layer, experiment, worst};
 use serde::{Deserialize, Serialize};
 
 /// The experiment.
@@ -34,7 +32,7 @@ const HALVINGS: u32 = 18;
 const APART_MAX: f64 = 2.0;
 
 /// A law and a rate.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub(crate) struct Case {
     law: String,
     rate_hz: f64,
@@ -43,21 +41,27 @@ pub(crate) struct Case {
 
 /// The result of a case.
 #[derive(Debug, Clone, Serialize, Deserialize)]
-pub(crate) struct Row {
-    law: String,
-    rate_hz: f64,
-    halvings: u32,
+pub(crate) struct Found {
     /// The greatest stiffness at which the motion decays, N/m.
     measured_n_m: f64,
     /// 0.55 μ/τ² with τ = H/2, half a step of the slow body.
     theory_n_m: f64,
 }
 
+type Row = experiment::Row<Case, Found>;
+
 impl Experiment for PenaltyLimit {
     type Case = Case;
     type Row = Row;
     const NAME: &'static str = "penalty-limit";
     const TITLE: &'static str = "stability limit of penalty contact from stale states, compared with 0.55 μ/τ²";
+    const COLUMNS: &'static [Column<Row>] = &[
+        ("law", |r| (&r.case.law).into()),
+        ("rate_hz", |r| (r.case.rate_hz, 0).into()),
+        ("measured_n_m", |r| (r.measured_n_m, 2).into()),
+        ("0.55 μ/τ²", |r| (r.theory_n_m, 2).into()),
+        ("measured / formula", |r| (r.measured_n_m / r.theory_n_m, 2).into()),
+    ];
 
     fn cases(quick: bool) -> Vec<Case> {
         let (rates, halvings) = if quick { (&RATES_HZ[2..3], 8) } else { (&RATES_HZ[..], HALVINGS) };
@@ -73,44 +77,20 @@ impl Experiment for PenaltyLimit {
         }
         let reduced_kg = MOUNTED_KG * FALLING_KG / (MOUNTED_KG + FALLING_KG);
         let tau_s = 0.5 / case.rate_hz;
-        let Case { law, rate_hz, halvings } = case.clone();
-        Row {
-            law,
-            rate_hz,
-            halvings,
-            measured_n_m: libm::exp(0.5 * (low + high)),
-            theory_n_m: LIMIT * reduced_kg / (tau_s * tau_s),
-        }
-    }
-
-    fn case_of(row: &Row) -> Case {
-        Case { law: row.law.clone(), rate_hz: row.rate_hz, halvings: row.halvings }
+        let measured_n_m = libm::exp(0.5 * (low + high));
+        let theory_n_m = LIMIT * reduced_kg / (tau_s * tau_s);
+        Row { case: case.clone(), found: Found { measured_n_m, theory_n_m } }
     }
 
     fn figure(rows: &[Row]) -> Figure {
-        let theory = rows.iter().filter(|r| r.law == LAWS[0]).map(|r| (r.rate_hz, r.theory_n_m));
-        let mark = Mark::Dashed(theory.collect());
-        let mut layers = vec![Layer { label: "0.55 μ/τ², τ = H/2".to_owned(), colour: Colour::Grey, mark }];
+        let theory = rows.iter().filter(|r| r.case.law == LAWS[0]).map(|r| (r.case.rate_hz, r.theory_n_m));
+        let mut layers = vec![Layer::dashed("0.55 μ/τ², τ = H/2", Colour::Grey, theory)];
         for (law, colour) in LAWS.into_iter().zip(Colour::LINES) {
-            let points = rows.iter().filter(|r| r.law == law).map(|r| (r.rate_hz, r.measured_n_m)).collect();
-            layers.push(Layer { label: format!("{law}, measured"), colour, mark: Mark::Line(points) });
+            let points = rows.iter().filter(|r| r.case.law == law).map(|r| (r.case.rate_hz, r.measured_n_m));
+            layers.push(Layer::line(format!("{law}, measured"), colour, points));
         }
         let (x, y) = (Axis::log("rate of the slow body, Hz", 8.0, 300.0), Axis::log("stiffest contact, N/m", 0.5, 1e5));
-        let panel = Panel { title: String::new(), x, y, layers };
-        Figure {
-            title: "Stability limit of penalty contact from stale states".to_owned(),
-            panels: vec![panel],
-            columns: 1,
-        }
-    }
-
-    fn table(rows: &[Row]) -> Table {
-        let mut table = Table::new(&["law", "rate_hz", "measured_n_m", "0.55 μ/τ²", "measured / formula"]);
-        table.rows.extend(rows.iter().map(|r| {
-            let numbers = [r.measured_n_m, r.theory_n_m, r.measured_n_m / r.theory_n_m].map(|k| (k, 2).into());
-            [vec![r.law.clone().into(), (r.rate_hz, 0).into()], numbers.to_vec()].concat()
-        }));
-        table
+        Figure::single("Stability limit of penalty contact from stale states", x, y, layers)
     }
 
     fn findings(rows: &[Row]) -> Vec<Finding> {
