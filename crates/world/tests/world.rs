@@ -182,7 +182,7 @@ fn a_static_solid_is_as_rough_as_a_body_may_be() {
         let floor = Obstacle { friction, restitution, ..static_solid("floor", Solid::Plane) };
         let scene = Scene::builder().obstacle(floor).build().unwrap();
         let error = World::start(&scene, ExecutorKind::Lockstep).unwrap_err().to_string();
-        assert!(error.contains("\"floor\"") && error.contains("must be between 0 and"), "{error}");
+        assert!(error.contains("\"floor\"") && error.contains("expected a number from 0 to"), "{error}");
     }
 }
 

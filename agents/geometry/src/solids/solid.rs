@@ -126,9 +126,9 @@ pub struct Obstacle {
     pub position: DVec3,
     /// Rotation from its axes to the world's.
     pub rotation: DQuat,
-    /// Coulomb friction coefficient, ≥ 0.
+    /// Coulomb friction coefficient, within [`FRICTION`](crate::FRICTION).
     pub friction: f64,
-    /// Coefficient of restitution, 0 … 1.
+    /// Coefficient of restitution, within [`RESTITUTION`](crate::RESTITUTION).
     pub restitution: f64,
     /// Its groups, combine rules, spin friction, and whether it is a sensor.
     pub traits: ContactTraits,

@@ -2,6 +2,7 @@
 
 use super::{Integrator, TubeSpec, WallModel};
 use glam::DVec3;
+use metachron_core::OutOfRange;
 
 /// Why a tube cannot be built.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
@@ -40,15 +41,8 @@ pub enum TubeError {
         integrator: &'static str,
     },
     /// A number is outside its range.
-    #[error("the tube's {name} is {value}; expected {range}")]
-    OutOfRange {
-        /// Name of the number.
-        name: &'static str,
-        /// Its value.
-        value: f64,
-        /// Its valid range.
-        range: &'static str,
-    },
+    #[error("the tube's {0}")]
+    OutOfRange(#[from] OutOfRange),
 }
 
 /// The sharpest turn between two chords of a path, radians: past it the smooth curve is almost a cusp.
@@ -89,8 +83,8 @@ fn check_path(path: &[DVec3]) -> Result<(), TubeError> {
 }
 
 /// A number that must be finite and satisfy `ok`.
-fn number(name: &'static str, value: f64, ok: bool, range: &'static str) -> Result<(), TubeError> {
-    if value.is_finite() && ok { Ok(()) } else { Err(TubeError::OutOfRange { name, value, range }) }
+fn number(name: &'static str, value: f64, ok: bool, range: &str) -> Result<(), TubeError> {
+    Ok(OutOfRange::unless(value.is_finite() && ok, name, value, range)?)
 }
 
 fn positive(name: &'static str, value: f64) -> Result<(), TubeError> {

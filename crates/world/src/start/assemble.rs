@@ -8,7 +8,7 @@ use crate::error::WorldError;
 use crate::{Member, Scene, Spec};
 use metachron_contact::Agent;
 use metachron_contact::detect::{ClusterScene, Passage};
-use metachron_geometry::Obstacle;
+use metachron_geometry::{FRICTION, Obstacle, RESTITUTION};
 use metachron_models::rigid::{KinematicBody, RigidBody};
 use metachron_models::rod::Tube;
 use metachron_models::soft::SoftBody;
@@ -73,17 +73,8 @@ pub(crate) fn surroundings(scene: &Scene) -> Result<Arc<ClusterScene>, WorldErro
 
 /// A static solid's friction and restitution have the same ranges as a body's.
 fn check_surface(solid: &Obstacle) -> Result<(), WorldError> {
-    let wrong = |what: &str, value: f64, most: f64| {
-        let reason = format!("the {what} is {value}; it must be between 0 and {most}");
-        Err(WorldError::Build { name: solid.name.clone(), reason })
-    };
-    if !(0.0..=1000.0).contains(&solid.friction) {
-        return wrong("friction", solid.friction, 1000.0);
-    }
-    if !(0.0..=1.0).contains(&solid.restitution) {
-        return wrong("restitution", solid.restitution, 1.0);
-    }
-    Ok(())
+    let good = FRICTION.check("friction", solid.friction).and(RESTITUTION.check("restitution", solid.restitution));
+    good.map_err(|wrong| WorldError::Build { name: solid.name.clone(), reason: wrong.to_string() })
 }
 
 /// The executor asked for; where that is left open, chosen by the number of agents.
