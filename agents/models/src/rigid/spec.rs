@@ -5,7 +5,7 @@ use crate::symmetric::principal_axes;
 use crate::trajectory::Keyframe;
 use glam::{DMat3, DQuat, DVec3};
 use metachron_core::{NumberRange, OutOfRange, Ranges, unit_rotation};
-use metachron_geometry::{ContactTraits, FRICTION, RESTITUTION, ShapeError, Solid};
+use metachron_geometry::{ContactTraits, FRICTION, RESTITUTION, ShapeError, Solid, SolidShape};
 
 /// Ranges of the numbers of [`RigidSpec`] and its [`Restraint`].
 pub const LIMITS: Ranges = Ranges(&[
@@ -188,8 +188,18 @@ impl RigidSpec {
         self.led.iter_mut().flat_map(|led| &mut led.keyframes).for_each(|key| key.tip_m += by_m);
     }
 
+    /// Whether a body can be built of it.
+    ///
+    /// # Errors
+    /// [`RigidError`] for a shape without volume, a plane and a number outside its range.
+    pub fn check(&self) -> Result<(), RigidError> {
+        self.check_numbers()?;
+        SolidShape::moving(&self.solid, MassDistribution::of_body(self)?.com)?;
+        Ok(())
+    }
+
     /// Whether every number is in its range.
-    pub(super) fn check(&self) -> Result<(), RigidError> {
+    pub(super) fn check_numbers(&self) -> Result<(), RigidError> {
         if matches!(self.solid, Solid::Plane) {
             return Err(RigidError::MovingPlane);
         }

@@ -52,13 +52,18 @@ const TWIST_MAX_RAD: f64 = 1000.0;
 /// Points nearer than this share of the path's extent are the same point.
 const SAME_POINT: f64 = 1e-9;
 
-/// Checks everything that does not need the skeleton.
-pub fn check(spec: &TubeSpec) -> Result<(), TubeError> {
-    check_path(&spec.path_m)?;
-    check_section(spec)?;
-    check_numbers(spec)?;
-    check_wall(spec)?;
-    check_attachments(spec)
+impl TubeSpec {
+    /// Whether a tube can be built of it.
+    ///
+    /// # Errors
+    /// [`TubeError`].
+    pub fn check(&self) -> Result<(), TubeError> {
+        check_path(&self.path_m)?;
+        check_section(self)?;
+        check_numbers(self)?;
+        check_wall(self)?;
+        check_attachments(self)
+    }
 }
 
 fn check_path(path: &[DVec3]) -> Result<(), TubeError> {

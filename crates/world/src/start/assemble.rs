@@ -8,7 +8,8 @@ use crate::error::WorldError;
 use crate::{Member, Scene, Spec};
 use metachron_contact::Agent;
 use metachron_contact::detect::{ClusterScene, Passage};
-use metachron_geometry::{FRICTION, Obstacle, RESTITUTION};
+use metachron_core::OutOfRange;
+use metachron_geometry::Obstacle;
 use metachron_models::rigid::{KinematicBody, RigidBody};
 use metachron_models::rod::Tube;
 use metachron_models::soft::SoftBody;
@@ -62,19 +63,17 @@ pub(super) fn lone(
 /// [`WorldError::Build`] for a solid or a joint that cannot be.
 pub(crate) fn surroundings(scene: &Scene) -> Result<Arc<ClusterScene>, WorldError> {
     let failed = |reason: String| WorldError::Build { name: scene.name.clone(), reason };
-    scene.obstacles.iter().try_for_each(check_surface)?;
+    let rough = |solid: &Obstacle| {
+        let wrong = |wrong: OutOfRange| WorldError::Build { name: solid.name.clone(), reason: wrong.to_string() };
+        solid.check_surface().map_err(wrong)
+    };
+    scene.obstacles.iter().try_for_each(rough)?;
     let among = ClusterScene::new(&scene.obstacles).map_err(|error| failed(error.to_string()))?;
     let among = among.resting_at(scene.contact_depth_m).map_err(|error| failed(error.to_string()))?;
     let among = among.within(scene.contact_budget).map_err(|error| failed(error.to_string()))?;
     let passages = scene.held_through().map(|(body, solid)| Passage { body, solid: solid as u32 });
     let among = among.with_passages(passages);
     among.jointed(Arc::clone(&scene.joints)).map(Arc::new).map_err(|error| failed(error.to_string()))
-}
-
-/// A static solid's friction and restitution have the same ranges as a body's.
-fn check_surface(solid: &Obstacle) -> Result<(), WorldError> {
-    let good = FRICTION.check("friction", solid.friction).and(RESTITUTION.check("restitution", solid.restitution));
-    good.map_err(|wrong| WorldError::Build { name: solid.name.clone(), reason: wrong.to_string() })
 }
 
 /// The executor asked for; where that is left open, chosen by the number of agents.
