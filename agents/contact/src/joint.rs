@@ -3,7 +3,7 @@
 //! In: two bodies, two anchors and a kind. Out: a checked [`Joint`]. Never here: how a joint is solved (`constraint/`).
 
 use glam::{DQuat, DVec3};
-use metachron_core::AgentId;
+use metachron_core::{AgentId, NumberRange, OutOfRange};
 
 /// A joint between two rigid bodies, or between one and the world. Jointed bodies are always members of one cluster.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -122,18 +122,18 @@ impl Motor {
     /// # Errors
     /// [`JointError::BadNumber`] with the first that is not.
     pub fn check(&self) -> Result<(), JointError> {
-        number_if(self.max_effort > 0.0, "motor's greatest effort", self.max_effort, "above zero")?;
-        let goal = |what, value: f64| number_if(value.abs() <= NUMBER_MAX, what, value, "at most 1e9 in magnitude");
+        OutOfRange::unless(self.max_effort > 0.0, "motor's greatest effort", self.max_effort, "above zero")?;
         match self.goal {
-            MotorGoal::Velocity(velocity) => goal("motor's velocity", velocity),
+            MotorGoal::Velocity(velocity) => GOAL.check("motor's velocity", velocity)?,
             MotorGoal::Spring { position, velocity, stiffness, damping } => {
-                goal("motor's position", position)?;
-                goal("motor's velocity", velocity)?;
-                number("motor's stiffness", stiffness, 0.0)?;
-                number("motor's damping", damping, 0.0)?;
-                number("motor's stiffness and damping together", stiffness + damping, 1e-9)
+                GOAL.check("motor's position", position)?;
+                GOAL.check("motor's velocity", velocity)?;
+                NUMBER.check("motor's stiffness", stiffness)?;
+                NUMBER.check("motor's damping", damping)?;
+                ABOVE_ZERO.check("motor's stiffness and damping together", stiffness + damping)?;
             }
         }
+        Ok(())
     }
 }
 
@@ -145,15 +145,8 @@ pub enum JointError {
     #[error("a joint needs two different bodies; both of its ends are the same body")]
     SameBody,
     /// A number is outside its range.
-    #[error("the joint's {what} is {value}; it must be {wanted}")]
-    BadNumber {
-        /// Which number.
-        what: &'static str,
-        /// The value given.
-        value: f64,
-        /// The range it must be in.
-        wanted: &'static str,
-    },
+    #[error("the joint's {0}")]
+    BadNumber(#[from] OutOfRange),
     /// A vector is not finite, or an axis has no direction.
     #[error("the joint's {what} must be finite and of a length above zero")]
     BadVector {
@@ -210,27 +203,27 @@ impl Joint {
             return Err(JointError::BadVector { what: "rest rotation" });
         }
         let [tears_n, yields_n] = [self.tears_above_n, self.yields_above_n];
-        number_if(tears_n > 0.0, "tearing force", tears_n, "above zero")?;
+        OutOfRange::unless(tears_n > 0.0, "tearing force", tears_n, "above zero")?;
         let yields_first = yields_n > 0.0 && (yields_n < tears_n || yields_n == f64::INFINITY);
-        number_if(yields_first, "yield force", yields_n, "above zero and below the tearing force")?;
+        OutOfRange::unless(yields_first, "yield force", yields_n, "above zero and below the tearing force")?;
         match self.kind {
             JointKind::Fixed | JointKind::Spherical => Ok(()),
             JointKind::Revolute { axis, range_rad, motor } => {
                 direction(axis)?;
                 motor.as_ref().map_or(Ok(()), Motor::check)?;
-                range_rad.map_or(Ok(()), |r| range("angle range", r, std::f64::consts::PI, "between −π and π rad"))
+                range_rad.map_or(Ok(()), |r| range("angle range", r, ANGLE))
             }
             JointKind::Prismatic { axis, range_m, motor } => {
                 direction(axis)?;
                 motor.as_ref().map_or(Ok(()), Motor::check)?;
-                range_m.map_or(Ok(()), |r| range("travel range", r, NUMBER_MAX, "at most 1e9 m"))
+                range_m.map_or(Ok(()), |r| range("travel range", r, GOAL))
             }
             JointKind::Spring { stiffness_n_m, damping_n_s_m, rest_m } => {
-                number("stiffness", stiffness_n_m, 0.0)?;
-                number("damping", damping_n_s_m, 0.0)?;
-                number("rest length", rest_m, 0.0)
+                NUMBER.check("stiffness", stiffness_n_m)?;
+                NUMBER.check("damping", damping_n_s_m)?;
+                Ok(NUMBER.check("rest length", rest_m)?)
             }
-            JointKind::Rope { length_m } => number("length", length_m, 1e-9),
+            JointKind::Rope { length_m } => Ok(ABOVE_ZERO.check("length", length_m)?),
         }
     }
 
@@ -263,22 +256,14 @@ impl Joint {
 
 /// The largest coordinate of an anchor, metres.
 const REACH_MAX_M: f64 = 1e6;
-/// The largest number accepted in a joint.
-const NUMBER_MAX: f64 = 1e9;
+/// Stiffness, damping and lengths at rest; [`ABOVE_ZERO`] is that of lengths of ropes, [`GOAL`] that of goals of motors.
+const NUMBER: NumberRange = NumberRange::new(0.0, 1e9, "");
+const ABOVE_ZERO: NumberRange = NumberRange { least: 1e-9, ..NUMBER };
+const GOAL: NumberRange = NumberRange { least: -1e9, ..NUMBER };
+const ANGLE: NumberRange = NumberRange::new(-std::f64::consts::PI, std::f64::consts::PI, "rad");
 
-fn number_if(is_good: bool, what: &'static str, value: f64, wanted: &'static str) -> Result<(), JointError> {
-    if is_good { Ok(()) } else { Err(JointError::BadNumber { what, value, wanted }) }
-}
-
-fn number(what: &'static str, value: f64, least: f64) -> Result<(), JointError> {
-    let wanted = if least > 0.0 { "above zero and at most 1e9" } else { "between 0 and 1e9" };
-    number_if((least..=NUMBER_MAX).contains(&value), what, value, wanted)
-}
-
-fn range(what: &'static str, [low, high]: [f64; 2], most: f64, wanted: &'static str) -> Result<(), JointError> {
-    for value in [low, high] {
-        number_if(value.abs() <= most, what, value, wanted)?;
-    }
+fn range(what: &'static str, [low, high]: [f64; 2], within: NumberRange) -> Result<(), JointError> {
+    [low, high].into_iter().try_for_each(|value| within.check(what, value))?;
     if low <= high { Ok(()) } else { Err(JointError::EmptyRange { low, high }) }
 }
 
@@ -303,22 +288,22 @@ mod tests {
     fn a_joint_with_an_impossible_number_is_refused() {
         assert_eq!(rope(1.0).check(), Ok(()));
         for length_m in [0.0, -1.0, f64::NAN, f64::INFINITY] {
-            assert!(matches!(rope(length_m).check(), Err(JointError::BadNumber { .. })), "{length_m}");
+            assert!(matches!(rope(length_m).check(), Err(JointError::BadNumber(_))), "{length_m}");
         }
         for tears_above_n in [0.0, -1.0, f64::NAN] {
             let joint = Joint { tears_above_n, ..rope(1.0) };
-            assert!(matches!(joint.check(), Err(JointError::BadNumber { .. })), "{tears_above_n}");
+            assert!(matches!(joint.check(), Err(JointError::BadNumber(_))), "{tears_above_n}");
         }
         for yields_above_n in [0.0, -1.0, f64::NAN, 2.0, 3.0] {
             let joint = Joint { yields_above_n, tears_above_n: 2.0, ..rope(1.0) };
-            assert!(matches!(joint.check(), Err(JointError::BadNumber { .. })), "{yields_above_n}");
+            assert!(matches!(joint.check(), Err(JointError::BadNumber(_))), "{yields_above_n}");
         }
         assert_eq!(Joint { yields_above_n: 1.9, tears_above_n: 2.0, ..rope(1.0) }.check(), Ok(()));
         let to_itself = Joint { b: Some(AgentId(0)), ..rope(1.0) };
         assert_eq!(to_itself.check(), Err(JointError::SameBody));
         let hinge = |axis, range_rad| Joint { kind: JointKind::Revolute { axis, range_rad, motor: None }, ..rope(1.0) };
         assert!(matches!(hinge(DVec3::ZERO, None).check(), Err(JointError::BadVector { .. })));
-        assert!(matches!(hinge(DVec3::X, Some([4.0, 5.0])).check(), Err(JointError::BadNumber { .. })));
+        assert!(matches!(hinge(DVec3::X, Some([4.0, 5.0])).check(), Err(JointError::BadNumber(_))));
         assert!(matches!(hinge(DVec3::X, Some([1.0, 0.5])).check(), Err(JointError::EmptyRange { .. })));
         assert_eq!(hinge(DVec3::X * 3.0, Some([-1.0, 0.5])).check(), Ok(()));
     }

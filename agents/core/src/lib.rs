@@ -1,4 +1,4 @@
-//! Time, numbers of agents, published states and linear algebra that every part of metachron shares.
+//! Time, numbers of agents, ranges of numbers, published states and linear algebra that every part of metachron shares.
 //!
 //! In: plain values. Out: types that models write and that contact, drawing and reports read.
 //! Never here: a clock, a thread, a file, the GPU, a model of physics, a shape.
@@ -32,6 +32,7 @@ pub mod ledger;
 mod local_model;
 pub mod pair;
 pub mod parallel;
+mod range;
 mod recycle;
 mod removed;
 pub mod resolution;
@@ -59,6 +60,7 @@ pub use ledger::{Ahead, Entry, Impulse, Ledger, Page, Scheduled, Site};
 pub use local_model::{LocalBlock, LocalModel, LocalPartner};
 pub use pair::{PairKind, PairState};
 pub use parallel::{ParallelFor, PlainLoop};
+pub use range::{NumberRange, OutOfRange, Ranges};
 pub use recycle::recycled;
 pub use removed::Removed;
 pub use resolution::{N_MAX, Resolution, ResolutionRange};

@@ -29,7 +29,7 @@ pub use narrow_phase::{StaticSolid, StaticSolidError, TouchKey, TouchKind};
 pub use solids::collision_shape::{
     CollisionShape, ContactSide, Place, PlacedShape, ShapeKind, ShapePose, SolidShape, SurfaceShape, Touch,
 };
-pub use solids::contact_traits::{CollisionGroups, CombineRule, ContactTraits};
+pub use solids::contact_traits::{CollisionGroups, CombineRule, ContactTraits, FRICTION, RESTITUTION};
 pub use solids::parry_shapes::{ShapeError, Triangles, hull_triangles, mesh_triangles};
 pub use solids::solid::{COMPOUND_PARTS_MAX, CompoundPart, Obstacle, Solid};
 pub use solids::{

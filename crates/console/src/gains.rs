@@ -4,7 +4,7 @@
 
 use super::output::BadInput;
 use anyhow::Context;
-use metachron_core::gains;
+use metachron_core::{NumberRange, gains};
 use metachron_lod::adaptive::{DEFAULT_MARGIN, MARGIN_MAX};
 use metachron_lod::control::{Law, RateGains};
 use metachron_lod::tune::{Candidate, NORMALISED};
@@ -68,21 +68,21 @@ pub fn parse(text: &str, target_hz: f64) -> anyhow::Result<Candidate> {
 }
 
 fn candidate(law: &str, value: &dyn Fn(&str) -> Option<f64>, target_hz: f64) -> anyhow::Result<Candidate> {
-    let gain = |shown: &str, name: &str, own: f64, (low, high): (f64, f64)| {
+    let gain = |shown: &str, name: &str, own: f64, range: NumberRange| {
         let gain = value(name).unwrap_or(own);
-        check_range(shown, gain, low, high).map(|()| gain)
+        check_range(shown, gain, range).map(|()| gain)
     };
     let beta = || gain("β", "beta", 5.0, gains::BETA);
     let lead = if law == "pi" { 0.2 } else { 0.0 };
     Ok(match law {
         "printed" => Law::Printed { alpha: gain("α", "alpha", 1e-4, gains::ALPHA)?, beta: beta()? }.into(),
         "normalised" => {
-            let k = gain("k", "k", NORMALISED, (1e-6, 10.0))?;
+            let k = gain("k", "k", NORMALISED, NumberRange::new(1e-6, 10.0, ""))?;
             Law::Printed { alpha: k / target_hz, beta: beta()? }.into()
         }
-        "adaptive" => {
-            Candidate::Adaptive { margin: gain(MARGIN, MARGIN, DEFAULT_MARGIN, (gains::MARGIN.0, MARGIN_MAX))? }
-        }
+        "adaptive" => Candidate::Adaptive {
+            margin: gain(MARGIN, MARGIN, DEFAULT_MARGIN, NumberRange { greatest: MARGIN_MAX, ..gains::MARGIN })?,
+        },
         _ => Law::Corrected {
             kappa: gain("κ", "kappa", 0.5, gains::KAPPA)?,
             lead: gain("λ", "lead", lead, gains::LEAD)?,
@@ -101,10 +101,11 @@ fn no_law(name: &str) -> anyhow::Error {
     BadInput(format!("there is no law `{name}` (there are: {laws})")).into()
 }
 
-fn check_range(name: &str, value: f64, low: f64, high: f64) -> anyhow::Result<()> {
-    if (low..=high).contains(&value) {
+fn check_range(name: &str, value: f64, range: NumberRange) -> anyhow::Result<()> {
+    if range.contains(value) {
         return Ok(());
     }
+    let NumberRange { least: low, greatest: high, .. } = range;
     Err(BadInput(format!("the gain {name} = {value} is out of range: expected {low} to {high}")).into())
 }
 

@@ -8,9 +8,10 @@ use super::diagnostic::{Problem, did_you_mean};
 use super::document::Document;
 use super::format::{OneOrRange, Point};
 use glam::DVec3;
+use metachron_core::{NumberRange, Ranges};
 use serde::de::DeserializeOwned;
 use std::fmt::Display;
-use std::ops::{Range, RangeInclusive};
+use std::ops::Range;
 use toml::Spanned;
 use toml::de::{DeTable, DeValue, ValueDeserializer};
 
@@ -86,28 +87,22 @@ impl Place {
     }
 }
 
-/// A range of allowed values and its unit.
-#[derive(Debug, Clone)]
-pub(super) struct Allowed {
-    range: RangeInclusive<f64>,
-    unit: &'static str,
+/// The range of a number: one for all keys, or the one that a list has for the key.
+pub(super) trait Allowed {
+    /// The range of the number under `key`.
+    fn of(self, key: &str) -> NumberRange;
 }
 
-/// Allowed values from `range`, in `unit`.
-pub(super) const fn allowed(range: RangeInclusive<f64>, unit: &'static str) -> Allowed {
-    Allowed { range, unit }
-}
-
-impl Allowed {
-    pub(super) fn contains(&self, value: f64) -> bool {
-        self.range.contains(&value)
+impl Allowed for NumberRange {
+    fn of(self, _key: &str) -> NumberRange {
+        self
     }
 }
 
-impl Display for Allowed {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        write!(f, "a number from {} to {}", self.range.start(), self.range.end())?;
-        if self.unit.is_empty() { Ok(()) } else { write!(f, " {}", self.unit) }
+impl Allowed for Ranges {
+    fn of(self, key: &str) -> NumberRange {
+        let name = key.split('.').next().unwrap_or(key);
+        self.get(name).unwrap_or_else(|| unreachable!("a key with a number has a range: {key}"))
     }
 }
 
@@ -212,18 +207,23 @@ impl<'d, 't> Checker<'d, 't> {
         self.problems.push(Problem::new(span, format!("{} {what}", place.named(key))).expecting(expected));
     }
 
-    /// A number within `allowed`. One outside is reported and replaced by the nearest allowed number.
-    pub(super) fn number(&mut self, place: &Place, key: &str, value: f64, allowed: &Allowed) -> f64 {
-        if allowed.contains(value) {
-            return value;
+    /// A number within its range. One outside is reported and replaced by the nearest that is within it.
+    pub(super) fn number(&mut self, place: &Place, key: &str, value: f64, allowed: impl Allowed) -> f64 {
+        let range = allowed.of(key);
+        if !range.contains(value) {
+            self.wrong(place, key, format_args!("is {value}"), format!("expected {range}"));
         }
-        self.wrong(place, key, format_args!("is {value}"), format!("expected {allowed}"));
-        let (least, greatest) = (*allowed.range.start(), *allowed.range.end());
-        if value.is_nan() { least } else { value.clamp(least, greatest) }
+        range.nearest(value)
     }
 
     /// As [`Self::number`], for a value that may be left out.
-    pub(super) fn optional(&mut self, place: &Place, key: &str, value: Option<f64>, allowed: &Allowed) -> Option<f64> {
+    pub(super) fn optional(
+        &mut self,
+        place: &Place,
+        key: &str,
+        value: Option<f64>,
+        allowed: impl Allowed,
+    ) -> Option<f64> {
         value.map(|given| self.number(place, key, given, allowed))
     }
 
@@ -238,18 +238,25 @@ impl<'d, 't> Checker<'d, 't> {
     }
 
     /// One number or a range, both ends within `allowed` and in order.
-    pub(super) fn ends(&mut self, place: &Place, key: &str, value: OneOrRange<f64>, allowed: &Allowed) -> (f64, f64) {
+    pub(super) fn ends(
+        &mut self,
+        place: &Place,
+        key: &str,
+        value: OneOrRange<f64>,
+        allowed: impl Allowed,
+    ) -> (f64, f64) {
+        let range = allowed.of(key);
         let (least, greatest) = value.ends();
-        if !(allowed.contains(least) && allowed.contains(greatest)) {
-            let bad = if allowed.contains(least) { greatest } else { least };
-            self.wrong(place, key, format_args!("has the value {bad}"), format!("expected {allowed}"));
+        if !(range.contains(least) && range.contains(greatest)) {
+            let bad = if range.contains(least) { greatest } else { least };
+            self.wrong(place, key, format_args!("has the value {bad}"), format!("expected {range}"));
         } else if least > greatest {
             let expected = format!("expected the lesser number first: [{greatest}, {least}]");
             self.wrong(place, key, format_args!("runs from {least} down to {greatest}"), expected);
         } else {
             return (least, greatest);
         }
-        (*allowed.range.start(), *allowed.range.end())
+        (range.least, range.greatest)
     }
 
     /// Whether `name` is one of `known`; one that is neither known nor an object that could not be read is reported.

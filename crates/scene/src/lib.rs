@@ -37,20 +37,16 @@ pub use schema::json_schema;
 pub use source::{FileVersion, Limits, SCENE_BYTES_MAX, Source, SourceFile};
 
 use build::{Objects, SceneContext};
-use check::{Checker, Place, allowed};
+use check::{Checker, Place};
 use diagnostic::Problem;
 use document::Document;
-use format::{ContactsFile, SceneFile, SolvesFile, WorldFile};
+use format::{ContactsFile, SCENE, SURROUNDINGS, SceneFile, SolvesFile, WorldFile};
 use glam::DVec3;
-use metachron_contact::detect::{DEPTH_RANGE_M, LEAST_STEPS_DEFAULT, LEAST_STEPS_RANGE, SolveBudget};
+use metachron_contact::detect::{LEAST_STEPS_DEFAULT, SolveBudget};
 use metachron_contact::solve::DEPTH_DEFAULT_M;
 use metachron_world::Scene;
 use metachron_world::kinds::ExecutorKind;
-use std::ops::RangeInclusive;
 use std::time::Duration;
-
-/// The least and the most time that a turn may be given, seconds.
-const STALL_RANGE_S: RangeInclusive<f64> = 0.001..=3600.0;
 
 /// The only version of the format.
 const FORMAT: i64 = 1;
@@ -121,7 +117,7 @@ fn gravity(c: &mut Checker<'_, '_>, world: Option<&WorldFile>) -> DVec3 {
 
 /// How long a turn may last.
 fn stall_limit(c: &mut Checker<'_, '_>, stall_s: Option<f64>) -> Option<Duration> {
-    let given_s = c.optional(&Place::new("", ""), "stall_s", stall_s, &allowed(STALL_RANGE_S, "s"))?;
+    let given_s = c.optional(&Place::new("", ""), "stall_s", stall_s, SCENE)?;
     Some(Duration::from_secs_f64(given_s))
 }
 
@@ -160,8 +156,7 @@ fn assemble(c: &mut Checker<'_, '_>, source: &Source, file: SceneFile, gravity: 
     }
     let depth = file.world.as_ref().and_then(|world| world.contact_depth_m);
     let contact_depth_m = depth.map_or(DEPTH_DEFAULT_M, |depth_m| {
-        let range = allowed(DEPTH_RANGE_M, "m");
-        c.number(&Place::new("world", "of `[world]`"), "contact_depth_m", depth_m, &range)
+        c.number(&Place::new("world", "of `[world]`"), "contact_depth_m", depth_m, SURROUNDINGS)
     });
     let contact_budget = contact_budget(c, file.world.as_ref());
     let environment = file.world.as_ref().and_then(|world| world.environment).unwrap_or_default();
@@ -200,8 +195,7 @@ fn assemble(c: &mut Checker<'_, '_>, source: &Source, file: SceneFile, gravity: 
 /// How far the solves of contacts go.
 fn contact_budget(c: &mut Checker<'_, '_>, world: Option<&WorldFile>) -> SolveBudget {
     let least = world.and_then(|world| world.contact_least_steps).map_or(LEAST_STEPS_DEFAULT, |steps| {
-        let range = allowed(f64::from(*LEAST_STEPS_RANGE.start())..=f64::from(*LEAST_STEPS_RANGE.end()), "");
-        c.number(&Place::new("world", "of `[world]`"), "contact_least_steps", f64::from(steps), &range) as u32
+        c.number(&Place::new("world", "of `[world]`"), "contact_least_steps", f64::from(steps), SURROUNDINGS) as u32
     });
     match world.and_then(|world| world.contact).unwrap_or_default() {
         SolvesFile::Budget => SolveBudget::Timed { least_steps: least },

@@ -100,14 +100,8 @@ fn an_invalid_scene_is_refused_with_the_name_of_the_object() {
         let scene = Scene::builder().add("b", Rigid::ball(0.1).rate_hz(rate_hz)).build();
         assert!(matches!(scene, Err(SceneBuildError::BadRate { .. })), "{rate_hz}");
     }
-    for part in [Rigid::ball(f64::NAN), Rigid::ball(0.1).mass_kg(-1.0), Rigid::new(Solid::Plane)] {
-        let scene = Scene::builder().add("b", part).build().unwrap();
-        let error = World::start(&scene, ExecutorKind::Lockstep).err().unwrap();
-        assert!(matches!(&error, WorldError::Build { name, .. } if name == "b"), "{error}");
-    }
     for tube in [Tube::along(&[]), Tube::along(&[[0.0; 3]; 2]), Tube::along(&[[0.0; 3], [1.0, 0.0, 0.0]]).wall_m(1.0)] {
-        let scene = Scene::builder().add("t", tube).build().unwrap();
-        assert!(matches!(World::start(&scene, ExecutorKind::Lockstep), Err(WorldError::Build { .. })));
+        assert!(matches!(Scene::builder().add("t", tube).build(), Err(SceneBuildError::BadObject { .. })));
     }
     let world = World::start(&falling_ball(), ExecutorKind::Lockstep).unwrap();
     assert!(matches!(world.object("bal"), Err(WorldError::NoObject { .. })));
@@ -180,9 +174,8 @@ fn a_sensor_a_motor_and_groups_are_said_in_code_as_in_scenes() {
 fn a_static_solid_is_as_rough_as_a_body_may_be() {
     for (friction, restitution) in [(-1.0, 0.0), (f64::NAN, 0.0), (0.5, 1.5)] {
         let floor = Obstacle { friction, restitution, ..static_solid("floor", Solid::Plane) };
-        let scene = Scene::builder().obstacle(floor).build().unwrap();
-        let error = World::start(&scene, ExecutorKind::Lockstep).unwrap_err().to_string();
-        assert!(error.contains("\"floor\"") && error.contains("must be between 0 and"), "{error}");
+        let error = Scene::builder().obstacle(floor).build().unwrap_err().to_string();
+        assert!(error.contains("\"floor\"") && error.contains("expected a number from 0 to"), "{error}");
     }
 }
 
@@ -201,11 +194,47 @@ fn parts_and_spacings_out_of_range_are_refused_with_what_is_expected() {
         (sheet.eps_m((0.1, 0.01)).into(), "no finer than the finest"),
     ];
     for (part, expected) in parts {
-        let scene = Scene::builder().add("a", part).build();
-        let world = scene
-            .map_err(|e| e.to_string())
-            .and_then(|scene| World::start(&scene, ExecutorKind::Lockstep).map_err(|e| e.to_string()));
-        let said = world.expect_err(expected);
+        let said = Scene::builder().add("a", part).build().expect_err(expected).to_string();
         assert!(said.contains(expected), "{said}");
+    }
+}
+
+#[test]
+fn a_scene_that_no_world_can_start_is_not_built_and_its_object_is_named() {
+    let line = [[0.0; 3], [1.0, 0.0, 0.0]];
+    let rope = || Soft::rope(&line, 0.01, 8);
+    let parts: [(Part, &str); 16] = [
+        (Rigid::ball(-0.1).into(), "radius"),
+        (Rigid::ball(f64::NAN).into(), "NaN"),
+        (Rigid::ball(0.1).mass_kg(0.0).into(), "mass_kg is 0; expected a number from 0.000000001 to 1000000000 kg"),
+        (Rigid::ball(0.1).mass_kg(f64::NAN).into(), "mass_kg is NaN"),
+        (Rigid::ball(0.1).at([f64::NAN, 0.0, 0.0]).into(), "position"),
+        (Rigid::ball(0.1).velocity_m_s([0.0, f64::INFINITY, 0.0]).into(), "velocity"),
+        (Rigid::ball(0.1).restitution(1.1).into(), "restitution is 1.1; expected a number from 0 to 1"),
+        (Rigid::new(Solid::Plane).into(), "a plane cannot be a moving body"),
+        (Rigid::ball(0.1).kinematic().friction(f64::NAN).into(), "friction is NaN"),
+        (Soft::cuboid([0.1; 3], [2; 3]).poisson(0.5).into(), "poisson is 0.5; expected a number from 0 to 0.499"),
+        (Soft::cuboid([0.1; 3], [2; 3]).young_pa(f64::NAN).into(), "young_pa is NaN"),
+        (rope().at([f64::NAN, 0.0, 0.0]).into(), "position"),
+        (Soft::rope(&line[..1], 0.01, 8).into(), "at least two different points"),
+        (Tube::along(&line[..1]).into(), "has 1 points; expected at least 2"),
+        (Tube::along(&line).young_pa(f64::NAN).into(), "young_pa is NaN"),
+        (Tube::along(&line).wall_m(0.02).into(), "wall_m is 0.02"),
+    ];
+    for (part, expected) in parts {
+        let scene = Scene::builder().fixed("floor", Solid::Plane).add("odd one", part.clone());
+        let error = scene.build().expect_err(expected);
+        assert!(matches!(&error, SceneBuildError::BadObject { name, .. } if name == "odd one"), "{error:?}");
+        assert!(error.to_string().contains("\"odd one\"") && error.to_string().contains(expected), "{error}");
+        let world = World::start(&Scene::builder().build().unwrap(), ExecutorKind::Lockstep).unwrap();
+        assert!(world.add("odd one", part).unwrap_err().to_string().contains(expected), "{expected}");
+    }
+    let falling = Scene::builder().gravity([0.0, 0.0, f64::NAN]).add("ball", Rigid::ball(0.1)).build();
+    assert!(falling.unwrap_err().to_string().contains("gravity"));
+    let hollow = Scene::builder().fixed("floor", Solid::Ball { radius_m: -1.0 }).build();
+    assert!(hollow.unwrap_err().to_string().contains("\"floor\""));
+    for depth_m in [0.0, f64::NAN] {
+        let deep = Scene::builder().contact_depth_m(depth_m).build();
+        assert!(matches!(deep, Err(SceneBuildError::BadContact { .. })));
     }
 }

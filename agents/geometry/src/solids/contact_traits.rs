@@ -4,6 +4,13 @@
 //! In: the traits that a scene gives an object. Out: the same of a pair. Never here: where skins touch, impulses.
 //! Theory: docs/theory/contact.md, section 5.
 
+use metachron_core::NumberRange;
+
+/// Range of Coulomb friction coefficients of skins.
+pub const FRICTION: NumberRange = NumberRange::new(0.0, 1e3, "");
+/// Range of coefficients of restitution.
+pub const RESTITUTION: NumberRange = NumberRange::new(0.0, 1.0, "");
+
 /// The contact traits of a skin, the same for bodies and static solids.
 #[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct ContactTraits {

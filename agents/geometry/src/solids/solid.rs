@@ -1,7 +1,8 @@
 //! Solid shapes of rigid bodies and static obstacles.
 
-use crate::ContactTraits;
+use crate::solids::contact_traits::{ContactTraits, FRICTION, RESTITUTION};
 use glam::{DQuat, DVec3};
+use metachron_core::OutOfRange;
 use std::sync::Arc;
 
 /// A solid in its own axes, metres, with its primitive's centre at the origin.
@@ -126,15 +127,24 @@ pub struct Obstacle {
     pub position: DVec3,
     /// Rotation from its axes to the world's.
     pub rotation: DQuat,
-    /// Coulomb friction coefficient, ≥ 0.
+    /// Coulomb friction coefficient, within [`FRICTION`](crate::FRICTION).
     pub friction: f64,
-    /// Coefficient of restitution, 0 … 1.
+    /// Coefficient of restitution, within [`RESTITUTION`](crate::RESTITUTION).
     pub restitution: f64,
     /// Its groups, combine rules, spin friction, and whether it is a sensor.
     pub traits: ContactTraits,
 }
 
 impl Obstacle {
+    /// Whether its friction and its restitution are in their ranges, which are those of bodies.
+    ///
+    /// # Errors
+    /// [`OutOfRange`].
+    pub fn check_surface(&self) -> Result<(), OutOfRange> {
+        FRICTION.check("friction", self.friction)?;
+        RESTITUTION.check("restitution", self.restitution)
+    }
+
     /// A solid with its axes at the origin, unturned, with a friction of 0.5 and no rebound, which touches everything.
     #[must_use]
     pub fn new(name: impl Into<String>, solid: Solid) -> Self {

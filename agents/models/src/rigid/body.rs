@@ -43,7 +43,7 @@ impl RigidBody {
     /// # Errors
     /// [`RigidError`] for a shape without volume, a plane and a number outside its range.
     pub fn new(spec: RigidSpec) -> Result<Self, RigidError> {
-        spec.check()?;
+        spec.check_numbers()?;
         let spread = MassDistribution::of_body(&spec)?;
         let rotation = spec.rotation.normalize();
         let mut motion = Motion {

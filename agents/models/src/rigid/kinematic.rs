@@ -64,7 +64,7 @@ impl KinematicBody {
     /// # Errors
     /// [`RigidError`] as for a body that is moved by forces.
     pub fn new(spec: &RigidSpec) -> Result<Self, RigidError> {
-        spec.check()?;
+        spec.check_numbers()?;
         let com_local = MassDistribution::of_body(spec)?.com;
         let shape = SolidShape::moving(&spec.solid, com_local)?;
         let radius_m = shape.radius_m;

@@ -4,8 +4,19 @@ use super::mass_properties::MassDistribution;
 use crate::symmetric::principal_axes;
 use crate::trajectory::Keyframe;
 use glam::{DMat3, DQuat, DVec3};
-use metachron_core::unit_rotation;
-use metachron_geometry::{ContactTraits, ShapeError, Solid};
+use metachron_core::{NumberRange, OutOfRange, Ranges, unit_rotation};
+use metachron_geometry::{ContactTraits, FRICTION, RESTITUTION, ShapeError, Solid, SolidShape};
+
+/// Ranges of the numbers of [`RigidSpec`] and its [`Restraint`].
+pub const LIMITS: Ranges = Ranges(&[
+    ("mass_kg", MASS),
+    ("restitution", RESTITUTION),
+    ("linear_damping_per_s", DAMPING),
+    ("angular_damping_per_s", DAMPING),
+]);
+/// Range of the mass.
+pub const MASS: NumberRange = NumberRange::new(1e-9, 1e9, "kg");
+const DAMPING: NumberRange = NumberRange::new(0.0, 1e6, "1/s");
 
 /// A rigid body before it is built.
 #[derive(Debug, Clone, serde::Serialize, serde::Deserialize)]
@@ -20,13 +31,13 @@ pub struct RigidSpec {
     pub velocity: DVec3,
     /// Angular velocity at the start, rad/s, world axes.
     pub spin: DVec3,
-    /// Mass, kilograms, > 0.
+    /// Mass, kilograms, within [`MASS`].
     pub mass_kg: f64,
     /// Where its mass is; `None` for evenly inside its shape.
     pub inertia: Option<GivenInertia>,
-    /// Coefficient of restitution, 0 … 1; a pair takes the larger.
+    /// Coefficient of restitution, within [`RESTITUTION`]; a pair takes the larger.
     pub restitution: f64,
-    /// Coulomb friction coefficient, ≥ 0; a pair takes the geometric mean.
+    /// Coulomb friction coefficient, within [`FRICTION`]; a pair takes the geometric mean.
     pub friction: f64,
     /// Its groups, combine rules, spin friction, and whether it is a sensor.
     pub traits: ContactTraits,
@@ -54,7 +65,7 @@ pub struct GivenInertia {
 /// The damping of a rigid body wherever it is, and the axes of the world along and about which it does not move.
 #[derive(Debug, Clone, Copy, PartialEq, Default, serde::Serialize, serde::Deserialize)]
 pub struct Restraint {
-    /// Its velocity decays by this rate, 1/s, 0 … 1e6.
+    /// Its velocity decays by this rate, 1/s, within the range of [`LIMITS`].
     pub linear_damping_per_s: f64,
     /// Its angular momentum likewise.
     pub angular_damping_per_s: f64,
@@ -112,15 +123,8 @@ pub enum RigidError {
     #[error("a plane cannot be a moving body; make it a static solid")]
     MovingPlane,
     /// A number is outside its range.
-    #[error("{what} is {value}; it must be {wanted}")]
-    BadNumber {
-        /// Which number.
-        what: &'static str,
-        /// The value given.
-        value: f64,
-        /// The range it must be in.
-        wanted: &'static str,
-    },
+    #[error(transparent)]
+    BadNumber(#[from] OutOfRange),
     /// No body has these principal moments of inertia.
     #[error(
         "the inertia has the principal moments {moments_kg_m2:?} kg·m²; they must be above zero, and none larger than the sum of the others"
@@ -184,17 +188,24 @@ impl RigidSpec {
         self.led.iter_mut().flat_map(|led| &mut led.keyframes).for_each(|key| key.tip_m += by_m);
     }
 
+    /// Whether a body can be built of it.
+    ///
+    /// # Errors
+    /// [`RigidError`] for a shape without volume, a plane and a number outside its range.
+    pub fn check(&self) -> Result<(), RigidError> {
+        self.check_numbers()?;
+        SolidShape::moving(&self.solid, MassDistribution::of_body(self)?.com)?;
+        Ok(())
+    }
+
     /// Whether every number is in its range.
-    pub(super) fn check(&self) -> Result<(), RigidError> {
+    pub(super) fn check_numbers(&self) -> Result<(), RigidError> {
         if matches!(self.solid, Solid::Plane) {
             return Err(RigidError::MovingPlane);
         }
-        number("the mass", self.mass_kg, (1e-9, 1e9), "between 1e-9 and 1e9 kg")?;
-        number("the restitution", self.restitution, (0.0, 1.0), "between 0 and 1")?;
-        number("the friction", self.friction, (0.0, 1e3), "between 0 and 1000")?;
         let Restraint { linear_damping_per_s, angular_damping_per_s, .. } = self.restraint;
-        number("the linear damping", linear_damping_per_s, (0.0, 1e6), "between 0 and 1e6 per second")?;
-        number("the angular damping", angular_damping_per_s, (0.0, 1e6), "between 0 and 1e6 per second")?;
+        LIMITS.check([self.mass_kg, self.restitution, linear_damping_per_s, angular_damping_per_s])?;
+        FRICTION.check("friction", self.friction)?;
         self.inertia.as_ref().map_or(Ok(()), GivenInertia::check)?;
         vector("the position", self.position)?;
         vector("the velocity", self.velocity)?;
@@ -231,21 +242,15 @@ impl Led {
         let mut before_s = 0.0;
         for (at, key) in self.keyframes.iter().enumerate() {
             let rises = if at == 0 { key.at_s >= before_s } else { key.at_s > before_s };
-            if !(rises && key.at_s <= SCRIPT_MAX_S) {
-                let (what, wanted) = ("the time of a keyframe", "later than the one before, 0 to 1e6 s");
-                return Err(RigidError::BadNumber { what, value: key.at_s, wanted });
-            }
+            let is_good = rises && key.at_s <= SCRIPT_MAX_S;
+            let expected = "one later than that before, from 0 to 1e6 s";
+            OutOfRange::unless(is_good, "the time of a keyframe", key.at_s, expected)?;
             before_s = key.at_s;
             vector("the position of a keyframe", key.tip_m)?;
             rotation("the rotation of a keyframe", key.rotation)?;
         }
         Ok(())
     }
-}
-
-fn number(what: &'static str, value: f64, range: (f64, f64), wanted: &'static str) -> Result<(), RigidError> {
-    let good = (range.0..=range.1).contains(&value);
-    if good { Ok(()) } else { Err(RigidError::BadNumber { what, value, wanted }) }
 }
 
 fn vector(what: &'static str, value: DVec3) -> Result<(), RigidError> {

@@ -2,6 +2,7 @@
 
 use super::{Integrator, TubeSpec, WallModel};
 use glam::DVec3;
+use metachron_core::OutOfRange;
 
 /// Why a tube cannot be built.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
@@ -40,15 +41,8 @@ pub enum TubeError {
         integrator: &'static str,
     },
     /// A number is outside its range.
-    #[error("the tube's {name} is {value}; expected {range}")]
-    OutOfRange {
-        /// Name of the number.
-        name: &'static str,
-        /// Its value.
-        value: f64,
-        /// Its valid range.
-        range: &'static str,
-    },
+    #[error("the tube's {0}")]
+    OutOfRange(#[from] OutOfRange),
 }
 
 /// The sharpest turn between two chords of a path, radians: past it the smooth curve is almost a cusp.
@@ -58,13 +52,18 @@ const TWIST_MAX_RAD: f64 = 1000.0;
 /// Points nearer than this share of the path's extent are the same point.
 const SAME_POINT: f64 = 1e-9;
 
-/// Checks everything that does not need the skeleton.
-pub fn check(spec: &TubeSpec) -> Result<(), TubeError> {
-    check_path(&spec.path_m)?;
-    check_section(spec)?;
-    check_numbers(spec)?;
-    check_wall(spec)?;
-    check_attachments(spec)
+impl TubeSpec {
+    /// Whether a tube can be built of it.
+    ///
+    /// # Errors
+    /// [`TubeError`].
+    pub fn check(&self) -> Result<(), TubeError> {
+        check_path(&self.path_m)?;
+        check_section(self)?;
+        check_numbers(self)?;
+        check_wall(self)?;
+        check_attachments(self)
+    }
 }
 
 fn check_path(path: &[DVec3]) -> Result<(), TubeError> {
@@ -89,8 +88,8 @@ fn check_path(path: &[DVec3]) -> Result<(), TubeError> {
 }
 
 /// A number that must be finite and satisfy `ok`.
-fn number(name: &'static str, value: f64, ok: bool, range: &'static str) -> Result<(), TubeError> {
-    if value.is_finite() && ok { Ok(()) } else { Err(TubeError::OutOfRange { name, value, range }) }
+fn number(name: &'static str, value: f64, ok: bool, range: &str) -> Result<(), TubeError> {
+    Ok(OutOfRange::unless(value.is_finite() && ok, name, value, range)?)
 }
 
 fn positive(name: &'static str, value: f64) -> Result<(), TubeError> {

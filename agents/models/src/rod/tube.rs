@@ -6,7 +6,7 @@
 mod agent;
 
 use super::anchor_springs::{NodeSpring, carry_slips, springs};
-use super::check::{TubeError, check};
+use super::check::TubeError;
 use super::discretization;
 use super::discretization::Discretization;
 use super::member::Unknowns;
@@ -71,7 +71,7 @@ impl Tube {
     /// # Errors
     /// [`TubeError`] for a path that no tube can follow and for numbers outside their range.
     pub fn new(spec: TubeSpec) -> Result<Self, TubeError> {
-        check(&spec)?;
+        spec.check()?;
         let skeleton = RestCurve::new(&spec.path_m).strained(spec.straight, spec.twist_rad);
         let resolution = spec.range.clamp(spec.resolution);
         let count = match spec.segments {
@@ -183,7 +183,7 @@ impl Tube {
     /// [`TubeError::OutOfRange`] for a pressure that a new tube would not take; it then keeps the one it has.
     pub fn set_pressure_pa(&mut self, pressure_pa: f64) -> Result<(), TubeError> {
         let before = std::mem::replace(&mut self.spec.pressure_pa, pressure_pa);
-        if let Err(error) = check(&self.spec) {
+        if let Err(error) = self.spec.check() {
             self.spec.pressure_pa = before;
             return Err(error);
         }

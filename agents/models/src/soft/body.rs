@@ -3,7 +3,6 @@
 //! In: a [`SoftSpec`]. Out: snapshots ([`super::publish`]). Never here: how a step is solved ([`super::step`]), contact.
 //! Theory: docs/theory/soft.md.
 
-use super::carrier::Carrier;
 use super::division::{Division, form};
 use super::fe_mesh::FeMesh;
 use super::member::Unknowns;
@@ -56,10 +55,6 @@ impl SoftBody {
     pub fn new(spec: SoftSpec) -> Result<Self, SoftError> {
         spec.check()?;
         let eps_m = spec.spacing().map_or(0.0, |spacing| spacing.eps_m);
-        if let Some(spacing) = spec.spacing() {
-            let eps_m = spacing.range_m.0;
-            Carrier::new(&spec, eps_m).ok_or(SoftError::FineCage { eps_m })?;
-        }
         let Division { mut mesh, surface, skin } = Division::of(&spec, eps_m)?;
         let rotation = spec.rotation.normalize();
         let positions: Vec<_> = mesh.rest.iter().map(|rest| spec.position + rotation * *rest).collect();

@@ -36,4 +36,7 @@ mod tetrahedron;
 
 pub use body::SoftBody;
 pub use grid::Side;
-pub use spec::{MaterialLaw, NodeSpacing, RegionMatter, SoftError, SoftMatter, SoftShape, SoftSpec, VERTICES_MAX};
+pub use spec::{
+    LENGTH, MATTER, MaterialLaw, NodeSpacing, RegionMatter, SEGMENTS, SoftError, SoftMatter, SoftShape, SoftSpec,
+    VERTICES_MAX,
+};

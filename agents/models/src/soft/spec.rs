@@ -1,13 +1,27 @@
 //! Specification of a soft body: its properties and initial state, the numbers a scene gives, and their checks.
 
+use super::carrier::Carrier;
 use super::grid::Side;
 use super::material::Lame;
 use glam::{DQuat, DVec3};
-use metachron_core::{ResolutionRange, unit_rotation};
+use metachron_core::{NumberRange, OutOfRange, Ranges, ResolutionRange, unit_rotation};
 use metachron_geometry::{
-    ContactTraits, Tetrahedra, TetrahedraFault, Triangles, branch, cage_counts, is_closed, opposed,
+    ContactTraits, FRICTION, Tetrahedra, TetrahedraFault, Triangles, branch, cage_counts, is_closed, opposed,
 };
 use std::sync::Arc;
+
+/// Ranges of the numbers of [`SoftMatter`]. At a Poisson's ratio of 0.5 a material is incompressible, which its elements cannot be.
+pub const MATTER: Ranges = Ranges(&[
+    ("young_pa", NumberRange::new(1.0, 1e11, "Pa")),
+    ("poisson", NumberRange::new(0.0, 0.499, "")),
+    ("density_kg_m3", NumberRange::new(1.0, 1e5, "kg/m³")),
+    ("damping_per_s", NumberRange::new(0.0, 1e4, "1/s")),
+    ("damping_s", NumberRange::new(0.0, 10.0, "s")),
+]);
+/// Range of lengths, radii, thicknesses and spacings.
+pub const LENGTH: NumberRange = NumberRange::new(1e-6, 1e4, "m");
+/// Range of the number of cells along an axis; of a ball from 2 on.
+pub const SEGMENTS: NumberRange = NumberRange::new(1.0, 2047.0, "");
 
 /// A soft body before it is built.
 #[derive(Debug, Clone, serde::Serialize, serde::Deserialize)]
@@ -27,7 +41,7 @@ pub struct SoftSpec {
     pub velocity: DVec3,
     /// The sides whose vertices never move.
     pub held: Vec<Side>,
-    /// Coulomb friction coefficient of its skin, ≥ 0.
+    /// Coulomb friction coefficient of its skin, within [`FRICTION`].
     pub friction: f64,
     /// Its groups, combine rules, spin friction, and whether it is a sensor.
     pub traits: ContactTraits,
@@ -39,18 +53,18 @@ pub struct SoftSpec {
     pub sleep: bool,
 }
 
-/// The material of a soft body.
+/// The material of a soft body; [`MATTER`] has the ranges of its numbers.
 #[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct SoftMatter {
-    /// Young's modulus, Pa, 1 … 1e11.
+    /// Young's modulus, Pa.
     pub young_pa: f64,
-    /// Poisson's ratio, 0 … 0.499.
+    /// Poisson's ratio.
     pub poisson: f64,
-    /// Density, kg/m³, 1 … 1e5.
+    /// Density, kg/m³.
     pub density_kg_m3: f64,
-    /// Mass-proportional damping, 1/s, 0 … 1e4: dv/dt = … − c v.
+    /// Mass-proportional damping, 1/s: dv/dt = … − c v.
     pub damping_per_s: f64,
-    /// Stiffness-proportional damping of Rayleigh, s, 0 … 10: stresses lag behind strains by this time.
+    /// Stiffness-proportional damping of Rayleigh, s: stresses lag behind strains by this time.
     pub damping_s: f64,
     /// How stress follows from strain; sheets and ropes have laws of their own.
     pub law: MaterialLaw,
@@ -83,7 +97,7 @@ pub struct RegionMatter {
 /// How far apart the nodes are that carry a skin.
 #[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct NodeSpacing {
-    /// Largest length of a cell at the start, metres, 1e-6 … 1e4.
+    /// Largest length of a cell at the start, metres, within [`LENGTH`].
     pub eps_m: f64,
     /// The finest and the coarsest one that it may take, metres.
     pub range_m: (f64, f64),
@@ -155,15 +169,8 @@ pub enum SoftShape {
 #[non_exhaustive]
 pub enum SoftError {
     /// A number is outside its range.
-    #[error("{what} is {value}; it must be {wanted}")]
-    BadNumber {
-        /// Which number.
-        what: &'static str,
-        /// The value given.
-        value: f64,
-        /// The range it must be in.
-        wanted: &'static str,
-    },
+    #[error(transparent)]
+    BadNumber(#[from] OutOfRange),
     /// A vector or rotation is not finite, or a rotation is zero.
     #[error("{what} is not finite")]
     BadVector {
@@ -268,21 +275,20 @@ impl SoftShape {
     }
 
     fn check(&self) -> Result<(), SoftError> {
-        let length = |what, value| number(what, value, (1e-6, 1e4), "between 1e-6 and 1e4 m");
-        let count = |what, value: u32| number(what, f64::from(value), (1.0, 2047.0), "between 1 and 2047");
+        let count = |what, value: u32| SEGMENTS.check(what, f64::from(value));
         match self {
             Self::Sheet { size_m, thickness_m, segments } => {
-                size_m.iter().try_for_each(|size| length("the size", *size))?;
-                length("the thickness", *thickness_m)?;
+                size_m.iter().try_for_each(|size| LENGTH.check("the size", *size))?;
+                LENGTH.check("the thickness", *thickness_m)?;
                 segments.iter().try_for_each(|n| count("the number of segments", *n))?;
             }
             Self::Box { size_m, segments } => {
-                size_m.to_array().into_iter().try_for_each(|size| length("the size", size))?;
+                size_m.to_array().into_iter().try_for_each(|size| LENGTH.check("the size", size))?;
                 segments.iter().try_for_each(|n| count("the number of segments", *n))?;
             }
             Self::Ball { radius_m, segments } => {
-                length("the radius", *radius_m)?;
-                number("the number of segments", f64::from(*segments), (2.0, 2047.0), "between 2 and 2047")?;
+                LENGTH.check("the radius", *radius_m)?;
+                NumberRange { least: 2.0, ..SEGMENTS }.check("the number of segments", f64::from(*segments))?;
             }
             // how many vertices a cage has is known when it is made
             Self::Embedded { surface, eps_m, range_m } => {
@@ -294,11 +300,11 @@ impl SoftShape {
                 regions.iter().try_for_each(|region| region.matter.check())?;
             }
             Self::Shell { surface, thickness_m } => {
-                length("the thickness", *thickness_m)?;
+                LENGTH.check("the thickness", *thickness_m)?;
                 check_sheet(surface)?;
             }
             Self::Rope { path_m, radius_m, segments } => {
-                length("the radius", *radius_m)?;
+                LENGTH.check("the radius", *radius_m)?;
                 count("the number of segments", *segments)?;
                 path_m.iter().try_for_each(|point| vector("a point of the path", *point))?;
                 let length_m: f64 = path_m.windows(2).map(|pair| pair[0].distance(pair[1])).sum();
@@ -321,7 +327,7 @@ impl SoftSpec {
     /// size; other shapes stay as they are.
     #[must_use]
     pub fn spaced(self, range_m: (f64, f64)) -> Option<Self> {
-        let fitted = |size: f64| (size / range_m.0).ceil().clamp(1.0, 2047.0) as u32;
+        let fitted = |size: f64| SEGMENTS.nearest((size / range_m.0).ceil()) as u32;
         let lattice = match &self.shape {
             SoftShape::Sheet { .. } | SoftShape::Rope { .. } => {
                 let most = |shape: &SoftShape| match *shape {
@@ -329,7 +335,9 @@ impl SoftSpec {
                     SoftShape::Rope { segments, .. } => segments,
                     _ => 0,
                 };
-                let fits = |finest: &SoftShape| finest.vertices() <= VERTICES_MAX && (1..=2047).contains(&most(finest));
+                let fits = |finest: &SoftShape| {
+                    finest.vertices() <= VERTICES_MAX && SEGMENTS.contains(f64::from(most(finest)))
+                };
                 let shape = self.shape.divided_by(range_m.0).filter(fits)?;
                 return Some(Self { shape, nodes: Some(NodeSpacing { eps_m: range_m.0, range_m }), ..self });
             }
@@ -367,9 +375,9 @@ impl SoftShape {
 impl NodeSpacing {
     fn check(&self) -> Result<(), SoftError> {
         let all = [("ε", self.eps_m), ("the finest ε", self.range_m.0), ("the coarsest ε", self.range_m.1)];
-        all.into_iter().try_for_each(|(what, value)| number(what, value, (1e-6, 1e4), "between 1e-6 and 1e4 m"))?;
+        all.into_iter().try_for_each(|(what, value)| LENGTH.check(what, value))?;
         let (finest, coarsest) = self.range_m;
-        number("the coarsest ε", coarsest, (finest, 1e4), "no finer than the finest")
+        Ok(OutOfRange::unless(finest <= coarsest, "the coarsest ε", coarsest, "one no finer than the finest")?)
     }
 }
 
@@ -424,18 +432,10 @@ fn check_sheet(surface: &Triangles) -> Result<(), SoftError> {
 impl SoftMatter {
     fn check(&self) -> Result<(), SoftError> {
         let Self { young_pa, poisson, density_kg_m3, damping_per_s, damping_s, law } = *self;
-        number("Young's modulus", young_pa, (1.0, 1e11), "between 1 and 1e11 Pa")?;
-        number(
-            "Poisson's ratio",
-            poisson,
-            (0.0, 0.499),
-            "between 0 and 0.499 (at 0.5 the material is incompressible)",
-        )?;
-        number("the density", density_kg_m3, (1.0, 1e5), "between 1 and 1e5 kg/m³")?;
-        number("the damping", damping_per_s, (0.0, 1e4), "between 0 and 1e4 per second")?;
-        number("the damping of strains", damping_s, (0.0, 10.0), "between 0 and 10 s")?;
+        MATTER.check([young_pa, poisson, density_kg_m3, damping_per_s, damping_s])?;
         let MaterialLaw::Ogden { exponent } = law else { return Ok(()) };
-        number("the exponent of Ogden", exponent.abs(), (1.0, 20.0), "between 1 and 20, or −20 and −1")?;
+        let is_good = (1.0..=20.0).contains(&exponent.abs());
+        OutOfRange::unless(is_good, "the exponent of Ogden", exponent, "a number from 1 to 20, or from −20 to −1")?;
         let Lame { mu, lambda } = Lame::of(self);
         if lambda + 2.0 * mu / exponent > 0.0 { Ok(()) } else { Err(SoftError::Unstable { exponent }) }
     }
@@ -457,8 +457,18 @@ impl SoftSpec {
         }
     }
 
+    /// Whether a body can be built of it.
+    ///
+    /// # Errors
+    /// [`SoftError`] for a number outside its range, a side it does not have, a surface without an inside.
+    pub fn check(&self) -> Result<(), SoftError> {
+        self.check_numbers()?;
+        let Some(eps_m) = self.spacing().map(|spacing| spacing.range_m.0) else { return Ok(()) };
+        Carrier::new(self, eps_m).map(drop).ok_or(SoftError::FineCage { eps_m })
+    }
+
     /// Whether every number is in its range.
-    pub(super) fn check(&self) -> Result<(), SoftError> {
+    fn check_numbers(&self) -> Result<(), SoftError> {
         self.shape.check()?;
         if let Some(nodes) = &self.nodes {
             nodes.check()?;
@@ -466,7 +476,7 @@ impl SoftSpec {
             finest.ok_or(SoftError::NoSpacing { model: self.shape.model() })?.check()?;
         }
         self.matter.check()?;
-        number("the friction", self.friction, (0.0, 1e3), "between 0 and 1000")?;
+        FRICTION.check("friction", self.friction)?;
         vector("the position", self.position)?;
         vector("the velocity", self.velocity)?;
         vector("the gravity", self.gravity)?;
@@ -477,11 +487,6 @@ impl SoftSpec {
             false => Err(SoftError::NoSide { model, side: side.name() }),
         })
     }
-}
-
-fn number(what: &'static str, value: f64, range: (f64, f64), wanted: &'static str) -> Result<(), SoftError> {
-    let good = (range.0..=range.1).contains(&value);
-    if good { Ok(()) } else { Err(SoftError::BadNumber { what, value, wanted }) }
 }
 
 fn vector(what: &'static str, value: DVec3) -> Result<(), SoftError> {

@@ -16,7 +16,7 @@ mod spec;
 
 pub use crate::trajectory::Keyframe;
 pub use agent::Tool;
-pub use spec::{ToolError, ToolSpec};
+pub use spec::{LIMITS, ToolError, ToolSpec};
 
 #[cfg(test)]
 mod tests;

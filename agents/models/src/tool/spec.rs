@@ -2,8 +2,17 @@
 
 use crate::trajectory::Keyframe;
 use glam::DVec3;
-use metachron_core::{AgentId, unit_rotation};
+use metachron_core::{AgentId, NumberRange, OutOfRange, Ranges, unit_rotation};
 use metachron_geometry::ContactTraits;
+
+/// Ranges of the numbers of [`ToolSpec`]. The tip has a mass of 6 g per newton of its drive (docs/theory/coupling.md, eq. 9e): past a
+/// kilonewton it presses an object of 50 g millimetres into the floor, past a hundred kilonewtons through it.
+pub const LIMITS: Ranges = Ranges(&[
+    ("reach_m", NumberRange::new(1e-9, 1e3, "m")),
+    ("stiffness_n_m", NumberRange::new(f64::MIN_POSITIVE, 1e9, "N/m")),
+    ("damping_n_s_m", NumberRange::new(0.0, 1e9, "N·s/m")),
+    ("max_force_n", NumberRange::new(1e-6, 1e3, "N")),
+]);
 
 /// A tool before it is built.
 #[derive(Debug, Clone)]
@@ -13,15 +22,14 @@ pub struct ToolSpec {
     /// Whether the motion starts again after the last keyframe. A script that does not end where it began first goes back
     /// there, in as long as its last leg took.
     pub repeat: bool,
-    /// How far the jaws reach from the tip, metres, > 0: from the tip to the skin of the grasped body. A rigid body is kept
+    /// How far the jaws reach from the tip, metres: from the tip to the skin of the grasped body. A rigid body is kept
     /// from turning as by springs at this distance.
     pub reach_m: f64,
-    /// Stiffness of the grasp, N/m, > 0.
+    /// Stiffness of the grasp, N/m.
     pub stiffness_n_m: f64,
-    /// Damping of the grasp, N·s/m, ≥ 0.
+    /// Damping of the grasp, N·s/m.
     pub damping_n_s_m: f64,
-    /// Force limit of its drive, newtons, 1e-6 … 1000: a stronger resistance holds the tip back from its path. Above that range light
-    /// bodies are pressed into their supports.
+    /// Force limit of its drive, newtons, within the range of [`LIMITS`]: a stronger resistance holds the tip back from its path.
     pub max_force_n: f64,
     /// The agents it can grasp: tubes, soft and rigid bodies.
     pub graspable: Vec<AgentId>,
@@ -53,16 +61,12 @@ pub enum ToolError {
         before_s: f64,
     },
     /// A number of a keyframe is outside its range.
-    #[error("{what} of keyframe {index} is {value}; it must be {wanted}")]
+    #[error("in keyframe {index} {fault}")]
     BadKeyframe {
         /// Number of the keyframe, from 0.
         index: usize,
-        /// Which number.
-        what: &'static str,
-        /// The value given.
-        value: f64,
-        /// The range it must be in.
-        wanted: &'static str,
+        /// The number, its value and its range.
+        fault: OutOfRange,
     },
     /// The tip of a keyframe is so far from the pivot, or so near, that the pivot is not on the shaft.
     #[error(
@@ -80,23 +84,17 @@ pub enum ToolError {
         most_m: f64,
     },
     /// A number of the tool is outside its range.
-    #[error("{what} is {value}; it must be {wanted}")]
-    BadNumber {
-        /// Which number.
-        what: &'static str,
-        /// The value given.
-        value: f64,
-        /// The range it must be in.
-        wanted: &'static str,
-    },
+    #[error(transparent)]
+    BadNumber(#[from] OutOfRange),
 }
 
 /// The largest coordinate of a tool, metres.
 pub(super) const REACH_MAX_M: f64 = 1e6;
-/// The strongest drive, newtons: its tip has a mass of 6 kg.
-const FORCE_MAX_N: f64 = 1e3;
-/// The longest script, seconds (11 days).
-const SCRIPT_MAX_S: f64 = 1e6;
+const COORDINATE: NumberRange = NumberRange::new(-REACH_MAX_M, REACH_MAX_M, "m");
+/// The times of a script: up to 11 days.
+const TIME: NumberRange = NumberRange::new(0.0, 1e6, "s");
+/// How far jaws are open.
+const JAW: NumberRange = NumberRange::new(0.0, 1.0, "");
 
 impl ToolSpec {
     /// Whether every number is in its range.
@@ -104,27 +102,11 @@ impl ToolSpec {
         if self.keyframes.is_empty() {
             return Err(ToolError::NoKeyframe);
         }
-        let number = |what, value: f64, good: bool, wanted| {
-            if good { Ok(()) } else { Err(ToolError::BadNumber { what, value, wanted }) }
-        };
-        let within = |value: f64, low: f64, high: f64| (low..=high).contains(&value);
-        number("the reach", self.reach_m, within(self.reach_m, 1e-9, 1e3), "between 1e-9 and 1000 m")?;
-        let k = self.stiffness_n_m;
-        number("the stiffness", k, within(k, f64::MIN_POSITIVE, 1e9), "above zero and at most 1e9 N/m")?;
-        let c = self.damping_n_s_m;
-        let f = self.max_force_n;
-        number("the maximum force", f, within(f, 1e-6, FORCE_MAX_N), "between 1e-6 and 1000 N")?;
-        number("the damping", c, within(c, 0.0, 1e9), "between 0 and 1e9 N·s/m")?;
-        let off_m = self.starts_off_m.length();
-        number(
-            "the initial offset from the first keyframe",
-            off_m,
-            within(off_m, 0.0, REACH_MAX_M),
-            "finite, within 1e6 m",
-        )?;
+        LIMITS.check([self.reach_m, self.stiffness_n_m, self.damping_n_s_m, self.max_force_n])?;
+        COORDINATE.check("the initial offset from the first keyframe", self.starts_off_m.length())?;
         let pivot = self.pivot();
         for value in self.pivot_m.map_or([0.0; 3], |pivot_m| pivot_m.to_array()) {
-            number("the pivot", value, within(value, -REACH_MAX_M, REACH_MAX_M), "finite, within 1e6 m")?;
+            COORDINATE.check("the pivot", value)?;
         }
         let mut before_s = f64::NEG_INFINITY;
         for (index, key) in self.keyframes.iter().enumerate() {
@@ -141,17 +123,11 @@ impl ToolSpec {
 
 impl Keyframe {
     fn check(&self, index: usize) -> Result<(), ToolError> {
-        let check = |what, value: f64, range: (f64, f64), wanted| {
-            let good = (range.0..=range.1).contains(&value);
-            if good { Ok(()) } else { Err(ToolError::BadKeyframe { index, what, value, wanted }) }
-        };
-        check("the time", self.at_s, (0.0, SCRIPT_MAX_S), "between 0 and 1e6 s")?;
-        check("the jaw", self.jaw, (0.0, 1.0), "between 0 and 1")?;
-        for value in self.tip_m.to_array() {
-            check("the tip", value, (-REACH_MAX_M, REACH_MAX_M), "finite, within 1e6 m")?;
-        }
-        let (what, wanted) = ("the rotation's length", "above zero and finite");
-        let bad = || ToolError::BadKeyframe { index, what, value: self.rotation.length(), wanted };
-        unit_rotation(self.rotation).map(drop).ok_or_else(bad)
+        let wrong = |fault| ToolError::BadKeyframe { index, fault };
+        TIME.check("the time", self.at_s).map_err(wrong)?;
+        JAW.check("the jaw", self.jaw).map_err(wrong)?;
+        self.tip_m.to_array().into_iter().try_for_each(|value| COORDINATE.check("the tip", value)).map_err(wrong)?;
+        let bad = || OutOfRange::new("the rotation's length", self.rotation.length(), "one above zero and finite");
+        unit_rotation(self.rotation).map(drop).ok_or_else(|| wrong(bad()))
     }
 }

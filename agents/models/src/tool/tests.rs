@@ -155,7 +155,7 @@ fn a_pivot_that_no_shaft_passes_through_is_refused() {
         assert!(matches!(error, ToolError::Unreachable { index: 0, .. }), "{error}");
     }
     for bad in [DVec3::NAN, DVec3::Y * f64::INFINITY] {
-        assert!(matches!(refuse(bad), ToolError::BadNumber { .. }));
+        assert!(matches!(refuse(bad), ToolError::BadNumber(_)));
     }
 }
 
@@ -312,10 +312,10 @@ fn invalid_scripts_are_refused() {
     }
     for value in [0.0, -1.0, f64::NAN, f64::INFINITY] {
         let good = spec(vec![key(0.0, DVec3::Y, 1.0)]);
-        assert!(matches!(refuse(ToolSpec { reach_m: value, ..good.clone() }), ToolError::BadNumber { .. }));
-        assert!(matches!(refuse(ToolSpec { stiffness_n_m: value, ..good.clone() }), ToolError::BadNumber { .. }));
-        assert!(matches!(refuse(ToolSpec { max_force_n: value, ..good.clone() }), ToolError::BadNumber { .. }));
-        assert!(matches!(refuse(ToolSpec { max_force_n: 1001.0, ..good.clone() }), ToolError::BadNumber { .. }));
+        assert!(matches!(refuse(ToolSpec { reach_m: value, ..good.clone() }), ToolError::BadNumber(_)));
+        assert!(matches!(refuse(ToolSpec { stiffness_n_m: value, ..good.clone() }), ToolError::BadNumber(_)));
+        assert!(matches!(refuse(ToolSpec { max_force_n: value, ..good.clone() }), ToolError::BadNumber(_)));
+        assert!(matches!(refuse(ToolSpec { max_force_n: 1001.0, ..good.clone() }), ToolError::BadNumber(_)));
         let damped = Tool::new(ToolSpec { damping_n_s_m: value, ..good });
         assert_eq!(damped.is_ok(), value == 0.0, "damping {value}");
     }

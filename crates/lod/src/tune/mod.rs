@@ -34,6 +34,6 @@ pub use loops::robust_fit::Line;
 const _: () = {
     use crate::log_law;
     use metachron_core::gains;
-    assert!(log_law::KAPPA.0 == gains::KAPPA.0 && log_law::KAPPA.1 == gains::KAPPA.1);
-    assert!(log_law::LEAD.0 == gains::LEAD.0 && log_law::LEAD.1 == gains::LEAD.1);
+    assert!(log_law::KAPPA.0 == gains::KAPPA.least && log_law::KAPPA.1 == gains::KAPPA.greatest);
+    assert!(log_law::LEAD.0 == gains::LEAD.least && log_law::LEAD.1 == gains::LEAD.greatest);
 };

@@ -5,8 +5,8 @@
 use super::POSITION_MAX_M;
 use super::common::parse_colour;
 use super::objects::{OBSTACLES_MAX, Objects, too_many};
-use crate::check::{Allowed, Checker, Place, allowed};
-use crate::format::{CellFile, Point, PortalFile, SideKind};
+use crate::check::{Checker, Place};
+use crate::format::{CELL, CellFile, Point, PortalFile, SideKind};
 use glam::{DQuat, DVec3};
 use metachron_geometry::{Cell, Cells, CellsError, ContactTraits, Obstacle, Portal, Region, Side, Solid};
 use metachron_world::Appearance;
@@ -24,8 +24,6 @@ const OUTSIDE: &str = "outside";
 const WALL_COLOUR: [u8; 3] = [0xd8, 0xd2, 0xc4];
 /// Friction and restitution of walls.
 const WALL_SURFACE: (f64, f64) = (0.5, 0.0);
-
-const THICKNESS: Allowed = allowed(1e-3..=100.0, "m");
 
 /// Reads cells and portals, and adds the walls of the cells to the fixed objects.
 pub(crate) fn cells(
@@ -81,7 +79,7 @@ fn cell(c: &mut Checker<'_, '_>, at: usize, file: &CellFile, earlier: &[CellFile
     }
     let low_m = c.point(&place, "from_m", file.from_m, POSITION_MAX_M);
     let high_m = c.point(&place, "to_m", file.to_m, POSITION_MAX_M);
-    let thickness = c.optional(&place, "walls_m", file.walls_m, &THICKNESS);
+    let thickness = c.optional(&place, "walls_m", file.walls_m, CELL);
     let least = (high_m - low_m).min_element();
     if let Some(thickness) = thickness.filter(|thickness| least > 0.0 && 2.0 * thickness >= least) {
         let expected = format!("expected less than {}, half the least side of the cell", 0.5 * least);

@@ -1,7 +1,7 @@
 //! Keys that objects of every model share: time, primitive levels, appearance, points and rotations.
 
-use crate::check::{Allowed, Checker, Place, allowed};
-use crate::format::{CommonFile, FaultsFile, HoldKind, OneOrRange, Point};
+use crate::check::{Checker, Place};
+use crate::format::{COMMON, CommonFile, FAULTS, FaultsFile, HoldKind, OneOrRange, Point};
 use glam::{DQuat, DVec3, EulerRot};
 use metachron_core::{N_MAX, ResolutionRange, SimSpan};
 use metachron_world::couplings::Faults;
@@ -14,13 +14,6 @@ const RATE_DEFAULT_HZ: f64 = 240.0;
 const N_DEFAULT: (u8, u8) = (1, 5);
 /// A rate agrees with a step when their product is 1 within this: a rate may be written with 5 digits.
 const RATE_AGREES: f64 = 1e-4;
-
-const RATE: Allowed = allowed(1.0..=100_000.0, "Hz");
-const DT: Allowed = allowed(0.01..=1000.0, "ms");
-const IMPORTANCE: Allowed = allowed(0.001..=1000.0, "");
-const TOLERANCE: Allowed = allowed(1e-9..=1e3, "m");
-const JITTER: Allowed = allowed(0.0..=0.5, "");
-const LOSS: Allowed = allowed(0.0..=0.9, "");
 
 /// Rotation by angles about the world's x, then y, then z axis, in degrees.
 pub(super) fn rotation(degrees: DVec3) -> DQuat {
@@ -40,12 +33,12 @@ pub(super) fn point_or_zero(
 
 /// Rate and step: either gives the other; both together must agree.
 pub(super) fn pace(c: &mut Checker<'_, '_>, place: &Place, file: &CommonFile) -> PaceWish {
-    let rate = file.rate_hz.map(|rate| c.number(place, "rate_hz", rate, &RATE));
+    let rate = file.rate_hz.map(|rate| c.number(place, "rate_hz", rate, COMMON));
     let Some(dt) = file.dt_ms else {
         let rate_hz = rate.unwrap_or(RATE_DEFAULT_HZ);
         return wish(rate_hz, 1000.0 / rate_hz, None);
     };
-    let (least, greatest) = c.ends(place, "dt_ms", dt, &DT);
+    let (least, greatest) = c.ends(place, "dt_ms", dt, COMMON);
     let rate_hz = rate.unwrap_or(1000.0 / least);
     let wanted_ms = 1000.0 / rate_hz;
     if least * (1.0 - RATE_AGREES) > wanted_ms || wanted_ms > greatest * (1.0 + RATE_AGREES) {
@@ -84,7 +77,7 @@ pub(super) fn tolerance(
         }
         return None;
     };
-    let tolerance_m = c.number(place, "tolerance_m", tolerance_m, &TOLERANCE);
+    let tolerance_m = c.number(place, "tolerance_m", tolerance_m, COMMON);
     let Some(range) = range else {
         refuse_tolerance(c, place, file);
         return None;
@@ -137,8 +130,8 @@ pub(super) fn faults(
     let (own, world) = (own.unwrap_or(&none), world.unwrap_or(&none));
     let world_jitter = world.jitter.unwrap_or(0.0);
     Faults {
-        jitter: c.optional(&own_place, "jitter", own.jitter, &JITTER).unwrap_or(world_jitter),
-        loss: c.optional(&own_place, "loss", own.loss, &LOSS).unwrap_or(world.loss.unwrap_or(0.0)),
+        jitter: c.optional(&own_place, "jitter", own.jitter, FAULTS).unwrap_or(world_jitter),
+        loss: c.optional(&own_place, "loss", own.loss, FAULTS).unwrap_or(world.loss.unwrap_or(0.0)),
         seed: u64::from(own.seed.or(world.seed).unwrap_or(0)),
     }
 }
@@ -146,8 +139,8 @@ pub(super) fn faults(
 /// Checks the values of `[world.faults]`.
 pub(crate) fn world_faults(c: &mut Checker<'_, '_>, file: &FaultsFile) {
     let place = Place::new("world.faults", "of `[world.faults]`");
-    c.optional(&place, "jitter", file.jitter, &JITTER);
-    c.optional(&place, "loss", file.loss, &LOSS);
+    c.optional(&place, "jitter", file.jitter, FAULTS);
+    c.optional(&place, "loss", file.loss, FAULTS);
 }
 
 /// The levels of the drawn primitive.
@@ -195,7 +188,7 @@ pub(super) fn painted_appearance(
             colour_of(material)
         }),
     };
-    let importance = c.optional(place, "importance", file.importance, &IMPORTANCE).unwrap_or(1.0);
+    let importance = c.optional(place, "importance", file.importance, COMMON).unwrap_or(1.0);
     let shading = file.shading.unwrap_or_default();
     Appearance { colour, material, importance, may_vanish: file.may_vanish, shading }
 }

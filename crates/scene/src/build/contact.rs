@@ -2,8 +2,8 @@
 //!
 //! In: [`ContactFile`]s, the names of all groups of the scene. Out: [`ContactTraits`]; problems to the [`Checker`]. Never here: forces.
 
-use crate::check::{Checker, Place, allowed};
-use crate::format::{CombineRuleName, ContactFile};
+use crate::check::{Checker, Place};
+use crate::format::{CONTACT, CombineRuleName, ContactFile};
 use metachron_geometry::{CollisionGroups, CombineRule, ContactTraits};
 use std::collections::BTreeSet;
 
@@ -67,13 +67,12 @@ impl GroupNames {
             member_of: self.bits(c, &place, "groups", file.groups.as_ref()),
             collides_with: self.bits(c, &place, "collides_with", file.collides_with.as_ref()),
         };
-        let radius = allowed(0.0..=10.0, "m");
         ContactTraits {
             groups,
             is_sensor: file.sensor.unwrap_or(false),
             friction_rule: file.friction_rule.map(rule),
             restitution_rule: file.restitution_rule.map(rule),
-            spin_radius_m: c.optional(&place, "spin_radius_m", file.spin_radius_m, &radius).unwrap_or(0.0),
+            spin_radius_m: c.optional(&place, "spin_radius_m", file.spin_radius_m, CONTACT).unwrap_or(0.0),
         }
     }
 }

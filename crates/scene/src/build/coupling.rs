@@ -3,12 +3,13 @@
 //! In: [`CouplingFile`]s and the objects of the scene. Out: [`Coupling`]s, problems to the [`Checker`].
 //! Never here: forces.
 
+use super::POSITION_MAX_M;
 use super::force_limits::{ForceLimits, ForceLimitsFile};
 use super::objects::{NamedObject, Objects};
 use super::soft;
-use super::{DAMPING, POSITION_MAX_M, STIFFNESS};
-use crate::check::{Allowed, Checker, Place, allowed};
-use crate::format::{CouplingFile, CouplingKind as Kind, CouplingLaw, Spot};
+use crate::check::{Checker, Place};
+use crate::format::ranges::SHARE;
+use crate::format::{COUPLING, CouplingFile, CouplingKind as Kind, CouplingLaw, Spot};
 use glam::DVec3;
 use metachron_contact::Law;
 use metachron_core::{AgentId, Anchor};
@@ -20,8 +21,6 @@ use std::collections::BTreeMap;
 
 /// Most couplings of a scene.
 const COUPLINGS_MAX: usize = 10_000;
-
-const REST: Allowed = allowed(0.0..=1e4, "m");
 
 /// The couplings of the scene.
 pub(crate) fn couplings(c: &mut Checker<'_, '_>, files: &[CouplingFile], objects: &Objects) -> Vec<Coupling> {
@@ -181,8 +180,8 @@ fn law(c: &mut Checker<'_, '_>, place: &Place, file: &CouplingFile) -> Option<La
 }
 
 fn spring(c: &mut Checker<'_, '_>, place: &Place, file: &CouplingFile) -> Option<(f64, f64)> {
-    let stiffness = c.number(place, "stiffness_n_m", file.stiffness_n_m?, &STIFFNESS);
-    Some((stiffness, c.optional(place, "damping_n_s_m", file.damping_n_s_m, &DAMPING).unwrap_or(0.0)))
+    let stiffness = c.number(place, "stiffness_n_m", file.stiffness_n_m?, COUPLING);
+    Some((stiffness, c.optional(place, "damping_n_s_m", file.damping_n_s_m, COUPLING).unwrap_or(0.0)))
 }
 
 fn attach(
@@ -195,7 +194,7 @@ fn attach(
     let at_a = Attachment { key: "at_a", object: a, spot: file.at_a? }.anchor(c, place, objects);
     let at_b = Attachment { key: "at_b", object: b, spot: file.at_b? }.anchor(c, place, objects);
     let (stiffness_n_m, damping_n_s_m) = spring(c, place, file)?;
-    let rest_m = c.optional(place, "rest_m", file.rest_m, &REST).unwrap_or(0.0);
+    let rest_m = c.optional(place, "rest_m", file.rest_m, COUPLING).unwrap_or(0.0);
     let limits =
         ForceLimits::read(c, place, ForceLimitsFile { tears: file.tears_above_n, yields: file.yields_above_n });
     let ForceLimits { tears_above_n, yields_above_n } = limits;
@@ -218,9 +217,7 @@ impl Attachment {
         if let Some(Spec::Soft(spec)) = spec_of(objects, id) {
             let is_rope = matches!(spec.shape, SoftShape::Rope { .. });
             return match spot {
-                Spot::Share(share) if is_rope => {
-                    soft::along(spec, c.number(place, key, share, &allowed(0.0..=1.0, "")))
-                }
+                Spot::Share(share) if is_rope => soft::along(spec, c.number(place, key, share, SHARE)),
                 Spot::Point(at) if !is_rope => soft::nearest(spec, c.point(place, key, at, POSITION_MAX_M)),
                 Spot::Share(_) => {
                     let expected = "expected a point [x, y, z] in the object's axes, metres from its middle";
@@ -245,7 +242,7 @@ impl Attachment {
         }
         match (spot, matches!(object, NamedObject::Tube(_))) {
             (Spot::Share(share), true) => {
-                let share = c.number(place, key, share, &allowed(0.0..=1.0, ""));
+                let share = c.number(place, key, share, SHARE);
                 Some(Anchor::Arc(share * tube_length_m(objects, id)?))
             }
             (Spot::Point(at), false) => {

@@ -3,8 +3,8 @@
 //! In: the forces that a joint or coupling of a scene file gives. Out: the two, in order; problems to the [`Checker`].
 //! Never here: their effect.
 
-use super::TEARING;
 use crate::check::{Checker, Place};
+use crate::format::ranges::TEARING;
 
 /// The forces as a file gives them.
 #[derive(Debug, Clone, Copy)]
@@ -23,7 +23,7 @@ pub(super) struct ForceLimits {
 impl ForceLimits {
     /// Reads both: an attachment yields below the force at which it tears.
     pub(super) fn read(c: &mut Checker<'_, '_>, place: &Place, file: ForceLimitsFile) -> Self {
-        let mut read = |key: &str, given| c.optional(place, key, given, &TEARING).unwrap_or(f64::INFINITY);
+        let mut read = |key: &str, given| c.optional(place, key, given, TEARING).unwrap_or(f64::INFINITY);
         let tears_above_n = read("tears_above_n", file.tears);
         let yields_above_n = read("yields_above_n", file.yields);
         if yields_above_n >= tears_above_n && yields_above_n < f64::INFINITY {

@@ -4,8 +4,8 @@
 
 use super::POSITION_MAX_M;
 use super::common::rotation;
-use crate::check::{Allowed, Checker, Place, allowed};
-use crate::format::{CommonFile, OneOrEach};
+use crate::check::{Checker, Place};
+use crate::format::{COMMON, CommonFile, OneOrEach};
 use glam::{DQuat, DVec3};
 use metachron_core::AgentId;
 use metachron_world::{Member, Spec};
@@ -14,9 +14,6 @@ use metachron_world::{Member, Spec};
 const SIDE_MAX: u32 = 1000;
 /// Greatest spacing of neighbours in a grid, and greatest random displacement, metres.
 const SPACING_MAX_M: f64 = 1e4;
-
-/// Greatest random turn about an axis to either side, degrees: any turn there is.
-const TURN_MAX_DEG: f64 = 180.0;
 
 /// The copies of one object.
 #[derive(Debug, Clone)]
@@ -174,14 +171,14 @@ fn scatter(c: &mut Checker<'_, '_>, place: &Place, common: &CommonFile, repeats:
     if common.scatter_deg.is_some() && repeats != Repeats::MovedAndTurned {
         c.wrong(place, "scatter_deg", "turns rigid bodies alone", "expected no `scatter_deg` for this model");
     }
-    let reach_m = each(c, place, "scatter_m", common.scatter_m, &allowed(0.0..=SPACING_MAX_M, "m"));
-    let reach_deg = each(c, place, "scatter_deg", common.scatter_deg, &allowed(0.0..=TURN_MAX_DEG, "degrees"));
+    let reach_m = each(c, place, "scatter_m", common.scatter_m);
+    let reach_deg = each(c, place, "scatter_deg", common.scatter_deg);
     Scatter { reach_m, reach_deg, seed: u64::from(common.scatter_seed.unwrap_or(0)) }
 }
 
 /// One number for all axes, or one each; zero where none is given.
-fn each(c: &mut Checker<'_, '_>, place: &Place, key: &str, given: Option<OneOrEach>, range: &Allowed) -> DVec3 {
-    let mut number = |value: f64| c.number(place, key, value, range);
+fn each(c: &mut Checker<'_, '_>, place: &Place, key: &str, given: Option<OneOrEach>) -> DVec3 {
+    let mut number = |value: f64| c.number(place, key, value, COMMON);
     match given {
         None => DVec3::ZERO,
         Some(OneOrEach::One(value)) => DVec3::splat(number(value)),

@@ -4,10 +4,11 @@
 //! Never here: membership of groups, choice of the level drawn. Theory: `docs/theory/multiresolution.md`, section 2.
 
 use super::scenery::mesh_model;
-use crate::check::{Checker, Place, allowed};
+use crate::check::{Checker, Place};
 use crate::format::GroupFile;
 use crate::source::Source;
 use glam::{DQuat, DVec3};
+use metachron_core::NumberRange;
 use metachron_drawable::{Model, Placement, ProgressiveMesh, proxy};
 use metachron_world::{Appearance, GROUP_LEVELS_MAX, Member, Scenery};
 use std::sync::Arc;
@@ -90,7 +91,7 @@ fn check(c: &mut Checker<'_, '_>, place: &Place, levels: &[u32]) {
     }
     for (at, count) in levels.iter().enumerate() {
         let key = format!("levels.{at}");
-        c.number(place, &key, f64::from(*count), &allowed(1.0..=1e5, ""));
+        c.number(place, &key, f64::from(*count), NumberRange::new(1.0, 1e5, ""));
         if let Some(before) = at.checked_sub(1).map(|at| levels[at]).filter(|before| before >= count) {
             let expected = "expected rising numbers, the coarsest level first";
             c.wrong(place, &key, format_args!("goes from {before} to {count}"), expected);

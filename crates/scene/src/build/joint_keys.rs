@@ -1,9 +1,9 @@
 //! Reads the keys of a joint: which belong to its kind, and the motion that they leave free.
 
 use super::motor::{HINGE, SLIDE};
-use super::{DAMPING, STIFFNESS};
-use crate::check::{Checker, Place, allowed};
-use crate::format::{JointFile, JointKind as Kind};
+
+use crate::check::{Checker, Place};
+use crate::format::{JOINT, JointFile, JointKind as Kind};
 use glam::DVec3;
 use metachron_models::rigid::Motor;
 
@@ -64,18 +64,12 @@ pub(super) fn free_motion(c: &mut Checker<'_, '_>, place: &Place, file: &JointFi
             let motor = SLIDE.read(c, place, file.motor.as_ref(), range_m);
             FreeMotion::Prismatic { axis: axis(c, place, file)?, range_m, motor }
         }
-        Kind::Spring => {
-            let length = allowed(0.0..=LENGTH_MAX_M, "m");
-            FreeMotion::Spring {
-                stiffness_n_m: c.number(place, "stiffness_n_m", file.stiffness_n_m?, &STIFFNESS),
-                damping_n_s_m: c.optional(place, "damping_n_s_m", file.damping_n_s_m, &DAMPING).unwrap_or(0.0),
-                rest_m: file.rest_m.map(|rest| c.number(place, "rest_m", rest, &length)),
-            }
-        }
-        Kind::Rope => {
-            let length = allowed(1e-6..=LENGTH_MAX_M, "m");
-            FreeMotion::Rope { length_m: file.length_m.map(|m| c.number(place, "length_m", m, &length)) }
-        }
+        Kind::Spring => FreeMotion::Spring {
+            stiffness_n_m: c.number(place, "stiffness_n_m", file.stiffness_n_m?, JOINT),
+            damping_n_s_m: c.optional(place, "damping_n_s_m", file.damping_n_s_m, JOINT).unwrap_or(0.0),
+            rest_m: file.rest_m.map(|rest| c.number(place, "rest_m", rest, JOINT)),
+        },
+        Kind::Rope => FreeMotion::Rope { length_m: file.length_m.map(|m| c.number(place, "length_m", m, JOINT)) },
     })
 }
 

@@ -45,6 +45,6 @@ pub(super) use mesh::triangles;
 pub(super) use object::read_objects;
 pub(super) use objects::{AGENTS_MAX, Names, Objects, SceneContext};
 pub(super) use ranges::POSITION_MAX_M;
-use ranges::{DAMPING, FRICTION, KEYFRAMES_MAX, LENGTH, ROTATION_MAX_DEG, SCALE, SPEED_MAX, STIFFNESS, TEARING, TIME};
+use ranges::{KEYFRAMES_MAX, ROTATION_MAX_DEG, SPEED_MAX};
 pub(super) use sensor::{joint_names, sensors};
 pub(super) use stage::{cameras, machine, probes, target};

@@ -2,9 +2,8 @@
 //!
 //! In: [`MotorFile`]s. Out: [`Motor`]s, in radians; problems to the [`Checker`]. Never here: the joint's other keys.
 
-use super::{DAMPING, SPEED_MAX, STIFFNESS};
-use crate::check::{Allowed, Checker, Place, allowed};
-use crate::format::MotorFile;
+use crate::check::{Checker, Place};
+use crate::format::{MOTOR, MotorFile};
 use metachron_models::rigid::{Motor, MotorGoal};
 
 /// The motors of hinges and slides: their keys, and how far either goes.
@@ -16,8 +15,7 @@ pub(super) struct MotorKeys {
     effort: &'static str,
     stiffness: &'static str,
     damping: &'static str,
-    /// The largest position either way, as the file writes it, and its unit in the units of the joint.
-    position_max: f64,
+    /// The unit of a position in the file, in the units of the joint.
     position_unit: f64,
 }
 
@@ -29,7 +27,6 @@ pub(super) const HINGE: MotorKeys = MotorKeys {
     effort: "max_torque_n_m",
     stiffness: "stiffness_n_m_rad",
     damping: "damping_n_m_s_rad",
-    position_max: 180.0,
     position_unit: std::f64::consts::PI / 180.0,
 };
 
@@ -41,12 +38,8 @@ pub(super) const SLIDE: MotorKeys = MotorKeys {
     effort: "max_force_n",
     stiffness: "stiffness_n_m",
     damping: "damping_n_s_m",
-    position_max: 1e4,
     position_unit: 1.0,
 };
-
-/// Most torque or force of a motor.
-const EFFORT: Allowed = allowed(1e-9..=1e9, "N·m or N");
 
 impl MotorKeys {
     /// The motor of a joint whose range is `range`, in the units of the joint.
@@ -64,12 +57,10 @@ impl MotorKeys {
         if c.count() > before {
             return None;
         }
-        let position = allowed(-self.position_max..=self.position_max, "");
-        let speed = allowed(-SPEED_MAX..=SPEED_MAX, "");
-        let mut read = |key: &str, allowed: &Allowed| c.optional(place, key, file.get(key), allowed);
-        let (position, velocity) = (read(self.position, &position), read(self.velocity, &speed));
-        let (stiffness, damping) = (read(self.stiffness, &STIFFNESS), read(self.damping, &DAMPING));
-        let max_effort = read(self.effort, &EFFORT).unwrap_or(f64::INFINITY);
+        let mut read = |key: &str| c.optional(place, key, file.get(key), MOTOR);
+        let (position, velocity) = (read(self.position), read(self.velocity));
+        let (stiffness, damping) = (read(self.stiffness), read(self.damping));
+        let max_effort = read(self.effort).unwrap_or(f64::INFINITY);
         let position = position.map(|at| at * self.position_unit);
         if let (Some(at), Some([least, greatest])) = (position, range)
             && !(least..=greatest).contains(&at)

@@ -6,32 +6,24 @@ use super::mesh;
 use super::mesh::Mesh;
 use super::objects::ModelContext;
 use super::scenery::{SurfaceSource, generator, surface_source};
-use super::{FRICTION, KEYFRAMES_MAX, LENGTH, POSITION_MAX_M, ROTATION_MAX_DEG, SCALE, SPEED_MAX, TIME};
-use crate::check::{Allowed, Checker, Place, allowed};
+use super::{KEYFRAMES_MAX, POSITION_MAX_M, ROTATION_MAX_DEG, SPEED_MAX};
+use crate::check::{Checker, Place};
 use crate::demand::Cost;
-use crate::format::{Axis, GeneratorKind, PartFile, Point, RigidFile, Shape};
+use crate::format::{Axis, GeneratorKind, PartFile, Point, RIGID, RigidFile, Shape, TIMES};
 use crate::source::Source;
 use glam::{DQuat, DVec3};
 use metachron_drawable::generate_surface;
 use metachron_geometry::{Aabb, COMPOUND_PARTS_MAX, CompoundPart, ContactTraits, Obstacle, Solid, hull_corners};
 use metachron_models::rigid::{Keyframe, Led, Restraint, RigidSpec};
+use metachron_models::rigid::{LIMITS, MASS};
 use std::sync::Arc;
 
 /// Density where a scene gives neither mass nor density: water's, kg/m³.
 const DENSITY_DEFAULT_KG_M3: f64 = 1000.0;
 
-/// Triangles of generated surfaces.
-const TRIANGLES: Allowed = allowed(4.0..=1e5, "");
-
-/// How far points may lie above a face of their hull.
-const HULL_WITHIN: Allowed = allowed(0.0..=0.1, "m");
 /// The same where the scene does not say, metres, and at most this share of the diagonal of the box around them.
 const HULL_WITHIN_M: f64 = 1e-4;
 const HULL_SHARE: f64 = 1e-3;
-
-const DENSITY: Allowed = allowed(1e-3..=1e6, "kg/m³");
-
-const MASS: Allowed = allowed(1e-9..=1e9, "kg");
 
 /// Whether the object never moves; reports a plane with `fixed = false`.
 pub(super) fn is_fixed(c: &mut Checker<'_, '_>, place: &Place, file: &RigidFile) -> bool {
@@ -81,7 +73,7 @@ pub(super) fn obstacle(c: &mut Checker<'_, '_>, place: &Place, file: &RigidFile,
 pub(super) fn build(c: &mut Checker<'_, '_>, file: &RigidFile, context: &ModelContext<'_>) -> Option<RigidSpec> {
     let place = context.place;
     let before = c.count();
-    let density = c.optional(place, "density_kg_m3", file.density_kg_m3, &DENSITY).unwrap_or(DENSITY_DEFAULT_KG_M3);
+    let density = c.optional(place, "density_kg_m3", file.density_kg_m3, RIGID).unwrap_or(DENSITY_DEFAULT_KG_M3);
     let solid = solid(c, place, file, PartContext { source: context.source, density_kg_m3: density, is_fixed: false })?;
     // a wrong shape or density gives a wrong mass: one problem is reported, not two
     let mass_kg = if c.count() == before { mass(c, place, file, &solid, density) } else { 1.0 };
@@ -91,7 +83,7 @@ pub(super) fn build(c: &mut Checker<'_, '_>, file: &RigidFile, context: &ModelCo
     let start = led.as_ref().and_then(|led| led.keyframes.first());
     let (position, rotation) = start.map_or((position, rotation), |key| (key.tip_m, key.rotation));
     let (restitution, friction) = surface(c, place, file);
-    let scale = c.optional(place, "gravity_scale", file.gravity_scale, &allowed(-1000.0..=1000.0, "")).unwrap_or(1.0);
+    let scale = c.optional(place, "gravity_scale", file.gravity_scale, RIGID).unwrap_or(1.0);
     Some(RigidSpec {
         restraint: restraint(c, place, file),
         led,
@@ -112,8 +104,7 @@ pub(super) fn build(c: &mut Checker<'_, '_>, file: &RigidFile, context: &ModelCo
 
 /// The damping of an object, and the axes along which it cannot move.
 fn restraint(c: &mut Checker<'_, '_>, place: &Place, file: &RigidFile) -> Restraint {
-    let rate = allowed(0.0..=1e6, "1/s");
-    let mut damping = |key: &str, given: Option<f64>| c.optional(place, key, given, &rate).unwrap_or(0.0);
+    let mut damping = |key: &str, given: Option<f64>| c.optional(place, key, given, LIMITS).unwrap_or(0.0);
     let locked = |axes: Option<&Vec<Axis>>| {
         [Axis::X, Axis::Y, Axis::Z].map(|axis| axes.is_some_and(|locked| locked.contains(&axis)))
     };
@@ -171,7 +162,7 @@ fn keyframes(c: &mut Checker<'_, '_>, place: &Place, file: &RigidFile, rotation:
     let mut keys: Vec<Keyframe> = Vec::with_capacity(files.len());
     for (i, file) in files.iter().enumerate() {
         let (place, before) = (place.entry("keyframe", i), keys.last().copied());
-        let at_s = c.optional(&place, "at_s", file.at_s, &TIME).unwrap_or(0.0);
+        let at_s = c.optional(&place, "at_s", file.at_s, TIMES).unwrap_or(0.0);
         if let Some(before) = before.filter(|before| at_s <= before.at_s) {
             let what = file.at_s.map_or("is missing".to_owned(), |at_s| format!("is {at_s}"));
             c.wrong(&place, "at_s", what, format!("expected a time after the keyframe before, {} s", before.at_s));
@@ -190,8 +181,8 @@ fn pose(c: &mut Checker<'_, '_>, place: &Place, file: &RigidFile) -> (DVec3, DQu
 }
 
 fn surface(c: &mut Checker<'_, '_>, place: &Place, file: &RigidFile) -> (f64, f64) {
-    let restitution = c.optional(place, "restitution", file.restitution, &allowed(0.0..=1.0, "")).unwrap_or(0.0);
-    (restitution, c.optional(place, "friction", file.friction, &FRICTION).unwrap_or(0.5))
+    let restitution = c.optional(place, "restitution", file.restitution, LIMITS).unwrap_or(0.0);
+    (restitution, c.optional(place, "friction", file.friction, RIGID).unwrap_or(0.5))
 }
 
 /// The keys of a shape, of an object or of a part of one.
@@ -278,7 +269,7 @@ impl ShapeKeys<'_> {
 
     /// The solid; of a compound nothing, as that has others.
     fn solid(&self, c: &mut Checker<'_, '_>, place: &Place, among: PartContext<'_>) -> Option<Solid> {
-        let mut length = |key: &str, value: Option<f64>| c.number(place, key, value.unwrap_or_default(), &LENGTH);
+        let mut length = |key: &str, value: Option<f64>| c.number(place, key, value.unwrap_or_default(), RIGID);
         Some(match self.shape {
             Shape::Ball => Solid::Ball { radius_m: length("radius_m", self.radius_m) },
             Shape::Capsule => Solid::Capsule {
@@ -297,7 +288,7 @@ impl ShapeKeys<'_> {
             Shape::Plane => Solid::Plane,
             Shape::Hull => {
                 let points_m = self.points(c, place, among)?;
-                let given_m = c.optional(place, "hull_within_m", self.hull_within_m, &HULL_WITHIN);
+                let given_m = c.optional(place, "hull_within_m", self.hull_within_m, RIGID);
                 let Aabb { low, high } = Aabb::of(&points_m);
                 let tolerance_m = given_m.unwrap_or(HULL_WITHIN_M.min(HULL_SHARE * low.distance(high)));
                 let points_m = if tolerance_m > 0.0 { hull_corners(&points_m, tolerance_m).into() } else { points_m };
@@ -329,7 +320,7 @@ impl ShapeKeys<'_> {
         let Some(name) = self.file.filter(|_| self.generate.is_none()) else {
             return Some(self.surface(c, place, among)?.0);
         };
-        let scale = c.optional(place, "scale", self.scale, &SCALE).unwrap_or(1.0);
+        let scale = c.optional(place, "scale", self.scale, RIGID).unwrap_or(1.0);
         if !c.may_read(place, "file", among.source.head(name), |head| Cost::solid_of_file(head, among.is_fixed)) {
             return None;
         }
@@ -339,8 +330,8 @@ impl ShapeKeys<'_> {
     }
 
     fn surface(&self, c: &mut Checker<'_, '_>, place: &Place, among: PartContext<'_>) -> Option<Surface> {
-        let scale = c.optional(place, "scale", self.scale, &SCALE).unwrap_or(1.0);
-        let wanted = c.optional(place, "triangles", self.triangles.map(f64::from), &TRIANGLES).unwrap_or(4000.0);
+        let scale = c.optional(place, "scale", self.scale, RIGID).unwrap_or(1.0);
+        let wanted = c.optional(place, "triangles", self.triangles.map(f64::from), RIGID).unwrap_or(4000.0);
         let name = match surface_source(c, place, self.file, self.generate)? {
             SurfaceSource::File(name) => name,
             SurfaceSource::Generated(kind) => {
@@ -410,7 +401,7 @@ fn part(c: &mut Checker<'_, '_>, place: &Place, file: &PartFile, among: PartCont
     let solid = keys.solid(c, place, among)?;
     let position_m = point_or_zero(c, place, "position_m", file.position_m, POSITION_MAX_M);
     let rotation = rotation(point_or_zero(c, place, "rotation_deg", file.rotation_deg, ROTATION_MAX_DEG));
-    let density = c.optional(place, "density_kg_m3", file.density_kg_m3, &DENSITY).unwrap_or(default) / default;
+    let density = c.optional(place, "density_kg_m3", file.density_kg_m3, RIGID).unwrap_or(default) / default;
     Some(CompoundPart { density, ..CompoundPart::new(solid, position_m, rotation) })
 }
 
@@ -424,7 +415,7 @@ fn mass(c: &mut Checker<'_, '_>, place: &Place, file: &RigidFile, solid: &Solid,
             let expected = "expected `mass_kg` or `density_kg_m3`, not both";
             c.wrong(place, "density_kg_m3", "contradicts `mass_kg`", expected);
         }
-        return c.number(place, "mass_kg", mass, &MASS);
+        return c.number(place, "mass_kg", mass, LIMITS);
     }
     let volume = weighted_m3(solid);
     if is_flat(solid, volume) {

@@ -8,10 +8,10 @@ use super::contact;
 use super::objects::{Entry, ModelFile};
 use super::texture;
 use super::texture::Textures;
-use super::{POSITION_MAX_M, ROTATION_MAX_DEG, SCALE, SPEED_MAX, mesh};
-use crate::check::{Checker, Place, allowed};
+use super::{POSITION_MAX_M, ROTATION_MAX_DEG, SPEED_MAX, mesh};
+use crate::check::{Checker, Place};
 use crate::demand::Cost;
-use crate::format::{GeneratorKind, MeshFile, MotionFile, Point, TreeFile, TreeLod};
+use crate::format::{GeneratorKind, MESH, MOTION, MeshFile, MotionFile, Point, TREE, TreeFile, TreeLod};
 use crate::source::Source;
 use glam::{DQuat, DVec3};
 use metachron_drawable::{
@@ -27,8 +27,6 @@ use std::sync::Arc;
 const TRIANGLES_DEFAULT: u32 = 1000;
 /// Default boughs and leaves of a tree: the first of (RH05, §6).
 const TREE_DEFAULT: (u32, u32) = (62, 240);
-/// Most boughs, most leaves.
-const PIECES_MAX: f64 = 1e5;
 /// Leaves are less important than the trunk (RH05, §6 gives no number).
 const LEAVES_IMPORTANCE: f64 = 0.5;
 /// Default swings of a motion, Hz.
@@ -110,10 +108,9 @@ fn mesh_of(
     meshes: &mut Meshes<'_>,
 ) -> Option<(Arc<ProgressiveMesh>, Placement)> {
     let count = |n: u32| f64::from(n);
-    let triangles = file.triangles.map(|n| c.number(place, "triangles", count(n), &allowed(4.0..=1e6, "")) as u32);
-    let least =
-        file.least_triangles.map(|n| c.number(place, "least_triangles", count(n), &allowed(1.0..=1e6, "")) as u32);
-    let scale = c.optional(place, "scale", file.scale, &SCALE).unwrap_or(1.0);
+    let triangles = file.triangles.map(|n| c.number(place, "triangles", count(n), MESH) as u32);
+    let least = file.least_triangles.map(|n| c.number(place, "least_triangles", count(n), MESH) as u32);
+    let scale = c.optional(place, "scale", file.scale, MESH).unwrap_or(1.0);
     let at = Placement { scale, ..placement(c, place, file.position_m, file.rotation_deg) };
     if file.seed.is_some() && file.generate.is_none() {
         c.wrong(place, "seed", "has no effect alone", "expected `generate` beside it");
@@ -249,7 +246,7 @@ fn mesh_parts(c: &mut Checker<'_, '_>, entry: &Entry, file: &MeshFile, meshes: &
     if file.dome_m.is_some() && file.scale.is_some() {
         c.wrong(&entry.place, "scale", "contradicts `dome_m`", "expected one of them");
     }
-    let dome = file.dome_m.map(|radius| c.number(&entry.place, "dome_m", radius, &allowed(1e-3..=1e4, "m")));
+    let dome = file.dome_m.map(|radius| c.number(&entry.place, "dome_m", radius, MESH));
     let motion = file.motion.as_ref().map(|file| motion(c, &entry.place.table("motion"), file));
     let Some((mesh, at)) = mesh_of(c, &entry.place, file, meshes) else { return Parts::new() };
     let motion = motion.map(|motion| Motion { about_m: at.position, ..motion });
@@ -275,7 +272,7 @@ fn motion(c: &mut Checker<'_, '_>, place: &Place, file: &MotionFile) -> Motion {
         about_m: DVec3::ZERO,
         spin_rad_s: point_or_zero(c, place, "spin_rad_s", file.spin_rad_s, SPEED_MAX),
         swing_m: point_or_zero(c, place, "swing_m", file.swing_m, POSITION_MAX_M),
-        swing_hz: c.optional(place, "swing_hz", file.swing_hz, &allowed(1e-4..=100.0, "Hz")).unwrap_or(SWING_HZ),
+        swing_hz: c.optional(place, "swing_hz", file.swing_hz, MOTION).unwrap_or(SWING_HZ),
     }
 }
 
@@ -283,20 +280,19 @@ fn tree_parts(c: &mut Checker<'_, '_>, entry: &Entry, file: &TreeFile) -> Parts 
     let place = &entry.place;
     check_unused_keys(c, entry);
     let bark = appearance(c, place, &entry.common, Material::Skin);
-    let pieces = allowed(1.0..=PIECES_MAX, "");
     let mut count = |key: &str, given: Option<u32>, usual: u32| {
-        c.optional(place, key, given.map(f64::from), &pieces).unwrap_or(f64::from(usual)) as u32
+        c.optional(place, key, given.map(f64::from), TREE).unwrap_or(f64::from(usual)) as u32
     };
     let (branches, leaves) =
         (count("branches", file.branches, TREE_DEFAULT.0), count("leaves", file.leaves, TREE_DEFAULT.1));
     let spec = TreeSpec {
         seed: u64::from(file.seed.unwrap_or(0)),
-        height_m: c.number(place, "height_m", file.height_m, &allowed(0.01..=1e3, "m")),
+        height_m: c.number(place, "height_m", file.height_m, TREE),
         branches,
         leaves,
         prefix: file.lod == Some(TreeLod::Prefix),
     };
-    let share = c.optional(place, "leaves_importance", file.leaves_importance, &allowed(1e-3..=1.0, ""));
+    let share = c.optional(place, "leaves_importance", file.leaves_importance, TREE);
     let share = share.unwrap_or(LEAVES_IMPORTANCE);
     let colour = file.leaves_colour.as_deref().map_or(Some(LEAF), parse_colour).unwrap_or_else(|| {
         c.wrong(place, "leaves_colour", "is not a colour", "expected `#rrggbb`, such as `#5a8a42`");

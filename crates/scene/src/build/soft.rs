@@ -5,24 +5,23 @@ use super::mesh::{self, Mesh};
 use super::objects::ModelContext;
 use super::scenery::{SurfaceSource, generator, surface_source};
 use super::soft_mesh;
-use super::{FRICTION, LENGTH, POSITION_MAX_M, ROTATION_MAX_DEG, SCALE, SPEED_MAX};
-use crate::check::{Allowed, Checker, Place, allowed};
+use super::{POSITION_MAX_M, ROTATION_MAX_DEG, SPEED_MAX};
+use crate::check::{Checker, Place};
 use crate::demand::Cost;
-use crate::format::{OneOrRange, Point, RopeEnd, RopeFile, SheetFile, SheetSide, SoftShapeKind, SolidFile, SolidSide};
+use crate::format::{
+    OneOrRange, Point, RopeEnd, RopeFile, SOFT, SheetFile, SheetSide, SoftShapeKind, SolidFile, SolidSide,
+};
 use glam::{DQuat, DVec3};
 use metachron_core::{Anchor, Body};
 use metachron_drawable::generate_surface;
 use metachron_geometry::{Aabb, Cage, Triangles, open_edge, subdivided};
+use metachron_models::soft::MATTER;
 use metachron_models::soft::Side;
 use metachron_models::soft::SoftBody;
 use metachron_models::soft::{MaterialLaw, SoftMatter, SoftShape, SoftSpec, VERTICES_MAX};
 use std::sync::Arc;
 
-pub(super) const YOUNG: Allowed = allowed(1.0..=1e11, "Pa");
-pub(super) const POISSON: Allowed = allowed(0.0..=0.499, "");
 const POISSON_DEFAULT: f64 = 0.4;
-pub(super) const DENSITY: Allowed = allowed(1.0..=1e5, "kg/m³");
-const DAMPING_RATE: Allowed = allowed(0.0..=1e4, "1/s");
 /// Most triangles into which a coarse surface is divided, to be as fine as its finest cage; a cage of more has too many vertices.
 const SKIN_TRIANGLES_MAX: usize = 200_000;
 /// The diagonal of a cell, in its edges: no edge of a surface from a file is longer.
@@ -32,8 +31,6 @@ const COARSE_TRIANGLES: u32 = 500;
 const TOO_FINE: &str = "expected a larger finest ε";
 /// A soft solid from a file is hardly longer than this, metres: a file with no scale that is was drawn in millimetres.
 const LARGE_M: f64 = 10.0;
-const SEGMENTS: Allowed = allowed(1.0..=2047.0, "");
-
 /// The keys that all soft bodies share.
 struct Shared {
     young_pa: f64,
@@ -87,12 +84,12 @@ fn flat_sheet(c: &mut Checker<'_, '_>, place: &Place, file: &SheetFile) -> Optio
     if file.scale.is_some() {
         c.wrong(place, "scale", "has no `file` that it belongs to", "expected no such key here");
     }
-    let thickness_m = c.number(place, "thickness_m", file.thickness_m, &LENGTH);
+    let thickness_m = c.number(place, "thickness_m", file.thickness_m, SOFT);
     let Some(size_m) = file.size_m else {
         c.wrong(place, "size_m", "is missing", "a sheet needs it, or `file`: expected `size_m` in this table");
         return None;
     };
-    let size_m = std::array::from_fn(|i| c.number(place, &format!("size_m.{i}"), size_m[i], &LENGTH));
+    let size_m = std::array::from_fn(|i| c.number(place, &format!("size_m.{i}"), size_m[i], SOFT));
     let given = file.segments.unwrap_or([1; 2]);
     let segments = std::array::from_fn(|i| segments(c, place, &format!("segments.{i}"), given[i]));
     Some(SoftShape::Sheet { size_m, thickness_m, segments })
@@ -108,7 +105,7 @@ pub(super) struct BuiltSoft {
 pub(super) fn solid(c: &mut Checker<'_, '_>, file: &SolidFile, context: &ModelContext<'_>) -> Option<BuiltSoft> {
     let place = context.place;
     check_solid_keys(c, place, file);
-    let eps_m = file.eps_m.map(|eps| c.ends(place, "eps_m", eps, &LENGTH));
+    let eps_m = file.eps_m.map(|eps| c.ends(place, "eps_m", eps, SOFT));
     let shape = solid_shape(c, file, context, eps_m)?;
     let side = |side: &SolidSide| match side {
         SolidSide::Left => Side::Left,
@@ -216,11 +213,11 @@ fn solid_shape(
         file.segments.map(|cells| std::array::from_fn(|i| segments(c, place, &format!("segments.{i}"), cells[i])));
     let lattice = if file.shape == SoftShapeKind::Box {
         let size = file.size_m?;
-        let size = std::array::from_fn(|i| c.number(place, &format!("size_m.{i}"), size[i], &LENGTH));
+        let size = std::array::from_fn(|i| c.number(place, &format!("size_m.{i}"), size[i], SOFT));
         let segments = given.or_else(|| Some([fitted(size[0])?, fitted(size[1])?, fitted(size[2])?]))?;
         SoftShape::Box { size_m: DVec3::from_array(size), segments }
     } else {
-        let radius_m = c.number(place, "radius_m", file.radius_m?, &LENGTH);
+        let radius_m = c.number(place, "radius_m", file.radius_m?, SOFT);
         let cells: [u32; 3] = given.or_else(|| Some([fitted(2.0 * radius_m)?.max(2); 3]))?;
         if cells.iter().any(|n| *n != cells[0] || *n < 2) {
             let expected = "expected the same number, at least 2, three times: a ball has no long side";
@@ -241,8 +238,8 @@ fn solid_shape(
 /// The closed surface of a file or a generator, metres; `None` where there is none, which is reported.
 fn closed_surface(c: &mut Checker<'_, '_>, file: &SolidFile, context: &ModelContext<'_>) -> Option<Triangles> {
     let place = context.place;
-    let scale = c.optional(place, "scale", file.scale, &SCALE).unwrap_or(1.0);
-    let count = file.triangles.map(|n| c.number(place, "triangles", f64::from(n), &allowed(4.0..=1e5, "")) as u32);
+    let scale = c.optional(place, "scale", file.scale, SOFT).unwrap_or(1.0);
+    let count = file.triangles.map(|n| c.number(place, "triangles", f64::from(n), SOFT) as u32);
     let (key, read) = match surface_source(c, place, file.file.as_deref(), file.generate)? {
         SurfaceSource::File(name) if !c.may_read(place, "file", context.source.head(name), Cost::soft_of_file) => {
             return None;
@@ -342,7 +339,7 @@ pub(super) fn rope(c: &mut Checker<'_, '_>, file: &RopeFile, context: &ModelCont
         held: file.hold.iter().flatten().map(end).collect(),
         law: MaterialLaw::default(),
     };
-    let radius_m = c.number(place, "radius_m", file.radius_m, &LENGTH);
+    let radius_m = c.number(place, "radius_m", file.radius_m, SOFT);
     let eps_m = one_division(c, place, file.segments.is_some(), file.eps_m);
     let segments = segments(c, place, "segments", file.segments.unwrap_or(1));
     let pose = Pose { position: DVec3::ZERO, rotation: DQuat::IDENTITY };
@@ -363,7 +360,7 @@ fn one_division(
         _ => {}
     }
     let before = c.count();
-    let range = eps_m.map(|eps| c.ends(place, "eps_m", eps, &LENGTH));
+    let range = eps_m.map(|eps| c.ends(place, "eps_m", eps, SOFT));
     // a range that was reported says nothing of one that would fit
     range.filter(|_| c.count() == before)
 }
@@ -384,7 +381,7 @@ fn divided(c: &mut Checker<'_, '_>, place: &Place, spec: SoftSpec, eps_m: Option
 }
 
 fn segments(c: &mut Checker<'_, '_>, place: &Place, key: &str, count: u32) -> u32 {
-    c.number(place, key, f64::from(count), &SEGMENTS) as u32
+    c.number(place, key, f64::from(count), SOFT) as u32
 }
 
 /// Position of the first corner and rotation of a body at the start.
@@ -410,11 +407,11 @@ fn pose(
 fn spec(c: &mut Checker<'_, '_>, context: &ModelContext<'_>, shape: SoftShape, pose: Pose, shared: Shared) -> SoftSpec {
     let place = context.place;
     let matter = SoftMatter {
-        young_pa: c.number(place, "young_pa", shared.young_pa, &YOUNG),
-        poisson: c.optional(place, "poisson", shared.poisson, &POISSON).unwrap_or(POISSON_DEFAULT),
-        density_kg_m3: c.optional(place, "density_kg_m3", shared.density_kg_m3, &DENSITY).unwrap_or(1050.0),
-        damping_per_s: c.optional(place, "damping_per_s", shared.damping_per_s, &DAMPING_RATE).unwrap_or(0.0),
-        damping_s: c.optional(place, "damping_s", shared.damping_s, &allowed(0.0..=10.0, "s")).unwrap_or(0.0),
+        young_pa: c.number(place, "young_pa", shared.young_pa, MATTER),
+        poisson: c.optional(place, "poisson", shared.poisson, MATTER).unwrap_or(POISSON_DEFAULT),
+        density_kg_m3: c.optional(place, "density_kg_m3", shared.density_kg_m3, MATTER).unwrap_or(1050.0),
+        damping_per_s: c.optional(place, "damping_per_s", shared.damping_per_s, MATTER).unwrap_or(0.0),
+        damping_s: c.optional(place, "damping_s", shared.damping_s, MATTER).unwrap_or(0.0),
         law: shared.law,
     };
     SoftSpec {
@@ -425,7 +422,7 @@ fn spec(c: &mut Checker<'_, '_>, context: &ModelContext<'_>, shape: SoftShape, p
         rotation: pose.rotation,
         velocity: shared.velocity_m_s.map_or(DVec3::ZERO, |v| c.point(place, "velocity_m_s", v, SPEED_MAX)),
         held: shared.held,
-        friction: c.optional(place, "friction", shared.friction, &FRICTION).unwrap_or(0.3),
+        friction: c.optional(place, "friction", shared.friction, SOFT).unwrap_or(0.3),
         traits: context.traits,
         gravity: context.gravity,
         self_contact: shared.self_contact,

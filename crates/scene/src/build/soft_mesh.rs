@@ -5,12 +5,14 @@
 
 use super::mesh;
 use super::objects::ModelContext;
-use super::soft::{DENSITY, POISSON, YOUNG, too_large};
-use super::{LENGTH, SCALE, tetrahedra};
-use crate::check::{Checker, Place, allowed};
+use super::soft::too_large;
+use super::tetrahedra;
+use crate::check::{Checker, Place};
 use crate::demand::Cost;
-use crate::format::{LawKind, RegionFile, SheetFile, SolidFile};
+use crate::format::{LawKind, RegionFile, SOFT, SheetFile, SolidFile};
+use metachron_core::NumberRange;
 use metachron_geometry::{Aabb, Tetrahedra, Triangles, branch, opposed, pieces, welded};
+use metachron_models::soft::MATTER;
 use metachron_models::soft::{MaterialLaw, RegionMatter, SoftMatter, SoftShape, VERTICES_MAX};
 use std::sync::Arc;
 
@@ -24,7 +26,7 @@ pub(super) fn law(
 ) -> MaterialLaw {
     match (kind, exponent) {
         (Some(LawKind::Ogden), Some(exponent)) => {
-            let size = c.number(place, "exponent", exponent.abs(), &allowed(1.0..=20.0, "or its negative"));
+            let size = c.number(place, "exponent", exponent.abs(), NumberRange::new(1.0, 20.0, "or its negative"));
             // λ + 2 μ/a > 0: else it would push back less the more it is compressed
             let least = 1.0 / (size + 2.0);
             if exponent < 0.0 && poisson <= least {
@@ -74,7 +76,7 @@ pub(super) fn tetrahedra_of(
             c.wrong(place, key, what, "expected no such key, or a closed surface of triangles as the file");
         }
     }
-    let scale = c.optional(place, "scale", file.scale, &SCALE).unwrap_or(1.0);
+    let scale = c.optional(place, "scale", file.scale, SOFT).unwrap_or(1.0);
     if !c.may_make(place, "file", Cost::soft_of_file(&head)) {
         return Some(None);
     }
@@ -127,14 +129,14 @@ pub(super) fn regions(
         if regions.iter().any(|known| known.region == region) {
             c.wrong(&here, "region", format!("is {region}, which has a material already"), "expected each region once");
         }
-        let poisson = c.optional(&here, "poisson", file.poisson, &POISSON).unwrap_or(matter.poisson);
+        let poisson = c.optional(&here, "poisson", file.poisson, MATTER).unwrap_or(matter.poisson);
         let own = law(c, &here, file.law, file.exponent, poisson);
         let law = if file.law.is_some() { own } else { matter.law };
         let matter = SoftMatter {
-            young_pa: c.number(&here, "young_pa", file.young_pa, &YOUNG),
+            young_pa: c.number(&here, "young_pa", file.young_pa, MATTER),
             poisson,
             density_kg_m3: c
-                .optional(&here, "density_kg_m3", file.density_kg_m3, &DENSITY)
+                .optional(&here, "density_kg_m3", file.density_kg_m3, MATTER)
                 .unwrap_or(matter.density_kg_m3),
             law,
             ..*matter
@@ -154,8 +156,8 @@ pub(super) fn shell(c: &mut Checker<'_, '_>, file: &SheetFile, context: &ModelCo
             c.wrong(place, key, "contradicts `file`", "expected one of them: a mesh is taken as it is");
         }
     }
-    let scale = c.optional(place, "scale", file.scale, &SCALE).unwrap_or(1.0);
-    let thickness_m = c.number(place, "thickness_m", file.thickness_m, &LENGTH);
+    let scale = c.optional(place, "scale", file.scale, SOFT).unwrap_or(1.0);
+    let thickness_m = c.number(place, "thickness_m", file.thickness_m, SOFT);
     if !c.may_read(place, "file", context.source.head(name), Cost::sheet_of_file) {
         return None;
     }

@@ -1,14 +1,14 @@
 //! Reads target, camera, machine and probes of a scene file.
 
-use super::{Names, POSITION_MAX_M, TIME};
-use crate::check::{Allowed, Checker, Place, allowed};
+use super::{Names, POSITION_MAX_M};
+use crate::check::{Checker, Place};
 use crate::diagnostic::{Problem, did_you_mean};
 use crate::format::{
-    CameraFile, CameraFiles, CameraKeyFile, LoadFile, MODELS, MachineFile, Point, ProbeFile, ShadingCostFile,
-    TargetFile, model_named,
+    CAMERA, COST, CameraFile, CameraFiles, CameraKeyFile, LOAD, LoadFile, MACHINE, MODELS, MachineFile, PROBE, Point,
+    ProbeFile, STEP_COST, ShadingCostFile, TARGET, TargetFile, model_named,
 };
 use glam::DVec3;
-use metachron_core::{SimSpan, gains};
+use metachron_core::SimSpan;
 use metachron_world::{
     Camera, FACTOR, Factors, Gains, Machine, NamedCamera, ObjectCost, Probe, RENDER_SCALE, Target, View,
 };
@@ -30,34 +30,29 @@ const PRESETS: [&str; 2] = ["two-cores-software", "workstation"];
 /// An eye nearer than this to the point it looks at has no direction, metres.
 const EYE_NEAREST_M: f64 = 1e-6;
 
-const FOV: Allowed = allowed(1.0..=150.0, "degrees");
-
 /// The target frame rate and how it is held.
 pub(crate) fn target(c: &mut Checker<'_, '_>, file: Option<&TargetFile>) -> Target {
     let place = Place::new("target", "of `[target]`");
     let frame_hz = file.and_then(|f| f.frame_hz);
-    let mut gain = |key: &str, value: Option<f64>, range: Allowed| value.map(|v| c.number(&place, key, v, &range));
+    let mut gain = |key: &str, value: Option<f64>| c.optional(&place, key, value, TARGET);
     let given = file.map_or_else(Gains::default, |f| Gains {
-        alpha: gain("alpha", f.alpha, gain_range(gains::ALPHA)),
-        beta: gain("beta", f.beta, gain_range(gains::BETA)),
-        kappa: gain("kappa", f.kappa, gain_range(gains::KAPPA)),
-        lead: gain("lead", f.lead, gain_range(gains::LEAD)),
-        margin: gain("margin", f.margin, gain_range(gains::MARGIN)),
-        agent_refine: gain("agent_refine", f.agent_refine, gain_range(gains::REFINE)),
-        agent_yield: gain("agent_yield", f.agent_yield, gain_range(gains::YIELD)),
+        alpha: gain("alpha", f.alpha),
+        beta: gain("beta", f.beta),
+        kappa: gain("kappa", f.kappa),
+        lead: gain("lead", f.lead),
+        margin: gain("margin", f.margin),
+        agent_refine: gain("agent_refine", f.agent_refine),
+        agent_yield: gain("agent_yield", f.agent_yield),
     });
-    let mut factor = |key: &str, value: Option<f64>| value.map(|v| c.number(&place, key, v, &allowed(0.0..=1.0, "")));
     let factors = file.map_or_else(Factors::default, |f| Factors {
-        focus: factor("focus", f.focus),
-        motion: factor("motion", f.motion),
-        hysteresis: factor("hysteresis", f.hysteresis),
+        focus: gain("focus", f.focus),
+        motion: gain("motion", f.motion),
+        hysteresis: gain("hysteresis", f.hysteresis),
     });
-    let scales = file
-        .and_then(|f| f.render_scale)
-        .map(|scales| c.ends(&place, "render_scale", scales, &allowed(RENDER_SCALE.0..=RENDER_SCALE.1, "")));
+    let scales = file.and_then(|f| f.render_scale).map(|scales| c.ends(&place, "render_scale", scales, TARGET));
     Target {
         lag: lag(c, &place, file),
-        frame_hz: c.optional(&place, "frame_hz", frame_hz, &allowed(1.0..=1000.0, "Hz")).unwrap_or(FRAME_DEFAULT_HZ),
+        frame_hz: c.optional(&place, "frame_hz", frame_hz, TARGET).unwrap_or(FRAME_DEFAULT_HZ),
         policy: file.and_then(|f| f.policy).unwrap_or_default(),
         value: file.and_then(|f| f.value).unwrap_or_default(),
         law: file.and_then(|f| f.law).unwrap_or_default(),
@@ -69,22 +64,17 @@ pub(crate) fn target(c: &mut Checker<'_, '_>, file: Option<&TargetFile>) -> Targ
     }
 }
 
-/// The allowed values of a gain.
-const fn gain_range(ends: (f64, f64)) -> Allowed {
-    allowed(ends.0..=ends.1, "")
-}
-
 /// The greatest lag in seconds and the optimiser's share of it.
 fn lag(c: &mut Checker<'_, '_>, place: &Place, file: Option<&TargetFile>) -> Option<(f64, f64)> {
     let share = file.and_then(|f| f.optimiser_share);
-    let part = c.optional(place, "optimiser_share", share, &allowed(1e-3..=0.5, "")).unwrap_or(OPTIMISER_SHARE);
+    let part = c.optional(place, "optimiser_share", share, TARGET).unwrap_or(OPTIMISER_SHARE);
     let Some(lag_ms) = file.and_then(|f| f.lag_ms) else {
         if share.is_some() {
             c.wrong(place, "optimiser_share", "has no effect alone", "expected `lag_ms` beside it");
         }
         return None;
     };
-    Some((c.number(place, "lag_ms", lag_ms, &allowed(1.0..=1000.0, "ms")) * 1e-3, part))
+    Some((c.number(place, "lag_ms", lag_ms, TARGET) * 1e-3, part))
 }
 
 /// Most cameras of a scene.
@@ -118,7 +108,7 @@ pub(crate) fn cameras(c: &mut Checker<'_, '_>, files: &CameraFiles) -> Vec<Named
 }
 
 fn camera(c: &mut Checker<'_, '_>, place: &Place, file: &CameraFile) -> Option<Camera> {
-    let fov_deg = c.optional(place, "fov_deg", file.fov_deg, &FOV).unwrap_or(FOV_DEFAULT_DEG);
+    let fov_deg = c.optional(place, "fov_deg", file.fov_deg, CAMERA).unwrap_or(FOV_DEFAULT_DEG);
     if let Some(keys) = &file.keyframe {
         for (key, given) in [
             ("eye_m", file.eye_m.is_some()),
@@ -182,8 +172,8 @@ fn camera_keys(
     let mut keys: Vec<(f64, View)> = Vec::with_capacity(files.len());
     for (i, file) in files.iter().enumerate() {
         let place = place.entry("keyframe", i);
-        let at_s = c.number(&place, "at_s", file.at_s, &TIME);
-        let fov = c.optional(&place, "fov_deg", file.fov_deg, &FOV).unwrap_or(fov_deg);
+        let at_s = c.number(&place, "at_s", file.at_s, CAMERA);
+        let fov = c.optional(&place, "fov_deg", file.fov_deg, CAMERA).unwrap_or(fov_deg);
         if let Some((before, _)) = keys.last().filter(|(before, _)| *before >= at_s) {
             let expected = format!("expected a time after the keyframe before, {before} s");
             c.wrong(&place, "at_s", format_args!("is {at_s}"), expected);
@@ -202,18 +192,18 @@ pub(crate) fn machine(c: &mut Checker<'_, '_>, file: Option<&MachineFile>) -> Ma
     if !PRESETS.contains(&preset.as_str()) {
         c.reference(&place, "preset", &preset, PRESETS.into_iter());
     }
-    let mut number = |key: &str, value: Option<f64>, range: Allowed| value.map(|v| c.number(&place, key, v, &range));
-    let cores = number("cores", file.cores.map(f64::from), allowed(1.0..=4096.0, "")).map(|n| n as u32);
-    let draw_setup_ms = number("draw_setup_ms", file.draw_setup_ms, allowed(0.0..=1e4, "ms"));
-    let draw_object_us = number("draw_object_us", file.draw_object_us, allowed(0.0..=1e6, "µs"));
-    let draw_triangle_us = number("draw_triangle_us", file.draw_triangle_us, allowed(0.0..=1e4, "µs"));
-    let draw_pixel_ns = number("draw_pixel_ns", file.draw_pixel_ns, allowed(0.0..=1e6, "ns"));
-    let draw_enlarge_ns = number("draw_enlarge_ns", file.draw_enlarge_ns, allowed(0.0..=1e6, "ns"));
-    let cull_object_ns = number("cull_object_ns", file.cull_object_ns, allowed(0.0..=1e6, "ns"));
-    let choose_object_ns = number("choose_object_ns", file.choose_object_ns, allowed(0.0..=1e6, "ns"));
-    let noise = number("noise", file.noise, allowed(0.0..=1.0, ""));
-    let wander = number("wander", file.wander, allowed(0.0..=1.0, ""));
-    let spikes = number("spikes", file.spikes, allowed(0.0..=1.0, ""));
+    let mut number = |key: &str, value: Option<f64>| c.optional(&place, key, value, MACHINE);
+    let cores = number("cores", file.cores.map(f64::from)).map(|n| n as u32);
+    let draw_setup_ms = number("draw_setup_ms", file.draw_setup_ms);
+    let draw_object_us = number("draw_object_us", file.draw_object_us);
+    let draw_triangle_us = number("draw_triangle_us", file.draw_triangle_us);
+    let draw_pixel_ns = number("draw_pixel_ns", file.draw_pixel_ns);
+    let draw_enlarge_ns = number("draw_enlarge_ns", file.draw_enlarge_ns);
+    let cull_object_ns = number("cull_object_ns", file.cull_object_ns);
+    let choose_object_ns = number("choose_object_ns", file.choose_object_ns);
+    let noise = number("noise", file.noise);
+    let wander = number("wander", file.wander);
+    let spikes = number("spikes", file.spikes);
     let seed = file.seed.map(u64::from);
     let steps = step_prices(c, &place.table("step"), file);
     let table = place.table("shading");
@@ -257,12 +247,12 @@ fn load(c: &mut Checker<'_, '_>, place: &Place, key: &str, entries: &[LoadFile])
     let mut steps: Vec<(f64, f64)> = Vec::with_capacity(entries.len());
     for (i, entry) in entries.iter().enumerate() {
         let place = place.entry(key, i);
-        let at_s = c.number(&place, "at_s", entry.at_s, &TIME);
+        let at_s = c.number(&place, "at_s", entry.at_s, LOAD);
         if let Some((before, _)) = steps.last().filter(|(before, _)| *before >= at_s) {
             let expected = format!("expected a time after the entry before, {before} s");
             c.wrong(&place, "at_s", format_args!("is {at_s}"), expected);
         }
-        steps.push((at_s, c.number(&place, "factor", entry.factor, &allowed(0.01..=100.0, ""))));
+        steps.push((at_s, c.number(&place, "factor", entry.factor, LOAD)));
     }
     steps
 }
@@ -270,12 +260,12 @@ fn load(c: &mut Checker<'_, '_>, place: &Place, key: &str, entries: &[LoadFile])
 /// Cost of objects that are drawn in one way, as far as the scene gives it.
 fn object_cost(c: &mut Checker<'_, '_>, place: &Place, file: Option<ShadingCostFile>) -> ObjectCost {
     let file = file.unwrap_or_default();
-    let mut number = |key: &str, value: Option<f64>, range: Allowed| value.map(|v| c.number(place, key, v, &range));
+    let mut number = |key: &str, value: Option<f64>| c.optional(place, key, value, COST);
     ObjectCost {
-        object_us: number("object_us", file.object_us, allowed(0.0..=1e6, "µs")),
-        triangle_us: number("triangle_us", file.triangle_us, allowed(0.0..=1e4, "µs")),
-        vertex_us: number("vertex_us", file.vertex_us, allowed(0.0..=1e4, "µs")),
-        pixel_ns: number("pixel_ns", file.pixel_ns, allowed(0.0..=1e6, "ns")),
+        object_us: number("object_us", file.object_us),
+        triangle_us: number("triangle_us", file.triangle_us),
+        vertex_us: number("vertex_us", file.vertex_us),
+        pixel_ns: number("pixel_ns", file.pixel_ns),
     }
 }
 
@@ -292,7 +282,7 @@ fn step_prices(c: &mut Checker<'_, '_>, place: &Place, file: &MachineFile) -> Ve
             );
         }
         let place = place.table(model);
-        let mut cost = |key: &str, v: Option<f64>| v.map(|v| c.number(&place, key, v, &allowed(0.0..=1e9, "µs")));
+        let mut cost = |key: &str, v: Option<f64>| v.map(|v| c.number(&place, key, v, STEP_COST));
         steps.push((known.unwrap_or(model).to_owned(), cost("base_us", price.base_us), cost("unit_us", price.unit_us)));
     }
     steps
@@ -313,8 +303,8 @@ pub(crate) fn probes(c: &mut Checker<'_, '_>, files: &[ProbeFile], names: &Names
 }
 
 fn probe(c: &mut Checker<'_, '_>, place: &Place, file: &ProbeFile, names: &Names) -> Option<Probe> {
-    let at = c.optional(place, "at", file.at, &allowed(0.0..=1.0, "")).unwrap_or(1.0);
-    let every_ms = file.every_ms.map(|ms| c.number(place, "every_ms", ms, &allowed(0.01..=1e6, "ms")));
+    let at = c.optional(place, "at", file.at, PROBE).unwrap_or(1.0);
+    let every_ms = file.every_ms.map(|ms| c.number(place, "every_ms", ms, PROBE));
     let agent = match names.get(&file.object) {
         Some(named) if named.agent().is_some() => named.agent()?,
         Some(_) => {

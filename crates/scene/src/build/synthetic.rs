@@ -1,8 +1,8 @@
 //! Reads a synthetic agent of a scene file as a [`SyntheticSpec`].
 
 use super::objects::ModelContext;
-use crate::check::{Checker, allowed};
-use crate::format::SyntheticFile;
+use crate::check::Checker;
+use crate::format::{SYNTHETIC, SyntheticFile};
 use metachron_core::ResolutionRange;
 use metachron_models::synthetic::SyntheticSpec;
 
@@ -17,12 +17,12 @@ pub(super) fn build(
 ) -> (SyntheticSpec, ResolutionRange) {
     let place = context.place;
     let usual = (EPS_DEFAULT_M, EPS_DEFAULT_M);
-    let eps_m = file.eps_m.map_or(usual, |eps| c.ends(place, "eps_m", eps, &allowed(1e-6..=1e3, "m")));
+    let eps_m = file.eps_m.map_or(usual, |eps| c.ends(place, "eps_m", eps, SYNTHETIC));
     let spec = SyntheticSpec {
-        cost_us: c.number(place, "cost_us", file.cost_us, &allowed(0.0..=1e6, "µs")),
-        cost_order: c.optional(place, "cost_order", file.cost_order, &allowed(0.0..=4.0, "")).unwrap_or(1.0),
-        error_m: c.optional(place, "error_m", file.error_m, &allowed(0.0..=1e3, "m")).unwrap_or(0.0),
-        error_order: c.optional(place, "error_order", file.error_order, &allowed(0.0..=8.0, "")).unwrap_or(2.0),
+        cost_us: c.number(place, "cost_us", file.cost_us, SYNTHETIC),
+        cost_order: c.optional(place, "cost_order", file.cost_order, SYNTHETIC).unwrap_or(1.0),
+        error_m: c.optional(place, "error_m", file.error_m, SYNTHETIC).unwrap_or(0.0),
+        error_order: c.optional(place, "error_order", file.error_order, SYNTHETIC).unwrap_or(2.0),
     };
     (spec, ResolutionRange { eps_m, n: context.levels })
 }

@@ -3,24 +3,17 @@
 use super::common::rotation;
 use super::common::rounded;
 use super::objects::{ModelContext, NamedObject, Names};
-use super::{KEYFRAMES_MAX, POSITION_MAX_M, ROTATION_MAX_DEG, TIME};
-use crate::check::{Checker, Place, allowed};
-use crate::format::{KeyframeFile, Point, ToolFile};
+use super::{KEYFRAMES_MAX, POSITION_MAX_M, ROTATION_MAX_DEG};
+use crate::check::{Checker, Place};
+use crate::format::{KEYFRAME, KeyframeFile, Point, TOOL, ToolFile};
 use glam::{DQuat, DVec3};
 use metachron_core::AgentId;
 use metachron_models::tool::{Keyframe, ToolSpec};
-use std::ops::RangeInclusive;
 
 /// Default reach of the jaws, metres.
 const REACH_DEFAULT_M: f64 = 0.02;
 /// Default limit of the force of a tool's drive, newtons: an arm holds against it without effort.
 const FORCE_DEFAULT_N: f64 = 50.0;
-/// Allowed limits of that force. The tip has a mass of 6 g per newton (docs/theory/coupling.md, eq. 9e): past a kilonewton it presses
-/// an object of 50 g millimetres into the floor, past a hundred kilonewtons through it.
-const FORCES_N: RangeInclusive<f64> = 1e-3..=1e3;
-/// See [`FORCES_N`].
-const FORCES_WHY: &str = "N: a stronger drive would push light objects into their support";
-
 /// Reads a tool.
 pub(super) fn build(c: &mut Checker<'_, '_>, file: &ToolFile, context: &ModelContext<'_>, names: &Names) -> ToolSpec {
     let place = context.place;
@@ -29,16 +22,10 @@ pub(super) fn build(c: &mut Checker<'_, '_>, file: &ToolFile, context: &ModelCon
         pivot_m: file.pivot_m.and_then(|pivot| pivot_of(c, place, pivot, &keyframes)),
         keyframes,
         repeat: file.repeat.unwrap_or(false),
-        reach_m: c.optional(place, "reach_m", file.reach_m, &allowed(1e-6..=100.0, "m")).unwrap_or(REACH_DEFAULT_M),
-        stiffness_n_m: c
-            .optional(place, "stiffness_n_m", file.stiffness_n_m, &allowed(1e-3..=1e7, "N/m"))
-            .unwrap_or(200.0),
-        damping_n_s_m: c
-            .optional(place, "damping_n_s_m", file.damping_n_s_m, &allowed(0.0..=1e5, "N·s/m"))
-            .unwrap_or(1.0),
-        max_force_n: c
-            .optional(place, "max_force_n", file.max_force_n, &allowed(FORCES_N, FORCES_WHY))
-            .unwrap_or(FORCE_DEFAULT_N),
+        reach_m: c.optional(place, "reach_m", file.reach_m, TOOL).unwrap_or(REACH_DEFAULT_M),
+        stiffness_n_m: c.optional(place, "stiffness_n_m", file.stiffness_n_m, TOOL).unwrap_or(200.0),
+        damping_n_s_m: c.optional(place, "damping_n_s_m", file.damping_n_s_m, TOOL).unwrap_or(1.0),
+        max_force_n: c.optional(place, "max_force_n", file.max_force_n, TOOL).unwrap_or(FORCE_DEFAULT_N),
         graspable: graspable(c, place, file, names),
         starts_off_m: DVec3::ZERO,
         traits: context.traits,
@@ -118,11 +105,11 @@ fn keyframes(c: &mut Checker<'_, '_>, place: &Place, files: &[KeyframeFile]) -> 
 
 fn keyframe(c: &mut Checker<'_, '_>, place: &Place, file: &KeyframeFile, before: Keyframe) -> Keyframe {
     Keyframe {
-        at_s: c.optional(place, "at_s", file.at_s, &TIME).unwrap_or(0.0),
+        at_s: c.optional(place, "at_s", file.at_s, KEYFRAME).unwrap_or(0.0),
         tip_m: c.point(place, "tip_m", file.tip_m, POSITION_MAX_M),
         rotation: file
             .rotation_deg
             .map_or(before.rotation, |deg| rotation(c.point(place, "rotation_deg", deg, ROTATION_MAX_DEG))),
-        jaw: c.optional(place, "jaw", file.jaw, &allowed(0.0..=1.0, "")).unwrap_or(before.jaw),
+        jaw: c.optional(place, "jaw", file.jaw, KEYFRAME).unwrap_or(before.jaw),
     }
 }

@@ -1,11 +1,15 @@
 //! Reads a tube of a scene file as a [`TubeSpec`].
 
+use super::POSITION_MAX_M;
 use super::force_limits::{ForceLimits, ForceLimitsFile};
 use super::objects::ModelContext;
-use super::{FRICTION, POSITION_MAX_M, TIME};
-use crate::check::{Allowed, Checker, Place, allowed};
-use crate::format::{AttachFile, End, Integrator as Method, PeristalsisFile, PressureFile, TubeFile, Wall};
+use crate::check::{Checker, Place};
+use crate::format::ranges::TIME;
+use crate::format::{
+    ATTACH, AttachFile, End, Integrator as Method, PERISTALSIS, PeristalsisFile, PressureFile, TUBE, TubeFile, Wall,
+};
 use glam::DVec3;
+use metachron_core::NumberRange;
 use metachron_core::{Resolution, ResolutionRange};
 use metachron_models::rod::Integrator;
 use metachron_models::rod::SUBSTEPS_MAX;
@@ -27,15 +31,6 @@ const PRESSURE_KEYS_MAX: usize = 10_000;
 /// Most attached parts of a tube (stretches of a mesentery).
 const ATTACH_MAX: usize = 1000;
 
-const RADIUS: Allowed = allowed(1e-6..=100.0, "m");
-const YOUNG: Allowed = allowed(1.0..=1e13, "Pa");
-const POISSON: Allowed = allowed(-0.999..=0.5, "");
-const DENSITY: Allowed = allowed(1e-3..=1e6, "kg/m³");
-const STIFFNESS: Allowed = allowed(1e-15..=1e15, "");
-const TWIST: Allowed = allowed(-36_000.0..=36_000.0, "°");
-const PRESSURE: Allowed = allowed(0.0..=1e7, "Pa");
-const SHARE: Allowed = allowed(0.0..=1.0, "");
-
 /// A tube and the resolutions that its picture may take.
 pub(super) struct BuiltTube {
     pub(super) spec: TubeSpec,
@@ -53,17 +48,14 @@ pub(super) fn build(c: &mut Checker<'_, '_>, file: &TubeFile, context: &ModelCon
     let spec = TubeSpec {
         path_m,
         straight: file.straight.unwrap_or(false),
-        twist_rad: c.optional(place, "twist_deg", file.twist_deg, &TWIST).unwrap_or(0.0).to_radians(),
+        twist_rad: c.optional(place, "twist_deg", file.twist_deg, TUBE).unwrap_or(0.0).to_radians(),
         section,
         resolution,
         range,
         segments: file.segments.map(|n| n.clamp(2, SEGMENTS_MAX) as usize),
         integrator: file.integrator.map_or_else(Default::default, integrator),
-        substeps: c.optional(place, "substeps", file.substeps.map(f64::from), &allowed(1.0..=1000.0, "")).unwrap_or(1.0)
-            as u32,
-        damping_per_s: c
-            .optional(place, "damping_per_s", file.damping_per_s, &allowed(0.0..=1e4, "1/s"))
-            .unwrap_or(0.0),
+        substeps: c.optional(place, "substeps", file.substeps.map(f64::from), TUBE).unwrap_or(1.0) as u32,
+        damping_per_s: c.optional(place, "damping_per_s", file.damping_per_s, TUBE).unwrap_or(0.0),
         clamp,
         pin,
         attachments: attachments(c, place, file.attach.as_deref().unwrap_or_default()),
@@ -73,7 +65,7 @@ pub(super) fn build(c: &mut Checker<'_, '_>, file: &TubeFile, context: &ModelCon
         pressure_pa: pressure_pa(c, place, file),
         pressure_keys: pressure_keys(c, place, file),
         self_contact: file.self_contact.unwrap_or(true),
-        friction: c.optional(place, "friction", file.friction, &FRICTION).unwrap_or(0.2),
+        friction: c.optional(place, "friction", file.friction, TUBE).unwrap_or(0.2),
         traits: context.traits,
         gravity: context.gravity,
         sleep: context.sleep,
@@ -106,7 +98,7 @@ fn wall(c: &mut Checker<'_, '_>, place: &Place, file: &TubeFile) -> WallModel {
 /// The pressure, where it is one number.
 fn pressure_pa(c: &mut Checker<'_, '_>, place: &Place, file: &TubeFile) -> f64 {
     match file.pressure_pa {
-        Some(PressureFile::Constant(pressure_pa)) => c.number(place, "pressure_pa", pressure_pa, &PRESSURE),
+        Some(PressureFile::Constant(pressure_pa)) => c.number(place, "pressure_pa", pressure_pa, TUBE),
         _ => 0.0,
     }
 }
@@ -122,8 +114,8 @@ fn pressure_keys(c: &mut Checker<'_, '_>, place: &Place, file: &TubeFile) -> Vec
     let mut keys: Vec<PressureKey> = Vec::with_capacity(list.len());
     for (at, &[at_s, pressure_pa]) in list.iter().enumerate() {
         let [time, pressure] = [0, 1].map(|part| format!("pressure_pa.{at}.{part}"));
-        let at_s = c.number(place, &time, at_s, &TIME);
-        let pressure_pa = c.number(place, &pressure, pressure_pa, &PRESSURE);
+        let at_s = c.number(place, &time, at_s, TIME);
+        let pressure_pa = c.number(place, &pressure, pressure_pa, TUBE);
         if let Some(before) = keys.last().filter(|before| at_s <= before.at_s) {
             let expected = format!("expected a time after the one before, {} s", before.at_s);
             c.wrong(place, &time, format_args!("is {at_s}"), expected);
@@ -186,7 +178,7 @@ fn path(c: &mut Checker<'_, '_>, place: &Place, points: &[[f64; 3]]) -> Vec<DVec
 
 /// The section from modulus, density and dimensions; numbers that the file gives override them.
 fn section(c: &mut Checker<'_, '_>, place: &Place, file: &TubeFile) -> Section {
-    let radius_m = c.number(place, "radius_m", file.radius_m, &RADIUS);
+    let radius_m = c.number(place, "radius_m", file.radius_m, TUBE);
     let wall_m = file.wall_m.unwrap_or(radius_m);
     let sound_wall = wall_m > 0.0 && wall_m <= radius_m;
     // a wall that is too thick only because the radius is wrong is not reported: one problem, not two
@@ -199,9 +191,8 @@ fn section(c: &mut Checker<'_, '_>, place: &Place, file: &TubeFile) -> Section {
     let area_m2 = Section::hollow(radius_m, wall_m, unit).mass_per_length_kg_m;
     let young_pa = modulus(c, place, file, area_m2);
     let density_kg_m3 = density(c, place, file, area_m2);
-    let poisson = c.optional(place, "poisson", file.poisson, &POISSON).unwrap_or(0.45);
-    let shear_factor =
-        c.optional(place, "shear_factor", file.shear_factor, &allowed(1e-3..=2.0, "")).unwrap_or(27.0 / 28.0);
+    let poisson = c.optional(place, "poisson", file.poisson, TUBE).unwrap_or(0.45);
+    let shear_factor = c.optional(place, "shear_factor", file.shear_factor, TUBE).unwrap_or(27.0 / 28.0);
     let material = Material { young_pa, poisson, density_kg_m3, shear_factor };
     let mut section = Section::hollow(radius_m, wall_m, material);
     for (key, given, into) in [
@@ -210,17 +201,17 @@ fn section(c: &mut Checker<'_, '_>, place: &Place, file: &TubeFile) -> Section {
         ("ei_n_m2", file.ei_n_m2, &mut section.ei_n_m2),
         ("gj_n_m2", file.gj_n_m2, &mut section.gj_n_m2),
     ] {
-        *into = c.optional(place, key, given, &STIFFNESS).unwrap_or(*into);
+        *into = c.optional(place, key, given, TUBE).unwrap_or(*into);
     }
     section.mass_per_length_kg_m = c
-        .optional(place, "mass_per_length_kg_m", file.mass_per_length_kg_m, &allowed(1e-9..=1e9, "kg/m"))
+        .optional(place, "mass_per_length_kg_m", file.mass_per_length_kg_m, TUBE)
         .unwrap_or(section.mass_per_length_kg_m);
     section
 }
 
 fn modulus(c: &mut Checker<'_, '_>, place: &Place, file: &TubeFile, area_m2: f64) -> f64 {
     match (file.young_pa, file.ea_n) {
-        (Some(young), _) => c.number(place, "young_pa", young, &YOUNG),
+        (Some(young), _) => c.number(place, "young_pa", young, TUBE),
         (None, Some(ea)) if ea > 0.0 => ea / area_m2,
         (None, _) => {
             c.wrong(
@@ -236,7 +227,7 @@ fn modulus(c: &mut Checker<'_, '_>, place: &Place, file: &TubeFile, area_m2: f64
 
 fn density(c: &mut Checker<'_, '_>, place: &Place, file: &TubeFile, area_m2: f64) -> f64 {
     match (file.density_kg_m3, file.mass_per_length_kg_m) {
-        (Some(density), _) => c.number(place, "density_kg_m3", density, &DENSITY),
+        (Some(density), _) => c.number(place, "density_kg_m3", density, TUBE),
         (None, Some(mass)) if mass > 0.0 => mass / area_m2,
         (None, _) => {
             let expected = "expected `density_kg_m3` (or `mass_per_length_kg_m`, from which it follows) in this table";
@@ -256,13 +247,13 @@ fn resolutions(
 ) -> (Resolution, ResolutionRange, ResolutionRange) {
     let finest = length_m / f64::from(SEGMENTS_MAX);
     // an ε as long as the tube is one interval; longer ones mean the same and are accepted up to ten lengths
-    let spacing = allowed(rounded_up(finest)..=length_m * 10.0, "m (1/4096 … 10 times its length)");
-    let eps = file.eps_m.map(|eps| c.ends(place, "eps_m", eps, &spacing));
-    let picture = file.picture_eps_m.map(|eps| c.ends(place, "picture_eps_m", eps, &spacing));
+    let spacing = NumberRange::new(rounded_up(finest), length_m * 10.0, "m (1/4096 … 10 times its length)");
+    let eps = file.eps_m.map(|eps| c.ends(place, "eps_m", eps, spacing));
+    let picture = file.picture_eps_m.map(|eps| c.ends(place, "picture_eps_m", eps, spacing));
     let usual = length_m / SEGMENTS_DEFAULT;
     let simulation = match file.segments {
         Some(n) => {
-            let n = c.number(place, "segments", f64::from(n), &allowed(2.0..=f64::from(SEGMENTS_MAX), ""));
+            let n = c.number(place, "segments", f64::from(n), TUBE);
             (length_m / n, length_m / n)
         }
         None => eps.unwrap_or((usual, usual)),
@@ -301,8 +292,8 @@ fn attachments(c: &mut Checker<'_, '_>, place: &Place, files: &[AttachFile]) -> 
 }
 
 fn attachment(c: &mut Checker<'_, '_>, place: &Place, file: &AttachFile) -> Attachment {
-    let from = c.number(place, "from", file.from, &SHARE);
-    let to = c.number(place, "to", file.to, &SHARE);
+    let from = c.number(place, "from", file.from, ATTACH);
+    let to = c.number(place, "to", file.to, ATTACH);
     if from >= to {
         c.wrong(place, "to", format_args!("is {to}"), format!("expected a number above `from`, {from}"));
     }
@@ -312,11 +303,9 @@ fn attachment(c: &mut Checker<'_, '_>, place: &Place, file: &AttachFile) -> Atta
     Attachment {
         from,
         to,
-        stiffness_n_m2: c.number(place, "stiffness_n_m2", file.stiffness_n_m2, &allowed(0.0..=1e9, "N/m²")),
-        slack_m: c.optional(place, "slack_m", file.slack_m, &allowed(0.0..=100.0, "m")).unwrap_or(0.0),
-        damping_n_s_m2: c
-            .optional(place, "damping_n_s_m2", file.damping_n_s_m2, &allowed(0.0..=1e6, "N·s/m²"))
-            .unwrap_or(0.0),
+        stiffness_n_m2: c.number(place, "stiffness_n_m2", file.stiffness_n_m2, ATTACH),
+        slack_m: c.optional(place, "slack_m", file.slack_m, ATTACH).unwrap_or(0.0),
+        damping_n_s_m2: c.optional(place, "damping_n_s_m2", file.damping_n_s_m2, ATTACH).unwrap_or(0.0),
         tears_above_n,
         yields_above_n,
     }
@@ -324,8 +313,8 @@ fn attachment(c: &mut Checker<'_, '_>, place: &Place, file: &AttachFile) -> Atta
 
 fn peristalsis(c: &mut Checker<'_, '_>, place: &Place, file: PeristalsisFile) -> Peristalsis {
     Peristalsis {
-        amplitude: c.number(place, "amplitude", file.amplitude, &allowed(0.0..=0.95, "")),
-        wavelength_m: c.number(place, "wavelength_m", file.wavelength_m, &allowed(1e-4..=100.0, "m")),
-        speed_m_s: c.number(place, "speed_m_s", file.speed_m_s, &allowed(-100.0..=100.0, "m/s")),
+        amplitude: c.number(place, "amplitude", file.amplitude, PERISTALSIS),
+        wavelength_m: c.number(place, "wavelength_m", file.wavelength_m, PERISTALSIS),
+        speed_m_s: c.number(place, "speed_m_s", file.speed_m_s, PERISTALSIS),
     }
 }

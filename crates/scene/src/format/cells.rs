@@ -1,13 +1,19 @@
 //! `[[cell]]` and `[[portal]]`: the rooms of a building and the openings between them.
 
 use super::Point;
+use super::ranges::within;
+use metachron_core::{NumberRange, Ranges};
 use metachron_world::kinds::Material;
 use schemars::JsonSchema;
 use serde::Deserialize;
 
+/// Ranges of keys of [`CellFile`].
+pub const CELL: Ranges = Ranges(&[("walls_m", NumberRange::new(1e-3, 100.0, "m"))]);
+
 /// A room: a box along the axes, whose sides hide everything beyond them but for portals. Cells do not overlap.
 #[derive(Debug, Clone, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
+#[schemars(transform = within(CELL))]
 pub struct CellFile {
     /// The cell's name: unique among cells, and not `outside`.
     #[schemars(length(min = 1, max = 64))]
@@ -16,7 +22,7 @@ pub struct CellFile {
     pub from_m: Point,
     /// Its upper corner, metres: each coordinate above that of `from_m`.
     pub to_m: Point,
-    /// Thickness of walls that are built on its sides, within it, metres, 0.001 … 100: fixed boxes, with the portals left open. A portal
+    /// Thickness of walls that are built on its sides, within it, metres: fixed boxes, with the portals left open. A portal
     /// through them is a rectangle along the axes. Default: no walls, for sides that objects of the scene stand for.
     pub walls_m: Option<f64>,
     /// Sides without a wall. Default none.

@@ -1,6 +1,8 @@
 //! The keys that objects of every model share.
 
+use super::ranges::within;
 use super::{ContactFile, FaultsFile, OneOrEach, OneOrRange, Point};
+use metachron_core::{NumberRange, Ranges};
 use metachron_world::kinds::{Material, ShadingKind};
 use schemars::JsonSchema;
 use serde::Deserialize;
@@ -29,31 +31,39 @@ pub const COMMON_KEYS: [&str; 20] = [
     "scatter_seed",
 ];
 
+/// Ranges of keys of [`CommonFile`].
+pub const COMMON: Ranges = Ranges(&[
+    ("rate_hz", NumberRange::new(1.0, 1e5, "Hz")),
+    ("dt_ms", NumberRange::new(0.01, 1000.0, "ms")),
+    ("tolerance_m", NumberRange::new(1e-9, 1e3, "m")),
+    ("importance", NumberRange::new(1e-3, 1e3, "")),
+    ("scatter_m", NumberRange::new(0.0, 1e4, "m")),
+    ("scatter_deg", NumberRange::new(0.0, 180.0, "degrees")),
+]);
+
 /// Keys of every object, whatever its model.
 #[derive(Debug, Clone, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
+#[schemars(transform = within(COMMON))]
 pub struct CommonFile {
     /// The object's name: unique in the scene, not empty, at most 64 characters.
     #[schemars(length(min = 1, max = 64))]
     pub name: String,
-    /// Requested steps per second, 1 … 100000. Default: 1000 / `dt_ms` (its least value, if it is a range), or 240 without `dt_ms`.
+    /// Requested steps per second. Default: 1000 / `dt_ms` (its least value, if it is a range), or 240 without `dt_ms`.
     /// A single `dt_ms` must agree with it.
-    #[schemars(range(min = 1.0, max = 100_000.0))]
     pub rate_hz: Option<f64>,
-    /// Step length, milliseconds, 0.01 … 1000: one number fixes it; `[least, greatest]` is the range that the controller may use.
+    /// Step length, milliseconds: one number fixes it; `[least, greatest]` is the range that the controller may use.
     /// Default: 1000 / `rate_hz`, fixed.
     pub dt_ms: Option<OneOrRange<f64>>,
     /// Quantity that the controller holds within `dt_ms` and `eps_m`: `rate` (default), or `error`, which needs `tolerance_m`.
     /// For a sheet, solid or rope `hold` lists the parts that never move; `tolerance_m` alone selects `error` there.
     pub hold: Option<HoldKind>,
-    /// Greatest error by the object's own estimate, metres, 1e-9 … 1e3: the longest steps and the coarsest ε within its ranges that
+    /// Greatest error by the object's own estimate, metres: the longest steps and the coarsest ε within its ranges that
     /// keep it are used.
-    #[schemars(range(min = 1e-9, max = 1e3))]
     pub tolerance_m: Option<f64>,
     /// Level of the primitive drawn over one interval, 0 … 10: O(2ⁿ) polygons. Default: `[1, 5]`.
     pub n: Option<OneOrRange<u8>>,
-    /// Weight of the object's picture relative to that of others, 0.001 … 1000. Default 1.
-    #[schemars(range(min = 0.001, max = 1000.0))]
+    /// Weight of the object's picture relative to that of others. Default 1.
     pub importance: Option<f64>,
     /// Whether policies that choose by cost may leave the object out of the picture where not even the coarsest of everything fits. Default: that of `[target]`.
     pub may_vanish: Option<bool>,
@@ -80,11 +90,11 @@ pub struct CommonFile {
     /// Rise from each copy of the grid to the next, along x and along y, metres, up to 1e4 in magnitude. Default `[0, 0]`.
     #[schemars(length(min = 2, max = 2))]
     pub rise_m: Option<[f64; 2]>,
-    /// Moves every copy of the grid by a random distance along each axis, uniform up to this far either way, metres, 0 … 1e4; one
+    /// Moves every copy of the grid by a random distance along each axis, uniform up to this far either way, metres; one
     /// number, or one per axis: `[x, y, z]`. Default 0.
     pub scatter_m: Option<OneOrEach>,
     /// Turns every copy of the grid, of a rigid body, by a random angle about each of the world's axes, x, then y, then z, uniform up to this far either way,
-    /// degrees, 0 … 180; one number, or one per axis: `[x, y, z]`. Default 0.
+    /// degrees; one number, or one per axis: `[x, y, z]`. Default 0.
     pub scatter_deg: Option<OneOrEach>,
     /// Seed of the random distances and turns. Default 0.
     pub scatter_seed: Option<u32>,

@@ -1,12 +1,18 @@
 //! `contact` of an object: the groups that it collides with, how a pair shares its coefficients, whether it only
 //! senses.
 
+use super::ranges::within;
+use metachron_core::{NumberRange, Ranges};
 use schemars::JsonSchema;
 use serde::Deserialize;
+
+/// Ranges of keys of [`ContactFile`].
+pub const CONTACT: Ranges = Ranges(&[("spin_radius_m", NumberRange::new(0.0, 10.0, "m"))]);
 
 /// The contact traits of an object.
 #[derive(Debug, Clone, Default, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
+#[schemars(transform = within(CONTACT))]
 pub struct ContactFile {
     /// Names of the collision groups that it is in; at most 32 in a scene. Default: all of them.
     pub groups: Option<Vec<String>>,
@@ -20,9 +26,8 @@ pub struct ContactFile {
     pub friction_rule: Option<CombineRuleName>,
     /// How a pair with it shares both restitutions, as `friction_rule`. Default: the other object's rule; where neither has one `max`.
     pub restitution_rule: Option<CombineRuleName>,
-    /// Radius r of the patch by which each of its contacts resists spin about its normal, metres, 0 … 10: with a torque up to friction · r ·
+    /// Radius r of the patch by which each of its contacts resists spin about its normal, metres: with a torque up to friction · r ·
     /// push. A pair takes the larger one. It acts between objects that turn as a whole, and static solids. Default 0.
-    #[schemars(range(min = 0.0, max = 10.0))]
     pub spin_radius_m: Option<f64>,
 }
 

@@ -1,12 +1,28 @@
 //! `[[coupling]]` and `faults`: interactions of two objects other than the default contact, and injected faults.
 
 use super::Point;
+use super::ranges::{DAMPING, REST, STIFFNESS, TEARING, within};
+use metachron_core::{NumberRange, Ranges};
 use schemars::JsonSchema;
 use serde::Deserialize;
+
+/// Ranges of keys of [`CouplingFile`].
+pub const COUPLING: Ranges = Ranges(&[
+    ("stiffness_n_m", STIFFNESS),
+    ("damping_n_s_m", DAMPING),
+    ("rest_m", REST),
+    ("tears_above_n", TEARING),
+    ("yields_above_n", TEARING),
+]);
+
+/// Ranges of keys of [`FaultsFile`].
+pub const FAULTS: Ranges =
+    Ranges(&[("jitter", NumberRange::new(0.0, 0.5, "")), ("loss", NumberRange::new(0.0, 0.9, ""))]);
 
 /// Interaction of two moving objects, other than the default contact.
 #[derive(Debug, Clone, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
+#[schemars(transform = within(COUPLING))]
 pub struct CouplingFile {
     /// Name of a moving object.
     pub a: String,
@@ -21,16 +37,16 @@ pub struct CouplingFile {
     pub at_a: Option<Spot>,
     /// Point of `b` that an `attach` holds, as `at_a`.
     pub at_b: Option<Spot>,
-    /// Stiffness of an `attach`, or of a contact by `tlm`, N/m, 1e-6 … 1e9.
+    /// Stiffness of an `attach`, or of a contact by `tlm`, N/m.
     pub stiffness_n_m: Option<f64>,
-    /// Damping of the same spring, N·s/m, 0 … 1e7. Default 0.
+    /// Damping of the same spring, N·s/m. Default 0.
     pub damping_n_s_m: Option<f64>,
-    /// Rest length of an `attach`, metres, 0 … 1e4. Default 0.
+    /// Rest length of an `attach`, metres. Default 0.
     pub rest_m: Option<f64>,
-    /// Force above which an `attach` without a `law` tears, N, 1e-6 … 1e9: the mean over a common step of the two. It is gone then for
+    /// Force above which an `attach` without a `law` tears, N: the mean over a common step of the two. It is gone then for
     /// good, and the report has it under `events`. Default: never.
     pub tears_above_n: Option<f64>,
-    /// Greatest force that an `attach` without a `law` gives, N, 1e-6 … 1e9 and below `tears_above_n`: a greater load
+    /// Greatest force that an `attach` without a `law` gives, N; below `tears_above_n`: a greater load
     /// moves the place at which it holds, or lengthens one with a `rest_m`, for good. The report has the first time
     /// under `events`. Default: as much as it takes.
     pub yields_above_n: Option<f64>,
@@ -93,12 +109,11 @@ pub enum Spot {
 /// Faults injected into the clock and the messages of an object, for tests of couplings.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
+#[schemars(transform = within(FAULTS))]
 pub struct FaultsFile {
-    /// Every step is longer or shorter by a random share up to this, 0 … 0.5. Default 0.
-    #[schemars(range(min = 0.0, max = 0.5))]
+    /// Every step is longer or shorter by a random share up to this. Default 0.
     pub jitter: Option<f64>,
-    /// Share of published states that no other object receives, 0 … 0.9. Default 0.
-    #[schemars(range(min = 0.0, max = 0.9))]
+    /// Share of published states that no other object receives. Default 0.
     pub loss: Option<f64>,
     /// Seed of the random numbers of both. Default 0.
     pub seed: Option<u32>,

@@ -1,12 +1,44 @@
 //! `[[joint]]`: a joint between two rigid objects, or between one and the world.
 
 use super::Point;
+use super::ranges::{DAMPING, REST, STIFFNESS, TEARING, within};
+use metachron_core::{NumberRange, Ranges};
 use schemars::JsonSchema;
 use serde::Deserialize;
+
+/// Most torque or force of a motor.
+const EFFORT: NumberRange = NumberRange::new(1e-9, 1e9, "N·m or N");
+/// Fastest motion, m/s and rad/s.
+const SPEED: NumberRange = NumberRange::new(-1e4, 1e4, "");
+
+/// Ranges of keys of [`JointFile`].
+pub const JOINT: Ranges = Ranges(&[
+    ("stiffness_n_m", STIFFNESS),
+    ("damping_n_s_m", DAMPING),
+    ("rest_m", REST),
+    ("length_m", NumberRange::new(1e-6, 1e4, "m")),
+    ("tears_above_n", TEARING),
+    ("yields_above_n", TEARING),
+]);
+
+/// Ranges of keys of [`MotorFile`].
+pub const MOTOR: Ranges = Ranges(&[
+    ("position_deg", NumberRange::new(-180.0, 180.0, "")),
+    ("velocity_rad_s", SPEED),
+    ("max_torque_n_m", EFFORT),
+    ("stiffness_n_m_rad", STIFFNESS),
+    ("damping_n_m_s_rad", DAMPING),
+    ("position_m", NumberRange::new(-1e4, 1e4, "")),
+    ("velocity_m_s", SPEED),
+    ("max_force_n", EFFORT),
+    ("stiffness_n_m", STIFFNESS),
+    ("damping_n_s_m", DAMPING),
+]);
 
 /// A joint between two rigid objects, or between one and the world.
 #[derive(Debug, Clone, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
+#[schemars(transform = within(JOINT))]
 pub struct JointFile {
     /// Its name, by which programs drive it and sensors read it: unique among the names of joints. Default: none.
     #[schemars(length(min = 1, max = 64))]
@@ -33,21 +65,21 @@ pub struct JointFile {
     pub range_deg: Option<[f64; 2]>,
     /// Motor of a `revolute` or `prismatic` joint.
     pub motor: Option<MotorFile>,
-    /// Stiffness of a `spring`, N/m, 1e-6 … 1e9.
+    /// Stiffness of a `spring`, N/m.
     pub stiffness_n_m: Option<f64>,
-    /// Damping of a `spring`, N·s/m, 0 … 1e7. Default 0.
+    /// Damping of a `spring`, N·s/m. Default 0.
     pub damping_n_s_m: Option<f64>,
-    /// Rest length of a `spring`, metres, 0 … 1e4. Default: its length at the start.
+    /// Rest length of a `spring`, metres. Default: its length at the start.
     pub rest_m: Option<f64>,
-    /// Greatest length of a `rope`, metres, 1e-6 … 1e4. Default: its length at the start.
+    /// Greatest length of a `rope`, metres. Default: its length at the start.
     pub length_m: Option<f64>,
     /// Whether the two objects can collide with each other, also once the joint has torn. Default true for a spring or rope, false for
     /// the others.
     pub collide: Option<bool>,
-    /// Force above which it tears, N, 1e-6 … 1e9: the mean over a common step of the two; its torques do not count. It
+    /// Force above which it tears, N: the mean over a common step of the two; its torques do not count. It
     /// is gone then for good, and the report has it under `events`. Default: never.
     pub tears_above_n: Option<f64>,
-    /// Greatest force that it gives, N, 1e-6 … 1e9 and below `tears_above_n`: a load above it moves the point of `b`
+    /// Greatest force that it gives, N; below `tears_above_n`: a load above it moves the point of `b`
     /// that it holds, or lengthens a `rope` or `spring`, for good. Its torques are not bounded. The report has the
     /// first time under `events`. Default: as much as it takes.
     pub yields_above_n: Option<f64>,
@@ -57,27 +89,28 @@ pub struct JointFile {
 /// kept exactly as long as the effort suffices; a position is approached by a spring, with a damper against the velocity (default 0).
 #[derive(Debug, Clone, Copy, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
+#[schemars(transform = within(MOTOR))]
 pub struct MotorFile {
-    /// Angle of a `revolute` joint at which its spring rests, degrees, up to 180 in magnitude; it is reached the shorter way around.
+    /// Angle of a `revolute` joint at which its spring rests, degrees; it is reached the shorter way around.
     pub position_deg: Option<f64>,
-    /// Velocity of a `revolute` joint, rad/s, up to 1e4 in magnitude.
+    /// Velocity of a `revolute` joint, rad/s.
     pub velocity_rad_s: Option<f64>,
-    /// Greatest torque, N·m, 1e-9 … 1e9. Default: as much as it takes.
+    /// Greatest torque, N·m. Default: as much as it takes.
     pub max_torque_n_m: Option<f64>,
-    /// Stiffness of the spring to `position_deg`, N·m/rad, 1e-6 … 1e9.
+    /// Stiffness of the spring to `position_deg`, N·m/rad.
     pub stiffness_n_m_rad: Option<f64>,
-    /// Damping against `velocity_rad_s`, N·m·s/rad, 0 … 1e7: without a position the motor gives this times the missing
+    /// Damping against `velocity_rad_s`, N·m·s/rad: without a position the motor gives this times the missing
     /// velocity.
     pub damping_n_m_s_rad: Option<f64>,
-    /// Position of a `prismatic` joint at which its spring rests, metres, up to 1e4 in magnitude.
+    /// Position of a `prismatic` joint at which its spring rests, metres.
     pub position_m: Option<f64>,
-    /// Velocity of a `prismatic` joint, m/s, up to 1e4 in magnitude.
+    /// Velocity of a `prismatic` joint, m/s.
     pub velocity_m_s: Option<f64>,
-    /// Greatest force, N, 1e-9 … 1e9. Default: as much as it takes.
+    /// Greatest force, N. Default: as much as it takes.
     pub max_force_n: Option<f64>,
-    /// Stiffness of the spring to `position_m`, N/m, 1e-6 … 1e9.
+    /// Stiffness of the spring to `position_m`, N/m.
     pub stiffness_n_m: Option<f64>,
-    /// Damping against `velocity_m_s`, N·s/m, 0 … 1e7: without a position the motor gives this times the missing
+    /// Damping against `velocity_m_s`, N·s/m: without a position the motor gives this times the missing
     /// velocity.
     pub damping_n_s_m: Option<f64>,
 }

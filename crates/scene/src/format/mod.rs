@@ -8,6 +8,7 @@ mod common;
 mod contact;
 mod coupling;
 mod joint;
+pub mod ranges;
 mod rigid;
 mod scene;
 mod scenery;
@@ -18,22 +19,25 @@ mod tool;
 mod tube;
 mod value;
 
-pub use cells::{CellFile, PortalFile, SideKind};
-pub use common::{COMMON_KEYS, CommonFile, HoldKind};
-pub use contact::{CombineRuleName, ContactFile};
-pub use coupling::{CouplingFile, CouplingKind, CouplingLaw, FaultsFile, Spot};
-pub use joint::{JointFile, JointKind, MotorFile};
-pub use rigid::{Axis, PartFile, PoseKeyFile, RigidFile, Shape};
+pub use cells::{CELL, CellFile, PortalFile, SideKind};
+pub use common::{COMMON, COMMON_KEYS, CommonFile, HoldKind};
+pub use contact::{CONTACT, CombineRuleName, ContactFile};
+pub use coupling::{COUPLING, CouplingFile, CouplingKind, CouplingLaw, FAULTS, FaultsFile, Spot};
+pub use joint::{JOINT, JointFile, JointKind, MOTOR, MotorFile};
+pub use rigid::{Axis, PartFile, PoseKeyFile, RIGID, RigidFile, Shape, TIMES};
 pub use scene::{
-    CameraFile, CameraFiles, CameraKeyFile, ContactPath, ContactsFile, LoadFile, MachineFile, ModelCostFile, ProbeFile,
-    SceneFile, ShadingCostFile, SolvesFile, TargetFile, WorldFile,
+    CAMERA, COST, CameraFile, CameraFiles, CameraKeyFile, ContactPath, ContactsFile, LOAD, LoadFile, MACHINE,
+    MachineFile, ModelCostFile, PROBE, ProbeFile, SCENE, STEP_COST, SURROUNDINGS, SceneFile, ShadingCostFile,
+    SolvesFile, TARGET, TargetFile, WorldFile,
 };
-pub use scenery::{GeneratorKind, GroupFile, MeshFile, MotionFile, TreeFile, TreeLod};
+pub use scenery::{GeneratorKind, GroupFile, MESH, MOTION, MeshFile, MotionFile, TREE, TreeFile, TreeLod};
 pub use sensor::{SensorFile, SensorFileKind};
-pub use soft::{LawKind, RegionFile, RopeEnd, RopeFile, SheetFile, SheetSide, SoftShapeKind, SolidFile, SolidSide};
-pub use synthetic::SyntheticFile;
-pub use tool::{KeyframeFile, ToolFile};
-pub use tube::{AttachFile, End, Integrator, PeristalsisFile, PressureFile, TubeFile, Wall};
+pub use soft::{
+    LawKind, RegionFile, RopeEnd, RopeFile, SOFT, SheetFile, SheetSide, SoftShapeKind, SolidFile, SolidSide,
+};
+pub use synthetic::{SYNTHETIC, SyntheticFile};
+pub use tool::{KEYFRAME, KeyframeFile, TOOL, ToolFile};
+pub use tube::{ATTACH, AttachFile, End, Integrator, PERISTALSIS, PeristalsisFile, PressureFile, TUBE, TubeFile, Wall};
 pub use value::{OneOrEach, OneOrRange, Point};
 
 /// The models an object can have, as scenes write them.

@@ -1,22 +1,42 @@
 //! `model = "rigid"`: a rigid body, or with `fixed = true` a solid that never moves.
 
+use super::ranges::{DENSITY, FRICTION, LENGTH, SCALE, TIME, TRIANGLES, within};
 use super::{GeneratorKind, Point};
+use metachron_core::{NumberRange, Ranges};
+use metachron_models::rigid::LIMITS;
 use schemars::JsonSchema;
 use serde::Deserialize;
+
+/// Ranges of keys of [`RigidFile`] and [`PartFile`].
+pub const RIGID: Ranges = Ranges(&[
+    ("radius_m", LENGTH),
+    ("half_extents_m", LENGTH),
+    ("half_height_m", LENGTH),
+    ("triangles", TRIANGLES),
+    ("scale", SCALE),
+    ("hull_within_m", NumberRange::new(0.0, 0.1, "m")),
+    ("density_kg_m3", DENSITY),
+    ("friction", FRICTION),
+    ("gravity_scale", NumberRange::new(-1000.0, 1000.0, "")),
+]);
+
+/// Ranges of keys of [`PoseKeyFile`].
+pub const TIMES: Ranges = Ranges(&[("at_s", TIME)]);
 
 /// A rigid body, or a static solid that others collide with.
 #[derive(Debug, Clone, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
+#[schemars(transform = within(LIMITS), transform = within(RIGID))]
 pub struct RigidFile {
     /// Its shape. `ball`: `radius_m`. `box`: `half_extents_m`. `capsule` and `cylinder` (along z): `radius_m`,
     /// `half_height_m`. `plane`: the half space below z = 0 of its axes, always fixed. `hull` and `mesh`: `file`
     /// or `generate`. `compound`: several solids as one, one `[[object.part]]` each.
     pub shape: Shape,
-    /// Radius of a ball, capsule or cylinder, metres, 1e-6 … 1e4.
+    /// Radius of a ball, capsule or cylinder, metres.
     pub radius_m: Option<f64>,
-    /// Half the edges of a box, metres, each 1e-6 … 1e4.
+    /// Half the edges of a box, metres.
     pub half_extents_m: Option<Point>,
-    /// Half the length of a cylinder, or of a capsule's straight part, metres, 1e-6 … 1e4.
+    /// Half the length of a cylinder, or of a capsule's straight part, metres.
     pub half_height_m: Option<f64>,
     /// A .glb file (+y up), an STL or an OBJ file (+z up), its path relative to the scene file: the points of a hull, the triangles of a mesh.
     pub file: Option<String>,
@@ -24,14 +44,12 @@ pub struct RigidFile {
     pub generate: Option<GeneratorKind>,
     /// Seed of a generated surface. Default 0.
     pub seed: Option<u32>,
-    /// Triangles of a generated surface, 4 … 100000. Default 4000.
-    #[schemars(range(min = 4, max = 100_000))]
+    /// Triangles of a generated surface. Default 4000.
     pub triangles: Option<u32>,
-    /// Factor that converts the surface's coordinates to metres, 1e-6 … 1e6. Default 1.
+    /// Factor that converts the surface's coordinates to metres. Default 1.
     pub scale: Option<f64>,
-    /// How far points of a surface may lie above a face of its hull, metres, 0 … 0.1: the hull is simplified so far, and 0 keeps all points.
+    /// How far points of a surface may lie above a face of its hull, metres: the hull is simplified so far, and 0 keeps all points.
     /// Default 1e-4, or a thousandth of the diagonal of the box around the points where that is less.
-    #[schemars(range(min = 0.0, max = 0.1))]
     pub hull_within_m: Option<f64>,
     /// The solids of a `compound`, 1 … 16: each has a shape with its keys, and may have `position_m`, `rotation_deg` and `density_kg_m3`.
     #[schemars(length(min = 1, max = 16))]
@@ -44,26 +62,24 @@ pub struct RigidFile {
     pub velocity_m_s: Option<Point>,
     /// Angular velocity at the start about the world's axes, rad/s, up to 1e4. Default none.
     pub spin_rad_s: Option<Point>,
-    /// Mass, kilograms, 1e-9 … 1e9. Not together with `density_kg_m3`.
+    /// Mass, kilograms. Not together with `density_kg_m3`.
     pub mass_kg: Option<f64>,
-    /// Density, kg/m³, 1e-3 … 1e6. Default 1000 where no mass is given.
+    /// Density, kg/m³. Default 1000 where no mass is given.
     pub density_kg_m3: Option<f64>,
     /// Centre of mass in the axes of the object, metres; beside `inertia_kg_m2`. Default: the origin of those axes.
     pub centre_of_mass_m: Option<Point>,
     /// Moments and products of inertia about the centre of mass along the axes of the object, kg·m²: `[xx, yy, zz, xy, xz, yz]`, beside
     /// `mass_kg`. The products are elements of the tensor, as in URDF and MJCF. Default: the shape's, evenly filled.
     pub inertia_kg_m2: Option<[f64; 6]>,
-    /// Coefficient of restitution, 0 … 1; a pair takes the larger one. Default 0.
-    #[schemars(range(min = 0.0, max = 1.0))]
+    /// Coefficient of restitution; a pair takes the larger one. Default 0.
     pub restitution: Option<f64>,
-    /// Coulomb friction coefficient, 0 … 10; a pair takes the geometric mean. Default 0.5.
-    #[schemars(range(min = 0.0, max = 10.0))]
+    /// Coulomb friction coefficient; a pair takes the geometric mean. Default 0.5.
     pub friction: Option<f64>,
-    /// How many times as strong gravity is for it, -1000 … 1000. Default 1.
+    /// How many times as strong gravity is for it. Default 1.
     pub gravity_scale: Option<f64>,
-    /// Rate by which its velocity decays, 1/s, 0 … 1e6. Default 0.
+    /// Rate by which its velocity decays, 1/s. Default 0.
     pub linear_damping_per_s: Option<f64>,
-    /// Rate by which its angular momentum decays, 1/s, 0 … 1e6. Default 0.
+    /// Rate by which its angular momentum decays, 1/s. Default 0.
     pub angular_damping_per_s: Option<f64>,
     /// Axes of the world along which it does not move. Default none.
     pub lock_translation: Option<Vec<Axis>>,
@@ -96,14 +112,15 @@ pub enum Axis {
 /// A solid of a `compound`.
 #[derive(Debug, Clone, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
+#[schemars(transform = within(RIGID))]
 pub struct PartFile {
     /// Its shape; no plane and no compound.
     pub shape: Shape,
-    /// Radius of a ball, capsule or cylinder, metres, 1e-6 … 1e4.
+    /// Radius of a ball, capsule or cylinder, metres.
     pub radius_m: Option<f64>,
-    /// Half the edges of a box, metres, each 1e-6 … 1e4.
+    /// Half the edges of a box, metres.
     pub half_extents_m: Option<Point>,
-    /// Half the length of a cylinder, or of a capsule's straight part, metres, 1e-6 … 1e4.
+    /// Half the length of a cylinder, or of a capsule's straight part, metres.
     pub half_height_m: Option<f64>,
     /// A .glb, STL or OBJ file, its path relative to the scene file.
     pub file: Option<String>,
@@ -111,28 +128,27 @@ pub struct PartFile {
     pub generate: Option<GeneratorKind>,
     /// Seed of a generated surface. Default 0.
     pub seed: Option<u32>,
-    /// Triangles of a generated surface, 4 … 100000. Default 4000.
-    #[schemars(range(min = 4, max = 100_000))]
+    /// Triangles of a generated surface. Default 4000.
     pub triangles: Option<u32>,
-    /// Factor that converts the surface's coordinates to metres, 1e-6 … 1e6. Default 1.
+    /// Factor that converts the surface's coordinates to metres. Default 1.
     pub scale: Option<f64>,
-    /// How far points of a surface may lie above a face of its hull, metres, 0 … 0.1: the hull is simplified so far, and 0 keeps all points.
+    /// How far points of a surface may lie above a face of its hull, metres: the hull is simplified so far, and 0 keeps all points.
     /// Default 1e-4, or a thousandth of the diagonal of the box around the points where that is less.
-    #[schemars(range(min = 0.0, max = 0.1))]
     pub hull_within_m: Option<f64>,
     /// Position of the origin of its axes in the object's axes, metres. Default: their origin.
     pub position_m: Option<Point>,
     /// Rotation by angles about the object's x, then y, then z axis, degrees. Default none.
     pub rotation_deg: Option<Point>,
-    /// Density, kg/m³, 1e-3 … 1e6; where the object has a mass, the densities of its parts only share it. Default: that of the object.
+    /// Density, kg/m³; where the object has a mass, the densities of its parts only share it. Default: that of the object.
     pub density_kg_m3: Option<f64>,
 }
 
 /// Pose of a kinematic object at one time.
 #[derive(Debug, Clone, Copy, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
+#[schemars(transform = within(TIMES))]
 pub struct PoseKeyFile {
-    /// Seconds from the start, 0 … 1e6, later than the keyframe before. Default 0 for the first.
+    /// Seconds from the start; later than the keyframe before. Default 0 for the first.
     pub at_s: Option<f64>,
     /// Position of the origin of the shape's axes, metres.
     pub position_m: Point,

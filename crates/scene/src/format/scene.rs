@@ -1,7 +1,10 @@
 //! The tables of a scene other than its objects.
 
+use super::ranges::{SHARE, TIME, within};
 use super::{CellFile, CouplingFile, FaultsFile, GroupFile, JointFile, OneOrRange, Point, PortalFile, SensorFile};
-use metachron_core::gains;
+use metachron_contact::detect::{DEPTH_RANGE_M, LEAST_STEPS_RANGE};
+use metachron_core::{NumberRange, Ranges, gains};
+use metachron_world::RENDER_SCALE;
 use metachron_world::kinds::{EnvironmentKind, ExecutorKind, LawKind, PolicyKind, PriorityKind, StatesKind, ValueKind};
 use schemars::JsonSchema;
 use serde::de::IgnoredAny;
@@ -13,6 +16,7 @@ use std::collections::BTreeMap;
 /// A scene file without its `[[object]]` tables, which are read one by one according to their models.
 #[derive(Debug, Clone, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
+#[schemars(transform = within(SCENE))]
 pub struct SceneFile {
     /// Version of this format: 1.
     #[schemars(range(min = 1, max = 1))]
@@ -26,7 +30,6 @@ pub struct SceneFile {
     pub priority: Option<PriorityKind>,
     /// How long the turn of an object may last before the object counts as stalled, seconds on the clock of the wall. Default 0.25.
     /// Ten of its steps are always allowed, and a cluster's turn as many times as long as it has members, 25 at most; a checkpoint waits for a stalled turn as long.
-    #[schemars(range(min = 0.001, max = 3600.0))]
     pub stall_s: Option<f64>,
     /// Time at which states are drawn. Default `interpolate`.
     pub states: Option<StatesKind>,
@@ -73,9 +76,78 @@ pub struct SceneFile {
     pub object: IgnoredAny,
 }
 
+/// Depths of resting contacts.
+const DEPTH: NumberRange = NumberRange::new(*DEPTH_RANGE_M.start(), *DEPTH_RANGE_M.end(), "m");
+/// Nanoseconds per pixel or object.
+const PER_PIECE: NumberRange = NumberRange::new(0.0, 1e6, "ns");
+
+/// Ranges of keys of [`SceneFile`].
+pub const SCENE: Ranges = Ranges(&[("stall_s", NumberRange::new(1e-3, 3600.0, "s"))]);
+
+/// Ranges of keys of [`WorldFile`].
+pub const SURROUNDINGS: Ranges = Ranges(&[
+    ("contact_depth_m", DEPTH),
+    ("contact_least_steps", NumberRange::new(*LEAST_STEPS_RANGE.start() as f64, *LEAST_STEPS_RANGE.end() as f64, "")),
+]);
+
+/// Ranges of keys of [`TargetFile`].
+pub const TARGET: Ranges = Ranges(&[
+    ("frame_hz", NumberRange::new(1.0, 1000.0, "Hz")),
+    ("alpha", gains::ALPHA),
+    ("beta", gains::BETA),
+    ("kappa", gains::KAPPA),
+    ("lead", gains::LEAD),
+    ("margin", gains::MARGIN),
+    ("agent_refine", gains::REFINE),
+    ("agent_yield", gains::YIELD),
+    ("lag_ms", NumberRange::new(1.0, 1000.0, "ms")),
+    ("optimiser_share", NumberRange::new(1e-3, 0.5, "")),
+    ("focus", SHARE),
+    ("motion", SHARE),
+    ("hysteresis", SHARE),
+    ("render_scale", NumberRange::new(RENDER_SCALE.0, RENDER_SCALE.1, "")),
+]);
+
+/// Ranges of keys of [`CameraFile`] and [`CameraKeyFile`].
+pub const CAMERA: Ranges = Ranges(&[("fov_deg", NumberRange::new(1.0, 150.0, "degrees")), ("at_s", TIME)]);
+
+/// Ranges of keys of [`MachineFile`].
+pub const MACHINE: Ranges = Ranges(&[
+    ("cores", NumberRange::new(1.0, 4096.0, "")),
+    ("draw_setup_ms", NumberRange::new(0.0, 1e4, "ms")),
+    ("draw_object_us", NumberRange::new(0.0, 1e6, "µs")),
+    ("draw_triangle_us", NumberRange::new(0.0, 1e4, "µs")),
+    ("draw_pixel_ns", PER_PIECE),
+    ("draw_enlarge_ns", PER_PIECE),
+    ("cull_object_ns", PER_PIECE),
+    ("choose_object_ns", PER_PIECE),
+    ("noise", SHARE),
+    ("wander", SHARE),
+    ("spikes", SHARE),
+]);
+
+/// Ranges of keys of [`LoadFile`].
+pub const LOAD: Ranges = Ranges(&[("at_s", TIME), ("factor", NumberRange::new(0.01, 100.0, ""))]);
+
+/// Ranges of keys of [`ShadingCostFile`].
+pub const COST: Ranges = Ranges(&[
+    ("object_us", NumberRange::new(0.0, 1e6, "µs")),
+    ("triangle_us", NumberRange::new(0.0, 1e4, "µs")),
+    ("vertex_us", NumberRange::new(0.0, 1e4, "µs")),
+    ("pixel_ns", PER_PIECE),
+]);
+
+/// Ranges of keys of [`ModelCostFile`].
+pub const STEP_COST: Ranges =
+    Ranges(&[("base_us", NumberRange::new(0.0, 1e9, "µs")), ("unit_us", NumberRange::new(0.0, 1e9, "µs"))]);
+
+/// Ranges of keys of [`ProbeFile`].
+pub const PROBE: Ranges = Ranges(&[("at", SHARE), ("every_ms", NumberRange::new(0.01, 1e6, "ms"))]);
+
 /// `[world]`: the surroundings of the objects.
 #[derive(Debug, Clone, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
+#[schemars(transform = within(SURROUNDINGS))]
 pub struct WorldFile {
     /// Gravity, m/s², up to 1e4. Default `[0, 0, -9.81]`.
     pub gravity_m_s2: Option<Point>,
@@ -83,16 +155,14 @@ pub struct WorldFile {
     pub environment: Option<EnvironmentKind>,
     /// Whether moving objects collide with each other. Default true; with false only pairs that a `[[coupling]]` names do.
     pub contacts: Option<ContactsFile>,
-    /// How deep objects that lie on each other rest, metres, 1e-6 … 1e-3: the softness of contacts follows from it. Default 2e-5; smaller
+    /// How deep objects that lie on each other rest, metres: the softness of contacts follows from it. Default 2e-5; smaller
     /// for bodies below a centimetre, at some more factors a step. Bodies too light to be pressed so deep lie less
     /// deep.
-    #[schemars(range(min = 1e-6, max = 1e-3))]
     pub contact_depth_m: Option<f64>,
     /// How far the solves of contacts go. Default `exact`; at the free pace they are so in any case.
     pub contact: Option<SolvesFile>,
-    /// How many steps a solve makes in any case where it goes by `budget` and has not come to its end before, 1 … 400. Default 5, after which an
+    /// How many steps a solve makes in any case where it goes by `budget` and has not come to its end before. Default 5, after which an
     /// answer is safe; with more contacts are less deep while bodies land, and turns may take longer than there is time.
-    #[schemars(range(min = 1, max = 400))]
     pub contact_least_steps: Option<u32>,
     /// Faults injected into the clock and messages of every object.
     pub faults: Option<FaultsFile>,
@@ -134,9 +204,9 @@ pub enum ContactPath {
 /// `[target]`: the target frame rate and how it is held.
 #[derive(Debug, Clone, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
+#[schemars(transform = within(TARGET))]
 pub struct TargetFile {
-    /// Target frames per second, 1 … 1000. Default 60.
-    #[schemars(range(min = 1.0, max = 1000.0))]
+    /// Target frames per second. Default 60.
     pub frame_hz: Option<f64>,
     /// Policy that chooses the level of every visible object. Default `adaptive`.
     pub policy: Option<PolicyKind>,
@@ -144,50 +214,40 @@ pub struct TargetFile {
     pub value: Option<ValueKind>,
     /// Feedback law. Default `corrected`.
     pub law: Option<LawKind>,
-    /// Gain α of the printed law, 1e-9 … 1. Default 1e-4.
-    #[schemars(range(min = gains::ALPHA.0, max = gains::ALPHA.1))]
+    /// Gain α of the printed law. Default 1e-4.
     pub alpha: Option<f64>,
-    /// Gain β of the printed law, 1e-6 … 1e3. Default 5.
-    #[schemars(range(min = gains::BETA.0, max = gains::BETA.1))]
+    /// Gain β of the printed law. Default 5.
     pub beta: Option<f64>,
-    /// Gain κ of the corrected law, 0.001 … 1.99; below 1 it is stable for every scene. Default: the law's own.
-    #[schemars(range(min = gains::KAPPA.0, max = gains::KAPPA.1))]
+    /// Gain κ of the corrected law; below 1 it is stable for every scene. Default: the law's own.
     pub kappa: Option<f64>,
-    /// Gain λ of the corrected law on the error's change, 0 … 1.99. Default: the law's own.
-    #[schemars(range(min = gains::LEAD.0, max = gains::LEAD.1))]
+    /// Gain λ of the corrected law on the error's change. Default: the law's own.
     pub lead: Option<f64>,
-    /// Share of the frame time that is left free, 0 … 0.9. Default: for feedback its law's own, for policies that predict 0.02.
-    #[schemars(range(min = gains::MARGIN.0, max = gains::MARGIN.1))]
+    /// Share of the frame time that is left free. Default: for feedback its law's own, for policies that predict 0.02.
     pub margin: Option<f64>,
-    /// Gain of the agents' own loops: share of the way to a finer level that one demand goes, 0.02 … 1. Default 0.5.
-    #[schemars(range(min = gains::REFINE.0, max = gains::REFINE.1))]
+    /// Gain of the agents' own loops: share of the way to a finer level that one demand goes. Default 0.5.
     pub agent_refine: Option<f64>,
-    /// Gain of the agents' own loops: share of a delay by others that one demand removes, 0.02 … 1.99. Default 0.5.
-    #[schemars(range(min = gains::YIELD.0, max = gains::YIELD.1))]
+    /// Gain of the agents' own loops: share of a delay by others that one demand removes. Default 0.5.
     pub agent_yield: Option<f64>,
-    /// Greatest lag from reading the camera to the finished picture, milliseconds, 1 … 1000: levels are chosen so that it is kept, and the
+    /// Greatest lag from reading the camera to the finished picture, milliseconds: levels are chosen so that it is kept, and the
     /// camera is drawn at its predicted pose for that time. Default: no bound, and the camera is drawn where it was read.
     pub lag_ms: Option<f64>,
-    /// Share reserved for choosing levels, of the part that culling leaves of `lag_ms`, 0.001 … 0.5. Default 0.05.
+    /// Share reserved for choosing levels, of the part that culling leaves of `lag_ms`. Default 0.05.
     pub optimiser_share: Option<f64>,
     /// Whether `adaptive` and `robin-hood` spend time left over when everything is at its finest on still smoother shapes and softer
     /// shadows. Default false.
     pub raise: Option<bool>,
     /// Whether policies that choose by cost may leave objects out of the picture where not even the coarsest of everything fits: for objects without a `may_vanish` of their own. Default false.
     pub may_vanish: Option<bool>,
-    /// How much a level's benefit falls with the distance from the middle of the picture, 0 … 1. Default 0. This and the next two are for
+    /// How much a level's benefit falls with the distance from the middle of the picture. Default 0. This and the next two are for
     /// policies that choose by cost.
-    #[schemars(range(min = 0.0, max = 1.0))]
     pub focus: Option<f64>,
-    /// How much it falls with speed across the picture, 0 … 1. Default 0 for `greedy`, `greedy-incremental` and `greedy-repaired`, 0.5 for
+    /// How much it falls with speed across the picture. Default 0 for `greedy`, `greedy-incremental` and `greedy-repaired`, 0.5 for
     /// the others.
-    #[schemars(range(min = 0.0, max = 1.0))]
     pub motion: Option<f64>,
-    /// How much it falls with the distance from the level of the frame before, 0 … 1: for `greedy`, `greedy-incremental`,
+    /// How much it falls with the distance from the level of the frame before: for `greedy`, `greedy-incremental`,
     /// `greedy-repaired`, and in addition to its own for `adaptive`. Default 0.
-    #[schemars(range(min = 0.0, max = 1.0))]
     pub hysteresis: Option<f64>,
-    /// Fraction of its width and height that the picture is drawn with, `[least, most]` or one number for both, 0.35 … 1 in steps of 0.05; then it is
+    /// Fraction of its width and height that the picture is drawn with, `[least, most]` or one number for both; in steps of 0.05. Then it is
     /// enlarged.
     /// Fewer pixels are drawn where all else is at its coarsest and frames are late still. Default `[0.35, 1.0]`.
     pub render_scale: Option<OneOrRange<f64>>,
@@ -235,6 +295,7 @@ impl<'de> Deserialize<'de> for CameraFiles {
 /// `[camera]`, or one of `[[camera]]`: a still view; with `period_s` an orbit about `look_at_m`; with `keyframe` a path.
 #[derive(Debug, Clone, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
+#[schemars(transform = within(CAMERA))]
 pub struct CameraFile {
     /// Its name, by which it is chosen; each camera has another. Default: `camera`, and of several `camera 1` and so on.
     pub name: Option<String>,
@@ -242,7 +303,7 @@ pub struct CameraFile {
     pub eye_m: Option<Point>,
     /// Point that it looks at, metres. Default: the origin.
     pub look_at_m: Option<Point>,
-    /// Vertical angle of view, degrees, 1 … 150. Default 40.
+    /// Vertical angle of view, degrees. Default 40.
     pub fov_deg: Option<f64>,
     /// Seconds per turn about `look_at_m`, 0.1 … 1e5 in magnitude; negative turns clockwise seen from above.
     pub period_s: Option<f64>,
@@ -257,56 +318,54 @@ pub struct CameraFile {
 /// View of the camera at one time.
 #[derive(Debug, Clone, Copy, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
+#[schemars(transform = within(CAMERA))]
 pub struct CameraKeyFile {
-    /// Seconds from the start, 0 … 1e6, later than the keyframe before.
+    /// Seconds from the start; later than the keyframe before.
     pub at_s: f64,
     /// Position of the eye, metres.
     pub eye_m: Point,
     /// Point that it looks at, metres.
     pub look_at_m: Point,
-    /// Vertical angle of view, degrees, 1 … 150. Default: the camera's `fov_deg`.
+    /// Vertical angle of view, degrees. Default: the camera's `fov_deg`.
     pub fov_deg: Option<f64>,
 }
 
 /// `[machine]`: a preset, and the values that differ from it.
 #[derive(Debug, Clone, Default, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
+#[schemars(transform = within(MACHINE))]
 pub struct MachineFile {
     /// The preset to start from: `two-cores-software` (default) or `workstation`.
     pub preset: Option<String>,
-    /// Cores that agents and frames share, 1 … 4096.
-    #[schemars(range(min = 1, max = 4096))]
+    /// Cores that agents and frames share.
     pub cores: Option<u32>,
     /// Costs of a step of each model, by the model's name, and of a factor of contacts that are solved as one problem, by `factor`.
     #[serde(default)]
     pub step: BTreeMap<String, ModelCostFile>,
-    /// Milliseconds per frame before anything is drawn, 0 … 1e4.
+    /// Milliseconds per frame before anything is drawn.
     pub draw_setup_ms: Option<f64>,
-    /// Microseconds per drawn object, 0 … 1e6.
+    /// Microseconds per drawn object.
     pub draw_object_us: Option<f64>,
-    /// Microseconds per triangle, 0 … 1e4.
+    /// Microseconds per triangle.
     pub draw_triangle_us: Option<f64>,
-    /// Nanoseconds per pixel of the picture as drawn, 0 … 1e6.
+    /// Nanoseconds per pixel of the picture as drawn.
     pub draw_pixel_ns: Option<f64>,
-    /// Nanoseconds per pixel that a picture of fewer pixels is enlarged to, 0 … 1e6.
+    /// Nanoseconds per pixel that a picture of fewer pixels is enlarged to.
     pub draw_enlarge_ns: Option<f64>,
     /// Whether a graphics card draws, and not the cores that agents step on. Default: as the preset has it, a card in `workstation`.
     pub graphics_card: Option<bool>,
-    /// Nanoseconds per object for culling, 0 … 1e6. Default 0.
+    /// Nanoseconds per object for culling. Default 0.
     pub cull_object_ns: Option<f64>,
-    /// Nanoseconds per object in view for choosing its level, 0 … 1e6. Default 0.
+    /// Nanoseconds per object in view for choosing its level. Default 0.
     pub choose_object_ns: Option<f64>,
     /// Costs of objects by their shading, where they differ from `draw_object_us`, `draw_triangle_us` and the preset.
     pub shading: Option<ShadingCostsFile>,
-    /// Relative standard deviation of every cost, 0 … 1.
-    #[schemars(range(min = 0.0, max = 1.0))]
+    /// Relative standard deviation of every cost.
     pub noise: Option<f64>,
-    /// Relative standard deviation of a slowly varying factor on the frame time, which keeps nine tenths of itself from frame to frame,
-    /// 0 … 1. Default 0.
-    #[schemars(range(min = 0.0, max = 1.0))]
+    /// Relative standard deviation of a slowly varying factor on the frame time; it keeps nine tenths of itself from frame to frame.
+    /// Default 0.
     pub wander: Option<f64>,
-    /// Share of frames that take 1.5 times as long, 0 … 1. Default 0.
-    #[schemars(range(min = 0.0, max = 1.0))]
+    /// Share of frames that take 1.5 times as long. Default 0.
     pub spikes: Option<f64>,
     /// Additional load of the machine while frames are drawn, by rising time; at most 1000 entries.
     #[serde(default)]
@@ -323,10 +382,11 @@ pub struct MachineFile {
 /// `[[machine.load]]` and `[[machine.step_load]]`: from a time on every frame, or every step, takes a factor times its declared time.
 #[derive(Debug, Clone, Copy, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
+#[schemars(transform = within(LOAD))]
 pub struct LoadFile {
-    /// Wall-clock seconds after the start, 0 … 1e6; later than the entry before.
+    /// Wall-clock seconds after the start; later than the entry before.
     pub at_s: f64,
-    /// The factor from then on, 0.01 … 100: 2.5 is a machine 2.5 times as slow, 0.4 one 2.5 times as fast.
+    /// The factor from then on: 2.5 is a machine 2.5 times as slow, 0.4 one 2.5 times as fast.
     pub factor: f64,
 }
 
@@ -351,38 +411,40 @@ pub struct ShadingCostsFile {
 /// Cost of an object: object + max(triangle · triangles + vertex · vertices, pixel · pixels that it covers).
 #[derive(Debug, Clone, Copy, Default, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
+#[schemars(transform = within(COST))]
 pub struct ShadingCostFile {
-    /// Microseconds per object, 0 … 1e6.
+    /// Microseconds per object.
     pub object_us: Option<f64>,
-    /// Microseconds per triangle, 0 … 1e4.
+    /// Microseconds per triangle.
     pub triangle_us: Option<f64>,
-    /// Microseconds per vertex, 0 … 1e4. Default 0.
+    /// Microseconds per vertex. Default 0.
     pub vertex_us: Option<f64>,
-    /// Nanoseconds per pixel that the object covers, 0 … 1e6. Default 0.
+    /// Nanoseconds per pixel that the object covers. Default 0.
     pub pixel_ns: Option<f64>,
 }
 
 /// Cost of a step of a model: base + unit · work.
 #[derive(Debug, Clone, Copy, Default, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
+#[schemars(transform = within(STEP_COST))]
 pub struct ModelCostFile {
-    /// Microseconds per step, 0 … 1e9.
+    /// Microseconds per step.
     pub base_us: Option<f64>,
-    /// Microseconds per unit of work (tube: one segment in one solved system, with one or more systems per substep; synthetic: a declared
-    /// microsecond; factor: a contact; others: a step), 0 … 1e9.
+    /// Microseconds per unit of work; that is of a tube one segment in one solved system, with one or more systems per substep, of a synthetic
+    /// agent a declared microsecond, of `factor` a contact, of others a step.
     pub unit_us: Option<f64>,
 }
 
 /// `[[probe]]`: a material point whose position and velocity are reported.
 #[derive(Debug, Clone, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
+#[schemars(transform = within(PROBE))]
 pub struct ProbeFile {
     /// Name of the object.
     pub object: String,
-    /// Point of a tube: 0 start … 1 end, arc length along the rest shape. Default 1.
+    /// Point of a tube by arc length along the rest shape: its start at 0, its end at 1. Default 1.
     /// A rigid object reports its centre of mass, a tool its tip.
-    #[schemars(range(min = 0.0, max = 1.0))]
     pub at: Option<f64>,
-    /// Milliseconds between samples, 0.01 … 1e6: the report then has `samples` as well. Default: only the last state.
+    /// Milliseconds between samples: the report then has `samples` as well. Default: only the last state.
     pub every_ms: Option<f64>,
 }

@@ -1,13 +1,38 @@
 //! `model = "mesh"` and `model = "tree"`: scenery that is only drawn; and `[[group]]`, objects drawn as one mesh from afar.
 
 use super::Point;
+use super::ranges::{SCALE, within};
+use metachron_core::{NumberRange, Ranges};
 use schemars::JsonSchema;
 use serde::Deserialize;
+
+const PIECES: NumberRange = NumberRange::new(1.0, 1e5, "");
+
+/// Ranges of keys of [`MeshFile`].
+pub const MESH: Ranges = Ranges(&[
+    ("triangles", NumberRange::new(4.0, 1e6, "")),
+    ("least_triangles", NumberRange::new(1.0, 1e6, "")),
+    ("scale", SCALE),
+    ("texture_m", NumberRange::new(1e-3, 1e3, "m")),
+    ("dome_m", NumberRange::new(1e-3, 1e4, "m")),
+]);
+
+/// Ranges of keys of [`MotionFile`].
+pub const MOTION: Ranges = Ranges(&[("swing_hz", NumberRange::new(1e-4, 100.0, "Hz"))]);
+
+/// Ranges of keys of [`TreeFile`].
+pub const TREE: Ranges = Ranges(&[
+    ("height_m", NumberRange::new(0.01, 1e3, "m")),
+    ("branches", PIECES),
+    ("leaves", PIECES),
+    ("leaves_importance", NumberRange::new(1e-3, 1.0, "")),
+]);
 
 /// A triangle mesh that is drawn with as many triangles as the frame has time for. It is only drawn: nothing collides with it
 /// (a `rigid` object of shape `mesh` with `fixed = true` does collide).
 #[derive(Debug, Clone, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
+#[schemars(transform = within(MESH))]
 pub struct MeshFile {
     /// A file of triangles, binary glTF (.glb, +y up), STL or OBJ (+z up), its path relative to the scene file; not with `generate`. The surface
     /// may be open, but no edge may be shared by more than two triangles, and no coordinate may be past ± 1e5 m.
@@ -16,14 +41,12 @@ pub struct MeshFile {
     pub generate: Option<GeneratorKind>,
     /// Seed of a generated mesh. Default 0.
     pub seed: Option<u32>,
-    /// Triangles of the full mesh, 4 … 1000000: of a generated mesh, or the number to which a file with more is reduced. Default: 1000 for
+    /// Triangles of the full mesh: of a generated mesh, or the number to which a file with more is reduced. Default: 1000 for
     /// a generated mesh, all for a file.
-    #[schemars(range(min = 4, max = 1_000_000))]
     pub triangles: Option<u32>,
-    /// Fewest triangles that it is drawn with, 1 … 1000000; a mesh with fewer has all drawn. Default: as few as it can be reduced to.
-    #[schemars(range(min = 1, max = 1_000_000))]
+    /// Fewest triangles that it is drawn with; a mesh with fewer has all drawn. Default: as few as it can be reduced to.
     pub least_triangles: Option<u32>,
-    /// Factor that converts coordinates to metres, 1e-6 … 1e6. Default 1.
+    /// Factor that converts coordinates to metres. Default 1.
     pub scale: Option<f64>,
     /// Position of the origin of the mesh's axes, metres. Default: the world's origin.
     pub position_m: Option<Point>,
@@ -34,9 +57,9 @@ pub struct MeshFile {
     /// them, and one with `texture_m` are mapped straight onto each side. Default: for a .glb file the image of its base colours, if they
     /// all use one; else none.
     pub texture: Option<String>,
-    /// Length of one repeat of `texture` where it is mapped onto each side, metres, 0.001 … 1000. Default 1.
+    /// Length of one repeat of `texture` where it is mapped onto each side, metres. Default 1.
     pub texture_m: Option<f64>,
-    /// Makes a dome: 120 copies along the edges of a geodesic sphere of this radius, metres, 0.001 … 1e4, each spanning its edge from −1 to
+    /// Makes a dome: 120 copies along the edges of a geodesic sphere of this radius, metres; each spans its edge from −1 to
     /// 1 on its z axis; their names are `NAME-0` … `NAME-119`. Not with `scale`, nor in a `proxy`.
     pub dome_m: Option<f64>,
     /// How it moves, by itself and whatever is in its way. Not in a `proxy`, which moves as the members of its group do. Default: never.
@@ -46,36 +69,35 @@ pub struct MeshFile {
 /// The motion of a mesh: it turns about its own origin, which swings along a line.
 #[derive(Debug, Clone, Copy, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
+#[schemars(transform = within(MOTION))]
 pub struct MotionFile {
     /// Angular velocity about the origin of the mesh's axes (of a dome: about its centre), rad/s, each −1e4 … 1e4. Default none.
     pub spin_rad_s: Option<Point>,
     /// Greatest offset of the swing, metres. At the start it is 0 and grows. Default none.
     pub swing_m: Option<Point>,
-    /// Swings per second, Hz, 1e-4 … 100. Default 0.1.
+    /// Swings per second, Hz. Default 0.1.
     pub swing_hz: Option<f64>,
 }
 
 /// A tree of boughs and leaves: two drawn objects, `NAME` and `NAME.leaves`, with levels from points and lines up to triangles.
 #[derive(Debug, Clone, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
+#[schemars(transform = within(TREE))]
 pub struct TreeFile {
     /// Seed of its shape. Default 0.
     pub seed: Option<u32>,
-    /// Height, metres, 0.01 … 1000.
+    /// Height, metres.
     pub height_m: f64,
-    /// Boughs, 1 … 100000, each of 10 triangles at its finest. Default 62.
-    #[schemars(range(min = 1, max = 100_000))]
+    /// Boughs; each has 10 triangles at its finest. Default 62.
     pub branches: Option<u32>,
-    /// Leaves, 1 … 100000, each of 2 triangles at its finest. Default 240.
-    #[schemars(range(min = 1, max = 100_000))]
+    /// Leaves; each has 2 triangles at its finest. Default 240.
     pub leaves: Option<u32>,
     /// `levels` (default): lines and points from afar, meshes when near. `prefix`: always the mesh, as much of it as there is time for.
     pub lod: Option<TreeLod>,
     /// Colour of the leaves as `#rrggbb` (sRGB). Default: a green. `colour` is that of the trunk.
     #[schemars(regex(pattern = "^#[0-9a-fA-F]{6}$"))]
     pub leaves_colour: Option<String>,
-    /// Weight of the leaves' picture, as a share of `importance`, 0.001 … 1. Default 0.5.
-    #[schemars(range(min = 0.001, max = 1.0))]
+    /// Weight of the leaves' picture, as a share of `importance`. Default 0.5.
     pub leaves_importance: Option<f64>,
     /// Position, metres. Default: the origin.
     pub position_m: Option<Point>,

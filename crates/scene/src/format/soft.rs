@@ -1,15 +1,31 @@
 //! `model = "sheet"`, `"solid"` and `"rope"`: soft bodies of finite elements.
 
+use super::ranges::{FRICTION, LENGTH, SCALE, TRIANGLES, within};
 use super::value::OneOrRange;
 use super::{GeneratorKind, Point};
+use metachron_core::Ranges;
+use metachron_models::soft::{MATTER, SEGMENTS};
 use schemars::JsonSchema;
 use serde::Deserialize;
+
+/// Ranges of keys of sheets, solids and ropes.
+pub const SOFT: Ranges = Ranges(&[
+    ("size_m", LENGTH),
+    ("radius_m", LENGTH),
+    ("thickness_m", LENGTH),
+    ("eps_m", LENGTH),
+    ("segments", SEGMENTS),
+    ("scale", SCALE),
+    ("triangles", TRIANGLES),
+    ("friction", FRICTION),
+]);
 
 /// A soft sheet that stretches and bends: flat, or of the shape of a mesh.
 #[derive(Debug, Clone, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
+#[schemars(transform = within(MATTER), transform = within(SOFT))]
 pub struct SheetFile {
-    /// Length along its x and y axes, metres, each 1e-6 … 1e4. Needed without `file`.
+    /// Length along its x and y axes, metres. Needed without `file`.
     pub size_m: Option<[f64; 2]>,
     /// Cells along x and y, which never change; at most 10,000 vertices in all. Either this, `eps_m` or `file`.
     pub segments: Option<[u32; 2]>,
@@ -20,20 +36,19 @@ pub struct SheetFile {
     /// A surface as a file of triangles, STL, binary glTF (.glb, +y up) or OBJ, its path relative to the scene file: at rest the sheet has its
     /// shape and its vertices. It may be open.
     pub file: Option<String>,
-    /// Factor that converts the file's coordinates to metres, 1e-6 … 1e6. Default 1.
+    /// Factor that converts the file's coordinates to metres. Default 1.
     pub scale: Option<f64>,
-    /// Thickness, metres, 1e-6 … 1e4.
+    /// Thickness, metres.
     pub thickness_m: f64,
-    /// Young's modulus, Pa, 1 … 1e11.
+    /// Young's modulus, Pa.
     pub young_pa: f64,
-    /// Poisson's ratio, 0 … 0.499. Default 0.4.
-    #[schemars(range(min = 0.0, max = 0.499))]
+    /// Poisson's ratio. Default 0.4.
     pub poisson: Option<f64>,
-    /// Density, kg/m³, 1 … 1e5. Default 1050.
+    /// Density, kg/m³. Default 1050.
     pub density_kg_m3: Option<f64>,
-    /// Mass-proportional damping, 1/s, 0 … 1e4. Default 0.
+    /// Mass-proportional damping, 1/s. Default 0.
     pub damping_per_s: Option<f64>,
-    /// Stiffness-proportional damping (Rayleigh), s, 0 … 10: high frequencies fade first. Default 0.
+    /// Stiffness-proportional damping (Rayleigh), s: high frequencies fade first. Default 0.
     pub damping_s: Option<f64>,
     /// Position of its middle, metres. Default: the origin.
     pub position_m: Option<Point>,
@@ -43,8 +58,7 @@ pub struct SheetFile {
     pub velocity_m_s: Option<Point>,
     /// Sides whose vertices never move. Default none.
     pub hold: Option<Vec<SheetSide>>,
-    /// Coulomb friction coefficient, 0 … 10; a pair takes the geometric mean. Default 0.3.
-    #[schemars(range(min = 0.0, max = 10.0))]
+    /// Coulomb friction coefficient; a pair takes the geometric mean. Default 0.3.
     pub friction: Option<f64>,
     /// Whether it touches itself. Default true.
     pub self_contact: Option<bool>,
@@ -53,12 +67,13 @@ pub struct SheetFile {
 /// A soft solid: a box, a ball, or the volume within a closed surface.
 #[derive(Debug, Clone, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
+#[schemars(transform = within(MATTER), transform = within(SOFT))]
 pub struct SolidFile {
     /// Its shape. `box`: `size_m`. `ball`: `radius_m`. `mesh`: `file` or `generate`.
     pub shape: SoftShapeKind,
-    /// Length of a box along its x, y and z axes, metres, each 1e-6 … 1e4.
+    /// Length of a box along its x, y and z axes, metres.
     pub size_m: Option<Point>,
-    /// Radius of a ball, metres, 1e-6 … 1e4.
+    /// Radius of a ball, metres.
     pub radius_m: Option<f64>,
     /// Cells along x, y and z of a box, or of a ball (three equal numbers of at least 2), which never change; at most 10,000 vertices in all.
     /// Not together with `eps_m`.
@@ -74,15 +89,13 @@ pub struct SolidFile {
     pub generate: Option<GeneratorKind>,
     /// Seed of a generated surface. Default 0.
     pub seed: Option<u32>,
-    /// Triangles of a generated surface, 4 … 100000. Default 4000.
-    #[schemars(range(min = 4, max = 100_000))]
+    /// Triangles of a generated surface. Default 4000.
     pub triangles: Option<u32>,
-    /// Factor that converts the surface's coordinates to metres, 1e-6 … 1e6. Default 1.
+    /// Factor that converts the surface's coordinates to metres. Default 1.
     pub scale: Option<f64>,
-    /// Young's modulus, Pa, 1 … 1e11.
+    /// Young's modulus, Pa.
     pub young_pa: f64,
-    /// Poisson's ratio, 0 … 0.499. Default 0.4. Tetrahedra lock near 0.5: above 0.45 a cage (`eps_m`) bends more truly.
-    #[schemars(range(min = 0.0, max = 0.499))]
+    /// Poisson's ratio. Default 0.4. Tetrahedra lock near 0.5: above 0.45 a cage (`eps_m`) bends more truly.
     pub poisson: Option<f64>,
     /// How stress follows from strain. Default `corotational`.
     pub law: Option<LawKind>,
@@ -90,11 +103,11 @@ pub struct SolidFile {
     pub exponent: Option<f64>,
     /// Regions of a mesh of tetrahedra that are of another material.
     pub regions: Option<Vec<RegionFile>>,
-    /// Density, kg/m³, 1 … 1e5. Default 1050.
+    /// Density, kg/m³. Default 1050.
     pub density_kg_m3: Option<f64>,
-    /// Mass-proportional damping, 1/s, 0 … 1e4. Default 0.
+    /// Mass-proportional damping, 1/s. Default 0.
     pub damping_per_s: Option<f64>,
-    /// Stiffness-proportional damping (Rayleigh), s, 0 … 10: high frequencies fade first. Default 0.
+    /// Stiffness-proportional damping (Rayleigh), s: high frequencies fade first. Default 0.
     pub damping_s: Option<f64>,
     /// Position of its middle, of a mesh that of the origin of its axes, metres. Default: the origin.
     pub position_m: Option<Point>,
@@ -105,8 +118,7 @@ pub struct SolidFile {
     /// Faces of a box whose vertices never move; of a mesh, sides of the box around it: the vertices of its cage there,
     /// of tetrahedra the vertices within half a mean edge. Default none.
     pub hold: Option<Vec<SolidSide>>,
-    /// Coulomb friction coefficient, 0 … 10; a pair takes the geometric mean. Default 0.3.
-    #[schemars(range(min = 0.0, max = 10.0))]
+    /// Coulomb friction coefficient; a pair takes the geometric mean. Default 0.3.
     pub friction: Option<f64>,
     /// Whether it touches itself. Default false.
     pub self_contact: Option<bool>,
@@ -115,31 +127,31 @@ pub struct SolidFile {
 /// A rope: it stretches, and has no stiffness against bending or twisting.
 #[derive(Debug, Clone, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
+#[schemars(transform = within(MATTER), transform = within(SOFT))]
 pub struct RopeFile {
     /// Points of its centre line at rest, metres: at least two.
     pub path_m: Vec<Point>,
-    /// Radius, metres, 1e-6 … 1e4.
+    /// Radius, metres.
     pub radius_m: f64,
-    /// Number of segments, 1 … 2047, which never changes. Either this or `eps_m`.
+    /// Number of segments. It never changes. Either this or `eps_m`.
     pub segments: Option<u32>,
     /// Largest length ε of a segment, metres: one number, or `[finest, coarsest]`, of which the controllers choose
     /// while it runs. Its line in contacts, grasps and pictures is the line of the finest. At most 2047 segments at the
     /// finest.
     pub eps_m: Option<OneOrRange<f64>>,
-    /// Young's modulus, Pa, 1 … 1e11.
+    /// Young's modulus, Pa.
     pub young_pa: f64,
-    /// Density, kg/m³, 1 … 1e5. Default 1050.
+    /// Density, kg/m³. Default 1050.
     pub density_kg_m3: Option<f64>,
-    /// Mass-proportional damping, 1/s, 0 … 1e4. Default 0.
+    /// Mass-proportional damping, 1/s. Default 0.
     pub damping_per_s: Option<f64>,
-    /// Stiffness-proportional damping (Rayleigh), s, 0 … 10: high frequencies fade first. Default 0.
+    /// Stiffness-proportional damping (Rayleigh), s: high frequencies fade first. Default 0.
     pub damping_s: Option<f64>,
     /// Velocity of the whole rope at the start, m/s, up to 1e4. Default: none.
     pub velocity_m_s: Option<Point>,
     /// Ends that never move. Default none.
     pub hold: Option<Vec<RopeEnd>>,
-    /// Coulomb friction coefficient, 0 … 10; a pair takes the geometric mean. Default 0.3.
-    #[schemars(range(min = 0.0, max = 10.0))]
+    /// Coulomb friction coefficient; a pair takes the geometric mean. Default 0.3.
     pub friction: Option<f64>,
     /// Whether it touches itself. Default true.
     pub self_contact: Option<bool>,
@@ -160,16 +172,16 @@ pub enum LawKind {
 /// A region of a mesh of tetrahedra.
 #[derive(Debug, Clone, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
+#[schemars(transform = within(MATTER))]
 pub struct RegionFile {
     /// Its number: of gmsh the physical group, or the volume's own where it has none; of VTK the cell data `region`, `gmsh:physical`,
     /// `medit:ref`, `material` or `CellEntityIds`, the first of these that there is.
     pub region: i64,
-    /// Young's modulus, Pa, 1 … 1e11.
+    /// Young's modulus, Pa.
     pub young_pa: f64,
-    /// Poisson's ratio, 0 … 0.499. Default: that of the solid.
-    #[schemars(range(min = 0.0, max = 0.499))]
+    /// Poisson's ratio. Default: that of the solid.
     pub poisson: Option<f64>,
-    /// Density, kg/m³, 1 … 1e5. Default: that of the solid.
+    /// Density, kg/m³. Default: that of the solid.
     pub density_kg_m3: Option<f64>,
     /// How stress follows from strain. Default: as in the solid.
     pub law: Option<LawKind>,

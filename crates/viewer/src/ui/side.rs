@@ -9,7 +9,7 @@ use super::protocol::{Action, AgentRow, AgentState, ContactSolve, Filled, Law, S
 use super::text;
 use super::theme::{Palette, palette};
 use egui::{Align, ComboBox, Layout, ProgressBar, RichText, Slider, SliderClamping, Ui};
-use metachron_core::gains;
+use metachron_core::{NumberRange, gains};
 use metachron_lod::cost::benefit::Sliders;
 use std::ops::RangeInclusive;
 
@@ -174,7 +174,7 @@ fn law_gains(ui: &mut Ui, law: &mut Law) {
             slider(ui, "Gain κ", kappa, range(gains::KAPPA), |s| s.max_decimals(2));
             slider(ui, "Lead λ", lead, range(gains::LEAD), |s| s.max_decimals(2));
             let mut percent = *margin * 100.0;
-            slider(ui, "Margin", &mut percent, range((100.0 * gains::MARGIN.0, 100.0 * gains::MARGIN.1)), |s| {
+            slider(ui, "Margin", &mut percent, 0.0..=100.0 * gains::MARGIN.greatest, |s| {
                 s.max_decimals(0).suffix(" %")
             });
             // the conversion to percent and back must not count as a change
@@ -321,8 +321,8 @@ fn labelled(ui: &mut Ui, name: &str, content: impl FnOnce(&mut Ui)) {
     });
 }
 
-const fn range(ends: (f64, f64)) -> RangeInclusive<f64> {
-    ends.0..=ends.1
+const fn range(of: NumberRange) -> RangeInclusive<f64> {
+    of.least..=of.greatest
 }
 
 fn slider(

@@ -1,7 +1,7 @@
 //! A scene built in code: rigid bodies, tubes, static solids, gravity.
 //!
 //! In: parts with their measures, by name. Out: a [`Scene`] with the defaults that scene files have.
-//! Never here: files; whether a model can be built is found at [`crate::World::start`].
+//! Never here: files.
 
 mod rigid;
 mod sensors;
@@ -16,10 +16,10 @@ use super::kinds::{
 use super::scene::{Factors, Gains, Machine, Member, PaceWish, RENDER_SCALE, Scene, Spec, Target};
 use glam::{DQuat, DVec3};
 use metachron_contact::Agent;
-use metachron_contact::detect::SolveBudget;
+use metachron_contact::detect::{ClusterScene, SolveBudget};
 use metachron_contact::solve::DEPTH_DEFAULT_M;
 use metachron_core::{AgentId, N_MAX, Resolution, ResolutionRange, SimSpan, unit_rotation};
-use metachron_geometry::{Cells, Obstacle, Solid};
+use metachron_geometry::{Cells, Obstacle, Solid, StaticSolid};
 use metachron_models::rigid::{Joint, JointError, JointKind, RigidSpec};
 pub use rigid::Rigid;
 pub use sensors::SensorOn;
@@ -92,6 +92,20 @@ pub enum SceneBuildError {
         /// The first body.
         name: String,
         /// Why.
+        reason: String,
+    },
+    /// How contacts rest or are solved cannot be.
+    #[error("{reason}")]
+    BadContact {
+        /// The number that is wrong, its value and its range.
+        reason: String,
+    },
+    /// An object that cannot be built.
+    #[error("object \"{name}\": {reason}")]
+    BadObject {
+        /// The object.
+        name: String,
+        /// The number that is wrong, its value and its range.
         reason: String,
     },
     /// A rate is outside its range.
@@ -305,6 +319,7 @@ impl SceneBuilder {
         let Self { gravity, contact_depth_m, contact_budget, fixed, parts, joints, sensors } = self;
         let unit = |solid: Obstacle| Ok(Obstacle { rotation: checked_rotation(&solid.name, solid.rotation)?, ..solid });
         let obstacles: Arc<[Obstacle]> = fixed.into_iter().map(unit).collect::<Result<_, _>>()?;
+        check_surroundings(&obstacles, contact_depth_m, contact_budget)?;
         let ids = (0..).map(AgentId);
         let agents: Result<Vec<_>, _> =
             ids.zip(parts).map(|(id, (name, part))| member(id, name, part, gravity)).collect();
@@ -409,6 +424,18 @@ impl Joined {
     }
 }
 
+/// Whether the static solids can be, and contacts can rest so deep and be solved so far.
+fn check_surroundings(solids: &[Obstacle], depth_m: f64, budget: SolveBudget) -> Result<(), SceneBuildError> {
+    let wrong = |reason: String| SceneBuildError::BadContact { reason };
+    ClusterScene::default().resting_at(depth_m).map_err(|error| wrong(error.to_string()))?;
+    ClusterScene::default().within(budget).map_err(|error| wrong(error.to_string()))?;
+    solids.iter().try_for_each(|solid| {
+        let bad = |reason: String| SceneBuildError::BadObject { name: solid.name.clone(), reason };
+        solid.check_surface().map_err(|error| bad(error.to_string()))?;
+        StaticSolid::new(solid).map(drop).map_err(|error| bad(error.to_string()))
+    })
+}
+
 /// The rotation of an object, of length 1.
 fn checked_rotation(name: &str, given: DQuat) -> Result<DQuat, SceneBuildError> {
     let bad = || SceneBuildError::BadRotation { name: name.to_owned(), found: given.to_string() };
@@ -434,7 +461,7 @@ const DEFAULT_APPEARANCE: Appearance = Appearance {
 /// The agent of a part.
 ///
 /// # Errors
-/// [`SceneBuildError::BadRate`], [`SceneBuildError::BadRotation`] and [`SceneBuildError::TooFine`].
+/// [`SceneBuildError::BadRate`], [`SceneBuildError::BadRotation`], [`SceneBuildError::TooFine`] and [`SceneBuildError::BadObject`].
 pub(crate) fn member(id: AgentId, name: String, part: Part, gravity: DVec3) -> Result<Member, SceneBuildError> {
     let rate_hz = match &part {
         Part::Rigid(rigid) => rigid.rate_hz,
@@ -464,6 +491,7 @@ pub(crate) fn member(id: AgentId, name: String, part: Part, gravity: DVec3) -> R
         }
         Part::Custom(custom) => (Spec::Custom(custom), Resolution { eps_m: 1.0, n: 1 }),
     };
+    spec.check().map_err(|reason| SceneBuildError::BadObject { name: name.clone(), reason: reason.to_string() })?;
     let picture = ResolutionRange { eps_m: (start.eps_m, start.eps_m), n: (1, 5) };
     Ok(Member {
         id,

@@ -23,6 +23,17 @@ pub struct Division {
 }
 
 impl Spec {
+    /// Whether its model can be built; another's own is known only once it is.
+    pub(crate) fn check(&self) -> Result<(), Box<dyn std::error::Error>> {
+        match self {
+            Self::Tube(spec) => spec.check()?,
+            Self::Rigid(spec) => spec.check()?,
+            Self::Soft(spec) => spec.check()?,
+            Self::Tool(_) | Self::Synthetic(_) | Self::Custom(_) => {}
+        }
+        Ok(())
+    }
+
     /// True where ε is the spacing of the simulated elements, which a governor may change during the run.
     #[must_use]
     pub const fn adapts_spacing(&self) -> bool {

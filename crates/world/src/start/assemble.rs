@@ -8,6 +8,7 @@ use crate::error::WorldError;
 use crate::{Member, Scene, Spec};
 use metachron_contact::Agent;
 use metachron_contact::detect::{ClusterScene, Passage};
+use metachron_core::OutOfRange;
 use metachron_geometry::Obstacle;
 use metachron_models::rigid::{KinematicBody, RigidBody};
 use metachron_models::rod::Tube;
@@ -62,28 +63,17 @@ pub(super) fn lone(
 /// [`WorldError::Build`] for a solid or a joint that cannot be.
 pub(crate) fn surroundings(scene: &Scene) -> Result<Arc<ClusterScene>, WorldError> {
     let failed = |reason: String| WorldError::Build { name: scene.name.clone(), reason };
-    scene.obstacles.iter().try_for_each(check_surface)?;
+    let rough = |solid: &Obstacle| {
+        let wrong = |wrong: OutOfRange| WorldError::Build { name: solid.name.clone(), reason: wrong.to_string() };
+        solid.check_surface().map_err(wrong)
+    };
+    scene.obstacles.iter().try_for_each(rough)?;
     let among = ClusterScene::new(&scene.obstacles).map_err(|error| failed(error.to_string()))?;
     let among = among.resting_at(scene.contact_depth_m).map_err(|error| failed(error.to_string()))?;
     let among = among.within(scene.contact_budget).map_err(|error| failed(error.to_string()))?;
     let passages = scene.held_through().map(|(body, solid)| Passage { body, solid: solid as u32 });
     let among = among.with_passages(passages);
     among.jointed(Arc::clone(&scene.joints)).map(Arc::new).map_err(|error| failed(error.to_string()))
-}
-
-/// A static solid's friction and restitution have the same ranges as a body's.
-fn check_surface(solid: &Obstacle) -> Result<(), WorldError> {
-    let wrong = |what: &str, value: f64, most: f64| {
-        let reason = format!("the {what} is {value}; it must be between 0 and {most}");
-        Err(WorldError::Build { name: solid.name.clone(), reason })
-    };
-    if !(0.0..=1000.0).contains(&solid.friction) {
-        return wrong("friction", solid.friction, 1000.0);
-    }
-    if !(0.0..=1.0).contains(&solid.restitution) {
-        return wrong("restitution", solid.restitution, 1.0);
-    }
-    Ok(())
 }
 
 /// The executor asked for; where that is left open, chosen by the number of agents.

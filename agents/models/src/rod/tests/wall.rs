@@ -176,7 +176,7 @@ fn pressure_that_follows_keys_widens_the_tube_by_lames_law_at_each_of_them() {
     run(&mut tube, 5.0, 0.5);
     assert_eq!(tube.pressure_pa(), 50.0);
     let back = TubeSpec { pressure_keys: vec![key(1.0, 0.0), key(1.0, 5.0)], ..giving(1e-3, 8) };
-    assert!(matches!(Tube::new(back), Err(TubeError::OutOfRange { .. })));
+    assert!(matches!(Tube::new(back), Err(TubeError::OutOfRange(_))));
 }
 
 #[test]

@@ -9,7 +9,7 @@ mod full_load;
 use crate::Bound;
 use crate::log_law::ERROR_MAX;
 use full_load::{FullLoad, IN_A_ROW};
-use metachron_core::gains;
+use metachron_core::{NumberRange, gains};
 
 /// Measured times of a turn.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -59,8 +59,7 @@ impl Default for RateGains {
 impl RateGains {
     fn sound(self) -> Self {
         let own = Self::default();
-        let kept =
-            |gain: f64, own: f64, (low, high): (f64, f64)| if gain.is_finite() { gain.clamp(low, high) } else { own };
+        let kept = |gain: f64, own: f64, range: NumberRange| if gain.is_finite() { range.nearest(gain) } else { own };
         Self {
             refine: kept(self.refine, own.refine, gains::REFINE),
             yielding: kept(self.yielding, own.yielding, gains::YIELD),

@@ -95,8 +95,8 @@ fn better(first: AgentVerdict, second: AgentVerdict) -> AgentVerdict {
 
 fn neighbours(at: RateGains, factor: f64) -> [RateGains; 4] {
     let RateGains { refine, yielding } = at;
-    let [finer, coarser] = [factor, 1.0 / factor].map(|f| (f * refine).clamp(gains::REFINE.0, gains::REFINE.1));
-    let [more, less] = [factor, 1.0 / factor].map(|f| (f * yielding).clamp(gains::YIELD.0, gains::YIELD.1));
+    let [finer, coarser] = [factor, 1.0 / factor].map(|f| gains::REFINE.nearest(f * refine));
+    let [more, less] = [factor, 1.0 / factor].map(|f| gains::YIELD.nearest(f * yielding));
     [
         RateGains { refine: finer, yielding },
         RateGains { refine: coarser, yielding },
@@ -260,8 +260,8 @@ mod tests {
         assert!(tuned.best.coarsened_s.is_some_and(|s| s < 2.0), "{tuned:?}");
         assert!(tuned.best.refined_s.is_some_and(|s| s < 6.0), "{tuned:?}");
         let RateGains { refine, yielding } = tuned.best.gains;
-        assert!((gains::REFINE.0..=gains::REFINE.1).contains(&refine), "{refine}");
-        assert!((gains::YIELD.0..=gains::YIELD.1).contains(&yielding), "{yielding}");
+        assert!(gains::REFINE.contains(refine), "{refine}");
+        assert!(gains::YIELD.contains(yielding), "{yielding}");
     }
 
     #[test]

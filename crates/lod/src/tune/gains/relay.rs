@@ -27,8 +27,8 @@ pub fn relay_gains(plant: &Plant, target_hz: f64, margin: f64) -> Option<Law> {
     let period = tail.len() as f64 / rises as f64;
     let ultimate = 4.0 * HEIGHT / (std::f64::consts::PI * amplitude);
     let proportional = 0.45 * ultimate;
-    let kappa = (proportional * 1.2 / period).clamp(gains::KAPPA.0, gains::KAPPA.1);
-    Some(Law::Corrected { kappa, lead: proportional.min(gains::LEAD.1), margin })
+    let kappa = gains::KAPPA.nearest(proportional * 1.2 / period);
+    Some(Law::Corrected { kappa, lead: proportional.min(gains::LEAD.greatest), margin })
 }
 
 /// ln(t/T_set) of frames whose ln ε is moved against it by a relay, without noise.

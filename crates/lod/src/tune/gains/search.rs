@@ -8,7 +8,7 @@ use crate::adaptive::MARGIN_MAX;
 use crate::control::Law;
 use crate::tune::loops::candidate::Candidate;
 use crate::tune::loops::plant::Plant;
-use metachron_core::gains;
+use metachron_core::{NumberRange, gains};
 use std::cmp::Ordering;
 
 /// A search.
@@ -65,7 +65,7 @@ impl Family {
 
     /// The candidate with the gains whose logarithms are `at`, inside the ranges of gains.
     fn candidate(self, at: &[f64]) -> Candidate {
-        let gain = |k: usize, (low, high): (f64, f64)| libm::exp(at[k]).clamp(low, high);
+        let gain = |k: usize, range: NumberRange| range.nearest(libm::exp(at[k]));
         match self {
             Self::Corrected => {
                 Law::Corrected { kappa: gain(0, gains::KAPPA), lead: 0.0, margin: gain(1, gains::MARGIN) }.into()
@@ -77,7 +77,9 @@ impl Family {
             }
             .into(),
             Self::Printed => Law::Printed { alpha: gain(0, gains::ALPHA), beta: gain(1, gains::BETA) }.into(),
-            Self::Adaptive => Candidate::Adaptive { margin: gain(0, (gains::MARGIN.0, MARGIN_MAX)) },
+            Self::Adaptive => {
+                Candidate::Adaptive { margin: gain(0, NumberRange { greatest: MARGIN_MAX, ..gains::MARGIN }) }
+            }
         }
     }
 
@@ -302,8 +304,7 @@ mod tests {
         // the ends of the box, and far beyond them
         for family in Family::ALL {
             for wish in [-1e3, 1e3] {
-                let within =
-                    |value: f64, (low, high): (f64, f64)| assert!((low..=high).contains(&value), "{family:?} {value}");
+                let within = |value: f64, range: NumberRange| assert!(range.contains(value), "{family:?} {value}");
                 match family.candidate(&[wish; 3]) {
                     Candidate::Feedback(Law::Corrected { kappa, lead, margin }) => {
                         within(kappa, gains::KAPPA);
