@@ -9,6 +9,7 @@ use super::rig::machine::own_cpu;
 use super::subject::{Progress, Subject};
 use crate::chart::{Axis, Colour, Column, Figure, Layer, exponent, span};
 use glam::DVec3;
+use metachron_contact::step::LoneStepper;
 use metachron_core::SimSpan;
 use serde::{Deserialize, Serialize};
 use std::time::Duration;
@@ -76,11 +77,12 @@ impl Subject for Rod {
 
 fn measure(segments: usize, self_contact: bool, span: Duration) -> anyhow::Result<Row> {
     let mut tube = rod(DVec3::ZERO, segments, self_contact)?;
+    let mut stepper = LoneStepper::default();
     // fills caches and sizes buffers
-    (0..BATCH).try_for_each(|_| step(&mut tube, DT))?;
+    (0..BATCH).try_for_each(|_| step(&mut tube, &mut stepper, DT))?;
     let (from, mut steps) = (own_cpu(), 0_u32);
     while own_cpu() - from < span {
-        (0..BATCH).try_for_each(|_| step(&mut tube, DT))?;
+        (0..BATCH).try_for_each(|_| step(&mut tube, &mut stepper, DT))?;
         steps += BATCH;
     }
     let step_s = (own_cpu() - from).as_secs_f64() / f64::from(steps.max(1));
