@@ -117,6 +117,10 @@ const RINGS: [(&str, usize); 19] = [
     (".", 2),
 ];
 
+/// Most production lines of Rust in all crates and the Python module: neither blank, comment nor test code. Work that needs
+/// more raises it beforehand, in a commit that names what the lines are for.
+const LINES_MAX: usize = 102_800;
+
 fn root() -> PathBuf {
     PathBuf::from(env!("CARGO_MANIFEST_DIR"))
 }
@@ -375,6 +379,45 @@ fn rooms_of_contact_use_those_before_them_alone() {
     assert!(upward.is_empty(), "{upward:#?}");
     let entered = arrows.keys().filter_map(|file| room(file)).collect::<BTreeSet<_>>();
     assert_eq!(entered.len(), CONTACT_ROOMS.len(), "a room has no file");
+}
+
+/// Lines of a text that are neither blank nor comments that begin with `comment`; of Rust, those before its tests.
+fn production_lines(text: &str, comment: &str) -> usize {
+    let is_tests = |at: &usize| {
+        let module = text[*at..].lines().nth(1).unwrap_or_default();
+        module.starts_with("mod ") && module.ends_with('{')
+    };
+    let tests = text.match_indices("#[cfg(test)]\n").map(|(at, _)| at).find(is_tests).unwrap_or(text.len());
+    let code = text[..tests].lines().map(str::trim);
+    code.filter(|line| !line.is_empty() && !line.starts_with(comment)).count()
+}
+
+#[test]
+fn production_code_keeps_to_its_lines() {
+    let folders = ARROWS.iter().map(|(folder, _)| (*folder, format!("{folder}/src"), "rs", "//"));
+    let folders = folders.chain([
+        ("the command", "src".to_owned(), "rs", "//"),
+        ("python, Rust", "python/src".to_owned(), "rs", "//"),
+        ("python, Python", "python/package".to_owned(), "py", "#"),
+        ("shaders", "crates".to_owned(), "wgsl", "//"),
+    ]);
+    let mut rust = 0;
+    for (name, folder, extension, comment) in folders {
+        let files = files_below(&root().join(folder), extension).into_iter().filter(|file| !is_test(&relative(file)));
+        let lines: usize = files.map(|file| production_lines(&fs::read_to_string(file).unwrap(), comment)).sum();
+        println!("{lines:>7}  {name}");
+        rust += if extension == "rs" { lines } else { 0 };
+    }
+    println!("{rust:>7}  Rust in all");
+    assert!(rust <= LINES_MAX, "{rust} lines of {LINES_MAX}: less of others, or a ceiling raised with its reason");
+}
+
+#[test]
+fn comments_blank_lines_and_tests_are_no_production_code() {
+    let text = "//! Doc.\n\nfn a() {\n    // why\n}\n#[cfg(test)]\nmod tests {\n    fn b() {}\n}\n";
+    assert_eq!(production_lines(text, "//"), 2);
+    assert_eq!(production_lines("#[cfg(test)]\nmod tests;\nfn b() {}\n", "//"), 3);
+    assert_eq!(production_lines("# why\nx = 1\n", "#"), 1);
 }
 
 /// Crates whose folders have a dozen files at most, each folder named by the question that it answers.

@@ -28,7 +28,7 @@ pub fn solve_prices() -> Vec<f64> {
     let mut least_s = Integrator::ALL.map(|_| f64::NAN);
     for _ in 0..BATCHES {
         for (tube, least_s) in tubes.iter_mut().zip(&mut least_s) {
-            let batch_s = tube.as_mut().and_then(batch_s).unwrap_or(f64::NAN);
+            let batch_s = tube.as_mut().and_then(|(tube, stepper)| batch_s(tube, stepper)).unwrap_or(f64::NAN);
             *least_s = least_s.min(batch_s);
         }
     }
@@ -47,7 +47,7 @@ fn swinging(integrator: Integrator) -> Option<Tube> {
 }
 
 /// CPU seconds per unit of work, over some steps.
-fn batch_s((tube, stepper): &mut (Tube, LoneStepper)) -> Option<f64> {
+fn batch_s(tube: &mut Tube, stepper: &mut LoneStepper) -> Option<f64> {
     let (start, mut work) = (ThreadTime::now(), 0.0);
     for _ in 0..STEPS {
         work += stepper.step(tube, DT, StepContext::alone(AgentId(0), SimTime::ZERO)).ok()?.work;

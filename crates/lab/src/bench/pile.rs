@@ -56,6 +56,9 @@ impl Row {
     }
 }
 
+/// A measurement of one row.
+type Measure<'a> = Box<dyn FnOnce() -> anyhow::Result<Row> + 'a>;
+
 /// CPU seconds that the plain world has used after each of its steps.
 type Spent = Vec<f64>;
 
@@ -77,7 +80,7 @@ impl Subject for Pile {
         let sim_s = args.seconds.unwrap_or(SECONDS[usize::from(args.quick)]);
         let scene = load(&Source::open("pile")?, &[])?;
         let mut spent = Spent::new();
-        let cases: Vec<(&str, Box<dyn FnOnce() -> anyhow::Result<Row> + '_>)> = vec![
+        let cases: Vec<(&str, Measure<'_>)> = vec![
             ("one rapier3d world", Box::new(|| plain(&scene, sim_s, Settings::Own, &mut spent))),
             (
                 "one rapier3d world, careful settings",

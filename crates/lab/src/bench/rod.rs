@@ -3,14 +3,14 @@
 //! In: numbers of segments. Out: rows of CPU time per step. Never here: agents, threads.
 
 use super::super::args::BenchArgs;
+use super::rig::bare::step;
 use super::rig::cast::{ROD_SEGMENTS, rod};
 use super::rig::machine::own_cpu;
 use super::subject::{Progress, Subject};
 use crate::chart::{Axis, Colour, Column, Figure, Layer, exponent, span};
 use glam::DVec3;
-use metachron_contact::StepContext;
 use metachron_contact::step::LoneStepper;
-use metachron_core::{AgentId, SimSpan, SimTime};
+use metachron_core::SimSpan;
 use serde::{Deserialize, Serialize};
 use std::time::Duration;
 
@@ -76,14 +76,13 @@ impl Subject for Rod {
 }
 
 fn measure(segments: usize, self_contact: bool, span: Duration) -> anyhow::Result<Row> {
-    let (mut tube, mut stepper) = (rod(DVec3::ZERO, segments, self_contact)?, LoneStepper::default());
-    let alone = StepContext::alone(AgentId(0), SimTime::ZERO);
-    let mut batch = || (0..BATCH).try_for_each(|_| stepper.step(&mut tube, DT, alone).map(drop));
+    let mut tube = rod(DVec3::ZERO, segments, self_contact)?;
+    let mut stepper = LoneStepper::default();
     // fills caches and sizes buffers
-    batch()?;
+    (0..BATCH).try_for_each(|_| step(&mut tube, &mut stepper, DT))?;
     let (from, mut steps) = (own_cpu(), 0_u32);
     while own_cpu() - from < span {
-        batch()?;
+        (0..BATCH).try_for_each(|_| step(&mut tube, &mut stepper, DT))?;
         steps += BATCH;
     }
     let step_s = (own_cpu() - from).as_secs_f64() / f64::from(steps.max(1));

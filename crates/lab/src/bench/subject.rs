@@ -85,18 +85,11 @@ pub(super) fn run<S: Subject>(args: &BenchArgs) -> anyhow::Result<Exit> {
 pub(super) fn write<S: Subject>(folder: &Path, rows: &[S::Row]) -> anyhow::Result<()> {
     let mut csv = csv::Writer::from_writer(Vec::new());
     rows.iter().try_for_each(|row| csv.serialize(row))?;
-    let figure = S::figure(rows);
-    let files = [
-        ("csv", csv.into_inner()?),
-        ("json", json::<S>(rows)?.into_bytes()),
-        ("svg", figure::svg(&figure)?.into_bytes()),
-        ("png", figure::png(&figure)?),
-    ];
-    for (kind, bytes) in files {
+    for (kind, bytes) in [("csv", csv.into_inner()?), ("json", json::<S>(rows)?.into_bytes())] {
         let path = folder.join(format!("{}.{kind}", S::NAME));
         std::fs::write(&path, bytes).with_context(|| format!("{} cannot be written", path.display()))?;
     }
-    Ok(())
+    figure::write(folder, S::NAME, &S::figure(rows)).map(drop)
 }
 
 fn json<S: Subject>(rows: &[S::Row]) -> anyhow::Result<String> {

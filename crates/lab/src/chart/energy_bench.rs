@@ -49,7 +49,7 @@ impl Play {
 }
 
 /// Energy of springs between fixed points and a body, joules.
-fn springs_j(springs: &[AnchorSpring], state: &RigidState) -> f64 {
+pub(super) fn springs_j(springs: &[AnchorSpring], state: &RigidState) -> f64 {
     let one = |spring: &AnchorSpring| {
         let end = Body::Rigid(*state).point(spring.anchor);
         end.map_or(0.0, |(end, _)| 0.5 * spring.stiffness_n_m * end.distance_squared(spring.target))

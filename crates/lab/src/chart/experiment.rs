@@ -14,7 +14,7 @@ use std::ops::Deref;
 pub trait Experiment: Sync {
     /// Identifies a row: rows of the same case are the same measurement.
     type Case: PartialEq + Sync;
-    /// A case with its measurements: [`Row`], where the fields of a case are the first columns.
+    /// A case with its measurements: [`Measured`], where the fields of a case are the first columns.
     type Row: Record<Self::Case> + 'static;
 
     /// The name that `--only` takes; the files are called after it.
@@ -68,14 +68,14 @@ pub trait Record<C>: Serialize + Clone + Send + Sync {
 
 /// A case and its measurements; the fields of both are the columns of the CSV file.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Row<C, M> {
+pub struct Measured<C, M> {
     /// The case.
     pub case: C,
     /// Its measurements.
     pub found: M,
 }
 
-impl<C, M> Deref for Row<C, M> {
+impl<C, M> Deref for Measured<C, M> {
     type Target = M;
 
     fn deref(&self) -> &M {
@@ -83,13 +83,13 @@ impl<C, M> Deref for Row<C, M> {
     }
 }
 
-impl<C: Serialize, M: Serialize> Serialize for Row<C, M> {
+impl<C: Serialize, M: Serialize> Serialize for Measured<C, M> {
     fn serialize<S: Serializer>(&self, out: S) -> Result<S::Ok, S::Error> {
         (&self.case, &self.found).serialize(out)
     }
 }
 
-impl<C, M> Record<C> for Row<C, M>
+impl<C, M> Record<C> for Measured<C, M>
 where
     C: Serialize + DeserializeOwned + Clone + Send + Sync,
     M: Serialize + DeserializeOwned + Clone + Send + Sync,
@@ -120,6 +120,11 @@ impl Finding {
     /// Holds where `measured` is at most `limit`; does not hold for NaN.
     pub fn at_most(claim: impl Into<String>, measured: f64, limit: f64) -> Self {
         Self { claim: claim.into(), measured, limit, holds: Some(measured <= limit) }
+    }
+
+    /// Claims with what was measured and what it is at most.
+    pub fn all_at_most<const N: usize>(claims: [(&str, f64, f64); N]) -> Vec<Self> {
+        claims.into_iter().map(|(claim, measured, limit)| Self::at_most(claim, measured, limit)).collect()
     }
 
     /// Holds where `measured` is at least `limit`; does not hold for NaN.

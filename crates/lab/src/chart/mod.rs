@@ -7,7 +7,7 @@ mod asynchronous;
 mod bench;
 mod coupling;
 mod energy_bench;
-pub(super) mod experiment;
+mod experiment;
 pub(super) mod figure;
 mod lockstep_run;
 mod policies;
@@ -20,7 +20,8 @@ mod sweep;
 mod table;
 mod timing;
 
-pub(crate) use stability::common::GRAVITY;
+pub(crate) use bench::{Cluster, Member};
+pub(crate) use stability::common::{GRAVITY, plain_soft};
 
 use super::args::{ChartArgs, Subject};
 use accuracy::diagram::Diagram;
@@ -38,7 +39,7 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicU32, Ordering};
 
-pub(super) use experiment::{Experiment, Finding, Record, worst};
+pub(super) use experiment::{Experiment, Finding, Measured, Record, worst};
 pub(super) use figure::{Axis, Colour, Figure, Layer, Mark, Panel, lines, span};
 pub(super) use policies::compared::selection::Selection;
 pub(super) use power::exponent;
@@ -248,7 +249,7 @@ fn run<E: Experiment>(setting: &Setting<'_>) -> anyhow::Result<Done> {
     drop(bar);
     let mut files = vec![setting.folder.join(format!("{stem}.csv"))];
     if swept.complete {
-        files.extend(drawn::<E>(setting.folder, &stem, &swept.rows)?);
+        files.extend(figure::write(setting.folder, &stem, &E::figure(&swept.rows))?);
         files.extend(pictured::<E>(setting.folder, &stem, &swept.rows)?);
     }
     let findings = E::findings(&swept.rows);
@@ -268,17 +269,6 @@ fn run<E: Experiment>(setting: &Setting<'_>) -> anyhow::Result<Done> {
 fn settings<E: Experiment>(quick: bool) -> String {
     let built = std::env::current_exe().and_then(std::fs::metadata).and_then(|m| Ok((m.len(), m.modified()?)));
     format!("{} quick={quick} version={} built={:?}\n", E::NAME, env!("CARGO_PKG_VERSION"), built.ok())
-}
-
-/// Writes the figure as SVG and as PNG.
-fn drawn<E: Experiment>(folder: &Path, stem: &str, rows: &[E::Row]) -> anyhow::Result<[PathBuf; 2]> {
-    let figure = E::figure(rows);
-    let (svg, png) = (figure::svg(&figure)?, figure::png(&figure)?);
-    let paths = ["svg", "png"].map(|kind| folder.join(format!("{stem}.{kind}")));
-    for (path, bytes) in paths.iter().zip([svg.as_bytes(), &png]) {
-        std::fs::write(path, bytes).with_context(|| format!("{} cannot be written", path.display()))?;
-    }
-    Ok(paths)
 }
 
 /// Writes the pictures next to the figure.

@@ -3,8 +3,7 @@
 //! In: the table, the rope. Out: the table with other keys. Never here: whether a rope would do.
 
 use super::write_back::{rounded, set};
-use metachron_models::soft::Side;
-use metachron_models::soft::SoftShape;
+use metachron_models::soft::{Side, SoftShape};
 use metachron_world::{Member, Spec};
 use toml_edit::{Array, Table, Value};
 

@@ -109,32 +109,21 @@ impl AgentLoops {
 }
 
 fn rows(tuning: &AgentTuning) -> Table {
-    let mut table = Table::new(&[
-        "gains of",
-        "agent_refine",
-        "agent_yield",
-        "coarsened_s",
-        "refined_s",
-        "late_share",
-        "reversals_per_s",
-        "quality",
-        "objective",
-    ]);
     let seconds = |settle: Option<f64>| settle.map_or_else(|| "never".into(), |s| Cell::Number(s, 2));
-    for (name, row) in ROWS.iter().zip(&tuning.rows) {
-        table.rows.push(vec![
-            (*name).into(),
-            Cell::Number(row.gains.refine, 3),
-            Cell::Number(row.gains.yielding, 3),
-            seconds(row.coarsened_s),
-            seconds(row.refined_s),
-            Cell::Number(row.late_share, 4),
-            Cell::Number(row.reversals_per_s, 3),
-            Cell::Number(row.quality, 3),
-            Cell::Number(row.objective, 4),
-        ]);
-    }
-    table
+    let line = |(name, row): (&&str, &AgentVerdict)| {
+        vec![
+            ("gains of", (*name).into()),
+            ("agent_refine", (row.gains.refine, 3).into()),
+            ("agent_yield", (row.gains.yielding, 3).into()),
+            ("coarsened_s", seconds(row.coarsened_s)),
+            ("refined_s", seconds(row.refined_s)),
+            ("late_share", (row.late_share, 4).into()),
+            ("reversals_per_s", (row.reversals_per_s, 3).into()),
+            ("quality", (row.quality, 3).into()),
+            ("objective", (row.objective, 4).into()),
+        ]
+    };
+    Table::named(ROWS.iter().zip(&tuning.rows).map(line))
 }
 
 fn gains_text(gains: RateGains) -> String {

@@ -5,7 +5,6 @@
 use super::super::chart::figure;
 use super::super::chart::figure::{Axis, Colour, Figure, Layer, Mark, Panel, span};
 use super::{Identified, origin_name};
-use anyhow::Context;
 use metachron_lod::control::Law;
 use metachron_lod::tune::{Candidate, Disturbance, Measures, Origin, Plant, Start, Trial, Tuning, measure, play};
 use std::path::{Path, PathBuf};
@@ -28,13 +27,7 @@ const SPEEDS: [f64; 9] = [0.25, 0.35, 0.5, 0.71, 1.0, 1.41, 2.0, 2.83, 4.0];
 pub(super) fn write(folder: &Path, stem: &str, on: &Identified, tuned: &Tuning) -> anyhow::Result<[PathBuf; 2]> {
     let panels = vec![fit(&on.plant), responses(on, tuned), map(on, tuned), late_frames(on, tuned)];
     let title = format!("{} at {} Hz on {}", on.scene.name, on.target_hz, on.machine);
-    let figure = Figure::new(title, 2, panels);
-    let (svg, png) = (figure::svg(&figure)?, figure::png(&figure)?);
-    let paths = ["svg", "png"].map(|kind| folder.join(format!("tune-{stem}.{kind}")));
-    for (path, bytes) in paths.iter().zip([svg.as_bytes(), &png]) {
-        std::fs::write(path, bytes).with_context(|| format!("{} cannot be written", path.display()))?;
-    }
-    Ok(paths)
+    figure::write(folder, &format!("tune-{stem}"), &Figure::new(title, 2, panels))
 }
 
 fn layer(label: impl Into<String>, colour: Colour, mark: Mark) -> Layer {
@@ -47,10 +40,8 @@ fn fit(plant: &Plant) -> Panel {
     let x = span(points.iter().map(|p| p.0).chain([0.0]), false);
     let y = span(points.iter().map(|p| p.1).chain([0.0]), false);
     let at = |thousands: f64| (thousands, 1e3 * plant.line.at(1e3 * thousands));
-    let layers = [
-        layer("frames", Colour::Sky, Mark::Dots(points)),
-        layer("fit", Colour::Grey, Mark::Dashed(vec![at(x.0.max(0.0)), at(x.1)])),
-    ];
+    let layers =
+        [Layer::dots("frames", Colour::Sky, points), Layer::dashed("fit", Colour::Grey, [at(x.0.max(0.0)), at(x.1)])];
     let (x, y) =
         (Axis::linear("polygons, thousands", x.0.max(0.0), x.1), Axis::linear("frame time, ms", y.0.max(0.0), y.1));
     Panel::new("plant: measured frames and fitted line", x, y, layers)
@@ -73,7 +64,7 @@ fn styles(tuned: &Tuning) -> impl Iterator<Item = (Colour, Drawn)> {
 /// Step responses from 0.4 and from 2.5 times the target rate.
 fn responses(on: &Identified, tuned: &Tuning) -> Panel {
     let plant = evaluated_plant(on, tuned);
-    let mut layers = vec![layer("", Colour::Grey, Mark::Dashed(vec![(0.0, 1.0), (SHOWN_S, 1.0)]))];
+    let mut layers = vec![Layer::limit("", [0.0, SHOWN_S], 1.0)];
     for (row, (colour, mark)) in tuned.rows.iter().zip(styles(tuned)) {
         for (k, rate) in STARTS.into_iter().enumerate() {
             let beats = play(&plant, &undisturbed_trial(on, row.verdict.candidate, rate, SHOWN_S));
@@ -115,14 +106,15 @@ fn map(on: &Identified, tuned: &Tuning) -> Panel {
     });
     let measured = measure(&plant, &starts.collect::<Vec<_>>(), None);
     let kinds: Vec<usize> = measured.chunks(STARTS.len()).map(kind).collect();
-    let of = |kind: usize| cells.iter().zip(&kinds).filter(|(_, k)| **k == kind).map(|(cell, _)| *cell).collect();
+    let of =
+        |kind: usize| cells.iter().zip(&kinds).filter(|(_, k)| **k == kind).map(|(cell, _)| *cell).collect::<Vec<_>>();
     let [good, slow, swings] = [0, 1, 2].map(of);
     let (x, y) = (Axis::log("α", alphas.0, alphas.1), Axis::log("β", betas.0, betas.1));
     let layers = [
-        layer("settles within 1 s", Colour::Green, Mark::Cells(good)),
-        layer("settles later or elsewhere", Colour::Sky, Mark::Cells(slow)),
-        layer("limit cycle", Colour::Red, Mark::Cells(swings)),
-        layer("chosen", Colour::Blue, Mark::Dots(found)),
+        Layer::cells("settles within 1 s", Colour::Green, good),
+        Layer::cells("settles later or elsewhere", Colour::Sky, slow),
+        Layer::cells("limit cycle", Colour::Red, swings),
+        Layer::dots("chosen", Colour::Blue, found),
     ];
     Panel::new("stability map of the printed law", x, y, layers)
 }

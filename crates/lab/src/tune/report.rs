@@ -23,38 +23,24 @@ pub(super) struct Found<'a> {
 /// The table of a tuning, the plant, the files.
 pub(super) fn text(on: &Identified, found: &Found<'_>) -> String {
     let Found { tuned, agents, checked, files } = found;
-    let mut table = Table::new(&[
-        "law",
-        "gains",
-        "settle_s",
-        "overshoot",
-        "miss_share",
-        "gain_margin",
-        "delay_margin",
-        "reversals",
-        "quality",
-        "robust_to",
-        "lacks",
-        "objective",
-    ]);
-    for row in &tuned.rows {
+    let table = Table::named(tuned.rows.iter().map(|row| {
         let v = &row.verdict;
-        let settle: Cell = v.settle_s.map_or_else(|| "never".into(), |s| Cell::Number(s, 2));
-        table.rows.push(vec![
-            origin_name(row.origin).into(),
-            gains::gains_text(v.candidate).into(),
-            settle,
-            Cell::Number(v.overshoot, 3),
-            Cell::Number(v.miss_share, 4),
-            v.margins.map_or_else(|| "–".into(), |m| Cell::Number(m.gain, 1)),
-            v.margins.map_or_else(|| "–".into(), |m| Cell::Number(m.delay as f64, 0)),
-            Cell::Number(v.reversals, 4),
-            Cell::Number(v.quality, 3),
-            robust(v).into(),
-            Cell::Number(v.shortfall, 2),
-            Cell::Number(v.objective, 4),
-        ]);
-    }
+        let number = |value: f64, digits| Cell::Number(value, digits);
+        vec![
+            ("law", origin_name(row.origin).into()),
+            ("gains", gains::gains_text(v.candidate).into()),
+            ("settle_s", v.settle_s.map_or_else(|| "never".into(), |s| number(s, 2))),
+            ("overshoot", number(v.overshoot, 3)),
+            ("miss_share", number(v.miss_share, 4)),
+            ("gain_margin", v.margins.map_or_else(|| "–".into(), |m| number(m.gain, 1))),
+            ("delay_margin", v.margins.map_or_else(|| "–".into(), |m| number(m.delay as f64, 0))),
+            ("reversals", number(v.reversals, 4)),
+            ("quality", number(v.quality, 3)),
+            ("robust_to", robust(v).into()),
+            ("lacks", number(v.shortfall, 2)),
+            ("objective", number(v.objective, 4)),
+        ]
+    }));
     let files: Vec<_> = files.iter().map(|f| f.display().to_string()).collect();
     format!(
         "{}{}{}\n{}\nbest: {}\n{}{}files: {}\n",

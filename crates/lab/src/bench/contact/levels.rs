@@ -8,7 +8,7 @@ use super::peer::PeerRun;
 use super::stage::Stage;
 use super::{Case as BenchCase, Row as BenchRow, cases, peer_row, row};
 use crate::bench::rig::peers::Peers;
-use crate::chart::{Axis, Column, Experiment, Figure, Finding, Mark, Panel, experiment, lines, span, worst};
+use crate::chart::{Axis, Column, Experiment, Figure, Finding, Mark, Measured, Panel, lines, span, worst};
 use anyhow::Context;
 use metachron_console::output::message;
 use serde::{Deserialize, Serialize};
@@ -94,7 +94,7 @@ pub(crate) struct Found {
     lost_j: f64,
 }
 
-type Row = experiment::Row<Case, Found>;
+type Row = Measured<Case, Found>;
 
 impl Found {
     const UNKNOWN: Self = Self {
@@ -242,19 +242,11 @@ impl Experiment for SolveLevels {
         let from_five = |row: &&Row| row.case.level == EXACT || row.case.level.parse().is_ok_and(|most: u32| most >= 5);
         let from_five: Vec<_> = towers.filter(from_five).collect();
         let most = |of: fn(&Row) -> f64| worst(from_five.iter().map(|row| of(row)));
-        vec![
-            Finding::at_most(
-                "from five factors a solve on: by how much the tower sinks, mm",
-                most(|row| row.sank_mm.abs()),
-                1.0,
-            ),
-            Finding::at_most("how far a box of it creeps in half a second at rest, mm", most(|row| row.drift_mm), 0.01),
-            Finding::at_most(
-                "energy that it makes, J (a box falls by its height with 0.08 J)",
-                most(|row| row.made_j),
-                2e-3,
-            ),
-        ]
+        Finding::all_at_most([
+            ("from five factors a solve on: by how much the tower sinks, mm", most(|row| row.sank_mm.abs()), 1.0),
+            ("how far a box of it creeps in half a second at rest, mm", most(|row| row.drift_mm), 0.01),
+            ("energy that it makes, J (a box falls by its height with 0.08 J)", most(|row| row.made_j), 2e-3),
+        ])
     }
 }
 

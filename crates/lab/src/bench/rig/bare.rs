@@ -5,8 +5,9 @@
 
 use super::cast::{Model, agent, rate_hz};
 use super::machine::own_cpu;
-use anyhow::{Context, bail};
-use metachron_contact::{Agent, StepContext, Stepping};
+use anyhow::Context;
+use metachron_contact::step::LoneStepper;
+use metachron_contact::{Agent, StepContext};
 use metachron_core::{AgentId, SimSpan, SimTime};
 use metachron_runtime::THREADS_MAX;
 use std::cmp::Reverse;
@@ -28,17 +29,19 @@ pub(crate) fn measure(model: Model, count: usize, mean_hz: f64, span: Duration) 
     let mut agents = (0..count).map(|k| agent(model, k)).collect::<Result<Vec<_>, _>>()?;
     let spans: Vec<_> = (0..count).map(|k| period(k, mean_hz)).collect();
     // one round to fill caches and size buffers
+    let mut stepper = LoneStepper::default();
     for (agent, dt) in agents.iter_mut().zip(&spans) {
-        step(&mut **agent, *dt)?;
+        step(&mut **agent, &mut stepper, *dt)?;
     }
     Ok(Bare { free_us: free(&mut agents, &spans, span)?, paced_us: run_paced(&mut agents, &spans, span)? })
 }
 
 fn free(agents: &mut [Box<dyn Agent>], spans: &[SimSpan], span: Duration) -> anyhow::Result<f64> {
+    let mut stepper = LoneStepper::default();
     let (cpu, mut steps) = (own_cpu(), 0_u64);
     while own_cpu() - cpu < span {
         for (agent, dt) in agents.iter_mut().zip(spans) {
-            step(&mut **agent, *dt)?;
+            step(&mut **agent, &mut stepper, *dt)?;
         }
         steps += agents.len() as u64;
     }
@@ -47,6 +50,7 @@ fn free(agents: &mut [Box<dyn Agent>], spans: &[SimSpan], span: Duration) -> any
 
 fn run_paced(agents: &mut [Box<dyn Agent>], spans: &[SimSpan], span: Duration) -> anyhow::Result<f64> {
     let mut due: BinaryHeap<_> = (0..agents.len()).map(|k| Reverse((Duration::ZERO, k))).collect();
+    let mut stepper = LoneStepper::default();
     let (cpu, start, mut steps) = (own_cpu(), Instant::now(), 0_u64);
     let mut now = start.elapsed();
     while now < span {
@@ -54,7 +58,7 @@ fn run_paced(agents: &mut [Box<dyn Agent>], spans: &[SimSpan], span: Duration) -
         if at > now {
             thread::sleep(at - now);
         }
-        step(&mut *agents[k], spans[k])?;
+        step(&mut *agents[k], &mut stepper, spans[k])?;
         steps += 1;
         due.push(Reverse((at + Duration::from_nanos(spans[k].as_nanos()), k)));
         now = start.elapsed();
@@ -82,11 +86,12 @@ pub(crate) fn on_threads(model: Model, count: usize, mean_hz: f64, span: Duratio
 
 /// Steps one agent at its due times until `span` after `start`; returns the CPU time of this thread and the number of steps.
 fn run_alone(agent: &mut dyn Agent, dt: SimSpan, start: Instant, span: Duration) -> anyhow::Result<(Duration, u64)> {
-    step(agent, dt)?;
+    let mut stepper = LoneStepper::default();
+    step(agent, &mut stepper, dt)?;
     let (cpu, mut due, mut steps) = (own_cpu(), start.elapsed(), 0);
     while start.elapsed() < span {
         thread::sleep(due.saturating_sub(start.elapsed()));
-        step(agent, dt)?;
+        step(agent, &mut stepper, dt)?;
         steps += 1;
         due += Duration::from_nanos(dt.as_nanos());
     }
@@ -94,9 +99,8 @@ fn run_alone(agent: &mut dyn Agent, dt: SimSpan, start: Instant, span: Duration)
 }
 
 /// One step of an agent without neighbours.
-pub(crate) fn step(agent: &mut dyn Agent, dt: SimSpan) -> anyhow::Result<()> {
-    let Stepping::Own(own) = agent.stepping() else { bail!("a {} does not step by itself", agent.model()) };
-    own.step(dt, &StepContext::alone(AgentId(0), SimTime::ZERO))?;
+pub(crate) fn step(agent: &mut dyn Agent, stepper: &mut LoneStepper, dt: SimSpan) -> anyhow::Result<()> {
+    stepper.step(agent, dt, StepContext::alone(AgentId(0), SimTime::ZERO))?;
     Ok(())
 }
 

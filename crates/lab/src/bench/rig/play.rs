@@ -3,14 +3,14 @@
 //! In: bodies, static solids, joints, the length of a step. Out: CPU time of each step, contacts, states. Never here: which bodies.
 
 use super::machine::own_cpu;
+use crate::chart::{Cluster, Member};
 use anyhow::Context;
 use glam::DVec3;
+use metachron_contact::Agent;
 use metachron_contact::detect::ClusterScene;
 use metachron_contact::joint::Joint;
-use metachron_contact::member::{ContactMemory, Participant};
-use metachron_contact::step::{ClusterReport, ClusterStepper, Plan};
-use metachron_contact::{Agent, StepContext};
-use metachron_core::{AgentId, Body, Grip, PlainLoop, SimSpan, SimTime, Snapshot};
+use metachron_contact::step::ClusterReport;
+use metachron_core::{Body, SimSpan, Snapshot};
 use metachron_geometry::Obstacle;
 use std::time::Duration;
 
@@ -31,91 +31,52 @@ pub(crate) struct Bound {
 
 /// A cluster of bodies.
 pub(crate) struct Play {
-    bodies: Vec<Member>,
-    scene: ClusterScene,
-    stepper: ClusterStepper,
-    time: SimTime,
+    cluster: Cluster,
     snapshot: Snapshot,
-}
-
-struct Member {
-    agent: Box<dyn Agent>,
-    /// The length of a step that it wants, seconds.
-    step_s: f64,
-    memory: ContactMemory,
-    grips: Vec<Grip>,
 }
 
 impl Play {
     /// Bodies among static solids, in steps of `step_s` seconds.
     pub(crate) fn new(bodies: Vec<Box<dyn Agent>>, obstacles: &[Obstacle], step_s: f64) -> anyhow::Result<Self> {
-        let member = |agent| Member { agent, step_s, memory: ContactMemory::default(), grips: Vec::new() };
-        Ok(Self {
-            bodies: bodies.into_iter().map(member).collect(),
-            scene: ClusterScene::new(obstacles).context("the static solids")?,
-            stepper: ClusterStepper::default(),
-            time: SimTime::ZERO,
-            snapshot: Snapshot::default(),
-        })
+        let mut cluster = Cluster::new(ClusterScene::new(obstacles).context("the static solids")?);
+        for body in bodies {
+            cluster.add(body, step_s).context("a body that touches nothing")?;
+        }
+        Ok(Self { cluster, snapshot: Snapshot::default() })
     }
 
     /// The same with steps of another length from now on.
     pub(crate) fn in_steps_of(mut self, step_s: f64) -> Self {
-        self.bodies.iter_mut().for_each(|body| body.step_s = step_s);
+        self.cluster.members.iter_mut().for_each(|body| body.step_s = step_s);
         self
     }
 
     /// The same with steps of its own length of each body.
     pub(crate) fn in_own_steps(mut self, steps_s: &[f64]) -> Self {
-        self.bodies.iter_mut().zip(steps_s).for_each(|(body, step_s)| body.step_s = *step_s);
+        self.cluster.members.iter_mut().zip(steps_s).for_each(|(body, step_s)| body.step_s = *step_s);
         self
     }
 
     /// The same with joints between its bodies, which are numbered in their order.
-    pub(crate) fn jointed(self, joints: Vec<Joint>) -> anyhow::Result<Self> {
-        Ok(Self { scene: self.scene.jointed(joints.into()).context("the joints")?, ..self })
+    pub(crate) fn jointed(mut self, joints: Vec<Joint>) -> anyhow::Result<Self> {
+        self.cluster.scene = self.cluster.scene.jointed(joints.into()).context("the joints")?;
+        Ok(self)
     }
 
     /// The same with at most so many factors of each solve; `None` for as many as the laws of contact take.
     pub(crate) fn within(mut self, factors_max: Option<u32>) -> Self {
-        self.stepper.set_factors_max(factors_max);
+        self.cluster.stepper.set_factors_max(factors_max);
         self
     }
 
     /// The time so far, seconds.
     pub(crate) fn time_s(&self) -> f64 {
-        self.time.as_secs_f64()
+        self.cluster.time.as_secs_f64()
     }
 
     /// Makes one macro step.
     pub(crate) fn step(&mut self) -> anyhow::Result<ClusterReport> {
-        let Self { bodies, scene, stepper, time, .. } = self;
-        let mut wishes = Vec::with_capacity(bodies.len());
-        for body in bodies.iter_mut() {
-            wishes.push((body.agent.member().context("a body that touches nothing")?.role(), body.step_s));
-        }
-        let plan = Plan::of(wishes.iter().copied());
-        let dt = SimSpan::from_secs_f64(plan.macro_s).context("the length of a step")?;
-        let mut all = Vec::with_capacity(bodies.len());
-        for ((id, body), (role, wanted_s)) in (0..).zip(bodies.iter_mut()).zip(wishes) {
-            let Member { agent, memory, grips, .. } = body;
-            let member = agent.member().context("a body that touches nothing")?;
-            let (id, parts) = (AgentId(id), plan.parts_in(role, wanted_s));
-            let context = StepContext::alone(id, *time);
-            all.push(Participant {
-                id,
-                member: member.into(),
-                context,
-                laws: &[],
-                memory,
-                parts,
-                alone_s: wanted_s,
-                grips,
-            });
-        }
-        let report = stepper.step(scene, &mut all, dt, &PlainLoop)?;
-        *time += dt;
-        Ok(report)
+        Ok(self.cluster.step(SimSpan::from_nanos(u64::MAX))?)
     }
 
     /// Steps on within a bound and measures each step; at least one.
@@ -137,17 +98,17 @@ impl Play {
 
     /// Kinetic, potential and stored energy of all bodies, J.
     pub(crate) fn energy_j(&mut self) -> f64 {
-        let Self { bodies, snapshot, .. } = self;
+        let Self { cluster, snapshot } = self;
         let of = |body: &Member| {
             body.agent.write_snapshot(snapshot);
             snapshot.energy_j
         };
-        bodies.iter().map(of).sum()
+        cluster.members.iter().map(of).sum()
     }
 
     /// Where the middle of each body is that has one, metres: its centre of mass, or the mean of its points.
     pub(crate) fn middles(&mut self) -> Vec<DVec3> {
-        let Self { bodies, snapshot, .. } = self;
+        let Self { cluster, snapshot } = self;
         let mean = |list: &[DVec3]| list.iter().sum::<DVec3>() / list.len() as f64;
         let of = |body: &Member| {
             body.agent.write_snapshot(snapshot);
@@ -158,12 +119,12 @@ impl Play {
                 _ => None,
             }
         };
-        bodies.iter().filter_map(of).collect()
+        cluster.members.iter().filter_map(of).collect()
     }
 
     /// Where the points of a soft body are.
     pub(crate) fn points(&mut self, body: usize) -> Vec<DVec3> {
-        self.bodies[body].agent.write_snapshot(&mut self.snapshot);
+        self.cluster.members[body].agent.write_snapshot(&mut self.snapshot);
         match &self.snapshot.body {
             Body::Soft(soft) => soft.positions.clone(),
             Body::Curve(curve) => curve.positions.clone(),

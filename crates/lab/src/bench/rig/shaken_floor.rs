@@ -8,8 +8,9 @@ use metachron_contact::member::{ClusterMember, MaterialPoint, Role};
 use metachron_contact::solve::Side;
 use metachron_contact::{Agent, Stepping};
 use metachron_core::{Anchor, Snapshot, StepError};
-use metachron_geometry::{CollisionShape, ContactSide, Place, PlacedShape, ShapeError, ShapeKind, ShapePose};
-use metachron_geometry::{Solid, SolidShape};
+use metachron_geometry::{
+    CollisionShape, ContactSide, Place, PlacedShape, ShapeError, ShapeKind, ShapePose, Solid, SolidShape,
+};
 
 /// Largest acceleration, m/s².
 const SHAKE_M_S2: f64 = 0.3 * GRAVITY;

@@ -2,10 +2,10 @@
 //!
 //! In: a number of cells. Out: specifications. Never here: steps.
 
-use super::super::super::chart::GRAVITY;
+use super::super::super::chart::{GRAVITY, plain_soft};
 use anyhow::Context;
 use glam::{DQuat, DVec3};
-use metachron_geometry::{ContactTraits, Obstacle, Solid};
+use metachron_geometry::{Obstacle, Solid};
 use metachron_models::rigid::{RigidBody, RigidSpec};
 use metachron_models::rod::{Tube, TubeSpec, WallModel};
 use metachron_models::soft::{MaterialLaw, Side, SoftMatter, SoftShape, SoftSpec};
@@ -35,20 +35,7 @@ const TISSUE: SoftMatter = SoftMatter {
 
 /// A free soft body.
 pub(in super::super) fn soft(shape: SoftShape, matter: SoftMatter, position: DVec3) -> SoftSpec {
-    SoftSpec {
-        shape,
-        nodes: None,
-        matter,
-        position,
-        rotation: DQuat::IDENTITY,
-        velocity: DVec3::ZERO,
-        held: Vec::new(),
-        friction: 0.5,
-        traits: ContactTraits::default(),
-        gravity: DVec3::NEG_Z * GRAVITY,
-        self_contact: false,
-        sleep: false,
-    }
+    SoftSpec { position, friction: 0.5, ..plain_soft(shape, matter) }
 }
 
 /// The cube, free just above the floor, of so many cells along each edge.

@@ -1,13 +1,11 @@
 //! A solid clamped to a wall at one end, under its own weight, against Timoshenko's beam.
 
-use super::super::stability::common::GRAVITY;
+use super::super::stability::common::{GRAVITY, plain_soft};
 use super::diagram::{Benchmark, Case};
 use super::play::Play;
-use super::sheet::soft;
 use glam::DVec3;
 use metachron_models::rod::Integrator;
-use metachron_models::soft::Side;
-use metachron_models::soft::{MaterialLaw, SoftMatter, SoftShape, SoftSpec};
+use metachron_models::soft::{MaterialLaw, Side, SoftMatter, SoftShape, SoftSpec};
 
 /// The benchmark.
 pub(in super::super) struct SolidBeam;
@@ -42,7 +40,7 @@ impl Benchmark for SolidBeam {
         let across = if case.segments < 16 { 1 } else { 2 };
         let shape =
             SoftShape::Box { size_m: DVec3::new(LENGTH_M, side, side), segments: [case.segments, across, across] };
-        let mut play = Play::soft(SoftSpec { held: vec![Side::Left], ..soft(shape, MATTER) }, case)?;
+        let mut play = Play::soft(SoftSpec { held: vec![Side::Left], ..plain_soft(shape, MATTER) }, case)?;
         let before = play.point(1.0).z;
         let sound = play.run(SECONDS, &[]);
         let error = ((before - play.point(1.0).z) / sag_m(side) - 1.0).abs();

@@ -6,7 +6,7 @@ use super::front::front;
 use super::peers;
 use super::play::Play;
 use crate::chart::{
-    Axis, Cell, Colour, Experiment, Figure, Finding, Layer, Panel, Table, calibration_us, experiment, exponent, lines,
+    Axis, Cell, Colour, Experiment, Figure, Finding, Layer, Measured, Panel, Table, calibration_us, exponent, lines,
     pace_for_goals, span,
 };
 use metachron_models::rod::Integrator;
@@ -101,7 +101,7 @@ pub(in super::super) struct Found {
     calibration_us: Option<f64>,
 }
 
-pub(in super::super) type Row = experiment::Row<Case, Found>;
+pub(in super::super) type Row = Measured<Case, Found>;
 
 /// The diagram of a benchmark.
 pub(in super::super) struct Diagram<B>(PhantomData<B>);

@@ -4,6 +4,7 @@
 //! rest shapes against the reference of the same law (docs/accuracy.md). Never here: our own rows.
 
 use serde::Deserialize;
+use serde::de::DeserializeOwned;
 
 /// The machine on which they were measured.
 pub(super) const MACHINE: &str = "two cores of a virtual AMD EPYC";
@@ -35,8 +36,12 @@ impl Peer {
 
 /// The runs of a benchmark.
 pub(in super::super) fn of(benchmark: &str) -> Vec<Peer> {
-    let rows = csv::Reader::from_reader(TABLE.as_bytes()).into_deserialize::<Peer>();
-    rows.flatten().filter(|peer| peer.benchmark == benchmark).collect()
+    stored::<Peer>(TABLE).into_iter().filter(|peer| peer.benchmark == benchmark).collect()
+}
+
+/// The rows of a stored table.
+pub(in super::super) fn stored<R: DeserializeOwned>(table: &str) -> Vec<R> {
+    csv::Reader::from_reader(table.as_bytes()).into_deserialize().flatten().collect()
 }
 
 #[cfg(test)]

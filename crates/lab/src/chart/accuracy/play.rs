@@ -10,11 +10,8 @@ use glam::DVec3;
 use metachron_contact::step::LoneStepper;
 use metachron_contact::{Agent, AnchorSpring, StepContext};
 use metachron_core::{AgentId, Body, CurveState, SimSpan, SimTime, Snapshot};
-use metachron_models::rod::Integrator;
-use metachron_models::rod::Tube;
-use metachron_models::rod::{Material, Section, TubeSpec};
-use metachron_models::soft::SoftBody;
-use metachron_models::soft::SoftSpec;
+use metachron_models::rod::{Integrator, Material, Section, Tube, TubeSpec};
+use metachron_models::soft::{SoftBody, SoftSpec};
 
 /// Factor by which a [`slender_tube`] is stiffer in stretch and shear than the tube of the references.
 const STIFFER: f64 = 1e3;

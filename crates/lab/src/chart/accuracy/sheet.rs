@@ -1,13 +1,10 @@
 //! A sheet between two walls under its own weight, against the elastic catenary.
 
-use super::super::stability::common::GRAVITY;
+use super::super::stability::common::{GRAVITY, plain_soft};
 use super::diagram::{Benchmark, Case};
 use super::play::Play;
-use glam::{DQuat, DVec3};
-use metachron_geometry::ContactTraits;
 use metachron_models::rod::Integrator;
-use metachron_models::soft::Side;
-use metachron_models::soft::{MaterialLaw, SoftMatter, SoftShape, SoftSpec};
+use metachron_models::soft::{MaterialLaw, Side, SoftMatter, SoftShape, SoftSpec};
 
 /// The benchmark.
 pub(in super::super) struct Sheet;
@@ -43,28 +40,10 @@ impl Benchmark for Sheet {
             damping_s: 0.0,
             law: MaterialLaw::Corotational,
         };
-        let mut play = Play::soft(SoftSpec { held: vec![Side::Left, Side::Right], ..soft(shape, matter) }, case)?;
+        let mut play = Play::soft(SoftSpec { held: vec![Side::Left, Side::Right], ..plain_soft(shape, matter) }, case)?;
         let sound = play.run(SECONDS, &[]);
         let error = (-play.lowest_m() - sag_m(young_pa)).abs() / SPAN_M;
         sound.then_some((play, error))
-    }
-}
-
-/// A soft body under gravity, attached nowhere and without obstacles.
-pub(super) fn soft(shape: SoftShape, matter: SoftMatter) -> SoftSpec {
-    SoftSpec {
-        shape,
-        nodes: None,
-        matter,
-        position: DVec3::ZERO,
-        rotation: DQuat::IDENTITY,
-        velocity: DVec3::ZERO,
-        held: Vec::new(),
-        friction: 0.0,
-        traits: ContactTraits::default(),
-        gravity: DVec3::NEG_Z * GRAVITY,
-        self_contact: false,
-        sleep: false,
     }
 }
 

@@ -3,18 +3,16 @@
 //! In: bodies and tubes with rates, springs from fixed points, links between them. Out: energy as each agent reports it at its
 //! own time, and energy and momentum at a common time. Never here: which bodies, which claims.
 
+use super::super::energy_bench::springs_j;
 use super::bench::{Faults, PairLaw, StepHarness, Weight};
 use glam::DVec3;
-use metachron_contact::AnchorSpring;
-use metachron_contact::Link;
 use metachron_contact::audit::{Audit, audit, in_flight, settled};
+use metachron_contact::{AnchorSpring, Link};
 use metachron_core::{AgentId, Anchor, Body, RigidState, SimTime, Snapshot};
 use metachron_geometry::narrow_phase::{NarrowPhaseScratch, gap};
 use metachron_geometry::{PlacedShape, ShapePose};
-use metachron_models::rigid::RigidBody;
-use metachron_models::rigid::RigidSpec;
-use metachron_models::rod::Tube;
-use metachron_models::rod::TubeSpec;
+use metachron_models::rigid::{RigidBody, RigidSpec};
+use metachron_models::rod::{Tube, TubeSpec};
 
 /// Agents, and the data for sums over them.
 pub(in super::super) struct Play {
@@ -149,15 +147,6 @@ impl Play {
         };
         self.links.iter().map(one).sum()
     }
-}
-
-/// Energy of springs between fixed points and a body, joules.
-fn springs_j(springs: &[AnchorSpring], state: &RigidState) -> f64 {
-    let one = |spring: &AnchorSpring| {
-        let end = Body::Rigid(*state).point(spring.anchor);
-        end.map_or(0.0, |(end, _)| 0.5 * spring.stiffness_n_m * end.distance_squared(spring.target))
-    };
-    springs.iter().map(one).sum()
 }
 
 /// The impulse of contacts on a rigid body, step by step: the change of its momentum minus the parts of gravity and its springs.

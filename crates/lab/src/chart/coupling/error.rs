@@ -5,7 +5,7 @@
 
 use super::super::energy_bench::Play;
 use super::super::scenes::{Scene, scene};
-use crate::chart::{Axis, Colour, Column, Experiment, Figure, Finding, Layer, Panel, experiment, span, worst};
+use crate::chart::{Axis, Colour, Column, Experiment, Figure, Finding, Layer, Measured, Panel, span, worst};
 use glam::DVec3;
 use metachron_core::{AgentId, Anchor};
 use serde::{Deserialize, Serialize};
@@ -57,7 +57,7 @@ impl Default for Found {
     }
 }
 
-type Row = experiment::Row<Case, Found>;
+type Row = Measured<Case, Found>;
 
 impl Experiment for CouplingError {
     type Case = Case;
@@ -103,16 +103,12 @@ impl Experiment for CouplingError {
     fn findings(rows: &[Row]) -> Vec<Finding> {
         let lost = rows.iter().filter(|r| !r.position_rms_m.is_finite()).count() as f64;
         let of = |scene: &str, get: fn(&Row) -> f64| worst(rows.iter().filter(|r| r.case.scene == scene).map(get));
-        vec![
-            Finding::at_most("runs that stopped early", lost, 0.0),
-            Finding::at_most(
-                "two balls: impulse error over the impulse with fine steps",
-                of(SCENES[0], |r| r.impulse),
-                BLOW_MAX,
-            ),
-            Finding::at_most("two balls: momentum error over the impulse", of(SCENES[0], |r| r.momentum), MOMENTUM_MAX),
-            Finding::at_most("ball on box: position error, m", of(SCENES[1], |r| r.position_max_m), REST_MAX_M),
-        ]
+        Finding::all_at_most([
+            ("runs that stopped early", lost, 0.0),
+            ("two balls: impulse error over the impulse with fine steps", of(SCENES[0], |r| r.impulse), BLOW_MAX),
+            ("two balls: momentum error over the impulse", of(SCENES[0], |r| r.momentum), MOMENTUM_MAX),
+            ("ball on box: position error, m", of(SCENES[1], |r| r.position_max_m), REST_MAX_M),
+        ])
     }
 }
 

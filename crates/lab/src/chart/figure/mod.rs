@@ -6,7 +6,10 @@ mod draw;
 mod font;
 mod scale;
 
-pub use draw::{headings, png, svg};
+use anyhow::Context;
+pub use draw::headings;
+use draw::{png, svg};
+use std::path::{Path, PathBuf};
 
 /// Some panels under one title.
 #[derive(Debug, Clone, Default)]
@@ -29,6 +32,19 @@ impl Figure {
     pub fn single(title: impl Into<String>, x: Axis, y: Axis, layers: impl IntoIterator<Item = Layer>) -> Self {
         Self::new(title, 1, vec![Panel::new("", x, y, layers)])
     }
+}
+
+/// Writes a figure as SVG and as PNG.
+///
+/// # Errors
+/// Text that cannot be drawn, a file that cannot be written.
+pub fn write(folder: &Path, stem: &str, figure: &Figure) -> anyhow::Result<[PathBuf; 2]> {
+    let (svg, png) = (svg(figure)?, png(figure)?);
+    let paths = ["svg", "png"].map(|kind| folder.join(format!("{stem}.{kind}")));
+    for (path, bytes) in paths.iter().zip([svg.as_bytes(), &png]) {
+        std::fs::write(path, bytes).with_context(|| format!("{} cannot be written", path.display()))?;
+    }
+    Ok(paths)
 }
 
 /// A pair of axes with the layers drawn in it.

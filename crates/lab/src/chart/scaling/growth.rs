@@ -3,7 +3,7 @@
 //! In: a [`Growth`]. Out: an experiment whose cases are measured one at a time. Never here: what is counted.
 
 use crate::chart::{
-    Axis, Colour, Experiment, Figure, Finding, Layer, Panel, Table, calibration_us, experiment, exponent, lines,
+    Axis, Colour, Experiment, Figure, Finding, Layer, Measured, Panel, Table, calibration_us, exponent, lines,
     pace_for_goals, span,
 };
 use serde::{Deserialize, Serialize};
@@ -70,7 +70,7 @@ pub(in super::super) struct Found {
     pub(super) calibration_us: Option<f64>,
 }
 
-pub(in super::super) type Row = experiment::Row<Case, Found>;
+pub(in super::super) type Row = Measured<Case, Found>;
 
 impl Found {
     /// Count and microseconds; NaN where there are none.

@@ -8,8 +8,7 @@ use glam::{DQuat, DVec3};
 use metachron_contact::Neighbour;
 use metachron_core::{AgentId, Anchor, Body, Grasp, Snapshot, ToolState};
 use metachron_geometry::{Obstacle, Solid};
-use metachron_models::rod::Tube;
-use metachron_models::rod::TubeSpec;
+use metachron_models::rod::{Tube, TubeSpec};
 use std::sync::Arc;
 
 /// Segments of one strand of a folded tube.

@@ -6,11 +6,10 @@
 
 use super::super::bench::StepHarness;
 use super::common::{dead_load, plain_tube};
-use crate::chart::{Axis, Colour, Column, Experiment, Figure, Finding, Layer, experiment, worst};
+use crate::chart::{Axis, Colour, Column, Experiment, Figure, Finding, Layer, Measured, worst};
 use glam::{DQuat, DVec3};
 use metachron_geometry::{Obstacle, Solid};
-use metachron_models::rod::Tube;
-use metachron_models::rod::TubeSpec;
+use metachron_models::rod::{Tube, TubeSpec};
 use serde::{Deserialize, Serialize};
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
 
@@ -59,7 +58,7 @@ pub(in super::super) struct Found {
     ratio: Option<f64>,
 }
 
-type Row = experiment::Row<Case, Found>;
+type Row = Measured<Case, Found>;
 
 impl Found {
     fn error(&self) -> f64 {

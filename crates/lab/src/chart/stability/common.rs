@@ -1,11 +1,12 @@
 //! Shared parts of the stability experiments: plain bodies and tubes, and loads.
 
-use glam::DVec3;
+use glam::{DQuat, DVec3};
 use metachron_contact::AnchorSpring;
 use metachron_core::Anchor;
-use metachron_geometry::Solid;
+use metachron_geometry::{ContactTraits, Solid};
 use metachron_models::rigid::RigidSpec;
 use metachron_models::rod::{Material, Section, TubeSpec};
+use metachron_models::soft::{SoftMatter, SoftShape, SoftSpec};
 
 /// Gravity of the Earth, m/s².
 pub(crate) const GRAVITY: f64 = 9.81;
@@ -25,6 +26,24 @@ pub(in super::super) fn plain_tube(path_m: Vec<DVec3>, radius_m: f64, segments: 
 /// A free rigid body at rest at `position`, no weight, no friction, no rebound.
 pub(in super::super) fn plain_body(solid: Solid, position: DVec3, mass_kg: f64) -> RigidSpec {
     RigidSpec { friction: 0.0, ..RigidSpec::free(solid, position, mass_kg) }
+}
+
+/// A soft body under gravity, attached nowhere, no friction.
+pub(crate) fn plain_soft(shape: SoftShape, matter: SoftMatter) -> SoftSpec {
+    SoftSpec {
+        shape,
+        nodes: None,
+        matter,
+        position: DVec3::ZERO,
+        rotation: DQuat::IDENTITY,
+        velocity: DVec3::ZERO,
+        held: Vec::new(),
+        friction: 0.0,
+        traits: ContactTraits::default(),
+        gravity: DVec3::NEG_Z * GRAVITY,
+        self_contact: false,
+        sleep: false,
+    }
 }
 
 /// A constant force on the point of a tube at a rest arc length: a spring so soft and long that motion does not change its force.

@@ -1,18 +1,17 @@
 //! Heavy on light: stacks and chains whose far end weighs a hundred or a thousand times as much, compared with other engines.
 //!
 //! Cubes of 1 m on a floor, each an agent; twenty links on ball joints. Measurements of the other engines, made once, are in
-//! `docs/reference/peers_w4.json`: for each engine the best of its variants at this mass ratio and step.
+//! `peers.csv`: for each engine the best of its variants at this mass ratio and step.
 
 use super::super::lockstep_run::LockstepRun;
 use super::common::{GRAVITY, plain_body};
-use crate::chart::{Axis, Colour, Column, Experiment, Figure, Finding, Layer, Panel, experiment, worst};
+use crate::chart::accuracy::peers::stored;
+use crate::chart::{Axis, Colour, Column, Experiment, Figure, Finding, Layer, Measured, Panel, worst};
 use glam::{DQuat, DVec3};
 use metachron_contact::detect::ClusterScene;
 use metachron_core::{AgentId, Body, RigidState, Snapshot};
 use metachron_geometry::{Obstacle, Solid};
-use metachron_models::rigid::RigidBody;
-use metachron_models::rigid::RigidSpec;
-use metachron_models::rigid::{Joint, JointKind};
+use metachron_models::rigid::{Joint, JointKind, RigidBody, RigidSpec};
 use metachron_runtime::AgentSpawn;
 use serde::{Deserialize, Serialize};
 use std::sync::Arc;
@@ -20,7 +19,7 @@ use std::sync::Arc;
 /// The experiment.
 pub(in super::super) struct Heavy;
 
-const PEERS: &str = include_str!("peers_w4.json");
+const PEERS: &str = include_str!("peers.csv");
 const TESTS: [&str; 4] = ["stack2", "stack10", "chain20-hang", "chain20-swing"];
 const RATIOS: [f64; 3] = [1.0, 100.0, 1000.0];
 const RATES_HZ: [f64; 2] = [60.0, 240.0];
@@ -47,7 +46,7 @@ pub(in super::super) struct Case {
 }
 
 /// The results of a test.
-#[derive(Debug, Clone, Serialize, Deserialize)]
+#[derive(Debug, Clone, Default, Serialize, Deserialize)]
 pub(in super::super) struct Found {
     /// Sink of the top, metres, or greatest stretch of the chain as a share of its length.
     value: f64,
@@ -63,7 +62,7 @@ pub(in super::super) struct Found {
     best_peer: String,
 }
 
-type Row = experiment::Row<Case, Found>;
+type Row = Measured<Case, Found>;
 
 /// One measurement of another engine.
 #[derive(Debug, Clone, Deserialize)]
@@ -77,14 +76,9 @@ struct Peer {
     status: String,
 }
 
-#[derive(Deserialize)]
-struct Peers {
-    rows: Vec<Peer>,
-}
-
-/// All measurements of other engines; empty if the file were invalid, which a test excludes.
+/// All measurements of other engines.
 fn peers() -> Vec<Peer> {
-    serde_json::from_str::<Peers>(PEERS).map_or_else(|_| Vec::new(), |peers| peers.rows)
+    stored(PEERS)
 }
 
 /// The best of the other engines that hold.
@@ -127,17 +121,18 @@ impl Experiment for Heavy {
     fn measure(case: &Case) -> Row {
         let is_stack = case.test.starts_with("stack");
         let result = if is_stack { cube_stack(case) } else { hanging_chain(case) };
-        let MassRatioResult { value, aside_m, gain, led } =
-            result.unwrap_or(MassRatioResult { value: f64::NAN, aside_m: 0.0, gain: 0.0, led: 0 });
-        let holds = if is_stack {
-            value.abs() <= SINK_MAX_M && aside_m <= ASIDE_MAX_M
-        } else {
-            value <= STRETCH_MAX && gain <= GAIN_MAX
-        };
         let peer = best_peer(case);
-        let best_peer_value = peer.as_ref().and_then(|p| p.value);
-        let best_peer = peer.map_or_else(String::new, |p| format!("{} {}", p.peer, p.variant));
-        Row { case: case.clone(), found: Found { value, aside_m, gain, holds, led, best_peer_value, best_peer } }
+        let mut found = Found {
+            best_peer_value: peer.as_ref().and_then(|p| p.value),
+            best_peer: peer.map_or_else(String::new, |p| format!("{} {}", p.peer, p.variant)),
+            ..result.unwrap_or(Found { value: f64::NAN, ..Found::default() })
+        };
+        found.holds = if is_stack {
+            found.value.abs() <= SINK_MAX_M && found.aside_m <= ASIDE_MAX_M
+        } else {
+            found.value <= STRETCH_MAX && found.gain <= GAIN_MAX
+        };
+        Row { case: case.clone(), found }
     }
 
     fn figure(rows: &[Row]) -> Figure {
@@ -148,28 +143,16 @@ impl Experiment for Heavy {
     fn findings(rows: &[Row]) -> Vec<Finding> {
         let fails = |r: &&Row| !r.holds && !r.best_peer.is_empty();
         let worse = |r: &&Row| r.best_peer_value.is_some_and(|best| r.value.abs() > best.max(STRETCH_MAX));
-        vec![
-            Finding::at_most(
-                "cases that fail where another engine holds",
-                rows.iter().filter(fails).count() as f64,
-                0.0,
-            ),
-            Finding::at_most("cases that fail", rows.iter().filter(|r| !r.holds).count() as f64, 0.0),
-            Finding::at_most(
+        Finding::all_at_most([
+            ("cases that fail where another engine holds", rows.iter().filter(fails).count() as f64, 0.0),
+            ("cases that fail", rows.iter().filter(|r| !r.holds).count() as f64, 0.0),
+            (
                 "cases that sink or stretch by more than 0.001 and more than the best engine",
                 rows.iter().filter(worse).count() as f64,
                 0.0,
             ),
-        ]
+        ])
     }
-}
-
-/// The results of a stack or a chain.
-struct MassRatioResult {
-    value: f64,
-    aside_m: f64,
-    gain: f64,
-    led: usize,
 }
 
 fn rigid(snapshot: &Snapshot) -> Option<RigidState> {
@@ -180,7 +163,7 @@ fn rigid(snapshot: &Snapshot) -> Option<RigidState> {
 }
 
 /// Stacks cubes a millimetre apart; the top one is heavier.
-fn cube_stack(case: &Case) -> Option<MassRatioResult> {
+fn cube_stack(case: &Case) -> Option<Found> {
     let count: u32 = case.test.strip_prefix("stack")?.parse().ok()?;
     let scene = Arc::new(ClusterScene::new(&[Obstacle::new("floor", Solid::Plane)]).ok()?);
     let mut spawns = Vec::new();
@@ -197,16 +180,16 @@ fn cube_stack(case: &Case) -> Option<MassRatioResult> {
     run.run_to(SECONDS);
     let states: Vec<RigidState> = run.snapshots().iter().filter_map(|s| rigid(s)).collect();
     let top = states.last()?.position.z;
-    Some(MassRatioResult {
+    Some(Found {
         value: f64::from(count) - 0.5 - top,
         aside_m: worst(states.iter().map(|s| s.position.truncate().length())),
-        gain: 0.0,
         led: run.steps().iter().filter(|(_, leader)| leader.is_some()).count(),
+        ..Found::default()
     })
 }
 
 /// Hangs a chain from the origin, straight down or horizontal; the last link is heavier.
-fn hanging_chain(case: &Case) -> Option<MassRatioResult> {
+fn hanging_chain(case: &Case) -> Option<Found> {
     let along = if case.test.ends_with("swing") { DVec3::X } else { DVec3::NEG_Z };
     let joint = |i: u32| Joint {
         anchor_a_m: DVec3::Z * HALF_LINK_M,
@@ -227,7 +210,7 @@ fn hanging_chain(case: &Case) -> Option<MassRatioResult> {
         spawns.push(one);
     }
     let mut run = LockstepRun::start(spawns).ok()?;
-    let mut result = MassRatioResult { value: 0.0, aside_m: 0.0, gain: 0.0, led: 0 };
+    let mut result = Found::default();
     let length = 2.0 * HALF_LINK_M * f64::from(LINKS);
     let scale = GRAVITY * length * (case.ratio + 0.5 * f64::from(LINKS - 1));
     let (mut start_j, mut t) = (None, 0.0);

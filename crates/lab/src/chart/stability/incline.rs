@@ -2,15 +2,13 @@
 
 use super::super::bench::StepHarness;
 use super::common::{GRAVITY, plain_body, plain_tube};
-use crate::chart::{Axis, Colour, Column, Experiment, Figure, Finding, Layer, experiment, span, worst};
+use crate::chart::{Axis, Colour, Column, Experiment, Figure, Finding, Layer, Measured, span, worst};
 use glam::{DQuat, DVec3};
 use metachron_contact::Agent;
 use metachron_core::{Body, Snapshot};
 use metachron_geometry::{Obstacle, Solid};
-use metachron_models::rigid::RigidBody;
-use metachron_models::rigid::RigidSpec;
-use metachron_models::rod::Tube;
-use metachron_models::rod::TubeSpec;
+use metachron_models::rigid::{RigidBody, RigidSpec};
+use metachron_models::rod::{Tube, TubeSpec};
 use serde::{Deserialize, Serialize};
 
 /// The experiment.
@@ -45,7 +43,7 @@ pub(in super::super) struct Found {
     theory_m: f64,
 }
 
-type Row = experiment::Row<Case, Found>;
+type Row = Measured<Case, Found>;
 
 impl Experiment for Incline {
     type Case = Case;

@@ -3,7 +3,7 @@
 use super::super::energy_bench::Play;
 use super::super::scenes::{Scene, WITH_TUBES, scene};
 use super::common::COMMON_ENERGY_MAX;
-use crate::chart::{Axis, Colour, Column, Experiment, Figure, Finding, Layer, Panel, experiment, worst};
+use crate::chart::{Axis, Colour, Column, Experiment, Figure, Finding, Layer, Measured, Panel, worst};
 use glam::DVec3;
 use metachron_core::{AgentId, Anchor};
 use serde::{Deserialize, Serialize};
@@ -40,7 +40,7 @@ pub(in super::super) struct Found {
     contacts: u32,
 }
 
-type Row = experiment::Row<Case, Found>;
+type Row = Measured<Case, Found>;
 
 impl Experiment for Pairs {
     type Case = Case;
@@ -99,11 +99,11 @@ impl Experiment for Pairs {
     fn findings(rows: &[Row]) -> Vec<Finding> {
         let at_60 = rows.iter().filter(|r| r.slow_hz >= 50.0).map(|r| r.depth_m);
         let apart = rows.iter().filter(|r| r.contacts == 0).count() as f64;
-        vec![
-            Finding::at_most("peak energy over the start's", worst(rows.iter().map(|r| r.peak)), COMMON_ENERGY_MAX),
-            Finding::at_most("overlap at rest at 50 Hz and more, m", worst(at_60), DEPTH_MAX_M),
-            Finding::at_most("pairs without contact at the end", apart, 0.0),
-        ]
+        Finding::all_at_most([
+            ("peak energy over the start's", worst(rows.iter().map(|r| r.peak)), COMMON_ENERGY_MAX),
+            ("overlap at rest at 50 Hz and more, m", worst(at_60), DEPTH_MAX_M),
+            ("pairs without contact at the end", apart, 0.0),
+        ])
     }
 }
 

@@ -6,14 +6,12 @@
 
 use super::common::{GRAVITY, plain_tube};
 use super::hanging::Hanging;
-use crate::chart::{Axis, Colour, Experiment, Figure, Finding, Layer, Panel, Table, experiment};
+use crate::chart::{Axis, Colour, Experiment, Figure, Finding, Layer, Measured, Panel, Table};
 use glam::DVec3;
 use metachron_contact::step::LoneStepper;
 use metachron_contact::{Agent, StepContext};
 use metachron_core::{AgentId, SimSpan, SimTime, Snapshot};
-use metachron_models::rod::Integrator;
-use metachron_models::rod::Tube;
-use metachron_models::rod::{Material, Section, TubeSpec};
+use metachron_models::rod::{Integrator, Material, Section, Tube, TubeSpec};
 use serde::{Deserialize, Serialize};
 
 /// The experiment.
@@ -58,7 +56,7 @@ pub(in super::super) struct Found {
     substeps_per_step: f64,
 }
 
-type Row = experiment::Row<Case, Found>;
+type Row = Measured<Case, Found>;
 
 /// The verdicts on a case.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
@@ -139,14 +137,10 @@ impl Experiment for TubeMap {
         let bad =
             rows.iter().filter(|r| implicit.contains(&r.case.integrator.as_str()) && r.verdict != Verdict::Stable);
         let unsaid = rows.iter().filter(|r| matches!(r.verdict, Verdict::Wrong | Verdict::BlownUp));
-        vec![
-            Finding::at_most("implicit methods: cells of the map that are not stable", bad.count() as f64, 0.0),
-            Finding::at_most(
-                "all methods: cells that fail without being refused beforehand",
-                unsaid.count() as f64,
-                0.0,
-            ),
-        ]
+        Finding::all_at_most([
+            ("implicit methods: cells of the map that are not stable", bad.count() as f64, 0.0),
+            ("all methods: cells that fail without being refused beforehand", unsaid.count() as f64, 0.0),
+        ])
     }
 }
 

@@ -9,8 +9,7 @@ use crate::chart::accuracy::play::{Play, metre, reference_tube, slender_tube};
 use crate::chart::stability::common::dead_load;
 use glam::DVec3;
 use metachron_core::CurveState;
-use metachron_models::rod::Integrator;
-use metachron_models::rod::TubeSpec;
+use metachron_models::rod::{Integrator, TubeSpec};
 use std::f64::consts::TAU;
 
 /// The benchmark of the straight tube.

@@ -5,8 +5,7 @@ use crate::chart::accuracy::play::{Play, metre, reference_tube};
 use crate::chart::stability::common::GRAVITY;
 use crate::chart::stability::hanging::Hanging;
 use glam::DVec3;
-use metachron_models::rod::Integrator;
-use metachron_models::rod::{Section, TubeSpec};
+use metachron_models::rod::{Integrator, Section, TubeSpec};
 
 /// The benchmark.
 pub(crate) struct Cantilever;

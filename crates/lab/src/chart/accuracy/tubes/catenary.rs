@@ -4,8 +4,7 @@ use crate::chart::accuracy::diagram::{Benchmark, Case};
 use crate::chart::accuracy::play::{Play, reference_tube};
 use crate::chart::stability::common::GRAVITY;
 use glam::DVec3;
-use metachron_models::rod::Integrator;
-use metachron_models::rod::TubeSpec;
+use metachron_models::rod::{Integrator, TubeSpec};
 
 /// The benchmark.
 pub(crate) struct Catenary;

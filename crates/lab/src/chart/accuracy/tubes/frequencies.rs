@@ -9,8 +9,7 @@ use crate::chart::stability::common::dead_load;
 use glam::{DQuat, DVec3};
 use metachron_contact::AnchorSpring;
 use metachron_core::CurveState;
-use metachron_models::rod::Integrator;
-use metachron_models::rod::TubeSpec;
+use metachron_models::rod::{Integrator, TubeSpec};
 use std::f64::consts::{FRAC_PI_2, TAU};
 
 /// The benchmark.

@@ -8,8 +8,7 @@ use crate::chart::accuracy::play::{Play, slender_tube};
 use crate::chart::stability::common::dead_load;
 use glam::DVec3;
 use metachron_contact::AnchorSpring;
-use metachron_models::rod::Integrator;
-use metachron_models::rod::TubeSpec;
+use metachron_models::rod::{Integrator, TubeSpec};
 use std::f64::consts::TAU;
 
 /// The benchmark.

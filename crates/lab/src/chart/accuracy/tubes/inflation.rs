@@ -4,8 +4,7 @@
 
 use crate::chart::accuracy::diagram::{Benchmark, Case};
 use crate::chart::accuracy::play::{Play, metre};
-use metachron_models::rod::Integrator;
-use metachron_models::rod::{Material, Section, TubeSpec};
+use metachron_models::rod::{Integrator, Material, Section, TubeSpec};
 
 /// The benchmark.
 pub(crate) struct Inflation;

@@ -5,8 +5,7 @@ use crate::chart::accuracy::diagram::{Benchmark, Case, Goal};
 use crate::chart::accuracy::play::{Play, metre, slender_tube};
 use crate::chart::stability::common::GRAVITY;
 use glam::DVec3;
-use metachron_models::rod::Integrator;
-use metachron_models::rod::TubeSpec;
+use metachron_models::rod::{Integrator, TubeSpec};
 use serde::Deserialize;
 
 /// The benchmark.

@@ -3,7 +3,7 @@
 use crate::chart::policies::numeric::common::LEVEL_PARTS;
 use crate::chart::policies::numeric::machine::RandomSource;
 use crate::chart::policies::numeric::metrics::mean;
-use crate::chart::{Axis, Colour, Column, Experiment, Figure, Finding, Layer, experiment};
+use crate::chart::{Axis, Colour, Column, Experiment, Figure, Finding, Layer, Measured};
 use metachron_lod::adaptive::{Adaptive, Offer, Settings, Time};
 use metachron_lod::select::{Entry, Mode, Problem, funkhouser, incremental, linear, marginal};
 use serde::{Deserialize, Serialize};
@@ -46,7 +46,7 @@ pub(crate) struct Found {
     least: f64,
 }
 
-type Row = experiment::Row<Case, Found>;
+type Row = Measured<Case, Found>;
 
 impl Experiment for Bound {
     type Case = Case;

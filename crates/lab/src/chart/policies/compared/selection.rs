@@ -1,7 +1,7 @@
 //! Wall time of a choice, from 100 objects to 100,000: the only experiment here that reads a clock.
 
 use crate::chart::policies::numeric::common::LEVEL_PARTS;
-use crate::chart::{Axis, Column, Experiment, Figure, Finding, Layer, experiment, lines, median};
+use crate::chart::{Axis, Column, Experiment, Figure, Finding, Layer, Measured, lines, median};
 use metachron_lod::adaptive::{Adaptive, Offer, Settings, Time};
 use metachron_lod::select::{Entry, Level, Mode, Problem, funkhouser, incremental, marginal};
 use serde::{Deserialize, Serialize};
@@ -47,7 +47,7 @@ pub struct Found {
     least_ms: f64,
 }
 
-type Row = experiment::Row<Case, Found>;
+type Row = Measured<Case, Found>;
 
 impl Experiment for Selection {
     type Case = Case;

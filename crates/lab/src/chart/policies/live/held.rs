@@ -5,7 +5,7 @@
 //! window. Policies and loads take turns, round by round, so that other work of the machine meets all of them.
 
 use crate::chart::policies::numeric::metrics::{deviation95, error_over_allowed, mean, predicts, within};
-use crate::chart::{Axis, Colour, Column, Experiment, Figure, Finding, Layer, Panel, experiment, worst};
+use crate::chart::{Axis, Colour, Column, Experiment, Figure, Finding, Layer, Measured, Panel, worst};
 use anyhow::Context;
 use metachron_lod::control::Policy;
 use metachron_render::{Camera, Gpu, Offscreen, RendererOptions, SceneView, Size, Style};
@@ -76,7 +76,7 @@ pub(in super::super::super) struct Found {
     said: String,
 }
 
-type Row = experiment::Row<Case, Found>;
+type Row = Measured<Case, Found>;
 
 /// Threads that do nothing but compute, until they are dropped.
 struct Busy {

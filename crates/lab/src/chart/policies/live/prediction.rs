@@ -164,11 +164,11 @@ impl Experiment for Prediction {
     fn findings(rows: &[Row]) -> Vec<Finding> {
         let by_areas = || rows.iter().filter(|row| row.prices == "areas");
         let all = |of: fn(&Row) -> f64| worst(by_areas().map(of));
-        vec![
-            Finding::at_most("19 of 20 pictures of every scene: error of the prediction", all(|r| r.error95), WANTED),
-            Finding::at_most("the same with one factor per scene", all(|r| r.scaled_error95), WANTED),
-            Finding::at_most("19 of 20 drawings of the same picture: scatter", all(|r| r.scatter95), WANTED),
-        ]
+        Finding::all_at_most([
+            ("19 of 20 pictures of every scene: error of the prediction", all(|r| r.error95), WANTED),
+            ("the same with one factor per scene", all(|r| r.scaled_error95), WANTED),
+            ("19 of 20 drawings of the same picture: scatter", all(|r| r.scatter95), WANTED),
+        ])
     }
 }
 

@@ -3,7 +3,7 @@
 //!
 //! In: a mesh of 100,000 triangles. Out: triangles per second at each resolution. Never here: drawing.
 
-use crate::chart::{Axis, Colour, Column, Experiment, Figure, Finding, Layer, Panel, experiment, span, worst};
+use crate::chart::{Axis, Colour, Column, Experiment, Figure, Finding, Layer, Measured, Panel, span, worst};
 use metachron_drawable::{Generator, ProgressiveMesh, generate};
 use serde::{Deserialize, Serialize};
 use std::sync::OnceLock;
@@ -34,7 +34,7 @@ pub(in super::super::super) struct Found {
     rate: f64,
 }
 
-type Row = experiment::Row<Case, Found>;
+type Row = Measured<Case, Found>;
 
 fn mesh() -> Option<&'static ProgressiveMesh> {
     static MESH: OnceLock<Option<ProgressiveMesh>> = OnceLock::new();

@@ -3,7 +3,7 @@
 use crate::chart::policies::numeric::geodesic;
 use crate::chart::policies::numeric::geodesic::{DOMES, STRUTS};
 use crate::chart::policies::numeric::metrics::mean;
-use crate::chart::{Axis, Column, Experiment, Figure, Finding, Panel, experiment, lines};
+use crate::chart::{Axis, Column, Experiment, Figure, Finding, Measured, Panel, lines};
 use metachron_lod::select::incremental::Keep;
 use metachron_lod::select::tree::{Node, Tree};
 use metachron_lod::select::{Entry, Level, Mode, Problem, funkhouser, mason, mason_flat, tree_exact};
@@ -67,7 +67,7 @@ pub(crate) struct Found {
     balls: f64,
 }
 
-type Row = experiment::Row<Case, Found>;
+type Row = Measured<Case, Found>;
 
 impl Experiment for Domes {
     type Case = Case;

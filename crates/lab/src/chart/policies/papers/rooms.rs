@@ -2,7 +2,7 @@
 //!
 //! In: the built-in scene `auditorium` at three places of its walk. Out: counts, and a plan for each place. Never here: a policy.
 
-use crate::chart::{Axis, Colour, Column, Experiment, Figure, Finding, Layer, Mark, Panel, experiment};
+use crate::chart::{Axis, Colour, Column, Experiment, Figure, Finding, Layer, Mark, Measured, Panel};
 use glam::DVec3;
 use metachron_geometry::Cell;
 use metachron_render::{Size, VisibleCounts};
@@ -112,7 +112,7 @@ impl Plan {
     }
 }
 
-type Row = experiment::Row<Case, Found>;
+type Row = Measured<Case, Found>;
 
 impl Experiment for Rooms {
     type Case = Case;

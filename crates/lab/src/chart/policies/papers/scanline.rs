@@ -2,7 +2,7 @@
 //!
 //! A diffuse cylinder under one directional light, in an orthographic projection: the meaning of the printed accuracy of a level.
 
-use crate::chart::{Axis, Colour, Column, Experiment, Figure, Finding, Layer, Panel, experiment};
+use crate::chart::{Axis, Colour, Column, Experiment, Figure, Finding, Layer, Measured, Panel};
 use serde::{Deserialize, Serialize};
 use std::f64::consts::PI;
 
@@ -86,7 +86,7 @@ impl Shading {
     }
 }
 
-type Row = experiment::Row<Case, Found>;
+type Row = Measured<Case, Found>;
 
 impl Experiment for Scanline {
     type Case = Case;
@@ -134,12 +134,12 @@ impl Experiment for Scanline {
         let row = |k: usize| rows.iter().find(|r| r.case.picture == PICTURES[k].0);
         let rms = |k: usize| row(k).map_or(f64::NAN, |r| r.rms);
         let colours = |k: usize| row(k).map_or(f64::NAN, |r| r.colours as f64);
-        vec![
-            Finding::at_most("colours of the flat prism of 8 faces", colours(1), 4.0),
-            Finding::at_most("colours of the flat prism of 16 faces", colours(2), 8.0),
-            Finding::at_most("error of 16 flat faces over that of 8, accuracy 1 − ½/samples", rms(2) / rms(1), 0.6),
-            Finding::at_most("error of 16 Gouraud faces over that of 8 flat ones", rms(3) / rms(1), 0.2),
-        ]
+        Finding::all_at_most([
+            ("colours of the flat prism of 8 faces", colours(1), 4.0),
+            ("colours of the flat prism of 16 faces", colours(2), 8.0),
+            ("error of 16 flat faces over that of 8, accuracy 1 − ½/samples", rms(2) / rms(1), 0.6),
+            ("error of 16 Gouraud faces over that of 8 flat ones", rms(3) / rms(1), 0.2),
+        ])
     }
 }
 

@@ -6,7 +6,7 @@ use crate::chart::policies::numeric::forest;
 use crate::chart::policies::numeric::forest::{CameraPath, Forms};
 use crate::chart::policies::numeric::machine::Fault;
 use crate::chart::policies::numeric::metrics::mean;
-use crate::chart::{Axis, Colour, Column, Experiment, Figure, Finding, Layer, Panel, experiment};
+use crate::chart::{Axis, Colour, Column, Experiment, Figure, Finding, Layer, Measured, Panel};
 use metachron_lod::cost::value::Value;
 use serde::{Deserialize, Serialize};
 
@@ -58,7 +58,7 @@ fn drawn(value: Value) -> (Vec<(f64, f64)>, f64) {
     (parts, frames[FRAME].time)
 }
 
-type Row = experiment::Row<Case, Found>;
+type Row = Measured<Case, Found>;
 
 impl Experiment for Values {
     type Case = Case;

@@ -9,7 +9,7 @@
 use super::closed_system::{ROOM_M, SYSTEMS, system};
 use crate::chart::asynchronous::play::Play;
 use crate::chart::stability::common::COMMON_ENERGY_MAX;
-use crate::chart::{Axis, Colour, Column, Experiment, Figure, Finding, Layer, Panel, experiment, span, worst};
+use crate::chart::{Axis, Colour, Column, Experiment, Figure, Finding, Layer, Measured, Panel, span, worst};
 use glam::DVec3;
 use metachron_contact::audit::{Audit, audit};
 use metachron_core::{AgentId, SimTime};
@@ -70,7 +70,7 @@ pub(crate) struct Found {
     in_flight_of_second: String,
 }
 
-type Row = experiment::Row<Case, Found>;
+type Row = Measured<Case, Found>;
 
 impl Experiment for Closed {
     type Case = Case;

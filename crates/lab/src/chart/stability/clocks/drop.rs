@@ -6,10 +6,9 @@
 use crate::chart::asynchronous::bench::{Faults, PairLaw};
 use crate::chart::asynchronous::play::{ContactImpulse, Play};
 use crate::chart::stability::common::{COMMON_ENERGY_MAX, GRAVITY, plain_body};
-use crate::chart::{Axis, Colour, Experiment, Figure, Finding, Layer, Panel, Table, experiment, worst};
+use crate::chart::{Axis, Colour, Experiment, Figure, Finding, Layer, Measured, Panel, Table, worst};
 use glam::{DQuat, DVec3};
-use metachron_contact::AnchorSpring;
-use metachron_contact::Law;
+use metachron_contact::{AnchorSpring, Law};
 use metachron_core::{AgentId, Anchor};
 use metachron_geometry::Solid;
 use metachron_geometry::narrow_phase::NarrowPhaseScratch;
@@ -83,7 +82,7 @@ pub(crate) struct Found {
     depth_m: f64,
 }
 
-type Row = experiment::Row<Case, Found>;
+type Row = Measured<Case, Found>;
 
 impl Experiment for Drop {
     type Case = Case;
@@ -166,12 +165,12 @@ impl Experiment for Drop {
     fn findings(rows: &[Row]) -> Vec<Finding> {
         let ours = || rows.iter().filter(|r| r.case.law == "ledger");
         let at_60 = ours().filter(|r| r.case.rate_hz == 60.0).map(|r| r.depth_m);
-        vec![
-            Finding::at_most("ledger: peak of the sum over two clocks", worst(ours().map(|r| r.raw_peak)), RAW_MAX),
-            Finding::at_most("ledger: peak at a common time", worst(ours().map(|r| r.common_peak)), COMMON_ENERGY_MAX),
-            Finding::at_most("ledger: momentum error", worst(ours().map(|r| r.momentum_error)), MOMENTUM_MAX),
-            Finding::at_most("ledger: overlap at rest at 60 Hz, m", worst(at_60), DEPTH_MAX_M),
-        ]
+        Finding::all_at_most([
+            ("ledger: peak of the sum over two clocks", worst(ours().map(|r| r.raw_peak)), RAW_MAX),
+            ("ledger: peak at a common time", worst(ours().map(|r| r.common_peak)), COMMON_ENERGY_MAX),
+            ("ledger: momentum error", worst(ours().map(|r| r.momentum_error)), MOMENTUM_MAX),
+            ("ledger: overlap at rest at 60 Hz, m", worst(at_60), DEPTH_MAX_M),
+        ])
     }
 }
 

@@ -2,15 +2,13 @@
 
 use crate::chart::lockstep_run::{LockstepRun, members};
 use crate::chart::stability::common::plain_body;
-use crate::chart::{Axis, Colour, Experiment, Figure, Finding, Layer, Panel, Table, experiment, span, worst};
+use crate::chart::{Axis, Colour, Experiment, Figure, Finding, Layer, Measured, Panel, Table, span, worst};
 use glam::DVec3;
 use metachron_contact::Law;
 use metachron_contact::audit::settled;
-use metachron_core::{AgentId, PairKind};
-use metachron_core::{SimSpan, SimTime};
+use metachron_core::{AgentId, PairKind, SimSpan, SimTime};
 use metachron_geometry::Solid;
-use metachron_models::rigid::RigidBody;
-use metachron_models::rigid::RigidSpec;
+use metachron_models::rigid::{RigidBody, RigidSpec};
 use metachron_runtime::AgentSpawn;
 use serde::{Deserialize, Serialize};
 
@@ -60,7 +58,7 @@ impl Default for Found {
     }
 }
 
-type Row = experiment::Row<Case, Found>;
+type Row = Measured<Case, Found>;
 
 impl Experiment for Impact {
     type Case = Case;
@@ -135,14 +133,14 @@ impl Experiment for Impact {
 
     fn findings(rows: &[Row]) -> Vec<Finding> {
         let other = rows.iter().filter(|r| r.kind != PairKind::Ledger.name() || r.led).count();
-        vec![
-            Finding::at_most(
+        Finding::all_at_most([
+            (
                 "velocities after the impact: error over the closing speed",
                 worst(rows.iter().map(|r| r.error)),
                 TOLERANCE,
             ),
-            Finding::at_most("pairs not coupled by the ledger, or stepped in one cluster", other as f64, 0.0),
-        ]
+            ("pairs not coupled by the ledger, or stepped in one cluster", other as f64, 0.0),
+        ])
     }
 }
 

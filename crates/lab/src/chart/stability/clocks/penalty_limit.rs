@@ -9,7 +9,7 @@
 
 use super::drop::{FALLING_KG, MOUNTED_KG, Pair, law, pair};
 use crate::chart::asynchronous::bench::Faults;
-use crate::chart::{Axis, Colour, Column, Experiment, Figure, Finding, Layer, experiment, worst};
+use crate::chart::{Axis, Colour, Column, Experiment, Figure, Finding, Layer, Measured, worst};
 use serde::{Deserialize, Serialize};
 
 /// The experiment.
@@ -48,7 +48,7 @@ pub(crate) struct Found {
     theory_n_m: f64,
 }
 
-type Row = experiment::Row<Case, Found>;
+type Row = Measured<Case, Found>;
 
 impl Experiment for PenaltyLimit {
     type Case = Case;
