@@ -1,6 +1,9 @@
 //! The schema of scenes for editors: it accepts the scenes that load.
 
 use crate::scene::TUBE;
+use metachron_core::NumberRange;
+use metachron_geometry::RESTITUTION;
+use metachron_models::{rigid, soft};
 use metachron_scene::json_schema;
 
 /// Whether `value` keeps the parts of JSON Schema that ours uses; says where it does not.
@@ -86,5 +89,46 @@ fn the_schema_explains_every_key() {
         for (key, inner) in schema["$defs"][model]["properties"].as_object().unwrap() {
             assert!(key == "model" || inner["description"].is_string(), "{model}.{key}");
         }
+    }
+}
+
+#[test]
+fn the_schema_bounds_a_number_by_the_range_of_the_models_specification() {
+    let schema = json_schema();
+    for model in ["sheet", "solid", "rope"] {
+        let keys = &schema["$defs"][model]["properties"];
+        for (name, range) in soft::MATTER.0.iter().filter(|(name, _)| keys.get(name).is_some()) {
+            let bounds = [&keys[name]["minimum"], &keys[name]["maximum"]].map(serde_json::Value::as_f64);
+            assert_eq!(bounds, [Some(range.least), Some(range.greatest)], "{model}.{name}");
+        }
+    }
+    let poisson = schema["$defs"]["solid"]["properties"]["poisson"]["description"].as_str().unwrap();
+    assert!(poisson.starts_with("Poisson's ratio, 0 … 0.499. Default 0.4."), "{poisson}");
+}
+
+/// The ranges in a line of text, as `0 ... 0.499`.
+fn ranges_in(line: &str) -> Vec<(f64, f64)> {
+    let words: Vec<&str> = line.split([' ', ';', ',', '"']).filter(|word| !word.is_empty()).collect();
+    let around = words.windows(3).filter(|words| words[1] == "...");
+    around.map(|words| (words[0].parse().unwrap(), words[2].trim_end_matches('.').parse().unwrap())).collect()
+}
+
+#[test]
+fn the_documentation_of_pythons_parts_has_the_ranges_of_the_models() {
+    let text = std::fs::read_to_string("python/package/metachron/parts.py").unwrap();
+    let matter = |name: &str| soft::MATTER.get(name).unwrap();
+    let fields: [(&str, &str, &[NumberRange]); 6] = [
+        ("_Placed", "restitution", &[RESTITUTION]),
+        ("_Moving", "mass", &[rigid::MASS]),
+        ("_Soft", "young", &[matter("young_pa")]),
+        ("_Soft", "poisson", &[matter("poisson")]),
+        ("_Soft", "density", &[matter("density_kg_m3")]),
+        ("_Soft", "damping", &[matter("damping_per_s"), matter("damping_s")]),
+    ];
+    for (class, field, ranges) in fields {
+        let (_, body) = text.split_once(&format!("class {class}")).expect(class);
+        let (_, after) = body.split_once(&format!("\n    {field}: ")).expect(field);
+        let wanted: Vec<_> = ranges.iter().map(|range| (range.least, range.greatest)).collect();
+        assert_eq!(ranges_in(after.lines().nth(1).unwrap()), wanted, "{class}.{field}");
     }
 }

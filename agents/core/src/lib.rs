@@ -28,6 +28,7 @@ mod disjoint_sets;
 pub mod gains;
 pub mod id;
 mod inverse_mass;
+pub mod kinds;
 pub mod ledger;
 mod local_model;
 pub mod pair;

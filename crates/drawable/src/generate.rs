@@ -10,6 +10,7 @@ use metachron_geometry::{PrimitiveMesh, Triangles};
 
 /// Shape of a generated mesh.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
+#[cfg_attr(feature = "schema", derive(serde::Deserialize, schemars::JsonSchema), serde(rename_all = "kebab-case"))]
 pub enum Generator {
     /// A ball of radius 1.
     Sphere,

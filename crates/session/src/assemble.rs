@@ -13,14 +13,12 @@ use metachron_drawable::{Model, PieceKind};
 use metachron_lod::control;
 use metachron_lod::control::{
     ErrorControl, ErrorLimits, GivenSliders, Kind, Law, LevelDemand, ObjectView, PRIMITIVE_LEVELS, PictureControl,
-    Pieces, Policy, Prices, RateControl, RateDemand, RateGains, RateLimits, Stages, Stroke, Value,
+    Pieces, Prices, RateControl, RateDemand, RateGains, RateLimits, Stages, Stroke, Value,
 };
-use metachron_render::{
-    Actor, Appearance, Camera, Environment, Form, Level, Material, SceneView, StaticObject, Visibility,
-};
+use metachron_render::{Actor, Appearance, Camera, EnvironmentLight, Form, Level, SceneView, StaticObject, Visibility};
 use metachron_runtime::{DrawPrice, Governor, ObjectPrice};
 use metachron_world::kinds;
-use metachron_world::kinds::{EnvironmentKind, LawKind, PolicyKind, ShadingKind, ValueKind};
+use metachron_world::kinds::{LawKind, ShadingKind, ValueKind};
 use metachron_world::{Factors, Member, Scene, Scenery, machine};
 use std::sync::Arc;
 
@@ -141,7 +139,7 @@ pub fn scene_view(scene: &Scene) -> SceneView {
     let mut scene_view = SceneView::new(actors.collect(), props.collect());
     scene_view.set_groups(&members(scene));
     scene_view.set_cells(scene.cells.clone());
-    scene_view.set_environment(environment(scene.environment));
+    scene_view.set_environment(scene.environment);
     for (id, it) in (scene.agents.len() as u32..).zip(scenery(scene)) {
         if let Some(texture) = &it.texture {
             scene_view.paint(AgentId(id), texture);
@@ -162,14 +160,6 @@ pub fn join(scene: &mut Scene, scene_view: &mut SceneView, member: Member) {
 /// How an agent is drawn.
 pub fn actor(member: &Member) -> Actor {
     Actor { id: member.id, form: form(&member.spec), appearance: appearance(&member.appearance) }
-}
-
-const fn environment(kind: EnvironmentKind) -> Environment {
-    match kind {
-        EnvironmentKind::Room => Environment::Room,
-        EnvironmentKind::Sky => Environment::Sky,
-        EnvironmentKind::Endoscope => Environment::Endoscope,
-    }
 }
 
 /// For every group the actors in it and in its groups: agents, then scenery.
@@ -211,25 +201,19 @@ fn scenery(scene: &Scene) -> impl Iterator<Item = &Scenery> {
 }
 
 const fn appearance(wish: &metachron_world::Appearance) -> Appearance {
-    let material = match wish.material {
-        kinds::Material::Tissue => Material::Tissue,
-        kinds::Material::Metal => Material::Metal,
-        kinds::Material::Plastic => Material::Plastic,
-        kinds::Material::Skin => Material::Skin,
-    };
-    Appearance { colour: wish.colour, material }
+    Appearance { colour: wish.colour, material: wish.material }
 }
 
 /// The picture controller configured by `scene`.
 pub fn picture_control(scene: &Scene) -> PictureControl {
     let target = &scene.target;
-    let mut control = PictureControl::new(policy(target.policy), law(target), target.frame_hz);
+    let mut control = PictureControl::new(target.policy, law(target), target.frame_hz);
     control.set_value(value(target.value));
     let Factors { focus, motion, hysteresis } = target.factors;
     control.set_sliders(GivenSliders { focus, motion, hysteresis, ..GivenSliders::default() });
     control.set_raise(target.raise);
     control.set_render_scale(target.render_scale);
-    control.set_throws_shadows(environment(scene.environment).throws_shadows());
+    control.set_throws_shadows(EnvironmentLight::of(scene.environment).throws_shadows());
     if let Some((lag_s, share)) = target.lag {
         control.set_lag(lag_s, share);
     }
@@ -238,11 +222,6 @@ pub fn picture_control(scene: &Scene) -> PictureControl {
         control.set_margin(margin);
     }
     control
-}
-
-/// Control's type for a policy; scenes and control use the same names.
-pub fn policy(kind: PolicyKind) -> Policy {
-    Policy::named(kind.name()).unwrap_or_default()
 }
 
 const fn value(kind: ValueKind) -> Value {
@@ -414,16 +393,9 @@ fn view_of(
 
 /// Converts control's demand to the renderer's type.
 pub fn level(view: &ObjectView, demand: &LevelDemand) -> Level {
-    let shading = match demand.shading {
-        control::Shading::Flat => metachron_render::Shading::Flat,
-        control::Shading::Gouraud => metachron_render::Shading::Gouraud,
-        control::Shading::PerPixel => metachron_render::Shading::PerPixel,
-        control::Shading::Textured => metachron_render::Shading::Textured,
-        control::Shading::Shadowed => metachron_render::Shading::Shadowed,
-    };
     // a cast of floats saturates; the detail sets the colour of visible objects
     let detail = if view.visible { control::detail(view, demand) as f32 } else { 0.0 };
-    Level { resolution: demand.resolution, triangles: demand.polygons as u32, shading, detail }
+    Level { resolution: demand.resolution, triangles: demand.polygons as u32, shading: demand.shading, detail }
 }
 
 /// A camera of the scene `seconds` after the start; if the scene has none of that number, a camera in front that sees everything.
@@ -459,12 +431,5 @@ mod tests {
     #[test]
     fn a_group_may_have_as_many_levels_as_control_chooses_among() {
         assert_eq!(metachron_world::GROUP_LEVELS_MAX, control::IMPOSTORS_MAX);
-    }
-
-    #[test]
-    fn scenes_and_control_have_the_same_names_for_policies() {
-        let written: Vec<_> = PolicyKind::ALL.into_iter().map(PolicyKind::name).collect();
-        let known: Vec<_> = Policy::ALL.into_iter().map(Policy::name).collect();
-        assert_eq!(written, known);
     }
 }

@@ -226,13 +226,8 @@ impl PriceTable {
 const LONGEST_S: f64 = 3.0;
 
 fn measured(drawn: &Drawn) -> Measured {
-    let shading = match drawn.shading {
-        metachron_render::Shading::Flat => Shading::Flat,
-        metachron_render::Shading::Gouraud => Shading::Gouraud,
-        metachron_render::Shading::PerPixel => Shading::PerPixel,
-        // the benchmark draws no soft shadows
-        metachron_render::Shading::Textured | metachron_render::Shading::Shadowed => Shading::Textured,
-    };
+    // the benchmark draws no soft shadows
+    let shading = drawn.shading.min(Shading::Textured);
     let stroke = drawn.strokes.map(|kind| match kind {
         PieceKind::Leaf => Stroke::Point,
         PieceKind::Bough => Stroke::Line,

@@ -4,12 +4,10 @@
 
 use crate::ui::{AgentRow, AgentState, ContactSolve, CouplingRow, Filled, Law, Shares, Status, TurnRow};
 use metachron_core::{SimTime, Snapshot};
-use metachron_lod::control;
 use metachron_lod::control::Policy;
 use metachron_runtime::{AgentStats, Turn};
 use metachron_session::FrameRecord;
 use metachron_session::Session;
-use metachron_world::kinds::PolicyKind;
 use metachron_world::{Member, Spec};
 use std::time::Duration;
 
@@ -24,13 +22,13 @@ const WIDENED_MAX: f64 = 0.3;
 /// The panels of a session that has just begun.
 pub(super) fn initial_status(session: &Session) -> Status {
     let scene = session.scene();
-    let own = viewer_law(metachron_session::law(&scene.target));
-    let others = [control::Law::CORRECTED, control::Law::PRINTED].map(viewer_law).into_iter();
+    let own = metachron_session::law(&scene.target);
+    let others = [Law::CORRECTED, Law::PRINTED].into_iter();
     let laws = std::iter::once(own).chain(others.filter(|law| !law.is_same_law(&own))).collect();
     Status {
         scene: scene.name.clone(),
         executor: scene.executor.name().to_owned(),
-        policies: PolicyKind::ALL.iter().map(|kind| kind.name().to_owned()).collect(),
+        policies: Policy::ALL.iter().map(|kind| kind.name().to_owned()).collect(),
         laws,
         cameras: session.camera_names().map(str::to_owned).collect(),
         running: true,
@@ -112,7 +110,7 @@ pub(super) fn fill(status: &mut Status, session: &mut Session, meter: &mut Meter
     let control = session.control();
     status.target_hz = control.target_hz();
     let policy = control.policy();
-    status.law = (policy == Policy::Feedback).then(|| viewer_law(control.law()));
+    status.law = (policy == Policy::Feedback).then(|| control.law());
     status.sliders = policy.predicts().then(|| control.sliders());
     status.damped = policy.has_hysteresis();
     status.frozen = control.is_frozen();
@@ -196,13 +194,7 @@ fn fill_row(row: &mut AgentRow, stats: &AgentStats, newest: &Snapshot) {
     });
     row.residual_m = stats.residual_m;
     row.force_n = newest.body.tool().map(|tool| tool.force_n);
-    row.state = match &stats.state {
-        metachron_runtime::AgentState::Running => AgentState::Running,
-        metachron_runtime::AgentState::Stalled => AgentState::Stalled,
-        metachron_runtime::AgentState::Resting => AgentState::Resting,
-        metachron_runtime::AgentState::Parked(reason) => AgentState::Parked(reason.clone()),
-        metachron_runtime::AgentState::Gone => AgentState::Gone,
-    };
+    row.state.clone_from(&stats.state);
 }
 
 /// A turn for its lane.
@@ -223,20 +215,4 @@ pub(super) fn turn(turn: &Turn) -> TurnRow {
 pub(super) fn mass_kg(spec: &Spec) -> f64 {
     let mass_kg = spec.mass_kg().unwrap_or(STRETCH_MASS_KG);
     if spec.is_deformable() { mass_kg.min(STRETCH_MASS_KG) } else { mass_kg }
-}
-
-/// The viewer's type for a law.
-const fn viewer_law(law: control::Law) -> Law {
-    match law {
-        control::Law::Printed { alpha, beta } => Law::Printed { alpha, beta },
-        control::Law::Corrected { kappa, lead, margin } => Law::Corrected { kappa, lead, margin },
-    }
-}
-
-/// Control's type for a law.
-pub(super) const fn control_law(law: Law) -> control::Law {
-    match law {
-        Law::Printed { alpha, beta } => control::Law::Printed { alpha, beta },
-        Law::Corrected { kappa, lead, margin } => control::Law::Corrected { kappa, lead, margin },
-    }
 }

@@ -341,7 +341,7 @@ impl Simulation for WindowSimulation<'_> {
             Action::Speed(speed) => self.drive(TimelineCommand::Speed(speed)),
             Action::TargetFps(hz) => self.session.control().set_target_hz(hz),
             Action::Policy(name) => self.session.set_policy(&name),
-            Action::Law(law) => self.session.control().set_law(view_model::control_law(law)),
+            Action::Law(law) => self.session.control().set_law(law),
             Action::Sliders(sliders) => {
                 let control = self.session.control();
                 control.set_sliders(control.given_sliders().moved(control.sliders(), sliders));

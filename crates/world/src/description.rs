@@ -5,10 +5,11 @@
 pub mod appearance;
 pub mod builder;
 pub mod couplings;
-pub mod kinds;
 pub mod placement;
 pub mod scene;
 #[cfg(feature = "scenery")]
 pub mod scenery;
 pub mod sensor;
 pub mod spec;
+
+pub use metachron_core::kinds;

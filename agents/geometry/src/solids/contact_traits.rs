@@ -38,16 +38,18 @@ pub struct CollisionGroups {
 
 /// How two coefficients become that of a pair. Of two sides with different rules the later one of this list counts, as in Rapier.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, serde::Serialize, serde::Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
+#[serde(rename_all = "kebab-case")]
 pub enum CombineRule {
-    /// (a + b)/2.
+    /// Half of their sum.
     Average,
-    /// The smaller.
+    /// The smaller one.
     Min,
-    /// a b.
+    /// Their product.
     Multiply,
-    /// The larger.
+    /// The larger one.
     Max,
-    /// √(a b).
+    /// The square root of their product.
     GeometricMean,
 }
 

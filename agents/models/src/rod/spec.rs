@@ -62,6 +62,7 @@ pub struct TubeSpec {
 
 /// How a tube's sections behave.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
+#[cfg_attr(feature = "schema", derive(serde::Deserialize, schemars::JsonSchema), serde(rename_all = "kebab-case"))]
 pub enum WallModel {
     /// They stay round, and their radius is given: pressure and peristalsis widen and narrow them, and nothing else does.
     #[default]
@@ -201,18 +202,20 @@ impl Section {
 
 /// Time integration of a tube.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
+#[cfg_attr(feature = "schema", derive(serde::Deserialize, schemars::JsonSchema), serde(rename_all = "kebab-case"))]
 pub enum Integrator {
-    /// Explicit, of first order: no elastic stiffness in the matrix; stable below [`Tube::longest_substep_s`](super::Tube::longest_substep_s) only.
+    /// Explicit, first order: for soft, coarse tubes with substeps below `Tube::longest_substep_s`; scene
+    /// files with longer ones are refused.
     SymplecticEuler,
-    /// Compliant constraints, projected forth and back once per substep (MMC16): never unstable, but bends too softly where
-    /// substeps are longer than [`Tube::longest_substep_s`](super::Tube::longest_substep_s).
+    /// Compliant constraints, projected forth and back once per substep (MMC16): for comparison, as it bends too softly where substeps are
+    /// longer than `Tube::longest_substep_s`.
     Xpbd,
-    /// Linearly implicit Euler, usually one Newton step: stable at any step, exact at rest, damps motion.
+    /// Linearly implicit Euler, usually one Newton step: stable at any step, exact at rest, damps fast motion.
     #[default]
     ImplicitEuler,
-    /// Backward differences of second order: little damping, stable at any step.
+    /// Backward differences of second order, with little damping; implicit Euler while the tube is in contact or held.
     Bdf2,
-    /// Mean forces that conserve energy and momentum: no damping at all.
+    /// Conserves energy and momentum of a tube without contact; implicit Euler while it is in contact or held.
     EnergyMomentum,
 }
 

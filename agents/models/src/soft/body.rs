@@ -3,6 +3,7 @@
 //! In: a [`SoftSpec`]. Out: snapshots ([`super::publish`]). Never here: how a step is solved ([`super::step`]), contact.
 //! Theory: docs/theory/soft.md.
 
+use super::carrier::Carrier;
 use super::division::{Division, form};
 use super::fe_mesh::FeMesh;
 use super::member::Unknowns;
@@ -45,6 +46,18 @@ pub struct SoftBody {
     pub(super) steps: u64,
     /// Its unknowns in a contact cluster.
     pub(super) unknowns: Unknowns,
+}
+
+impl SoftSpec {
+    /// Whether a body can be built of it.
+    ///
+    /// # Errors
+    /// [`SoftError`] for a number outside its range, a side it does not have, a surface without an inside.
+    pub fn check(&self) -> Result<(), SoftError> {
+        self.check_numbers()?;
+        let Some(eps_m) = self.spacing().map(|spacing| spacing.range_m.0) else { return Ok(()) };
+        Carrier::new(self, eps_m).map(drop).ok_or(SoftError::FineCage { eps_m })
+    }
 }
 
 impl SoftBody {

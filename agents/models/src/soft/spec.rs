@@ -1,6 +1,5 @@
 //! Specification of a soft body: its properties and initial state, the numbers a scene gives, and their checks.
 
-use super::carrier::Carrier;
 use super::grid::Side;
 use super::material::Lame;
 use glam::{DQuat, DVec3};
@@ -457,18 +456,8 @@ impl SoftSpec {
         }
     }
 
-    /// Whether a body can be built of it.
-    ///
-    /// # Errors
-    /// [`SoftError`] for a number outside its range, a side it does not have, a surface without an inside.
-    pub fn check(&self) -> Result<(), SoftError> {
-        self.check_numbers()?;
-        let Some(eps_m) = self.spacing().map(|spacing| spacing.range_m.0) else { return Ok(()) };
-        Carrier::new(self, eps_m).map(drop).ok_or(SoftError::FineCage { eps_m })
-    }
-
     /// Whether every number is in its range.
-    fn check_numbers(&self) -> Result<(), SoftError> {
+    pub(super) fn check_numbers(&self) -> Result<(), SoftError> {
         self.shape.check()?;
         if let Some(nodes) = &self.nodes {
             nodes.check()?;

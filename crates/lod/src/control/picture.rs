@@ -16,7 +16,7 @@ use super::choice::select::Select;
 use super::choice::vanish::Vanish;
 use super::demand::level;
 use super::demand::plan::{FrameWork, LevelDemand, Plan, SizedView, in_view, steers};
-use super::demand::policy::{Law, Policy};
+use super::demand::policy::{Law, Policy, sliders};
 use super::demand::query::{FrameQuery, Promise, left_out};
 use super::demand::status::Status;
 use super::demand::view::ObjectView;
@@ -209,7 +209,7 @@ impl PictureControl {
 
     fn choose_by_cost(&mut self, levels: &mut [LevelDemand]) -> Promise {
         let (raised, prices) = (self.raise.is_some_and(|raise| raise.is_open()), self.picture_prices());
-        let sliders = self.policy.sliders(self.sliders());
+        let sliders = sliders(self.policy, self.sliders());
         self.ladders.update(&self.views, raised, &prices, &sliders);
         self.groups.update(if self.policy.chooses_groups() { &self.views } else { &[] });
         let (target_s, overhead_s) = (self.target_s(), self.overhead_s.unwrap_or(0.0));

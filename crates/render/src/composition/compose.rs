@@ -3,6 +3,7 @@
 //! In: a posed and surveyed [`SceneView`], levels, a style. Out: a [`Picture`]. Never here: the choice of levels, the GPU.
 //! An object outside the view is in the picture where it may shade a visible one: for its shadow only.
 
+use super::environment::EnvironmentLight;
 use super::instances::{Framed, Solids, add_solid, add_static, kind, sort_solids};
 use super::light_volume::LightColumn;
 use super::picture::{
@@ -81,7 +82,7 @@ impl SceneView {
                 track.geomorph = None;
             }
         }
-        let shaded = picture.environment.throws_shadows().then(|| LightColumn::of(&picture));
+        let shaded = EnvironmentLight::of(picture.environment).throws_shadows().then(|| LightColumn::of(&picture));
         let is_held = |prop: &StaticShape| shaded.is_some_and(|column| column.holds(prop.position, prop.body.radius_m));
         let shades = |prop: &StaticShape| prop.throws_shadow && is_held(prop);
         for prop in self.statics.iter().filter(|prop| prop.seen || shades(prop)) {
@@ -136,7 +137,7 @@ impl SceneView {
     /// Finds the actors that are visible or may shade a visible one.
     fn find_shown(&self, picture: &Picture, shown: &mut Vec<usize>) {
         let column = LightColumn::of(picture);
-        let shaded = picture.environment.throws_shadows();
+        let shaded = EnvironmentLight::of(picture.environment).throws_shadows();
         let needed = |track: &Track| track.seen || shaded && column.holds(track.bounds.centre, track.bounds.radius_m);
         shown.clear();
         shown.extend(self.tracks.iter().enumerate().filter(|(_, track)| needed(track)).map(|(number, _)| number));

@@ -7,19 +7,7 @@
 //! (RH01): `sky` facing up, `ground` facing down.
 
 use glam::DVec3;
-
-/// The surroundings of a scene, as far as they light it.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub enum Environment {
-    /// A bright room with a lamp overhead, whose light fades away from the scene.
-    #[default]
-    Room,
-    /// The open sky with a sun at 40° over the horizon, which lights everything alike.
-    Sky,
-    /// A dark cavity with a light at the camera's lens: brightest on the axis of view, weaker by the square of the distance, without visible
-    /// shadows.
-    Endoscope,
-}
+pub use metachron_core::kinds::EnvironmentKind as Environment;
 
 /// The numbers of an environment.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -42,13 +30,13 @@ pub struct EnvironmentLight {
     pub fades: bool,
 }
 
-impl Environment {
-    /// Its numbers.
+impl EnvironmentLight {
+    /// That of `environment`.
     #[must_use]
-    pub fn light(self) -> EnvironmentLight {
+    pub fn of(environment: Environment) -> Self {
         let rgb = DVec3::new;
-        match self {
-            Self::Room => EnvironmentLight {
+        match environment {
+            Environment::Room => Self {
                 toward: rgb(-0.36, -0.30, 0.883).normalize(),
                 key: rgb(3.7, 3.5, 3.2),
                 sky: rgb(0.26, 0.31, 0.39),
@@ -58,7 +46,7 @@ impl Environment {
                 far_share: 1.0,
                 fades: true,
             },
-            Self::Sky => EnvironmentLight {
+            Environment::Sky => Self {
                 toward: rgb(-0.58, -0.49, 0.65).normalize(),
                 key: rgb(4.2, 3.9, 3.4),
                 sky: rgb(0.36, 0.46, 0.64),
@@ -68,7 +56,7 @@ impl Environment {
                 far_share: 1.0,
                 fades: false,
             },
-            Self::Endoscope => EnvironmentLight {
+            Environment::Endoscope => Self {
                 toward: DVec3::Z,
                 key: rgb(3.6, 3.5, 3.35),
                 sky: rgb(0.06, 0.03, 0.026),
@@ -81,14 +69,12 @@ impl Environment {
         }
     }
 
-    /// Whether its light throws shadows.
+    /// Whether it throws shadows.
     #[must_use]
-    pub fn throws_shadows(self) -> bool {
-        !self.light().at_camera
+    pub const fn throws_shadows(&self) -> bool {
+        !self.at_camera
     }
-}
 
-impl EnvironmentLight {
     /// The light from the direction `from`, a unit vector, without the key light.
     #[must_use]
     pub fn radiance(&self, from: DVec3) -> DVec3 {
@@ -111,7 +97,7 @@ mod tests {
 
     #[test]
     fn a_surface_receives_the_integral_of_the_background_over_what_it_faces() {
-        for light in ALL.map(Environment::light) {
+        for light in ALL.map(EnvironmentLight::of) {
             for n in [DVec3::Z, DVec3::NEG_Z, DVec3::X, DVec3::new(0.6, -0.48, 0.64)] {
                 // midpoints in height and azimuth: areas of equal size on the sphere
                 let (rows, columns) = (200_i32, 200_i32);
@@ -131,7 +117,7 @@ mod tests {
 
     #[test]
     fn no_background_is_darker_than_black() {
-        for light in ALL.map(Environment::light) {
+        for light in ALL.map(EnvironmentLight::of) {
             assert!(light.radiance(DVec3::NEG_Z).min_element() >= 0.0 && light.radiance(DVec3::Z).min_element() >= 0.0);
         }
     }

@@ -3,6 +3,7 @@
 //! In: the box of a picture that the light falls on. Out: the column, and whether an object in it may throw a shadow. Never here: texels,
 //! the GPU.
 
+use super::environment::EnvironmentLight;
 use super::picture::Picture;
 use glam::DVec3;
 
@@ -33,7 +34,7 @@ pub struct LightColumn {
 impl LightColumn {
     /// The column of a picture.
     pub fn of(picture: &Picture) -> Self {
-        let light = picture.environment.light().toward;
+        let light = EnvironmentLight::of(picture.environment).toward;
         let right = DVec3::Z.cross(light).normalize_or(DVec3::X);
         let up = light.cross(right);
         let (low, high) = picture.shadowed_m;

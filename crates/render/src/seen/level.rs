@@ -2,23 +2,8 @@
 //!
 //! In: a policy's decision. Out: numbers at which [`crate::SceneView::compose`] draws. Never here: the choice of the level.
 
+pub use metachron_core::kinds::Shading;
 use metachron_core::{N_MAX, Resolution};
-
-/// Shading model of a surface.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Default)]
-pub enum Shading {
-    /// One colour per triangle.
-    Flat,
-    /// Lit per vertex, colours interpolated.
-    Gouraud,
-    /// Lit per pixel.
-    #[default]
-    PerPixel,
-    /// Lit per pixel with the texture, or that of tissue; an object without one is drawn as [`Shading::PerPixel`].
-    Textured,
-    /// Reference quality above what policies request: texture, soft-edged shadows, ambient occlusion at corners.
-    Shadowed,
-}
 
 /// The level at which an actor is drawn.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -23,31 +23,7 @@ use metachron_geometry::{Obstacle, PrimitiveMesh, Solid, ToolShape};
 pub(crate) use shapes::{BodyShape, Bounds, Models, StaticShape};
 use std::sync::Arc;
 
-/// The states that a frame shows.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub enum States {
-    /// Interpolated between the two newest: smooth, one step of the agent late.
-    #[default]
-    Interpolate,
-    /// The newest, extrapolated by its velocities to the frame's time: on time, wrong where forces act.
-    Extrapolate,
-    /// The newest, unchanged: on time to one step, not smooth where steps are longer than frames.
-    Latest,
-}
-
-/// Material of a surface.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Default)]
-pub enum Material {
-    /// Wet tissue with its own texture.
-    Tissue,
-    /// Brushed metal.
-    Metal,
-    /// Satin plastic.
-    #[default]
-    Plastic,
-    /// Matt, soft skin.
-    Skin,
-}
+pub use metachron_core::kinds::{Material, StatesKind as States};
 
 /// Appearance of an object.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -6,8 +6,8 @@ use image::RgbaImage;
 use metachron_core::{AgentId, Body, Resolution, RigidState, SimTime, Snapshot};
 use metachron_geometry::{Obstacle, Solid};
 use metachron_render::{
-    Actor, Appearance, Camera, Environment, Form, Gpu, Level, Material, Offscreen, RendererOptions, SceneView, Shading,
-    Size, States, StaticObject, Style,
+    Actor, Appearance, Camera, Environment, EnvironmentLight, Form, Gpu, Level, Material, Offscreen, RendererOptions,
+    SceneView, Shading, Size, States, StaticObject, Style,
 };
 use std::sync::Arc;
 
@@ -38,7 +38,7 @@ fn draw(gpu: &Gpu, stage: &mut SceneView, camera: &Camera, options: RendererOpti
 
 /// The green of a matt surface under the sun, by Lambert's law with wrapped light and the light from all around, 0 … 255.
 fn lambert(n: DVec3) -> f64 {
-    let light = Environment::Sky.light();
+    let light = EnvironmentLight::of(Environment::Sky);
     let linear = |c: f64| c * c * (c * 0.305306 + 0.682171) + c * 0.0125229;
     let albedo = linear(f64::from(LOOK.colour[1]) / 255.0);
     let cos = n.dot(light.toward);
@@ -76,7 +76,7 @@ fn obstacle(solid: Solid, position: DVec3, rotation: DQuat) -> Obstacle {
 #[test]
 fn a_ball_is_as_bright_as_lambert_s_law_up_to_its_terminator() {
     let Some(gpu) = gpu() else { return };
-    let light = Environment::Sky.light().toward;
+    let light = EnvironmentLight::of(Environment::Sky).toward;
     // half of the visible part of it is lit: from across the light
     let camera = Camera::looking(light.cross(DVec3::Z).normalize() * 3.0, DVec3::ZERO, 0.4);
     for (options, far_m) in QUALITIES.into_iter().flat_map(|options| [(options, 0.0), (options, 8.0)]) {
@@ -113,7 +113,7 @@ fn a_ball_is_as_bright_as_lambert_s_law_up_to_its_terminator() {
 #[test]
 fn a_plane_under_a_low_light_is_evenly_lit() {
     let Some(gpu) = gpu() else { return };
-    let light = Environment::Sky.light().toward;
+    let light = EnvironmentLight::of(Environment::Sky).toward;
     for height in [0.06_f64, 0.2, 0.6] {
         let level = light.cross(DVec3::Z).normalize();
         // the plane's normal is so far above the light's horizon

@@ -3,8 +3,8 @@
 //! In: [`ContactFile`]s, the names of all groups of the scene. Out: [`ContactTraits`]; problems to the [`Checker`]. Never here: forces.
 
 use crate::check::{Checker, Place};
-use crate::format::{CONTACT, CombineRuleName, ContactFile};
-use metachron_geometry::{CollisionGroups, CombineRule, ContactTraits};
+use crate::format::{CONTACT, ContactFile};
+use metachron_geometry::{CollisionGroups, ContactTraits};
 use std::collections::BTreeSet;
 
 /// Most collision groups of a scene: a bit each.
@@ -70,8 +70,8 @@ impl GroupNames {
         ContactTraits {
             groups,
             is_sensor: file.sensor.unwrap_or(false),
-            friction_rule: file.friction_rule.map(rule),
-            restitution_rule: file.restitution_rule.map(rule),
+            friction_rule: file.friction_rule,
+            restitution_rule: file.restitution_rule,
             spin_radius_m: c.optional(&place, "spin_radius_m", file.spin_radius_m, CONTACT).unwrap_or(0.0),
         }
     }
@@ -82,15 +82,5 @@ pub(super) fn refuse(c: &mut Checker<'_, '_>, place: &Place, file: Option<&Conta
     if file.is_some() {
         let expected = "expected no such table: only a rigid or soft object, a tube or a tool can touch others";
         c.wrong(place, "contact", "has no effect: nothing touches this object", expected);
-    }
-}
-
-const fn rule(name: CombineRuleName) -> CombineRule {
-    match name {
-        CombineRuleName::Average => CombineRule::Average,
-        CombineRuleName::Min => CombineRule::Min,
-        CombineRuleName::Multiply => CombineRule::Multiply,
-        CombineRuleName::Max => CombineRule::Max,
-        CombineRuleName::GeometricMean => CombineRule::GeometricMean,
     }
 }

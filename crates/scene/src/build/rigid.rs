@@ -5,14 +5,14 @@ use super::inertia::inertia;
 use super::mesh;
 use super::mesh::Mesh;
 use super::objects::ModelContext;
-use super::scenery::{SurfaceSource, generator, surface_source};
+use super::scenery::{SurfaceSource, surface_source};
 use super::{KEYFRAMES_MAX, POSITION_MAX_M, ROTATION_MAX_DEG, SPEED_MAX};
 use crate::check::{Checker, Place};
 use crate::demand::Cost;
-use crate::format::{Axis, GeneratorKind, PartFile, Point, RIGID, RigidFile, Shape, TIMES};
+use crate::format::{Axis, PartFile, Point, RIGID, RigidFile, Shape, TIMES};
 use crate::source::Source;
 use glam::{DQuat, DVec3};
-use metachron_drawable::generate_surface;
+use metachron_drawable::{Generator, generate_surface};
 use metachron_geometry::{Aabb, COMPOUND_PARTS_MAX, CompoundPart, ContactTraits, Obstacle, Solid, hull_corners};
 use metachron_models::rigid::{Keyframe, Led, Restraint, RigidSpec};
 use metachron_models::rigid::{LIMITS, MASS};
@@ -192,7 +192,7 @@ struct ShapeKeys<'a> {
     half_extents_m: Option<Point>,
     half_height_m: Option<f64>,
     file: Option<&'a str>,
-    generate: Option<GeneratorKind>,
+    generate: Option<Generator>,
     seed: Option<u32>,
     triangles: Option<u32>,
     scale: Option<f64>,
@@ -338,7 +338,7 @@ impl ShapeKeys<'_> {
                 if !c.may_make(place, "triangles", Cost::solid(wanted as u64, among.is_fixed)) {
                     return None;
                 }
-                let made = generate_surface(generator(kind), u64::from(self.seed.unwrap_or(0)), wanted as u32);
+                let made = generate_surface(kind, u64::from(self.seed.unwrap_or(0)), wanted as u32);
                 return Some((made.points.iter().map(|p| *p * scale).collect(), made.triangles.into()));
             }
         };

@@ -11,7 +11,7 @@ use super::texture::Textures;
 use super::{POSITION_MAX_M, ROTATION_MAX_DEG, SPEED_MAX, mesh};
 use crate::check::{Checker, Place};
 use crate::demand::Cost;
-use crate::format::{GeneratorKind, MESH, MOTION, MeshFile, MotionFile, Point, TREE, TreeFile, TreeLod};
+use crate::format::{MESH, MOTION, MeshFile, MotionFile, Point, TREE, TreeFile, TreeLod};
 use crate::source::Source;
 use glam::{DQuat, DVec3};
 use metachron_drawable::{
@@ -135,7 +135,7 @@ fn mesh_of(
     let built = match (&file.file, file.generate) {
         (Some(name), _) => from_file(name, meshes.source, scale),
         (None, kind) => {
-            ProgressiveMesh::new(&generate(generator(kind?), u64::from(key.1), triangles.unwrap_or(TRIANGLES_DEFAULT)))
+            ProgressiveMesh::new(&generate(kind?, u64::from(key.1), triangles.unwrap_or(TRIANGLES_DEFAULT)))
                 .map_err(|why| why.to_string())
         }
     };
@@ -183,7 +183,7 @@ pub(super) enum SurfaceSource<'a> {
     /// A file, by its path relative to the scene's.
     File(&'a str),
     /// A generator.
-    Generated(GeneratorKind),
+    Generated(Generator),
 }
 
 /// The one of `file` and `generate` that a table has; `None` where it has both or neither, which is reported.
@@ -191,7 +191,7 @@ pub(super) fn surface_source<'a>(
     c: &mut Checker<'_, '_>,
     place: &Place,
     file: Option<&'a str>,
-    generate: Option<GeneratorKind>,
+    generate: Option<Generator>,
 ) -> Option<SurfaceSource<'a>> {
     match (file, generate) {
         (Some(name), None) => return Some(SurfaceSource::File(name)),
@@ -200,24 +200,6 @@ pub(super) fn surface_source<'a>(
         (None, None) => c.wrong(place, "file", "is missing", "expected `file` or `generate` in this table"),
     }
     None
-}
-
-pub(super) const fn generator(kind: GeneratorKind) -> Generator {
-    match kind {
-        GeneratorKind::Sphere => Generator::Sphere,
-        GeneratorKind::Torus => Generator::Torus,
-        GeneratorKind::Blob => Generator::Blob,
-        GeneratorKind::Terrain => Generator::Terrain,
-        GeneratorKind::Seat => Generator::Seat,
-        GeneratorKind::Strut => Generator::Strut,
-        GeneratorKind::Bar => Generator::Bar,
-        GeneratorKind::Table => Generator::Table,
-        GeneratorKind::Shelf => Generator::Shelf,
-        GeneratorKind::Door => Generator::Door,
-        GeneratorKind::Books => Generator::Books,
-        GeneratorKind::Liver => Generator::Liver,
-        GeneratorKind::Cavity => Generator::Cavity,
-    }
 }
 
 fn placement(

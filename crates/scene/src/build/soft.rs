@@ -3,7 +3,7 @@
 use super::common::rotation;
 use super::mesh::{self, Mesh};
 use super::objects::ModelContext;
-use super::scenery::{SurfaceSource, generator, surface_source};
+use super::scenery::{SurfaceSource, surface_source};
 use super::soft_mesh;
 use super::{POSITION_MAX_M, ROTATION_MAX_DEG, SPEED_MAX};
 use crate::check::{Checker, Place};
@@ -249,11 +249,11 @@ fn closed_surface(c: &mut Checker<'_, '_>, file: &SolidFile, context: &ModelCont
             let triangles = count.unwrap_or(4000);
             let seed = u64::from(file.seed.unwrap_or(0));
             if c.is_draft() {
-                let coarse = generate_surface(generator(kind), seed, triangles.min(COARSE_TRIANGLES));
+                let coarse = generate_surface(kind, seed, triangles.min(COARSE_TRIANGLES));
                 draft_cage(c, place, &coarse, &WantedCage { scale, triangles, eps_m: file.eps_m?.ends().0 });
                 return None;
             }
-            let made = generate_surface(generator(kind), seed, triangles);
+            let made = generate_surface(kind, seed, triangles);
             ("generate", Ok(Mesh { points: made.points, uvs: vec![], triangles: made.triangles }))
         }
     };

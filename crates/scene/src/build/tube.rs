@@ -5,9 +5,7 @@ use super::force_limits::{ForceLimits, ForceLimitsFile};
 use super::objects::ModelContext;
 use crate::check::{Checker, Place};
 use crate::format::ranges::TIME;
-use crate::format::{
-    ATTACH, AttachFile, End, Integrator as Method, PERISTALSIS, PeristalsisFile, PressureFile, TUBE, TubeFile, Wall,
-};
+use crate::format::{ATTACH, AttachFile, End, PERISTALSIS, PeristalsisFile, PressureFile, TUBE, TubeFile};
 use glam::DVec3;
 use metachron_core::NumberRange;
 use metachron_core::{Resolution, ResolutionRange};
@@ -53,7 +51,7 @@ pub(super) fn build(c: &mut Checker<'_, '_>, file: &TubeFile, context: &ModelCon
         resolution,
         range,
         segments: file.segments.map(|n| n.clamp(2, SEGMENTS_MAX) as usize),
-        integrator: file.integrator.map_or_else(Default::default, integrator),
+        integrator: file.integrator.unwrap_or_default(),
         substeps: c.optional(place, "substeps", file.substeps.map(f64::from), TUBE).unwrap_or(1.0) as u32,
         damping_per_s: c.optional(place, "damping_per_s", file.damping_per_s, TUBE).unwrap_or(0.0),
         clamp,
@@ -73,23 +71,13 @@ pub(super) fn build(c: &mut Checker<'_, '_>, file: &TubeFile, context: &ModelCon
     BuiltTube { spec, picture }
 }
 
-const fn integrator(file: Method) -> Integrator {
-    match file {
-        Method::SymplecticEuler => Integrator::SymplecticEuler,
-        Method::Xpbd => Integrator::Xpbd,
-        Method::ImplicitEuler => Integrator::ImplicitEuler,
-        Method::Bdf2 => Integrator::Bdf2,
-        Method::EnergyMomentum => Integrator::EnergyMomentum,
-    }
-}
-
 /// The model of the sections; a wall that gives needs steps that take its bend as it is then.
 fn wall(c: &mut Checker<'_, '_>, place: &Place, file: &TubeFile) -> WallModel {
-    if file.wall != Some(Wall::Gives) {
+    if file.wall != Some(WallModel::Gives) {
         return WallModel::Prescribed;
     }
-    if let Some(method @ (Method::SymplecticEuler | Method::Xpbd)) = file.integrator {
-        let what = format!("is \"gives\", which `{}` has no steps for", integrator(method).name());
+    if let Some(method @ (Integrator::SymplecticEuler | Integrator::Xpbd)) = file.integrator {
+        let what = format!("is \"gives\", which `{}` has no steps for", method.name());
         c.wrong(place, "wall", what, "expected `integrator` to be \"implicit-euler\", \"bdf2\" or \"energy-momentum\"");
     }
     WallModel::Gives
@@ -128,7 +116,7 @@ fn pressure_keys(c: &mut Checker<'_, '_>, place: &Place, file: &TubeFile) -> Vec
 /// Whether the tube is closed: a gas that is shut in needs room, and walls that give.
 fn sealed(c: &mut Checker<'_, '_>, place: &Place, file: &TubeFile, section: &Section) -> bool {
     let sealed = file.sealed.unwrap_or(false);
-    if sealed && (file.wall != Some(Wall::Gives) || section.wall_m >= section.radius_m) {
+    if sealed && (file.wall != Some(WallModel::Gives) || section.wall_m >= section.radius_m) {
         c.wrong(place, "sealed", "is true", "expected false, or `wall = \"gives\"` and a `wall_m` below `radius_m`");
     }
     sealed

@@ -3,6 +3,7 @@
 
 use super::ranges::within;
 use metachron_core::{NumberRange, Ranges};
+use metachron_geometry::CombineRule;
 use schemars::JsonSchema;
 use serde::Deserialize;
 
@@ -23,26 +24,10 @@ pub struct ContactFile {
     pub sensor: Option<bool>,
     /// How a pair with it shares both frictions. Of two different rules the later one counts: `average`, `min`, `multiply`, `max`,
     /// `geometric-mean`. Default: the other object's rule; where neither has one `geometric-mean`.
-    pub friction_rule: Option<CombineRuleName>,
+    pub friction_rule: Option<CombineRule>,
     /// How a pair with it shares both restitutions, as `friction_rule`. Default: the other object's rule; where neither has one `max`.
-    pub restitution_rule: Option<CombineRuleName>,
+    pub restitution_rule: Option<CombineRule>,
     /// Radius r of the patch by which each of its contacts resists spin about its normal, metres: with a torque up to friction · r ·
     /// push. A pair takes the larger one. It acts between objects that turn as a whole, and static solids. Default 0.
     pub spin_radius_m: Option<f64>,
-}
-
-/// How two coefficients become that of a pair.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize, JsonSchema)]
-#[serde(rename_all = "kebab-case")]
-pub enum CombineRuleName {
-    /// Half of their sum.
-    Average,
-    /// The smaller one.
-    Min,
-    /// Their product.
-    Multiply,
-    /// The larger one.
-    Max,
-    /// The square root of their product.
-    GeometricMean,
 }

@@ -21,7 +21,7 @@ mod value;
 
 pub use cells::{CELL, CellFile, PortalFile, SideKind};
 pub use common::{COMMON, COMMON_KEYS, CommonFile, HoldKind};
-pub use contact::{CONTACT, CombineRuleName, ContactFile};
+pub use contact::{CONTACT, ContactFile};
 pub use coupling::{COUPLING, CouplingFile, CouplingKind, CouplingLaw, FAULTS, FaultsFile, Spot};
 pub use joint::{JOINT, JointFile, JointKind, MOTOR, MotorFile};
 pub use rigid::{Axis, PartFile, PoseKeyFile, RIGID, RigidFile, Shape, TIMES};
@@ -30,14 +30,14 @@ pub use scene::{
     MachineFile, ModelCostFile, PROBE, ProbeFile, SCENE, STEP_COST, SURROUNDINGS, SceneFile, ShadingCostFile,
     SolvesFile, TARGET, TargetFile, WorldFile,
 };
-pub use scenery::{GeneratorKind, GroupFile, MESH, MOTION, MeshFile, MotionFile, TREE, TreeFile, TreeLod};
+pub use scenery::{GroupFile, MESH, MOTION, MeshFile, MotionFile, TREE, TreeFile, TreeLod};
 pub use sensor::{SensorFile, SensorFileKind};
 pub use soft::{
     LawKind, RegionFile, RopeEnd, RopeFile, SOFT, SheetFile, SheetSide, SoftShapeKind, SolidFile, SolidSide,
 };
 pub use synthetic::{SYNTHETIC, SyntheticFile};
 pub use tool::{KEYFRAME, KeyframeFile, TOOL, ToolFile};
-pub use tube::{ATTACH, AttachFile, End, Integrator, PERISTALSIS, PeristalsisFile, PressureFile, TUBE, TubeFile, Wall};
+pub use tube::{ATTACH, AttachFile, End, PERISTALSIS, PeristalsisFile, PressureFile, TUBE, TubeFile};
 pub use value::{OneOrEach, OneOrRange, Point};
 
 /// The models an object can have, as scenes write them.

@@ -1,8 +1,9 @@
 //! `model = "rigid"`: a rigid body, or with `fixed = true` a solid that never moves.
 
+use super::Point;
 use super::ranges::{DENSITY, FRICTION, LENGTH, SCALE, TIME, TRIANGLES, within};
-use super::{GeneratorKind, Point};
 use metachron_core::{NumberRange, Ranges};
+use metachron_drawable::Generator;
 use metachron_models::rigid::LIMITS;
 use schemars::JsonSchema;
 use serde::Deserialize;
@@ -41,7 +42,7 @@ pub struct RigidFile {
     /// A .glb file (+y up), an STL or an OBJ file (+z up), its path relative to the scene file: the points of a hull, the triangles of a mesh.
     pub file: Option<String>,
     /// A generated surface, about a metre large; not with `file`.
-    pub generate: Option<GeneratorKind>,
+    pub generate: Option<Generator>,
     /// Seed of a generated surface. Default 0.
     pub seed: Option<u32>,
     /// Triangles of a generated surface. Default 4000.
@@ -125,7 +126,7 @@ pub struct PartFile {
     /// A .glb, STL or OBJ file, its path relative to the scene file.
     pub file: Option<String>,
     /// A generated surface, about a metre large; not with `file`.
-    pub generate: Option<GeneratorKind>,
+    pub generate: Option<Generator>,
     /// Seed of a generated surface. Default 0.
     pub seed: Option<u32>,
     /// Triangles of a generated surface. Default 4000.

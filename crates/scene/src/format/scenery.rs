@@ -3,6 +3,7 @@
 use super::Point;
 use super::ranges::{SCALE, within};
 use metachron_core::{NumberRange, Ranges};
+use metachron_drawable::Generator;
 use schemars::JsonSchema;
 use serde::Deserialize;
 
@@ -38,7 +39,7 @@ pub struct MeshFile {
     /// may be open, but no edge may be shared by more than two triangles, and no coordinate may be past ± 1e5 m.
     pub file: Option<String>,
     /// A generated mesh, about a metre large; not with `file`.
-    pub generate: Option<GeneratorKind>,
+    pub generate: Option<Generator>,
     /// Seed of a generated mesh. Default 0.
     pub seed: Option<u32>,
     /// Triangles of the full mesh: of a generated mesh, or the number to which a file with more is reduced. Default: 1000 for
@@ -127,38 +128,6 @@ pub struct GroupFile {
     /// members' triangles, 12 … 2000 (with a `proxy` all that it has), each coarser one a quarter, down to 12.
     #[schemars(length(min = 1, max = 8), inner(range(min = 1, max = 100_000)))]
     pub levels: Option<Vec<u32>>,
-}
-
-/// A generated mesh.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize, JsonSchema)]
-#[serde(rename_all = "kebab-case")]
-pub enum GeneratorKind {
-    /// A ball of radius 1.
-    Sphere,
-    /// A ring about z of radius 1.
-    Torus,
-    /// A ball with smooth bumps.
-    Blob,
-    /// Hills on a square of side 2.
-    Terrain,
-    /// A theatre seat that faces +y, 1 high.
-    Seat,
-    /// A rod along z from −1 to 1, of radius a twentieth.
-    Strut,
-    /// A rod along z from −1 to 1, of radius a sixth.
-    Bar,
-    /// A table, 1.6 long, 0.8 wide and 0.75 high.
-    Table,
-    /// A shelf that faces −y, 1 wide and 2 high.
-    Shelf,
-    /// A door that faces −y, 1 wide and 2.1 high.
-    Door,
-    /// Five books side by side, 0.3 wide and high.
-    Books,
-    /// A liver, about 2 long: closed.
-    Liver,
-    /// The wall of a cavity seen from within, 2 wide and 0.62 deep under the origin: open at the top.
-    Cavity,
 }
 
 /// How a tree is drawn from afar.

@@ -1,9 +1,10 @@
 //! `model = "sheet"`, `"solid"` and `"rope"`: soft bodies of finite elements.
 
+use super::Point;
 use super::ranges::{FRICTION, LENGTH, SCALE, TRIANGLES, within};
 use super::value::OneOrRange;
-use super::{GeneratorKind, Point};
 use metachron_core::Ranges;
+use metachron_drawable::Generator;
 use metachron_models::soft::{MATTER, SEGMENTS};
 use schemars::JsonSchema;
 use serde::Deserialize;
@@ -86,7 +87,7 @@ pub struct SolidFile {
     /// text), legacy VTK (.vtk) or VTK's XML (.vtu), which is taken as it is.
     pub file: Option<String>,
     /// A generated closed surface, about a metre large; not with `file`.
-    pub generate: Option<GeneratorKind>,
+    pub generate: Option<Generator>,
     /// Seed of a generated surface. Default 0.
     pub seed: Option<u32>,
     /// Triangles of a generated surface. Default 4000.

@@ -3,6 +3,7 @@
 use super::ranges::{DAMPING_RATE, DENSITY, FRICTION, SHARE, TEARING, within};
 use super::{OneOrRange, Point};
 use metachron_core::{NumberRange, Ranges};
+use metachron_models::rod::{Integrator, WallModel};
 use schemars::JsonSchema;
 use serde::Deserialize;
 
@@ -104,7 +105,7 @@ pub struct TubeFile {
     /// A travelling wave of the radius; where the wall gives, of the tension that would narrow it so if nothing resisted.
     pub peristalsis: Option<PeristalsisFile>,
     /// The motion of the sections. Default `prescribed`.
-    pub wall: Option<Wall>,
+    pub wall: Option<WallModel>,
     /// Pressure inside relative to outside, Pa: widens the tube. One number, or times in seconds, each above the one before, with
     /// the pressures then: `[[0, 0], [1, 4000]]`; between them it changes evenly. Default 0.
     pub pressure_pa: Option<PressureFile>,
@@ -135,32 +136,6 @@ pub enum End {
     Start,
     /// Where the path ends.
     End,
-}
-
-/// The motion of a tube's sections.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize, JsonSchema)]
-#[serde(rename_all = "kebab-case")]
-pub enum Wall {
-    /// They stay round, and pressure and peristalsis alone set their radius.
-    Prescribed,
-    /// They widen and flatten under pressure, bending and contact; not with `symplectic-euler` and `xpbd`.
-    Gives,
-}
-
-/// Time integrator of a tube.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize, JsonSchema)]
-#[serde(rename_all = "kebab-case")]
-pub enum Integrator {
-    /// Explicit, first order: for soft, coarse tubes with short substeps; refused where substeps are too long for it.
-    SymplecticEuler,
-    /// Compliant constraints, projected one by one: for comparison; refused where substeps are too long for its bending stiffness.
-    Xpbd,
-    /// Linearly implicit Euler with one Newton step: stable at large steps, damps fast motion.
-    ImplicitEuler,
-    /// Backward differences of second order, with little damping; implicit Euler while the tube is in contact or held.
-    Bdf2,
-    /// Conserves energy and momentum of a tube without contact; implicit Euler while it is in contact or held.
-    EnergyMomentum,
 }
 
 /// Springs along a part of a tube.

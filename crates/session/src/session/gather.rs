@@ -6,9 +6,7 @@
 use super::super::assemble;
 use super::Session;
 use metachron_core::SimTime;
-use metachron_render::States;
 use metachron_runtime::AgentState;
-use metachron_world::kinds::StatesKind;
 
 impl Session {
     /// Reads the newest states without a frame: for their couplings.
@@ -49,7 +47,7 @@ impl Session {
             self.levels.clear();
         }
         let time = shown.unwrap_or(now);
-        self.scene_view.pose(time, states(self.scene.states));
+        self.scene_view.pose(time, self.scene.states);
         self.chosen.sim = time;
         self.couplings.note(self.reader.newest());
         if let Some(trace) = &mut self.trace {
@@ -67,13 +65,5 @@ impl Session {
                 state => self.scene_view.set_snapshot(agent.id(), newest, state == AgentState::Running),
             }
         }
-    }
-}
-
-const fn states(kind: StatesKind) -> States {
-    match kind {
-        StatesKind::Interpolate => States::Interpolate,
-        StatesKind::Extrapolate => States::Extrapolate,
-        StatesKind::Latest => States::Latest,
     }
 }

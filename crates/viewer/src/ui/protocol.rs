@@ -5,8 +5,10 @@
 
 use glam::DVec3;
 use metachron_core::{AgentId, Resolution, SimTime, SolveLevel};
+pub use metachron_lod::control::Law;
 use metachron_lod::cost::benefit::Sliders;
 use metachron_render::{Camera, Hit, Picture, Ray, Size, Style, ToolForce};
+pub use metachron_runtime::AgentState;
 use metachron_session::RewindStatus;
 use std::path::PathBuf;
 use std::time::Duration;
@@ -119,27 +121,6 @@ pub enum Look {
     Forward,
     /// The present.
     Live,
-}
-
-/// The picture's feedback law and its gains.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub enum Law {
-    /// The published law (GDC04, eq. 1), on ε̂ = 40 ε/L.
-    Printed {
-        /// α: change of ε̂ per missing frame per second, > 0.
-        alpha: f64,
-        /// β: change of ρ per unit of ε̂, > 0.
-        beta: f64,
-    },
-    /// The law on the logarithm of the measured time, whose gain does not depend on the machine.
-    Corrected {
-        /// κ, 0.001 … 1.99: the fraction of an error that one frame removes.
-        kappa: f64,
-        /// λ, 0 … 0.99: the fraction of an error's change that one frame adds; above 0 it is a PI law without wind-up.
-        lead: f64,
-        /// Fraction of the frame's time that is left free, 0 … 0.9.
-        margin: f64,
-    },
 }
 
 /// One frame to draw.
@@ -328,22 +309,6 @@ pub struct CouplingRow {
     pub inverse_mass_per_kg: Option<[f64; 2]>,
 }
 
-/// Present activity of an agent.
-#[derive(Debug, Clone, PartialEq, Eq, Default)]
-pub enum AgentState {
-    /// Stepping.
-    #[default]
-    Running,
-    /// In a step that lasts too long.
-    Stalled,
-    /// Asleep until touched.
-    Resting,
-    /// Stopped, for this reason.
-    Parked(String),
-    /// Removed.
-    Gone,
-}
-
 /// One agent in numbers.
 #[derive(Debug, Clone)]
 pub struct AgentRow {
@@ -458,14 +423,6 @@ impl AgentRow {
             leader: None,
             state: AgentState::Running,
         }
-    }
-}
-
-impl Law {
-    /// Whether `other` is the same law, with any gains.
-    #[must_use]
-    pub fn is_same_law(&self, other: &Self) -> bool {
-        std::mem::discriminant(self) == std::mem::discriminant(other)
     }
 }
 

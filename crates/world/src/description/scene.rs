@@ -133,22 +133,22 @@ pub struct Factors {
     pub hysteresis: Option<f64>,
 }
 
-/// Gains of the laws that hold frames and agents at their times; `None` is the law's own default.
+/// Gains of the laws that hold frames and agents at their times, with the ranges of [`metachron_core::gains`]; `None` is the law's own default.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Gains {
     /// α of the printed law.
     pub alpha: Option<f64>,
     /// β of the printed law.
     pub beta: Option<f64>,
-    /// κ of the corrected law, 0.001 … 1.99; below 1 it is stable for every scene.
+    /// κ of the corrected law; below 1 it is stable for every scene.
     pub kappa: Option<f64>,
-    /// λ of the corrected law, 0 … 1.99.
+    /// λ of the corrected law.
     pub lead: Option<f64>,
-    /// Share of the frame time that is left free, 0 … 0.9.
+    /// Share of the frame time that is left free.
     pub margin: Option<f64>,
-    /// Of the agents' own loops: share of the way to a finer level that one demand goes, 0.02 … 1.
+    /// Of the agents' own loops: share of the way to a finer level that one demand goes.
     pub agent_refine: Option<f64>,
-    /// Of the agents' own loops: share of a delay by others that one demand removes, 0.02 … 1.99.
+    /// Of the agents' own loops: share of a delay by others that one demand removes.
     pub agent_yield: Option<f64>,
 }
 

@@ -3,28 +3,8 @@
 //! In: plain numbers. Out: the weight by which an object shares in the picture's polygons. Never here: state.
 
 use super::level::{IMPOSTORS_MAX, PRIMITIVE_LEVELS};
+pub use metachron_core::kinds::Shading;
 use metachron_core::{AgentId, ResolutionRange};
-
-/// How the light on a surface is computed: the rendering algorithm of (FS93), cheapest first.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Default)]
-pub enum Shading {
-    /// One colour per triangle.
-    Flat,
-    /// Colours at corners, interpolated between them.
-    Gouraud,
-    /// Lighting at every pixel.
-    #[default]
-    PerPixel,
-    /// The same with a texture.
-    Textured,
-    /// With soft shadows: better than an object's requested range ([`crate::control::PictureControl::set_raise`]).
-    Shadowed,
-}
-
-impl Shading {
-    /// The shadings that objects request and that have prices, cheapest first.
-    pub const ALL: [Self; 4] = [Self::Flat, Self::Gouraud, Self::PerPixel, Self::Textured];
-}
 
 /// The cheap form of the pieces of an object (RH05, §6).
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -5,7 +5,7 @@
 use super::super::render_scale::PictureRung;
 use super::PictureControl;
 use crate::control::choice::quality_boost::QualityBoost;
-use crate::control::demand::policy::{Law, Policy};
+use crate::control::demand::policy::{Law, Policy, prices, sliders, usual_sliders};
 use crate::control::prices::price::{Backdrop, Prices};
 use crate::cost::benefit::{GivenSliders, Sliders};
 use crate::cost::pipeline::Pipeline;
@@ -17,9 +17,9 @@ impl PictureControl {
     pub fn set_policy(&mut self, policy: Policy) {
         if policy != self.policy {
             self.ahead = None;
-            let before = (self.policy.prices(&self.prices), self.policy.sliders(self.sliders()));
+            let before = (prices(self.policy, &self.prices), sliders(self.policy, self.sliders()));
             self.policy = policy;
-            if (self.policy.prices(&self.prices), self.policy.sliders(self.sliders())) != before {
+            if (prices(self.policy, &self.prices), sliders(self.policy, self.sliders())) != before {
                 self.forget_ladders();
             }
             self.raise = self.raise.map(|_| QualityBoost::default());
@@ -67,7 +67,7 @@ impl PictureControl {
     /// How much each factor counts in the benefit of a level.
     #[must_use]
     pub fn sliders(&self) -> Sliders {
-        self.sliders.over(self.policy.usual_sliders())
+        self.sliders.over(usual_sliders(self.policy))
     }
 
     /// Changes the value formula of Robin Hood.
@@ -146,7 +146,7 @@ impl PictureControl {
 
     /// Prices of the next picture, as the policy reckons with them.
     pub(super) fn picture_prices(&self) -> Prices {
-        self.policy.prices(&self.prices.with_shadows(self.shadows()))
+        prices(self.policy, &self.prices.with_shadows(self.shadows()))
     }
 
     fn rung(&self) -> PictureRung {

@@ -6,6 +6,7 @@ use super::cuts::MorphedCut;
 use super::meshes::Mesh;
 use super::timing::Timing;
 use super::{Renderer, Target};
+use crate::composition::environment::EnvironmentLight;
 use crate::composition::picture::{Colouring, MeshKey, Picture, SkinSample, SolidInstance, SolidRun, TubeRun};
 use crate::composition::skin::SkinRun;
 use std::ops::Range;
@@ -27,7 +28,7 @@ impl Renderer {
         let inner = self.setup.options.shadow_px - 2;
         pass.set_scissor_rect(1, 1, inner, inner);
         let mut draws = 0;
-        if !(picture.shadows && picture.environment.throws_shadows()) {
+        if !(picture.shadows && EnvironmentLight::of(picture.environment).throws_shadows()) {
             return draws;
         }
         pass.set_pipeline(&self.pipelines.skin_shadow);

@@ -49,7 +49,7 @@ impl Rigid {
         Self::new(Solid::Box { half_extents_m: half_extents_m.into() })
     }
 
-    /// Its mass, kilograms, 1e-9 … 1e9.
+    /// Its mass, kilograms, within [`MASS`](metachron_models::rigid::MASS).
     #[must_use]
     pub const fn mass_kg(mut self, mass_kg: f64) -> Self {
         self.spec.mass_kg = mass_kg;
@@ -84,14 +84,14 @@ impl Rigid {
         self
     }
 
-    /// Coefficient of restitution, 0 … 1.
+    /// Coefficient of restitution, within [`RESTITUTION`](metachron_geometry::RESTITUTION).
     #[must_use]
     pub const fn restitution(mut self, restitution: f64) -> Self {
         self.spec.restitution = restitution;
         self
     }
 
-    /// Coulomb friction coefficient, ≥ 0.
+    /// Coulomb friction coefficient, within [`FRICTION`](metachron_geometry::FRICTION).
     #[must_use]
     pub const fn friction(mut self, friction: f64) -> Self {
         self.spec.friction = friction;
@@ -105,7 +105,7 @@ impl Rigid {
         self
     }
 
-    /// By which rates its velocity and its angular momentum decay, 1/s, 0 … 1e6.
+    /// By which rates its velocity and its angular momentum decay, 1/s, within the range of [`LIMITS`](metachron_models::rigid::LIMITS).
     #[must_use]
     pub const fn damping_per_s(mut self, linear_per_s: f64, angular_per_s: f64) -> Self {
         let restraint = &mut self.spec.restraint;

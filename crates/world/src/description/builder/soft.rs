@@ -113,28 +113,28 @@ impl Soft {
         self
     }
 
-    /// Young's modulus, Pa, 1 … 1e11.
+    /// Young's modulus, Pa; its range is in [`MATTER`](metachron_models::soft::MATTER), as are the next three.
     #[must_use]
     pub const fn young_pa(mut self, young_pa: f64) -> Self {
         self.spec.matter.young_pa = young_pa;
         self
     }
 
-    /// Poisson's ratio, 0 … 0.499.
+    /// Poisson's ratio.
     #[must_use]
     pub const fn poisson(mut self, poisson: f64) -> Self {
         self.spec.matter.poisson = poisson;
         self
     }
 
-    /// Density, kg/m³, 1 … 1e5.
+    /// Density, kg/m³.
     #[must_use]
     pub const fn density_kg_m3(mut self, density_kg_m3: f64) -> Self {
         self.spec.matter.density_kg_m3 = density_kg_m3;
         self
     }
 
-    /// Damping of its motion, 1/s, 0 … 1e4, and of its strains, s, 0 … 10.
+    /// Damping of its motion, 1/s, and of its strains, s.
     #[must_use]
     pub const fn damping(mut self, per_s: f64, of_strain_s: f64) -> Self {
         (self.spec.matter.damping_per_s, self.spec.matter.damping_s) = (per_s, of_strain_s);
@@ -155,7 +155,7 @@ impl Soft {
         self
     }
 
-    /// Coulomb friction coefficient of its skin, ≥ 0.
+    /// Coulomb friction coefficient of its skin, within [`FRICTION`](metachron_geometry::FRICTION).
     #[must_use]
     pub const fn friction(mut self, friction: f64) -> Self {
         self.spec.friction = friction;

@@ -2,6 +2,7 @@
 
 use super::policies::{control, holes, mesh};
 use super::*;
+use crate::control::demand::policy::usual_sliders;
 use crate::cost::benefit::Sliders;
 
 /// Policies that choose by cost without trees.
@@ -101,7 +102,7 @@ fn focus_motion_and_hysteresis_are_off_with_the_benefit_as_printed_and_count_whe
         [sum(0), sum(1)]
     };
     for policy in [Policy::Greedy, Policy::GreedyIncremental] {
-        let usual = policy.usual_sliders();
+        let usual = usual_sliders(policy);
         let plain: Vec<_> = base().collect();
         let none = polygons(policy, &plain, None);
         for (views, sliders) in
@@ -125,7 +126,7 @@ fn sliders_that_are_not_set_follow_the_policy() {
     let moved = Sliders { importance: 0.2, ..control.sliders() };
     control.set_sliders(control.given_sliders().moved(control.sliders(), moved));
     control.set_policy(Policy::Adaptive);
-    assert_eq!(control.sliders(), Sliders { importance: 0.2, focus: 0.7, ..Policy::Adaptive.usual_sliders() });
+    assert_eq!(control.sliders(), Sliders { importance: 0.2, focus: 0.7, ..usual_sliders(Policy::Adaptive) });
 }
 
 #[test]
@@ -144,7 +145,7 @@ fn hysteresis_as_printed_makes_levels_change_less() {
     for policy in [Policy::Greedy, Policy::GreedyIncremental] {
         let changes = |hysteresis: f64| {
             let mut control = control(policy, 40.0);
-            control.set_sliders(Sliders { hysteresis, ..policy.usual_sliders() });
+            control.set_sliders(Sliders { hysteresis, ..usual_sliders(policy) });
             (0..40).map(|frame| control.plan(&crowd(frame, false)).changes).skip(10).sum::<u32>()
         };
         let [without, with] = [0.0, 1.0].map(changes);

@@ -50,7 +50,8 @@ const MATERIALS: [[f32; 4]; 8] = [
 
 /// The constants of an environment's light, as shader source: constants cost a software rasteriser nothing.
 pub fn light_source(environment: Environment) -> String {
-    let EnvironmentLight { toward, key, sky, ground, lamp, at_camera, far_share, fades } = environment.light();
+    let EnvironmentLight { toward, key, sky, ground, lamp, at_camera, far_share, fades } =
+        EnvironmentLight::of(environment);
     let lamp_x = (LAMP_SIDE - toward * LAMP_SIDE.dot(toward)).normalize();
     let line = |name, v: DVec3| format!("const {name} = vec3f({:.9}, {:.9}, {:.9});\n", v.x, v.y, v.z);
     [
@@ -118,7 +119,7 @@ const FLOOR_REACH_OPEN: f64 = 300.0;
 
 /// How far the floor of a picture reaches, radii of the focus.
 fn floor_reach(picture: &Picture) -> f64 {
-    if picture.environment.light().fades { FLOOR_REACH } else { FLOOR_REACH_OPEN }
+    if EnvironmentLight::of(picture.environment).fades { FLOOR_REACH } else { FLOOR_REACH_OPEN }
 }
 
 /// Whether every pixel that nothing else covers shows the floor before it has faded into the room.

@@ -1,10 +1,10 @@
 //! Choices by name that a scene makes: executor, priority, policy, law, states, environment, shading, material.
 //!
-//! Only their names are known here. The runtime, the policies and the renderer give them their meaning.
+//! In: nothing. Out: choices by name, which files, scenes, control and the renderer share. Never here: their effects.
 
 /// How agents are run.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-#[cfg_attr(feature = "serde", derive(serde::Deserialize, schemars::JsonSchema), serde(rename_all = "kebab-case"))]
+#[cfg_attr(feature = "schema", derive(serde::Deserialize, schemars::JsonSchema), serde(rename_all = "kebab-case"))]
 pub enum ExecutorKind {
     /// Threads for a few agents, the pool for many.
     #[default]
@@ -19,7 +19,7 @@ pub enum ExecutorKind {
 
 /// How the operating system schedules the threads of agents.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-#[cfg_attr(feature = "serde", derive(serde::Deserialize, schemars::JsonSchema), serde(rename_all = "kebab-case"))]
+#[cfg_attr(feature = "schema", derive(serde::Deserialize, schemars::JsonSchema), serde(rename_all = "kebab-case"))]
 pub enum PriorityKind {
     /// Ordinary priority.
     #[default]
@@ -31,7 +31,7 @@ pub enum PriorityKind {
 
 /// Policy that chooses levels.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-#[cfg_attr(feature = "serde", derive(serde::Deserialize, schemars::JsonSchema), serde(rename_all = "kebab-case"))]
+#[cfg_attr(feature = "schema", derive(serde::Deserialize, schemars::JsonSchema), serde(rename_all = "kebab-case"))]
 pub enum PolicyKind {
     /// The finest level of everything, at any cost.
     Full,
@@ -71,7 +71,7 @@ pub enum PolicyKind {
 /// How `robin-hood` values an object (RH05, eq. 8 … 11): from its surface a and its depth z, or its distance d from the point that
 /// the camera looks at.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-#[cfg_attr(feature = "serde", derive(serde::Deserialize, schemars::JsonSchema), serde(rename_all = "kebab-case"))]
+#[cfg_attr(feature = "schema", derive(serde::Deserialize, schemars::JsonSchema), serde(rename_all = "kebab-case"))]
 pub enum ValueKind {
     /// a/√z.
     Gentle,
@@ -88,7 +88,7 @@ pub enum ValueKind {
 
 /// Feedback law.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-#[cfg_attr(feature = "serde", derive(serde::Deserialize, schemars::JsonSchema), serde(rename_all = "kebab-case"))]
+#[cfg_attr(feature = "schema", derive(serde::Deserialize, schemars::JsonSchema), serde(rename_all = "kebab-case"))]
 pub enum LawKind {
     /// The logarithmic law, whose gain does not depend on the machine.
     #[default]
@@ -99,7 +99,7 @@ pub enum LawKind {
 
 /// Time at which states are drawn.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-#[cfg_attr(feature = "serde", derive(serde::Deserialize, schemars::JsonSchema), serde(rename_all = "kebab-case"))]
+#[cfg_attr(feature = "schema", derive(serde::Deserialize, schemars::JsonSchema), serde(rename_all = "kebab-case"))]
 pub enum StatesKind {
     /// Interpolated between the two newest states, slightly late.
     #[default]
@@ -166,6 +166,42 @@ impl PolicyKind {
             Self::Adaptive => "adaptive",
         }
     }
+
+    /// Whether the policy predicts the cost of levels.
+    #[must_use]
+    pub const fn predicts(self) -> bool {
+        !matches!(self, Self::Full | Self::Static | Self::Threshold | Self::Feedback)
+    }
+
+    /// Whether the policy chooses between a group's impostor and its members; for the others there are members alone.
+    #[must_use]
+    pub const fn chooses_groups(self) -> bool {
+        matches!(self, Self::Hierarchical | Self::HierarchicalFlat | Self::MacielShirley | Self::Adaptive)
+    }
+
+    /// Whether the policy weighs levels by the benefit as it is printed (FS93, §5): accuracy by samples, motion and hysteresis by level.
+    #[must_use]
+    pub const fn has_printed_benefit(self) -> bool {
+        matches!(self, Self::Greedy | Self::GreedyIncremental | Self::GreedyRepaired)
+    }
+
+    /// Whether the slider of hysteresis changes the policy's choice.
+    #[must_use]
+    pub const fn has_hysteresis(self) -> bool {
+        self.has_printed_benefit() || matches!(self, Self::Adaptive)
+    }
+
+    /// Whether the policy takes pixels from the picture where all else is at its coarsest: one that ignores the time of frames does not.
+    #[must_use]
+    pub const fn scales_pictures(self) -> bool {
+        self.predicts() || matches!(self, Self::Feedback)
+    }
+
+    /// The policy of this name.
+    #[must_use]
+    pub fn named(name: &str) -> Option<Self> {
+        Self::ALL.into_iter().find(|policy| policy.name() == name)
+    }
 }
 
 impl LawKind {
@@ -193,7 +229,7 @@ impl StatesKind {
 
 /// The light of a scene from all around, and its background.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-#[cfg_attr(feature = "serde", derive(serde::Deserialize, schemars::JsonSchema), serde(rename_all = "kebab-case"))]
+#[cfg_attr(feature = "schema", derive(serde::Deserialize, schemars::JsonSchema), serde(rename_all = "kebab-case"))]
 pub enum EnvironmentKind {
     /// A bright room with a lamp overhead.
     #[default]
@@ -204,9 +240,30 @@ pub enum EnvironmentKind {
     Endoscope,
 }
 
-/// Shading of a surface.
+/// How the light on a surface is computed: the rendering algorithm of (FS93), cheapest first.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Default)]
+pub enum Shading {
+    /// One colour per triangle.
+    Flat,
+    /// Colours at vertices, interpolated between them.
+    Gouraud,
+    /// Lighting at every pixel.
+    #[default]
+    PerPixel,
+    /// The same with the texture, or that of tissue; an object without one is drawn as [`Self::PerPixel`].
+    Textured,
+    /// Better than objects request: texture, soft-edged shadows, ambient occlusion at corners.
+    Shadowed,
+}
+
+impl Shading {
+    /// The shadings that objects request and that have prices, cheapest first.
+    pub const ALL: [Self; 4] = [Self::Flat, Self::Gouraud, Self::PerPixel, Self::Textured];
+}
+
+/// Shading that a scene asks of a surface.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-#[cfg_attr(feature = "serde", derive(serde::Deserialize, schemars::JsonSchema), serde(rename_all = "kebab-case"))]
+#[cfg_attr(feature = "schema", derive(serde::Deserialize, schemars::JsonSchema), serde(rename_all = "kebab-case"))]
 pub enum ShadingKind {
     /// One colour per triangle.
     Flat,
@@ -222,14 +279,15 @@ pub enum ShadingKind {
 }
 
 /// Material of a surface.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-#[cfg_attr(feature = "serde", derive(serde::Deserialize, schemars::JsonSchema), serde(rename_all = "kebab-case"))]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Default)]
+#[cfg_attr(feature = "schema", derive(serde::Deserialize, schemars::JsonSchema), serde(rename_all = "kebab-case"))]
 pub enum Material {
     /// Wet tissue.
     Tissue,
     /// Brushed metal.
     Metal,
     /// Matt plastic.
+    #[default]
     Plastic,
     /// Dry skin.
     Skin,
