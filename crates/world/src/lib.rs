@@ -6,7 +6,7 @@
 //! ```
 //! use metachron_core::SimSpan;
 //! use metachron_geometry::Solid;
-//! use metachron_world::{Rigid, Scene, Tube, World, description::kinds::ExecutorKind};
+//! use metachron_world::{Rigid, Scene, Tube, World, kinds::ExecutorKind};
 //!
 //! let ball = Rigid::ball(0.05).mass_kg(0.2).at([0.0, 0.0, 0.5]).restitution(0.0);
 //! let tube = Tube::along(&[[-0.2, 1.0, 0.3], [0.2, 1.0, 0.3]]).radius_m(0.01).clamp([true, true]);
