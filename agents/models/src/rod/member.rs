@@ -8,7 +8,7 @@ use super::banded_ldl::Row;
 use super::energy_limiter;
 use super::history::History;
 use super::rest::RestDetector;
-use super::spec::{Integrator, TubeSpec};
+use super::spec::Integrator;
 use super::state::RodState;
 use super::step::{Divergence, Setting, Stepper, TURN_MAX_RAD};
 use super::system::SubstepProblem;
@@ -34,6 +34,8 @@ pub(super) struct Unknowns {
     radii_m: Vec<f64>,
     /// Whether its free motion in the step begun is good in one piece: there is a factor, and its energy does not rise.
     is_whole: bool,
+    /// Substeps that its own integrator made in the step before: the cluster counts their work with this one's.
+    own_substeps: u32,
     quiet_before: bool,
     /// The forces of its attachments that may tear in the last step.
     attached: Vec<OwnAttachment>,
@@ -54,6 +56,7 @@ struct Kept {
     acceleration: DVec3,
     at_rest: bool,
     steps: u64,
+    own_substeps: u32,
 }
 
 /// Velocities differ by less than this through rounding alone, as a share of them and of 1 m/s or rad/s.
@@ -217,7 +220,7 @@ impl ClusterMember for Tube {
     }
 
     fn strain(&self, v: &[DVec3], h_s: f64) -> f64 {
-        let divides_itself = self.integrates_free_motion(h_s) && self.unknowns.are_free(v);
+        let divides_itself = self.has_own_substeps() && self.substep_is_short(h_s) && self.unknowns.are_free(v);
         let (v, rates) = v.split_at(self.now.u.len());
         let reaches_m = self.wall.as_ref().map_or(f64::INFINITY, |wall| WALL_REACH * wall.law.outer_m);
         let fastest_m_s = rates.iter().map(|rate| rate.length_squared()).fold(0.0, f64::max).sqrt();
@@ -245,6 +248,7 @@ impl ClusterMember for Tube {
         kept.rest.copy_from(rest);
         (kept.time, kept.at_rest, kept.steps, kept.quiet_before) = (*time, *at_rest, *steps, unknowns.quiet_before);
         kept.acceleration = *acceleration;
+        kept.own_substeps = unknowns.own_substeps;
     }
 
     fn go_back(&mut self) {
@@ -260,6 +264,7 @@ impl ClusterMember for Tube {
         rest.copy_from(&kept.rest);
         (*time, *at_rest, *steps, unknowns.quiet_before) = (kept.time, kept.at_rest, kept.steps, kept.quiet_before);
         *acceleration = kept.acceleration;
+        unknowns.own_substeps = kept.own_substeps;
         self.follow_pressure(self.time);
         self.present_velocities();
     }
@@ -275,15 +280,18 @@ impl ClusterMember for Tube {
         let before = self.momentum().0;
         let integrates_freely = self.integrates_free_motion(h_s);
         let unknowns = std::mem::take(&mut self.unknowns);
-        let is_free = unknowns.are_free(v);
+        let (is_free, mut own_substeps) = (unknowns.are_free(v), 0);
         let (of_rod, of_wall) = v.split_at(self.now.u.len());
         let finite = self.wall_stays_finite(of_wall, h_s)
             && if is_free && !touched && integrates_freely {
-                self.step_by(h_s, Stepper::step).is_ok()
+                let taken = self.step_by(h_s, Stepper::step);
+                own_substeps = *taken.as_ref().unwrap_or(&0);
+                taken.is_ok()
             } else {
                 self.advance_with([of_rod, &unknowns.free], h_s, is_free)
             };
         self.unknowns = unknowns;
+        self.unknowns.own_substeps = own_substeps;
         if !finite {
             return Err(self.diverged(Divergence { slot: None }, h_s));
         }
@@ -344,7 +352,7 @@ impl ClusterMember for Tube {
     }
 
     fn work(&self) -> f64 {
-        self.division.segments() as f64
+        (self.division.segments() as f64) * f64::from(1 + self.unknowns.own_substeps)
     }
 }
 
@@ -383,12 +391,15 @@ impl Tube {
         present.extend(self.now.u.iter().chain(&wall.now.rate));
     }
 
+    /// Whether its free motion is in substeps of its own from the start, and not one step of implicit Euler.
+    fn has_own_substeps(&self) -> bool {
+        self.spec.integrator != Integrator::ImplicitEuler || self.spec.substeps > 1
+    }
+
     /// Whether its own integrator makes a step of `h_s` seconds in which nothing acts on it, in as many substeps as that takes. In contact all of
     /// them are implicit Euler in one piece.
     fn integrates_free_motion(&self, h_s: f64) -> bool {
-        let TubeSpec { integrator, substeps, .. } = self.spec;
-        let is_simple = integrator == Integrator::ImplicitEuler && substeps == 1 && self.unknowns.is_whole;
-        !is_simple && self.substep_is_short(h_s)
+        (self.has_own_substeps() || !self.unknowns.is_whole) && self.substep_is_short(h_s)
     }
 
     /// Notes the forces of attachments that may tear and never yield at the end of a step: implicit Euler has given
@@ -458,7 +469,7 @@ impl Unknowns {
 
     /// Writes or reads what is known of it between steps.
     pub(super) fn archive(&mut self, archive: &mut Archive<'_>) -> Result<(), ArchiveError> {
-        archive_values!(archive, self.places, self.radii_m, self.present, self.quiet_before)
+        archive_values!(archive, self.places, self.radii_m, self.present, self.quiet_before, self.own_substeps)
     }
 
     /// Adds the system of a wall that gives, with its solution.
