@@ -5,7 +5,6 @@
 //! Never here: how a step is repeated. Theory: docs/theory/control.md, eq. 31, 32.
 
 use crate::AgentId;
-use glam::DVec3;
 
 /// The error is extrapolated to this span, seconds: long enough to be visible, short enough that no motion has reversed.
 pub const DRIFT_S: f64 = 0.1;
@@ -28,8 +27,6 @@ pub struct DoublingSchedule {
     made: Option<u32>,
     /// Their length, seconds.
     span_s: f64,
-    /// Result of the last row, metres.
-    error_m: f64,
 }
 
 impl DoublingSchedule {
@@ -66,41 +63,18 @@ impl DoublingSchedule {
     pub fn span_s(&self) -> f64 {
         self.span_s
     }
-
-    /// Ends the row `apart_m` away from the same span in halves, by a rule of this order: halves leave 2⁻ᵖ of the error (eq. 31).
-    pub fn record(&mut self, apart_m: f64, order: i32) {
-        let error_m = drift_m(apart_m, order, self.span_s);
-        if error_m.is_finite() {
-            self.error_m = error_m;
-        }
-    }
-
-    /// Resets the estimate: the object rests, and past errors no longer matter.
-    pub fn rest(&mut self) {
-        *self = Self::default();
-    }
-
-    /// Error that steps accumulate in [`DRIFT_S`], metres.
-    pub fn error_m(&self) -> f64 {
-        self.error_m
-    }
 }
 
-/// Error accumulated in [`DRIFT_S`], metres, by a rule of this order of which steps over `span_s` seconds end `apart_m` metres from the same in
-/// halves (eq. 31).
+/// Error accumulated in [`DRIFT_S`], metres, by steps over `span_s` seconds that end `apart_m` metres from the same in halves: these leave half
+/// of the error of a rule of first order (eq. 31).
 #[must_use]
-pub fn drift_m(apart_m: f64, order: i32, span_s: f64) -> f64 {
-    apart_m / (1.0 - 0.5_f64.powi(order)) * DRIFT_S / span_s
+pub fn drift_m(apart_m: f64, span_s: f64) -> f64 {
+    apart_m / 0.5 * DRIFT_S / span_s
 }
 
 /// Index of an object's row among [`ROWS`]: consecutive numbers get different rows.
 fn row(agent: AgentId) -> u64 {
     (u64::from(agent.0.wrapping_mul(GOLDEN)) * ROWS) >> 32
-}
-
-/// The greatest distance between corresponding points of two states, metres.
-pub fn farthest(a: &[DVec3], b: &[DVec3]) -> f64 {
-    a.iter().zip(b).map(|(a, b)| a.distance_squared(*b)).fold(0.0, f64::max).sqrt()
 }
 
 #[cfg(test)]
@@ -116,18 +90,14 @@ mod tests {
             if schedule.is_on() {
                 again += 2;
                 if schedule.finish_step(1e-3) {
-                    schedule.record(1e-6, 1);
+                    // two steps of 1 ms end 1 µs apart: their error is 2 µs, that of a hundred steps 100 µs
+                    assert!((drift_m(1e-6, schedule.span_s()) - 1e-4).abs() < 1e-15);
                 }
             }
         }
         assert_eq!(again, 40); // 4.2 %
-        // two steps of 1 ms end 1 µs apart: their error is 2 µs, that of a hundred steps 100 µs
-        assert!((schedule.error_m() - 1e-4).abs() < 1e-15);
-        schedule.record(f64::NAN, 1);
-        assert!((schedule.error_m() - 1e-4).abs() < 1e-15);
-        schedule.rest();
-        assert_eq!(schedule.error_m(), 0.0);
     }
+
     #[test]
     fn similar_objects_are_staggered_and_none_starts_early() {
         // (number of objects of one rate, the most of them that repeat a step simultaneously); the mean stays as without staggering

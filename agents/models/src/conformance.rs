@@ -133,7 +133,7 @@ impl<'a> Suite<'a> {
     }
 }
 
-/// Tests the agent of `suite` against every promise; stepped as a run steps an agent that meets nobody.
+/// Tests the agent of `suite` against every promise; stepped as a run steps an agent that meets no other.
 #[must_use]
 pub fn check(suite: &Suite<'_>) -> Vec<Breach> {
     let promises = [

@@ -1,8 +1,8 @@
-//! Steps of an agent that meets nobody, as a run makes them: by itself, or in a cluster of one.
+//! Steps of an agent that meets no other, as a run makes them: by itself, or in a cluster of one.
 //!
-//! In: an agent, what it sees, the static solids around it. Out: the agent a step later, the forces of springs on it. Never here: other agents.
+//! In: an agent, what it sees. Out: the agent a step later, the forces of springs on it. Never here: other agents.
 
-use super::{ClusterReport, ClusterStepper};
+use super::ClusterStepper;
 use crate::agent::{Agent, Stepping};
 use crate::detect::ClusterScene;
 use crate::member::{ClusterMember, ContactMemory, Participant};
@@ -12,20 +12,18 @@ use metachron_core::{AgentId, Archive, ArchiveError, Grip, PlainLoop, SimSpan, S
 /// Steps one agent, and remembers what it touches between steps.
 #[derive(Default)]
 pub struct LoneStepper {
-    /// The static solids and the budget around it.
-    pub scene: ClusterScene,
+    scene: ClusterScene,
     stepper: ClusterStepper,
     memory: ContactMemory,
     grips: Vec<Grip>,
     laws: Vec<(AgentId, Law)>,
-    report: ClusterReport,
 }
 
 impl LoneStepper {
     /// Advances `agent` by exactly `dt`, and stops it where it may rest.
     ///
     /// # Errors
-    /// Those of [`ClusterStepper::step`] and of [`crate::OwnSteps::step`].
+    /// The errors of [`ClusterStepper::step`] and of [`crate::OwnSteps::step`].
     pub fn step(
         &mut self,
         agent: &mut dyn Agent,
@@ -36,7 +34,7 @@ impl LoneStepper {
             Stepping::Own(own) => return own.step(dt, &context),
             Stepping::Cluster(member) => member,
         };
-        let Self { scene, stepper, memory, grips, laws, report } = self;
+        let Self { scene, stepper, memory, grips, laws } = self;
         let id = context.me;
         laws.clear();
         laws.extend(context.neighbours.iter().map(|other| (other.id, other.law)));
@@ -50,7 +48,7 @@ impl LoneStepper {
             alone_s: dt.as_secs_f64(),
             grips,
         }];
-        *report = stepper.step(scene, &mut all, dt, &PlainLoop)?;
+        let report = stepper.step(scene, &mut all, dt, &PlainLoop)?;
         let [Participant { member, .. }] = &mut all;
         let at_rest = stepper.lets_rest() && member.is_calm();
         if at_rest {
@@ -65,13 +63,7 @@ impl LoneStepper {
         &self.grips
     }
 
-    /// What the cluster of one did in the last step.
-    #[must_use]
-    pub fn report(&self) -> &ClusterReport {
-        &self.report
-    }
-
-    /// Writes or reads what the next step starts from.
+    /// Writes or reads the state that the next step starts from.
     ///
     /// # Errors
     /// [`ArchiveError`] for what is no state of one.

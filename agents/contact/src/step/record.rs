@@ -45,7 +45,7 @@ impl ClusterStepper {
         }
     }
 
-    /// Notes what the next step starts from.
+    /// Notes the data from which the next step starts.
     pub(super) fn record(&mut self, all: &mut [Participant<'_>], h_s: f64, dt: SimSpan) {
         self.record_spins(all, h_s);
         self.record_contacts(all, h_s);

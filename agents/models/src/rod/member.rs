@@ -61,7 +61,7 @@ struct Kept {
 
 /// Velocities differ by less than this through rounding alone, as a share of them and of 1 m/s or rad/s.
 const ROUNDING: f64 = 1e-9;
-/// What a section may change by in a step as a share of its radius: its forces are linear in it.
+/// The most by which a section may change in a step, as a share of its radius: its forces are linear in it.
 const WALL_REACH: f64 = 0.05;
 /// The strain of a step in which its free motion raises its energy: it is made in two.
 const RISES: f64 = 2.0;
@@ -467,7 +467,7 @@ impl Unknowns {
         v.iter().zip(&self.free).all(|(v, free)| v.distance(*free) <= ROUNDING * (1.0 + free.length()))
     }
 
-    /// Writes or reads what is known of it between steps.
+    /// Writes or reads the state that is known between steps.
     pub(super) fn archive(&mut self, archive: &mut Archive<'_>) -> Result<(), ArchiveError> {
         archive_values!(archive, self.places, self.radii_m, self.present, self.quiet_before, self.own_substeps)
     }

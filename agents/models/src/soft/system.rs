@@ -158,7 +158,7 @@ impl System {
         }
     }
 
-    /// Replaces the velocities `x` of all vertices, from which a solution may start, by A⁻¹ of impulses on them (N·s), or by what is near it
+    /// Replaces the velocities `x` of all vertices, from which a solution may start, by A⁻¹ of impulses on them (N·s), or by an estimate
     /// where others find it; held vertices stay still.
     ///
     /// # Errors

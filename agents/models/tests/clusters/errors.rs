@@ -5,7 +5,7 @@ use crate::table::{GRAVITY, Placed, Table, placed, plane, spring};
 use glam::{DQuat, DVec3};
 use metachron_contact::AnchorSpring;
 use metachron_contact::step::StepDoubling;
-use metachron_core::step_doubling::{DRIFT_S, drift_m, farthest};
+use metachron_core::step_doubling::{DRIFT_S, drift_m};
 use metachron_core::{Anchor, SimSpan, Snapshot};
 use metachron_geometry::Solid;
 use metachron_models::rigid::{RigidBody, RigidSpec};
@@ -16,9 +16,14 @@ fn watched(bodies: Vec<Placed>) -> Table {
     table
 }
 
+/// The greatest distance between corresponding points of two states, metres.
+fn farthest(a: &[DVec3], b: &[DVec3]) -> f64 {
+    a.iter().zip(b).map(|(a, b)| a.distance_squared(*b)).fold(0.0, f64::max).sqrt()
+}
+
 /// The error in a tenth of a second that the last step of a table estimates for a body, metres.
 fn drift_of_m(table: &Table, body: usize, step_s: f64) -> f64 {
-    drift_m(table.doubling.as_ref().unwrap().apart_m()[body], 1, step_s)
+    drift_m(table.doubling.as_ref().unwrap().apart_m()[body], step_s)
 }
 
 #[test]

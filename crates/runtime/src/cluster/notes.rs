@@ -70,7 +70,7 @@ impl AgentRunner {
             if let (Some(seat), Some(apart_m)) = (&mut actor.cluster, apart_m.next())
                 && let Some(span_s) = span_s
             {
-                seat.drift_m = drift_m(*apart_m, 1, span_s);
+                seat.drift_m = drift_m(*apart_m, span_s);
             }
         });
     }

@@ -46,7 +46,7 @@ const SYNTHETIC_US: f64 = 0.85;
 /// An agent that takes part in no contact: the benchmark measures agents, not contacts.
 struct IsolatedAgent {
     agent: Box<dyn Agent>,
-    /// What steps a member of clusters, as if it were in one of its own.
+    /// The cluster of one of a member of clusters.
     stepper: Option<Box<LoneStepper>>,
     rests: bool,
 }
