@@ -9,7 +9,7 @@ const BALL: &str = "[[object]]\nname = \"ball\"\nmodel = \"rigid\"\nshape = \"ba
 /// Two tubes that fall: one of stuff that exists, and one whose numbers cannot be computed with.
 const IMPOSSIBLE: &str = "\
 [world]\ngravity_m_s2 = [0, 0, -1e4]\n\
-[[object]]\nname = \"impossible\"\nmodel = \"tube\"\npath_m = [[0, 0, 9e4], [1e-3, 0, 9e4], [2e-3, 1e-3, 9e4]]\nradius_m = 100\n\
+[[object]]\nname = \"impossible\"\nmodel = \"tube\"\npath_m = [[0, 0, 9e4], [1e-3, 0, 9e4], [2e-3, 1e-3, 9e4]]\nradius_m = 1e-6\n\
 young_pa = 1e13\ndensity_kg_m3 = 1e-3\nsegments = 2\nrate_hz = 1\ndt_ms = 1000\npressure_pa = 1e7\n";
 
 #[test]
