@@ -8,6 +8,7 @@
 //! answer: those of the step before, then those of the answer itself, until the joint holds. Positions are kept as by
 //! RATTLE (AND83): to second order, and a turning body keeps its energy. Theory: docs/theory/clusters.md, eq. 21.
 
+use crate::constraint::geometric_stiffness::Tie;
 use crate::constraint::{ConstraintRows, End, FineStep, Frame, Pull, RowOwner, Slides};
 use crate::detect::ClusterScene;
 use crate::joint::{Joint, JointKind, Motor, MotorGoal};
@@ -175,12 +176,15 @@ impl Joints {
         let turns = [a.turns.of_member(first), second.map_or(Side::FIXED, |at| b.turns.of_member(at))];
         let turns = Together { sides: turns, owner: lasting };
         let as_before_n = all[first].memory.recall(owner.partner, TouchKey::default()).force_n;
-        constraints.geometric_stiffness.note(step, &ends, as_before_n, owner);
         let (axis, now) = (joint.axis(&a, anchors[1] - anchors[0]), joint.off(&a, &b));
         let (rows, rotations) = ([constraints.rows.len(); 2], [a.rotation, b.rotation]);
         self.held.push(Held { of, axis, rows, now, rotations });
         self.lay(step, constraints, points, turns);
-        self.held.last_mut().into_iter().for_each(|held| held.rows[1] = constraints.rows.len());
+        let rows = [rows[0], constraints.rows.len()];
+        self.held.last_mut().into_iter().for_each(|held| held.rows = rows);
+        let is_point = !matches!(joint.kind, JointKind::Rope { .. });
+        let tie = Tie { ends: &ends, force_n: as_before_n, owner, rows, is_point };
+        constraints.geometric_stiffness.note(step, &tie);
     }
 
     /// Lays out the rows of the joint that was noted last.

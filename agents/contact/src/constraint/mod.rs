@@ -246,20 +246,37 @@ pub(crate) struct SlidingRow {
 /// The forces of a fine step at arms.
 #[derive(Debug, Default)]
 pub(crate) struct GeometricStiffness {
-    pulls: Vec<ForceAtArm>,
+    pulls: Vec<ForceAtArms>,
     /// Of each participant, how much inertia its pulls ask for, in shares of its own.
     asked: Vec<f64>,
 }
 
-/// A force at an arm of a body.
+/// A force between two places, as it acts at arms of bodies that move as a whole.
 #[derive(Debug, Clone, Copy)]
-struct ForceAtArm {
+struct ForceAtArms {
     owner: RowOwner,
-    /// The body, and its spin.
-    member: usize,
+    /// Its rows, from the first to past the last.
+    rows: [usize; 2],
+    /// Whether it holds both ends at one place.
+    is_point: bool,
+    /// Of its ends; `None` where an end is no such body.
+    arms: [Option<Arm>; 2],
+}
+
+/// An arm of a body.
+#[derive(Debug, Clone, Copy)]
+struct Arm {
+    /// Its end, and the spin of its body.
+    point: Side,
     turns: Side,
-    /// Along the arm, of length 1.
-    axis: DVec3,
-    /// The inertia that it asks for across the arm, kg m².
+    /// From the centre of mass when the step begins, metres, and as its rows have it.
+    arm_m: DVec3,
+    turned_m: DVec3,
+    /// The inverse inertia of the body across it, 1/(kg m²).
+    per_n_m: f64,
+    /// The inertia that the force asks for, kg m², and whether the force pulls the body along its arm.
     inertia_kg_m2: f64,
+    is_pulled: bool,
+    /// The row that adds it.
+    added: Option<usize>,
 }

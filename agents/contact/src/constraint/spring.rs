@@ -7,6 +7,7 @@
 
 use crate::AnchorSpring;
 use crate::agent::{Law, Link, tool_extrapolation_s};
+use crate::constraint::geometric_stiffness::Tie;
 use crate::constraint::{ConstraintRows, End, FineStep, Frame, Holders, Pull, RowOwner, Slides};
 use crate::member::memory::Partner;
 use crate::member::participant::place_of;
@@ -109,6 +110,7 @@ impl ConstraintRows {
         let sides = [a.side(), b.side()];
         let apart = a.point.position - b.point.position;
         let led_m_s = b.point.led_m_s - a.point.led_m_s;
+        let first = self.rows.len();
         let push = |constraints: &mut Self, key: u32, hold: Hold, law: Spring| {
             let row = JointRow::new(sides, hold.limited(owner.yields_above_n * step.h_s)).with_spring(law, step.h_s);
             let row = JointRow { target_m_s: row.target_m_s + led_m_s, ..row };
@@ -118,21 +120,23 @@ impl ConstraintRows {
         let axis = apart.try_normalize().unwrap_or(DVec3::Z);
         let stretch_m = apart - axis * rest_m;
         if rest_m == 0.0 {
-            if push(self, ALONG, Hold::ALL, Spring { stiffness_n_m, damping_n_s_m, stretch_m: apart }) {
+            if push(self, ALONG, Hold::ALL, Spring { stiffness_n_m, damping_n_s_m, stretch_m }) {
                 self.spring_slides(step, pull, Slides::Point(owner.frame));
             }
-            self.geometric_stiffness.note(step, ends, stretch_m * -stiffness_n_m, owner);
-            return;
+        } else {
+            if push(self, ALONG, Hold::along(axis), Spring { stiffness_n_m, damping_n_s_m, stretch_m }) {
+                self.spring_slides(step, pull, Slides::Length { axis });
+            }
+            let stretched = 1.0 - rest_m / apart.length();
+            if stretched > 0.0 {
+                let stiffness_n_m = stiffness_n_m * stretched;
+                let law = Spring { stiffness_n_m, damping_n_s_m: 0.0, stretch_m: DVec3::ZERO };
+                push(self, ACROSS, Hold::across(axis), law);
+            }
         }
-        if push(self, ALONG, Hold::along(axis), Spring { stiffness_n_m, damping_n_s_m, stretch_m }) {
-            self.spring_slides(step, pull, Slides::Length { axis });
-        }
-        let stretched = 1.0 - rest_m / apart.length();
-        if stretched > 0.0 {
-            let law = Spring { stiffness_n_m: stiffness_n_m * stretched, damping_n_s_m: 0.0, stretch_m: DVec3::ZERO };
-            push(self, ACROSS, Hold::across(axis), law);
-        }
-        self.geometric_stiffness.note(step, ends, stretch_m * -stiffness_n_m, owner);
+        let rows = [first, self.rows.len()];
+        self.geometric_stiffness
+            .note(step, &Tie { ends, force_n: stretch_m * -stiffness_n_m, owner, rows, is_point: false });
     }
 
     /// Lays out all links. Both agents see a link: of two participants the lower number takes it.

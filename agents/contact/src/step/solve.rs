@@ -69,7 +69,9 @@ impl ClusterStepper {
                 let torque_n_m = |row: usize| solution.rows_n_s[row].dot(contact.normal) / h_s;
                 owner.spin.torque_n_m = owner.spin_row.map_or(owner.spin.torque_n_m, torque_n_m);
             }
-            let Aimed { miss_m, turn_rad } = joints.aim(all, constraints, |member| &progress[member].v_solved[..], h_s);
+            let v_solved = |member: usize| &progress[member].v_solved[..];
+            constraints.turn_arms(progress, v_solved, h_s);
+            let Aimed { miss_m, turn_rad } = joints.aim(all, constraints, v_solved, h_s);
             let joints_done = miss_m < joint_miss_m(*depth_m) || miss_m > last_miss_m;
             let holds = miss_m < joint_miss_m(*depth_m);
             let made = (*macro_s / h_s).round();

@@ -149,17 +149,29 @@ fn a_chain_that_swings_a_weight_of_a_hundred_links_keeps_its_length() {
 
 #[test]
 fn a_chain_let_go_from_level_whips_and_keeps_its_length_and_its_energy() {
-    let (ratio, rate_hz, seconds) = (50.0, 240.0, 4.0);
-    let mut table = chain(ratio, DVec3::X, rate_hz);
-    let (start_j, fall_j) = (table.energy_j(), ratio * G * 4.0);
-    let (mut worst_m, mut off_j) = (0.0_f64, 0.0_f64);
-    while table.time.as_secs_f64() < seconds {
-        table.step();
-        worst_m = worst_m.max(stretch(&table, 20));
-        off_j = off_j.max((table.energy_j() - start_j).abs());
+    // of heavy weights the links' own swings, of up to a thousand a second, are far beyond these steps
+    for (ratio, rate_hz, factors_max) in
+        [(50.0, 240.0, 3000), (1000.0, 240.0, 3000), (1000.0, 60.0, 3000), (1e4, 60.0, 8000)]
+    {
+        let mut table = chain(ratio, DVec3::X, rate_hz);
+        // velocities are those of the middle of a step
+        let energy_j = |table: &mut Table| {
+            let falls: f64 = table.bodies.iter().map(|body| body.agent.momentum().0.z).sum();
+            table.energy_j() - 0.5 * G * falls / rate_hz
+        };
+        let (start_j, fall_j) = (energy_j(&mut table), (ratio + 9.5) * G * 4.0);
+        let (mut worst_m, mut made, mut lost, mut factors) = (0.0_f64, 0.0_f64, 0.0_f64, 0);
+        while table.time.as_secs_f64() < 4.0 {
+            factors += table.step().0.factors;
+            worst_m = worst_m.max(stretch(&table, 20));
+            let change = (energy_j(&mut table) - start_j) / fall_j;
+            (made, lost) = (made.max(change), lost.max(-change));
+        }
+        let case = format!("1 : {ratio} at {rate_hz} Hz");
+        assert!(worst_m < 1e-5, "{case}: a joint opened by {worst_m:e} m");
+        assert!(made < 0.01 && lost < 0.03, "{case}: {made} of its fall made, {lost} lost");
+        assert!(factors < factors_max, "{case}: {factors} factors");
     }
-    assert!(worst_m < 1e-5, "a joint opened by {worst_m:e} m");
-    assert!(off_j < 0.02 * fall_j, "{off_j} J of {fall_j}");
 }
 
 #[test]
@@ -191,12 +203,13 @@ fn links_of_a_thousandth_of_what_they_carry_do_not_begin_to_tremble() {
 fn a_chain_that_swings_allocates_next_to_nothing() {
     let mut table = chain(10.0, DVec3::new(1.0, 0.0, -1.0).normalize(), 60.0);
     let mut allocations = 0;
-    for step in 0..120 {
+    for step in 0..240 {
         table.step();
-        allocations += if step < 40 { 0 } else { table.allocations };
+        // the first swing makes room for the rows of all links
+        allocations += if step < 120 { 0 } else { table.allocations };
     }
     // room for links that come near each other for the first time
-    assert!(allocations <= 8, "{allocations} allocations in 80 steps");
+    assert!(allocations <= 8, "{allocations} allocations in 120 steps");
 }
 
 #[test]

@@ -82,6 +82,15 @@ impl Side {
         Self { member, ..self }
     }
 
+    /// Makes the arm of a point of a body that moves as a whole longer, by a vector in metres; `turns` is the body's spin.
+    pub(crate) fn lengthen(&mut self, turns: &Self, by_m: DVec3) {
+        for term in &mut self.terms[..self.count] {
+            for spin in turns.terms().iter().filter(|spin| spin.block == term.block) {
+                term.map += SideTerm::spin(0, by_m).map * spin.map;
+            }
+        }
+    }
+
     /// The velocity of the point where the blocks of its member have these velocities; zero of a fixed one.
     #[must_use]
     pub fn velocity(&self, blocks: &[DVec3]) -> DVec3 {
