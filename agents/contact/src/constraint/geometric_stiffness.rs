@@ -9,7 +9,7 @@
 
 use crate::constraint::{ConstraintRows, End, FineStep, ForceAtArm, GeometricStiffness, RowOwner};
 use crate::lists::reset;
-use crate::member::{ClusterMember, Participant};
+use crate::member::Participant;
 use crate::solve::{Hold, JointRow, Side};
 use glam::DVec3;
 
@@ -68,7 +68,8 @@ impl ForceAtArm {
     /// The trace of the inertia asked for over that of the body: no direction lacks more.
     fn share(&self, all: &[Participant<'_>]) -> f64 {
         let Some(spin) = self.turns.terms().first().map(|term| term.block) else { return 0.0 };
-        let own = all[self.member].member.blocks().iter().find(|block| block.row == spin && block.column == spin);
+        let own =
+            all[self.member].member.system().blocks.iter().find(|block| block.row == spin && block.column == spin);
         let Some(own) = own else { return 0.0 };
         let inverse = own.value.inverse();
         let trace = inverse.x_axis.x + inverse.y_axis.y + inverse.z_axis.z;

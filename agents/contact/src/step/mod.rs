@@ -33,7 +33,7 @@ use crate::impact::Impacts;
 use crate::member::memory::Partner;
 use crate::member::participant::Progress;
 use crate::member::problem::ProblemMembers;
-use crate::member::{ClusterMember, ContactMemory, Participant, Role};
+use crate::member::{ContactMemory, Participant, Role};
 use crate::solve::Solver;
 use crate::step::report::Sums;
 pub use doubling::StepDoubling;

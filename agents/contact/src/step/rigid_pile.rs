@@ -9,7 +9,7 @@ use crate::detect::domain::{Domain, assign};
 use crate::detect::{ClusterScene, Search};
 use crate::member::memory::Partner;
 use crate::member::participant::{Progress, place_of};
-use crate::member::{ClusterMember, Locked, Participant};
+use crate::member::{Locked, Participant};
 use crate::step::report::{ClusterReport, Sums, give, total_of};
 use glam::{DMat3, DQuat, DVec3};
 use metachron_core::{AgentId, Archive, ArchiveError, SolveLevel, StepError, archive_values};
@@ -243,7 +243,7 @@ impl RigidPile {
             let way_m = world.origin_m + pose.translation.as_dvec3() + goal * shape.com_local - centre_m;
             let turn = (goal * rotation.inverse()).to_scaled_axis();
             let axes = DMat3::from_quat(rotation);
-            one.member.carry(&[way_m * known.mass_kg, axes * known.inertia * axes.transpose() * turn]);
+            one.member.change(|m| m.carry(&[way_m * known.mass_kg, axes * known.inertia * axes.transpose() * turn]));
         }
     }
 }
@@ -433,7 +433,7 @@ fn placed<'a>(one: &'a Participant<'_>) -> Option<Placed<'a>> {
 }
 
 fn insert(physics: &mut PhysicsWorld, one: &Participant<'_>, body: &Placed<'_>, origin_m: DVec3) -> Known {
-    let [mass, inertia] = [0, 1].map(|block| one.member.blocks()[block].value);
+    let [mass, inertia] = [0, 1].map(|block| one.member.system().blocks[block].value);
     let locked = one.member.locked();
     let (mass_kg, inertia) = locked.map_or((mass.x_axis.x, inertia), |locked| (locked.mass_kg, locked.inertia));
     let axes = DMat3::from_quat(body.rotation);
