@@ -101,7 +101,7 @@ const RINGS: [(&str, usize); 19] = [
     ("agents/contact", 2),
     ("agents/models", 5),
     ("crates/drawable", 3),
-    ("crates/runtime", 8),
+    ("crates/runtime", 3),
     ("crates/world", 6),
     ("crates/scene", 6),
     ("crates/devices", 0),

@@ -3,9 +3,7 @@
 //! Out: snapshots and numbers, without ever waiting for the agent. In: commands. Never here: the agent itself.
 
 use super::agent_record::{AgentRecord, Live};
-use super::agent_spawn::AgentSpawn;
 use super::form_slot::FormSlot;
-use crate::cluster::Handover;
 use crate::commands::mailbox::{AwaitedMotion, Command, Keyed, Mailbox, SendError};
 use crate::lock_free::ring::{Ring, RingEntry};
 use crate::lock_free::sleep::SleepRegistry;
@@ -17,13 +15,12 @@ use crate::records::metrics::{AgentState, AgentStats, Metrics, REMOVED};
 use crate::records::probe::{Sample, Trace};
 use crate::records::streams::{EventStreams, Heard, Rings};
 use crate::records::turns::Turn;
-use crate::turn::agent_runner::AgentRunner;
-use crate::turn::model::Traits;
 use metachron_contact::detect::ClusterScene;
 use metachron_contact::member::CallMark;
 use metachron_contact::{Input, Inputs, Law};
 use metachron_core::{AgentId, Body, HASH_START, SimSpan, SimTime, Snapshot};
 use metachron_geometry::CollisionShape;
+use std::any::Any;
 use std::sync::atomic::Ordering::Relaxed;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
@@ -63,25 +60,9 @@ pub(crate) struct Identity {
     /// Whether the run began with it. Nothing outside can make such an agent again as it was, with its governor and its ties: where it leaves it
     /// keeps them and its model, and comes back with a state that is read.
     pub is_first: bool,
-    /// Entry for agents that it is to lead, and the place to which it returns from a leader; `None` where no agent can be led.
-    pub handover: Option<Handover>,
-}
-
-impl Identity {
-    /// That of the agent that is to be started, whose name it takes.
-    pub fn of(id: AgentId, spawn: &mut AgentSpawn, traits: &Traits, is_first: bool) -> Self {
-        let inputs = traits.inputs;
-        let is_motored = spawn.scene.joints_of(id).any(|(_, joint)| joint.takes_motor());
-        Self {
-            name: std::mem::take(&mut spawn.name).into(),
-            model: traits.model,
-            wanted_hz: spawn.rate_hz,
-            motored: is_motored.then(|| Arc::clone(&spawn.scene)),
-            inputs: inputs.with(Input::Resolution, inputs.has(Input::Resolution) && spawn.range.is_some()),
-            is_first,
-            handover: traits.is_member.then(Handover::default),
-        }
-    }
+    /// Entry for agents that it is to lead, and the place to which it returns from a leader, of a type that only clusters know
+    /// ([`crate::cluster::Handover`]); `None` where no agent can be led.
+    pub handover: Option<Box<dyn Any + Send + Sync>>,
 }
 
 impl Shared {
@@ -128,10 +109,6 @@ impl Shared {
             Some(lacks) => Err(SendError::NotTaken { name: Arc::clone(name), model, lacks, takes: *inputs }),
             None => Ok(()),
         }
-    }
-
-    pub const fn handover(&self) -> Option<&Handover> {
-        self.identity.handover.as_ref()
     }
 
     fn ages(&self) -> MutexGuard<'_, Option<Box<Histogram>>> {
@@ -188,11 +165,6 @@ impl AgentHandle {
     /// The agent; `None` of one that has left and is not kept.
     pub(crate) fn live(&self) -> Option<Live> {
         self.record.live()
-    }
-
-    /// The runner, if it has returned from a leader.
-    pub(crate) fn take_returned(&self) -> Option<Box<AgentRunner>> {
-        self.live()?.handover()?.take_returned()
     }
 
     /// Whether it has left.

@@ -25,12 +25,6 @@ pub(in super::super) struct Handover {
     pub(super) returned: AtomicCell<Option<Box<AgentRunner>>>,
 }
 
-impl std::fmt::Debug for Handover {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        f.debug_struct("Handover").finish_non_exhaustive()
-    }
-}
-
 /// An agent that waits to be led, boxed: it is far larger than the word that moves it.
 type Arrival = Box<AgentRunner>;
 
@@ -72,6 +66,19 @@ impl Handover {
     /// Removes all arrivals.
     fn clear(&self) -> Vec<Arrival> {
         std::mem::take(&mut *self.arrivals.lock().unwrap_or_else(PoisonError::into_inner))
+    }
+}
+
+impl Shared {
+    pub fn handover(&self) -> Option<&Handover> {
+        self.identity.handover.as_ref()?.downcast_ref()
+    }
+}
+
+impl AgentHandle {
+    /// The runner, if it has returned from a leader.
+    pub(crate) fn take_returned(&self) -> Option<Box<AgentRunner>> {
+        self.live()?.handover()?.take_returned()
     }
 }
 
