@@ -45,15 +45,15 @@ impl ClusterStepper {
 
     /// Finds where members may touch, but for members of a rigid pile: their contacts are not the problem's.
     pub(super) fn detect(&mut self, scene: &ClusterScene, all: &[Participant<'_>], h_s: f64) {
-        let Self { search, pile, progress, .. } = self;
+        let Self { search, pile, progress, factors_max, .. } = self;
         let round = Round { scene, all, progress, h_s, judge: Judge::Predicted };
-        if pile.go_on(scene, all) {
+        if pile.go_on(scene, all, *factors_max) {
             search.find(&round, pile.domains());
             pile.end_if_touched(search);
         }
         if !pile.is_on() {
             search.find(&round, &[]);
-            pile.begin(scene, all, search);
+            pile.begin(scene, all, search, *factors_max);
             if pile.is_on() {
                 search.find(&round, pile.domains());
             }

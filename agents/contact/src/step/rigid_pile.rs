@@ -47,8 +47,6 @@ pub(super) struct RigidPile {
     world: Option<Box<World>>,
     /// Of each member; without meaning where there is no heap.
     domains: Vec<Domain>,
-    /// How many factors each solve of the macro step has time for; `None` for as many as it takes.
-    pub factors_max: Option<u32>,
 }
 
 /// Counts and figures of a step of a rigid pile.
@@ -136,8 +134,8 @@ impl RigidPile {
     }
 
     /// Makes a rigid pile of the members that can be one, if there is no time for their problem, they are most of it and nothing else touches them.
-    pub fn begin(&mut self, scene: &ClusterScene, all: &[Participant<'_>], search: &Search) {
-        if self.factors_max.is_none_or(|most| most >= FACTORS_SAFE) {
+    pub fn begin(&mut self, scene: &ClusterScene, all: &[Participant<'_>], search: &Search, factors_max: Option<u32>) {
+        if factors_max.is_none_or(|most| most >= FACTORS_SAFE) {
             return;
         }
         assign(scene, all, &mut self.domains);
@@ -151,8 +149,8 @@ impl RigidPile {
     }
 
     /// Goes on with the rigid pile where it still is one; whether it goes on.
-    pub fn go_on(&mut self, scene: &ClusterScene, all: &[Participant<'_>]) -> bool {
-        let is_short = self.factors_max.is_some_and(|most| most < FACTORS_AGAIN);
+    pub fn go_on(&mut self, scene: &ClusterScene, all: &[Participant<'_>], factors_max: Option<u32>) -> bool {
+        let is_short = factors_max.is_some_and(|most| most < FACTORS_AGAIN);
         self.world = self.world.take().filter(|_| is_short);
         if self.is_on() {
             assign(scene, all, &mut self.domains);
