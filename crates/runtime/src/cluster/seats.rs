@@ -192,7 +192,7 @@ impl AgentRunner {
     fn admit(&mut self, actor: Box<AgentRunner>) {
         let (me, sleep) = (self.id(), Arc::clone(&self.shared.sleep));
         std::iter::once(actor.id()).chain(actor.led.ids()).for_each(|id| sleep.follow(id, Some(me)));
-        std::iter::once(&*actor).chain(actor.led.all()).for_each(|joining| joining.tell(EventKind::Joined(me)));
+        std::iter::once(&*actor).chain(actor.led.all()).for_each(|joining| joining.record_event(EventKind::Joined(me)));
         self.led.admit(actor);
     }
 
@@ -238,7 +238,7 @@ impl AgentRunner {
     fn return_turns(mut self: Box<Self>) {
         let (id, shared) = (self.id(), Arc::clone(&self.shared));
         self.led.ids().for_each(|led| shared.sleep.follow(led, Some(id)));
-        self.tell(EventKind::Left);
+        self.record_event(EventKind::Left);
         shared.sleep.follow(id, None);
         self.settle(1.0);
         if let Some(handover) = shared.handover() {
