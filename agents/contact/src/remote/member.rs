@@ -18,7 +18,7 @@ use metachron_geometry::{CollisionShape, ContactSide, Place, PlacedShape, ShapeK
 use std::sync::Arc;
 
 /// No partner is predicted by more than this many of its steps.
-const FORETOLD_STEPS: f64 = 2.0;
+const PREDICTED_STEPS_MAX: f64 = 2.0;
 
 /// A partner that is stepped elsewhere.
 #[derive(Debug, Default)]
@@ -127,10 +127,11 @@ impl RemoteMember {
     }
 
     /// Brings it to `time` (eq. 5, 6).
-    pub fn foretell(&mut self, neighbour: &Neighbour, time: SimTime) {
+    pub fn predict(&mut self, neighbour: &Neighbour, time: SimTime) {
         let size = self.model.blocks.len();
         let step_s = self.model.step_s;
-        let since_s = time.secs_after(neighbour.snapshot.time).clamp(-FORETOLD_STEPS * step_s, FORETOLD_STEPS * step_s);
+        let since_s =
+            time.secs_after(neighbour.snapshot.time).clamp(-PREDICTED_STEPS_MAX * step_s, PREDICTED_STEPS_MAX * step_s);
         self.now.clear();
         let Self { model, shape, led, now, deviation, carried, .. } = self;
         shape.go_on(*led, since_s);

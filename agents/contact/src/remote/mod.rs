@@ -156,7 +156,7 @@ impl Remotes {
             }
         }
         for Remote { seen, member, memory, grips, .. } in self.all.iter_mut().filter(|remote| remote.met) {
-            member.foretell(seen, time);
+            member.predict(seen, time);
             let (id, context) = (seen.id, StepContext::alone(seen.id, time));
             locals.push(Participant {
                 id,
