@@ -80,8 +80,8 @@ impl Loads {
         poses.retain(|pose| pose.acts(time));
         acting.pose = poses.first().map(|pose| pose.what.goal.after(time.secs_after(pose.what.from)));
         // a step that is made again has the same impulses
-        impulses.retain(|blow| blow.at.is_none_or(|at| at == time));
-        impulses.iter_mut().for_each(|blow| blow.at = Some(time));
+        impulses.retain(|impulse| impulse.at.is_none_or(|at| at == time));
+        impulses.iter_mut().for_each(|impulse| impulse.at = Some(time));
         acting.springs.clear();
         acting.springs.extend(springs.iter().map(|spring| spring.what));
         acting.motors.clear();
@@ -92,7 +92,7 @@ impl Loads {
             let left = force.until.map_or(dt, |until| until.since(time).min(dt));
             scaled(force.what, left.as_secs_f64() / dt_s)
         }));
-        acting.forces.extend(impulses.iter().map(|blow| scaled(blow.impulse, dt_s.recip())));
+        acting.forces.extend(impulses.iter().map(|impulse| scaled(impulse.impulse, dt_s.recip())));
     }
 
     /// The loads of the step prepared last.
@@ -103,7 +103,9 @@ impl Loads {
     /// Whether something acts at `now` or later that keeps the agent from resting. A motor that moves its joint does so by itself.
     pub fn keep_awake(&self, now: SimTime) -> bool {
         let pulled = self.springs.iter().any(|spring| spring.acts(now));
-        pulled || self.forces.iter().any(|force| force.acts(now)) || self.impulses.iter().any(|blow| blow.at.is_none())
+        pulled
+            || self.forces.iter().any(|force| force.acts(now))
+            || self.impulses.iter().any(|impulse| impulse.at.is_none())
     }
 }
 
