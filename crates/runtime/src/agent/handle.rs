@@ -13,7 +13,7 @@ use crate::records::histogram::Histogram;
 use crate::records::histogram::Spread;
 use crate::records::metrics::{AgentState, AgentStats, Metrics, REMOVED};
 use crate::records::probe::{Sample, Trace};
-use crate::records::streams::{EventStreams, Heard, Rings};
+use crate::records::streams::{EventStreams, Rings, StreamReader};
 use crate::records::turns::Turn;
 use metachron_contact::detect::ClusterScene;
 use metachron_contact::member::CallMark;
@@ -356,45 +356,45 @@ impl AgentHandle {
 
     /// Begins to keep its events for a reader.
     #[must_use]
-    pub fn listen(&self) -> Heard {
+    pub fn listen(&self) -> StreamReader {
         let stalls = self.live().map_or(0, |shared| shared.gauges.stalls.load(Relaxed));
-        let mut heard = self.listen_to(|rings| &rings.events);
-        heard.stalls = stalls;
-        heard
+        let mut reader = self.listen_to(|rings| &rings.events);
+        reader.stalls = stalls;
+        reader
     }
 
     /// Passes its events that a reader has not heard on to `take`; returns how many were lost: an agent keeps the newest
     /// [`crate::EVENTS_KEPT`].
-    pub fn hear_events(&self, heard: &mut Heard, mut take: impl FnMut(AgentEvent)) -> u64 {
-        let lost = self.hear(heard, |rings| &rings.events, &mut take);
-        let stalls = self.judged().map_or(heard.stalls, |shared| shared.gauges.stalls.load(Relaxed));
-        for _ in heard.stalls..stalls {
+    pub fn read_events(&self, reader: &mut StreamReader, mut take: impl FnMut(AgentEvent)) -> u64 {
+        let lost = self.read(reader, |rings| &rings.events, &mut take);
+        let stalls = self.judged().map_or(reader.stalls, |shared| shared.gauges.stalls.load(Relaxed));
+        for _ in reader.stalls..stalls {
             take(AgentEvent { at: self.latest().time, kind: EventKind::Stalled });
         }
-        heard.stalls = stalls;
+        reader.stalls = stalls;
         lost
     }
 
     /// Begins to keep its turns for a reader.
     #[must_use]
-    pub fn listen_to_turns(&self) -> Heard {
+    pub fn listen_to_turns(&self) -> StreamReader {
         self.listen_to(|rings| &rings.turns)
     }
 
     /// Passes its turns that a reader has not heard on to `take`; returns how many were lost: an agent keeps the newest
     /// [`crate::TURNS_KEPT`].
-    pub fn hear_turns(&self, heard: &mut Heard, take: impl FnMut(Turn)) -> u64 {
-        self.hear(heard, |rings| &rings.turns, take)
+    pub fn read_turns(&self, reader: &mut StreamReader, take: impl FnMut(Turn)) -> u64 {
+        self.read(reader, |rings| &rings.turns, take)
     }
 
-    fn listen_to<E: RingEntry>(&self, of: fn(&Rings) -> &Ring<E>) -> Heard {
-        self.live().map_or_else(Heard::default, |shared| shared.streams.listen(of))
+    fn listen_to<E: RingEntry>(&self, of: fn(&Rings) -> &Ring<E>) -> StreamReader {
+        self.live().map_or_else(StreamReader::default, |shared| shared.streams.listen(of))
     }
 
-    fn hear<E: RingEntry>(&self, heard: &mut Heard, of: fn(&Rings) -> &Ring<E>, take: impl FnMut(E)) -> u64 {
+    fn read<E: RingEntry>(&self, reader: &mut StreamReader, of: fn(&Rings) -> &Ring<E>, take: impl FnMut(E)) -> u64 {
         // looked up first: an agent that has left by then has pushed all its events before
         let live = self.live();
-        heard.hear(live.as_ref().map(|shared| &shared.streams), of, take)
+        reader.read(live.as_ref().map(|shared| &shared.streams), of, take)
     }
 
     /// CPU time of its turns so far, seconds; updated about twice a second on threads.
