@@ -15,7 +15,7 @@ pub(crate) struct Loads {
     motors: Vec<Lasting<SetMotor>>,
     /// At most one, as it is when the agent takes it.
     poses: Vec<Lasting<Led>>,
-    impulses: Vec<Blow>,
+    impulses: Vec<TimedImpulse>,
     /// The loads of the step that was prepared last.
     #[serde(skip)]
     acting: Acting,
@@ -54,7 +54,7 @@ struct Lasting<T> {
 
 /// An impulse: it acts evenly over one step.
 #[derive(Debug, Clone, Copy, serde::Serialize, serde::Deserialize)]
-struct Blow {
+struct TimedImpulse {
     /// N·s and N·m·s.
     impulse: AnchorForce,
     /// The start of the step in which it acts, once that is known.
@@ -68,7 +68,7 @@ impl Loads {
         update(&mut self.forces, &mut sent.forces, now, |force| force);
         update(&mut self.motors, &mut sent.motors, now, |motor| motor);
         update(&mut self.poses, &mut sent.poses, now, |goal| Led { goal, from: now });
-        self.impulses.extend(sent.impulses.drain(..).map(|impulse| Blow { impulse, at: None }));
+        self.impulses.extend(sent.impulses.drain(..).map(|impulse| TimedImpulse { impulse, at: None }));
     }
 
     /// Prepares a step of `dt` from `time`. A force that ends within it acts for its part of it, all else to its end.
