@@ -4,7 +4,7 @@
 
 use super::Restraint;
 use super::RigidBody;
-use super::body::{CALM_M_S, REST_S};
+use super::body::{REST_S, STILL_M_S};
 use super::motion::{Flight, Motion};
 use glam::{DMat3, DQuat, DVec3};
 use metachron_contact::member::{
@@ -50,7 +50,7 @@ struct Kept {
     motion: Motion,
     acceleration: DVec3,
     angular_acceleration: DVec3,
-    calm_s: f64,
+    still_s: f64,
     at_rest: bool,
     steps: u64,
 }
@@ -178,15 +178,15 @@ impl ClusterMember for RigidBody {
     }
 
     fn keep(&mut self) {
-        let Self { motion, acceleration, angular_acceleration, calm_s, at_rest, steps, .. } = *self;
-        self.unknowns.kept = Some(Kept { motion, acceleration, angular_acceleration, calm_s, at_rest, steps });
+        let Self { motion, acceleration, angular_acceleration, still_s, at_rest, steps, .. } = *self;
+        self.unknowns.kept = Some(Kept { motion, acceleration, angular_acceleration, still_s, at_rest, steps });
     }
 
     fn go_back(&mut self) {
         let Some(kept) = self.unknowns.kept else { return };
-        let Kept { motion, acceleration, angular_acceleration, calm_s, at_rest, steps } = kept;
+        let Kept { motion, acceleration, angular_acceleration, still_s, at_rest, steps } = kept;
         (self.motion, self.acceleration, self.angular_acceleration) = (motion, acceleration, angular_acceleration);
-        (self.calm_s, self.at_rest, self.steps) = (calm_s, at_rest, steps);
+        (self.still_s, self.at_rest, self.steps) = (still_s, at_rest, steps);
     }
 
     fn end(&mut self, &StepEnd { v, h_s, touched, .. }: &StepEnd<'_>) -> Result<(), StepError> {
@@ -202,12 +202,12 @@ impl ClusterMember for RigidBody {
         self.unknowns.now = [self.motion.velocity, spin];
         self.steps += 1;
         self.at_rest = false;
-        self.count_calm(&before, h_s, touched);
+        self.count_still(&before, h_s, touched);
         Ok(())
     }
 
     fn can_sleep(&self) -> bool {
-        self.may_sleep && self.calm_s >= REST_S
+        self.may_sleep && self.still_s >= REST_S
     }
 
     fn sleep(&mut self) {
@@ -266,11 +266,11 @@ impl Attachments for RigidBody {
 }
 
 impl RigidBody {
-    /// Counts calm time after a step from `before`.
-    fn count_calm(&mut self, before: &Motion, h_s: f64, touched: bool) {
-        let still = self.motion.velocity.length() + self.swing_m_s() < CALM_M_S;
+    /// Counts the time that it is still after a step from `before`.
+    fn count_still(&mut self, before: &Motion, h_s: f64, touched: bool) {
+        let still = self.motion.velocity.length() + self.swing_m_s() < STILL_M_S;
         // one that hovers at the top of its flight is not at rest
         let held = touched || (self.flight.gravity == DVec3::ZERO && *before == self.motion);
-        self.calm_s = if still && held { self.calm_s + h_s } else { 0.0 };
+        self.still_s = if still && held { self.still_s + h_s } else { 0.0 };
     }
 }
