@@ -5,7 +5,7 @@
 
 use glam::DVec3;
 use metachron_contact::Neighbour;
-use metachron_contact::member::{ClusterMember, Participant};
+use metachron_contact::member::Participant;
 use metachron_contact::remote::PublishedShape;
 use metachron_contact::step::KnownImpulse;
 use metachron_geometry::narrow_phase::{NarrowPhaseScratch, touches};
