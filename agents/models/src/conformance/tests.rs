@@ -4,7 +4,6 @@ use super::{Breach, Load, Promise, Suite, check};
 use crate::rigid::{KinematicBody, Led, RigidSpec};
 use glam::{DQuat, DVec3};
 use metachron_contact::member::{ClusterMember, Role, SkinPoint, StepEnd};
-use metachron_contact::solve::Side;
 use metachron_contact::{Agent, AnchorSpring, Input, Inputs, OwnSteps, SetMotion, StepContext, Stepping};
 use metachron_core::{Anchor, Body, CurveState, Resolution, SimSpan, Snapshot, StepError, StepReport, check_span};
 use metachron_geometry::{CollisionShape, ContactSide, Place, PlacedShape, Solid};
