@@ -204,7 +204,7 @@ pub struct AnchorForce {
     pub anchor: Anchor,
     /// The force, world axes, N.
     pub force_n: DVec3,
-    /// A torque besides, world axes, N·m: without effect where no block of the body is a spin ([`ClusterMember::turn`]).
+    /// A torque besides, world axes, N·m: without effect where no block of the body is a spin ([`crate::member::Attachments::turn`]).
     pub torque_n_m: DVec3,
 }
 

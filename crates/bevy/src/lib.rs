@@ -90,6 +90,6 @@ impl Plugin for MetachronPlugin {
             .configure_sets(PostUpdate, in_order)
             .add_systems(PostUpdate, (objects::join, drag::take_pointer, drag::pull).chain().in_set(Act))
             .add_systems(PostUpdate, time::pass.in_set(Advance))
-            .add_systems(PostUpdate, (objects::show, messages::tell).chain().in_set(Show));
+            .add_systems(PostUpdate, (objects::show, messages::send).chain().in_set(Show));
     }
 }

@@ -61,7 +61,7 @@ pub struct Refused {
 pub(super) struct Listener(pub Events);
 
 /// Passes on the events.
-pub(super) fn tell(
+pub(super) fn send(
     mut listener: ResMut<'_, Listener>,
     followers: Res<'_, Followers>,
     mut contacts: MessageWriter<'_, ContactMessage>,

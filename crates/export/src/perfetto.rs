@@ -7,7 +7,7 @@
 
 use super::ExportError;
 use metachron_core::{AgentId, SimSpan, SimTime};
-use metachron_runtime::{AgentHandle, Heard, Turn};
+use metachron_runtime::{AgentHandle, StreamReader, Turn};
 use metachron_world::{Event, EventFilter, Events, Happening, World};
 use serde_json::{Map, Value, json};
 use std::fs::File;
@@ -52,7 +52,7 @@ pub struct PerfettoFile {
 
 /// The turns of an object that were read.
 struct Lane {
-    heard: Heard,
+    reader: StreamReader,
     /// A wait that may go on.
     wait: Option<Turn>,
     /// When the steps that were read last ended, by the object's own time.
@@ -138,7 +138,7 @@ impl PerfettoFile {
     fn listen(&mut self) -> Result<(), ExportError> {
         let world = self.world.clone();
         for agent in world.agents().iter().skip(self.lanes.len()) {
-            self.lanes.push(Lane { heard: agent.listen_to_turns(), wait: None, ended: Vec::new() });
+            self.lanes.push(Lane { reader: agent.listen_to_turns(), wait: None, ended: Vec::new() });
             let (name, tid) = (agent.name(), lane_of(agent.id()));
             self.put(
                 &json!({ "ph": "M", "name": "thread_name", "pid": OBJECTS, "tid": tid, "args": { "name": name } }),
@@ -150,7 +150,7 @@ impl PerfettoFile {
     fn turns(&mut self, agent: &AgentHandle) -> Result<(), ExportError> {
         let at = agent.id().0 as usize;
         let mut turns = Vec::new();
-        self.lost += agent.hear_turns(&mut self.lanes[at].heard, |turn| turns.push(turn));
+        self.lost += agent.read_turns(&mut self.lanes[at].reader, |turn| turns.push(turn));
         let steps = turns.iter().filter(|turn| is_step(turn));
         self.lanes[at].ended = steps.map(|turn| (turn.time, turn.ended)).collect();
         turns.iter().try_for_each(|turn| self.turn(agent.id(), turn))

@@ -36,7 +36,7 @@ use crate::turn::agent_runner::{AgentRunner, StepOutcome};
 use crate::turn::helpers::Helped;
 use crate::turn::model::contained;
 use metachron_contact::detect::ClusterScene;
-use metachron_contact::member::{ClusterMember, ContactMemory, Participant, Role};
+use metachron_contact::member::{ContactMemory, Participant, Role};
 use metachron_contact::remote::{Pairs, Remotes};
 use metachron_contact::step::{ClusterStepper, Plan, StepDoubling};
 use metachron_contact::{Link, Neighbour, StepContext};
@@ -461,7 +461,7 @@ impl AgentRunner {
     pub fn rest_members(&mut self) {
         self.each_member(|actor| {
             let rested = contained(|| {
-                actor.model.member()?.into_iter().for_each(|mut member| member.rest());
+                actor.model.member()?.into_iter().for_each(|mut member| member.change(|m| m.sleep()));
                 Ok(())
             });
             // it is parked where its state is written

@@ -54,7 +54,7 @@ pub use records::governor::{Demand, Governor, TurnMeasure};
 pub use records::histogram::Spread;
 pub use records::metrics::{AgentState, AgentStats, STALLED_FOR_GOOD};
 pub use records::probe::{SAMPLES_MAX, Sample, WatchedPoint};
-pub use records::streams::Heard;
+pub use records::streams::StreamReader;
 pub use records::turns::{TURNS_KEPT, Turn};
 pub use time::agent_clock::{AgentClock, LAG_CAP, SPEED_RANGE, SharedTimeline, Start, Timeline, TimelineCommand};
 pub use time::clock::{Clock, ManualClock, SystemClock, wait_until};

@@ -19,7 +19,7 @@ use metachron_contact::AnchorSpring;
 use metachron_core::{AgentId, SimSpan};
 use metachron_lod::control::Policy;
 use metachron_render::{Camera, Gpu, Hand, Hit, Picture, Ray};
-use metachron_runtime::{Heard, TimelineCommand};
+use metachron_runtime::{StreamReader, TimelineCommand};
 use metachron_scene::Source;
 use metachron_session::{Finished, FrameRecord, Outcome, REWIND_BYTES, Session};
 use scene_files::WatchedFiles;
@@ -103,7 +103,7 @@ struct WindowSimulation<'a> {
     /// Why the files as they are now cannot be shown.
     file_error: Option<Message>,
     /// How far the turns of each agent whose lane was shown have been read.
-    turns_heard: BTreeMap<AgentId, Heard>,
+    turn_readers: BTreeMap<AgentId, StreamReader>,
 }
 
 /// Frames stored of a run without an end: an hour at 30 frames a second, some 10 MB.
@@ -133,7 +133,7 @@ impl<'a> WindowSimulation<'a> {
             session,
             files: WatchedFiles::of(&plan.source),
             file_error: None,
-            turns_heard: BTreeMap::new(),
+            turn_readers: BTreeMap::new(),
             plan,
             hand: None,
             tuning: None,
@@ -170,7 +170,7 @@ impl<'a> WindowSimulation<'a> {
         self.status = Status { selected, ..view_model::initial_status(&self.session) };
         self.meter = Meter::new(&self.session);
         self.notices.clear();
-        self.turns_heard.clear();
+        self.turn_readers.clear();
         match recorded {
             Ok(true) => self.show_message(Severity::Note, "the recording ends with the run before this one".to_owned()),
             Ok(false) => {}
@@ -436,8 +436,8 @@ impl Simulation for WindowSimulation<'_> {
 
     fn turns(&mut self, of: AgentId, take: &mut dyn FnMut(TurnRow)) {
         let Some(agent) = self.session.agents().of(of) else { return };
-        let heard = self.turns_heard.entry(of).or_insert_with(|| agent.listen_to_turns());
-        agent.hear_turns(heard, |turn| take(view_model::turn(&turn)));
+        let reader = self.turn_readers.entry(of).or_insert_with(|| agent.listen_to_turns());
+        agent.read_turns(reader, |turn| take(view_model::turn(&turn)));
     }
 
     fn scene_camera(&self) -> Camera {

@@ -5,7 +5,9 @@
 //! It is one node on one spring that goes as deep as water carries it (Archimedes): m z'' = B(z) − m g − c z', with the surface at z = 0.
 //! A step is linearly implicit: (m + h c + h² k) v' = m v + h (B − m g), where k = −dB/dz; contact adds its impulses on the right.
 
-use metachron::contact::member::{ClusterMember, Pose, Role};
+pub mod puck;
+
+use metachron::contact::member::{ClusterMember, MemberMotion, Pose, Role, SkinPoint, StepEnd, StepSystem};
 use metachron::contact::solve::{Block, ProblemError, Side, SideTerm};
 use metachron::core::{Archive, ArchiveError, Bounds, RigidState, StepError, archive_values};
 use metachron::geometry::{CollisionShape, ContactSide, Place, PlacedShape, ShapeKind, ShapePose, SolidShape};
@@ -121,16 +123,8 @@ impl ClusterMember for Pontoon {
         Ok(())
     }
 
-    fn blocks(&self) -> &[Block] {
-        &self.block
-    }
-
-    fn free(&self) -> &[DVec3] {
-        &self.free
-    }
-
-    fn velocities(&self) -> &[DVec3] {
-        &self.velocity
+    fn system(&self) -> StepSystem<'_> {
+        StepSystem { blocks: &self.block, free: &self.free, velocities: &self.velocity, ..StepSystem::default() }
     }
 
     fn skin(&self) -> Option<PlacedShape<'_>> {
@@ -138,16 +132,8 @@ impl ClusterMember for Pontoon {
         Some(PlacedShape { form: &self.form, view })
     }
 
-    fn side(&self, _place: &Place, _contact: ContactSide) -> Side {
-        self.side
-    }
-
-    /// It moves as a whole: so the engine sums its contacts in its state's `contact_wrench`.
-    fn pose(&self, v: &[DVec3], t_s: f64) -> Option<Pose> {
-        // no velocities are given for where it is now
-        let way_m = v.first().map_or(0.0, |v| v.z * t_s);
-        let centre_m = self.middle() + DVec3::Z * way_m;
-        Some(Pose { centre_m, origin_m: centre_m, ..Pose::WORLD })
+    fn skin_point(&self, _place: &Place, _contact: ContactSide) -> SkinPoint {
+        self.side.into()
     }
 
     fn keep(&mut self) {
@@ -162,7 +148,7 @@ impl ClusterMember for Pontoon {
         self.skin_m = self.now.height_m + v[0].z * t_s;
     }
 
-    fn end(&mut self, v: &[DVec3], h_s: f64, _touched: bool) -> Result<(), StepError> {
+    fn end(&mut self, &StepEnd { v, h_s, .. }: &StepEnd<'_>) -> Result<(), StepError> {
         let State { height_m, steps, .. } = self.now;
         let velocity_m_s = v[0].z;
         let height_m = height_m + velocity_m_s * h_s;
@@ -172,6 +158,20 @@ impl ClusterMember for Pontoon {
         }
         self.take(State { height_m, velocity_m_s, steps: steps + 1 });
         Ok(())
+    }
+
+    fn motion(&self) -> Option<&dyn MemberMotion> {
+        Some(self)
+    }
+}
+
+impl MemberMotion for Pontoon {
+    /// It moves as a whole: so the engine sums its contacts in its state's `contact_wrench`.
+    fn pose(&self, v: &[DVec3], t_s: f64) -> Option<Pose> {
+        // no velocities are given for where it is now
+        let way_m = v.first().map_or(0.0, |v| v.z * t_s);
+        let centre_m = self.middle() + DVec3::Z * way_m;
+        Some(Pose { centre_m, origin_m: centre_m, ..Pose::WORLD })
     }
 }
 

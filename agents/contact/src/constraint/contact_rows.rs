@@ -6,7 +6,7 @@
 
 use crate::constraint::ConstraintRows;
 use crate::detect::{Owner, Search};
-use crate::member::{ClusterMember, Participant, Pose};
+use crate::member::{Participant, Pose};
 use crate::push_out::{PUSH_OUT_MAX_M_S, push_out_m_s};
 use crate::solve::{Contact, Hold, JointRow, Pressed};
 

@@ -9,7 +9,7 @@ use crate::constraint::{ConstraintRows, FineStep, Frame, Pull, RowOwner, Slides,
 use crate::lists::entry;
 use crate::member::memory::{Partner, UnfinishedLoad};
 use crate::member::participant::{Progress, relative};
-use crate::member::{ClusterMember, Participant, Slid};
+use crate::member::{GuardedMember, OwnFailure, Participant, Slid};
 use crate::solve::JointRow;
 use glam::DVec3;
 
@@ -71,8 +71,8 @@ impl Failures {
     }
 
     /// Adds the impulses of a member's own attachments over its step of `h_s` seconds, which has ended.
-    pub fn note_own(&mut self, member: usize, body: &dyn ClusterMember, h_s: f64) {
-        for own in body.attachments() {
+    pub fn note_own(&mut self, member: usize, body: &GuardedMember<'_>, h_s: f64) {
+        for own in body.own_attachments() {
             let owner = RowOwner::new(member, None, Partner::Attachment(own.number));
             self.note(&RowOwner { tears_above_n: own.tears_above_n, ..owner }, own.force_n * h_s);
         }
@@ -126,7 +126,7 @@ impl Failures {
             let first = !one.memory.has_slipped(owner.partner);
             let slip = one.memory.slip(owner.partner);
             match owner.own {
-                Some(place) => one.member.slip(place, slid),
+                Some(place) => one.member.change(|m| m.give_way(OwnFailure::Slips(place, slid))),
                 None => slip.slid += slid,
             }
             if first {
@@ -148,7 +148,7 @@ impl Participant<'_> {
     pub(crate) fn let_go(&mut self) {
         for torn in self.memory.torn() {
             if let Partner::Attachment(number) = torn {
-                self.member.let_go(*number);
+                self.member.change(|m| m.give_way(OwnFailure::Tears(*number)));
             }
         }
     }

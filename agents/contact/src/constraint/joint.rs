@@ -14,7 +14,7 @@ use crate::detect::ClusterScene;
 use crate::joint::{Joint, JointKind, Motor, MotorGoal};
 use crate::member::memory::Partner;
 use crate::member::participant::{place_of, relative, velocity};
-use crate::member::{ClusterMember, MaterialPoint, Participant, Pose};
+use crate::member::{MaterialPoint, Participant, Pose};
 use crate::push_out::PUSH_OUT_MAX_M_S;
 use crate::solve::{Hold, JointRow, Side, SideTerm, Spring};
 use glam::{DQuat, DVec3};
@@ -444,7 +444,7 @@ fn material(all: &[Participant<'_>], member: Option<usize>, pose: &Pose, place: 
 /// The inverse mass of a side along an axis where nothing but its member's own blocks resists, 1/kg, or 1/(kg m²) of a turn.
 fn own_inverse_mass(all: &[Participant<'_>], side: &Side, axis: DVec3) -> f64 {
     let of = |term: &SideTerm| {
-        let mut blocks = all[side.member].member.blocks().iter();
+        let mut blocks = all[side.member].member.system().blocks.iter();
         let block = blocks.find(|block| block.row == term.block && block.column == term.block)?;
         let given = term.map.transpose() * axis;
         Some(given.dot(block.value.inverse() * given))

@@ -11,7 +11,7 @@ pub(crate) mod spring;
 use crate::agent::Link;
 use crate::member::memory::Partner;
 use crate::member::participant::{Progress, relative};
-use crate::member::{ClusterMember, MaterialPoint, Participant, Pose};
+use crate::member::{MaterialPoint, Participant, Pose};
 use crate::solve::{Hold, JointRow, Side};
 pub use failure::FailedAttachment;
 use glam::{DQuat, DVec3};

@@ -11,7 +11,7 @@ use crate::constraint::geometric_stiffness::Tie;
 use crate::constraint::{ConstraintRows, End, FineStep, Frame, Holders, Pull, RowOwner, Slides};
 use crate::member::memory::Partner;
 use crate::member::participant::place_of;
-use crate::member::{ClusterMember, MaterialPoint, OwnSpring, Participant};
+use crate::member::{MaterialPoint, OwnSpring, Participant};
 use crate::solve::{Hold, JointRow, Side, Spring};
 use glam::{DQuat, DVec3};
 use metachron_core::{AgentId, Anchor, Body, shortest_turn};
@@ -225,7 +225,7 @@ fn computes_link(all: &[Participant<'_>], one: &Participant<'_>, link: &Link) ->
     let far = place_of(all, link.other).map(|other| &all[other].member);
     match link.law {
         Law::Cluster => far.is_none_or(|far| !far.is_remote()),
-        Law::Ledger => far.is_some_and(|far| !far.spares(one.id)),
+        Law::Ledger => far.is_some_and(|far| !far.passes_through(one.id)),
         Law::Tlm { .. } => far.is_some_and(|far| !far.is_remote()),
         Law::Off => false,
     }

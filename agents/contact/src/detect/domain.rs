@@ -6,7 +6,7 @@
 use crate::detect::ClusterScene;
 use crate::lists::reset;
 use crate::member::participant::place_of;
-use crate::member::{ClusterMember, Participant, Role};
+use crate::member::{Participant, Role};
 use metachron_core::AgentId;
 use metachron_geometry::{CollisionShape, ContactTraits, ShapeKind, ShapePose};
 
@@ -58,7 +58,7 @@ mod tests {
     use super::*;
     use crate::StepContext;
     use crate::joint::{Joint, JointKind};
-    use crate::member::{ClusterMember, ContactMemory};
+    use crate::member::{ClusterMember, ContactMemory, Remote, SkinPoint, StepEnd};
     use crate::solve::Side;
     use glam::{DQuat, DVec3};
     use metachron_core::{SimTime, StepError};
@@ -74,8 +74,8 @@ mod tests {
         fn role(&self) -> Role {
             Role::Rigid
         }
-        fn is_remote(&self) -> bool {
-            self.is_remote
+        fn remote(&self) -> Option<Remote<'_>> {
+            self.is_remote.then_some(Remote { answers_after_s: 0.0, partners: &[] })
         }
         fn begin(&mut self, _: f64) -> Result<(), StepError> {
             Ok(())
@@ -84,13 +84,12 @@ mod tests {
             let view = ShapePose::Solid { position: DVec3::ZERO, rotation: DQuat::IDENTITY };
             Some(PlacedShape { form: &self.form, view })
         }
-        fn side(&self, _: &Place, _: ContactSide) -> Side {
-            Side::FIXED
+        fn skin_point(&self, _: &Place, _: ContactSide) -> SkinPoint {
+            Side::FIXED.into()
         }
         fn keep(&mut self) {}
         fn go_back(&mut self) {}
-        fn move_to(&mut self, _: &[DVec3], _: f64) {}
-        fn end(&mut self, _: &[DVec3], _: f64, _: bool) -> Result<(), StepError> {
+        fn end(&mut self, _: &StepEnd<'_>) -> Result<(), StepError> {
             Ok(())
         }
     }
@@ -109,7 +108,7 @@ mod tests {
                 .iter_mut()
                 .map(|(id, member, memory, grips)| {
                     let context = StepContext::alone(*id, SimTime::ZERO);
-                    let member = member.into();
+                    let member = (member as &mut dyn ClusterMember).into();
                     Participant { id: *id, member, context, laws: &[], memory, parts: 1, alone_s: 0.01, grips }
                 })
                 .collect();

@@ -13,9 +13,9 @@ mod thinning;
 
 use crate::detect::domain::Domain;
 use crate::lists::refill;
+use crate::member::Role;
 use crate::member::found_places::TwoSolids;
 use crate::member::memory::{Partner, Spin};
-use crate::member::{ClusterMember, Role};
 use crate::solve::Contact;
 use glam::DVec3;
 use metachron_geometry::narrow_phase::{NarrowPhaseScratch, TouchKey, self_touches, touches};

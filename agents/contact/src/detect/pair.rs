@@ -6,7 +6,7 @@
 use crate::detect::ClusterScene;
 use crate::member::memory::{Partner, Spin};
 use crate::member::participant::{Progress, velocity};
-use crate::member::{ClusterMember, Participant};
+use crate::member::{Participant, SkinPoint};
 use crate::push_out::push_out_m_s;
 use crate::solve::{Contact, Side};
 use glam::DVec3;
@@ -162,21 +162,15 @@ impl Pair<'_> {
             Place::Chain { .. } | Place::Surface { .. } => *place,
         };
         let (on_a, on_b) = (back(&touch.on_a, ways[0]), back(&touch.on_b, ways[1]));
-        let side = |member: usize, place: &Place, contact: ContactSide| {
-            all[member].member.side(place, contact).of_member(member)
+        let point = |member: usize, place: &Place, contact: ContactSide| {
+            let point = all[member].member.skin_point(place, contact);
+            SkinPoint { side: point.side.of_member(member), ..point }
         };
-        let [first, second] = [ContactSide::first(touch.normal), ContactSide::second(touch.normal)];
-        let other = self.other();
-        let recess_m = |member: usize, place: &Place, contact: ContactSide| all[member].member.recess_m(place, contact);
-        Facing {
-            skins,
-            recess_m: recess_m(self.member, &on_a, first) + other.map_or(0.0, |other| recess_m(other, &on_b, second)),
-            sides: [side(self.member, &on_a, first), other.map_or(Side::FIXED, |other| side(other, &on_b, second))],
-            led_m_s: [
-                all[self.member].member.led_m_s(&on_a),
-                other.map_or(DVec3::ZERO, |other| all[other].member.led_m_s(&on_b)),
-            ],
-        }
+        let a = point(self.member, &on_a, ContactSide::first(touch.normal));
+        let b = self.other().map(|other| point(other, &on_b, ContactSide::second(touch.normal)));
+        let b = b.unwrap_or(Side::FIXED.into());
+        let (sides, led_m_s) = ([a.side, b.side], [a.led_m_s, b.led_m_s]);
+        Facing { skins, sides, recess_m: a.recess_m + b.recess_m, led_m_s }
     }
 }
 

@@ -5,7 +5,7 @@
 
 use crate::detect::pair::{Against, Pair, Round};
 use crate::lists::refill;
-use crate::member::{ClusterMember, Participant};
+use crate::member::Participant;
 use glam::DVec3;
 use metachron_geometry::narrow_phase::{NarrowPhaseScratch, SweptReach, SweptShape, first_touch};
 use metachron_geometry::{Aabb, ShapePose, Touch};

@@ -6,7 +6,6 @@
 use crate::detect::pair::{Against, MET_M, Pair, Reaching, Round};
 use crate::detect::reach::FAR_M;
 use crate::detect::{Meeting, Passage, Search};
-use crate::member::ClusterMember;
 use crate::member::memory::Partner;
 use glam::{DQuat, DVec3};
 use metachron_geometry::narrow_phase::touches;

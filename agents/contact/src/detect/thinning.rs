@@ -5,7 +5,6 @@
 
 use crate::detect::pair::{Judge, Owner, Pair, Round};
 use crate::lists::{refill, reset};
-use crate::member::ClusterMember;
 use crate::member::memory::Partner;
 use crate::solve::Contact;
 use glam::DVec3;

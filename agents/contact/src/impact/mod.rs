@@ -11,7 +11,7 @@ use crate::lists::{refill, reset};
 use crate::member::memory::Partner;
 use crate::member::participant::{Progress, relative, velocity};
 use crate::member::problem::{Posed, ProblemMembers, Velocities};
-use crate::member::{ClusterMember, Participant, Role};
+use crate::member::{Participant, Role};
 use crate::push_out::PUSH_OUT_SHARE;
 use crate::solve::{Contact, JointRow, Report, Settings, Side, Solution, Solver};
 use glam::DVec3;

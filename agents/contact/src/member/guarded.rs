@@ -4,11 +4,13 @@
 //! In: a member, the mark of its agent. Out: the same answers; from one that no step can go on with the call never returns, it unwinds like a
 //! panic of the member. Its catcher finds by the marks whose code it was. Never here: the fate of the agent, catching.
 
-use crate::StepContext;
-use crate::member::{ClusterMember, Drive, Locked, MaterialPoint, OwnAttachment, OwnSpring, Pose, Role, Slid};
-use crate::solve::{Block, Response, Side};
+use crate::member::{
+    ClusterMember, Drive, Locked, MaterialPoint, OwnAttachment, OwnSpring, Pose, Role, SkinPoint, StepEnd, StepSystem,
+    fastest,
+};
+use crate::solve::{Response, Side};
 use glam::DVec3;
-use metachron_core::{AgentId, Anchor, StepError};
+use metachron_core::{AgentId, Anchor, Impulse, StepError};
 use metachron_geometry::narrow_phase::RestShape;
 use metachron_geometry::{ContactSide, Place, PlacedShape, ShapePose};
 use std::panic::resume_unwind;
@@ -90,12 +92,6 @@ impl<'a> From<&'a mut dyn ClusterMember> for GuardedMember<'a> {
     }
 }
 
-impl<'a, M: ClusterMember> From<&'a mut M> for GuardedMember<'a> {
-    fn from(inner: &'a mut M) -> Self {
-        Self { inner, mark: None, blocks: 0 }
-    }
-}
-
 impl<'a> GuardedMember<'a> {
     /// `inner`, whose calls `mark` marks.
     ///
@@ -103,7 +99,7 @@ impl<'a> GuardedMember<'a> {
     /// Where `inner` does.
     pub fn new(inner: &'a mut dyn ClusterMember, mark: &'a CallMark) -> Self {
         // points of it are asked for before it begins a step
-        let blocks = mark.during(|| inner.velocities().len());
+        let blocks = mark.during(|| inner.system().velocities.len());
         Self { inner, mark: Some(mark), blocks }
     }
 
@@ -119,7 +115,7 @@ impl<'a> GuardedMember<'a> {
 
     /// The factor of its matrix, where it lends one.
     pub(crate) fn lent(&self) -> Option<Lent<'_>> {
-        self.response().map(|by| Lent { by, mark: self.mark })
+        self.system().response.map(|by| Lent { by, mark: self.mark })
     }
 
     /// Ends the step for an answer that was found to be of no use only then; nothing for a member whose calls are not marked.
@@ -147,7 +143,7 @@ impl<'a> GuardedMember<'a> {
     }
 
     /// Lets it change its state.
-    fn tell<T>(&mut self, call: impl FnOnce(&mut dyn ClusterMember) -> T) -> T {
+    pub fn change<T>(&mut self, call: impl FnOnce(&mut dyn ClusterMember) -> T) -> T {
         marked(self.mark, || call(&mut *self.inner))
     }
 
@@ -157,7 +153,7 @@ impl<'a> GuardedMember<'a> {
         let Some(mark) = mark else { return call(&mut **inner) };
         let outcome = mark.during(|| {
             call(&mut **inner)?;
-            *blocks = inner.velocities().len();
+            *blocks = inner.system().velocities.len();
             if let Some(what) = lengths_fault(&**inner) {
                 reject(what);
             }
@@ -195,7 +191,8 @@ fn reject(what: String) {
 /// The fault in the lists of a member after a step was begun or ended, or in the place of its skin, if there is one. Its matrix is looked through where it
 /// is used.
 fn lengths_fault(member: &dyn ClusterMember) -> Option<String> {
-    let (size, free, unanswered) = (member.velocities().len(), member.free().len(), member.unanswered().len());
+    let system = member.system();
+    let (size, free, unanswered) = (system.velocities.len(), system.free.len(), system.unanswered.len());
     if free != size {
         return Some(format!("{free} free velocities; expected one for each of its {size} velocities"));
     }
@@ -204,11 +201,11 @@ fn lengths_fault(member: &dyn ClusterMember) -> Option<String> {
             "{unanswered} momenta unanswered; expected none or one for each of its {size} velocities"
         ));
     }
-    if let Some(block) = member.blocks().iter().find(|block| block.row >= size || block.column > block.row) {
+    if let Some(block) = system.blocks.iter().find(|block| block.row >= size || block.column > block.row) {
         return Some(format!("block {}, {} of a matrix whose lower half has {size} rows", block.row, block.column));
     }
     let is_finite = |list: &[DVec3]| list.iter().all(|v| v.is_finite());
-    if !is_finite(member.velocities()) || !is_finite(member.free()) {
+    if !is_finite(system.velocities) || !is_finite(system.free) {
         return Some("a velocity that is not finite".to_owned());
     }
     let is_sound = match member.skin()?.view {
@@ -221,10 +218,6 @@ fn lengths_fault(member: &dyn ClusterMember) -> Option<String> {
 }
 
 fn number_fault(what: &'static str) -> impl FnOnce(&f64) -> Option<String> {
-    move |x| (!x.is_finite()).then(|| format!("{what} of {x}"))
-}
-
-fn vector_fault(what: &'static str) -> impl FnOnce(&DVec3) -> Option<String> {
     move |x| (!x.is_finite()).then(|| format!("{what} of {x}"))
 }
 
@@ -243,188 +236,143 @@ fn any<T>(_: &T) -> Option<String> {
     None
 }
 
-impl ClusterMember for GuardedMember<'_> {
-    fn role(&self) -> Role {
+/// Its answers, where it has any; the defaults of its optional traits where it has none of these.
+impl GuardedMember<'_> {
+    /// [`ClusterMember::role`].
+    #[must_use]
+    pub fn role(&self) -> Role {
         self.ask(|m| m.role(), any)
     }
 
-    fn look(&mut self, context: &StepContext<'_>, dt_s: f64) {
-        self.tell(|m| m.look(context, dt_s));
-    }
-
-    fn begin(&mut self, h_s: f64) -> Result<(), StepError> {
+    pub(crate) fn begin(&mut self, h_s: f64) -> Result<(), StepError> {
         self.step(|m| m.begin(h_s))
     }
 
-    fn blocks(&self) -> &[Block] {
-        self.ask(|m| m.blocks(), any)
+    /// [`ClusterMember::system`]. Calls of its factor are not marked.
+    #[must_use]
+    pub fn system(&self) -> StepSystem<'_> {
+        self.ask(|m| m.system(), any)
     }
 
-    fn locked(&self) -> Option<Locked> {
-        self.ask(|m| m.locked(), any)
-    }
-
-    fn response(&self) -> Option<&dyn Response> {
-        self.ask(|m| m.response(), any)
-    }
-
-    fn free(&self) -> &[DVec3] {
-        self.ask(|m| m.free(), any)
-    }
-
-    fn unanswered(&self) -> &[DVec3] {
-        self.ask(|m| m.unanswered(), any)
-    }
-
-    fn velocities(&self) -> &[DVec3] {
-        self.ask(|m| m.velocities(), any)
-    }
-
-    fn leave(&mut self, unanswered: &[DVec3]) {
-        self.tell(|m| m.leave(unanswered));
-    }
-
-    fn skin(&self) -> Option<PlacedShape<'_>> {
+    /// [`ClusterMember::skin`].
+    #[must_use]
+    pub fn skin(&self) -> Option<PlacedShape<'_>> {
         self.ask(|m| m.skin(), skin_fault)
     }
 
-    fn skin_after<'a>(&'a self, v: &[DVec3], t_s: f64, nodes: &'a mut Vec<DVec3>) -> Option<PlacedShape<'a>> {
-        self.ask(|m| m.skin_after(v, t_s, nodes), skin_fault)
+    pub(crate) fn skin_after<'b>(
+        &'b self,
+        v: &[DVec3],
+        t_s: f64,
+        nodes: &'b mut Vec<DVec3>,
+    ) -> Option<PlacedShape<'b>> {
+        self.ask(|m| m.motion()?.skin_after(v, t_s, nodes), skin_fault)
     }
 
-    fn rest_shape(&self) -> Option<RestShape<'_>> {
-        self.ask(|m| m.rest_shape(), any)
+    pub(crate) fn rest_shape(&self) -> Option<RestShape<'_>> {
+        self.ask(|m| m.motion()?.rest_shape(), any)
     }
 
-    fn side(&self, place: &Place, contact: ContactSide) -> Side {
-        self.ask(|m| m.side(place, contact), |side| self.side_fault(side))
+    /// [`ClusterMember::skin_point`].
+    #[must_use]
+    pub fn skin_point(&self, place: &Place, contact: ContactSide) -> SkinPoint {
+        let fault = |point: &SkinPoint| {
+            let SkinPoint { side, led_m_s, recess_m } = point;
+            let is_sound = led_m_s.is_finite() && recess_m.is_finite();
+            if is_sound { self.side_fault(side) } else { Some(format!("{recess_m} m inside, led by {led_m_s} m/s")) }
+        };
+        self.ask(|m| m.skin_point(place, contact), fault)
     }
 
-    fn cell_of(&self, place: &Place) -> Option<u32> {
-        self.ask(|m| m.cell_of(place), any)
+    pub(crate) fn cell_of(&self, place: &Place) -> Option<u32> {
+        self.ask(|m| m.motion()?.cell_of(place), any)
     }
 
-    fn recess_m(&self, place: &Place, contact: ContactSide) -> f64 {
-        self.ask(|m| m.recess_m(place, contact), number_fault("a recess"))
+    pub(crate) fn speed_bound(&self, v: &[DVec3]) -> f64 {
+        self.ask(|m| m.motion().map_or_else(|| fastest(v), |m| m.speed_bound(v)), number_fault("a speed"))
     }
 
-    fn led_m_s(&self, place: &Place) -> DVec3 {
-        self.ask(|m| m.led_m_s(place), vector_fault("a led velocity"))
+    /// Whether it passes through `other`, or stands for a partner of others alone.
+    pub(crate) fn passes_through(&self, other: AgentId) -> bool {
+        let passes = |m: &dyn ClusterMember| {
+            m.remote().is_some_and(|remote| !remote.partners.contains(&other))
+                || m.motion().is_some_and(|motion| motion.passes_through(other))
+        };
+        self.ask(passes, any)
     }
 
-    fn anchor(&self, anchor: Anchor) -> Option<MaterialPoint> {
-        self.ask(|m| m.anchor(anchor), |point| self.point_fault(point.as_ref()?))
-    }
-
-    fn turn(&self, anchor: Anchor) -> Option<Side> {
-        self.ask(|m| m.turn(anchor), |side| self.side_fault(side.as_ref()?))
-    }
-
-    fn slot_of(&self, block: usize) -> u32 {
-        self.ask(|m| m.slot_of(block), any)
-    }
-
-    fn answers_after_s(&self) -> f64 {
-        self.ask(|m| m.answers_after_s(), number_fault("a delay"))
-    }
-
-    fn is_remote(&self) -> bool {
-        self.ask(|m| m.is_remote(), any)
-    }
-
-    fn pose(&self, v: &[DVec3], t_s: f64) -> Option<Pose> {
+    pub(crate) fn pose(&self, v: &[DVec3], t_s: f64) -> Option<Pose> {
         let fault = |pose: &Option<Pose>| {
             let Pose { centre_m, origin_m, rotation, turns, led_rad_s } = pose.as_ref()?;
             let is_sound = [centre_m, origin_m, led_rad_s].iter().all(|v| v.is_finite()) && rotation.is_finite();
             if is_sound { self.side_fault(turns) } else { Some("a pose that is not finite".to_owned()) }
         };
-        self.ask(|m| m.pose(v, t_s), fault)
+        self.ask(|m| m.motion()?.pose(v, t_s), fault)
     }
 
-    fn drive(&self) -> Option<Drive> {
-        self.ask(|m| m.drive(), |drive| self.point_fault(&drive.as_ref()?.point))
+    pub(crate) fn locked(&self) -> Option<Locked> {
+        self.ask(|m| m.motion()?.locked(), any)
     }
 
-    fn is_led(&self) -> bool {
-        self.ask(|m| m.is_led(), any)
+    pub(crate) fn anchor(&self, anchor: Anchor) -> Option<MaterialPoint> {
+        self.ask(|m| m.attachments()?.anchor(anchor), |point| self.point_fault(point.as_ref()?))
     }
 
-    fn spares(&self, other: AgentId) -> bool {
-        self.ask(|m| m.spares(other), any)
+    /// The sides at the material point `anchor` with their shares of an impulse and an angular one there, but for those that are zero.
+    pub(crate) fn visit_sides(&self, anchor: Anchor, impulse: Impulse, mut visit: impl FnMut(Side, DVec3)) {
+        if let Some(point) = self.anchor(anchor).filter(|_| impulse.linear != DVec3::ZERO) {
+            visit(point.side, impulse.linear);
+        }
+        let turn = self.ask(|m| m.attachments()?.turn(anchor), |side| self.side_fault(side.as_ref()?));
+        if let Some(side) = turn.filter(|_| impulse.angular != DVec3::ZERO) {
+            visit(side, impulse.angular);
+        }
     }
 
-    fn speed_bound(&self, v: &[DVec3]) -> f64 {
-        self.ask(|m| m.speed_bound(v), number_fault("a speed"))
+    pub(crate) fn slot_of(&self, block: usize) -> u32 {
+        self.ask(|m| m.attachments().map_or(block as u32, |points| points.slot_of(block)), any)
     }
 
-    fn strain(&self, v: &[DVec3], h_s: f64) -> f64 {
+    pub(crate) fn drive(&self) -> Option<Drive> {
+        self.ask(|m| m.attachments()?.drive(), |drive| self.point_fault(&drive.as_ref()?.point))
+    }
+
+    /// Whether the springs of users lead it instead of pulling at it. A remote member's own cluster solves its contacts with static solids.
+    pub(crate) fn is_led(&self) -> bool {
+        self.role() == Role::Kinematic || self.is_remote() || self.drive().is_some()
+    }
+
+    pub(crate) fn own_attachments(&self) -> &[OwnAttachment] {
+        self.ask(|m| m.attachments().map_or(&[][..], |points| points.own()), any)
+    }
+
+    pub(crate) fn own_spring(&self, place: usize) -> Option<OwnSpring> {
+        self.ask(|m| m.attachments()?.own_spring(place), |spring| self.point_fault(&spring.as_ref()?.point))
+    }
+
+    pub(crate) fn is_remote(&self) -> bool {
+        self.ask(|m| m.remote().is_some(), any)
+    }
+
+    pub(crate) fn answers_after_s(&self) -> f64 {
+        self.ask(|m| m.remote().map_or(0.0, |remote| remote.answers_after_s), number_fault("a delay"))
+    }
+
+    pub(crate) fn strain(&self, v: &[DVec3], h_s: f64) -> f64 {
         self.ask(|m| m.strain(v, h_s), any)
     }
 
-    fn carry(&mut self, impulses_n_s2: &[DVec3]) {
-        self.tell(|m| m.carry(impulses_n_s2));
+    pub(crate) fn end(&mut self, step: &StepEnd<'_>) -> Result<(), StepError> {
+        self.step(|m| m.end(step))
     }
 
-    fn keep(&mut self) {
-        self.tell(|m| m.keep());
+    /// [`ClusterMember::can_sleep`].
+    #[must_use]
+    pub fn can_sleep(&self) -> bool {
+        self.ask(|m| m.can_sleep(), any)
     }
 
-    fn go_back(&mut self) {
-        self.tell(|m| m.go_back());
-    }
-
-    fn move_to(&mut self, v: &[DVec3], t_s: f64) {
-        self.tell(|m| m.move_to(v, t_s));
-    }
-
-    fn end(&mut self, v: &[DVec3], h_s: f64, touched: bool) -> Result<(), StepError> {
-        self.step(|m| m.end(v, h_s, touched))
-    }
-
-    fn attachments(&self) -> &[OwnAttachment] {
-        self.ask(|m| m.attachments(), any)
-    }
-
-    fn own_spring(&self, place: usize) -> Option<OwnSpring> {
-        self.ask(|m| m.own_spring(place), |spring| self.point_fault(&spring.as_ref()?.point))
-    }
-
-    fn slip(&mut self, place: usize, by: Slid) {
-        self.tell(|m| m.slip(place, by));
-    }
-
-    fn let_go(&mut self, number: u32) {
-        self.tell(|m| m.let_go(number));
-    }
-
-    fn is_calm(&self) -> bool {
-        self.ask(|m| m.is_calm(), any)
-    }
-
-    fn rest(&mut self) {
-        self.tell(|m| m.rest());
-    }
-
-    fn work(&self) -> f64 {
+    pub(crate) fn work(&self) -> f64 {
         self.ask(|m| m.work(), number_fault("a work"))
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    /// The names of the methods in the block of `text` that begins with `head`.
-    fn methods(text: &str, head: &str) -> Vec<String> {
-        let block = text.split(head).nth(1).and_then(|rest| rest.split("\n}\n").next()).unwrap();
-        let heads = block.lines().filter_map(|line| line.strip_prefix("    fn "));
-        let mut names: Vec<_> = heads.map(|head| head.split(['(', '<']).next().unwrap().to_owned()).collect();
-        names.sort_unstable();
-        names
-    }
-
-    #[test]
-    fn every_method_of_a_member_is_passed_on() {
-        let wanted = methods(include_str!("mod.rs"), "pub trait ClusterMember");
-        assert!(wanted.len() > 30, "{wanted:?}");
-        assert_eq!(methods(include_str!("guarded.rs"), "impl ClusterMember for GuardedMember"), wanted);
     }
 }

@@ -22,14 +22,12 @@ pub use participant::Participant;
 ///
 /// A step is `begin`, then `move_to` within it where others make shorter steps, then `end`. A refused `begin` leaves the state as it was,
 /// and so does a `begin` with no `end`. `keep` and `go_back` frame several steps that may have to be made again.
+///
+/// A model on which others rest needs the first eight methods and, where it bends, [`Self::move_to`]. What more there is to say of it is
+/// in optional traits: [`MemberMotion`], [`Attachments`].
 pub trait ClusterMember: Send {
     /// How it takes part.
     fn role(&self) -> Role;
-
-    /// Reads its surroundings at the start of a macro step of `dt_s` seconds: its goal, the bodies that it may grasp.
-    fn look(&mut self, context: &StepContext<'_>, dt_s: f64) {
-        let _ = (context, dt_s);
-    }
 
     /// Prepares a step of `h_s` seconds from its present state: its matrix A and the velocities at the step's end without contact.
     ///
@@ -37,48 +35,100 @@ pub trait ClusterMember: Send {
     /// [`StepError::Diverged`] where the matrix has no factor.
     fn begin(&mut self, h_s: f64) -> Result<(), StepError>;
 
-    /// The lower half of A = M + h C + h² K of the step begun: symmetric and positive definite, kg or kg·m². Blocks that never move
-    /// stand for themselves, and no side refers to them. None of a body that is led.
-    fn blocks(&self) -> &[Block] {
-        &[]
-    }
-
-    /// The axes of the world along and about which nothing moves it, of a rigid body that has such: its matrix is as good as unbounded there.
-    fn locked(&self) -> Option<Locked> {
-        None
-    }
-
-    /// The factor of that matrix, where `begin` has made one. Of up to 200 blocks without one the problem makes it; beyond, conjugate
-    /// gradients solve the whole cluster.
-    fn response(&self) -> Option<&dyn Response> {
-        None
-    }
-
-    /// The velocity of each block at the end of the step begun, if nothing touched the body. Where [`Self::unanswered`]
-    /// has momentum left, this is an estimate: it predicts places, and the solution tells into how many parts the step
-    /// is divided.
-    fn free(&self) -> &[DVec3] {
-        &[]
-    }
-
-    /// A (v − v̂): the momentum that free velocities v̂ do not answer, where the body leaves it to the cluster to find v, N·s on each block.
-    /// Empty for none.
-    fn unanswered(&self) -> &[DVec3] {
-        &[]
-    }
-
-    /// The velocity of each block now.
-    fn velocities(&self) -> &[DVec3] {
-        &[]
-    }
-
-    /// Receives before the end of its step the momentum that its last velocities leave unanswered, N·s on each block (eq. 17).
-    fn leave(&mut self, unanswered: &[DVec3]) {
-        let _ = unanswered;
+    /// The linear system of the step begun; the empty one of a kinematic body. Its velocities are asked for before a step is begun, too.
+    fn system(&self) -> StepSystem<'_> {
+        StepSystem::default()
     }
 
     /// Its skin where it is now; `None` where nothing can touch it.
     fn skin(&self) -> Option<PlacedShape<'_>>;
+
+    /// How the point `place` of its skin moves, for one side of a contact.
+    fn skin_point(&self, place: &Place, contact: ContactSide) -> SkinPoint;
+
+    /// Ends the step begun.
+    ///
+    /// # Errors
+    /// [`StepError::Diverged`] where the state would not be finite; it is then as it was before.
+    fn end(&mut self, step: &StepEnd<'_>) -> Result<(), StepError>;
+
+    /// Keeps the present state, at the end of a step.
+    fn keep(&mut self);
+
+    /// Goes back to the state kept last.
+    fn go_back(&mut self);
+
+    /// Places the skin where it is `t_s` seconds into the step begun, having moved with the velocities `v` from its start. Only a
+    /// deformable is ever within a step: the steps of all others are the shortest of their cluster.
+    fn move_to(&mut self, v: &[DVec3], t_s: f64) {
+        let _ = (v, t_s);
+    }
+
+    /// Reads its surroundings at the start of a macro step of `dt_s` seconds: its goal, the bodies that it may grasp.
+    fn look(&mut self, context: &StepContext<'_>, dt_s: f64) {
+        let _ = (context, dt_s);
+    }
+
+    /// By how much the velocities `v` would turn or stretch it in a step of `h_s` seconds, as a share of the most that
+    /// its linear forces can take: above 1 the step should be divided. Zero for a body whose forces are exact.
+    fn strain(&self, v: &[DVec3], h_s: f64) -> f64 {
+        let _ = (v, h_s);
+        0.0
+    }
+
+    /// Moves it by A⁻¹ of these, N·s² and N·m·s²: impulses times the seconds for which they should have moved it longer; its velocities
+    /// stay. A body whose flight is not its centre's alone stays where it is.
+    fn carry(&mut self, impulses_n_s2: &[DVec3]) {
+        let _ = impulses_n_s2;
+    }
+
+    /// Whether it has been still long enough to sleep, as far as it can tell by itself; never of a body that does not sleep.
+    fn can_sleep(&self) -> bool {
+        false
+    }
+
+    /// Stops it: it sleeps until something wakes it.
+    fn sleep(&mut self) {}
+
+    /// The cost of the step begun, in the unit of [`metachron_core::StepReport::work`].
+    fn work(&self) -> f64 {
+        1.0
+    }
+
+    /// What there is to say of its motion; `None` where [`Self::skin_point`] says all.
+    fn motion(&self) -> Option<&dyn MemberMotion> {
+        None
+    }
+
+    /// Its material points; `None` where nothing is attached to it.
+    fn attachments(&self) -> Option<&dyn Attachments> {
+        None
+    }
+
+    /// Lets an attachment of its own slip or tear.
+    fn give_way(&mut self, failure: OwnFailure) {
+        let _ = failure;
+    }
+
+    /// The partner of an asynchronous pair that it stands for, which is stepped elsewhere; `None` of all others.
+    fn remote(&self) -> Option<Remote<'_>> {
+        None
+    }
+}
+
+/// The motion of a body: as a whole, and of its skin.
+pub trait MemberMotion: ClusterMember {
+    /// Where it is once it has moved for `t_s` seconds with the velocities `v`, of which there need be none where `t_s` is zero; `None` for a
+    /// body that does not move as a whole.
+    fn pose(&self, v: &[DVec3], t_s: f64) -> Option<Pose> {
+        let _ = (v, t_s);
+        None
+    }
+
+    /// The axes of the world along and about which nothing moves it: its matrix is as good as unbounded there.
+    fn locked(&self) -> Option<Locked> {
+        None
+    }
 
     /// Its skin once it has gone on from where it is for `t_s` seconds with the velocities `v`; `nodes` is storage for it. `None` for a body
     /// that does not say: its contacts are found near it at the start of a step, however far it goes.
@@ -95,9 +145,6 @@ pub trait ClusterMember: Send {
         None
     }
 
-    /// How the point `place` of its skin moves with its blocks, for one side of a contact. The side's member is left to the caller.
-    fn side(&self, place: &Place, contact: ContactSide) -> Side;
-
     /// The cell that carries the point `place` of its skin, by its number: all points of one move with the same few blocks. `None` where each
     /// moves by itself.
     fn cell_of(&self, place: &Place) -> Option<u32> {
@@ -105,26 +152,24 @@ pub trait ClusterMember: Send {
         None
     }
 
-    /// By how much its skin at `place` is inside the shape that [`Self::skin`] gives, metres: for a section that is not round the shape
-    /// is the round one about it.
-    fn recess_m(&self, place: &Place, contact: ContactSide) -> f64 {
-        let _ = (place, contact);
-        0.0
+    /// The speed of its fastest point where its blocks have the velocities `v`, m/s.
+    fn speed_bound(&self, v: &[DVec3]) -> f64 {
+        fastest(v)
     }
 
-    /// The velocity of the point `place` of its skin in the step begun beyond that of its blocks, m/s: of a body that is led, all of it.
-    fn led_m_s(&self, place: &Place) -> DVec3 {
-        let _ = place;
-        DVec3::ZERO
+    /// Whether it passes through `other` where the two meet, as jaws do through a body that they hold.
+    fn passes_through(&self, other: AgentId) -> bool {
+        let _ = other;
+        false
     }
+}
 
+/// The material points of a body, by which others hold it, and the attachments that are its own.
+pub trait Attachments {
     /// The material point `anchor`; `None` for one that the body does not have.
-    fn anchor(&self, anchor: Anchor) -> Option<MaterialPoint> {
-        let _ = anchor;
-        None
-    }
+    fn anchor(&self, anchor: Anchor) -> Option<MaterialPoint>;
 
-    /// How the matter at the material point `anchor` turns with the body's blocks; `None` where no block is a spin there.
+    /// How the body turns at the material point `anchor` with its blocks; `None` where no block is a spin there.
     fn turn(&self, anchor: Anchor) -> Option<Side> {
         let _ = anchor;
         None
@@ -135,76 +180,14 @@ pub trait ClusterMember: Send {
         block as u32
     }
 
-    /// How long an impulse on it takes to show, seconds: a step of its own for a body that is stepped elsewhere, 0 for all others.
-    fn answers_after_s(&self) -> f64 {
-        0.0
-    }
-
-    /// Whether it stands for a partner of an asynchronous pair that is stepped elsewhere.
-    fn is_remote(&self) -> bool {
-        false
-    }
-
-    /// Where it is once it has moved for `t_s` seconds with the velocities `v`, of which there need be none where `t_s` is zero; `None` for a
-    /// body that does not move as a whole.
-    fn pose(&self, v: &[DVec3], t_s: f64) -> Option<Pose> {
-        let _ = (v, t_s);
-        None
-    }
-
-    /// The spring by which it follows its goal; `None` for a body that nothing drives.
+    /// The spring by which it follows its goal, and by which users lead it; `None` for a body that nothing drives.
     fn drive(&self) -> Option<Drive> {
         None
     }
 
-    /// Whether the springs of users lead it by its [`Self::drive`] instead of pulling at it.
-    fn is_led(&self) -> bool {
-        self.role() == Role::Kinematic
-    }
-
-    /// Whether it passes through `other` where the two meet, as jaws do through a body that they hold.
-    fn spares(&self, other: AgentId) -> bool {
-        let _ = other;
-        false
-    }
-
-    /// The speed of its fastest point where its blocks have the velocities `v`, m/s.
-    fn speed_bound(&self, v: &[DVec3]) -> f64 {
-        v.iter().map(|v| v.length_squared()).fold(0.0, f64::max).sqrt()
-    }
-
-    /// By how much the velocities `v` would turn or stretch it in a step of `h_s` seconds, as a share of the most that
-    /// its linear forces can take: above 1 the step should be divided. Zero for a body whose forces are exact.
-    fn strain(&self, v: &[DVec3], h_s: f64) -> f64 {
-        let _ = (v, h_s);
-        0.0
-    }
-
-    /// Moves it by A⁻¹ of these, N·s² and N·m·s²: impulses times the seconds for which they should have moved it longer; its velocities
-    /// stay. A body whose flight is not its centre's alone stays where it is.
-    fn carry(&mut self, impulses_n_s2: &[DVec3]) {
-        let _ = impulses_n_s2;
-    }
-
-    /// Keeps the present state, at the end of a step.
-    fn keep(&mut self);
-
-    /// Goes back to the state kept last.
-    fn go_back(&mut self);
-
-    /// Places the skin where it is `t_s` seconds into the step begun, having moved with the velocities `v` from its start.
-    fn move_to(&mut self, v: &[DVec3], t_s: f64);
-
-    /// Ends the step begun, of `h_s` seconds, with these velocities. `touched` is false where nothing acted on the body but impacts at the
-    /// start, which make the difference of `v` from its free velocities: its motion after them is then its own.
-    ///
-    /// # Errors
-    /// [`StepError::Diverged`] where the state would not be finite; it is then as it was before.
-    fn end(&mut self, v: &[DVec3], h_s: f64, touched: bool) -> Result<(), StepError>;
-
     /// Its own attachments to the world that may tear, with their forces over the step that ended last. Springs to other members, and
     /// springs that yield, are rows of the problem.
-    fn attachments(&self) -> &[OwnAttachment] {
+    fn own(&self) -> &[OwnAttachment] {
         &[]
     }
 
@@ -213,29 +196,53 @@ pub trait ClusterMember: Send {
         let _ = place;
         None
     }
+}
 
-    /// Lets that spring slip.
-    fn slip(&mut self, place: usize, by: Slid) {
-        let _ = (place, by);
-    }
+/// The linear system of a step begun; all velocities of blocks in one order.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct StepSystem<'a> {
+    /// The lower half of A = M + h C + h² K: symmetric and positive definite, kg or kg·m². Blocks that never move stand for themselves,
+    /// and no side refers to them.
+    pub blocks: &'a [Block],
+    /// The factor of that matrix, where `begin` has made one. Of up to 200 blocks without one the problem makes it; beyond, conjugate
+    /// gradients solve the whole cluster.
+    pub response: Option<&'a dyn Response>,
+    /// The velocity of each block at the end of the step, if nothing touched the body. Where there are momenta unanswered, this is an
+    /// estimate: it predicts places, and the solution tells into how many parts the step is divided.
+    pub free: &'a [DVec3],
+    /// A (v − v̂): the momentum that free velocities v̂ do not answer, where the body leaves it to the cluster to find v, N·s on each block.
+    /// Empty for none.
+    pub unanswered: &'a [DVec3],
+    /// The velocity of each block now.
+    pub velocities: &'a [DVec3],
+}
 
-    /// Lets go of its own attachment `number`, for good; nothing where it has done so before.
-    fn let_go(&mut self, number: u32) {
-        let _ = number;
-    }
+/// The end of a step begun, as the cluster found it.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct StepEnd<'a> {
+    /// The velocity of each block.
+    pub v: &'a [DVec3],
+    /// The step, seconds, > 0.
+    pub h_s: f64,
+    /// False where nothing acted on the body but impacts at the start, which make the difference of `v` from its free velocities: its
+    /// motion after them is then its own.
+    pub touched: bool,
+    /// The momentum that `v` leaves unanswered, N·s on each block (eq. 17); empty for none.
+    pub unanswered: &'a [DVec3],
+}
 
-    /// Whether it has been still long enough to rest, as far as it can tell by itself; never of a body that does not rest.
-    fn is_calm(&self) -> bool {
-        false
-    }
+/// The partner of an asynchronous pair.
+#[derive(Debug, Clone, Copy)]
+pub struct Remote<'a> {
+    /// How long an impulse on it takes to show, seconds: a step of its own; 0 of one that answers none.
+    pub answers_after_s: f64,
+    /// The participants that compute their pairs with it.
+    pub partners: &'a [AgentId],
+}
 
-    /// Stops it: it rests until something wakes it.
-    fn rest(&mut self) {}
-
-    /// The cost of the step begun, in the unit of [`metachron_core::StepReport::work`].
-    fn work(&self) -> f64 {
-        1.0
-    }
+/// The greatest of some velocities, m/s.
+fn fastest(v: &[DVec3]) -> f64 {
+    v.iter().map(|v| v.length_squared()).fold(0.0, f64::max).sqrt()
 }
 
 /// How a member takes part in its cluster.
@@ -260,6 +267,24 @@ pub struct Locked {
     pub mass_kg: f64,
     /// Its inertia without locks, world axes, kg·m².
     pub inertia: DMat3,
+}
+
+/// A point of a body's skin, as one side of a contact sees it.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct SkinPoint {
+    /// How it moves with the body's blocks. Its member is left to the caller.
+    pub side: Side,
+    /// Its velocity beyond that in the step begun, m/s: of a body that is led, all of it.
+    pub led_m_s: DVec3,
+    /// By how much the skin is there inside the shape that [`ClusterMember::skin`] gives, metres: for a section that is not round the shape
+    /// is the round one about it.
+    pub recess_m: f64,
+}
+
+impl From<Side> for SkinPoint {
+    fn from(side: Side) -> Self {
+        Self { side, led_m_s: DVec3::ZERO, recess_m: 0.0 }
+    }
 }
 
 /// A point of a body's matter.
@@ -318,6 +343,15 @@ pub struct OwnSpring {
     pub yields_above_n: f64,
     /// The force of the whole attachment above which it tears, N; infinite where it never does.
     pub tears_above_n: f64,
+}
+
+/// The failure of an attachment that is a body's own.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum OwnFailure {
+    /// The spring of this place ([`Attachments::own_spring`]) has slipped.
+    Slips(usize, Slid),
+    /// The attachment of this number is let go of, for good; it may be so already.
+    Tears(u32),
 }
 
 /// How far an attachment has slipped.

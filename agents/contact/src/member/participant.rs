@@ -6,7 +6,7 @@
 use crate::StepContext;
 use crate::agent::Law;
 use crate::lists::{refill, reset};
-use crate::member::{ClusterMember, ContactMemory, GuardedMember};
+use crate::member::{ContactMemory, GuardedMember};
 use crate::solve::Side;
 use glam::DVec3;
 use metachron_core::{AgentId, Grip, StepError};
@@ -44,7 +44,7 @@ impl Participant<'_> {
     /// How many blocks of three velocities it has.
     #[must_use]
     pub fn size(&self) -> usize {
-        self.member.velocities().len()
+        self.member.system().velocities.len()
     }
 
     /// Whether it touches `other` where the two meet. An asynchronous pair whose sides have come into one cluster has one clock in it.
@@ -56,7 +56,7 @@ impl Participant<'_> {
             [false, false] => law.is_some_and(|law| !law.is_asynchronous()),
             _ => law != Some(Law::Ledger),
         };
-        !(off || self.member.spares(other.id) || other.member.spares(self.id)) && self.meets(other)
+        !(off || self.member.passes_through(other.id) || other.member.passes_through(self.id)) && self.meets(other)
     }
 
     /// Whether neither lets the other pass by its collision groups.
@@ -117,20 +117,20 @@ pub(crate) struct Progress {
 
 impl Progress {
     /// Lets a member begin a step, and counts its work.
-    pub fn begin(&mut self, member: &mut dyn ClusterMember, own_s: f64) {
+    pub fn begin(&mut self, member: &mut GuardedMember<'_>, own_s: f64) {
         self.failure = member.begin(own_s).err();
         self.work += member.work();
     }
 
     /// Begins the step that a member has begun.
-    pub fn start(&mut self, member: &dyn ClusterMember) {
-        let (now, free) = (member.velocities(), member.free());
+    pub fn start(&mut self, member: &GuardedMember<'_>) {
+        let (now, free) = (member.system().velocities, member.system().free);
         now.clone_into(&mut self.v_start);
         refill(&mut self.dv_free, free.iter().zip(now).map(|(free, now)| *free - *now));
         reset(&mut self.dv_impulses, now.len(), DVec3::ZERO);
         self.v_before.clone_from(&self.v_start);
         self.owed_n_s.clear();
-        reset(&mut self.unanswered, member.unanswered().len(), DVec3::ZERO);
+        reset(&mut self.unanswered, member.system().unanswered.len(), DVec3::ZERO);
         (self.touched, self.held) = (false, false);
     }
 
@@ -161,12 +161,12 @@ impl Progress {
     }
 
     /// Finds v̄(p), û and the momentum that they leave unanswered, of the fine step that begins (eq. 24).
-    pub fn look(&mut self, member: &dyn ClusterMember) {
+    pub fn look(&mut self, member: &GuardedMember<'_>) {
         self.dv_impacts.clear();
         self.dx_impacts.clear();
         let (p, shares) = (f64::from(self.part), f64::from(self.share));
         let (each, s) = (shares.recip(), p / shares);
-        self.unanswered.iter_mut().zip(member.unanswered()).for_each(|(r, more)| *r += *more * each);
+        self.unanswered.iter_mut().zip(member.system().unanswered).for_each(|(r, more)| *r += *more * each);
         self.unanswered.iter_mut().zip(&self.owed_n_s).for_each(|(r, more)| *r += *more * each);
         let changes = self.dv_free.iter().zip(&self.dv_impulses);
         let so_far = |(v, (free, impulses)): (&DVec3, (&DVec3, &DVec3))| *v + *free * s + *impulses;

@@ -5,7 +5,7 @@
 
 use crate::member::guarded::Lent;
 use crate::member::participant::Progress;
-use crate::member::{ClusterMember, GuardedMember, Participant};
+use crate::member::{GuardedMember, Participant};
 use crate::solve::{Contact, JointRow, Member, Problem, ProblemError, Report, Response, Solver, StepForm};
 use glam::DVec3;
 use metachron_core::{ParallelFor, StepError, recycled};
@@ -49,7 +49,7 @@ impl Posed<'_, '_> {
         let taking = || places.iter().map(|at| (&all[*at], &progress[*at]));
         lenders.extend(taking().map(|(one, _)| one.member.lent()));
         list.extend(taking().zip(&lenders).map(|((one, state), lender)| Member {
-            blocks: one.member.blocks(),
+            blocks: one.member.system().blocks,
             response: lender.as_ref().map(|lender| lender as &dyn Response),
             free: free(state),
             unanswered: open(state),
@@ -100,7 +100,7 @@ pub(crate) fn respond(member: &GuardedMember<'_>, impulses: &mut [DVec3], residu
     // block Gauss–Seidel: exact after one sweep where no blocks are coupled, as of rigid bodies
     impulses.clone_into(residual);
     impulses.fill(DVec3::ZERO);
-    let blocks = member.blocks();
+    let blocks = member.system().blocks;
     for _ in 0..SWEEPS_MAX {
         let mut change = 0.0_f64;
         for at in 0..impulses.len() {

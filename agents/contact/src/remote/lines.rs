@@ -5,7 +5,7 @@
 //! Theory: docs/theory/coupling.md, eq. 10 to 11.
 
 use crate::lists::entry;
-use crate::member::{ClusterMember, Participant};
+use crate::member::{Participant, SkinPoint};
 use crate::remote::ledgers::state_of;
 use crate::remote::published_shape::PublishedShape;
 use crate::remote::transmission_line::{Line, LineLaw, LineStep};
@@ -127,7 +127,7 @@ impl Lines {
             along: Some(normal),
             arriving,
         };
-        let velocity = side.velocity(one.member.velocities()) + led_m_s - far_m_s;
+        let velocity = side.velocity(one.member.system().velocities) + led_m_s - far_m_s;
         let slip = velocity - along(velocity);
         let forms = one.member.skin().map(|skin| skin.form).zip(other.form.as_deref());
         let friction = forms.map_or(0.0, |(mine, theirs)| mine.friction_with(theirs));
@@ -161,14 +161,8 @@ impl Lines {
         let (mine, theirs) = (middle(|touch| touch.on_a), middle(|touch| touch.on_b));
         let place = mine.map_or(deepest.on_a, Place::Point);
         let far_m_s = shape.velocity(&other.snapshot.body, &theirs.map_or(deepest.on_b, Place::Point));
-        Some(Pressed {
-            side: one.member.side(&place, ContactSide::first(normal)),
-            led_m_s: one.member.led_m_s(&place),
-            normal,
-            far_m_s,
-            depth_m: -deepest.gap_m,
-            places: found.len() as u32,
-        })
+        let SkinPoint { side, led_m_s, .. } = one.member.skin_point(&place, ContactSide::first(normal));
+        Some(Pressed { side, led_m_s, normal, far_m_s, depth_m: -deepest.gap_m, places: found.len() as u32 })
     }
 
     /// Sends the answers of the ends at `place`, and writes the states of the pairs.

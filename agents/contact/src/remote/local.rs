@@ -6,13 +6,13 @@
 
 use crate::lists::reset;
 use crate::member::problem::respond;
-use crate::member::{ClusterMember, GuardedMember, Participant, Role};
-use crate::remote::published_shape::{PublishedShape, anchor_of};
+use crate::member::{GuardedMember, Participant, Role};
+use crate::remote::published_shape::PublishedShape;
 use crate::solve::Side;
 use crate::step::ClusterStepper;
 use crate::{Law, Neighbour};
 use glam::DVec3;
-use metachron_core::{Impulse, LocalBlock, LocalModel, Site};
+use metachron_core::{LocalBlock, LocalModel};
 use metachron_geometry::narrow_phase::{NarrowPhaseScratch, touches};
 use metachron_geometry::{CollisionShape, ContactSide, ShapeKind, Touch};
 
@@ -63,7 +63,7 @@ impl ClusterStepper {
         let free = |block: usize| {
             (state.dv_free[block] - state.dv_known.get(block).copied().unwrap_or(DVec3::ZERO)) * (-1.0 / own_s)
         };
-        for block in all[place].member.blocks().iter().filter(|block| block.row < state.dv_free.len()) {
+        for block in all[place].member.system().blocks.iter().filter(|block| block.row < state.dv_free.len()) {
             into[block.row] += block.value * free(block.column);
             if block.row != block.column {
                 into[block.column] += block.value.transpose() * free(block.row);
@@ -110,7 +110,7 @@ fn own_compliance(member: &GuardedMember<'_>, blocks: &[usize], storage: &mut [V
     reset(&mut into.compliance, blocks.len() * blocks.len(), glam::DMat3::ZERO);
     for (column, &pushed) in blocks.iter().enumerate() {
         for axis in 0..3 {
-            reset(x, member.free().len(), DVec3::ZERO);
+            reset(x, member.system().free.len(), DVec3::ZERO);
             x[pushed] = DVec3::AXES[axis];
             respond(member, x, residual);
             for (row, &block) in blocks.iter().enumerate() {
@@ -120,27 +120,11 @@ fn own_compliance(member: &GuardedMember<'_>, blocks: &[usize], storage: &mut [V
     }
 }
 
-/// Visits the sides of a member at a site, with their shares of an impulse there.
-pub(crate) fn visit_sides(
-    member: &dyn ClusterMember,
-    site: Site,
-    impulse: Impulse,
-    mut visit: impl FnMut(Side, DVec3),
-) {
-    let anchor = anchor_of(site);
-    if let Some(point) = member.anchor(anchor).filter(|_| impulse.linear != DVec3::ZERO) {
-        visit(point.side, impulse.linear);
-    }
-    if let Some(side) = member.turn(anchor).filter(|_| impulse.angular != DVec3::ZERO) {
-        visit(side, impulse.angular);
-    }
-}
-
 /// Adds the blocks of `one` that `other` may move within the next steps of `step_s` seconds.
 pub(crate) fn find_blocks(one: &Participant<'_>, other: &Neighbour, step_s: f64, scratch: &mut Scratch) {
     let Scratch { blocks, shape, narrow, touches: found, .. } = scratch;
     if one.member.role() != Role::Deformable {
-        blocks.extend(0..one.member.free().len());
+        blocks.extend(0..one.member.system().free.len());
         return;
     }
     let mut add = |side: Side| blocks.extend(side.terms().iter().map(|term| term.block));
@@ -154,7 +138,7 @@ pub(crate) fn find_blocks(one: &Participant<'_>, other: &Neighbour, step_s: f64,
     }
     let Some(theirs) = shape.placed(form) else { return };
     let their_m_s = other.snapshot.bounds.map_or(0.0, |bounds| bounds.speed_m_s);
-    let speed_m_s = one.member.speed_bound(one.member.velocities()) + their_m_s;
+    let speed_m_s = one.member.speed_bound(one.member.system().velocities) + their_m_s;
     let reach_m = NEAR_M + edge_m(skin.form) + STEPS_AHEAD * step_s * speed_m_s;
     if !skin.bounds().grown(reach_m).meets(theirs.bounds()) {
         return;
@@ -162,7 +146,7 @@ pub(crate) fn find_blocks(one: &Participant<'_>, other: &Neighbour, step_s: f64,
     touches(&skin, &theirs, reach_m, narrow, found);
     found.sort_unstable_by(|a, b| a.gap_m.total_cmp(&b.gap_m).then(a.key.cmp(&b.key)));
     for touch in found.iter().take(PLACES_MAX) {
-        add(one.member.side(&touch.on_a, ContactSide::first(touch.normal)));
+        add(one.member.skin_point(&touch.on_a, ContactSide::first(touch.normal)).side);
     }
 }
 

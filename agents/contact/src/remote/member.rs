@@ -6,7 +6,9 @@
 
 use crate::Neighbour;
 use crate::lists::{refill, reset};
-use crate::member::{ClusterMember, MaterialPoint, Role};
+use crate::member::{
+    Attachments, ClusterMember, MaterialPoint, MemberMotion, Remote, Role, SkinPoint, StepEnd, StepSystem,
+};
 use crate::remote::local::invert;
 use crate::remote::published_shape::{Motion, PublishedShape};
 use crate::solve::{Block, Side, SideTerm};
@@ -16,7 +18,7 @@ use metachron_geometry::{CollisionShape, ContactSide, Place, PlacedShape, ShapeK
 use std::sync::Arc;
 
 /// No partner is predicted by more than this many of its steps.
-const FORETOLD_STEPS: f64 = 2.0;
+const PREDICTED_STEPS_MAX: f64 = 2.0;
 
 /// A partner that is stepped elsewhere.
 #[derive(Debug, Default)]
@@ -125,10 +127,11 @@ impl RemoteMember {
     }
 
     /// Brings it to `time` (eq. 5, 6).
-    pub fn foretell(&mut self, neighbour: &Neighbour, time: SimTime) {
+    pub fn predict(&mut self, neighbour: &Neighbour, time: SimTime) {
         let size = self.model.blocks.len();
         let step_s = self.model.step_s;
-        let since_s = time.secs_after(neighbour.snapshot.time).clamp(-FORETOLD_STEPS * step_s, FORETOLD_STEPS * step_s);
+        let since_s =
+            time.secs_after(neighbour.snapshot.time).clamp(-PREDICTED_STEPS_MAX * step_s, PREDICTED_STEPS_MAX * step_s);
         self.now.clear();
         let Self { model, shape, led, now, deviation, carried, .. } = self;
         shape.go_on(*led, since_s);
@@ -222,39 +225,94 @@ impl ClusterMember for RemoteMember {
         Ok(())
     }
 
-    fn blocks(&self) -> &[Block] {
-        &self.blocks
-    }
-
-    fn free(&self) -> &[DVec3] {
-        &self.free
-    }
-
-    fn velocities(&self) -> &[DVec3] {
-        &self.now
+    fn system(&self) -> StepSystem<'_> {
+        let Self { blocks, free, now: velocities, .. } = self;
+        StepSystem { blocks, free, velocities, ..StepSystem::default() }
     }
 
     fn skin(&self) -> Option<PlacedShape<'_>> {
         self.shape.placed(self.form.as_deref()?)
     }
 
-    fn side(&self, place: &Place, contact: ContactSide) -> Side {
-        match *place {
-            Place::Point(point) => self.whole(point - self.shape.centre),
+    fn skin_point(&self, place: &Place, contact: ContactSide) -> SkinPoint {
+        let (side, led_m_s) = match *place {
+            Place::Point(point) => (self.whole(point - self.shape.centre), self.led_at(point)),
             Place::Surface { vertices: [a, b, c], shares } => {
-                self.shared(&[(a, shares[0]), (b, shares[1]), (c, shares[2])], None)
+                (self.shared(&[(a, shares[0]), (b, shares[1]), (c, shares[2])], None), DVec3::ZERO)
             }
             Place::Chain { segment, share, radius_m } => {
                 let spin = (2 * segment + 1, contact.outward * radius_m);
-                self.shared(&[(2 * segment, 1.0 - share), (2 * segment + 2, share)], Some(spin))
+                (self.shared(&[(2 * segment, 1.0 - share), (2 * segment + 2, share)], Some(spin)), DVec3::ZERO)
             }
+        };
+        SkinPoint { led_m_s, ..side.into() }
+    }
+
+    fn keep(&mut self) {
+        let Self { shape, now, kept, .. } = self;
+        kept.0.clone_from(shape);
+        kept.1.clone_from(now);
+    }
+
+    fn go_back(&mut self) {
+        let Self { shape, now, kept, .. } = self;
+        shape.clone_from(&kept.0);
+        now.clone_from(&kept.1);
+    }
+
+    fn end(&mut self, &StepEnd { v, h_s, .. }: &StepEnd<'_>) -> Result<(), StepError> {
+        let Self { shape, model, led, now, .. } = self;
+        shape.go_on(*led, h_s);
+        for (block, v) in model.blocks.iter_mut().zip(v) {
+            let at = LocalBlock { velocity: *v, ..*block };
+            shape.shift(&at, DVec3::ZERO, h_s);
+        }
+        now.copy_from_slice(v);
+        Ok(())
+    }
+
+    fn can_sleep(&self) -> bool {
+        true
+    }
+
+    fn work(&self) -> f64 {
+        0.0
+    }
+
+    fn motion(&self) -> Option<&dyn MemberMotion> {
+        Some(self)
+    }
+
+    fn attachments(&self) -> Option<&dyn Attachments> {
+        Some(self)
+    }
+
+    fn remote(&self) -> Option<Remote<'_>> {
+        // a led body answers nothing
+        let answers_after_s = if self.led.is_some() { 0.0 } else { self.model.step_s };
+        Some(Remote { answers_after_s, partners: &self.partners })
+    }
+}
+
+impl MemberMotion for RemoteMember {
+    fn speed_bound(&self, v: &[DVec3]) -> f64 {
+        let radius_m = match self.form.as_deref().map(|form| &form.kind) {
+            Some(ShapeKind::Solid(solid)) => solid.radius_m,
+            _ => 0.0,
+        };
+        let led = self.led.map_or(0.0, |led| led.velocity_m_s.length() + led.spin_rad_s.length() * radius_m);
+        let is_spin = |block: &LocalBlock| self.shape.point(block.slot).is_none() && block.slot % 2 == 1;
+        let of = |(block, v): (&LocalBlock, &DVec3)| v.length() * if is_spin(block) { radius_m } else { 1.0 };
+        let blocks = self.model.blocks.iter().zip(v).map(of);
+        if self.shape.points.is_empty() {
+            led + blocks.sum::<f64>()
+        } else {
+            blocks.chain(self.shape.fastest()).fold(0.0, f64::max)
         }
     }
+}
 
-    fn led_m_s(&self, place: &Place) -> DVec3 {
-        if let Place::Point(point) = *place { self.led_at(point) } else { DVec3::ZERO }
-    }
-
+impl Attachments for RemoteMember {
     fn anchor(&self, anchor: Anchor) -> Option<MaterialPoint> {
         let shape = &self.shape;
         match anchor {
@@ -277,77 +335,8 @@ impl ClusterMember for RemoteMember {
         }
     }
 
-    // its own cluster solves its contacts with static solids
-    fn is_led(&self) -> bool {
-        true
-    }
-
-    fn is_remote(&self) -> bool {
-        true
-    }
-
-    // a led body answers nothing
-    fn answers_after_s(&self) -> f64 {
-        if self.led.is_some() { 0.0 } else { self.model.step_s }
-    }
-
     fn slot_of(&self, block: usize) -> u32 {
         self.model.blocks[block].slot
-    }
-
-    fn spares(&self, other: AgentId) -> bool {
-        !self.partners.contains(&other)
-    }
-
-    fn speed_bound(&self, v: &[DVec3]) -> f64 {
-        let radius_m = match self.form.as_deref().map(|form| &form.kind) {
-            Some(ShapeKind::Solid(solid)) => solid.radius_m,
-            _ => 0.0,
-        };
-        let led = self.led.map_or(0.0, |led| led.velocity_m_s.length() + led.spin_rad_s.length() * radius_m);
-        let is_spin = |block: &LocalBlock| self.shape.point(block.slot).is_none() && block.slot % 2 == 1;
-        let of = |(block, v): (&LocalBlock, &DVec3)| v.length() * if is_spin(block) { radius_m } else { 1.0 };
-        let blocks = self.model.blocks.iter().zip(v).map(of);
-        if self.shape.points.is_empty() {
-            led + blocks.sum::<f64>()
-        } else {
-            blocks.chain(self.shape.fastest()).fold(0.0, f64::max)
-        }
-    }
-
-    fn keep(&mut self) {
-        let Self { shape, now, kept, .. } = self;
-        kept.0.clone_from(shape);
-        kept.1.clone_from(now);
-    }
-
-    fn go_back(&mut self) {
-        let Self { shape, now, kept, .. } = self;
-        shape.clone_from(&kept.0);
-        now.clone_from(&kept.1);
-    }
-
-    fn move_to(&mut self, _v: &[DVec3], _t_s: f64) {
-        // its steps are the shortest of its cluster: it is never within one
-    }
-
-    fn end(&mut self, v: &[DVec3], h_s: f64, _touched: bool) -> Result<(), StepError> {
-        let Self { shape, model, led, now, .. } = self;
-        shape.go_on(*led, h_s);
-        for (block, v) in model.blocks.iter_mut().zip(v) {
-            let at = LocalBlock { velocity: *v, ..*block };
-            shape.shift(&at, DVec3::ZERO, h_s);
-        }
-        now.copy_from_slice(v);
-        Ok(())
-    }
-
-    fn is_calm(&self) -> bool {
-        true
-    }
-
-    fn work(&self) -> f64 {
-        0.0
     }
 }
 

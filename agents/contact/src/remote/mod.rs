@@ -22,6 +22,7 @@ use crate::member::memory::Partner;
 use crate::member::{ClusterMember, ContactMemory, Participant};
 use crate::remote::ledgers::state_of;
 use crate::remote::local::Scratch;
+use crate::remote::published_shape::anchor_of;
 use crate::solve::Side;
 use crate::step::{ClusterStepper, KnownImpulse};
 use crate::{Law, Neighbour, StepContext};
@@ -155,11 +156,11 @@ impl Remotes {
             }
         }
         for Remote { seen, member, memory, grips, .. } in self.all.iter_mut().filter(|remote| remote.met) {
-            member.foretell(seen, time);
+            member.predict(seen, time);
             let (id, context) = (seen.id, StepContext::alone(seen.id, time));
             locals.push(Participant {
                 id,
-                member: member.into(),
+                member: (member as &mut dyn ClusterMember).into(),
                 context,
                 laws: &[],
                 memory,
@@ -228,11 +229,11 @@ impl Pairs {
                     list.get_mut(term.block).into_iter().for_each(|sum| *sum += term.map.transpose() * impulse);
                 }
             };
-            local::visit_sides(&one.member, taken.site, taken.impulse, |side, impulse| {
+            one.member.visit_sides(anchor_of(taken.site), taken.impulse, |side, impulse| {
                 known.push(KnownImpulse { member: place, side, impulse });
                 add(sums, &side, impulse);
             });
-            local::visit_sides(&one.member, taken.site, taken.carried, |side, way| add(carried, &side, way));
+            one.member.visit_sides(anchor_of(taken.site), taken.carried, |side, way| add(carried, &side, way));
         });
         for ((way, sum), weight) in carried.iter_mut().zip(&*sums).zip(&*weight) {
             let force = *sum / dt_s;
@@ -240,7 +241,7 @@ impl Pairs {
             *way *= 1.0 - lasts.clamp(0.0, 1.0);
         }
         if carried.iter().any(|way| *way != DVec3::ZERO) {
-            one.member.carry(carried);
+            one.member.change(|m| m.carry(carried));
         }
     }
 
@@ -302,7 +303,7 @@ impl Pairs {
         for partner in &mut model.partners {
             reset(&mut partner.forces, blocks.len(), DVec3::ZERO);
             let add = |site: Site, force: Impulse, list: &mut [DVec3]| {
-                local::visit_sides(&one.member, site, force, |side, force| {
+                one.member.visit_sides(anchor_of(site), force, |side, force| {
                     for term in side.terms() {
                         if let Ok(at) = blocks.binary_search(&term.block) {
                             list[at] += term.map.transpose() * force;

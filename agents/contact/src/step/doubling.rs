@@ -4,7 +4,7 @@
 //! them. Never here: which steps are repeated, the use of the error. Theory: docs/theory/control.md, eq. 31; docs/theory/clusters.md, section 9.
 
 use crate::detect::ClusterScene;
-use crate::member::{ClusterMember, Participant};
+use crate::member::{GuardedMember, Participant};
 use crate::step::ClusterStepper;
 use glam::DVec3;
 use metachron_core::{AgentId, Archive, ArchiveError, ParallelFor, SimSpan, StepError, archive_values};
@@ -108,7 +108,7 @@ impl StepDoubling {
 }
 
 /// The points by which the places of a member are compared: nodes, vertices, three points as far from its middle as the farthest of its shape.
-fn probe(member: &dyn ClusterMember, into: &mut Vec<DVec3>) {
+fn probe(member: &GuardedMember<'_>, into: &mut Vec<DVec3>) {
     into.clear();
     let Some(skin) = member.skin() else {
         return into.extend(member.pose(&[], 0.0).map(|pose| pose.centre_m));

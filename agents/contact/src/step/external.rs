@@ -5,12 +5,13 @@
 
 use crate::constraint::{ConstraintRows, FineStep, RowOwner};
 use crate::lists::reset;
+use crate::member::Participant;
 use crate::member::memory::Partner;
 use crate::member::participant::Progress;
 use crate::member::problem::respond;
-use crate::member::{ClusterMember, Participant};
 use crate::solve::{Hold, JointRow, Side};
 use glam::DVec3;
+use metachron_core::Impulse;
 
 /// An impulse that a partner gave before the macro step: it acts evenly over it.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -99,7 +100,7 @@ impl ExternalImpulses {
         if forces.is_empty() && !known.iter().any(|known| known.member == place) {
             return state.push(&[]);
         }
-        scratch.resize(member.free().len(), DVec3::ZERO);
+        scratch.resize(member.system().free.len(), DVec3::ZERO);
         let mut give = |side: &Side, impulse: DVec3| {
             for term in side.terms() {
                 scratch[term.block] += term.map.transpose() * impulse;
@@ -109,14 +110,10 @@ impl ExternalImpulses {
             give(&known.side, known.impulse * (own_s / macro_s));
         }
         for force in forces {
-            if let Some(point) = member.anchor(force.anchor) {
-                give(&point.side, force.force_n * own_s);
-            }
-            if let Some(turn) = member.turn(force.anchor).filter(|_| force.torque_n_m != DVec3::ZERO) {
-                give(&turn, force.torque_n_m * own_s);
-            }
+            let impulse = Impulse { linear: force.force_n * own_s, angular: force.torque_n_m * own_s };
+            member.visit_sides(force.anchor, impulse, |side, impulse| give(&side, impulse));
         }
-        if member.unanswered().is_empty() {
+        if member.system().unanswered.is_empty() {
             respond(member, scratch, residual);
             state.push(scratch);
         } else {

@@ -5,7 +5,7 @@
 use super::ClusterStepper;
 use crate::agent::{Agent, Stepping};
 use crate::detect::ClusterScene;
-use crate::member::{ClusterMember, ContactMemory, Participant};
+use crate::member::{ContactMemory, Participant};
 use crate::{Law, StepContext};
 use metachron_core::{AgentId, Archive, ArchiveError, Grip, PlainLoop, SimSpan, StepError, StepReport};
 
@@ -50,9 +50,9 @@ impl LoneStepper {
         }];
         let report = stepper.step(scene, &mut all, dt, &PlainLoop)?;
         let [Participant { member, .. }] = &mut all;
-        let at_rest = stepper.lets_rest() && member.is_calm();
+        let at_rest = stepper.lets_rest() && member.can_sleep();
         if at_rest {
-            member.rest();
+            member.change(|m| m.sleep());
         }
         Ok(StepReport { work: report.work, substeps: report.fine_steps, at_rest })
     }

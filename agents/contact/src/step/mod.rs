@@ -33,7 +33,7 @@ use crate::impact::Impacts;
 use crate::member::memory::Partner;
 use crate::member::participant::Progress;
 use crate::member::problem::ProblemMembers;
-use crate::member::{ClusterMember, ContactMemory, Participant, Role};
+use crate::member::{ContactMemory, Participant, Role};
 use crate::solve::Solver;
 use crate::step::report::Sums;
 pub use doubling::StepDoubling;
@@ -57,6 +57,8 @@ struct On<'a> {
 /// Steps clusters one after the other, and keeps structure and storage between them.
 #[derive(Default)]
 pub struct ClusterStepper {
+    /// How many factors each solve has time for; `None` for as many as it takes.
+    factors_max: Option<u32>,
     /// How deep contacts rest in the scene of the macro step that is made, metres.
     depth_m: f64,
     pub(crate) solver: Solver,
@@ -96,7 +98,7 @@ impl ClusterStepper {
     /// laws take. It makes as many as the scene grants in any case ([`SolveBudget`](crate::detect::SolveBudget)); with time for fewer than three,
     /// rigid bodies that nothing else touches are stepped by rapier3d. Momentum is exact and no answer makes energy at any number.
     pub fn set_factors_max(&mut self, most: Option<u32>) {
-        self.pile.factors_max = most;
+        self.factors_max = most;
     }
 
     /// The macro step that was made last, seconds.
@@ -145,7 +147,7 @@ impl ClusterStepper {
         self.macro_s = dt.as_secs_f64();
         self.depth_m = scene.depth_m();
         self.solver.settings.depth_m = self.depth_m;
-        let factors_max = self.pile.factors_max.map(|most| most.max(scene.budget().least_steps()));
+        let factors_max = self.factors_max.map(|most| most.max(scene.budget().least_steps()));
         (self.solver.settings.factors_max, self.impacts.factors_max) = (factors_max, factors_max);
         self.joints.missed_m = f64::INFINITY;
         all.iter_mut().for_each(Participant::let_go);

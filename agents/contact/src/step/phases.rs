@@ -5,8 +5,8 @@
 
 use crate::constraint::FineStep;
 use crate::detect::{ClusterScene, Judge, Round};
-use crate::member::ClusterMember;
-use crate::member::participant::Participant;
+use crate::member::StepEnd;
+use crate::member::participant::{Participant, Progress};
 use crate::solve::multiply;
 use crate::step::ClusterStepper;
 use crate::step::report::ClusterReport;
@@ -45,15 +45,15 @@ impl ClusterStepper {
 
     /// Finds where members may touch, but for members of a rigid pile: their contacts are not the problem's.
     pub(super) fn detect(&mut self, scene: &ClusterScene, all: &[Participant<'_>], h_s: f64) {
-        let Self { search, pile, progress, .. } = self;
+        let Self { search, pile, progress, factors_max, .. } = self;
         let round = Round { scene, all, progress, h_s, judge: Judge::Predicted };
-        if pile.go_on(scene, all) {
+        if pile.go_on(scene, all, *factors_max) {
             search.find(&round, pile.domains());
             pile.end_if_touched(search);
         }
         if !pile.is_on() {
             search.find(&round, &[]);
-            pile.begin(scene, all, search);
+            pile.begin(scene, all, search, *factors_max);
             if pile.is_on() {
                 search.find(&round, pile.domains());
             }
@@ -96,14 +96,15 @@ impl ClusterStepper {
         for_each(threads, all, &mut self.progress, &Participant::size, &|one, state| {
             let since_s = h_s * f64::from(state.part);
             if state.part < state.share {
-                one.member.move_to(&state.v_before, since_s);
+                one.member.change(|m| m.move_to(&state.v_before, since_s));
             } else {
-                one.member.leave(&state.unanswered);
-                state.failure = one.member.end(&state.v_before, since_s, state.touched).err();
+                let Progress { v_before: v, touched, unanswered, .. } = &*state;
+                let end = StepEnd { v, h_s: since_s, touched: *touched, unanswered };
+                state.failure = one.member.end(&end).err();
                 if state.failure.is_none() && !state.dx_impacts.is_empty() {
                     // by the impulses that move it so far; how it has gone is not needed any more
-                    multiply(one.member.blocks(), &state.dx_impacts, &mut state.v_mean);
-                    one.member.carry(&state.v_mean);
+                    multiply(one.member.system().blocks, &state.dx_impacts, &mut state.v_mean);
+                    one.member.change(|m| m.carry(&state.v_mean));
                 }
                 state.part = 0;
             }

@@ -3,7 +3,7 @@
 //! In: the step that each member wants, its strain by a solve, joints that do not hold. Out: the plan; members and their memories as they were
 //! at the start of the macro step. Never here: steps themselves. Theory: docs/theory/clusters.md, section 9 (eq. 23).
 
-use crate::member::{ClusterMember, ContactMemory, Participant, Role};
+use crate::member::{ContactMemory, Participant, Role};
 use crate::step::ClusterStepper;
 use metachron_core::parallel::for_each;
 use metachron_core::{ParallelFor, StepError};
@@ -71,9 +71,9 @@ impl ClusterStepper {
     ) -> Result<(), StepError> {
         for_each(threads, all, &mut self.progress, &Participant::size, &|one, state| {
             let own_s = dt_s / f64::from(one.parts);
-            one.member.look(&one.context, dt_s);
+            one.member.change(|m| m.look(&one.context, dt_s));
             state.begin(&mut one.member, own_s);
-            let more = times(one.member.strain(one.member.free(), own_s));
+            let more = times(one.member.strain(one.member.system().free, own_s));
             state.parts = one.parts * more;
             state.begun_s = if more == 1 { own_s } else { 0.0 };
         });
@@ -120,7 +120,7 @@ impl ClusterStepper {
     pub(super) fn keep(&mut self, all: &mut [Participant<'_>]) {
         self.kept.resize_with(all.len(), ContactMemory::default);
         for (one, kept) in all.iter_mut().zip(&mut self.kept) {
-            one.member.keep();
+            one.member.change(|m| m.keep());
             kept.clone_from(one.memory);
         }
         self.is_kept = true;
@@ -146,7 +146,7 @@ impl ClusterStepper {
         }
         for (one, kept) in all.iter_mut().zip(&self.kept).filter(|(one, _)| !one.member.is_broken()) {
             // this one may unwind as well: its mark says so
-            drop(catch_unwind(AssertUnwindSafe(|| one.member.go_back())));
+            drop(catch_unwind(AssertUnwindSafe(|| one.member.change(|m| m.go_back()))));
             one.memory.clone_from(kept);
         }
     }
@@ -154,7 +154,7 @@ impl ClusterStepper {
     /// Goes back to the start of the macro step.
     pub(super) fn go_back(&mut self, all: &mut [Participant<'_>]) {
         for ((one, kept), state) in all.iter_mut().zip(&self.kept).zip(&mut self.progress) {
-            one.member.go_back();
+            one.member.change(|m| m.go_back());
             one.memory.clone_from(kept);
             state.begun_s = 0.0;
         }

@@ -9,7 +9,7 @@ use crate::detect::{Owner, Search};
 use crate::lists::refill;
 use crate::member::memory::{Partner, Remembered, Spin};
 use crate::member::participant::{place_of, relative};
-use crate::member::{ClusterMember, Drive, Participant, Role};
+use crate::member::{Drive, Participant, Role};
 use crate::solve::Side;
 use crate::step::ClusterStepper;
 use crate::step::report::{PairTotal, give, total_of};
@@ -164,7 +164,9 @@ impl Participant<'_> {
     /// A stiffness within a step along `normal`, with the drive's spring alone where mass and damping of a driven tip resist too: a hand that
     /// goes on evenly is followed without them.
     fn drive_settled(&self, within_n_m: f64, normal: DVec3, steps: Steps) -> f64 {
-        let Some((drive, tip)) = self.member.drive().zip(self.member.blocks().first()) else { return within_n_m };
+        let Some((drive, tip)) = self.member.drive().zip(self.member.system().blocks.first()) else {
+            return within_n_m;
+        };
         let (Drive { stiffness_n_m, damping_n_s_m, .. }, Steps { problem_s, longer_s }) = (drive, steps);
         let given_kg = normal.dot(tip.value * normal) + problem_s * (damping_n_s_m + problem_s * stiffness_n_m);
         let give_m_per_n = (within_n_m.recip() - problem_s * longer_s / given_kg).max(0.0);

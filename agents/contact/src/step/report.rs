@@ -4,7 +4,7 @@
 
 use crate::constraint::JointTotal;
 use crate::lists::{entry, reset};
-use crate::member::ClusterMember;
+use crate::member::GuardedMember;
 use crate::member::memory::Partner;
 use crate::solve::Report;
 use glam::DVec3;
@@ -74,7 +74,7 @@ impl PairTotal {
 }
 
 /// Adds an impulse at a point to the contact wrench of a body, if that moves as a whole.
-pub(super) fn give(wrench: &mut Wrench, member: &dyn ClusterMember, impulse_n_s: DVec3, point_m: DVec3) {
+pub(super) fn give(wrench: &mut Wrench, member: &GuardedMember<'_>, impulse_n_s: DVec3, point_m: DVec3) {
     if let Some(pose) = member.pose(&[], 0.0) {
         wrench.add(impulse_n_s, point_m - pose.centre_m);
     }

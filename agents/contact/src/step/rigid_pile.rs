@@ -9,7 +9,7 @@ use crate::detect::domain::{Domain, assign};
 use crate::detect::{ClusterScene, Search};
 use crate::member::memory::Partner;
 use crate::member::participant::{Progress, place_of};
-use crate::member::{ClusterMember, Locked, Participant};
+use crate::member::{Locked, Participant};
 use crate::step::report::{ClusterReport, Sums, give, total_of};
 use glam::{DMat3, DQuat, DVec3};
 use metachron_core::{AgentId, Archive, ArchiveError, SolveLevel, StepError, archive_values};
@@ -47,8 +47,6 @@ pub(super) struct RigidPile {
     world: Option<Box<World>>,
     /// Of each member; without meaning where there is no heap.
     domains: Vec<Domain>,
-    /// How many factors each solve of the macro step has time for; `None` for as many as it takes.
-    pub factors_max: Option<u32>,
 }
 
 /// Counts and figures of a step of a rigid pile.
@@ -136,8 +134,8 @@ impl RigidPile {
     }
 
     /// Makes a rigid pile of the members that can be one, if there is no time for their problem, they are most of it and nothing else touches them.
-    pub fn begin(&mut self, scene: &ClusterScene, all: &[Participant<'_>], search: &Search) {
-        if self.factors_max.is_none_or(|most| most >= FACTORS_SAFE) {
+    pub fn begin(&mut self, scene: &ClusterScene, all: &[Participant<'_>], search: &Search, factors_max: Option<u32>) {
+        if factors_max.is_none_or(|most| most >= FACTORS_SAFE) {
             return;
         }
         assign(scene, all, &mut self.domains);
@@ -151,8 +149,8 @@ impl RigidPile {
     }
 
     /// Goes on with the rigid pile where it still is one; whether it goes on.
-    pub fn go_on(&mut self, scene: &ClusterScene, all: &[Participant<'_>]) -> bool {
-        let is_short = self.factors_max.is_some_and(|most| most < FACTORS_AGAIN);
+    pub fn go_on(&mut self, scene: &ClusterScene, all: &[Participant<'_>], factors_max: Option<u32>) -> bool {
+        let is_short = factors_max.is_some_and(|most| most < FACTORS_AGAIN);
         self.world = self.world.take().filter(|_| is_short);
         if self.is_on() {
             assign(scene, all, &mut self.domains);
@@ -243,7 +241,7 @@ impl RigidPile {
             let way_m = world.origin_m + pose.translation.as_dvec3() + goal * shape.com_local - centre_m;
             let turn = (goal * rotation.inverse()).to_scaled_axis();
             let axes = DMat3::from_quat(rotation);
-            one.member.carry(&[way_m * known.mass_kg, axes * known.inertia * axes.transpose() * turn]);
+            one.member.change(|m| m.carry(&[way_m * known.mass_kg, axes * known.inertia * axes.transpose() * turn]));
         }
     }
 }
@@ -433,7 +431,7 @@ fn placed<'a>(one: &'a Participant<'_>) -> Option<Placed<'a>> {
 }
 
 fn insert(physics: &mut PhysicsWorld, one: &Participant<'_>, body: &Placed<'_>, origin_m: DVec3) -> Known {
-    let [mass, inertia] = [0, 1].map(|block| one.member.blocks()[block].value);
+    let [mass, inertia] = [0, 1].map(|block| one.member.system().blocks[block].value);
     let locked = one.member.locked();
     let (mass_kg, inertia) = locked.map_or((mass.x_axis.x, inertia), |locked| (locked.mass_kg, locked.inertia));
     let axes = DMat3::from_quat(body.rotation);

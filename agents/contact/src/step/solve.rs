@@ -10,7 +10,7 @@ use crate::impact::SolvedStep;
 use crate::lists::refill;
 use crate::member::participant::Progress;
 use crate::member::problem::{Posed, Velocities};
-use crate::member::{ClusterMember, Participant, Role};
+use crate::member::{Participant, Role};
 use crate::step::plan::times;
 use crate::step::report::ClusterReport;
 use crate::step::{ClusterStepper, On};

@@ -3,8 +3,7 @@
 use super::{Breach, Load, Promise, Suite, check};
 use crate::rigid::{KinematicBody, Led, RigidSpec};
 use glam::{DQuat, DVec3};
-use metachron_contact::member::{ClusterMember, Role};
-use metachron_contact::solve::Side;
+use metachron_contact::member::{ClusterMember, Role, SkinPoint, StepEnd};
 use metachron_contact::{Agent, AnchorSpring, Input, Inputs, OwnSteps, SetMotion, StepContext, Stepping};
 use metachron_core::{Anchor, Body, CurveState, Resolution, SimSpan, Snapshot, StepError, StepReport, check_span};
 use metachron_geometry::{CollisionShape, ContactSide, Place, PlacedShape, Solid};
@@ -212,8 +211,8 @@ impl ClusterMember for Slab {
         self.body.skin().filter(|_| self.has_skin)
     }
 
-    fn side(&self, place: &Place, contact: ContactSide) -> Side {
-        self.body.side(place, contact)
+    fn skin_point(&self, place: &Place, contact: ContactSide) -> SkinPoint {
+        self.body.skin_point(place, contact)
     }
 
     fn keep(&mut self) {
@@ -224,12 +223,8 @@ impl ClusterMember for Slab {
         self.body.go_back();
     }
 
-    fn move_to(&mut self, v: &[DVec3], t_s: f64) {
-        self.body.move_to(v, t_s);
-    }
-
-    fn end(&mut self, v: &[DVec3], h_s: f64, touched: bool) -> Result<(), StepError> {
-        self.body.end(v, h_s, touched)
+    fn end(&mut self, step: &StepEnd<'_>) -> Result<(), StepError> {
+        self.body.end(step)
     }
 }
 

@@ -26,15 +26,15 @@ pub struct RigidBody {
     /// How its spin changed in the mean of that step, rad/s².
     pub(super) angular_acceleration: DVec3,
     pub(super) at_rest: bool,
-    pub(super) calm_s: f64,
+    pub(super) still_s: f64,
     pub(super) steps: u64,
     /// Its unknowns in a contact cluster.
     pub(super) unknowns: Unknowns,
 }
 
-/// A body in contact that moves slower than this everywhere is calm, m/s: below the visible.
-pub(super) const CALM_M_S: f64 = 2e-3;
-/// A body that was calm for this long of its own time is at rest, seconds.
+/// A body in contact that moves slower than this everywhere is still, m/s: below the visible.
+pub(super) const STILL_M_S: f64 = 2e-3;
+/// A body that was still for this long of its own time is at rest, seconds.
 pub(super) const REST_S: f64 = 0.5;
 
 impl RigidBody {
@@ -69,7 +69,7 @@ impl RigidBody {
             acceleration: flight.gravity,
             angular_acceleration: DVec3::ZERO,
             at_rest: false,
-            calm_s: 0.0,
+            still_s: 0.0,
             steps: 0,
             unknowns: Unknowns::default(),
         };
@@ -126,7 +126,7 @@ impl Agent for RigidBody {
             return false;
         }
         *motion = to;
-        (self.at_rest, self.calm_s) = (false, 0.0);
+        (self.at_rest, self.still_s) = (false, 0.0);
         (self.acceleration, self.angular_acceleration) = (DVec3::ZERO, DVec3::ZERO);
         self.unknowns.start([velocity, spin_rad_s]);
         true
@@ -170,7 +170,7 @@ impl Agent for RigidBody {
 
     fn archive(&mut self, archive: &mut Archive<'_>) -> Result<(), ArchiveError> {
         archive_values!(archive, self.motion, self.acceleration, self.angular_acceleration)?;
-        archive_values!(archive, self.at_rest, self.calm_s, self.steps)?;
+        archive_values!(archive, self.at_rest, self.still_s, self.steps)?;
         self.unknowns.archive(archive)
     }
 

@@ -11,7 +11,9 @@ use super::mass_properties::MassDistribution;
 use super::{RigidError, RigidSpec};
 use crate::trajectory::{Pose as Pace, Script};
 use glam::{DQuat, DVec3};
-use metachron_contact::member::{ClusterMember, MaterialPoint, Pose, Role};
+use metachron_contact::member::{
+    Attachments, ClusterMember, MaterialPoint, MemberMotion, Pose, Role, SkinPoint, StepEnd,
+};
 use metachron_contact::solve::Side;
 use metachron_contact::{Agent, Input, Inputs, PoseGoal, SetMotion, StepContext, Stepping};
 use metachron_core::{
@@ -150,30 +152,9 @@ impl ClusterMember for KinematicBody {
         Some(PlacedShape { form: &self.form, view: ShapePose::Solid { position, rotation } })
     }
 
-    fn side(&self, _place: &Place, _contact: ContactSide) -> Side {
-        Side::FIXED
-    }
-
-    fn led_m_s(&self, place: &Place) -> DVec3 {
-        if let Place::Point(point) = *place { self.led_at(point) } else { DVec3::ZERO }
-    }
-
-    fn anchor(&self, anchor: Anchor) -> Option<MaterialPoint> {
-        let Anchor::Local(local) = anchor else { return None };
-        let point = self.now.at.position + self.now.at.rotation * local;
-        Some(MaterialPoint::led(point, self.led_at(point)))
-    }
-
-    fn pose(&self, _v: &[DVec3], t_s: f64) -> Option<Pose> {
-        let BodyPose { position, rotation } = self.now.at;
-        let (led_rad_s, centre_m) = (self.led_rad_s, position + self.led_m_s * t_s);
-        let rotation = if t_s > 0.0 { DQuat::from_scaled_axis(led_rad_s * t_s) * rotation } else { rotation };
-        let origin_m = centre_m - rotation * self.com_local;
-        Some(Pose { centre_m, origin_m, rotation, turns: Side::FIXED, led_rad_s })
-    }
-
-    fn speed_bound(&self, _v: &[DVec3]) -> f64 {
-        self.led_m_s.length() + self.led_rad_s.length() * self.radius_m
+    fn skin_point(&self, place: &Place, _contact: ContactSide) -> SkinPoint {
+        let led_m_s = if let Place::Point(point) = *place { self.led_at(point) } else { DVec3::ZERO };
+        SkinPoint { led_m_s, ..Side::FIXED.into() }
     }
 
     fn keep(&mut self) {
@@ -184,11 +165,7 @@ impl ClusterMember for KinematicBody {
         self.now = self.kept.unwrap_or(self.now);
     }
 
-    fn move_to(&mut self, _v: &[DVec3], _t_s: f64) {
-        // its steps are the shortest of its cluster: it is never within one
-    }
-
-    fn end(&mut self, _v: &[DVec3], h_s: f64, _touched: bool) -> Result<(), StepError> {
+    fn end(&mut self, &StepEnd { h_s, .. }: &StepEnd<'_>) -> Result<(), StepError> {
         let Now { time, goal, steps, .. } = self.now;
         self.now = Now {
             time: time + SimSpan::from_secs_f64(h_s).unwrap_or(SimSpan::ZERO),
@@ -202,7 +179,7 @@ impl ClusterMember for KinematicBody {
         Ok(())
     }
 
-    fn is_calm(&self) -> bool {
+    fn can_sleep(&self) -> bool {
         let Now { time, velocity, spin, goal, .. } = self.now;
         let stands = velocity == DVec3::ZERO && spin == DVec3::ZERO;
         let awaits = match (&self.script, goal) {
@@ -214,8 +191,38 @@ impl ClusterMember for KinematicBody {
         self.may_sleep && stands && !awaits
     }
 
-    fn rest(&mut self) {
+    fn sleep(&mut self) {
         self.now.at_rest = true;
+    }
+
+    fn motion(&self) -> Option<&dyn MemberMotion> {
+        Some(self)
+    }
+
+    fn attachments(&self) -> Option<&dyn Attachments> {
+        Some(self)
+    }
+}
+
+impl MemberMotion for KinematicBody {
+    fn pose(&self, _v: &[DVec3], t_s: f64) -> Option<Pose> {
+        let BodyPose { position, rotation } = self.now.at;
+        let (led_rad_s, centre_m) = (self.led_rad_s, position + self.led_m_s * t_s);
+        let rotation = if t_s > 0.0 { DQuat::from_scaled_axis(led_rad_s * t_s) * rotation } else { rotation };
+        let origin_m = centre_m - rotation * self.com_local;
+        Some(Pose { centre_m, origin_m, rotation, turns: Side::FIXED, led_rad_s })
+    }
+
+    fn speed_bound(&self, _v: &[DVec3]) -> f64 {
+        self.led_m_s.length() + self.led_rad_s.length() * self.radius_m
+    }
+}
+
+impl Attachments for KinematicBody {
+    fn anchor(&self, anchor: Anchor) -> Option<MaterialPoint> {
+        let Anchor::Local(local) = anchor else { return None };
+        let point = self.now.at.position + self.now.at.rotation * local;
+        Some(MaterialPoint::led(point, self.led_at(point)))
     }
 }
 

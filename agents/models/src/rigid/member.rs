@@ -4,10 +4,12 @@
 
 use super::Restraint;
 use super::RigidBody;
-use super::body::{CALM_M_S, REST_S};
+use super::body::{REST_S, STILL_M_S};
 use super::motion::{Flight, Motion};
 use glam::{DMat3, DQuat, DVec3};
-use metachron_contact::member::{ClusterMember, Locked, MaterialPoint, Pose, Role};
+use metachron_contact::member::{
+    Attachments, ClusterMember, Locked, MaterialPoint, MemberMotion, Pose, Role, SkinPoint, StepEnd, StepSystem,
+};
 use metachron_contact::solve::{Block, Side};
 use metachron_core::{Anchor, Archive, ArchiveError, Inertia, StepError, inverse_of_free};
 use metachron_geometry::{ContactSide, Place, PlacedShape, ShapePose};
@@ -48,7 +50,7 @@ struct Kept {
     motion: Motion,
     acceleration: DVec3,
     angular_acceleration: DVec3,
-    calm_s: f64,
+    still_s: f64,
     at_rest: bool,
     steps: u64,
 }
@@ -149,23 +151,9 @@ impl ClusterMember for RigidBody {
         }
     }
 
-    fn blocks(&self) -> &[Block] {
-        &self.unknowns.blocks
-    }
-
-    fn locked(&self) -> Option<Locked> {
-        let Flight { restraint, .. } = self.flight;
-        let Restraint { locked_translation, locked_rotation, .. } = restraint;
-        let (mass_kg, inertia) = (self.spread.mass_kg, self.inertia());
-        restraint.locks().then_some(Locked { locked_translation, locked_rotation, mass_kg, inertia })
-    }
-
-    fn free(&self) -> &[DVec3] {
-        &self.unknowns.free
-    }
-
-    fn velocities(&self) -> &[DVec3] {
-        &self.unknowns.now
+    fn system(&self) -> StepSystem<'_> {
+        let Unknowns { blocks, free, now: velocities, .. } = &self.unknowns;
+        StepSystem { blocks, free, velocities, ..StepSystem::default() }
     }
 
     fn skin(&self) -> Option<PlacedShape<'_>> {
@@ -173,39 +161,11 @@ impl ClusterMember for RigidBody {
         Some(PlacedShape { form: &self.form, view: ShapePose::Solid { position, rotation } })
     }
 
-    fn skin_after<'a>(&'a self, v: &[DVec3], t_s: f64, _nodes: &'a mut Vec<DVec3>) -> Option<PlacedShape<'a>> {
-        let Motion { position, rotation, .. } = self.motion;
-        let (position, rotation) = (position + v[0] * t_s, DQuat::from_scaled_axis(v[SPIN] * t_s) * rotation);
-        Some(PlacedShape { form: &self.form, view: ShapePose::Solid { position, rotation } })
-    }
-
-    fn side(&self, place: &Place, _contact: ContactSide) -> Side {
+    fn skin_point(&self, place: &Place, _contact: ContactSide) -> SkinPoint {
         match *place {
-            Place::Point(point) => Side::rigid(0, point - self.motion.position),
-            Place::Chain { .. } | Place::Surface { .. } => Side::FIXED,
+            Place::Point(point) => Side::rigid(0, point - self.motion.position).into(),
+            Place::Chain { .. } | Place::Surface { .. } => Side::FIXED.into(),
         }
-    }
-
-    fn anchor(&self, anchor: Anchor) -> Option<MaterialPoint> {
-        let Anchor::Local(local) = anchor else { return None };
-        let arm = self.motion.rotation * local;
-        Some(MaterialPoint::new(self.motion.position + arm, Side::rigid(0, arm)))
-    }
-
-    fn turn(&self, anchor: Anchor) -> Option<Side> {
-        matches!(anchor, Anchor::Local(_)).then(|| Side::node(0, SPIN))
-    }
-
-    fn pose(&self, v: &[DVec3], t_s: f64) -> Option<Pose> {
-        let motion = if t_s > 0.0 { self.moved(v, t_s, v != self.unknowns.free) } else { self.motion };
-        let Motion { position, rotation, .. } = motion;
-        let origin_m = position - rotation * self.spread.com;
-        let turns = Side::node(0, SPIN);
-        Some(Pose { centre_m: position, origin_m, rotation, turns, led_rad_s: DVec3::ZERO })
-    }
-
-    fn speed_bound(&self, v: &[DVec3]) -> f64 {
-        v[0].length() + v[1].length() * self.radius_m
     }
 
     fn carry(&mut self, impulses_n_s2: &[DVec3]) {
@@ -218,22 +178,18 @@ impl ClusterMember for RigidBody {
     }
 
     fn keep(&mut self) {
-        let Self { motion, acceleration, angular_acceleration, calm_s, at_rest, steps, .. } = *self;
-        self.unknowns.kept = Some(Kept { motion, acceleration, angular_acceleration, calm_s, at_rest, steps });
+        let Self { motion, acceleration, angular_acceleration, still_s, at_rest, steps, .. } = *self;
+        self.unknowns.kept = Some(Kept { motion, acceleration, angular_acceleration, still_s, at_rest, steps });
     }
 
     fn go_back(&mut self) {
         let Some(kept) = self.unknowns.kept else { return };
-        let Kept { motion, acceleration, angular_acceleration, calm_s, at_rest, steps } = kept;
+        let Kept { motion, acceleration, angular_acceleration, still_s, at_rest, steps } = kept;
         (self.motion, self.acceleration, self.angular_acceleration) = (motion, acceleration, angular_acceleration);
-        (self.calm_s, self.at_rest, self.steps) = (calm_s, at_rest, steps);
+        (self.still_s, self.at_rest, self.steps) = (still_s, at_rest, steps);
     }
 
-    fn move_to(&mut self, _v: &[DVec3], _t_s: f64) {
-        // its steps are the shortest of its cluster: it is never within one
-    }
-
-    fn end(&mut self, v: &[DVec3], h_s: f64, touched: bool) -> Result<(), StepError> {
+    fn end(&mut self, &StepEnd { v, h_s, touched, .. }: &StepEnd<'_>) -> Result<(), StepError> {
         let before = self.motion;
         self.motion = self.moved(v, h_s, touched);
         if !self.motion.is_sane(&self.spread) {
@@ -246,28 +202,75 @@ impl ClusterMember for RigidBody {
         self.unknowns.now = [self.motion.velocity, spin];
         self.steps += 1;
         self.at_rest = false;
-        self.count_calm(&before, h_s, touched);
+        self.count_still(&before, h_s, touched);
         Ok(())
     }
 
-    fn is_calm(&self) -> bool {
-        self.may_sleep && self.calm_s >= REST_S
+    fn can_sleep(&self) -> bool {
+        self.may_sleep && self.still_s >= REST_S
     }
 
-    fn rest(&mut self) {
+    fn sleep(&mut self) {
         self.at_rest = true;
         (self.motion.velocity, self.motion.angular) = (DVec3::ZERO, DVec3::ZERO);
         (self.acceleration, self.angular_acceleration) = (DVec3::ZERO, DVec3::ZERO);
         self.unknowns.now = [DVec3::ZERO; 2];
     }
+
+    fn motion(&self) -> Option<&dyn MemberMotion> {
+        Some(self)
+    }
+
+    fn attachments(&self) -> Option<&dyn Attachments> {
+        Some(self)
+    }
+}
+
+impl MemberMotion for RigidBody {
+    fn pose(&self, v: &[DVec3], t_s: f64) -> Option<Pose> {
+        let motion = if t_s > 0.0 { self.moved(v, t_s, v != self.unknowns.free) } else { self.motion };
+        let Motion { position, rotation, .. } = motion;
+        let origin_m = position - rotation * self.spread.com;
+        let turns = Side::node(0, SPIN);
+        Some(Pose { centre_m: position, origin_m, rotation, turns, led_rad_s: DVec3::ZERO })
+    }
+
+    fn locked(&self) -> Option<Locked> {
+        let Flight { restraint, .. } = self.flight;
+        let Restraint { locked_translation, locked_rotation, .. } = restraint;
+        let (mass_kg, inertia) = (self.spread.mass_kg, self.inertia());
+        restraint.locks().then_some(Locked { locked_translation, locked_rotation, mass_kg, inertia })
+    }
+
+    fn skin_after<'a>(&'a self, v: &[DVec3], t_s: f64, _nodes: &'a mut Vec<DVec3>) -> Option<PlacedShape<'a>> {
+        let Motion { position, rotation, .. } = self.motion;
+        let (position, rotation) = (position + v[0] * t_s, DQuat::from_scaled_axis(v[SPIN] * t_s) * rotation);
+        Some(PlacedShape { form: &self.form, view: ShapePose::Solid { position, rotation } })
+    }
+
+    fn speed_bound(&self, v: &[DVec3]) -> f64 {
+        v[0].length() + v[1].length() * self.radius_m
+    }
+}
+
+impl Attachments for RigidBody {
+    fn anchor(&self, anchor: Anchor) -> Option<MaterialPoint> {
+        let Anchor::Local(local) = anchor else { return None };
+        let arm = self.motion.rotation * local;
+        Some(MaterialPoint::new(self.motion.position + arm, Side::rigid(0, arm)))
+    }
+
+    fn turn(&self, anchor: Anchor) -> Option<Side> {
+        matches!(anchor, Anchor::Local(_)).then(|| Side::node(0, SPIN))
+    }
 }
 
 impl RigidBody {
-    /// Counts calm time after a step from `before`.
-    fn count_calm(&mut self, before: &Motion, h_s: f64, touched: bool) {
-        let still = self.motion.velocity.length() + self.swing_m_s() < CALM_M_S;
+    /// Counts the time that it is still after a step from `before`.
+    fn count_still(&mut self, before: &Motion, h_s: f64, touched: bool) {
+        let still = self.motion.velocity.length() + self.swing_m_s() < STILL_M_S;
         // one that hovers at the top of its flight is not at rest
         let held = touched || (self.flight.gravity == DVec3::ZERO && *before == self.motion);
-        self.calm_s = if still && held { self.calm_s + h_s } else { 0.0 };
+        self.still_s = if still && held { self.still_s + h_s } else { 0.0 };
     }
 }

@@ -3,7 +3,8 @@
 //! In: steps and velocities. Out: the matrix of linearly implicit Euler, velocities without contact, its skin. Never here: contacts.
 //! Theory: docs/theory/rod.md, eq. 11–20; docs/theory/clusters.md, section 9.
 
-use super::anchor_springs::NodeSpring;
+mod attachments;
+
 use super::banded_ldl::Row;
 use super::energy_limiter;
 use super::history::History;
@@ -14,11 +15,14 @@ use super::step::{Divergence, Setting, Stepper, TURN_MAX_RAD};
 use super::system::SubstepProblem;
 use super::tube::Tube;
 use super::wall::{Sections, Wall};
+use attachments::lasting;
 use glam::{DMat3, DVec2, DVec3};
-use metachron_contact::member::{ClusterMember, MaterialPoint, OwnAttachment, OwnSpring, Role, Slid};
+use metachron_contact::member::{
+    Attachments, ClusterMember, MemberMotion, OwnAttachment, OwnFailure, Role, SkinPoint, Slid, StepEnd, StepSystem,
+};
 use metachron_contact::solve::{Block, Response, SIDE_TERMS_MAX, Side, SideTerm};
 use metachron_contact::{Agent, StepContext};
-use metachron_core::{Anchor, Archive, ArchiveError, SimSpan, SimTime, StepError, archive_values};
+use metachron_core::{Archive, ArchiveError, SimSpan, SimTime, StepError, archive_values};
 use metachron_geometry::narrow_phase::RestShape;
 use metachron_geometry::{ContactSide, Place, PlacedShape, ShapePose};
 
@@ -139,20 +143,11 @@ impl ClusterMember for Tube {
         Ok(())
     }
 
-    fn blocks(&self) -> &[Block] {
-        &self.unknowns.blocks
-    }
-
-    fn response(&self) -> Option<&dyn Response> {
-        if self.wall.is_some() { Some(self) } else { Some(self.stepper.factor()) }
-    }
-
-    fn free(&self) -> &[DVec3] {
-        &self.unknowns.free
-    }
-
-    fn velocities(&self) -> &[DVec3] {
-        if self.wall.is_some() { &self.unknowns.present } else { &self.now.u }
+    fn system(&self) -> StepSystem<'_> {
+        let Unknowns { blocks, free, present, .. } = &self.unknowns;
+        let (response, velocities): (&dyn Response, &[DVec3]) =
+            if self.wall.is_some() { (self, present) } else { (self.stepper.factor(), &self.now.u) };
+        StepSystem { blocks, response: Some(response), free, unanswered: &[], velocities }
     }
 
     fn skin(&self) -> Option<PlacedShape<'_>> {
@@ -161,62 +156,18 @@ impl ClusterMember for Tube {
             .then(|| PlacedShape { form: &self.form, view: ShapePose::Chain { positions: places, radii_m } })
     }
 
-    fn skin_after<'a>(&'a self, v: &[DVec3], t_s: f64, nodes: &'a mut Vec<DVec3>) -> Option<PlacedShape<'a>> {
-        let PlacedShape { form, view: ShapePose::Chain { positions, radii_m } } = self.skin()? else { return None };
-        nodes.clear();
-        nodes.extend(positions.iter().zip(v.iter().step_by(2)).map(|(at, v)| *at + *v * t_s));
-        Some(PlacedShape { form, view: ShapePose::Chain { positions: nodes, radii_m } })
-    }
-
-    fn rest_shape(&self) -> Option<RestShape<'_>> {
-        self.spec.self_contact.then_some(RestShape::Chain(&self.division.arc_m))
-    }
-
-    fn side(&self, place: &Place, contact: ContactSide) -> Side {
+    fn skin_point(&self, place: &Place, contact: ContactSide) -> SkinPoint {
         match *place {
             Place::Chain { segment, share, radius_m } => {
-                let arm_m = contact.outward * (radius_m - self.recess_m(place, contact));
-                let side = self.point_side(segment as usize, share, arm_m);
-                if self.wall.is_some() {
-                    self.skin_side(side, [segment as usize, segment as usize + 1], share, contact.outward)
-                } else {
-                    side
-                }
+                let (node, outward) = (segment as usize, contact.outward);
+                let Some(wall) = &self.wall else { return self.point_side(node, share, outward * radius_m).into() };
+                let at = |node: usize| wall.radius_m(node, self.across(node, outward));
+                let recess_m = radius_m - (at(node) * (1.0 - share) + at(node + 1) * share);
+                let side = self.point_side(node, share, outward * (radius_m - recess_m));
+                SkinPoint { recess_m, ..self.skin_side(side, [node, node + 1], share, outward).into() }
             }
-            Place::Point(_) | Place::Surface { .. } => Side::FIXED,
+            Place::Point(_) | Place::Surface { .. } => Side::FIXED.into(),
         }
-    }
-
-    fn recess_m(&self, place: &Place, contact: ContactSide) -> f64 {
-        match (&self.wall, *place) {
-            (Some(wall), Place::Chain { segment, share, radius_m }) => {
-                let node = segment as usize;
-                let at = |node: usize| wall.radius_m(node, self.across(node, contact.outward));
-                radius_m - (at(node) * (1.0 - share) + at(node + 1) * share)
-            }
-            _ => 0.0,
-        }
-    }
-
-    fn anchor(&self, anchor: Anchor) -> Option<MaterialPoint> {
-        let Anchor::Arc(arc_m) = anchor else { return None };
-        let (segment, share) = self.division.locate(arc_m);
-        let places = &self.unknowns.places;
-        let position = places.get(segment)?.lerp(*places.get(segment + 1)?, share);
-        Some(MaterialPoint::new(position, self.point_side(segment, share, DVec3::ZERO)))
-    }
-
-    fn turn(&self, anchor: Anchor) -> Option<Side> {
-        let Anchor::Arc(arc_m) = anchor else { return None };
-        Some(Side::node(0, 2 * self.division.locate(arc_m).0 + 1))
-    }
-
-    fn speed_bound(&self, v: &[DVec3]) -> f64 {
-        let (v, wall) = v.split_at(self.now.u.len());
-        let nodes = v.iter().step_by(2).map(|v| v.length_squared()).fold(0.0, f64::max).sqrt();
-        let spins = v.iter().skip(1).step_by(2).map(|w| w.length_squared()).fold(0.0, f64::max).sqrt();
-        let rates = wall.iter().map(|rate| rate.length_squared()).fold(0.0, f64::max).sqrt();
-        nodes + spins * self.widest_m() + 2.0 * rates
     }
 
     fn strain(&self, v: &[DVec3], h_s: f64) -> f64 {
@@ -276,7 +227,7 @@ impl ClusterMember for Tube {
         }
     }
 
-    fn end(&mut self, v: &[DVec3], h_s: f64, touched: bool) -> Result<(), StepError> {
+    fn end(&mut self, &StepEnd { v, h_s, touched, .. }: &StepEnd<'_>) -> Result<(), StepError> {
         let before = self.momentum().0;
         let integrates_freely = self.integrates_free_motion(h_s);
         let unknowns = std::mem::take(&mut self.unknowns);
@@ -307,44 +258,11 @@ impl ClusterMember for Tube {
         Ok(())
     }
 
-    fn attachments(&self) -> &[OwnAttachment] {
-        &self.unknowns.attached
-    }
-
-    fn own_spring(&self, place: usize) -> Option<OwnSpring> {
-        let spring = self.springs.get(lasting(&self.springs).len() + place)?;
-        let position = *self.unknowns.places.get(spring.node)?;
-        let side = if self.is_held(2 * spring.node) { Side::FIXED } else { Side::node(0, 2 * spring.node) };
-        Some(OwnSpring {
-            attachment: spring.attachment,
-            point: MaterialPoint::new(position, side),
-            place_m: spring.place(),
-            slack_m: spring.slack(),
-            stiffness_n_m: spring.stiffness,
-            damping_n_s_m: spring.damping,
-            yields_above_n: spring.yields_above_n,
-            tears_above_n: self.spec.attachments[spring.attachment as usize].tears_above_n,
-        })
-    }
-
-    fn slip(&mut self, place: usize, by: Slid) {
-        let first = lasting(&self.springs).len();
-        self.springs.iter_mut().skip(first).nth(place).into_iter().for_each(|spring| spring.slid += by);
-    }
-
-    fn let_go(&mut self, number: u32) {
-        if !self.let_go.contains(&number) {
-            self.let_go.push(number);
-            self.lay_out_springs();
-            self.rest.wake();
-        }
-    }
-
-    fn is_calm(&self) -> bool {
+    fn can_sleep(&self) -> bool {
         self.unknowns.quiet_before
     }
 
-    fn rest(&mut self) {
+    fn sleep(&mut self) {
         self.at_rest = true;
         self.acceleration = DVec3::ZERO;
         self.stop();
@@ -353,6 +271,50 @@ impl ClusterMember for Tube {
 
     fn work(&self) -> f64 {
         (self.division.segments() as f64) * f64::from(1 + self.unknowns.own_substeps)
+    }
+
+    fn motion(&self) -> Option<&dyn MemberMotion> {
+        Some(self)
+    }
+
+    fn attachments(&self) -> Option<&dyn Attachments> {
+        Some(self)
+    }
+
+    fn give_way(&mut self, failure: OwnFailure) {
+        match failure {
+            OwnFailure::Slips(place, by) => {
+                let first = lasting(&self.springs).len();
+                self.springs.iter_mut().skip(first).nth(place).into_iter().for_each(|spring| spring.slid += by);
+            }
+            OwnFailure::Tears(number) if !self.let_go.contains(&number) => {
+                self.let_go.push(number);
+                self.lay_out_springs();
+                self.rest.wake();
+            }
+            OwnFailure::Tears(_) => {}
+        }
+    }
+}
+
+impl MemberMotion for Tube {
+    fn skin_after<'a>(&'a self, v: &[DVec3], t_s: f64, nodes: &'a mut Vec<DVec3>) -> Option<PlacedShape<'a>> {
+        let PlacedShape { form, view: ShapePose::Chain { positions, radii_m } } = self.skin()? else { return None };
+        nodes.clear();
+        nodes.extend(positions.iter().zip(v.iter().step_by(2)).map(|(at, v)| *at + *v * t_s));
+        Some(PlacedShape { form, view: ShapePose::Chain { positions: nodes, radii_m } })
+    }
+
+    fn rest_shape(&self) -> Option<RestShape<'_>> {
+        self.spec.self_contact.then_some(RestShape::Chain(&self.division.arc_m))
+    }
+
+    fn speed_bound(&self, v: &[DVec3]) -> f64 {
+        let (v, wall) = v.split_at(self.now.u.len());
+        let nodes = v.iter().step_by(2).map(|v| v.length_squared()).fold(0.0, f64::max).sqrt();
+        let spins = v.iter().skip(1).step_by(2).map(|w| w.length_squared()).fold(0.0, f64::max).sqrt();
+        let rates = wall.iter().map(|rate| rate.length_squared()).fold(0.0, f64::max).sqrt();
+        nodes + spins * self.widest_m() + 2.0 * rates
     }
 }
 
@@ -402,25 +364,6 @@ impl Tube {
         (self.has_own_substeps() || !self.unknowns.is_whole) && self.substep_is_short(h_s)
     }
 
-    /// Notes the forces of attachments that may tear and never yield at the end of a step: implicit Euler has given
-    /// these all along it.
-    fn note_attachments(&mut self) {
-        let Self { spec, springs, now, unknowns, .. } = self;
-        let attached = &mut unknowns.attached;
-        attached.clear();
-        for spring in lasting(springs) {
-            let (number, force_n) = (spring.attachment, spring.force(now.x[spring.node], now.u[2 * spring.node]));
-            let tears_above_n = spec.attachments[number as usize].tears_above_n;
-            if tears_above_n == f64::INFINITY {
-                continue;
-            }
-            match attached.last_mut().filter(|last| last.number == number) {
-                Some(last) => last.force_n += force_n,
-                None => attached.push(OwnAttachment { number, force_n, tears_above_n }),
-            }
-        }
-    }
-
     /// Ends the step begun with the velocities `v`, which are the free ones where it `is_free`; whether its state is finite then.
     fn advance_with(&mut self, velocities: [&[DVec3]; 2], h_s: f64, is_free: bool) -> bool {
         self.step_by(h_s, |stepper, now, setting| {
@@ -438,11 +381,6 @@ impl Tube {
             finite
         })
     }
-}
-
-/// Its springs that never yield.
-fn lasting(springs: &[NodeSpring]) -> &[NodeSpring] {
-    &springs[..springs.partition_point(|spring| !spring.yields())]
 }
 
 /// A step of `h_s` seconds in one piece. Springs on the tube, and its own springs that yield, are rows of the cluster's problem.

@@ -9,8 +9,10 @@ use super::system::Purpose;
 use crate::limits::{QUIET_ACCELERATION_M_S2, QUIET_S, QUIET_SPEED_M_S};
 use glam::{DQuat, DVec3};
 use metachron_contact::Agent;
-use metachron_contact::member::{ClusterMember, MaterialPoint, Role};
-use metachron_contact::solve::{Block, Response, Side, SideTerm};
+use metachron_contact::member::{
+    Attachments, ClusterMember, MaterialPoint, MemberMotion, Role, SkinPoint, StepEnd, StepSystem,
+};
+use metachron_contact::solve::{Response, Side, SideTerm};
 use metachron_core::{Anchor, Archive, ArchiveError, StepError};
 use metachron_geometry::narrow_phase::RestShape;
 use metachron_geometry::{Carried, ContactSide, Place, PlacedShape, ShapePose};
@@ -112,90 +114,29 @@ impl ClusterMember for SoftBody {
         Ok(())
     }
 
-    fn blocks(&self) -> &[Block] {
-        self.system.blocks()
-    }
-
-    fn response(&self) -> Option<&dyn Response> {
-        self.system.response().map(|factor| factor as &dyn Response)
-    }
-
-    fn free(&self) -> &[DVec3] {
-        &self.unknowns.free
-    }
-
-    fn unanswered(&self) -> &[DVec3] {
-        self.system.unanswered()
-    }
-
-    fn velocities(&self) -> &[DVec3] {
-        &self.unknowns.now
-    }
-
-    fn leave(&mut self, unanswered: &[DVec3]) {
-        self.unknowns.owed_m_s = self.system.together(unanswered);
+    fn system(&self) -> StepSystem<'_> {
+        let Self { system, unknowns: Unknowns { free, now: velocities, .. }, .. } = self;
+        let response = system.response().map(|factor| factor as &dyn Response);
+        StepSystem { blocks: system.blocks(), response, free, unanswered: system.unanswered(), velocities }
     }
 
     fn skin(&self) -> Option<PlacedShape<'_>> {
         Some(PlacedShape { form: &self.form, view: ShapePose::Surface(self.seen()) })
     }
 
-    fn skin_after<'a>(&'a self, v: &[DVec3], t_s: f64, nodes: &'a mut Vec<DVec3>) -> Option<PlacedShape<'a>> {
-        let moved = |row: Option<u32>| row.map_or(DVec3::ZERO, |row| v[row as usize] * t_s);
-        let rows = self.system.rows();
-        nodes.clear();
-        match &self.skin {
-            Some(skin) => {
-                nodes.extend(skin.carried().iter().map(|carried| {
-                    carried.terms().map(|(node, w)| (self.positions[node] + moved(rows[node])) * w).sum::<DVec3>()
-                }));
-                if !skin.is_eased() {
-                    nodes.iter_mut().enumerate().for_each(|(point, at)| *at += skin.apart_of(point));
-                }
-            }
-            None => nodes.extend(self.positions.iter().zip(rows).map(|(at, row)| *at + moved(*row))),
-        }
-        Some(PlacedShape { form: &self.form, view: ShapePose::Surface(nodes) })
-    }
-
-    fn rest_shape(&self) -> Option<RestShape<'_>> {
-        let rest = || self.skin.as_ref().map_or(&self.mesh.rest[..], |skin| skin.rest());
-        self.spec.self_contact.then(|| RestShape::Surface(rest()))
-    }
-
-    fn side(&self, place: &Place, _contact: ContactSide) -> Side {
+    fn skin_point(&self, place: &Place, _contact: ContactSide) -> SkinPoint {
         match *place {
             Place::Surface { vertices, shares } => {
                 let [a, b, c] = vertices;
                 let own = || Carried { nodes: [a, b, c, c], weights: [shares[0], shares[1], shares[2], 0.0] };
                 let carried = self.skin.as_ref().map_or_else(own, |skin| skin.carried_at(vertices, shares));
-                self.carried_side(&carried)
+                let led_m_s = self.skin.as_ref().map_or(DVec3::ZERO, |skin| {
+                    vertices.iter().zip(shares).map(|(vertex, share)| skin.easing_m_s(*vertex) * share).sum()
+                });
+                SkinPoint { led_m_s, ..self.carried_side(&carried).into() }
             }
-            Place::Point(_) | Place::Chain { .. } => Side::FIXED,
+            Place::Point(_) | Place::Chain { .. } => Side::FIXED.into(),
         }
-    }
-
-    fn cell_of(&self, place: &Place) -> Option<u32> {
-        let Place::Surface { vertices, shares } = *place else { return None };
-        self.skin.as_ref()?.cell_at(vertices, shares)
-    }
-
-    fn led_m_s(&self, place: &Place) -> DVec3 {
-        let (Place::Surface { vertices, shares }, Some(skin)) = (place, &self.skin) else { return DVec3::ZERO };
-        vertices.iter().zip(shares).map(|(vertex, share)| skin.easing_m_s(*vertex) * *share).sum()
-    }
-
-    fn anchor(&self, anchor: Anchor) -> Option<MaterialPoint> {
-        let Anchor::Vertex(vertex) = anchor else { return None };
-        let position = *self.seen().get(vertex as usize)?;
-        let led_m_s = self.skin.as_ref().map_or(DVec3::ZERO, |skin| skin.easing_m_s(vertex));
-        Some(MaterialPoint { led_m_s, ..MaterialPoint::new(position, self.carried_side(&self.carried(vertex))) })
-    }
-
-    fn slot_of(&self, block: usize) -> u32 {
-        let mut rows = self.system.rows().iter();
-        let node = rows.position(|row| *row == Some(block as u32)).unwrap_or_default();
-        self.skin.as_ref().map_or(node as u32, |skin| skin.point_of(node))
     }
 
     fn strain(&self, v: &[DVec3], h_s: f64) -> f64 {
@@ -231,7 +172,8 @@ impl ClusterMember for SoftBody {
         self.follow();
     }
 
-    fn end(&mut self, v: &[DVec3], h_s: f64, _touched: bool) -> Result<(), StepError> {
+    fn end(&mut self, &StepEnd { v, h_s, unanswered, .. }: &StepEnd<'_>) -> Result<(), StepError> {
+        self.unknowns.owed_m_s = self.system.together(unanswered);
         self.place_after(v, h_s);
         let finite = self.positions.iter().all(|x| x.is_finite() && x.abs().max_element() <= super::step::REACH_MAX);
         if !finite {
@@ -259,11 +201,11 @@ impl ClusterMember for SoftBody {
         Ok(())
     }
 
-    fn is_calm(&self) -> bool {
+    fn can_sleep(&self) -> bool {
         self.spec.sleep && self.quiet_s >= QUIET_S && self.is_eased()
     }
 
-    fn rest(&mut self) {
+    fn sleep(&mut self) {
         self.at_rest = true;
         self.acceleration = DVec3::ZERO;
         self.velocities.fill(DVec3::ZERO);
@@ -272,5 +214,58 @@ impl ClusterMember for SoftBody {
 
     fn work(&self) -> f64 {
         SoftBody::work(self)
+    }
+
+    fn motion(&self) -> Option<&dyn MemberMotion> {
+        Some(self)
+    }
+
+    fn attachments(&self) -> Option<&dyn Attachments> {
+        Some(self)
+    }
+}
+
+impl MemberMotion for SoftBody {
+    fn skin_after<'a>(&'a self, v: &[DVec3], t_s: f64, nodes: &'a mut Vec<DVec3>) -> Option<PlacedShape<'a>> {
+        let moved = |row: Option<u32>| row.map_or(DVec3::ZERO, |row| v[row as usize] * t_s);
+        let rows = self.system.rows();
+        nodes.clear();
+        match &self.skin {
+            Some(skin) => {
+                nodes.extend(skin.carried().iter().map(|carried| {
+                    carried.terms().map(|(node, w)| (self.positions[node] + moved(rows[node])) * w).sum::<DVec3>()
+                }));
+                if !skin.is_eased() {
+                    nodes.iter_mut().enumerate().for_each(|(point, at)| *at += skin.apart_of(point));
+                }
+            }
+            None => nodes.extend(self.positions.iter().zip(rows).map(|(at, row)| *at + moved(*row))),
+        }
+        Some(PlacedShape { form: &self.form, view: ShapePose::Surface(nodes) })
+    }
+
+    fn rest_shape(&self) -> Option<RestShape<'_>> {
+        let rest = || self.skin.as_ref().map_or(&self.mesh.rest[..], |skin| skin.rest());
+        self.spec.self_contact.then(|| RestShape::Surface(rest()))
+    }
+
+    fn cell_of(&self, place: &Place) -> Option<u32> {
+        let Place::Surface { vertices, shares } = *place else { return None };
+        self.skin.as_ref()?.cell_at(vertices, shares)
+    }
+}
+
+impl Attachments for SoftBody {
+    fn anchor(&self, anchor: Anchor) -> Option<MaterialPoint> {
+        let Anchor::Vertex(vertex) = anchor else { return None };
+        let position = *self.seen().get(vertex as usize)?;
+        let led_m_s = self.skin.as_ref().map_or(DVec3::ZERO, |skin| skin.easing_m_s(vertex));
+        Some(MaterialPoint { led_m_s, ..MaterialPoint::new(position, self.carried_side(&self.carried(vertex))) })
+    }
+
+    fn slot_of(&self, block: usize) -> u32 {
+        let mut rows = self.system.rows().iter();
+        let node = rows.position(|row| *row == Some(block as u32)).unwrap_or_default();
+        self.skin.as_ref().map_or(node as u32, |skin| skin.point_of(node))
     }
 }

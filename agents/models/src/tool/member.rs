@@ -11,7 +11,9 @@ use super::spec::REACH_MAX_M;
 use crate::trajectory::PointMotion;
 use glam::{DMat3, DQuat, DVec3};
 use metachron_contact::member;
-use metachron_contact::member::{ClusterMember, MaterialPoint, Pose, Role};
+use metachron_contact::member::{
+    Attachments, ClusterMember, MaterialPoint, MemberMotion, Pose, Role, SkinPoint, StepEnd, StepSystem,
+};
 use metachron_contact::solve::{Block, Side};
 use metachron_contact::{AnchorSpring, StepContext};
 use metachron_core::{AgentId, Anchor, Archive, ArchiveError, SimSpan, SimTime, StepError, ToolState, archive_values};
@@ -152,16 +154,9 @@ impl ClusterMember for Tool {
         Ok(())
     }
 
-    fn blocks(&self) -> &[Block] {
-        &self.unknowns.block
-    }
-
-    fn free(&self) -> &[DVec3] {
-        &self.unknowns.free
-    }
-
-    fn velocities(&self) -> &[DVec3] {
-        &self.unknowns.now
+    fn system(&self) -> StepSystem<'_> {
+        let Unknowns { block, free, now, .. } = &self.unknowns;
+        StepSystem { blocks: block, free, velocities: now, ..StepSystem::default() }
     }
 
     fn skin(&self) -> Option<PlacedShape<'_>> {
@@ -169,67 +164,12 @@ impl ClusterMember for Tool {
         Some(PlacedShape { form: &self.form, view: ShapePose::Tool { tip, rotation, jaw } })
     }
 
-    fn skin_after<'a>(&'a self, v: &[DVec3], t_s: f64, _nodes: &'a mut Vec<DVec3>) -> Option<PlacedShape<'a>> {
-        let Pose { centre_m: tip, rotation, .. } = self.pose(v, t_s)?;
-        let jaw = self.tool.jaw + self.unknowns.jaw_per_s * t_s;
-        Some(PlacedShape { form: &self.form, view: ShapePose::Tool { tip, rotation, jaw } })
-    }
-
-    fn side(&self, place: &Place, _contact: ContactSide) -> Side {
-        let Place::Point(point) = *place else { return Side::node(0, 0) };
-        self.side_at(point - self.tool.tip)
-    }
-
-    fn led_m_s(&self, place: &Place) -> DVec3 {
-        let Place::Point(point) = *place else { return DVec3::ZERO };
+    fn skin_point(&self, place: &Place, _contact: ContactSide) -> SkinPoint {
+        let Place::Point(point) = *place else { return Side::node(0, 0).into() };
         let (arm, rotation) = (point - self.tool.tip, self.tool.rotation);
         let opening = shape().opening_m_s(rotation.conjugate() * arm, self.unknowns.jaw_per_s);
-        self.unknowns.led_rad_s.cross(arm) + rotation * opening
-    }
-
-    fn anchor(&self, anchor: Anchor) -> Option<MaterialPoint> {
-        let Anchor::Local(local) = anchor else { return None };
-        let arm = self.tool.rotation * local;
-        let led_m_s = self.unknowns.led_rad_s.cross(arm);
-        Some(MaterialPoint { led_m_s, ..MaterialPoint::new(self.tool.tip + arm, self.side_at(arm)) })
-    }
-
-    fn pose(&self, v: &[DVec3], t_s: f64) -> Option<Pose> {
-        let way = v.first().map_or(DVec3::ZERO, |v| *v * t_s);
-        let led_rad_s = self.unknowns.led_rad_s;
-        let centre_m = self.tool.tip + way;
-        let rolled = DQuat::from_scaled_axis(led_rad_s * t_s) * self.tool.rotation;
-        let rotation = self.pivot.map_or(rolled, |pivot| pivot.aligned(rolled, centre_m));
-        let turns = self.pivot.map_or(Side::FIXED, |pivot| pivot.turns(self.tool.tip));
-        Some(Pose { centre_m, origin_m: centre_m, rotation, turns, led_rad_s })
-    }
-
-    fn drive(&self) -> Option<member::Drive> {
-        Some(member::Drive {
-            point: MaterialPoint::new(self.tool.tip, Side::node(0, 0)),
-            target_m: self.commanded.position,
-            target_m_s: self.unknowns.led_m_s,
-            stiffness_n_m: self.drive.stiffness_n_m(),
-            damping_n_s_m: self.drive.damping_n_s_m(),
-            limit_n: self.spec.max_force_n,
-        })
-    }
-
-    fn is_led(&self) -> bool {
-        true
-    }
-
-    fn spares(&self, other: AgentId) -> bool {
-        self.tool.grasp.is_some_and(|grasp| grasp.target == other) || self.tool.admits == Some(other)
-    }
-
-    fn speed_bound(&self, v: &[DVec3]) -> f64 {
-        let (front, back, side_m) = reach();
-        let Unknowns { led_rad_s, jaw_per_s, .. } = self.unknowns;
-        let reach_m = front.length().max(back.length()) + side_m;
-        let moved_m_s = v[0].length();
-        let moved_m_s = self.pivot.map_or(moved_m_s, |pivot| pivot.speed_bound(self.tool.tip, moved_m_s, reach_m));
-        moved_m_s + led_rad_s.length() * reach_m + jaw_per_s.abs() * side_m
+        let led_m_s = self.unknowns.led_rad_s.cross(arm) + rotation * opening;
+        SkinPoint { led_m_s, ..self.side_at(arm).into() }
     }
 
     fn keep(&mut self) {
@@ -248,11 +188,7 @@ impl ClusterMember for Tool {
         (self.unknowns.time, self.unknowns.hand) = (time, hand);
     }
 
-    fn move_to(&mut self, _v: &[DVec3], _t_s: f64) {
-        // its steps are the shortest of its cluster: it is never within one
-    }
-
-    fn end(&mut self, v: &[DVec3], h_s: f64, _touched: bool) -> Result<(), StepError> {
+    fn end(&mut self, &StepEnd { v, h_s, .. }: &StepEnd<'_>) -> Result<(), StepError> {
         if !v[0].is_finite() {
             let what = "its tip is not at a finite place".to_owned();
             return Err(StepError::Diverged { model: "tool", dt_s: h_s, what });
@@ -291,11 +227,11 @@ impl ClusterMember for Tool {
         Ok(())
     }
 
-    fn is_calm(&self) -> bool {
+    fn can_sleep(&self) -> bool {
         self.tool.is_idle && self.tool.velocity.length() < SUPPORTING_MAX_M_S && !self.jaws.holds()
     }
 
-    fn rest(&mut self) {
+    fn sleep(&mut self) {
         self.at_rest = true;
         self.tool.velocity = DVec3::ZERO;
         // rounding of its way back from a user must not stay
@@ -304,6 +240,65 @@ impl ClusterMember for Tool {
             self.commanded = PointMotion { position: end.tip, velocity: DVec3::ZERO };
             (self.tool.tip, self.tool.rotation) = through(self.pivot, end.tip, self.tool.rotation);
         }
+    }
+
+    fn motion(&self) -> Option<&dyn MemberMotion> {
+        Some(self)
+    }
+
+    fn attachments(&self) -> Option<&dyn Attachments> {
+        Some(self)
+    }
+}
+
+impl MemberMotion for Tool {
+    fn pose(&self, v: &[DVec3], t_s: f64) -> Option<Pose> {
+        let way = v.first().map_or(DVec3::ZERO, |v| *v * t_s);
+        let led_rad_s = self.unknowns.led_rad_s;
+        let centre_m = self.tool.tip + way;
+        let rolled = DQuat::from_scaled_axis(led_rad_s * t_s) * self.tool.rotation;
+        let rotation = self.pivot.map_or(rolled, |pivot| pivot.aligned(rolled, centre_m));
+        let turns = self.pivot.map_or(Side::FIXED, |pivot| pivot.turns(self.tool.tip));
+        Some(Pose { centre_m, origin_m: centre_m, rotation, turns, led_rad_s })
+    }
+
+    fn skin_after<'a>(&'a self, v: &[DVec3], t_s: f64, _nodes: &'a mut Vec<DVec3>) -> Option<PlacedShape<'a>> {
+        let Pose { centre_m: tip, rotation, .. } = self.pose(v, t_s)?;
+        let jaw = self.tool.jaw + self.unknowns.jaw_per_s * t_s;
+        Some(PlacedShape { form: &self.form, view: ShapePose::Tool { tip, rotation, jaw } })
+    }
+
+    fn speed_bound(&self, v: &[DVec3]) -> f64 {
+        let (front, back, side_m) = reach();
+        let Unknowns { led_rad_s, jaw_per_s, .. } = self.unknowns;
+        let reach_m = front.length().max(back.length()) + side_m;
+        let moved_m_s = v[0].length();
+        let moved_m_s = self.pivot.map_or(moved_m_s, |pivot| pivot.speed_bound(self.tool.tip, moved_m_s, reach_m));
+        moved_m_s + led_rad_s.length() * reach_m + jaw_per_s.abs() * side_m
+    }
+
+    fn passes_through(&self, other: AgentId) -> bool {
+        self.tool.grasp.is_some_and(|grasp| grasp.target == other) || self.tool.admits == Some(other)
+    }
+}
+
+impl Attachments for Tool {
+    fn anchor(&self, anchor: Anchor) -> Option<MaterialPoint> {
+        let Anchor::Local(local) = anchor else { return None };
+        let arm = self.tool.rotation * local;
+        let led_m_s = self.unknowns.led_rad_s.cross(arm);
+        Some(MaterialPoint { led_m_s, ..MaterialPoint::new(self.tool.tip + arm, self.side_at(arm)) })
+    }
+
+    fn drive(&self) -> Option<member::Drive> {
+        Some(member::Drive {
+            point: MaterialPoint::new(self.tool.tip, Side::node(0, 0)),
+            target_m: self.commanded.position,
+            target_m_s: self.unknowns.led_m_s,
+            stiffness_n_m: self.drive.stiffness_n_m(),
+            damping_n_s_m: self.drive.damping_n_s_m(),
+            limit_n: self.spec.max_force_n,
+        })
     }
 }
 

@@ -2,6 +2,7 @@
 
 use super::clocks::{Clocks, GRAVITY, Tamper};
 use glam::{DQuat, DVec3};
+use metachron_contact::member::StepSystem;
 use metachron_contact::{Agent, AnchorSpring, Law};
 use metachron_core::{Anchor, Snapshot};
 use metachron_geometry::{ContactTraits, Obstacle, Solid};
@@ -92,12 +93,12 @@ fn column(young_pa: f64) -> SoftBody {
 /// Publishes the member's own W instead of that of its cluster with the floor held.
 fn own(agent: &mut dyn Agent, shown: &mut Snapshot) {
     let Some(member) = agent.member() else { return };
-    let (Some(response), size) = (member.response(), member.free().len()) else { return };
+    let StepSystem { response: Some(response), free, .. } = member.system() else { return };
     let model = &mut shown.local_model;
     let count = model.blocks.len();
     for column in 0..count {
         for axis in 0..3 {
-            let mut x = vec![DVec3::ZERO; size];
+            let mut x = vec![DVec3::ZERO; free.len()];
             x[model.blocks[column].slot as usize] = DVec3::AXES[axis]; // no vertex is held: slots are blocks
             response.respond(&mut x);
             for row in 0..count {

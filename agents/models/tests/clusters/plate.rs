@@ -1,7 +1,7 @@
 //! A model of a user's own, by the contracts of agents and members alone: all that it needs to be touched.
 
 use glam::{DMat3, DQuat, DVec3};
-use metachron_contact::member::{ClusterMember, Role};
+use metachron_contact::member::{ClusterMember, Role, SkinPoint, StepEnd, StepSystem};
 use metachron_contact::solve::{Block, Side};
 use metachron_contact::{Agent, Stepping};
 use metachron_core::{Body, Bounds, RigidState, Snapshot, StepError};
@@ -67,16 +67,8 @@ impl ClusterMember for Plate {
         Ok(())
     }
 
-    fn blocks(&self) -> &[Block] {
-        &self.block
-    }
-
-    fn free(&self) -> &[DVec3] {
-        &self.free
-    }
-
-    fn velocities(&self) -> &[DVec3] {
-        &self.velocity
+    fn system(&self) -> StepSystem<'_> {
+        StepSystem { blocks: &self.block, free: &self.free, velocities: &self.velocity, ..StepSystem::default() }
     }
 
     fn skin(&self) -> Option<PlacedShape<'_>> {
@@ -84,8 +76,8 @@ impl ClusterMember for Plate {
         Some(PlacedShape { form: &self.form, view })
     }
 
-    fn side(&self, _place: &Place, _contact: ContactSide) -> Side {
-        Side::node(0, 0)
+    fn skin_point(&self, _place: &Place, _contact: ContactSide) -> SkinPoint {
+        Side::node(0, 0).into()
     }
 
     fn keep(&mut self) {
@@ -101,7 +93,7 @@ impl ClusterMember for Plate {
         self.place = self.start + v[0] * t_s;
     }
 
-    fn end(&mut self, v: &[DVec3], h_s: f64, _touched: bool) -> Result<(), StepError> {
+    fn end(&mut self, &StepEnd { v, h_s, .. }: &StepEnd<'_>) -> Result<(), StepError> {
         self.velocity = [v[0]];
         self.start += v[0] * h_s;
         self.place = self.start;

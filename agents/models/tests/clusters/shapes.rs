@@ -68,7 +68,7 @@ fn every_shape_lands_and_comes_to_rest() {
         let mut deepest_m = 0.0_f64;
         let rested = (0..1200).any(|_| {
             deepest_m = deepest_m.max(table.step().0.depth_m);
-            table.bodies[0].agent.member().unwrap().is_calm()
+            table.bodies[0].agent.member().unwrap().can_sleep()
         });
         let middle = table.middle(0).0;
         assert!(rested, "{name} does not rest: {middle}");
@@ -184,7 +184,7 @@ fn a_stack_of_turned_boxes_falls_asleep_however_heavy_its_top() {
     for top_kg in [0.5, 50.0] {
         let mut table = turned_stack(top_kg);
         let found = table.play(3.0);
-        let calm: Vec<bool> = table.bodies.iter_mut().map(|body| body.agent.member().unwrap().is_calm()).collect();
+        let calm: Vec<bool> = table.bodies.iter_mut().map(|body| body.agent.member().unwrap().can_sleep()).collect();
         let top = table.middle(9);
         assert!(calm.iter().all(|calm| *calm) && found.factors_at_rest < 1.0, "{top_kg} kg: {calm:?}, {found:?}");
         // it stands where it was put

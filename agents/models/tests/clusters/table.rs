@@ -280,7 +280,7 @@ impl Table {
 
     /// Where a material point is.
     pub fn place(&mut self, body: usize, anchor: Anchor) -> DVec3 {
-        self.bodies[body].agent.member().unwrap().anchor(anchor).unwrap().position
+        self.bodies[body].agent.member().unwrap().attachments().unwrap().anchor(anchor).unwrap().position
     }
 
     /// The upward impulse of the last macro step by the floor, or by held bodies.

@@ -3,7 +3,9 @@
 use crate::bodies::{block, cube, rigid, sheet};
 use crate::table::{GRAVITY, Table, placed, spring};
 use glam::{DQuat, DVec3};
-use metachron_contact::member::{ClusterMember, MaterialPoint, Partner, Role};
+use metachron_contact::member::{
+    Attachments, ClusterMember, MaterialPoint, MemberMotion, Partner, Role, SkinPoint, StepEnd,
+};
 use metachron_contact::solve::Side;
 use metachron_contact::{Agent, AnchorSpring, Stepping};
 use metachron_core::{AgentId, Anchor, Body, Snapshot, StepError, ToolState};
@@ -197,26 +199,11 @@ impl ClusterMember for Pusher {
         Some(PlacedShape { form: &self.form, view })
     }
 
-    fn side(&self, _place: &Place, _contact: ContactSide) -> Side {
-        Side::FIXED
+    fn skin_point(&self, _place: &Place, _contact: ContactSide) -> SkinPoint {
+        SkinPoint { led_m_s: DVec3::X * self.m_s, ..Side::FIXED.into() }
     }
 
-    fn led_m_s(&self, _place: &Place) -> DVec3 {
-        DVec3::X * self.m_s
-    }
-
-    fn anchor(&self, anchor: Anchor) -> Option<MaterialPoint> {
-        let Anchor::Local(local) = anchor else { return None };
-        Some(MaterialPoint::led(self.place + local, DVec3::X * self.m_s))
-    }
-
-    fn speed_bound(&self, _v: &[DVec3]) -> f64 {
-        self.m_s
-    }
-
-    fn move_to(&mut self, _v: &[DVec3], _t_s: f64) {}
-
-    fn end(&mut self, _v: &[DVec3], h_s: f64, _touched: bool) -> Result<(), StepError> {
+    fn end(&mut self, &StepEnd { h_s, .. }: &StepEnd<'_>) -> Result<(), StepError> {
         self.place.x += self.m_s * h_s;
         Ok(())
     }
@@ -227,6 +214,27 @@ impl ClusterMember for Pusher {
 
     fn go_back(&mut self) {
         self.place = self.kept;
+    }
+
+    fn motion(&self) -> Option<&dyn MemberMotion> {
+        Some(self)
+    }
+
+    fn attachments(&self) -> Option<&dyn Attachments> {
+        Some(self)
+    }
+}
+
+impl MemberMotion for Pusher {
+    fn speed_bound(&self, _v: &[DVec3]) -> f64 {
+        self.m_s
+    }
+}
+
+impl Attachments for Pusher {
+    fn anchor(&self, anchor: Anchor) -> Option<MaterialPoint> {
+        let Anchor::Local(local) = anchor else { return None };
+        Some(MaterialPoint::led(self.place + local, DVec3::X * self.m_s))
     }
 }
 

@@ -30,7 +30,7 @@ pub(super) fn scene(name: &str, rates_hz: [f64; 2]) -> Option<Scene> {
         "gripper" => gripper(rates_hz),
         "crossing" => crossing(rates_hz),
         "ball-on-box" => ball_on_box(rates_hz),
-        "oblique-blow" => oblique_blow(rates_hz),
+        "oblique-blow" => oblique_impact(rates_hz),
         _ => None,
     }
 }
@@ -134,7 +134,7 @@ fn ball_on_box([ball_hz, box_hz]: [f64; 2]) -> Option<Scene> {
 }
 
 /// Two balls collide off-centre, with friction.
-fn oblique_blow(rates_hz: [f64; 2]) -> Option<Scene> {
+fn oblique_impact(rates_hz: [f64; 2]) -> Option<Scene> {
     let mut play = Play::among(&[])?;
     let ball = |at: DVec3, velocity: DVec3, mass: f64| RigidSpec {
         velocity,

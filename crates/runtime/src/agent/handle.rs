@@ -3,9 +3,7 @@
 //! Out: snapshots and numbers, without ever waiting for the agent. In: commands. Never here: the agent itself.
 
 use super::agent_record::{AgentRecord, Live};
-use super::agent_spawn::AgentSpawn;
 use super::form_slot::FormSlot;
-use crate::cluster::Handover;
 use crate::commands::mailbox::{AwaitedMotion, Command, Keyed, Mailbox, SendError};
 use crate::lock_free::ring::{Ring, RingEntry};
 use crate::lock_free::sleep::SleepRegistry;
@@ -15,15 +13,14 @@ use crate::records::histogram::Histogram;
 use crate::records::histogram::Spread;
 use crate::records::metrics::{AgentState, AgentStats, Metrics, REMOVED};
 use crate::records::probe::{Sample, Trace};
-use crate::records::streams::{EventStreams, Heard, Rings};
+use crate::records::streams::{EventStreams, Rings, StreamReader};
 use crate::records::turns::Turn;
-use crate::turn::agent_runner::AgentRunner;
-use crate::turn::model::Traits;
 use metachron_contact::detect::ClusterScene;
 use metachron_contact::member::CallMark;
 use metachron_contact::{Input, Inputs, Law};
 use metachron_core::{AgentId, Body, HASH_START, SimSpan, SimTime, Snapshot};
 use metachron_geometry::CollisionShape;
+use std::any::Any;
 use std::sync::atomic::Ordering::Relaxed;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
@@ -63,25 +60,9 @@ pub(crate) struct Identity {
     /// Whether the run began with it. Nothing outside can make such an agent again as it was, with its governor and its ties: where it leaves it
     /// keeps them and its model, and comes back with a state that is read.
     pub is_first: bool,
-    /// Entry for agents that it is to lead, and the place to which it returns from a leader; `None` where no agent can be led.
-    pub handover: Option<Handover>,
-}
-
-impl Identity {
-    /// That of the agent that is to be started, whose name it takes.
-    pub fn of(id: AgentId, spawn: &mut AgentSpawn, traits: &Traits, is_first: bool) -> Self {
-        let inputs = traits.inputs;
-        let is_motored = spawn.scene.joints_of(id).any(|(_, joint)| joint.takes_motor());
-        Self {
-            name: std::mem::take(&mut spawn.name).into(),
-            model: traits.model,
-            wanted_hz: spawn.rate_hz,
-            motored: is_motored.then(|| Arc::clone(&spawn.scene)),
-            inputs: inputs.with(Input::Resolution, inputs.has(Input::Resolution) && spawn.range.is_some()),
-            is_first,
-            handover: traits.is_member.then(Handover::default),
-        }
-    }
+    /// Entry for agents that it is to lead, and the place to which it returns from a leader, of a type that only clusters know
+    /// ([`crate::cluster::Handover`]); `None` where no agent can be led.
+    pub handover: Option<Box<dyn Any + Send + Sync>>,
 }
 
 impl Shared {
@@ -128,10 +109,6 @@ impl Shared {
             Some(lacks) => Err(SendError::NotTaken { name: Arc::clone(name), model, lacks, takes: *inputs }),
             None => Ok(()),
         }
-    }
-
-    pub const fn handover(&self) -> Option<&Handover> {
-        self.identity.handover.as_ref()
     }
 
     fn ages(&self) -> MutexGuard<'_, Option<Box<Histogram>>> {
@@ -188,11 +165,6 @@ impl AgentHandle {
     /// The agent; `None` of one that has left and is not kept.
     pub(crate) fn live(&self) -> Option<Live> {
         self.record.live()
-    }
-
-    /// The runner, if it has returned from a leader.
-    pub(crate) fn take_returned(&self) -> Option<Box<AgentRunner>> {
-        self.live()?.handover()?.take_returned()
     }
 
     /// Whether it has left.
@@ -384,45 +356,45 @@ impl AgentHandle {
 
     /// Begins to keep its events for a reader.
     #[must_use]
-    pub fn listen(&self) -> Heard {
+    pub fn listen(&self) -> StreamReader {
         let stalls = self.live().map_or(0, |shared| shared.gauges.stalls.load(Relaxed));
-        let mut heard = self.listen_to(|rings| &rings.events);
-        heard.stalls = stalls;
-        heard
+        let mut reader = self.listen_to(|rings| &rings.events);
+        reader.stalls = stalls;
+        reader
     }
 
     /// Passes its events that a reader has not heard on to `take`; returns how many were lost: an agent keeps the newest
     /// [`crate::EVENTS_KEPT`].
-    pub fn hear_events(&self, heard: &mut Heard, mut take: impl FnMut(AgentEvent)) -> u64 {
-        let lost = self.hear(heard, |rings| &rings.events, &mut take);
-        let stalls = self.judged().map_or(heard.stalls, |shared| shared.gauges.stalls.load(Relaxed));
-        for _ in heard.stalls..stalls {
+    pub fn read_events(&self, reader: &mut StreamReader, mut take: impl FnMut(AgentEvent)) -> u64 {
+        let lost = self.read(reader, |rings| &rings.events, &mut take);
+        let stalls = self.judged().map_or(reader.stalls, |shared| shared.gauges.stalls.load(Relaxed));
+        for _ in reader.stalls..stalls {
             take(AgentEvent { at: self.latest().time, kind: EventKind::Stalled });
         }
-        heard.stalls = stalls;
+        reader.stalls = stalls;
         lost
     }
 
     /// Begins to keep its turns for a reader.
     #[must_use]
-    pub fn listen_to_turns(&self) -> Heard {
+    pub fn listen_to_turns(&self) -> StreamReader {
         self.listen_to(|rings| &rings.turns)
     }
 
     /// Passes its turns that a reader has not heard on to `take`; returns how many were lost: an agent keeps the newest
     /// [`crate::TURNS_KEPT`].
-    pub fn hear_turns(&self, heard: &mut Heard, take: impl FnMut(Turn)) -> u64 {
-        self.hear(heard, |rings| &rings.turns, take)
+    pub fn read_turns(&self, reader: &mut StreamReader, take: impl FnMut(Turn)) -> u64 {
+        self.read(reader, |rings| &rings.turns, take)
     }
 
-    fn listen_to<E: RingEntry>(&self, of: fn(&Rings) -> &Ring<E>) -> Heard {
-        self.live().map_or_else(Heard::default, |shared| shared.streams.listen(of))
+    fn listen_to<E: RingEntry>(&self, of: fn(&Rings) -> &Ring<E>) -> StreamReader {
+        self.live().map_or_else(StreamReader::default, |shared| shared.streams.listen(of))
     }
 
-    fn hear<E: RingEntry>(&self, heard: &mut Heard, of: fn(&Rings) -> &Ring<E>, take: impl FnMut(E)) -> u64 {
+    fn read<E: RingEntry>(&self, reader: &mut StreamReader, of: fn(&Rings) -> &Ring<E>, take: impl FnMut(E)) -> u64 {
         // looked up first: an agent that has left by then has pushed all its events before
         let live = self.live();
-        heard.hear(live.as_ref().map(|shared| &shared.streams), of, take)
+        reader.read(live.as_ref().map(|shared| &shared.streams), of, take)
     }
 
     /// CPU time of its turns so far, seconds; updated about twice a second on threads.

@@ -61,7 +61,7 @@ impl AgentRunner {
     pub fn take_out(&mut self) {
         self.shared.mail.clear();
         self.open = None;
-        self.tell(EventKind::Gone);
+        self.record_event(EventKind::Gone);
         self.vanish();
         self.metrics.flush(&self.shared.gauges);
         self.notify_reader();

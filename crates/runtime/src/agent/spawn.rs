@@ -8,7 +8,7 @@ use super::agent_spawn::{AgentSpawn, RATE_MAX_HZ};
 use super::agents::{Agents, RunAgents};
 use super::form_slot::FormSlot;
 use super::handle::{AgentHandle, Identity, Shared};
-use crate::cluster::{ClusterSeat, JointedTo, Led, assign_leaders};
+use crate::cluster::{ClusterSeat, Handover, JointedTo, Led, assign_leaders};
 use crate::commands::mailbox::Mailbox;
 use crate::lock_free::sleep::SleepRegistry;
 use crate::lock_free::slot::SlotWriter;
@@ -22,7 +22,7 @@ use crate::turn::agent_runner::{AgentRunner, TurnPeriod};
 use crate::turn::helpers::Helpers;
 use crate::turn::model::{Model, Traits};
 use metachron_contact::member::CallMark;
-use metachron_contact::{Law, Link};
+use metachron_contact::{Input, Law, Link};
 use metachron_core::{AgentId, DT_MAX_S, SimSpan, SimTime, Snapshot};
 use std::sync::atomic::{AtomicBool, Ordering::Relaxed};
 use std::sync::{Arc, Mutex};
@@ -253,6 +253,23 @@ fn peers(
     let is_ordered = AtomicBool::new(false);
     let all = Agents::new(sleep, all.into_iter().map(|shared| AgentHandle::of(&Arc::new(shared))));
     (Peers { all, broad_phase, helpers, is_ordered }, writers)
+}
+
+impl Identity {
+    /// That of the agent that is to be started, whose name it takes.
+    fn of(id: AgentId, spawn: &mut AgentSpawn, traits: &Traits, is_first: bool) -> Self {
+        let inputs = traits.inputs;
+        let is_motored = spawn.scene.joints_of(id).any(|(_, joint)| joint.takes_motor());
+        Self {
+            name: std::mem::take(&mut spawn.name).into(),
+            model: traits.model,
+            wanted_hz: spawn.rate_hz,
+            motored: is_motored.then(|| Arc::clone(&spawn.scene)),
+            inputs: inputs.with(Input::Resolution, inputs.has(Input::Resolution) && spawn.range.is_some()),
+            is_first,
+            handover: traits.is_member.then(|| Box::<Handover>::default() as _),
+        }
+    }
 }
 
 /// For each agent the joints that hold it to others.

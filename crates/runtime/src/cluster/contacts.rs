@@ -70,7 +70,7 @@ impl ClusterSeat {
     }
 
     /// Tells that all contacts that are there begin: of one that went back to `now`, where readers have none of it.
-    pub fn tell_contacts(&self, now: SimTime, streams: &EventStreams) {
+    pub fn record_contacts(&self, now: SimTime, streams: &EventStreams) {
         for contact in &self.contacts {
             streams.event(&AgentEvent { at: now, kind: EventKind::ContactBegan(event(contact)) });
         }

@@ -11,7 +11,7 @@ use crate::turn::helpers::Helped;
 use crate::turn::model::contained;
 use metachron_contact::StepContext;
 use metachron_contact::detect::ClusterScene;
-use metachron_contact::member::{ClusterMember, Participant};
+use metachron_contact::member::Participant;
 use metachron_contact::remote::{MacroStep, Pairs, Remotes, part};
 use metachron_contact::step::{ClusterReport, ClusterStepper, Plan, StepDoubling};
 use metachron_core::step_doubling::DoublingSchedule;
@@ -62,7 +62,7 @@ impl Making<'_, '_> {
         if let Some(doubling) = doubling {
             doubling.compare(list);
         }
-        let may_rest = stepper.lets_rest() && list.iter().all(|one| one.member.is_calm());
+        let may_rest = stepper.lets_rest() && list.iter().all(|one| one.member.can_sleep());
         may_rest && !sides.iter().flatten().any(|pairs| pairs.is_active())
     }
 }

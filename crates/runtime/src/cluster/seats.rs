@@ -25,12 +25,6 @@ pub(in super::super) struct Handover {
     pub(super) returned: AtomicCell<Option<Box<AgentRunner>>>,
 }
 
-impl std::fmt::Debug for Handover {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        f.debug_struct("Handover").finish_non_exhaustive()
-    }
-}
-
 /// An agent that waits to be led, boxed: it is far larger than the word that moves it.
 type Arrival = Box<AgentRunner>;
 
@@ -72,6 +66,19 @@ impl Handover {
     /// Removes all arrivals.
     fn clear(&self) -> Vec<Arrival> {
         std::mem::take(&mut *self.arrivals.lock().unwrap_or_else(PoisonError::into_inner))
+    }
+}
+
+impl Shared {
+    pub fn handover(&self) -> Option<&Handover> {
+        self.identity.handover.as_ref()?.downcast_ref()
+    }
+}
+
+impl AgentHandle {
+    /// The runner, if it has returned from a leader.
+    pub(crate) fn take_returned(&self) -> Option<Box<AgentRunner>> {
+        self.live()?.handover()?.take_returned()
     }
 }
 
@@ -185,7 +192,7 @@ impl AgentRunner {
     fn admit(&mut self, actor: Box<AgentRunner>) {
         let (me, sleep) = (self.id(), Arc::clone(&self.shared.sleep));
         std::iter::once(actor.id()).chain(actor.led.ids()).for_each(|id| sleep.follow(id, Some(me)));
-        std::iter::once(&*actor).chain(actor.led.all()).for_each(|joining| joining.tell(EventKind::Joined(me)));
+        std::iter::once(&*actor).chain(actor.led.all()).for_each(|joining| joining.record_event(EventKind::Joined(me)));
         self.led.admit(actor);
     }
 
@@ -231,7 +238,7 @@ impl AgentRunner {
     fn return_turns(mut self: Box<Self>) {
         let (id, shared) = (self.id(), Arc::clone(&self.shared));
         self.led.ids().for_each(|led| shared.sleep.follow(led, Some(id)));
-        self.tell(EventKind::Left);
+        self.record_event(EventKind::Left);
         shared.sleep.follow(id, None);
         self.settle(1.0);
         if let Some(handover) = shared.handover() {

@@ -158,7 +158,7 @@ impl AgentRunner {
             let Some(open) = actor.open.take() else { return };
             let work_s = actor.cluster.as_ref().map_or(0.0, |seat| seat.work_s);
             published &= actor.record_step(&open, timeline, took.ended, work_s);
-            actor.tell_turn(&open, leader, took);
+            actor.record_turn(&open, leader, took);
             if let Err(reason) = contained(|| actor.run_governor(timeline, &open, work_s)) {
                 actor.park(reason);
             }

@@ -15,7 +15,7 @@ pub(crate) struct Loads {
     motors: Vec<Lasting<SetMotor>>,
     /// At most one, as it is when the agent takes it.
     poses: Vec<Lasting<Led>>,
-    impulses: Vec<Blow>,
+    impulses: Vec<TimedImpulse>,
     /// The loads of the step that was prepared last.
     #[serde(skip)]
     acting: Acting,
@@ -54,7 +54,7 @@ struct Lasting<T> {
 
 /// An impulse: it acts evenly over one step.
 #[derive(Debug, Clone, Copy, serde::Serialize, serde::Deserialize)]
-struct Blow {
+struct TimedImpulse {
     /// N·s and N·m·s.
     impulse: AnchorForce,
     /// The start of the step in which it acts, once that is known.
@@ -68,7 +68,7 @@ impl Loads {
         update(&mut self.forces, &mut sent.forces, now, |force| force);
         update(&mut self.motors, &mut sent.motors, now, |motor| motor);
         update(&mut self.poses, &mut sent.poses, now, |goal| Led { goal, from: now });
-        self.impulses.extend(sent.impulses.drain(..).map(|impulse| Blow { impulse, at: None }));
+        self.impulses.extend(sent.impulses.drain(..).map(|impulse| TimedImpulse { impulse, at: None }));
     }
 
     /// Prepares a step of `dt` from `time`. A force that ends within it acts for its part of it, all else to its end.
@@ -80,8 +80,8 @@ impl Loads {
         poses.retain(|pose| pose.acts(time));
         acting.pose = poses.first().map(|pose| pose.what.goal.after(time.secs_after(pose.what.from)));
         // a step that is made again has the same impulses
-        impulses.retain(|blow| blow.at.is_none_or(|at| at == time));
-        impulses.iter_mut().for_each(|blow| blow.at = Some(time));
+        impulses.retain(|impulse| impulse.at.is_none_or(|at| at == time));
+        impulses.iter_mut().for_each(|impulse| impulse.at = Some(time));
         acting.springs.clear();
         acting.springs.extend(springs.iter().map(|spring| spring.what));
         acting.motors.clear();
@@ -92,7 +92,7 @@ impl Loads {
             let left = force.until.map_or(dt, |until| until.since(time).min(dt));
             scaled(force.what, left.as_secs_f64() / dt_s)
         }));
-        acting.forces.extend(impulses.iter().map(|blow| scaled(blow.impulse, dt_s.recip())));
+        acting.forces.extend(impulses.iter().map(|impulse| scaled(impulse.impulse, dt_s.recip())));
     }
 
     /// The loads of the step prepared last.
@@ -103,7 +103,9 @@ impl Loads {
     /// Whether something acts at `now` or later that keeps the agent from resting. A motor that moves its joint does so by itself.
     pub fn keep_awake(&self, now: SimTime) -> bool {
         let pulled = self.springs.iter().any(|spring| spring.acts(now));
-        pulled || self.forces.iter().any(|force| force.acts(now)) || self.impulses.iter().any(|blow| blow.at.is_none())
+        pulled
+            || self.forces.iter().any(|force| force.acts(now))
+            || self.impulses.iter().any(|impulse| impulse.at.is_none())
     }
 }
 

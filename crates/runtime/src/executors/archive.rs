@@ -253,7 +253,7 @@ impl Cut {
             if runner.shared.mail.has_pending() && !sleep.is_woken(runner.id()) {
                 sleep.wake(runner.id());
             }
-            runner.tell_rewound();
+            runner.record_rewound();
         }
     }
 
@@ -317,9 +317,9 @@ fn runners_of<'a>(
 
 impl AgentRunner {
     /// Tells readers of its events that it went back, and its contacts in the state that it went back to.
-    fn tell_rewound(&self) {
-        self.tell(EventKind::Rewound);
-        self.cluster.iter().for_each(|seat| seat.tell_contacts(self.pace.time(), &self.shared.streams));
+    fn record_rewound(&self) {
+        self.record_event(EventKind::Rewound);
+        self.cluster.iter().for_each(|seat| seat.record_contacts(self.pace.time(), &self.shared.streams));
     }
 }
 

@@ -6,7 +6,7 @@ use crate::agent::agent_spawn::AgentSpawn;
 use crate::turn::watchdog::StallLimit;
 use crate::{AgentHandle, Clock, Priority, Run, SystemClock, Threads, TimelineCommand};
 use glam::{DQuat, DVec3};
-use metachron_contact::member::{ClusterMember, Role};
+use metachron_contact::member::{ClusterMember, MemberMotion, Role, SkinPoint, StepEnd};
 use metachron_contact::remote::{GivenAt, Ledgers};
 use metachron_contact::solve::Side;
 use metachron_contact::{Agent, Input, Inputs, OwnSteps, StepContext, Stepping};
@@ -347,16 +347,8 @@ impl ClusterMember for Dummy {
         Some(PlacedShape { form: self.form.as_deref()?, view })
     }
 
-    fn side(&self, _place: &Place, _contact: ContactSide) -> Side {
-        Side::FIXED
-    }
-
-    fn spares(&self, _other: AgentId) -> bool {
-        true
-    }
-
-    fn speed_bound(&self, _v: &[DVec3]) -> f64 {
-        self.speed_m_s()
+    fn skin_point(&self, _place: &Place, _contact: ContactSide) -> SkinPoint {
+        Side::FIXED.into()
     }
 
     fn keep(&mut self) {
@@ -368,9 +360,7 @@ impl ClusterMember for Dummy {
         self.made.lock().unwrap().clear();
     }
 
-    fn move_to(&mut self, _v: &[DVec3], _t_s: f64) {}
-
-    fn end(&mut self, _v: &[DVec3], h_s: f64, _touched: bool) -> Result<(), StepError> {
+    fn end(&mut self, &StepEnd { h_s, .. }: &StepEnd<'_>) -> Result<(), StepError> {
         self.steps += 1;
         let from = self.time + SimSpan::from_secs_f64(self.kept.after_s).unwrap();
         self.kept.after_s += h_s;
@@ -385,11 +375,25 @@ impl ClusterMember for Dummy {
         Ok(())
     }
 
-    fn is_calm(&self) -> bool {
+    fn can_sleep(&self) -> bool {
         self.rest_from.is_some_and(|from| self.steps >= from)
     }
 
     fn work(&self) -> f64 {
         self.work
+    }
+
+    fn motion(&self) -> Option<&dyn MemberMotion> {
+        Some(self)
+    }
+}
+
+impl MemberMotion for Dummy {
+    fn passes_through(&self, _other: AgentId) -> bool {
+        true
+    }
+
+    fn speed_bound(&self, _v: &[DVec3]) -> f64 {
+        self.speed_m_s()
     }
 }

@@ -55,7 +55,7 @@ impl<E: RingEntry> Ring<E> {
     }
 
     /// Whether anybody ever listened.
-    pub fn is_heard(&self) -> bool {
+    pub fn is_read(&self) -> bool {
         self.0.get().is_some()
     }
 

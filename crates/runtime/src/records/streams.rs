@@ -20,7 +20,7 @@ pub(crate) struct Rings {
 
 /// How far a reader has heard an agent.
 #[derive(Debug, Default)]
-pub struct Heard {
+pub struct StreamReader {
     rings: Option<Arc<Rings>>,
     next: u64,
     /// How many stalls were told of: the thread that writes the rings cannot tell of its own.
@@ -35,22 +35,22 @@ impl EventStreams {
 
     /// Tells of a turn, from one thread at a time.
     pub fn turn(&self, turn: impl FnOnce() -> Turn) {
-        if let Some(rings) = self.0.get().filter(|rings| rings.turns.is_heard()) {
+        if let Some(rings) = self.0.get().filter(|rings| rings.turns.is_read()) {
             rings.turns.push(&turn());
         }
     }
 
     /// Begins to keep the entries of the ring `of` for a reader.
-    pub fn listen<E: RingEntry>(&self, of: fn(&Rings) -> &Ring<E>) -> Heard {
+    pub fn listen<E: RingEntry>(&self, of: fn(&Rings) -> &Ring<E>) -> StreamReader {
         let rings = self.0.get_or_init(Arc::default);
-        Heard { next: of(rings).listen(), rings: Some(Arc::clone(rings)), stalls: 0 }
+        StreamReader { next: of(rings).listen(), rings: Some(Arc::clone(rings)), stalls: 0 }
     }
 }
 
-impl Heard {
+impl StreamReader {
     /// Passes the entries that it has not read on to `take`; returns how many were lost. `now` are the agent's streams,
     /// looked up before that; `None` where it has left.
-    pub(crate) fn hear<E: RingEntry>(
+    pub(crate) fn read<E: RingEntry>(
         &mut self,
         now: Option<&EventStreams>,
         of: fn(&Rings) -> &Ring<E>,

@@ -135,7 +135,7 @@ impl AgentRunner {
     }
 
     /// Tells readers of its events what happens to it now.
-    pub fn tell(&self, kind: EventKind) {
+    pub fn record_event(&self, kind: EventKind) {
         self.shared.streams.event(&AgentEvent { at: self.pace.time(), kind });
     }
 
@@ -164,7 +164,7 @@ impl AgentRunner {
         let Some(open) = self.open.take() else {
             let next = self.seek_leader().map_or(Next::Due, Next::Join);
             if next == Next::Due {
-                self.tell_wait(Took { ended: self.pace.due(timeline).unwrap_or(wall).max(wall), ..took });
+                self.record_wait(Took { ended: self.pace.due(timeline).unwrap_or(wall).max(wall), ..took });
             }
             return next;
         };
@@ -175,7 +175,7 @@ impl AgentRunner {
         // its own state comes last: a reader that sees it also sees the states of all agents that it leads
         let mut published = self.conclude_led(timeline, took);
         published &= self.record_step(&open, timeline, wall, work_s);
-        self.tell_turn(&open, self.id(), took);
+        self.record_turn(&open, self.id(), took);
         if let Err(reason) = contained(|| self.run_governor(timeline, &open, work_s)) {
             self.park(reason);
             self.disband(timeline, wall);
@@ -273,7 +273,7 @@ impl AgentRunner {
         self.show_withheld();
         self.metrics.flush(&self.shared.gauges);
         let left = self.shared.gauges.has_left();
-        self.tell(if left { EventKind::Gone } else { EventKind::Parked });
+        self.record_event(if left { EventKind::Gone } else { EventKind::Parked });
         self.shared.gauges.park(reason);
         self.notify_reader();
         if let Some(broad_phase) = self.peers.broad_phase.get().filter(|_| !left) {
@@ -335,7 +335,7 @@ impl AgentRunner {
         for carving in carvings {
             if let Some(removed) = self.model.call(|agent| agent.carve(carving))? {
                 self.carved = true;
-                self.tell(EventKind::Carved(removed));
+                self.record_event(EventKind::Carved(removed));
             }
         }
         if self.carved { self.publish_form() } else { Ok(()) }
@@ -395,7 +395,7 @@ impl AgentRunner {
     fn rest_now(&mut self) {
         self.metrics.flush(&self.shared.gauges);
         self.shared.gauges.set_resting(true);
-        self.tell(EventKind::Rests);
+        self.record_event(EventKind::Rests);
         self.notify_reader();
         if let Some(broad_phase) = self.peers.broad_phase.get() {
             broad_phase.publish_rest(self.id());
@@ -415,7 +415,7 @@ impl AgentRunner {
         self.metrics.pace(&self.shared.gauges, &self.pace);
         self.shared.gauges.woken_at.store(self.pace.scene_time().as_nanos(), Relaxed);
         self.shared.gauges.set_resting(false);
-        self.tell(EventKind::Wakes);
+        self.record_event(EventKind::Wakes);
         self.notify_reader();
         self.led.each(|seat| seat.resume(timeline, wall));
     }

@@ -137,7 +137,7 @@ impl AgentRunner {
 
 impl AgentRunner {
     /// Tells readers of its turns of the step that is `open`, made in a turn of `led_by`.
-    pub(crate) fn tell_turn(&mut self, open: &PendingTurn, led_by: AgentId, took: Took) {
+    pub(crate) fn record_turn(&mut self, open: &PendingTurn, led_by: AgentId, took: Took) {
         let Self { shared, model, pace, .. } = self;
         shared.streams.turn(|| Turn {
             begun: took.begun,
@@ -152,7 +152,7 @@ impl AgentRunner {
     }
 
     /// Tells readers of its turns that it waits, with all it leads.
-    pub(crate) fn tell_wait(&self, took: Took) {
+    pub(crate) fn record_wait(&self, took: Took) {
         self.shared.streams.turn(|| Turn {
             begun: took.begun,
             ended: took.ended,

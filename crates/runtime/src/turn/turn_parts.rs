@@ -171,7 +171,7 @@ impl AgentRunner {
             Err(reason) => self.step_without_failed(reason, wanted, step.factors_max())?,
         };
         if start.dropped > SimSpan::ZERO {
-            self.tell(EventKind::RateMissed);
+            self.record_event(EventKind::RateMissed);
         }
         self.pace.shorten(wanted, dt);
         let rests = report.at_rest && self.may_rest(timeline.sim_at(wall));

@@ -22,7 +22,7 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError, Weak};
 pub(crate) struct Log {
     mode: Mutex<Mode>,
     /// Whether it is recorded or replayed: governors look at this alone where it is not.
-    is_heard: AtomicBool,
+    is_in_use: AtomicBool,
 }
 
 #[derive(Default)]
@@ -55,7 +55,7 @@ impl Log {
             }
         }
         let script = Script { demands, played: 0, of: recording.entries.len(), fault: None };
-        Self { mode: Mutex::new(Mode::Replayed(script)), is_heard: AtomicBool::new(true) }
+        Self { mode: Mutex::new(Mode::Replayed(script)), is_in_use: AtomicBool::new(true) }
     }
 
     /// Writes down a call that is about to be made.
@@ -145,7 +145,7 @@ impl Log {
         }
         let (recorder, order) = begin(matches!(*mode, Mode::Fresh))?;
         *mode = Mode::Recorded(recorder, order);
-        self.is_heard.store(true, Release);
+        self.is_in_use.store(true, Release);
         Ok(())
     }
 
@@ -160,7 +160,7 @@ impl Log {
         if !matches!(*mode, Mode::Recorded(..)) {
             return None;
         }
-        self.is_heard.store(false, Release);
+        self.is_in_use.store(false, Release);
         match std::mem::replace(&mut *mode, Mode::Unrecorded) {
             Mode::Recorded(recorder, order) => {
                 order.inspect(|order| order.close());
@@ -190,7 +190,7 @@ impl Log {
 
     /// The demand of the governor of `agent` after a turn: by `answer`, or by the recording.
     fn demand(&self, agent: AgentId, answer: impl FnOnce() -> Demand) -> Demand {
-        if !self.is_heard.load(Acquire) {
+        if !self.is_in_use.load(Acquire) {
             return answer();
         }
         let mut mode = self.mode();

@@ -6,7 +6,7 @@ use super::object::{Object, Touched, WorldTag};
 use crate::world::World;
 use glam::DVec3;
 use metachron_core::{ContactPartner, Removed, SimTime};
-use metachron_runtime::{AgentEvent, AgentHandle, AgentState, ContactEvent, EventKind, Heard};
+use metachron_runtime::{AgentEvent, AgentHandle, AgentState, ContactEvent, EventKind, StreamReader};
 use std::fmt;
 use std::sync::Arc;
 
@@ -188,7 +188,7 @@ pub struct Events {
     world: World,
     filter: EventFilter,
     /// By their numbers.
-    objects: Vec<HeardObject>,
+    objects: Vec<ReadObject>,
     lost: u64,
     found: Vec<Found>,
     /// Contacts that have begun as the filter sees them.
@@ -197,8 +197,8 @@ pub struct Events {
 
 /// How far an object was heard.
 #[derive(Debug)]
-struct HeardObject {
-    heard: Heard,
+struct ReadObject {
+    reader: StreamReader,
     /// How often the world had gone back when the last event that was heard happened.
     rewinds: u64,
 }
@@ -214,7 +214,7 @@ struct Found {
 impl Events {
     pub(crate) fn new(world: World, filter: EventFilter) -> Self {
         let rewinds = world.rewinds();
-        let objects = world.agents().iter().map(|agent| HeardObject { heard: agent.listen(), rewinds }).collect();
+        let objects = world.agents().iter().map(|agent| ReadObject { reader: agent.listen(), rewinds }).collect();
         Self { world, filter, objects, lost: 0, found: Vec::new(), begun: Vec::new() }
     }
 
@@ -227,21 +227,21 @@ impl Events {
         let known = self.objects.len();
         // an object that joined since is heard from its first drain on
         let joined = world.agents().iter().skip(known);
-        self.objects.extend(joined.map(|agent| HeardObject { heard: agent.listen(), rewinds }));
+        self.objects.extend(joined.map(|agent| ReadObject { reader: agent.listen(), rewinds }));
         let count = self.objects.len();
-        world.agents().iter().take(count).for_each(|agent| self.hear(agent, rewinds));
+        world.agents().iter().take(count).for_each(|agent| self.read(agent, rewinds));
         let rank = |found: &Found| (found.rewinds, found.event.what != Happening::Rewound);
         self.found.sort_by_key(|found| (rank(found), found.event.at, found.event.object));
         self.found.drain(..).map(|found| found.event)
     }
 
     /// Takes in the events of an object, in a world that has gone back so often by now.
-    fn hear(&mut self, agent: &AgentHandle, rewinds: u64) {
+    fn read(&mut self, agent: &AgentHandle, rewinds: u64) {
         let Self { world, filter, objects, lost, found, begun } = self;
-        let HeardObject { heard, rewinds: own } = &mut objects[agent.id().0 as usize];
+        let ReadObject { reader, rewinds: own } = &mut objects[agent.id().0 as usize];
         let (tag, first) = (world.tag(), found.len());
         let object = tag.object(agent.id());
-        let overwritten = agent.hear_events(heard, |event| {
+        let overwritten = agent.read_events(reader, |event| {
             let what = happening(tag, &event);
             *own += u64::from(what == Happening::Rewound);
             if is_news(begun, object, &what, filter) {

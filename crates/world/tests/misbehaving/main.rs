@@ -252,7 +252,12 @@ fn one_that_misbehaves_is_parked_and_all_others_step_as_without_it() {
                     let wanted = if left.is_parked { &refuses.near } else { &clean.near };
                     let at_end = matches!(
                         kind,
-                        Kind::GoBack | Kind::Snapshot | Kind::NanBody | Kind::NanEnergy | Kind::NanBounds | Kind::Calm
+                        Kind::GoBack
+                            | Kind::Snapshot
+                            | Kind::NanBody
+                            | Kind::NanEnergy
+                            | Kind::NanBounds
+                            | Kind::CanSleep
                     );
                     if executor == ExecutorKind::Lockstep && !at_end && left.near != *wanted {
                         faults.push(format!("{name}: near {:?} instead of {wanted:?}", left.near));

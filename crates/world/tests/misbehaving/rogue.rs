@@ -1,7 +1,9 @@
 //! A model that behaves like a rigid body until it is told to misbehave, and how.
 
 use glam::{DMat3, DVec3};
-use metachron_contact::member::{ClusterMember, Locked, MaterialPoint, Pose, Role};
+use metachron_contact::member::{
+    Attachments, ClusterMember, Locked, MaterialPoint, MemberMotion, Pose, Role, SkinPoint, StepEnd, StepSystem,
+};
 use metachron_contact::solve::{Block, Side, SideTerm};
 use metachron_contact::{Agent, Inputs, SetMotion, StepContext, Stepping};
 use metachron_core::{AgentId, Anchor, Archive, ArchiveError, Body, Bounds, Snapshot, StepError};
@@ -19,9 +21,7 @@ pub enum Kind {
     None,
     Begin,
     End,
-    Free,
-    Blocks,
-    Velocities,
+    System,
     Side,
     Pose,
     Skin,
@@ -31,7 +31,7 @@ pub enum Kind {
     GoBack,
     MoveTo,
     Look,
-    Calm,
+    CanSleep,
     Member,
     Snapshot,
     SetMotion,
@@ -70,13 +70,11 @@ pub enum Kind {
 }
 
 impl Kind {
-    pub const ALL: [Self; 43] = [
+    pub const ALL: [Self; 41] = [
         Self::None,
         Self::Begin,
         Self::End,
-        Self::Free,
-        Self::Blocks,
-        Self::Velocities,
+        Self::System,
         Self::Side,
         Self::Pose,
         Self::Skin,
@@ -86,7 +84,7 @@ impl Kind {
         Self::GoBack,
         Self::MoveTo,
         Self::Look,
-        Self::Calm,
+        Self::CanSleep,
         Self::Member,
         Self::Snapshot,
         Self::SetMotion,
@@ -277,7 +275,7 @@ impl ClusterMember for Rogue {
             std::thread::sleep(Duration::from_millis(1));
         }
         self.body.begin(h_s)?;
-        let (free, nan) = (self.body.free().to_vec(), DVec3::NAN);
+        let (free, nan) = (self.body.system().free.to_vec(), DVec3::NAN);
         self.wrong = if self.switch.is(Kind::ShortFree) || self.switch.is(Kind::ShortVelocities) {
             free[..1].to_vec()
         } else if self.switch.is(Kind::LongFree) {
@@ -287,7 +285,7 @@ impl ClusterMember for Rogue {
         } else {
             Vec::new()
         };
-        let blocks = self.body.blocks();
+        let blocks = self.body.system().blocks;
         self.blocks = if self.switch.is(Kind::WrongBlock) {
             vec![Block { row: 7, ..blocks[0] }]
         } else if self.switch.is(Kind::NanBlocks) {
@@ -298,32 +296,26 @@ impl ClusterMember for Rogue {
         Ok(())
     }
 
-    fn blocks(&self) -> &[Block] {
-        self.switch.panics(Kind::Blocks);
-        if self.blocks.is_empty() { self.body.blocks() } else { &self.blocks }
-    }
-
-    fn locked(&self) -> Option<Locked> {
-        self.body.locked()
-    }
-
-    fn free(&self) -> &[DVec3] {
-        self.switch.panics(Kind::Free);
-        let is_wrong = [Kind::ShortFree, Kind::LongFree, Kind::NanFree].iter().any(|kind| self.switch.is(*kind));
-        if is_wrong && self.is_short() { &self.wrong } else { self.body.free() }
-    }
-
-    fn unanswered(&self) -> &[DVec3] {
-        if self.switch.is(Kind::WrongUnanswered) { &[DVec3::ZERO; 5] } else { self.body.unanswered() }
-    }
-
-    fn velocities(&self) -> &[DVec3] {
-        self.switch.panics(Kind::Velocities);
-        if self.switch.is(Kind::NoVelocities) {
-            return &[];
+    fn system(&self) -> StepSystem<'_> {
+        self.switch.panics(Kind::System);
+        let mut system = self.body.system();
+        let is_any = |kinds: &[Kind]| kinds.iter().any(|kind| self.switch.is(*kind));
+        if !self.blocks.is_empty() {
+            system.blocks = &self.blocks;
         }
-        let is_wrong = [Kind::ShortVelocities, Kind::NanVelocities].iter().any(|kind| self.switch.is(*kind));
-        if is_wrong && self.is_short() { &self.wrong } else { self.body.velocities() }
+        if is_any(&[Kind::ShortFree, Kind::LongFree, Kind::NanFree]) && self.is_short() {
+            system.free = &self.wrong;
+        }
+        if is_any(&[Kind::ShortVelocities, Kind::NanVelocities]) && self.is_short() {
+            system.velocities = &self.wrong;
+        }
+        if is_any(&[Kind::WrongUnanswered]) {
+            system.unanswered = &[DVec3::ZERO; 5];
+        }
+        if is_any(&[Kind::NoVelocities]) {
+            system.velocities = &[];
+        }
+        system
     }
 
     fn skin(&self) -> Option<PlacedShape<'_>> {
@@ -334,43 +326,16 @@ impl ClusterMember for Rogue {
         Some(if self.switch.is(Kind::NanSkin) { PlacedShape { view, ..skin } } else { skin })
     }
 
-    fn skin_after<'a>(&'a self, v: &[DVec3], t_s: f64, nodes: &'a mut Vec<DVec3>) -> Option<PlacedShape<'a>> {
-        self.body.skin_after(v, t_s, nodes)
-    }
-
-    fn side(&self, place: &Place, contact: ContactSide) -> Side {
+    fn skin_point(&self, place: &Place, contact: ContactSide) -> SkinPoint {
         self.switch.panics(Kind::Side);
         let of = |block, map| Side::new(0, &[SideTerm { block, map }]).unwrap();
         if self.switch.is(Kind::WrongSide) {
-            return of(9, DMat3::IDENTITY);
+            return of(9, DMat3::IDENTITY).into();
         }
         if self.switch.is(Kind::NanSide) {
-            return of(0, DMat3::NAN);
+            return of(0, DMat3::NAN).into();
         }
-        self.body.side(place, contact)
-    }
-
-    fn anchor(&self, anchor: Anchor) -> Option<MaterialPoint> {
-        self.body.anchor(anchor)
-    }
-
-    fn turn(&self, anchor: Anchor) -> Option<Side> {
-        self.body.turn(anchor)
-    }
-
-    fn pose(&self, v: &[DVec3], t_s: f64) -> Option<Pose> {
-        self.switch.panics(Kind::Pose);
-        let pose = self.body.pose(v, t_s)?;
-        Some(if self.switch.is(Kind::NanPose) { Pose { centre_m: DVec3::NAN, ..pose } } else { pose })
-    }
-
-    fn speed_bound(&self, v: &[DVec3]) -> f64 {
-        self.switch.panics(Kind::SpeedBound);
-        self.body.speed_bound(v)
-    }
-
-    fn spares(&self, other: AgentId) -> bool {
-        self.body.spares(other)
+        self.body.skin_point(place, contact)
     }
 
     fn carry(&mut self, impulses_n_s2: &[DVec3]) {
@@ -392,13 +357,56 @@ impl ClusterMember for Rogue {
         self.body.move_to(v, t_s);
     }
 
-    fn end(&mut self, v: &[DVec3], h_s: f64, touched: bool) -> Result<(), StepError> {
+    fn end(&mut self, step: &StepEnd<'_>) -> Result<(), StepError> {
         self.switch.panics(Kind::End);
-        self.body.end(v, h_s, touched)
+        self.body.end(step)
     }
 
-    fn is_calm(&self) -> bool {
-        self.switch.panics(Kind::Calm);
+    fn can_sleep(&self) -> bool {
+        self.switch.panics(Kind::CanSleep);
         false
+    }
+
+    fn motion(&self) -> Option<&dyn MemberMotion> {
+        Some(self)
+    }
+
+    fn attachments(&self) -> Option<&dyn Attachments> {
+        Some(self)
+    }
+}
+
+impl MemberMotion for Rogue {
+    fn pose(&self, v: &[DVec3], t_s: f64) -> Option<Pose> {
+        self.switch.panics(Kind::Pose);
+        let pose = self.body.pose(v, t_s)?;
+        Some(if self.switch.is(Kind::NanPose) { Pose { centre_m: DVec3::NAN, ..pose } } else { pose })
+    }
+
+    fn locked(&self) -> Option<Locked> {
+        self.body.locked()
+    }
+
+    fn skin_after<'a>(&'a self, v: &[DVec3], t_s: f64, nodes: &'a mut Vec<DVec3>) -> Option<PlacedShape<'a>> {
+        self.body.skin_after(v, t_s, nodes)
+    }
+
+    fn speed_bound(&self, v: &[DVec3]) -> f64 {
+        self.switch.panics(Kind::SpeedBound);
+        self.body.speed_bound(v)
+    }
+
+    fn passes_through(&self, other: AgentId) -> bool {
+        self.body.passes_through(other)
+    }
+}
+
+impl Attachments for Rogue {
+    fn anchor(&self, anchor: Anchor) -> Option<MaterialPoint> {
+        self.body.anchor(anchor)
+    }
+
+    fn turn(&self, anchor: Anchor) -> Option<Side> {
+        self.body.turn(anchor)
     }
 }

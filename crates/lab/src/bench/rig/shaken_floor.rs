@@ -4,7 +4,7 @@
 
 use crate::chart::GRAVITY;
 use glam::{DQuat, DVec3};
-use metachron_contact::member::{ClusterMember, MaterialPoint, Role};
+use metachron_contact::member::{Attachments, ClusterMember, MaterialPoint, MemberMotion, Role, SkinPoint, StepEnd};
 use metachron_contact::solve::Side;
 use metachron_contact::{Agent, Stepping};
 use metachron_core::{Anchor, Snapshot, StepError};
@@ -60,26 +60,11 @@ impl ClusterMember for ShakenFloor {
         Some(PlacedShape { form: &self.form, view })
     }
 
-    fn side(&self, _place: &Place, _contact: ContactSide) -> Side {
-        Side::FIXED
+    fn skin_point(&self, _place: &Place, _contact: ContactSide) -> SkinPoint {
+        SkinPoint { led_m_s: DVec3::X * self.led_m_s, ..Side::FIXED.into() }
     }
 
-    fn led_m_s(&self, _place: &Place) -> DVec3 {
-        DVec3::X * self.led_m_s
-    }
-
-    fn anchor(&self, anchor: Anchor) -> Option<MaterialPoint> {
-        let Anchor::Local(local) = anchor else { return None };
-        Some(MaterialPoint::led(self.middle() + local, DVec3::X * self.led_m_s))
-    }
-
-    fn speed_bound(&self, _v: &[DVec3]) -> f64 {
-        self.led_m_s.abs()
-    }
-
-    fn move_to(&mut self, _v: &[DVec3], _t_s: f64) {}
-
-    fn end(&mut self, _v: &[DVec3], h_s: f64, _touched: bool) -> Result<(), StepError> {
+    fn end(&mut self, &StepEnd { h_s, .. }: &StepEnd<'_>) -> Result<(), StepError> {
         self.time_s += h_s;
         Ok(())
     }
@@ -90,6 +75,27 @@ impl ClusterMember for ShakenFloor {
 
     fn go_back(&mut self) {
         self.time_s = self.kept_s;
+    }
+
+    fn motion(&self) -> Option<&dyn MemberMotion> {
+        Some(self)
+    }
+
+    fn attachments(&self) -> Option<&dyn Attachments> {
+        Some(self)
+    }
+}
+
+impl MemberMotion for ShakenFloor {
+    fn speed_bound(&self, _v: &[DVec3]) -> f64 {
+        self.led_m_s.abs()
+    }
+}
+
+impl Attachments for ShakenFloor {
+    fn anchor(&self, anchor: Anchor) -> Option<MaterialPoint> {
+        let Anchor::Local(local) = anchor else { return None };
+        Some(MaterialPoint::led(self.middle() + local, DVec3::X * self.led_m_s))
     }
 }
 

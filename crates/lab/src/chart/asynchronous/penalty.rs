@@ -5,7 +5,7 @@
 
 use glam::DVec3;
 use metachron_contact::Neighbour;
-use metachron_contact::member::{ClusterMember, Participant};
+use metachron_contact::member::Participant;
 use metachron_contact::remote::PublishedShape;
 use metachron_contact::step::KnownImpulse;
 use metachron_geometry::narrow_phase::{NarrowPhaseScratch, touches};
@@ -66,8 +66,8 @@ impl Overlaps {
         touches(&skin, &theirs, 0.0, &mut self.narrow, &mut self.touches);
         let friction = (skin.form.friction * form.friction).sqrt();
         for touch in self.touches.iter().filter(|touch| touch.gap_m < 0.0) {
-            let side = one.member.side(&touch.on_a, ContactSide::first(touch.normal));
-            let velocity_m_s = side.velocity(one.member.velocities()) - self.matter.velocity(body, &touch.on_b);
+            let side = one.member.skin_point(&touch.on_a, ContactSide::first(touch.normal)).side;
+            let velocity_m_s = side.velocity(one.member.system().velocities) - self.matter.velocity(body, &touch.on_b);
             let approach = Approach { gap_m: touch.gap_m, normal: touch.normal, velocity_m_s };
             let impulse = push_off_n(approach, stiffness_n_m, damping_n_s_m, friction) * dt_s;
             known.push(KnownImpulse { member: 0, side, impulse });

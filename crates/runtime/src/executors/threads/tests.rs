@@ -87,16 +87,16 @@ fn no_agent_is_lost_where_the_system_gives_no_thread() {
     let mut run = *running(Threads::start(spawns, Arc::new(SystemClock::new()), Priority::Normal).unwrap());
     let steps = |run: &Threads| run.agents().iter().map(AgentHandle::steps).collect::<Vec<_>>();
     eventually("all have begun", || steps(&run).iter().all(|made| *made > 0));
-    let mut heard: Vec<_> = run.agents().iter().map(AgentHandle::listen).collect();
+    let mut reader: Vec<_> = run.agents().iter().map(AgentHandle::listen).collect();
     let given = std::mem::replace(&mut run.spawner, refuse);
     let mut archive = Archive::writer();
     run.save(&mut archive).unwrap();
     let bytes = archive.into_bytes();
-    for (agent, heard) in run.agents().iter().zip(&mut heard) {
+    for (agent, reader) in run.agents().iter().zip(&mut reader) {
         let AgentState::Parked(reason) = agent.state() else { panic!("{:?}", agent.state()) };
         assert!(reason.contains("refused a thread for agent:"), "{reason}");
         let mut told = false;
-        agent.hear_events(heard, |event| told |= event.kind == EventKind::Parked);
+        agent.read_events(reader, |event| told |= event.kind == EventKind::Parked);
         assert!(told, "{}", agent.name());
     }
     // nor does one that joins leave anything behind

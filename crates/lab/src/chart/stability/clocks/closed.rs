@@ -60,13 +60,13 @@ pub(crate) struct Found {
     beyond: f64,
     /// Number of samples at which all clocks agreed, and number of such samples with an impact since the previous one.
     looks: u32,
-    blows: u32,
+    impacts: u32,
     /// The longest time without an impact, seconds.
     pause_s: f64,
     /// Second by second, separated by spaces: the highest energy, the greatest change of momentum as published, the greatest
     /// impulse in flight; shares as above.
     energy_of_second: String,
-    told_of_second: String,
+    published_of_second: String,
     in_flight_of_second: String,
 }
 
@@ -90,7 +90,7 @@ impl Experiment for Closed {
         ("angular", |r| (r.angular_drift, 4).into()),
         ("raw drift", |r| (r.raw_drift, 4).into()),
         ("in flight", |r| (r.in_flight, 4).into()),
-        ("blows", |r| (f64::from(r.blows), 0).into()),
+        ("blows", |r| (f64::from(r.impacts), 0).into()),
         ("pause_s", |r| (r.pause_s, 1).into()),
     ];
 
@@ -110,7 +110,7 @@ impl Experiment for Closed {
         let (extremes, whole) = play(case).unwrap_or_default();
         let [energy_peak, energy_end, raw_peak, drift, angular_drift, raw_drift, in_flight, beyond] =
             if whole { extremes.numbers() } else { [f64::NAN; 8] };
-        let [energy_of_second, told_of_second, in_flight_of_second] = [0, 1, 2].map(|k| extremes.of_second(k));
+        let [energy_of_second, published_of_second, in_flight_of_second] = [0, 1, 2].map(|k| extremes.of_second(k));
         let found = Found {
             energy_peak,
             energy_end,
@@ -121,10 +121,10 @@ impl Experiment for Closed {
             in_flight,
             beyond,
             looks: extremes.looks,
-            blows: extremes.blows,
-            pause_s: extremes.pause_s.max(case.seconds - extremes.last_blow_s),
+            impacts: extremes.impacts,
+            pause_s: extremes.pause_s.max(case.seconds - extremes.last_impact_s),
             energy_of_second,
-            told_of_second,
+            published_of_second,
             in_flight_of_second,
         };
         Row { case: case.clone(), found }
@@ -150,7 +150,7 @@ impl Experiment for Closed {
         let delivered = rows.iter().map(|r| r.drift).fold(FLOOR, f64::max);
         let layers = [
             dots("in flight", Colour::Orange, |r| &r.in_flight_of_second),
-            dots("change as published", Colour::Red, |r| &r.told_of_second),
+            dots("change as published", Colour::Red, |r| &r.published_of_second),
             Layer::line("greatest change, delivered", Colour::Blue, [0.0, seconds].map(|t| (t, delivered))),
         ];
         let momentum = Panel::new("momentum", x(), Axis::log("change / momenta at the start", FLOOR, 10.0), layers);
@@ -159,7 +159,7 @@ impl Experiment for Closed {
 
     fn findings(rows: &[Row]) -> Vec<Finding> {
         let most = |get: fn(&Row) -> f64| worst(rows.iter().map(get));
-        let idle = rows.iter().filter(|r| r.blows < BLOWS_MIN).count();
+        let idle = rows.iter().filter(|r| r.impacts < BLOWS_MIN).count();
         vec![
             Finding::at_most("energy at a common time over the start's", most(|r| r.energy_peak), COMMON_ENERGY_MAX),
             Finding::at_most(
@@ -189,8 +189,8 @@ struct Extremes {
     drift: [f64; 2],
     published: [f64; 3],
     looks: u32,
-    blows: u32,
-    last_blow_s: f64,
+    impacts: u32,
+    last_impact_s: f64,
     pause_s: f64,
     /// Cumulative impulses of the pairs.
     struck: BTreeMap<[AgentId; 2], f64>,
@@ -232,9 +232,9 @@ impl Extremes {
             }
         }
         if struck {
-            self.blows += 1;
-            self.pause_s = self.pause_s.max(at_s - self.last_blow_s);
-            self.last_blow_s = at_s;
+            self.impacts += 1;
+            self.pause_s = self.pause_s.max(at_s - self.last_impact_s);
+            self.last_impact_s = at_s;
         }
     }
 }
