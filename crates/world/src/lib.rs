@@ -40,8 +40,8 @@ pub use description::builder::{
 };
 pub use description::placement::{Moved, Overlap};
 pub use description::scene::{
-    Camera, Factors, Gains, Machine, Member, NamedCamera, ObjectCost, PaceWish, Probe, RENDER_SCALE, Scene, Spec,
-    Target, View,
+    Camera, Factors, Gains, Load, Machine, Member, NamedCamera, ObjectCost, PaceWish, Probe, RENDER_SCALE, Scene,
+    ShadingCosts, Spec, StepCost, Target, View,
 };
 #[cfg(feature = "scenery")]
 pub use description::scenery::{GROUP_LEVELS_MAX, Group, Scenery};

@@ -3,10 +3,11 @@
 //! In: tables of the file. Out: the same as types that readers of models share. Never here: the keys of a model.
 
 use super::grid::{Copies, Repeats};
+use super::rigid;
 use crate::check::{Checker, Place};
 use crate::diagnostic::Problem;
 use crate::format::{
-    CommonFile, FaultsFile, MeshFile, RigidFile, RopeFile, SheetFile, SolidFile, SyntheticFile, ToolFile, TreeFile,
+    CommonFile, FaultsFile, MeshFile, RopeFile, SheetFile, SoftFile, SolidFile, SyntheticFile, ToolFile, TreeFile,
     TubeFile,
 };
 use crate::source::Source;
@@ -124,10 +125,10 @@ pub(super) struct Entry {
 
 pub(super) enum ModelFile {
     Tube(TubeFile),
-    Rigid(RigidFile),
-    Sheet(SheetFile),
-    Solid(SolidFile),
-    Rope(RopeFile),
+    Rigid(rigid::Files),
+    Sheet(SoftFile, SheetFile),
+    Solid(SoftFile, SolidFile),
+    Rope(SoftFile, RopeFile),
     Tool(ToolFile),
     Synthetic(SyntheticFile),
     Mesh(MeshFile),
