@@ -277,7 +277,8 @@ fn all_keys_of_a_table_that_have_the_wrong_type_are_told_at_once() {
 
 #[test]
 fn the_range_of_the_pictures_scale_is_read_checked_and_has_a_default() {
-    let scales = |key: &str| read(&format!("format = 1\n[target]\n{key}\n")).map(|scene| scene.target.render_scale);
+    let scales =
+        |key: &str| read(&format!("format = 1\n[target]\n{key}\n")).map(|scene| scene.target.render_scale.ends());
     assert_eq!(scales("").unwrap(), (0.35, 1.0));
     assert_eq!(scales("render_scale = [0.5, 0.9]").unwrap(), (0.5, 0.9));
     assert_eq!(scales("render_scale = 1.0").unwrap(), (1.0, 1.0));

@@ -6,8 +6,7 @@
 use super::demand::{Cost, Demands, FileHead};
 use super::diagnostic::{Problem, did_you_mean};
 use super::document::Document;
-use super::limits;
-use super::schema::whole;
+use super::limits::{self, whole};
 use metachron_core::NumberRange;
 use schemars::JsonSchema;
 use serde::de::DeserializeOwned;
@@ -238,6 +237,11 @@ impl<'d, 't> Checker<'d, 't> {
     pub(super) fn given<'k>(&self, place: &Place, keys: &[&'k str]) -> Vec<&'k str> {
         let table = self.document.find(&place.path).and_then(|found| found.get_ref().as_table());
         keys.iter().copied().filter(|key| table.is_some_and(|table| table.contains_key(*key))).collect()
+    }
+
+    /// The word under `key` of the table at `place`.
+    pub(super) fn written(&self, place: &Place, key: &str) -> &'d str {
+        self.document.find(&place.key(key)).and_then(|found| found.get_ref().as_str()).unwrap_or_default()
     }
 
     /// The number under `key` of the table at `place`, where it has one.

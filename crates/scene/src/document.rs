@@ -91,7 +91,7 @@ impl<'t> Document<'t> {
     }
 }
 
-/// What a table or list has under a key or number.
+/// The entry of a table or list under a key or number.
 fn step<'a, 't>(here: &'a Spanned<DeValue<'t>>, step: &str) -> Option<&'a Spanned<DeValue<'t>>> {
     match here.get_ref() {
         DeValue::Table(table) => table.get(step),

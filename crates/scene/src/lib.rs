@@ -119,6 +119,7 @@ fn assemble(c: &mut Checker<'_, '_>, source: &Source, file: SceneFile, gravity: 
         let what = format!("is {}, which this version does not support", file.format);
         c.wrong(&Place::SCENE, "format", what, format!("expected {FORMAT}"));
     }
+    build::check_target(c, &file.target);
     check_executor(c, file.executor, objects.names.agents().count());
     let probes = build::probes(c, &file.probe, &objects.names);
     // ties between objects that are wrong themselves, or not made yet, would give spurious problems
@@ -147,7 +148,7 @@ fn assemble(c: &mut Checker<'_, '_>, source: &Source, file: SceneFile, gravity: 
         states: file.states,
         environment: file.world.environment,
         gravity,
-        target: build::target(c, &file.target),
+        target: file.target,
         cameras: build::cameras(c, &file.camera),
         machine: build::machine(c, file.machine),
         agents: objects.agents,

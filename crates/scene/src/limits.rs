@@ -1,13 +1,24 @@
 //! Checks a table of a scene against its schema: every number is within its range, every list within its length.
 //!
-//! In: the schema of a table ([`crate::schema::whole`]) and the table as it is written. Out: problems to the [`Checker`].
+//! In: the schema of a table ([`whole`]) and the table as it is written. Out: problems to the [`Checker`].
 //! Never here: types, which serde checks before; rules between keys (`build`).
 
 use crate::check::{Checker, Place};
+use crate::format::ranges::say_everywhere;
+use schemars::JsonSchema;
+use schemars::generate::SchemaSettings;
 use serde_json::Value;
 use std::fmt::Display;
 use toml::Spanned;
 use toml::de::{DeTable, DeValue};
+
+/// The schema of a table with those of the tables in it, for reading.
+pub(super) fn whole<T: JsonSchema>() -> Value {
+    let settings = SchemaSettings::draft2020_12().with(|settings| settings.inline_subschemas = true);
+    let mut schema = settings.into_generator().into_root_schema_for::<T>().to_value();
+    say_everywhere(&mut schema);
+    schema
+}
 
 /// Reports what of `table` is not as `schema` has it.
 pub(super) fn check(c: &mut Checker<'_, '_>, place: &Place, schema: &Value, table: &DeTable<'_>) {

@@ -8,17 +8,8 @@ use super::format::{
     CommonFile, MODELS, MeshFile, OLD_NAMES, RigidFile, RopeFile, SceneFile, SheetFile, SoftFile, SolidFile,
     SolidShapeFile, SyntheticFile, ToolFile, TreeFile, TubeFile,
 };
-use schemars::generate::SchemaSettings;
 use schemars::{JsonSchema, SchemaGenerator};
 use serde_json::{Map, Value, json};
-
-/// The schema of a table with those of the tables in it, for reading.
-pub(super) fn whole<T: JsonSchema>() -> Value {
-    let settings = SchemaSettings::draft2020_12().with(|settings| settings.inline_subschemas = true);
-    let mut schema = settings.into_generator().into_root_schema_for::<T>().to_value();
-    say_everywhere(&mut schema);
-    schema
-}
 
 /// The JSON Schema of a scene file.
 #[must_use]

@@ -51,8 +51,9 @@ fn coupling(c: &mut Checker<'_, '_>, place: &Place, file: &CouplingFile, objects
     if soft && file.law == Some(CouplingLaw::Tlm) {
         c.wrong(place, "law", "is `tlm`, which sheets, solids and ropes do not support", "expected `ledger` or `off`");
     }
-    if let Some(law @ (CouplingLaw::Penalty | CouplingLaw::PenaltyExtrapolated)) = file.law {
-        let what = format!("is `{}`: penalty laws stay in the laboratory (`metachron chart stability`)", law.name());
+    if let Some(CouplingLaw::Penalty | CouplingLaw::PenaltyExtrapolated) = file.law {
+        let law = c.written(place, "law");
+        let what = format!("is `{law}`: penalty laws stay in the laboratory (`metachron chart stability`)");
         c.wrong(place, "law", what, "expected `ledger`, `tlm` or `off`, or no law: all that touch is one problem");
         return None;
     }
@@ -97,7 +98,7 @@ fn check_keys(c: &mut Checker<'_, '_>, place: &Place, file: &CouplingFile) {
     let spring = attach || file.law == Some(CouplingLaw::Tlm);
     let what = match file.law {
         _ if attach => "an attachment".to_owned(),
-        Some(law) => format!("contact by `{}`", law.name()),
+        Some(_) => format!("contact by `{}`", c.written(place, "law")),
         None => "contact".to_owned(),
     };
     let (of_attach, of_spring) =
@@ -114,8 +115,8 @@ fn check_keys(c: &mut Checker<'_, '_>, place: &Place, file: &CouplingFile) {
     for key in needed.iter().filter(|key| !given.contains(key)) {
         c.wrong(place, key, "is missing", format!("{what} needs it: expected `{key}` in this table"));
     }
-    if let (true, Some(law @ (CouplingLaw::Ledger | CouplingLaw::Tlm))) = (attach, file.law) {
-        let law = law.name();
+    if let (true, Some(CouplingLaw::Ledger | CouplingLaw::Tlm)) = (attach, file.law) {
+        let law = c.written(place, "law");
         let what =
             format_args!("does not belong to an attachment by `{law}`, of which either side knows its own force");
         let expected = "expected no `law` beside it: then the two are one problem";

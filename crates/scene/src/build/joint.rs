@@ -5,7 +5,7 @@
 
 use super::common::point;
 use super::force_limits::ForceLimits;
-use super::joint_keys::{FreeMotion, free_motion};
+use super::joint_keys::{check_keys, free_motion};
 use super::joint_rules::{PlacedJoint, check_start, contradictions};
 use super::objects::{NamedObject, Objects};
 use crate::check::{Checker, Place};
@@ -58,7 +58,7 @@ pub(crate) fn joints(c: &mut Checker<'_, '_>, files: &[JointFile], objects: &Obj
 fn place_joint(c: &mut Checker<'_, '_>, index: usize, file: &JointFile, objects: &Objects) -> Option<PlacedJoint> {
     let place = c.place(&format!("joint.{index}"));
     let before = c.count();
-    let free = free_motion(c, &place, file);
+    let is_complete = check_keys(c, &place, file);
     let (a, b) = (end(c, &place, "a", &file.a, objects), end(c, &place, "b", &file.b, objects));
     let (a, b) = (a?, b?);
     if a.agent == b.agent || a.is_led && b.is_led {
@@ -77,6 +77,7 @@ fn place_joint(c: &mut Checker<'_, '_>, index: usize, file: &JointFile, objects:
     }
     let from = a.to_world(point(file.at_a_m));
     let to = other_anchor(c, &place, file, b, from)?;
+    let free = if is_complete { free_motion(c, &place, file, from.distance(to)) } else { None };
     let limits = ForceLimits::read(c, &place, [file.tears_above_n, file.yields_above_n]);
     if c.count() > before {
         return None;
@@ -142,7 +143,7 @@ fn other_anchor(c: &mut Checker<'_, '_>, place: &Place, file: &JointFile, b: End
     match (file.at_b_m, file.kind) {
         (Some(at), _) => Some(b.to_world(at.into())),
         (None, Kind::Spring | Kind::Rope) if b.agent.is_none() && file.b == WORLD => {
-            let expected = format!("expected the other end of the {} in the world, metres", file.kind.name());
+            let expected = format!("expected the other end of the {} in the world, metres", c.written(place, "kind"));
             c.wrong(place, "at_b_m", "is missing", expected);
             None
         }
@@ -171,22 +172,10 @@ impl PlacedJoint {
     /// The joint of the agent `id`, which is at `a`; `sign` is that of the axis.
     fn between(&self, id: AgentId, a: Anchored, b: Anchored, sign: f64) -> Joint {
         let (Anchored { end: a, anchor: from }, Anchored { end: b, anchor: to }) = (a, b);
-        let axis = |world: DVec3| a.rotation.conjugate() * world * sign;
-        let length = from.distance(to);
-        let kind = match self.free_motion {
-            FreeMotion::Fixed => JointKind::Fixed,
-            FreeMotion::Revolute { range_rad, motor, .. } => {
-                JointKind::Revolute { axis: axis(self.axis()), range_rad, motor }
-            }
-            FreeMotion::Spherical => JointKind::Spherical,
-            FreeMotion::Prismatic { range_m, motor, .. } => {
-                JointKind::Prismatic { axis: axis(self.axis()), range_m, motor }
-            }
-            FreeMotion::Spring { stiffness_n_m, damping_n_s_m, rest_m } => {
-                JointKind::Spring { stiffness_n_m, damping_n_s_m, rest_m: rest_m.unwrap_or(length) }
-            }
-            FreeMotion::Rope { length_m } => JointKind::Rope { length_m: length_m.unwrap_or(length) },
-        };
+        let mut kind = self.free_motion;
+        if let JointKind::Revolute { axis, .. } | JointKind::Prismatic { axis, .. } = &mut kind {
+            *axis = a.rotation.conjugate() * self.axis() * sign;
+        }
         // a joint to the world is given in the world's axes
         let (anchor_b_m, rotation_b) = match b.agent {
             Some(_) => (b.to_local(to), b.rotation),

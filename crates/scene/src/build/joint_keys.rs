@@ -5,24 +5,13 @@ use super::motor::{HINGE, SLIDE};
 use crate::check::{Checker, Place};
 use crate::format::{JointFile, JointKind as Kind};
 use glam::DVec3;
-use metachron_models::rigid::Motor;
+use metachron_models::rigid::JointKind;
 
 /// An axis shorter than this has no direction.
 const AXIS_MIN: f64 = 1e-9;
 /// The keys that not all kinds have.
 const OWN: [&str; 8] =
     ["axis", "range_m", "range_deg", "motor", "stiffness_n_m", "damping_n_s_m", "rest_m", "length_m"];
-
-/// The motion that a joint leaves free, as its keys say; axes are unit vectors in the axes of `a`.
-#[derive(Debug, Clone, Copy)]
-pub(super) enum FreeMotion {
-    Fixed,
-    Revolute { axis: DVec3, range_rad: Option<[f64; 2]>, motor: Option<Motor> },
-    Spherical,
-    Prismatic { axis: DVec3, range_m: Option<[f64; 2]>, motor: Option<Motor> },
-    Spring { stiffness_n_m: f64, damping_n_s_m: f64, rest_m: Option<f64> },
-    Rope { length_m: Option<f64> },
-}
 
 /// The keys of each kind that not all kinds have: required ones, then optional ones.
 const fn keys_of(kind: Kind) -> (&'static [&'static str], &'static [&'static str]) {
@@ -35,14 +24,11 @@ const fn keys_of(kind: Kind) -> (&'static [&'static str], &'static [&'static str
     }
 }
 
-/// Reads the motion that the joint leaves free.
-pub(super) fn free_motion(c: &mut Checker<'_, '_>, place: &Place, file: &JointFile) -> Option<FreeMotion> {
-    if !check_keys(c, place, file) {
-        return None;
-    }
+/// Reads the motion that the joint leaves free, its axis in the axes of `a`; `apart_m` is how far its anchors are apart at the start.
+pub(super) fn free_motion(c: &mut Checker<'_, '_>, place: &Place, file: &JointFile, apart_m: f64) -> Option<JointKind> {
     Some(match file.kind {
-        Kind::Fixed => FreeMotion::Fixed,
-        Kind::Spherical => FreeMotion::Spherical,
+        Kind::Fixed => JointKind::Fixed,
+        Kind::Spherical => JointKind::Spherical,
         Kind::Revolute => {
             let range = range(c, place, "range_deg", file.range_deg);
             let around_start = range.is_none_or(|[least, greatest]| least <= 0.0 && greatest >= 0.0);
@@ -56,26 +42,26 @@ pub(super) fn free_motion(c: &mut Checker<'_, '_>, place: &Place, file: &JointFi
             }
             let range_rad = range.map(|r| r.map(f64::to_radians));
             let motor = HINGE.read(c, place, file.motor.as_ref(), range_rad);
-            FreeMotion::Revolute { axis: axis(c, place, file)?, range_rad, motor }
+            JointKind::Revolute { axis: axis(c, place, file)?, range_rad, motor }
         }
         Kind::Prismatic => {
             let range_m = range(c, place, "range_m", file.range_m);
             let motor = SLIDE.read(c, place, file.motor.as_ref(), range_m);
-            FreeMotion::Prismatic { axis: axis(c, place, file)?, range_m, motor }
+            JointKind::Prismatic { axis: axis(c, place, file)?, range_m, motor }
         }
-        Kind::Spring => FreeMotion::Spring {
+        Kind::Spring => JointKind::Spring {
             stiffness_n_m: file.stiffness_n_m?,
             damping_n_s_m: file.damping_n_s_m.unwrap_or(0.0),
-            rest_m: file.rest_m,
+            rest_m: file.rest_m.unwrap_or(apart_m),
         },
-        Kind::Rope => FreeMotion::Rope { length_m: file.length_m },
+        Kind::Rope => JointKind::Rope { length_m: file.length_m.unwrap_or(apart_m) },
     })
 }
 
 /// Reports keys that belong to another kind, and required keys that are missing; returns whether none is missing.
-fn check_keys(c: &mut Checker<'_, '_>, place: &Place, file: &JointFile) -> bool {
+pub(super) fn check_keys(c: &mut Checker<'_, '_>, place: &Place, file: &JointFile) -> bool {
     let (needs, takes) = keys_of(file.kind);
-    let name = file.kind.name();
+    let name = c.written(place, "kind");
     let list = needs.iter().chain(takes).map(|k| format!("`{k}`")).collect::<Vec<_>>().join(", ");
     let expected = if list.is_empty() {
         format!("a {name} joint has no keys of its own")
@@ -104,6 +90,7 @@ fn range(c: &mut Checker<'_, '_>, place: &Place, key: &str, given: Option<[f64; 
     let [least, greatest] = given?;
     if least > greatest {
         c.wrong(place, key, format_args!("is [{least}, {greatest}]"), "expected [least, greatest]");
+        return None;
     }
     given
 }

@@ -44,4 +44,4 @@ pub(super) use mesh::triangles;
 pub(super) use object::read_objects;
 pub(super) use objects::{AGENTS_MAX, Names, Objects, SceneContext};
 pub(super) use sensor::{joint_names, sensors};
-pub(super) use stage::{cameras, machine, probes, target};
+pub(super) use stage::{cameras, check_target, machine, probes};

@@ -133,7 +133,7 @@ struct Parts<'a, 't> {
     place: &'a Place,
     /// Those of the types before.
     keys: Vec<String>,
-    /// What no type has taken yet.
+    /// The keys that no type has taken yet.
     rest: DeTable<'t>,
 }
 

@@ -3,12 +3,11 @@
 //! In: tables of the file. Out: the same as types that readers of models share. Never here: the keys of a model.
 
 use super::grid::{Copies, Repeats};
-use super::rigid;
 use crate::check::{Checker, Place};
 use crate::diagnostic::Problem;
 use crate::format::{
-    CommonFile, FaultsFile, MeshFile, RopeFile, SheetFile, SoftFile, SolidFile, SyntheticFile, ToolFile, TreeFile,
-    TubeFile,
+    CommonFile, FaultsFile, MeshFile, RigidFile, RopeFile, SheetFile, SoftFile, SolidFile, SolidShapeFile,
+    SyntheticFile, ToolFile, TreeFile, TubeFile,
 };
 use crate::source::Source;
 use glam::DVec3;
@@ -123,9 +122,12 @@ pub(super) struct Entry {
     pub(super) copies: Copies,
 }
 
+/// A rigid object as a file has it: its solid, and the rest.
+pub(super) type RigidFiles = (SolidShapeFile, RigidFile);
+
 pub(super) enum ModelFile {
     Tube(TubeFile),
-    Rigid(rigid::Files),
+    Rigid(RigidFiles),
     Sheet(SoftFile, SheetFile),
     Solid(SoftFile, SolidFile),
     Rope(SoftFile, RopeFile),

@@ -3,7 +3,7 @@
 use super::common::{point, rotation};
 use super::inertia::inertia;
 use super::mesh::{self, Mesh};
-use super::objects::ModelContext;
+use super::objects::{ModelContext, RigidFiles};
 use super::scenery::{SurfaceSource, surface_source};
 use crate::check::{Checker, Place};
 use crate::demand::Cost;
@@ -28,11 +28,8 @@ const LED: [&str; 2] = ["keyframe", "repeat"];
 const RESTRAINT: [&str; 5] =
     ["gravity_scale", "linear_damping_per_s", "angular_damping_per_s", "lock_translation", "lock_rotation"];
 
-/// A rigid object as a file has it: its solid, and the rest.
-pub(super) type Files = (SolidShapeFile, RigidFile);
-
 /// Whether the object never moves; reports a plane with `fixed = false`.
-pub(super) fn is_fixed(c: &mut Checker<'_, '_>, place: &Place, (solid, file): &Files) -> bool {
+pub(super) fn is_fixed(c: &mut Checker<'_, '_>, place: &Place, (solid, file): &RigidFiles) -> bool {
     let plane = solid.shape == Shape::Plane;
     if plane && file.fixed == Some(false) {
         c.wrong(
@@ -46,7 +43,12 @@ pub(super) fn is_fixed(c: &mut Checker<'_, '_>, place: &Place, (solid, file): &F
 }
 
 /// Reads a fixed object.
-pub(super) fn obstacle(c: &mut Checker<'_, '_>, place: &Place, files: &Files, source: &Source) -> Option<Obstacle> {
+pub(super) fn obstacle(
+    c: &mut Checker<'_, '_>,
+    place: &Place,
+    files: &RigidFiles,
+    source: &Source,
+) -> Option<Obstacle> {
     let (shape, file) = files;
     let moves = |given: Option<Point>| given.is_some_and(|v| v != [0.0; 3]);
     let moved = [
@@ -76,7 +78,7 @@ pub(super) fn obstacle(c: &mut Checker<'_, '_>, place: &Place, files: &Files, so
 }
 
 /// Reads a moving object.
-pub(super) fn build(c: &mut Checker<'_, '_>, files: &Files, context: &ModelContext<'_>) -> Option<RigidSpec> {
+pub(super) fn build(c: &mut Checker<'_, '_>, files: &RigidFiles, context: &ModelContext<'_>) -> Option<RigidSpec> {
     let (place, (shape, file)) = (context.place, files);
     let before = c.count();
     let density = shape.density_kg_m3.unwrap_or(DENSITY_DEFAULT_KG_M3);
@@ -269,7 +271,7 @@ impl SolidShapeFile {
     }
 }
 
-fn solid(c: &mut Checker<'_, '_>, place: &Place, (shape, file): &Files, among: PartContext<'_>) -> Option<Solid> {
+fn solid(c: &mut Checker<'_, '_>, place: &Place, (shape, file): &RigidFiles, among: PartContext<'_>) -> Option<Solid> {
     if !shape.check(c, place) {
         return None;
     }
@@ -307,7 +309,7 @@ fn part(c: &mut Checker<'_, '_>, place: &Place, file: &SolidShapeFile, among: Pa
 type Surface = (Arc<[DVec3]>, Arc<[[u32; 3]]>);
 
 /// Its mass: that of the file, or that of `solid` of its density.
-fn mass(c: &mut Checker<'_, '_>, place: &Place, (shape, file): &Files, solid: &Solid) -> f64 {
+fn mass(c: &mut Checker<'_, '_>, place: &Place, (shape, file): &RigidFiles, solid: &Solid) -> f64 {
     if let Some(mass) = file.mass_kg {
         if shape.density_kg_m3.is_some() && file.part.is_none() {
             let expected = "expected `mass_kg` or `density_kg_m3`, not both";

@@ -4,17 +4,11 @@ use super::Names;
 use super::objects::NamedObject;
 use crate::check::{Checker, Place};
 use crate::diagnostic::{Problem, did_you_mean};
-use crate::format::{
-    CameraFile, CameraFiles, CameraKeyFile, MODELS, OneOrRange, Point, ProbeFile, TargetFile, model_named,
-};
+use crate::format::{CameraFile, CameraFiles, CameraKeyFile, MODELS, Point, ProbeFile, model_named};
 use glam::DVec3;
 use metachron_core::SimSpan;
-use metachron_world::{Camera, FACTOR, Factors, Gains, Load, Machine, NamedCamera, Probe, RENDER_SCALE, Target, View};
+use metachron_world::{Camera, FACTOR, Load, Machine, NamedCamera, Probe, Target, View};
 
-/// Default share of the lag that is reserved for choosing levels: the most that (GB99) needed.
-const OPTIMISER_SHARE: f64 = 0.05;
-/// Default frames per second.
-const FRAME_DEFAULT_HZ: f64 = 60.0;
 /// Default vertical angle of view, degrees.
 const FOV_DEFAULT_DEG: f64 = 40.0;
 /// The machines that a scene can name.
@@ -22,30 +16,10 @@ const PRESETS: [&str; 2] = ["two-cores-software", "workstation"];
 /// An eye nearer than this to the point it looks at has no direction, metres.
 const EYE_NEAREST_M: f64 = 1e-6;
 
-/// The target frame rate and how it is held.
-pub(crate) fn target(c: &mut Checker<'_, '_>, f: &TargetFile) -> Target {
-    if f.lag_ms.is_none() {
+/// Reports a share of a lag that has no bound.
+pub(crate) fn check_target(c: &mut Checker<'_, '_>, target: &Target) {
+    if target.lag_ms.is_none() {
         c.refuse(&c.place("target"), &["optimiser_share"], "has no effect alone", "expected `lag_ms` beside it");
-    }
-    Target {
-        lag: f.lag_ms.map(|lag_ms| (lag_ms * 1e-3, f.optimiser_share.unwrap_or(OPTIMISER_SHARE))),
-        frame_hz: f.frame_hz.unwrap_or(FRAME_DEFAULT_HZ),
-        policy: f.policy,
-        value: f.value,
-        law: f.law,
-        gains: Gains {
-            alpha: f.alpha,
-            beta: f.beta,
-            kappa: f.kappa,
-            lead: f.lead,
-            margin: f.margin,
-            agent_refine: f.agent_refine,
-            agent_yield: f.agent_yield,
-        },
-        raise: f.raise,
-        may_vanish: f.may_vanish,
-        factors: Factors { focus: f.focus, motion: f.motion, hysteresis: f.hysteresis },
-        render_scale: f.render_scale.map_or(RENDER_SCALE, OneOrRange::ends),
     }
 }
 

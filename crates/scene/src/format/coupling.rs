@@ -66,20 +66,6 @@ pub enum CouplingLaw {
     Off,
 }
 
-impl CouplingLaw {
-    /// The name as scenes write it.
-    #[must_use]
-    pub const fn name(self) -> &'static str {
-        match self {
-            Self::Ledger => "ledger",
-            Self::Penalty => "penalty",
-            Self::PenaltyExtrapolated => "penalty-extrapolated",
-            Self::Tlm => "tlm",
-            Self::Off => "off",
-        }
-    }
-}
-
 /// A material point of an object: a share of the length of a tube or rope, or a point in the object's axes.
 #[derive(Debug, Clone, Copy, PartialEq, Deserialize, JsonSchema)]
 #[serde(untagged, expecting = "a number from 0 to 1 along a tube, or [x, y, z] in an object's axes")]

@@ -99,18 +99,3 @@ pub enum JointKind {
     /// All motion, up to a distance between two points.
     Rope,
 }
-
-impl JointKind {
-    /// The name as scenes write it.
-    #[must_use]
-    pub const fn name(self) -> &'static str {
-        match self {
-            Self::Fixed => "fixed",
-            Self::Revolute => "revolute",
-            Self::Spherical => "spherical",
-            Self::Prismatic => "prismatic",
-            Self::Spring => "spring",
-            Self::Rope => "rope",
-        }
-    }
-}

@@ -26,8 +26,7 @@ pub use coupling::{CouplingFile, CouplingKind, CouplingLaw, FaultsFile, Spot};
 pub use joint::{JointFile, JointKind, MotorFile};
 pub use rigid::{Axis, PoseKeyFile, RigidFile, Shape, SolidShapeFile};
 pub use scene::{
-    CameraFile, CameraFiles, CameraKeyFile, ContactPath, ContactsFile, ProbeFile, SceneFile, SolvesFile, TargetFile,
-    WorldFile,
+    CameraFile, CameraFiles, CameraKeyFile, ContactPath, ContactsFile, ProbeFile, SceneFile, SolvesFile, WorldFile,
 };
 pub use scenery::{GroupFile, MeshFile, MotionFile, TreeFile, TreeLod};
 pub use sensor::{SensorFile, SensorFileKind};

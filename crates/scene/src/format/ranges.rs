@@ -119,7 +119,7 @@ const KEYS: Ranges = Ranges(&[
     ("rise_m", FAR),
     ("scatter_m", NumberRange::new(0.0, 1e4, "m")),
     ("scatter_deg", NumberRange::new(0.0, 180.0, "degrees")),
-    // what is drawn
+    // pictures
     ("triangles", NumberRange::new(4.0, 1e5, "")),
     ("least_triangles", NumberRange::new(1.0, 1e6, "")),
     ("swing_hz", NumberRange::new(1e-4, 100.0, "Hz")),

@@ -1,8 +1,8 @@
 //! The tables of a scene other than its objects.
 
-use super::{CellFile, CouplingFile, FaultsFile, GroupFile, JointFile, OneOrRange, Point, PortalFile, SensorFile};
-use metachron_world::Machine;
-use metachron_world::kinds::{EnvironmentKind, ExecutorKind, LawKind, PolicyKind, PriorityKind, StatesKind, ValueKind};
+use super::{CellFile, CouplingFile, FaultsFile, GroupFile, JointFile, Point, PortalFile, SensorFile};
+use metachron_world::kinds::{EnvironmentKind, ExecutorKind, PriorityKind, StatesKind};
+use metachron_world::{Machine, Target};
 use schemars::JsonSchema;
 use serde::de::IgnoredAny;
 use serde::de::value::{MapAccessDeserializer, SeqAccessDeserializer};
@@ -36,7 +36,7 @@ pub struct SceneFile {
     pub world: WorldFile,
     /// The target frame rate and how it is held.
     #[serde(default)]
-    pub target: TargetFile,
+    pub target: Target,
     /// The camera, or several as `[[camera]]`; at most 100. Default: far enough away to see the whole scene.
     #[serde(default)]
     pub camera: CameraFiles,
@@ -131,57 +131,6 @@ pub enum ContactPath {
     Pairs,
     /// All that touch as one problem.
     Clusters,
-}
-
-/// `[target]`: the target frame rate and how it is held.
-#[derive(Debug, Clone, Default, Deserialize, JsonSchema)]
-#[serde(default, deny_unknown_fields)]
-pub struct TargetFile {
-    /// Target frames per second. Default 60.
-    pub frame_hz: Option<f64>,
-    /// Policy that chooses the level of every visible object. Default `adaptive`.
-    pub policy: PolicyKind,
-    /// How `robin-hood` values an object. Default `plain`.
-    pub value: ValueKind,
-    /// Feedback law. Default `corrected`.
-    pub law: LawKind,
-    /// Gain α of the printed law. Default 1e-4.
-    pub alpha: Option<f64>,
-    /// Gain β of the printed law. Default 5.
-    pub beta: Option<f64>,
-    /// Gain κ of the corrected law; below 1 it is stable for every scene. Default: the law's own.
-    pub kappa: Option<f64>,
-    /// Gain λ of the corrected law on the error's change. Default: the law's own.
-    pub lead: Option<f64>,
-    /// Share of the frame time that is left free. Default: for feedback its law's own, for policies that predict 0.02.
-    pub margin: Option<f64>,
-    /// Gain of the agents' own loops: share of the way to a finer level that one demand goes. Default 0.5.
-    pub agent_refine: Option<f64>,
-    /// Gain of the agents' own loops: share of a delay by others that one demand removes. Default 0.5.
-    pub agent_yield: Option<f64>,
-    /// Greatest lag from reading the camera to the finished picture, milliseconds: levels are chosen so that it is kept, and the
-    /// camera is drawn at its predicted pose for that time. Default: no bound, and the camera is drawn where it was read.
-    pub lag_ms: Option<f64>,
-    /// Share reserved for choosing levels, of the part that culling leaves of `lag_ms`. Default 0.05.
-    pub optimiser_share: Option<f64>,
-    /// Whether `adaptive` and `robin-hood` spend time left over when everything is at its finest on still smoother shapes and softer
-    /// shadows. Default false.
-    pub raise: bool,
-    /// Whether policies that choose by cost may leave objects out of the picture where not even the coarsest of everything fits: for objects without a `may_vanish` of their own. Default false.
-    pub may_vanish: bool,
-    /// How much a level's benefit falls with the distance from the middle of the picture. Default 0. This and the next two are for
-    /// policies that choose by cost.
-    pub focus: Option<f64>,
-    /// How much it falls with speed across the picture. Default 0 for `greedy`, `greedy-incremental` and `greedy-repaired`, 0.5 for
-    /// the others.
-    pub motion: Option<f64>,
-    /// How much it falls with the distance from the level of the frame before: for `greedy`, `greedy-incremental`,
-    /// `greedy-repaired`, and in addition to its own for `adaptive`. Default 0.
-    pub hysteresis: Option<f64>,
-    /// Fraction of its width and height that the picture is drawn with, `[least, most]` or one number for both; in steps of 0.05. Then it is
-    /// enlarged.
-    /// Fewer pixels are drawn where all else is at its coarsest and frames are late still. Default `[0.35, 1.0]`.
-    pub render_scale: Option<OneOrRange<f64>>,
 }
 
 /// One camera as a table, or several as a list of tables.

@@ -22,10 +22,9 @@ mod tube;
 
 use super::appearance::Appearance;
 use super::couplings::Faults;
-use super::kinds::{
-    EnvironmentKind, ExecutorKind, LawKind, Material, PolicyKind, PriorityKind, ShadingKind, StatesKind, ValueKind,
-};
-use super::scene::{Factors, Gains, Machine, Member, PaceWish, RENDER_SCALE, Scene, Spec, Target};
+use super::kinds::{EnvironmentKind, ExecutorKind, Material, PriorityKind, ShadingKind, StatesKind};
+use super::scene::{Machine, Member, PaceWish, Scene, Spec};
+use super::target::Target;
 use glam::{DQuat, DVec3};
 use metachron_contact::Agent;
 use metachron_contact::detect::{ClusterScene, SolveBudget};
@@ -324,18 +323,7 @@ impl SceneBuilder {
             states: StatesKind::default(),
             environment: EnvironmentKind::default(),
             gravity,
-            target: Target {
-                frame_hz: 60.0,
-                policy: PolicyKind::default(),
-                value: ValueKind::default(),
-                law: LawKind::default(),
-                gains: Gains::default(),
-                lag: None,
-                raise: false,
-                may_vanish: false,
-                factors: Factors::default(),
-                render_scale: RENDER_SCALE,
-            },
+            target: Target::default(),
             cameras: Vec::new(),
             machine: Machine::default(),
             agents,

@@ -6,11 +6,12 @@
 use super::appearance::Appearance;
 use super::builder::{Custom, SceneBuilder};
 use super::couplings::{Coupling, Faults};
-use super::kinds::{EnvironmentKind, ExecutorKind, LawKind, PolicyKind, PriorityKind, StatesKind, ValueKind};
+use super::kinds::{EnvironmentKind, ExecutorKind, PriorityKind, StatesKind};
 use super::placement::{Moved, Overlap};
 #[cfg(feature = "scenery")]
 use super::scenery::{Group, Scenery};
 use super::sensor::Sensor;
+use super::target::Target;
 use glam::DVec3;
 #[cfg(doc)]
 use metachron_contact::detect::DEPTH_RANGE_M;
@@ -91,66 +92,6 @@ pub struct Scene {
     pub overlaps: Vec<Overlap>,
     /// Agents that start elsewhere because of an overlap.
     pub moved: Vec<Moved>,
-}
-
-/// The target frame rate and how it is held.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Target {
-    /// Frames per second, 1 … 1000.
-    pub frame_hz: f64,
-    /// The policy that chooses levels.
-    pub policy: PolicyKind,
-    /// How `robin-hood` values an object.
-    pub value: ValueKind,
-    /// The feedback law.
-    pub law: LawKind,
-    /// Gains of the laws.
-    pub gains: Gains,
-    /// The greatest lag from reading the camera to the finished picture, seconds, and the share reserved for choosing
-    /// levels of the part that culling leaves of it; `None` where the scene sets no bound.
-    pub lag: Option<(f64, f64)>,
-    /// Whether time left over when everything is at its finest is spent on still smoother shapes and softer shadows.
-    pub raise: bool,
-    /// Whether objects that do not say may be left out of the picture where time is short.
-    pub may_vanish: bool,
-    /// How much some factors count in the benefit of a level.
-    pub factors: Factors,
-    /// Least and most fraction of its width and height that the picture is drawn with, 0.35 … 1: fewer pixels where all else is at its coarsest
-    /// and frames are late.
-    pub render_scale: (f64, f64),
-}
-
-/// The range of [`Target::render_scale`], and its default.
-pub const RENDER_SCALE: (f64, f64) = (0.35, 1.0);
-
-/// How much some factors count in the benefit of a level (FS93, §5), 0 … 1; `None` is the policy's own default.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub struct Factors {
-    /// Away from the middle of the picture.
-    pub focus: Option<f64>,
-    /// Blurred by motion.
-    pub motion: Option<f64>,
-    /// Unlike the frame before.
-    pub hysteresis: Option<f64>,
-}
-
-/// Gains of the laws that hold frames and agents at their times, with the ranges of [`metachron_core::gains`]; `None` is the law's own default.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub struct Gains {
-    /// α of the printed law.
-    pub alpha: Option<f64>,
-    /// β of the printed law.
-    pub beta: Option<f64>,
-    /// κ of the corrected law; below 1 it is stable for every scene.
-    pub kappa: Option<f64>,
-    /// λ of the corrected law.
-    pub lead: Option<f64>,
-    /// Share of the frame time that is left free.
-    pub margin: Option<f64>,
-    /// Of the agents' own loops: share of the way to a finer level that one demand goes.
-    pub agent_refine: Option<f64>,
-    /// Of the agents' own loops: share of a delay by others that one demand removes.
-    pub agent_yield: Option<f64>,
 }
 
 /// A camera of a scene, by its name.
