@@ -206,10 +206,13 @@ fn describe(key: &mut Value, range: NumberRange) {
 
 /// Bounds a number, or the numbers of a list, or of each form that a value may have; `false` where there is none, or it has a range.
 fn bound(key: &mut Value, range: NumberRange) -> bool {
+    if key.get("x-unit").is_some() {
+        return false;
+    }
     if let Some(Value::Array(forms)) = key.get_mut("anyOf") {
         return forms.iter_mut().fold(false, |any, form| bound(form, range) | any);
     }
-    let kind = if key.get("x-unit").is_some() { String::new() } else { key["type"].to_string() };
+    let kind = key["type"].to_string();
     if kind.contains("array") {
         return key.get_mut("items").is_some_and(|items| bound(items, range));
     }

@@ -44,6 +44,8 @@ pub struct TubeFile {
     pub mass_per_length_kg_m: Option<f64>,
     /// Spacing ε of the simulation along the tube, metres, length / 4096 … 10 lengths: one number fixes it; `[finest, coarsest]` is the
     /// range that the controller may use, starting at the finest. Default: length / 64, fixed.
+    // its range depends on the length
+    #[schemars(extend("x-unit" = "m"))]
     pub eps_m: Option<OneOrRange<f64>>,
     /// Fixed number of segments of the simulation; `eps_m` then applies to the picture only.
     pub segments: Option<u32>,
