@@ -5,7 +5,8 @@ use super::contact::{self, GroupNames};
 use super::grid::{Copies, copies};
 use super::joint::WORLD;
 use super::objects::{
-    AGENTS_MAX, Entry, ModelContext, ModelFile, NamedObject, Names, OBSTACLES_MAX, Objects, SceneContext, too_many,
+    AGENTS_MAX, Entry, ModelContext, ModelFile, NamedObject, Names, OBSTACLES_MAX, Objects, RigidFiles, SceneContext,
+    too_many,
 };
 use super::{rigid, scenery, soft, synthetic, tool, tube};
 use crate::check::{Checker, Place};
@@ -115,7 +116,7 @@ fn read_entry(c: &mut Checker<'_, '_>, index: usize, item: &Spanned<DeValue<'_>>
     }
     let own = match model {
         "tube" => parts.rest(c).map(ModelFile::Tube),
-        "rigid" => parts.both(c).map(ModelFile::Rigid),
+        "rigid" => parts.both(c).map(|(solid, body)| ModelFile::Rigid(RigidFiles { solid, body })),
         "sheet" => parts.both(c).map(|(soft, file)| ModelFile::Sheet(soft, file)),
         "solid" => parts.both(c).map(|(soft, file)| ModelFile::Solid(soft, file)),
         "rope" => parts.both(c).map(|(soft, file)| ModelFile::Rope(soft, file)),

@@ -123,7 +123,10 @@ pub(super) struct Entry {
 }
 
 /// A rigid object as a file has it: its solid, and the rest.
-pub(super) type RigidFiles = (SolidShapeFile, RigidFile);
+pub(super) struct RigidFiles {
+    pub(super) solid: SolidShapeFile,
+    pub(super) body: RigidFile,
+}
 
 pub(super) enum ModelFile {
     Tube(TubeFile),

@@ -29,8 +29,8 @@ const RESTRAINT: [&str; 5] =
     ["gravity_scale", "linear_damping_per_s", "angular_damping_per_s", "lock_translation", "lock_rotation"];
 
 /// Whether the object never moves; reports a plane with `fixed = false`.
-pub(super) fn is_fixed(c: &mut Checker<'_, '_>, place: &Place, (solid, file): &RigidFiles) -> bool {
-    let plane = solid.shape == Shape::Plane;
+pub(super) fn is_fixed(c: &mut Checker<'_, '_>, place: &Place, files: &RigidFiles) -> bool {
+    let (file, plane) = (&files.body, files.solid.shape == Shape::Plane);
     if plane && file.fixed == Some(false) {
         c.wrong(
             place,
@@ -49,7 +49,7 @@ pub(super) fn obstacle(
     files: &RigidFiles,
     source: &Source,
 ) -> Option<Obstacle> {
-    let (shape, file) = files;
+    let RigidFiles { solid: shape, body: file } = files;
     let moves = |given: Option<Point>| given.is_some_and(|v| v != [0.0; 3]);
     let moved = [
         ("velocity_m_s", moves(file.velocity_m_s)),
@@ -79,7 +79,7 @@ pub(super) fn obstacle(
 
 /// Reads a moving object.
 pub(super) fn build(c: &mut Checker<'_, '_>, files: &RigidFiles, context: &ModelContext<'_>) -> Option<RigidSpec> {
-    let (place, (shape, file)) = (context.place, files);
+    let (place, RigidFiles { solid: shape, body: file }) = (context.place, files);
     let before = c.count();
     let density = shape.density_kg_m3.unwrap_or(DENSITY_DEFAULT_KG_M3);
     let solid =
@@ -271,7 +271,8 @@ impl SolidShapeFile {
     }
 }
 
-fn solid(c: &mut Checker<'_, '_>, place: &Place, (shape, file): &RigidFiles, among: PartContext<'_>) -> Option<Solid> {
+fn solid(c: &mut Checker<'_, '_>, place: &Place, files: &RigidFiles, among: PartContext<'_>) -> Option<Solid> {
+    let RigidFiles { solid: shape, body: file } = files;
     if !shape.check(c, place) {
         return None;
     }
@@ -309,7 +310,8 @@ fn part(c: &mut Checker<'_, '_>, place: &Place, file: &SolidShapeFile, among: Pa
 type Surface = (Arc<[DVec3]>, Arc<[[u32; 3]]>);
 
 /// Its mass: that of the file, or that of `solid` of its density.
-fn mass(c: &mut Checker<'_, '_>, place: &Place, (shape, file): &RigidFiles, solid: &Solid) -> f64 {
+fn mass(c: &mut Checker<'_, '_>, place: &Place, files: &RigidFiles, solid: &Solid) -> f64 {
+    let RigidFiles { solid: shape, body: file } = files;
     if let Some(mass) = file.mass_kg {
         if shape.density_kg_m3.is_some() && file.part.is_none() {
             let expected = "expected `mass_kg` or `density_kg_m3`, not both";
