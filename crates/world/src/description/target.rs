@@ -65,7 +65,10 @@ pub struct Target {
 #[cfg_attr(
     feature = "serde",
     derive(serde::Serialize, serde::Deserialize, schemars::JsonSchema),
-    serde(untagged, expecting = "expected a number, of levels a whole number, or a range [least, greatest]"),
+    serde(
+        untagged,
+        expecting = "expected a number, of levels a whole number from 0 to 10, or a range [least, greatest]"
+    ),
     schemars(inline)
 )]
 pub enum OneOrRange<T> {
