@@ -121,7 +121,7 @@ fn values_out_of_range_are_underlined_with_their_range() {
     }
     refused("[0.3, 0.0, 0.1]", "[0.3, inf, 0.1]", "[0.3, inf, 0.1]", &["3 numbers from"]);
     refused("0.002", "0.02", "0.02", &["`wall_m`", "at most `radius_m`, 0.015 m"]);
-    refused("[1, 5]", "[1, 11]", "[1, 11]", &["levels from 0 to 10"]);
+    refused("[1, 5]", "[1, 11]", "[1, 11]", &["2 numbers from 0 to 10"]);
     refused("importance = 1.0", "importance = 0", "0", &["`importance`"]);
     refused("importance = 1.0", "poisson = 0.6", "0.6", &["`poisson`", "0.5"]);
     refused("format = 1", "format = 2", "2", &["expected 1"]);
@@ -277,7 +277,8 @@ fn all_keys_of_a_table_that_have_the_wrong_type_are_told_at_once() {
 
 #[test]
 fn the_range_of_the_pictures_scale_is_read_checked_and_has_a_default() {
-    let scales = |key: &str| read(&format!("format = 1\n[target]\n{key}\n")).map(|scene| scene.target.render_scale);
+    let scales =
+        |key: &str| read(&format!("format = 1\n[target]\n{key}\n")).map(|scene| scene.target.render_scale.ends());
     assert_eq!(scales("").unwrap(), (0.35, 1.0));
     assert_eq!(scales("render_scale = [0.5, 0.9]").unwrap(), (0.5, 0.9));
     assert_eq!(scales("render_scale = 1.0").unwrap(), (1.0, 1.0));
@@ -385,7 +386,7 @@ fn a_tool_may_be_called_an_instrument_as_it_was_before() {
     let read = |model: &str| load(&Source::memory("t", text(model).as_bytes()).unwrap(), &[]).unwrap();
     for scene in [read("instrument"), read("tool")] {
         assert_eq!(scene.agents[0].spec.model(), "tool");
-        assert_eq!(scene.machine.steps, [("tool".to_owned(), Some(7.0), None)]);
+        assert_eq!(scene.machine.step["tool"].base_us, Some(7.0));
     }
 }
 

@@ -83,7 +83,7 @@ fn an_eps_that_a_sheet_or_a_rope_cannot_have_is_told_with_its_line() {
         (sheet(""), 1, "`segments` of `s` is missing; expected `segments` or `eps_m`"),
         (sheet("eps_m = [0.0005, 0.05]"), 4, "`eps_m` of `s` is too fine for its size; expected a larger finest ε"),
         (sheet("eps_m = [0.05, 0.01]"), 4, "`eps_m` of `s` runs from 0.05 down to 0.01"),
-        (sheet("eps_m = -1"), 4, "`eps_m` of `s` has the value -1"),
+        (sheet("eps_m = -1"), 4, "`eps_m` of `s` is -1"),
         (rope("eps_m = 0.0004"), 5, "at most 10000 vertices, 2047 cells along an axis"),
         (rope("eps_m = 0.1\nsegments = 10"), 6, "`segments` of `s` contradicts `eps_m`"),
     ] {

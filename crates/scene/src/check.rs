@@ -6,14 +6,21 @@
 use super::demand::{Cost, Demands, FileHead};
 use super::diagnostic::{Problem, did_you_mean};
 use super::document::Document;
-use super::format::{OneOrRange, Point};
-use glam::DVec3;
-use metachron_core::{NumberRange, Ranges};
+use super::limits::{self, whole};
+use metachron_core::NumberRange;
+use schemars::JsonSchema;
 use serde::de::DeserializeOwned;
+use serde_json::Value;
+use std::any::TypeId;
+use std::collections::BTreeMap;
 use std::fmt::Display;
 use std::ops::Range;
+use std::rc::Rc;
 use toml::Spanned;
 use toml::de::{DeTable, DeValue, ValueDeserializer};
+
+/// Characters of a name in a message.
+const NAME_MAX: usize = 64;
 
 /// More names than this are counted, not listed.
 const LISTED_MAX: usize = 20;
@@ -49,6 +56,8 @@ pub(super) struct Checker<'d, 't> {
     problems: Vec<Problem>,
     /// Names of objects that could not be read.
     unread: Vec<String>,
+    /// Schemas of tables, by their types.
+    schemas: BTreeMap<TypeId, Rc<Value>>,
     /// In a draft, which makes nothing that takes memory or time: the memory that a scene would take.
     draft: Option<Demands>,
 }
@@ -63,18 +72,25 @@ pub(super) struct Place {
 }
 
 impl Place {
-    pub(super) fn new(path: impl Into<String>, owner: impl Into<String>) -> Self {
-        Self { path: path.into(), owner: owner.into() }
-    }
+    /// The scene itself, whose keys are in no table.
+    pub(super) const SCENE: Self = Self { path: String::new(), owner: String::new() };
 
     /// The `index`-th entry of the list under `key`.
     pub(super) fn entry(&self, key: &str, index: usize) -> Self {
-        Self { path: format!("{}.{key}.{index}", self.path), owner: self.owner.clone() }
+        self.table(&format!("{key}.{index}"))
     }
 
     /// The table under `key`.
     pub(super) fn table(&self, key: &str) -> Self {
-        Self { path: format!("{}.{key}", self.path), owner: self.owner.clone() }
+        let path = self.key(key);
+        let has_no_name = self.owner == format!("of `[{}]`", self.path);
+        let owner = if has_no_name { format!("of `[{path}]`") } else { self.owner.clone() };
+        Self { path, owner }
+    }
+
+    /// The same place for a message in which its name would be wrong.
+    pub(super) fn unnamed(&self) -> Self {
+        Self { owner: String::new(), ..self.clone() }
     }
 
     fn key(&self, key: &str) -> String {
@@ -87,28 +103,9 @@ impl Place {
     }
 }
 
-/// The range of a number: one for all keys, or the one that a list has for the key.
-pub(super) trait Allowed {
-    /// The range of the number under `key`.
-    fn of(self, key: &str) -> NumberRange;
-}
-
-impl Allowed for NumberRange {
-    fn of(self, _key: &str) -> NumberRange {
-        self
-    }
-}
-
-impl Allowed for Ranges {
-    fn of(self, key: &str) -> NumberRange {
-        let name = key.split('.').next().unwrap_or(key);
-        self.get(name).unwrap_or_else(|| unreachable!("a key with a number has a range: {key}"))
-    }
-}
-
 impl<'d, 't> Checker<'d, 't> {
     pub(super) fn new(document: &'d Document<'t>) -> Self {
-        Self { document, problems: Vec::new(), unread: Vec::new(), draft: None }
+        Self { document, problems: Vec::new(), unread: Vec::new(), schemas: BTreeMap::new(), draft: None }
     }
 
     /// A checker of a scene of which nothing is made.
@@ -171,19 +168,54 @@ impl<'d, 't> Checker<'d, 't> {
         self.problems.push(problem);
     }
 
-    /// Reads a `table` at `span`; `also` are further keys that it may have. Every wrong key of it is reported, up to the first twenty:
-    /// each is removed, so that the next is found.
-    pub(super) fn read<T: DeserializeOwned>(
+    /// The place of the table at `path`: one of a list is named as it names itself, or by the two that it connects.
+    pub(super) fn place(&self, path: &str) -> Place {
+        let table = self.document.find(path).and_then(|found| found.get_ref().as_table());
+        let text = |key: &str| Some(table?.get(key)?.get_ref().as_str()?.chars().take(NAME_MAX).collect::<String>());
+        let (list, number) = path.split_once('.').unwrap_or((path, ""));
+        let owner = match (text("a").zip(text("b")), text("name")) {
+            (_, Some(name)) if list == "object" => format!("of `{name}`"),
+            (Some((a, b)), _) => format!("of the {list} of `{a}` and `{b}`"),
+            (_, Some(name)) => format!("of {list} `{name}`"),
+            _ if number.parse::<usize>().is_ok() => format!("of `[[{list}]]`"),
+            _ => format!("of `[{path}]`"),
+        };
+        Place { path: path.to_owned(), owner }
+    }
+
+    /// The place of the table under `key` of the one at `place`.
+    pub(super) fn within(&self, place: &Place, key: &str) -> Place {
+        if place.path.is_empty() { self.place(key) } else { place.table(key) }
+    }
+
+    /// The schema of a table, with the tables in it.
+    fn schema<T: JsonSchema + 'static>(&mut self) -> Rc<Value> {
+        Rc::clone(self.schemas.entry(TypeId::of::<T>()).or_insert_with(|| Rc::new(whole::<T>())))
+    }
+
+    /// The keys that the table of a type may have.
+    pub(super) fn keys<T: JsonSchema + 'static>(&mut self) -> Vec<String> {
+        self.schema::<T>()["properties"].as_object().into_iter().flatten().map(|(key, _)| key.clone()).collect()
+    }
+
+    /// Reads the `table` at `place`; `also` are further keys that are read apart from it. Every wrong key of it is reported, up to the
+    /// first twenty: each is removed, so that the next is found. `None` where any was.
+    pub(super) fn read<T: DeserializeOwned + JsonSchema + 'static>(
         &mut self,
+        place: &Place,
         mut table: DeTable<'_>,
-        span: Range<usize>,
         also: &[&str],
     ) -> Option<T> {
+        let (span, before) = (self.document.locate(&place.path), self.count());
         let mut taken: Vec<String> = Vec::new();
         for _ in 0..TABLE_PROBLEMS_MAX {
             let value = ValueDeserializer::from(Spanned::new(span.clone(), DeValue::Table(table.clone())));
             let error = match T::deserialize(value) {
-                Ok(read) => return taken.is_empty().then_some(read),
+                Ok(read) => {
+                    let schema = self.schema::<T>();
+                    limits::check(self, place, &schema, &table);
+                    return (self.count() == before).then_some(read);
+                }
                 Err(error) => error,
             };
             let missing = error.message().strip_prefix("missing field `").and_then(|rest| rest.split('`').next());
@@ -201,62 +233,39 @@ impl<'d, 't> Checker<'d, 't> {
         None
     }
 
+    /// Which of `keys` the table at `place` has.
+    pub(super) fn given<'k>(&self, place: &Place, keys: &[&'k str]) -> Vec<&'k str> {
+        let table = self.document.find(&place.path).and_then(|found| found.get_ref().as_table());
+        keys.iter().copied().filter(|key| table.is_some_and(|table| table.contains_key(*key))).collect()
+    }
+
+    /// The word under `key` of the table at `place`.
+    pub(super) fn written(&self, place: &Place, key: &str) -> &'d str {
+        self.document.find(&place.key(key)).and_then(|found| found.get_ref().as_str()).unwrap_or_default()
+    }
+
+    /// The number under `key` of the table at `place`, where it has one.
+    pub(super) fn found(&self, place: &Place, key: &str) -> Option<f64> {
+        limits::number(self.document.find(&place.key(key))?.get_ref())
+    }
+
+    /// Reports each of `keys` that the table at `place` has.
+    pub(super) fn refuse(&mut self, place: &Place, keys: &[&str], what: impl Display, expected: &str) {
+        self.given(place, keys).into_iter().for_each(|key| self.wrong(place, key, &what, expected));
+    }
+
     /// Reports that `key` is wrong: its present value, and the expected one.
     pub(super) fn wrong(&mut self, place: &Place, key: &str, what: impl Display, expected: impl Into<String>) {
         let span = self.document.locate(&place.key(key));
         self.problems.push(Problem::new(span, format!("{} {what}", place.named(key))).expecting(expected));
     }
 
-    /// A number within its range. One outside is reported and replaced by the nearest that is within it.
-    pub(super) fn number(&mut self, place: &Place, key: &str, value: f64, allowed: impl Allowed) -> f64 {
-        let range = allowed.of(key);
+    /// A number whose range no key has for itself. One outside is reported and replaced by the nearest that is within it.
+    pub(super) fn number(&mut self, place: &Place, key: &str, value: f64, range: NumberRange) -> f64 {
         if !range.contains(value) {
             self.wrong(place, key, format_args!("is {value}"), format!("expected {range}"));
         }
         range.nearest(value)
-    }
-
-    /// As [`Self::number`], for a value that may be left out.
-    pub(super) fn optional(
-        &mut self,
-        place: &Place,
-        key: &str,
-        value: Option<f64>,
-        allowed: impl Allowed,
-    ) -> Option<f64> {
-        value.map(|given| self.number(place, key, given, allowed))
-    }
-
-    /// A point or direction, every coordinate within ± `most`.
-    pub(super) fn point(&mut self, place: &Place, key: &str, value: Point, most: f64) -> DVec3 {
-        if value.iter().all(|x| x.abs() <= most) {
-            return DVec3::from_array(value);
-        }
-        let expected = format!("expected 3 numbers from -{most} to {most}");
-        self.wrong(place, key, format_args!("is {value:?}"), expected);
-        DVec3::ZERO
-    }
-
-    /// One number or a range, both ends within `allowed` and in order.
-    pub(super) fn ends(
-        &mut self,
-        place: &Place,
-        key: &str,
-        value: OneOrRange<f64>,
-        allowed: impl Allowed,
-    ) -> (f64, f64) {
-        let range = allowed.of(key);
-        let (least, greatest) = value.ends();
-        if !(range.contains(least) && range.contains(greatest)) {
-            let bad = if range.contains(least) { greatest } else { least };
-            self.wrong(place, key, format_args!("has the value {bad}"), format!("expected {range}"));
-        } else if least > greatest {
-            let expected = format!("expected the lesser number first: [{greatest}, {least}]");
-            self.wrong(place, key, format_args!("runs from {least} down to {greatest}"), expected);
-        } else {
-            return (least, greatest);
-        }
-        (range.least, range.greatest)
     }
 
     /// Whether `name` is one of `known`; one that is neither known nor an object that could not be read is reported.

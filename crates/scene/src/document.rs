@@ -76,27 +76,28 @@ impl<'t> Document<'t> {
         0..self.text.find(['\n', '\r']).unwrap_or(self.text.len())
     }
 
+    /// The value at the dotted `path`.
+    pub(super) fn find(&self, path: &str) -> Option<&Spanned<DeValue<'t>>> {
+        let mut steps = path.split('.');
+        let first = self.root.get(steps.next()?)?;
+        steps.try_fold(first, step)
+    }
+
     /// Position of the value at the dotted `path`, or of the nearest thing around it that is in the text.
     pub(super) fn locate(&self, path: &str) -> Range<usize> {
-        locate(&self.root, path).unwrap_or_else(|| self.first_line())
+        let around = std::iter::successors(Some(path), |path| Some(path.rsplit_once('.')?.0));
+        let found = around.into_iter().find_map(|path| self.find(path));
+        found.map_or_else(|| self.first_line(), Spanned::span)
     }
 }
 
-fn locate(root: &DeTable<'_>, path: &str) -> Option<Range<usize>> {
-    let mut steps = path.split('.').filter(|s| !s.is_empty());
-    let mut here = root.get(steps.next()?)?;
-    for step in steps {
-        let next = match here.get_ref() {
-            DeValue::Table(table) => table.get(step),
-            DeValue::Array(items) => step.parse().ok().and_then(|i: usize| items.get(i)),
-            _ => None,
-        };
-        match next {
-            Some(next) => here = next,
-            None => break,
-        }
+/// The entry of a table or list under a key or number.
+fn step<'a, 't>(here: &'a Spanned<DeValue<'t>>, step: &str) -> Option<&'a Spanned<DeValue<'t>>> {
+    match here.get_ref() {
+        DeValue::Table(table) => table.get(step),
+        DeValue::Array(items) => items.get(step.parse::<usize>().ok()?),
+        _ => None,
     }
-    Some(here.span())
 }
 
 /// The parts of a dotted key, of which a quoted one may hold dots as in TOML; `None` where one is empty or a quote is not closed.

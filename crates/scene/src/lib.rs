@@ -26,6 +26,7 @@ mod demand;
 mod diagnostic;
 mod document;
 pub mod format;
+mod limits;
 pub mod papers;
 mod schema;
 mod snippet;
@@ -40,7 +41,7 @@ use build::{Objects, SceneContext};
 use check::{Checker, Place};
 use diagnostic::Problem;
 use document::Document;
-use format::{ContactsFile, SCENE, SURROUNDINGS, SceneFile, SolvesFile, WorldFile};
+use format::{ContactsFile, SceneFile, SolvesFile, WorldFile};
 use glam::DVec3;
 use metachron_contact::detect::{LEAST_STEPS_DEFAULT, SolveBudget};
 use metachron_contact::solve::DEPTH_DEFAULT_M;
@@ -54,8 +55,6 @@ const FORMAT: i64 = 1;
 pub const THREADED_MAX: usize = 1000;
 /// Default gravity, m/s².
 const GRAVITY_DEFAULT: DVec3 = DVec3::new(0.0, 0.0, -9.81);
-/// Strongest gravity, m/s².
-const GRAVITY_MAX: f64 = 1e4;
 
 /// Reads a scene. Each override is a dotted key, such as `target.frame_hz` or `object.NAME.rate_hz`, and a TOML value
 /// (text that is not TOML is a string); of equal keys the last counts.
@@ -89,12 +88,9 @@ fn read(source: &Source, text: &str) -> Result<Scene, Vec<Problem>> {
 
 fn resolve(c: &mut Checker<'_, '_>, source: &Source) -> Option<Scene> {
     let file = read_stage(c);
-    let world = file.as_ref().and_then(|f| f.world.as_ref());
-    let gravity = gravity(c, world);
+    let world = file.as_ref().map(|f| &f.world);
+    let gravity = world.and_then(|w| w.gravity_m_s2).map_or(GRAVITY_DEFAULT, DVec3::from);
     let faults = world.and_then(|w| w.faults.as_ref());
-    if let Some(faults) = faults {
-        build::world_faults(c, faults);
-    }
     let context = SceneContext { source, gravity, faults };
     let objects = c.document().root().get("object");
     let objects = build::read_objects(c, objects, &context);
@@ -106,35 +102,24 @@ fn read_stage(c: &mut Checker<'_, '_>) -> Option<SceneFile> {
     let document = c.document();
     let others = document.root().iter().filter(|(key, _)| key.get_ref() != "object");
     let table = others.map(|(key, value)| (key.clone(), value.clone())).collect();
-    c.read(table, document.first_line(), &[])
-}
-
-fn gravity(c: &mut Checker<'_, '_>, world: Option<&WorldFile>) -> DVec3 {
-    let place = Place::new("world", "of `[world]`");
-    let given = world.and_then(|w| w.gravity_m_s2);
-    given.map_or(GRAVITY_DEFAULT, |g| c.point(&place, "gravity_m_s2", g, GRAVITY_MAX))
-}
-
-/// How long a turn may last.
-fn stall_limit(c: &mut Checker<'_, '_>, stall_s: Option<f64>) -> Option<Duration> {
-    let given_s = c.optional(&Place::new("", ""), "stall_s", stall_s, SCENE)?;
-    Some(Duration::from_secs_f64(given_s))
+    c.read(&Place::SCENE, table, &[])
 }
 
 /// Whether the executor that was asked for takes so many agents.
-fn check_executor(c: &mut Checker<'_, '_>, executor: Option<ExecutorKind>, agents: usize) {
-    if executor == Some(ExecutorKind::Threads) && agents > THREADED_MAX {
+fn check_executor(c: &mut Checker<'_, '_>, executor: ExecutorKind, agents: usize) {
+    if executor == ExecutorKind::Threads && agents > THREADED_MAX {
         let what = format!("is `threads`, with {agents} agents");
         let expected = format!("expected `pool` or `auto`: at most {THREADED_MAX} agents have a thread each");
-        c.wrong(&Place::new("", ""), "executor", what, expected);
+        c.wrong(&Place::SCENE, "executor", what, expected);
     }
 }
 
 fn assemble(c: &mut Checker<'_, '_>, source: &Source, file: SceneFile, gravity: DVec3, mut objects: Objects) -> Scene {
     if file.format != FORMAT {
         let what = format!("is {}, which this version does not support", file.format);
-        c.wrong(&Place::new("", ""), "format", what, format!("expected {FORMAT}"));
+        c.wrong(&Place::SCENE, "format", what, format!("expected {FORMAT}"));
     }
+    build::check_target(c, &file.target);
     check_executor(c, file.executor, objects.names.agents().count());
     let probes = build::probes(c, &file.probe, &objects.names);
     // ties between objects that are wrong themselves, or not made yet, would give spurious problems
@@ -148,30 +133,24 @@ fn assemble(c: &mut Checker<'_, '_>, source: &Source, file: SceneFile, gravity: 
     let fixed = objects.obstacles.len();
     let cells = build::cells(c, &file.cell, &file.portal, &mut objects);
     let walls = fixed..objects.obstacles.len();
-    let contacts = file.world.as_ref().and_then(|world| world.contacts);
+    let contacts = file.world.contacts;
     if let Some(ContactsFile::By(_)) = contacts {
         let expected =
             "expected no such key: contacts are solved in clusters; or false, for those that a coupling names alone";
-        c.wrong(&Place::new("world", "of `[world]`"), "contacts", "is neither true nor false", expected);
+        c.wrong(&c.place("world"), "contacts", "is neither true nor false", expected);
     }
-    let depth = file.world.as_ref().and_then(|world| world.contact_depth_m);
-    let contact_depth_m = depth.map_or(DEPTH_DEFAULT_M, |depth_m| {
-        c.number(&Place::new("world", "of `[world]`"), "contact_depth_m", depth_m, SURROUNDINGS)
-    });
-    let contact_budget = contact_budget(c, file.world.as_ref());
-    let environment = file.world.as_ref().and_then(|world| world.environment).unwrap_or_default();
     Scene {
         name: source.name().to_owned(),
         description: file.description.unwrap_or_default(),
-        executor: file.executor.unwrap_or_default(),
-        priority: file.priority.unwrap_or_default(),
-        stall_limit: stall_limit(c, file.stall_s),
-        states: file.states.unwrap_or_default(),
-        environment,
+        executor: file.executor,
+        priority: file.priority,
+        stall_limit: file.stall_s.map(Duration::from_secs_f64),
+        states: file.states,
+        environment: file.world.environment,
         gravity,
-        target: build::target(c, file.target.as_ref()),
+        target: file.target,
         cameras: build::cameras(c, &file.camera),
-        machine: build::machine(c, file.machine.as_ref()),
+        machine: build::machine(c, file.machine),
         agents: objects.agents,
         obstacles: objects.obstacles,
         obstacle_appearances: objects.obstacle_appearances,
@@ -180,8 +159,8 @@ fn assemble(c: &mut Checker<'_, '_>, source: &Source, file: SceneFile, gravity: 
         cells,
         walls,
         contacts: contacts != Some(ContactsFile::Whether(false)),
-        contact_depth_m,
-        contact_budget,
+        contact_depth_m: file.world.contact_depth_m.unwrap_or(DEPTH_DEFAULT_M),
+        contact_budget: contact_budget(&file.world),
         joints: joints.into(),
         joint_names,
         sensors,
@@ -193,12 +172,11 @@ fn assemble(c: &mut Checker<'_, '_>, source: &Source, file: SceneFile, gravity: 
 }
 
 /// How far the solves of contacts go.
-fn contact_budget(c: &mut Checker<'_, '_>, world: Option<&WorldFile>) -> SolveBudget {
-    let least = world.and_then(|world| world.contact_least_steps).map_or(LEAST_STEPS_DEFAULT, |steps| {
-        c.number(&Place::new("world", "of `[world]`"), "contact_least_steps", f64::from(steps), SURROUNDINGS) as u32
-    });
-    match world.and_then(|world| world.contact).unwrap_or_default() {
-        SolvesFile::Budget => SolveBudget::Timed { least_steps: least },
+fn contact_budget(world: &WorldFile) -> SolveBudget {
+    match world.contact {
+        SolvesFile::Budget => {
+            SolveBudget::Timed { least_steps: world.contact_least_steps.unwrap_or(LEAST_STEPS_DEFAULT) }
+        }
         SolvesFile::Exact => SolveBudget::Exact,
     }
 }

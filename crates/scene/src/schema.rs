@@ -3,9 +3,10 @@
 //! In: nothing. Out: one schema (draft 2020-12). Never here: rules between keys, not all of which a schema can express.
 
 use super::build::AGENTS_MAX;
+use super::format::ranges::say_everywhere;
 use super::format::{
-    CommonFile, MODELS, MeshFile, OLD_NAMES, RigidFile, RopeFile, SceneFile, SheetFile, SolidFile, SyntheticFile,
-    ToolFile, TreeFile, TubeFile,
+    CommonFile, MODELS, MeshFile, OLD_NAMES, RigidFile, RopeFile, SceneFile, SheetFile, SoftFile, SolidFile,
+    SolidShapeFile, SyntheticFile, ToolFile, TreeFile, TubeFile,
 };
 use schemars::{JsonSchema, SchemaGenerator};
 use serde_json::{Map, Value, json};
@@ -15,15 +16,15 @@ use serde_json::{Map, Value, json};
 pub fn json_schema() -> Value {
     let mut generator = SchemaGenerator::default();
     let objects = [
-        object::<TubeFile>(&mut generator),
-        object::<RigidFile>(&mut generator),
-        object::<SheetFile>(&mut generator),
-        object::<SolidFile>(&mut generator),
-        object::<RopeFile>(&mut generator),
-        object::<ToolFile>(&mut generator),
-        object::<SyntheticFile>(&mut generator),
-        object::<MeshFile>(&mut generator),
-        object::<TreeFile>(&mut generator),
+        object::<(), TubeFile>(&mut generator),
+        object::<SolidShapeFile, RigidFile>(&mut generator),
+        object::<SoftFile, SheetFile>(&mut generator),
+        object::<SoftFile, SolidFile>(&mut generator),
+        object::<SoftFile, RopeFile>(&mut generator),
+        object::<(), ToolFile>(&mut generator),
+        object::<(), SyntheticFile>(&mut generator),
+        object::<(), MeshFile>(&mut generator),
+        object::<(), TreeFile>(&mut generator),
     ];
     let mut root = generator.root_schema_for::<SceneFile>().to_value();
     // made above; the root generator drops definitions that it does not use itself
@@ -41,6 +42,7 @@ pub fn json_schema() -> Value {
     for (name, object) in MODELS.into_iter().zip(objects) {
         root["$defs"][name] = with_model(object, name);
     }
+    say_everywhere(&mut root);
     drop_null(&mut root);
     root
 }
@@ -69,20 +71,17 @@ fn drop_null(schema: &mut Value) {
     }
 }
 
-/// A model's table with the keys that all models share.
-fn object<T: JsonSchema>(generator: &mut SchemaGenerator) -> Value {
-    let mut own = T::json_schema(generator).to_value();
-    let mut common = CommonFile::json_schema(generator).to_value();
-    let mut properties = Map::new();
-    for table in [&mut common, &mut own] {
-        if let Value::Object(keys) = table["properties"].take() {
-            properties.extend(keys);
-        }
+/// A model's table, which is read as two types, with the keys that all models share.
+fn object<S: JsonSchema, T: JsonSchema>(generator: &mut SchemaGenerator) -> Value {
+    let mut parts = [CommonFile::json_schema(generator), S::json_schema(generator), T::json_schema(generator)];
+    let (mut properties, mut required) = (Map::new(), Vec::new());
+    for part in &mut parts {
+        properties.extend(part.remove("properties").as_ref().and_then(Value::as_object).cloned().unwrap_or_default());
+        required.extend(part.remove("required").as_ref().and_then(Value::as_array).cloned().unwrap_or_default());
     }
-    let required: Vec<Value> =
-        [&common, &own].into_iter().filter_map(|t| t.get("required")?.as_array()).flatten().cloned().collect();
-    own["properties"] = Value::Object(properties);
-    own["required"] = Value::Array(required);
+    let [.., own] = parts;
+    let mut own = own.to_value();
+    (own["properties"], own["required"]) = (Value::Object(properties), Value::Array(required));
     own
 }
 

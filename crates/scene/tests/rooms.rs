@@ -99,7 +99,7 @@ fn objects_and_scenes_may_allow_objects_to_vanish() {
     };
     let asked = scene("may_vanish = true\nfocus = 0.5", "may_vanish = false").unwrap();
     assert!(asked.target.may_vanish && asked.agents[0].appearance.may_vanish == Some(false));
-    assert_eq!((asked.target.factors.focus, asked.target.factors.motion), (Some(0.5), None));
+    assert_eq!((asked.target.focus, asked.target.motion), (Some(0.5), None));
     let usual = scene("", "").unwrap();
     assert!(!usual.target.may_vanish && usual.agents[0].appearance.may_vanish.is_none());
     assert!(scene("hysteresis = 1.5", "").unwrap_err().contains("hysteresis"));

@@ -19,7 +19,7 @@ use metachron_render::{Actor, Appearance, Camera, EnvironmentLight, Form, Level,
 use metachron_runtime::{DrawPrice, Governor, ObjectPrice};
 use metachron_world::kinds;
 use metachron_world::kinds::{LawKind, ShadingKind, ValueKind};
-use metachron_world::{Factors, Member, Scene, Scenery, machine};
+use metachron_world::{Member, Scene, Scenery, Target, machine};
 use std::sync::Arc;
 
 /// Adds the governors of rates and errors to the agents of a scene, and keeps the data that they share with the frame
@@ -81,7 +81,7 @@ fn share(scene: &Scene) -> f64 {
 
 /// The gains of the agents' controllers: the scene's, or the law's own.
 fn rate_gains(scene: &Scene) -> RateGains {
-    let (given, own) = (&scene.target.gains, RateGains::default());
+    let (given, own) = (&scene.target, RateGains::default());
     RateGains { refine: given.agent_refine.unwrap_or(own.refine), yielding: given.agent_yield.unwrap_or(own.yielding) }
 }
 
@@ -209,16 +209,16 @@ pub fn picture_control(scene: &Scene) -> PictureControl {
     let target = &scene.target;
     let mut control = PictureControl::new(target.policy, law(target), target.frame_hz);
     control.set_value(value(target.value));
-    let Factors { focus, motion, hysteresis } = target.factors;
+    let Target { focus, motion, hysteresis, .. } = *target;
     control.set_sliders(GivenSliders { focus, motion, hysteresis, ..GivenSliders::default() });
     control.set_raise(target.raise);
-    control.set_render_scale(target.render_scale);
+    control.set_render_scale(target.render_scale.ends());
     control.set_throws_shadows(EnvironmentLight::of(scene.environment).throws_shadows());
-    if let Some((lag_s, share)) = target.lag {
+    if let Some((lag_s, share)) = target.lag() {
         control.set_lag(lag_s, share);
     }
     control.set_prices(prices(&machine(scene).draw));
-    if let Some(margin) = target.gains.margin {
+    if let Some(margin) = target.margin {
         control.set_margin(margin);
     }
     control
@@ -254,19 +254,18 @@ pub fn prices(draw: &DrawPrice) -> Prices {
 }
 
 /// The feedback law configured by a target.
-pub fn law(target: &metachron_world::Target) -> Law {
-    let gains = &target.gains;
+pub fn law(target: &Target) -> Law {
     match target.law {
         LawKind::Printed => {
             let Law::Printed { alpha, beta } = Law::PRINTED else { return Law::PRINTED };
-            Law::Printed { alpha: gains.alpha.unwrap_or(alpha), beta: gains.beta.unwrap_or(beta) }
+            Law::Printed { alpha: target.alpha.unwrap_or(alpha), beta: target.beta.unwrap_or(beta) }
         }
         LawKind::Corrected => {
             let Law::Corrected { kappa, lead, margin } = Law::CORRECTED else { return Law::CORRECTED };
             Law::Corrected {
-                kappa: gains.kappa.unwrap_or(kappa),
-                lead: gains.lead.unwrap_or(lead),
-                margin: gains.margin.unwrap_or(margin),
+                kappa: target.kappa.unwrap_or(kappa),
+                lead: target.lead.unwrap_or(lead),
+                margin: target.margin.unwrap_or(margin),
             }
         }
     }

@@ -11,5 +11,6 @@ pub mod scene;
 pub mod scenery;
 pub mod sensor;
 pub mod spec;
+pub mod target;
 
 pub use metachron_core::kinds;

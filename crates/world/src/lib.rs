@@ -40,13 +40,13 @@ pub use description::builder::{
 };
 pub use description::placement::{Moved, Overlap};
 pub use description::scene::{
-    Camera, Factors, Gains, Machine, Member, NamedCamera, ObjectCost, PaceWish, Probe, RENDER_SCALE, Scene, Spec,
-    Target, View,
+    Camera, Load, Machine, Member, NamedCamera, ObjectCost, PaceWish, Probe, Scene, ShadingCosts, Spec, StepCost, View,
 };
 #[cfg(feature = "scenery")]
 pub use description::scenery::{GROUP_LEVELS_MAX, Group, Scenery};
 pub use description::sensor::{Sensor, SensorKind, Site};
 pub use description::spec::Division;
+pub use description::target::{OneOrRange, RENDER_SCALE, Target};
 pub use description::{couplings, kinds};
 pub use error::WorldError;
 pub use history::checkpoint::{BadCheckpoint, Checkpoint, CheckpointError};

@@ -4,7 +4,7 @@ use metachron_core::{ClusterSolves, SimSpan, SolveLevel};
 use metachron_geometry::Solid;
 use metachron_runtime::FACTOR;
 use metachron_world::kinds::ExecutorKind;
-use metachron_world::{Pace, Rigid, Scene, SolveBudget, World};
+use metachron_world::{Pace, Rigid, Scene, SolveBudget, StepCost, World};
 
 const BUDGET: SolveBudget = SolveBudget::Timed { least_steps: 5 };
 
@@ -17,8 +17,9 @@ fn pile(budget: SolveBudget, factor_us: f64) -> Scene {
         scene.add(format!("{x} {y} {z}"), Rigid::cuboid([0.05; 3]).at(at).rate_hz(500.0))
     });
     let mut scene = scene.build().unwrap();
-    scene.machine.steps =
-        vec![(FACTOR.to_owned(), Some(factor_us), Some(0.0)), ("rigid".to_owned(), Some(0.0), Some(0.1))];
+    let cost = |base_us, unit_us| StepCost { base_us: Some(base_us), unit_us: Some(unit_us) };
+    let steps = [(FACTOR, cost(factor_us, 0.0)), ("rigid", cost(0.0, 0.1))];
+    scene.machine.step = steps.map(|(model, cost)| (model.to_owned(), cost)).into();
     scene
 }
 

@@ -6,7 +6,7 @@ use metachron_core::{SimSpan, SimTime};
 use metachron_geometry::Solid;
 use metachron_runtime::{Demand, Governor, TurnMeasure};
 use metachron_world::kinds::ExecutorKind;
-use metachron_world::{Member, Pace, Rigid, Scene, Tube, World};
+use metachron_world::{Member, Pace, Rigid, Scene, StepCost, Tube, World};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering::Relaxed};
 
@@ -39,7 +39,7 @@ fn chain(links: usize, rate_hz: impl Fn(usize) -> f64) -> Scene {
 /// The same on a machine whose steps cost so many milliseconds each.
 fn costing(scene: &Scene, step_ms: f64) -> Scene {
     let mut scene = scene.clone();
-    scene.machine.steps = vec![("rigid".to_owned(), Some(1e3 * step_ms), Some(0.0))];
+    scene.machine.step.insert("rigid".to_owned(), StepCost { base_us: Some(1e3 * step_ms), unit_us: Some(0.0) });
     scene
 }
 

@@ -42,7 +42,7 @@ mod xpbd;
 pub use check::TubeError;
 pub use discretization::{SEGMENTS_MAX, SEGMENTS_MIN};
 pub use pressure::PressureKey;
-pub use spec::{Attachment, Integrator, Material, Peristalsis, Section, TubeSpec, WallModel};
+pub use spec::{Attachment, Integrator, LIMITS, Material, Peristalsis, Section, TubeSpec, WallModel};
 pub use tube::{STRETCH_WARN, Tube, pressed_radius_m};
 
 /// The most substeps a scene may request per step: past it a step no longer runs in real time.

@@ -2,8 +2,28 @@
 
 use super::PressureKey;
 use glam::DVec3;
-use metachron_core::{Resolution, ResolutionRange};
+use metachron_core::{NumberRange, Ranges, Resolution, ResolutionRange};
 use metachron_geometry::ContactTraits;
+
+const RIGIDITY: NumberRange = NumberRange::new(1e-15, 1e15, "");
+
+/// Ranges of the numbers of a tube as files give them; what is built in code may be past them.
+pub const LIMITS: Ranges = Ranges(&[
+    ("radius_m", NumberRange::new(1e-6, 100.0, "m")),
+    ("young_pa", NumberRange::new(1.0, 1e13, "Pa")),
+    ("poisson", NumberRange::new(-0.999, 0.5, "")),
+    ("segments", NumberRange::new(2.0, 4096.0, "")),
+    ("twist_deg", NumberRange::new(-36_000.0, 36_000.0, "°")),
+    ("wall_m", NumberRange::new(1e-12, 100.0, "m")),
+    ("shear_factor", NumberRange::new(1e-3, 2.0, "")),
+    ("ea_n", RIGIDITY),
+    ("ga_n", RIGIDITY),
+    ("ei_n_m2", RIGIDITY),
+    ("gj_n_m2", RIGIDITY),
+    ("mass_per_length_kg_m", NumberRange::new(1e-9, 1e9, "kg/m")),
+    ("substeps", NumberRange::new(1.0, 1000.0, "")),
+    ("pressure_pa", NumberRange::new(0.0, 1e7, "Pa")),
+]);
 
 /// A tube, cable or rod before it is divided into segments.
 #[derive(Debug, Clone)]
@@ -96,35 +116,47 @@ pub struct Section {
     pub rotary_kg_m: f64,
 }
 
-/// Springs between an interval of the tube and its rest position.
+/// Springs between an interval of the tube and its rest position (a mesentery).
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "schema", derive(serde::Deserialize, schemars::JsonSchema), serde(deny_unknown_fields))]
 pub struct Attachment {
-    /// Start of the interval, as a share of the rest length: `0 <= from < to <= 1`.
+    /// Start of the interval, as a share of the rest length.
     pub from: f64,
-    /// End of the interval.
+    /// End of the interval, likewise; above `from`.
     pub to: f64,
-    /// Stiffness per length, N/m², ≥ 0.
+    /// Stiffness per length, N/m².
     pub stiffness_n_m2: f64,
-    /// Slack in metres, ≥ 0: within it the spring does not act (a mesentery hangs loose).
+    /// Slack, metres: within it the spring does not act, as a mesentery hangs loose. Default 0.
+    #[cfg_attr(feature = "schema", serde(default))]
     pub slack_m: f64,
-    /// Damping per length, N·s/m², ≥ 0.
+    /// Damping per length, N·s/m². Default 0.
+    #[cfg_attr(feature = "schema", serde(default))]
     pub damping_n_s_m2: f64,
-    /// The force of the whole interval above which all of it tears off, N, > 0: the mean over a macro step of the tube's cluster. Infinite
-    /// where it never does.
+    /// Force of the whole interval above which all of it tears off, N: the mean over a common step of the bodies that the tube touches. It is gone
+    /// then for good, and the report has it under `events`. Infinite, the default, where it never does.
+    #[cfg_attr(feature = "schema", serde(default = "never"), schemars(extend("default" = "never")))]
     pub tears_above_n: f64,
-    /// The most force that it gives in a cluster, N, > 0, spread evenly along the interval: each part of it slips under a greater load.
-    /// Below the tearing force; infinite where it never yields.
+    /// Greatest force that the whole interval gives, N; below `tears_above_n`, spread evenly along it: a part that would take more slips,
+    /// and holds from then on where it has come to. Infinite, the default, where it takes as much as it gets.
+    #[cfg_attr(feature = "schema", serde(default = "never"), schemars(extend("default" = "never")))]
     pub yields_above_n: f64,
 }
 
-/// A wave of contraction: r(s, t) = r₀ (1 − a·(1 + cos(2π (s − c t)/λ))/2).
+/// The force at which an attachment tears or yields that never does, N.
+#[cfg(feature = "schema")]
+const fn never() -> f64 {
+    f64::INFINITY
+}
+
+/// A travelling wave of contraction: r(s, t) = r₀ (1 − a·(1 + cos(2π (s − c t)/λ))/2).
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "schema", derive(serde::Deserialize, schemars::JsonSchema), serde(deny_unknown_fields))]
 pub struct Peristalsis {
-    /// Deepest contraction a as a share of the radius, `0 <= a < 1`.
+    /// Deepest contraction a as a share of the radius; below 1.
     pub amplitude: f64,
-    /// Wave length λ, metres, > 0.
+    /// Wave length λ, metres.
     pub wavelength_m: f64,
-    /// Wave speed c, m/s.
+    /// Wave speed c, m/s; negative runs from the end to the start.
     pub speed_m_s: f64,
 }
 

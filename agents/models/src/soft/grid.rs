@@ -7,6 +7,8 @@ use super::spec::SoftShape;
 
 /// A side of a soft body, in its own axes: a rope has two ends, a sheet four edges, a box six faces.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
+#[serde(rename_all = "kebab-case")]
 pub enum Side {
     /// Where x is least; the start of a rope.
     Left,

@@ -2,22 +2,17 @@
 //!
 //! In: `[[cell]]` and `[[portal]]` tables. Out: checked [`Cells`], walls as fixed boxes. Never here: a view.
 
-use super::POSITION_MAX_M;
 use super::common::parse_colour;
 use super::objects::{OBSTACLES_MAX, Objects, too_many};
 use crate::check::{Checker, Place};
-use crate::format::{CELL, CellFile, Point, PortalFile, SideKind};
+use crate::format::{CellFile, PortalFile, SideKind};
 use glam::{DQuat, DVec3};
 use metachron_geometry::{Cell, Cells, CellsError, ContactTraits, Obstacle, Portal, Region, Side, Solid};
 use metachron_world::Appearance;
 use metachron_world::kinds::{Material, ShadingKind};
 
-/// Most cells, and most portals, of a scene.
-const CELLS_MAX: usize = 1000;
 /// Longest name of a cell, in characters.
 const NAME_MAX: usize = 64;
-/// Most corners of a portal.
-const CORNERS_MAX: usize = 100;
 /// The region outside all cells, in `between`.
 const OUTSIDE: &str = "outside";
 /// Default colour of walls: a warm white.
@@ -32,13 +27,6 @@ pub(crate) fn cells(
     portals: &[PortalFile],
     objects: &mut Objects,
 ) -> Cells {
-    for (key, count) in [("cell", cells.len()), ("portal", portals.len())] {
-        if count > CELLS_MAX {
-            let expected = format!("expected at most {CELLS_MAX}");
-            c.wrong(&Place::new("", ""), key, format_args!("has {count} entries"), expected);
-            return Cells::default();
-        }
-    }
     let before = c.count();
     let boxes: Vec<_> = cells.iter().enumerate().map(|(at, file)| cell(c, at, file, &cells[..at])).collect();
     let openings: Vec<_> = portals.iter().enumerate().filter_map(|(at, file)| portal(c, at, file, cells)).collect();
@@ -57,42 +45,27 @@ pub(crate) fn cells(
     }
 }
 
-fn cell_place(at: usize, file: &CellFile) -> Place {
-    Place::new(format!("cell.{at}"), format!("of cell `{}`", file.name.chars().take(NAME_MAX).collect::<String>()))
-}
-
-fn portal_place(at: usize) -> Place {
-    Place::new(format!("portal.{at}"), "of `[[portal]]`")
-}
-
 fn cell(c: &mut Checker<'_, '_>, at: usize, file: &CellFile, earlier: &[CellFile]) -> Cell {
-    let place = cell_place(at, file);
+    let place = c.place(&format!("cell.{at}"));
     let length = file.name.chars().count();
     if file.name.trim().is_empty() || length > NAME_MAX || file.name.chars().any(char::is_control) {
         let expected = format!("expected 1 to {NAME_MAX} printable characters");
-        c.wrong(&Place::new(place.path.clone(), ""), "name", "is not a valid name", expected);
+        c.wrong(&place.unnamed(), "name", "is not a valid name", expected);
     } else if file.name == OUTSIDE {
         let what = format_args!("is `{OUTSIDE}`, the name of what is in no cell");
         c.wrong(&place, "name", what, "expected another name");
     } else if earlier.iter().any(|other| other.name == file.name) {
         c.wrong(&place, "name", format_args!("is `{}`, the name of another cell", file.name), "expected a unique name");
     }
-    let low_m = c.point(&place, "from_m", file.from_m, POSITION_MAX_M);
-    let high_m = c.point(&place, "to_m", file.to_m, POSITION_MAX_M);
-    let thickness = c.optional(&place, "walls_m", file.walls_m, CELL);
+    let (low_m, high_m) = (DVec3::from(file.from_m), DVec3::from(file.to_m));
     let least = (high_m - low_m).min_element();
-    if let Some(thickness) = thickness.filter(|thickness| least > 0.0 && 2.0 * thickness >= least) {
+    if let Some(thickness) = file.walls_m.filter(|thickness| least > 0.0 && 2.0 * thickness >= least) {
         let expected = format!("expected less than {}, half the least side of the cell", 0.5 * least);
         c.wrong(&place, "walls_m", format_args!("is {thickness}: nothing is left between the walls"), expected);
     }
-    for (key, given) in [
-        ("without", !file.without.is_empty()),
-        ("colour", file.colour.is_some()),
-        ("material", file.material.is_some()),
-    ] {
-        if given && file.walls_m.is_none() {
-            c.wrong(&place, key, "has no effect alone", "expected `walls_m` beside it");
-        }
+    if file.walls_m.is_none() {
+        let keys = ["without", "colour", "material"];
+        c.refuse(&place, &keys, "has no effect alone", "expected `walls_m` beside it");
     }
     if let Some(text) = file.colour.as_ref().filter(|text| parse_colour(text).is_none()) {
         c.wrong(&place, "colour", format_args!("is `{text}`"), "expected `#rrggbb`, such as `#c9776b`");
@@ -101,7 +74,7 @@ fn cell(c: &mut Checker<'_, '_>, at: usize, file: &CellFile, earlier: &[CellFile
 }
 
 fn portal(c: &mut Checker<'_, '_>, at: usize, file: &PortalFile, cells: &[CellFile]) -> Option<Portal> {
-    let place = portal_place(at);
+    let place = c.place(&format!("portal.{at}"));
     let known = || cells.iter().map(|cell| cell.name.as_str()).chain([OUTSIDE]);
     let mut region = |k: usize| {
         let name = &file.between[k];
@@ -119,18 +92,9 @@ fn portal(c: &mut Checker<'_, '_>, at: usize, file: &PortalFile, cells: &[CellFi
 fn corners(c: &mut Checker<'_, '_>, place: &Place, file: &PortalFile) -> Option<Vec<DVec3>> {
     let rectangle = "expected `from_m` and `to_m`, or `corners_m`";
     match (&file.corners_m, file.from_m, file.to_m) {
-        (Some(corners), None, None) if (3..=CORNERS_MAX).contains(&corners.len()) => {
-            let corner = |(k, at): (usize, &Point)| c.point(place, &format!("corners_m.{k}"), *at, POSITION_MAX_M);
-            Some(corners.iter().enumerate().map(corner).collect())
-        }
-        (Some(corners), None, None) => {
-            let expected = format!("expected 3 … {CORNERS_MAX}");
-            c.wrong(place, "corners_m", format_args!("has {} corners", corners.len()), expected);
-            None
-        }
+        (Some(corners), None, None) => Some(corners.iter().map(|at| DVec3::from(*at)).collect()),
         (None, Some(from), Some(to)) => {
-            let from = c.point(place, "from_m", from, POSITION_MAX_M);
-            let to = c.point(place, "to_m", to, POSITION_MAX_M);
+            let (from, to) = (DVec3::from(from), DVec3::from(to));
             let across = (0..3).find(|axis| from[*axis] == to[*axis]);
             let Some(across) = across else {
                 let expected = "expected one coordinate as in `from_m`: a portal is flat";
@@ -158,40 +122,42 @@ fn corners(c: &mut Checker<'_, '_>, place: &Place, file: &PortalFile) -> Option<
 
 /// Reports a fault at the cell or portal that has it.
 fn report(c: &mut Checker<'_, '_>, fault: &CellsError, cells: &[CellFile], portals: &[PortalFile]) {
+    let cell_place = |c: &Checker<'_, '_>, at: usize| c.place(&format!("cell.{at}"));
+    let portal_place = |c: &Checker<'_, '_>, at: usize| c.place(&format!("portal.{at}"));
     let corner_key = |portal: usize| if portals[portal].corners_m.is_some() { "corners_m" } else { "from_m" };
     let name = |cell: usize| cells.get(cell).map_or("", |cell| cell.name.as_str());
     match *fault {
         CellsError::Flat { cell } => {
             let expected = "expected each coordinate above that of `from_m`";
-            c.wrong(&cell_place(cell, &cells[cell]), "to_m", "leaves the cell no volume", expected);
+            c.wrong(&cell_place(c, cell), "to_m", "leaves the cell no volume", expected);
         }
         CellsError::Overlap { cell, with } => {
             let what = format_args!("is within cell `{}`, or the cell reaches into it", name(with));
-            c.wrong(&cell_place(cell, &cells[cell]), "from_m", what, "expected cells that touch at most");
+            c.wrong(&cell_place(c, cell), "from_m", what, "expected cells that touch at most");
         }
         CellsError::Nowhere { portal } => {
             c.wrong(
-                &portal_place(portal),
+                &portal_place(c, portal),
                 "between",
                 "names one cell twice",
                 "expected two cells, or one and `outside`",
             );
         }
         CellsError::Unknown { portal, .. } => {
-            c.wrong(&portal_place(portal), "between", "names a cell that does not exist", "expected names of cells");
+            c.wrong(&portal_place(c, portal), "between", "names a cell that does not exist", "expected names of cells");
         }
         CellsError::NotConvex { portal } => {
             let expected = "expected the corners of a convex polygon in their order around it";
-            c.wrong(&portal_place(portal), corner_key(portal), "is not a convex polygon", expected);
+            c.wrong(&portal_place(c, portal), corner_key(portal), "is not a convex polygon", expected);
         }
         CellsError::Off { portal, cell } => {
             let what = format_args!("is not on a side of cell `{}` that faces the other one", name(cell));
             let expected = "expected all corners on a side that both cells share";
-            c.wrong(&portal_place(portal), corner_key(portal), what, expected);
+            c.wrong(&portal_place(c, portal), corner_key(portal), what, expected);
         }
         CellsError::Inside { portal, cell } => {
             let what = format_args!("names `{OUTSIDE}`, but cell `{}` is behind the portal", name(cell));
-            c.wrong(&portal_place(portal), "between", what, format!("expected `{}` in its place", name(cell)));
+            c.wrong(&portal_place(c, portal), "between", what, format!("expected `{}` in its place", name(cell)));
         }
     }
 }
@@ -238,7 +204,12 @@ fn check_openings(c: &mut Checker<'_, '_>, cell: usize, cells: &Cells, walls: &[
         let is_of = portal.between.contains(&Region::Cell(cell));
         if is_of && cells.side(cell, portal).is_some_and(|side| walls.contains(&side)) && !portal.is_rectangle() {
             let expected = "expected `from_m` and `to_m`, or cells without `walls_m` on this side";
-            c.wrong(&portal_place(number), "corners_m", "is not a rectangle along the axes, in a wall", expected);
+            c.wrong(
+                &c.place(&format!("portal.{number}")),
+                "corners_m",
+                "is not a rectangle along the axes, in a wall",
+                expected,
+            );
         }
     }
 }

@@ -1,9 +1,9 @@
 //! Keys that objects of every model share: time, primitive levels, appearance, points and rotations.
 
 use crate::check::{Checker, Place};
-use crate::format::{COMMON, CommonFile, FAULTS, FaultsFile, HoldKind, OneOrRange, Point};
+use crate::format::{CommonFile, FaultsFile, HoldKind, OneOrRange, Point};
 use glam::{DQuat, DVec3, EulerRot};
-use metachron_core::{N_MAX, ResolutionRange, SimSpan};
+use metachron_core::{ResolutionRange, SimSpan};
 use metachron_world::couplings::Faults;
 use metachron_world::kinds::{Material, ShadingKind};
 use metachron_world::{Appearance, PaceWish};
@@ -15,31 +15,25 @@ const N_DEFAULT: (u8, u8) = (1, 5);
 /// A rate agrees with a step when their product is 1 within this: a rate may be written with 5 digits.
 const RATE_AGREES: f64 = 1e-4;
 
-/// Rotation by angles about the world's x, then y, then z axis, in degrees.
-pub(super) fn rotation(degrees: DVec3) -> DQuat {
-    let turn = degrees * (std::f64::consts::PI / 180.0);
+/// Rotation by angles about the world's x, then y, then z axis, in degrees; none where none is given.
+pub(super) fn rotation(degrees: Option<Point>) -> DQuat {
+    let turn = point(degrees) * (std::f64::consts::PI / 180.0);
     DQuat::from_euler(EulerRot::ZYX, turn.z, turn.y, turn.x)
 }
 
-pub(super) fn point_or_zero(
-    c: &mut Checker<'_, '_>,
-    place: &Place,
-    key: &str,
-    value: Option<Point>,
-    most: f64,
-) -> DVec3 {
-    value.map_or(DVec3::ZERO, |value| c.point(place, key, value, most))
+/// A point, or the origin where none is given.
+pub(super) fn point(given: Option<Point>) -> DVec3 {
+    given.unwrap_or_default().into()
 }
 
 /// Rate and step: either gives the other; both together must agree.
 pub(super) fn pace(c: &mut Checker<'_, '_>, place: &Place, file: &CommonFile) -> PaceWish {
-    let rate = file.rate_hz.map(|rate| c.number(place, "rate_hz", rate, COMMON));
     let Some(dt) = file.dt_ms else {
-        let rate_hz = rate.unwrap_or(RATE_DEFAULT_HZ);
+        let rate_hz = file.rate_hz.unwrap_or(RATE_DEFAULT_HZ);
         return wish(rate_hz, 1000.0 / rate_hz, None);
     };
-    let (least, greatest) = c.ends(place, "dt_ms", dt, COMMON);
-    let rate_hz = rate.unwrap_or(1000.0 / least);
+    let (least, greatest) = dt.ends();
+    let rate_hz = file.rate_hz.unwrap_or(1000.0 / least);
     let wanted_ms = 1000.0 / rate_hz;
     if least * (1.0 - RATE_AGREES) > wanted_ms || wanted_ms > greatest * (1.0 + RATE_AGREES) {
         let what = format!("is {rate_hz}, a step of {} ms, but `dt_ms` is {}", rounded(wanted_ms), shown(dt));
@@ -77,7 +71,6 @@ pub(super) fn tolerance(
         }
         return None;
     };
-    let tolerance_m = c.number(place, "tolerance_m", tolerance_m, COMMON);
     let Some(range) = range else {
         refuse_tolerance(c, place, file);
         return None;
@@ -120,43 +113,19 @@ pub(super) fn rounded(value: f64) -> f64 {
 }
 
 /// Injected faults: the object's own, and the world's for the keys that the object leaves out.
-pub(super) fn faults(
-    c: &mut Checker<'_, '_>,
-    place: &Place,
-    own: Option<&FaultsFile>,
-    world: Option<&FaultsFile>,
-) -> Faults {
-    let (none, own_place) = (FaultsFile::default(), place.table("faults"));
+pub(super) fn faults(own: Option<&FaultsFile>, world: Option<&FaultsFile>) -> Faults {
+    let none = FaultsFile::default();
     let (own, world) = (own.unwrap_or(&none), world.unwrap_or(&none));
-    let world_jitter = world.jitter.unwrap_or(0.0);
     Faults {
-        jitter: c.optional(&own_place, "jitter", own.jitter, FAULTS).unwrap_or(world_jitter),
-        loss: c.optional(&own_place, "loss", own.loss, FAULTS).unwrap_or(world.loss.unwrap_or(0.0)),
+        jitter: own.jitter.or(world.jitter).unwrap_or(0.0),
+        loss: own.loss.or(world.loss).unwrap_or(0.0),
         seed: u64::from(own.seed.or(world.seed).unwrap_or(0)),
     }
 }
 
-/// Checks the values of `[world.faults]`.
-pub(crate) fn world_faults(c: &mut Checker<'_, '_>, file: &FaultsFile) {
-    let place = Place::new("world.faults", "of `[world.faults]`");
-    c.optional(&place, "jitter", file.jitter, FAULTS);
-    c.optional(&place, "loss", file.loss, FAULTS);
-}
-
 /// The levels of the drawn primitive.
-pub(super) fn levels(c: &mut Checker<'_, '_>, place: &Place, file: &CommonFile) -> (u8, u8) {
-    let Some(n) = file.n else { return N_DEFAULT };
-    let (least, greatest) = n.ends();
-    if least > N_MAX || greatest > N_MAX {
-        let what = format!("has the value {}", least.max(greatest));
-        c.wrong(place, "n", what, format!("expected levels from 0 to {N_MAX}"));
-    } else if least > greatest {
-        let what = format!("runs from {least} down to {greatest}");
-        c.wrong(place, "n", what, format!("expected the lesser level first: [{greatest}, {least}]"));
-    } else {
-        return (least, greatest);
-    }
-    N_DEFAULT
+pub(super) fn levels(file: &CommonFile) -> (u8, u8) {
+    file.n.map_or(N_DEFAULT, OneOrRange::ends)
 }
 
 /// Colour and material of an object without a texture; `default` is the material of the model.
@@ -188,7 +157,7 @@ pub(super) fn painted_appearance(
             colour_of(material)
         }),
     };
-    let importance = c.optional(place, "importance", file.importance, COMMON).unwrap_or(1.0);
+    let importance = file.importance.unwrap_or(1.0);
     let shading = file.shading.unwrap_or_default();
     Appearance { colour, material, importance, may_vanish: file.may_vanish, shading }
 }

@@ -3,7 +3,7 @@
 //! In: [`ContactFile`]s, the names of all groups of the scene. Out: [`ContactTraits`]; problems to the [`Checker`]. Never here: forces.
 
 use crate::check::{Checker, Place};
-use crate::format::{CONTACT, ContactFile};
+use crate::format::ContactFile;
 use metachron_geometry::{CollisionGroups, ContactTraits};
 use std::collections::BTreeSet;
 
@@ -72,7 +72,7 @@ impl GroupNames {
             is_sensor: file.sensor.unwrap_or(false),
             friction_rule: file.friction_rule,
             restitution_rule: file.restitution_rule,
-            spin_radius_m: c.optional(&place, "spin_radius_m", file.spin_radius_m, CONTACT).unwrap_or(0.0),
+            spin_radius_m: file.spin_radius_m.unwrap_or(0.0),
         }
     }
 }

@@ -3,13 +3,12 @@
 //! In: [`CouplingFile`]s and the objects of the scene. Out: [`Coupling`]s, problems to the [`Checker`].
 //! Never here: forces.
 
-use super::POSITION_MAX_M;
-use super::force_limits::{ForceLimits, ForceLimitsFile};
+use super::force_limits::ForceLimits;
 use super::objects::{NamedObject, Objects};
 use super::soft;
 use crate::check::{Checker, Place};
 use crate::format::ranges::SHARE;
-use crate::format::{COUPLING, CouplingFile, CouplingKind as Kind, CouplingLaw, Spot};
+use crate::format::{CouplingFile, CouplingKind as Kind, CouplingLaw, Spot};
 use glam::DVec3;
 use metachron_contact::Law;
 use metachron_core::{AgentId, Anchor};
@@ -19,20 +18,12 @@ use metachron_world::Spec;
 use metachron_world::couplings::{Coupling, CouplingKind};
 use std::collections::BTreeMap;
 
-/// Most couplings of a scene.
-const COUPLINGS_MAX: usize = 10_000;
-
 /// The couplings of the scene.
 pub(crate) fn couplings(c: &mut Checker<'_, '_>, files: &[CouplingFile], objects: &Objects) -> Vec<Coupling> {
-    if files.len() > COUPLINGS_MAX {
-        let expected = format!("expected at most {COUPLINGS_MAX}");
-        c.wrong(&Place::new("", ""), "coupling", format_args!("has {} entries", files.len()), expected);
-        return Vec::new();
-    }
     let mut contacts = BTreeMap::new();
     let mut found = Vec::with_capacity(files.len());
     for (i, file) in files.iter().enumerate() {
-        let place = Place::new(format!("coupling.{i}"), format!("of the coupling of `{}` and `{}`", file.a, file.b));
+        let place = c.place(&format!("coupling.{i}"));
         let Some(coupling) = coupling(c, &place, file, objects) else { continue };
         let pair = (coupling.a.min(coupling.b), coupling.a.max(coupling.b));
         if coupling.kind == CouplingKind::Contact && contacts.insert(pair, i).is_some() {
@@ -60,14 +51,15 @@ fn coupling(c: &mut Checker<'_, '_>, place: &Place, file: &CouplingFile, objects
     if soft && file.law == Some(CouplingLaw::Tlm) {
         c.wrong(place, "law", "is `tlm`, which sheets, solids and ropes do not support", "expected `ledger` or `off`");
     }
-    if let Some(law @ (CouplingLaw::Penalty | CouplingLaw::PenaltyExtrapolated)) = file.law {
-        let what = format!("is `{}`: penalty laws stay in the laboratory (`metachron chart stability`)", law.name());
+    if let Some(CouplingLaw::Penalty | CouplingLaw::PenaltyExtrapolated) = file.law {
+        let law = c.written(place, "law");
+        let what = format!("is `{law}`: penalty laws stay in the laboratory (`metachron chart stability`)");
         c.wrong(place, "law", what, "expected `ledger`, `tlm` or `off`, or no law: all that touch is one problem");
         return None;
     }
     check_keys(c, place, file);
     check_traits(c, place, file, [a, b], objects);
-    let law = law(c, place, file);
+    let law = law(file);
     let kind = match file.kind.unwrap_or_default() {
         Kind::Contact => Some(CouplingKind::Contact),
         Kind::Attach => attach(c, place, file, [a, b], objects),
@@ -106,35 +98,29 @@ fn check_keys(c: &mut Checker<'_, '_>, place: &Place, file: &CouplingFile) {
     let spring = attach || file.law == Some(CouplingLaw::Tlm);
     let what = match file.law {
         _ if attach => "an attachment".to_owned(),
-        Some(law) => format!("contact by `{}`", law.name()),
+        Some(_) => format!("contact by `{}`", c.written(place, "law")),
         None => "contact".to_owned(),
     };
-    for (key, given, belongs, needed) in [
-        ("at_a", file.at_a.is_some(), attach, attach),
-        ("at_b", file.at_b.is_some(), attach, attach),
-        ("rest_m", file.rest_m.is_some(), attach, false),
-        ("tears_above_n", file.tears_above_n.is_some(), attach, false),
-        ("yields_above_n", file.yields_above_n.is_some(), attach, false),
-        ("stiffness_n_m", file.stiffness_n_m.is_some(), spring, spring),
-        ("damping_n_s_m", file.damping_n_s_m.is_some(), spring, false),
-    ] {
-        if given && !belongs {
-            c.wrong(place, key, format_args!("does not belong to {what}"), "expected no such key here");
-        }
-        if !given && needed {
-            c.wrong(place, key, "is missing", format!("{what} needs it: expected `{key}` in this table"));
-        }
+    let (of_attach, of_spring) =
+        (["at_a", "at_b", "rest_m", "tears_above_n", "yields_above_n"], ["stiffness_n_m", "damping_n_s_m"]);
+    let foreign: &[&str] = if attach { &[] } else { &of_attach };
+    c.refuse(place, foreign, format_args!("does not belong to {what}"), "expected no such key here");
+    let (foreign, needed): (&[&str], &[&str]) = match (attach, spring) {
+        (true, _) => (&[], &["at_a", "at_b", "stiffness_n_m"]),
+        (_, true) => (&[], &["stiffness_n_m"]),
+        _ => (&of_spring, &[]),
+    };
+    c.refuse(place, foreign, format_args!("does not belong to {what}"), "expected no such key here");
+    let given = c.given(place, needed);
+    for key in needed.iter().filter(|key| !given.contains(key)) {
+        c.wrong(place, key, "is missing", format!("{what} needs it: expected `{key}` in this table"));
     }
-    if let (true, Some(law @ (CouplingLaw::Ledger | CouplingLaw::Tlm))) = (attach, file.law) {
-        for (key, given) in [("tears_above_n", file.tears_above_n), ("yields_above_n", file.yields_above_n)] {
-            if given.is_some() {
-                let what = format!(
-                    "does not belong to an attachment by `{}`, of which either side knows its own force",
-                    law.name()
-                );
-                c.wrong(place, key, what, "expected no `law` beside it: then the two are one problem");
-            }
-        }
+    if let (true, Some(CouplingLaw::Ledger | CouplingLaw::Tlm)) = (attach, file.law) {
+        let law = c.written(place, "law");
+        let what =
+            format_args!("does not belong to an attachment by `{law}`, of which either side knows its own force");
+        let expected = "expected no `law` beside it: then the two are one problem";
+        c.refuse(place, &["tears_above_n", "yields_above_n"], what, expected);
     }
     if attach && file.law == Some(CouplingLaw::Off) {
         c.wrong(place, "law", "is `off`, which attaches nothing", "expected another law, or no such coupling");
@@ -166,12 +152,12 @@ fn check_traits(
     }
 }
 
-fn law(c: &mut Checker<'_, '_>, place: &Place, file: &CouplingFile) -> Option<Law> {
+fn law(file: &CouplingFile) -> Option<Law> {
     match file.law {
         None => Some(Law::Cluster),
         Some(CouplingLaw::Off) => Some(Law::Off),
         Some(CouplingLaw::Tlm) => {
-            let (stiffness_n_m, damping_n_s_m) = spring(c, place, file)?;
+            let (stiffness_n_m, damping_n_s_m) = spring(file)?;
             Some(Law::Tlm { stiffness_n_m, damping_n_s_m })
         }
         // penalties are refused before
@@ -179,9 +165,8 @@ fn law(c: &mut Checker<'_, '_>, place: &Place, file: &CouplingFile) -> Option<La
     }
 }
 
-fn spring(c: &mut Checker<'_, '_>, place: &Place, file: &CouplingFile) -> Option<(f64, f64)> {
-    let stiffness = c.number(place, "stiffness_n_m", file.stiffness_n_m?, COUPLING);
-    Some((stiffness, c.optional(place, "damping_n_s_m", file.damping_n_s_m, COUPLING).unwrap_or(0.0)))
+fn spring(file: &CouplingFile) -> Option<(f64, f64)> {
+    Some((file.stiffness_n_m?, file.damping_n_s_m.unwrap_or(0.0)))
 }
 
 fn attach(
@@ -193,11 +178,10 @@ fn attach(
 ) -> Option<CouplingKind> {
     let at_a = Attachment { key: "at_a", object: a, spot: file.at_a? }.anchor(c, place, objects);
     let at_b = Attachment { key: "at_b", object: b, spot: file.at_b? }.anchor(c, place, objects);
-    let (stiffness_n_m, damping_n_s_m) = spring(c, place, file)?;
-    let rest_m = c.optional(place, "rest_m", file.rest_m, COUPLING).unwrap_or(0.0);
-    let limits =
-        ForceLimits::read(c, place, ForceLimitsFile { tears: file.tears_above_n, yields: file.yields_above_n });
-    let ForceLimits { tears_above_n, yields_above_n } = limits;
+    let (stiffness_n_m, damping_n_s_m) = spring(file)?;
+    let rest_m = file.rest_m.unwrap_or(0.0);
+    let ForceLimits { tears_above_n, yields_above_n } =
+        ForceLimits::read(c, place, [file.tears_above_n, file.yields_above_n]);
     let (at_a, at_b) = (at_a?, at_b?);
     Some(CouplingKind::Attach { at_a, at_b, stiffness_n_m, damping_n_s_m, rest_m, tears_above_n, yields_above_n })
 }
@@ -214,52 +198,29 @@ impl Attachment {
     fn anchor(self, c: &mut Checker<'_, '_>, place: &Place, objects: &Objects) -> Option<Anchor> {
         let Self { key, object, spot } = self;
         let id = object.agent()?;
-        if let Some(Spec::Soft(spec)) = spec_of(objects, id) {
-            let is_rope = matches!(spec.shape, SoftShape::Rope { .. });
-            return match spot {
-                Spot::Share(share) if is_rope => soft::along(spec, c.number(place, key, share, SHARE)),
-                Spot::Point(at) if !is_rope => soft::nearest(spec, c.point(place, key, at, POSITION_MAX_M)),
-                Spot::Share(_) => {
-                    let expected = "expected a point [x, y, z] in the object's axes, metres from its middle";
-                    c.wrong(
-                        place,
-                        key,
-                        "is a share of a length, but the object is neither a tube nor a rope",
-                        expected,
-                    );
-                    None
-                }
-                Spot::Point(_) => {
-                    c.wrong(
-                        place,
-                        key,
-                        "is a point, but the object is a rope",
-                        "expected a share of its length, 0 … 1",
-                    );
-                    None
-                }
-            };
-        }
-        match (spot, matches!(object, NamedObject::Tube(_))) {
+        let soft = if let Some(Spec::Soft(spec)) = spec_of(objects, id) { Some(spec) } else { None };
+        let is_rope = soft.is_some_and(|spec| matches!(spec.shape, SoftShape::Rope { .. }));
+        match (spot, is_rope || matches!(object, NamedObject::Tube(_))) {
             (Spot::Share(share), true) => {
                 let share = c.number(place, key, share, SHARE);
-                Some(Anchor::Arc(share * tube_length_m(objects, id)?))
+                match soft {
+                    Some(rope) => soft::along(rope, share),
+                    None => Some(Anchor::Arc(share * tube_length_m(objects, id)?)),
+                }
             }
-            (Spot::Point(at), false) => {
-                let at = c.point(place, key, at, POSITION_MAX_M);
-                Some(Anchor::Local(at - centre_of_mass(objects, id)))
-            }
+            (Spot::Point(at), false) => match soft {
+                Some(spec) => soft::nearest(spec, at.into()),
+                None => Some(Anchor::Local(DVec3::from(at) - centre_of_mass(objects, id))),
+            },
             (Spot::Point(_), true) => {
-                c.wrong(place, key, "is a point, but the object is a tube", "expected a share of its length, 0 … 1");
+                let what = format_args!("is a point, but the object is a {}", if is_rope { "rope" } else { "tube" });
+                c.wrong(place, key, what, "expected a share of its length, 0 … 1");
                 None
             }
             (Spot::Share(_), false) => {
-                c.wrong(
-                    place,
-                    key,
-                    "is a share of a length, but the object is neither a tube nor a rope",
-                    "expected a point [x, y, z] in the object's axes, metres",
-                );
+                let from = if soft.is_some() { " from its middle" } else { "" };
+                let expected = format!("expected a point [x, y, z] in the object's axes, metres{from}");
+                c.wrong(place, key, "is a share of a length, but the object is neither a tube nor a rope", expected);
                 None
             }
         }

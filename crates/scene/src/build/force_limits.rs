@@ -4,14 +4,6 @@
 //! Never here: their effect.
 
 use crate::check::{Checker, Place};
-use crate::format::ranges::TEARING;
-
-/// The forces as a file gives them.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct ForceLimitsFile {
-    pub(super) tears: Option<f64>,
-    pub(super) yields: Option<f64>,
-}
 
 /// The forces at which an attachment yields and tears, N; infinite where it never does.
 #[derive(Debug, Clone, Copy)]
@@ -22,10 +14,8 @@ pub(super) struct ForceLimits {
 
 impl ForceLimits {
     /// Reads both: an attachment yields below the force at which it tears.
-    pub(super) fn read(c: &mut Checker<'_, '_>, place: &Place, file: ForceLimitsFile) -> Self {
-        let mut read = |key: &str, given| c.optional(place, key, given, TEARING).unwrap_or(f64::INFINITY);
-        let tears_above_n = read("tears_above_n", file.tears);
-        let yields_above_n = read("yields_above_n", file.yields);
+    pub(super) fn read(c: &mut Checker<'_, '_>, place: &Place, [tears, yields]: [Option<f64>; 2]) -> Self {
+        let [tears_above_n, yields_above_n] = [tears, yields].map(|given| given.unwrap_or(f64::INFINITY));
         if yields_above_n >= tears_above_n && yields_above_n < f64::INFINITY {
             let expected = format!("expected a force below `tears_above_n`, {tears_above_n} N");
             c.wrong(place, "yields_above_n", format_args!("is {yields_above_n}"), expected);

@@ -5,15 +5,13 @@
 use super::POSITION_MAX_M;
 use super::common::rotation;
 use crate::check::{Checker, Place};
-use crate::format::{COMMON, CommonFile, OneOrEach};
+use crate::format::{CommonFile, OneOrEach};
 use glam::{DQuat, DVec3};
 use metachron_core::AgentId;
 use metachron_world::{Member, Spec};
 
 /// Most objects along one side of a grid.
 const SIDE_MAX: u32 = 1000;
-/// Greatest spacing of neighbours in a grid, and greatest random displacement, metres.
-const SPACING_MAX_M: f64 = 1e4;
 
 /// The copies of one object.
 #[derive(Debug, Clone)]
@@ -111,16 +109,8 @@ pub(super) fn copies(
     most: usize,
 ) -> Copies {
     let Some(grid) = common.grid else {
-        let strays = [
-            ("spacing_m", common.spacing_m.is_some()),
-            ("rise_m", common.rise_m.is_some()),
-            ("scatter_m", common.scatter_m.is_some()),
-            ("scatter_deg", common.scatter_deg.is_some()),
-            ("scatter_seed", common.scatter_seed.is_some()),
-        ];
-        for (key, _) in strays.into_iter().filter(|(_, given)| *given) {
-            c.wrong(place, key, "has no effect without a grid", "expected `grid = [x, y, z]` beside it");
-        }
+        let keys = ["spacing_m", "rise_m", "scatter_m", "scatter_deg", "scatter_seed"];
+        c.refuse(place, &keys, "has no effect without a grid", "expected `grid = [x, y, z]` beside it");
         return Copies::single();
     };
     if repeats == Repeats::Nothing {
@@ -142,14 +132,13 @@ pub(super) fn copies(
         c.wrong(place, "spacing_m", "is missing", "expected `spacing_m = [x, y, z]` beside `grid`");
         return Copies::single();
     };
-    let spacing = c.point(place, "spacing_m", spacing, SPACING_MAX_M);
-    let [rise_x, rise_y] = common.rise_m.unwrap_or_default();
-    let rise = c.point(place, "rise_m", [rise_x, rise_y, 0.0], SPACING_MAX_M);
+    let ([rise_x, rise_y], spacing) = (common.rise_m.unwrap_or_default(), DVec3::from(spacing));
+    let rise = DVec3::new(rise_x, rise_y, 0.0);
     let scatter = scatter(c, place, common, repeats);
     let at = |k: u32| {
         let (steps, random) = (DVec3::from(grid_place(grid, k)), random_cubes(scatter.seed, k));
         let offset_m = steps * spacing + DVec3::Z * rise.dot(steps) + scatter.reach_m * random[0];
-        CopyPlace { offset_m, turn: rotation(scatter.reach_deg * random[1]) }
+        CopyPlace { offset_m, turn: rotation(Some((scatter.reach_deg * random[1]).into())) }
     };
     let all: Vec<CopyPlace> = (0..count as u32).map(at).collect();
     if all.iter().any(|copy| copy.offset_m.abs().max_element() > POSITION_MAX_M) {
@@ -171,18 +160,16 @@ fn scatter(c: &mut Checker<'_, '_>, place: &Place, common: &CommonFile, repeats:
     if common.scatter_deg.is_some() && repeats != Repeats::MovedAndTurned {
         c.wrong(place, "scatter_deg", "turns rigid bodies alone", "expected no `scatter_deg` for this model");
     }
-    let reach_m = each(c, place, "scatter_m", common.scatter_m);
-    let reach_deg = each(c, place, "scatter_deg", common.scatter_deg);
+    let [reach_m, reach_deg] = [common.scatter_m, common.scatter_deg].map(each);
     Scatter { reach_m, reach_deg, seed: u64::from(common.scatter_seed.unwrap_or(0)) }
 }
 
 /// One number for all axes, or one each; zero where none is given.
-fn each(c: &mut Checker<'_, '_>, place: &Place, key: &str, given: Option<OneOrEach>) -> DVec3 {
-    let mut number = |value: f64| c.number(place, key, value, COMMON);
+fn each(given: Option<OneOrEach>) -> DVec3 {
     match given {
         None => DVec3::ZERO,
-        Some(OneOrEach::One(value)) => DVec3::splat(number(value)),
-        Some(OneOrEach::Each(values)) => DVec3::from(values.map(number)),
+        Some(OneOrEach::One(value)) => DVec3::splat(value),
+        Some(OneOrEach::Each(values)) => values.into(),
     }
 }
 

@@ -13,9 +13,6 @@ use crate::source::Source;
 use metachron_core::AgentId;
 use metachron_world::{Group, Member};
 
-/// Most groups of a scene.
-const GROUPS_MAX: usize = 1000;
-
 /// Reads every group and reorders the scenery.
 pub(crate) fn groups(
     c: &mut Checker<'_, '_>,
@@ -23,15 +20,11 @@ pub(crate) fn groups(
     objects: &mut Objects,
     source: &Source,
 ) -> Vec<Group> {
-    if files.len() > GROUPS_MAX {
-        let expected = format!("expected at most {GROUPS_MAX}");
-        c.wrong(&Place::new("", ""), "group", format_args!("has {} entries", files.len()), expected);
-        return Vec::new();
-    }
     if c.is_draft() {
-        let proxies = files.iter().enumerate().filter_map(|(number, file)| Some((number, file, file.proxy.as_ref()?)));
-        proxies.for_each(|(number, file, proxy)| {
-            mesh_model(c, &group_place(number, file).table("proxy"), proxy, source);
+        let proxies = files.iter().enumerate().filter_map(|(number, file)| Some((number, file.proxy.as_ref()?)));
+        proxies.for_each(|(number, proxy)| {
+            let place = group_place(c, number).table("proxy");
+            mesh_model(c, &place, proxy, source);
         });
         return Vec::new();
     }
@@ -41,7 +34,7 @@ pub(crate) fn groups(
         groups: vec![None; files.len()],
     };
     for (number, file) in files.iter().enumerate() {
-        let place = group_place(number, file);
+        let place = group_place(c, number);
         if objects.names.is_known(&file.name) || files[..number].iter().any(|other| other.name == file.name) {
             c.wrong(
                 &place,
@@ -55,7 +48,8 @@ pub(crate) fn groups(
     if let Some(number) = owners.in_itself() {
         let what = format_args!("put group `{}` into itself", files[number].name);
         let expected = "expected groups that contain each other in one direction";
-        c.wrong(&group_place(number, &files[number]), "members", what, expected);
+        let place = group_place(c, number);
+        c.wrong(&place, "members", what, expected);
         return Vec::new();
     }
     let order = owners.inner_first();
@@ -70,7 +64,7 @@ pub(crate) fn groups(
     for (at, &number) in order.iter().enumerate() {
         let first = at - order[..at].iter().filter(|&&other| owners.is_within(other, number)).count();
         let members = before(first)..before(at + 1);
-        let place = group_place(number, &files[number]);
+        let place = group_place(c, number);
         let held = owners.agents_in(number, &objects.agents);
         let of_group = GroupMembers { scenery: &objects.scenery[members.clone()], agents: &held };
         if let Some((proxy, levels)) = impostors(c, &place, &files[number], &of_group, source) {
@@ -126,16 +120,13 @@ impl Owners {
 }
 
 /// The place of group `number` in the scene file.
-fn group_place(number: usize, file: &GroupFile) -> Place {
-    Place::new(format!("group.{number}"), format!("of group `{}`", file.name))
+fn group_place(c: &Checker<'_, '_>, number: usize) -> Place {
+    c.place(&format!("group.{number}"))
 }
 
 /// Assigns its members to group `number`.
 fn claim(c: &mut Checker<'_, '_>, number: usize, files: &[GroupFile], objects: &Objects, owners: &mut Owners) {
-    let place = &group_place(number, &files[number]);
-    if files[number].members.is_empty() {
-        c.wrong(place, "members", "is empty", "expected names of objects and groups");
-    }
+    let place = &group_place(c, number);
     for (at, wanted) in files[number].members.iter().enumerate() {
         let key = format!("members.{at}");
         let others = objects.names.only(|named| matches!(named, NamedObject::Fixed | NamedObject::Synthetic(_)));

@@ -8,7 +8,6 @@ use crate::check::{Checker, Place};
 use crate::format::GroupFile;
 use crate::source::Source;
 use glam::{DQuat, DVec3};
-use metachron_core::NumberRange;
 use metachron_drawable::{Model, Placement, ProgressiveMesh, proxy};
 use metachron_world::{Appearance, GROUP_LEVELS_MAX, Member, Scenery};
 use std::sync::Arc;
@@ -85,13 +84,8 @@ pub(super) fn impostors(
 
 /// Reports levels that are wrong whatever mesh they are cut from.
 fn check(c: &mut Checker<'_, '_>, place: &Place, levels: &[u32]) {
-    if levels.is_empty() || levels.len() > GROUP_LEVELS_MAX {
-        let expected = format!("expected 1 to {GROUP_LEVELS_MAX} numbers of triangles");
-        return c.wrong(place, "levels", format_args!("has {} entries", levels.len()), expected);
-    }
     for (at, count) in levels.iter().enumerate() {
         let key = format!("levels.{at}");
-        c.number(place, &key, f64::from(*count), NumberRange::new(1.0, 1e5, ""));
         if let Some(before) = at.checked_sub(1).map(|at| levels[at]).filter(|before| before >= count) {
             let expected = "expected rising numbers, the coarsest level first";
             c.wrong(place, &key, format_args!("goes from {before} to {count}"), expected);
@@ -215,7 +209,7 @@ mod tests {
     fn wrong_levels_are_refused_at_their_position() {
         let small = "proxy = { generate = \"sphere\", triangles = 100, scale = 8 }\nlevels = [20, 320]";
         let cases = [
-            ("levels = []", "`levels` of group `g` has 0 entries; expected 1 to 8"),
+            ("levels = []", "`levels` of group `g` has 0 entries; expected 1 … 8"),
             ("levels = [1, 2, 3, 4, 5, 6, 7, 8, 9]", "has 9 entries"),
             ("levels = [80, 20]", "goes from 80 to 20; expected rising"),
             ("levels = [80, 80]", "goes from 80 to 80"),

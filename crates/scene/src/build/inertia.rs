@@ -2,8 +2,7 @@
 //!
 //! In: a [`RigidFile`]. Out: a [`GivenInertia`], problems to the [`Checker`]. Never here: the mass, the shape.
 
-use super::POSITION_MAX_M;
-use super::common::point_or_zero;
+use super::common::point;
 use crate::check::{Checker, Place};
 use crate::format::RigidFile;
 use glam::{DMat3, DVec3};
@@ -12,7 +11,7 @@ use metachron_models::rigid::GivenInertia;
 /// Mass properties that the file gives in place of the shape's.
 pub(super) fn inertia(c: &mut Checker<'_, '_>, place: &Place, file: &RigidFile) -> Option<GivenInertia> {
     let before = c.count();
-    let com_m = point_or_zero(c, place, "centre_of_mass_m", file.centre_of_mass_m, POSITION_MAX_M);
+    let com_m = point(file.centre_of_mass_m);
     let Some([xx, yy, zz, xy, xz, yz]) = file.inertia_kg_m2 else {
         if file.centre_of_mass_m.is_some() {
             let expected = "expected `inertia_kg_m2` beside it: the moments about that point";

@@ -3,20 +3,18 @@
 //! In: [`JointFile`]s and the objects of the scene. Out: [`Joint`]s that can hold from the first step on, problems to the
 //! [`Checker`]. Never here: solving joints.
 
-use super::POSITION_MAX_M;
-use super::force_limits::{ForceLimits, ForceLimitsFile};
-use super::joint_keys::{FreeMotion, free_motion};
+use super::common::point;
+use super::force_limits::ForceLimits;
+use super::joint_keys::{check_keys, free_motion};
 use super::joint_rules::{PlacedJoint, check_start, contradictions};
 use super::objects::{NamedObject, Objects};
 use crate::check::{Checker, Place};
-use crate::format::{JointFile, JointKind as Kind, Point};
+use crate::format::{JointFile, JointKind as Kind};
 use glam::{DQuat, DVec3};
 use metachron_core::AgentId;
 use metachron_models::rigid::{Joint, JointKind};
 use metachron_world::Spec;
 
-/// Most joints of a scene.
-const JOINTS_MAX: usize = 10_000;
 /// The name of the world in joints: no object may have it.
 pub(super) const WORLD: &str = "world";
 
@@ -50,11 +48,6 @@ struct Anchored {
 
 /// The joints of the scene.
 pub(crate) fn joints(c: &mut Checker<'_, '_>, files: &[JointFile], objects: &Objects) -> Vec<Joint> {
-    if files.len() > JOINTS_MAX {
-        let expected = format!("expected at most {JOINTS_MAX}");
-        c.wrong(&Place::new("", ""), "joint", format_args!("has {} entries", files.len()), expected);
-        return Vec::new();
-    }
     let placed: Vec<PlacedJoint> =
         files.iter().enumerate().filter_map(|(i, file)| place_joint(c, i, file, objects)).collect();
     contradictions(c, &placed);
@@ -63,9 +56,9 @@ pub(crate) fn joints(c: &mut Checker<'_, '_>, files: &[JointFile], objects: &Obj
 
 /// Reads one joint and checks that it can hold at the start.
 fn place_joint(c: &mut Checker<'_, '_>, index: usize, file: &JointFile, objects: &Objects) -> Option<PlacedJoint> {
-    let place = Place::new(format!("joint.{index}"), format!("of the joint of `{}` and `{}`", file.a, file.b));
+    let place = c.place(&format!("joint.{index}"));
     let before = c.count();
-    let free = free_motion(c, &place, file);
+    let is_complete = check_keys(c, &place, file);
     let (a, b) = (end(c, &place, "a", &file.a, objects), end(c, &place, "b", &file.b, objects));
     let (a, b) = (a?, b?);
     if a.agent == b.agent || a.is_led && b.is_led {
@@ -82,11 +75,10 @@ fn place_joint(c: &mut Checker<'_, '_>, index: usize, file: &JointFile, objects:
         c.wrong(&place, "b", what, expected);
         return None;
     }
-    let at_a_m = file.at_a_m.map_or(DVec3::ZERO, |at| c.point(&place, "at_a_m", at, POSITION_MAX_M));
-    let from = a.to_world(at_a_m);
+    let from = a.to_world(point(file.at_a_m));
     let to = other_anchor(c, &place, file, b, from)?;
-    let limits =
-        ForceLimits::read(c, &place, ForceLimitsFile { tears: file.tears_above_n, yields: file.yields_above_n });
+    let free = if is_complete { free_motion(c, &place, file, from.distance(to)) } else { None };
+    let limits = ForceLimits::read(c, &place, [file.tears_above_n, file.yields_above_n]);
     if c.count() > before {
         return None;
     }
@@ -148,11 +140,10 @@ fn end(c: &mut Checker<'_, '_>, place: &Place, key: &str, name: &str, objects: &
 
 /// The anchor on `b`, in the world: `at_b_m` if given; else the anchor on `a`, or for springs and ropes the origin of `b`.
 fn other_anchor(c: &mut Checker<'_, '_>, place: &Place, file: &JointFile, b: End, from: DVec3) -> Option<DVec3> {
-    let given = |c: &mut Checker<'_, '_>, at: Point| b.to_world(c.point(place, "at_b_m", at, POSITION_MAX_M));
     match (file.at_b_m, file.kind) {
-        (Some(at), _) => Some(given(c, at)),
+        (Some(at), _) => Some(b.to_world(at.into())),
         (None, Kind::Spring | Kind::Rope) if b.agent.is_none() && file.b == WORLD => {
-            let expected = format!("expected the other end of the {} in the world, metres", file.kind.name());
+            let expected = format!("expected the other end of the {} in the world, metres", c.written(place, "kind"));
             c.wrong(place, "at_b_m", "is missing", expected);
             None
         }
@@ -181,22 +172,10 @@ impl PlacedJoint {
     /// The joint of the agent `id`, which is at `a`; `sign` is that of the axis.
     fn between(&self, id: AgentId, a: Anchored, b: Anchored, sign: f64) -> Joint {
         let (Anchored { end: a, anchor: from }, Anchored { end: b, anchor: to }) = (a, b);
-        let axis = |world: DVec3| a.rotation.conjugate() * world * sign;
-        let length = from.distance(to);
-        let kind = match self.free_motion {
-            FreeMotion::Fixed => JointKind::Fixed,
-            FreeMotion::Revolute { range_rad, motor, .. } => {
-                JointKind::Revolute { axis: axis(self.axis()), range_rad, motor }
-            }
-            FreeMotion::Spherical => JointKind::Spherical,
-            FreeMotion::Prismatic { range_m, motor, .. } => {
-                JointKind::Prismatic { axis: axis(self.axis()), range_m, motor }
-            }
-            FreeMotion::Spring { stiffness_n_m, damping_n_s_m, rest_m } => {
-                JointKind::Spring { stiffness_n_m, damping_n_s_m, rest_m: rest_m.unwrap_or(length) }
-            }
-            FreeMotion::Rope { length_m } => JointKind::Rope { length_m: length_m.unwrap_or(length) },
-        };
+        let mut kind = self.free_motion;
+        if let JointKind::Revolute { axis, .. } | JointKind::Prismatic { axis, .. } = &mut kind {
+            *axis = a.rotation.conjugate() * self.axis() * sign;
+        }
         // a joint to the world is given in the world's axes
         let (anchor_b_m, rotation_b) = match b.agent {
             Some(_) => (b.to_local(to), b.rotation),

@@ -2,11 +2,10 @@
 
 use super::force_limits::ForceLimits;
 use super::joint::End;
-use super::joint_keys::FreeMotion;
 use crate::check::{Checker, Place};
 use glam::DVec3;
 use metachron_core::AgentId;
-use metachron_models::rigid::JOINT_GAP_MAX_M as GAP_MAX_M;
+use metachron_models::rigid::{JOINT_GAP_MAX_M as GAP_MAX_M, JointKind};
 use std::collections::BTreeMap;
 
 /// Directions that differ by less than this are one direction: sine of the angle.
@@ -20,7 +19,7 @@ pub(super) struct PlacedJoint {
     pub(super) ends: [End; 2],
     /// The anchors on `a` and `b`, in the world.
     pub(super) anchors: [DVec3; 2],
-    pub(super) free_motion: FreeMotion,
+    pub(super) free_motion: JointKind,
     pub(super) collide: bool,
     pub(super) limits: ForceLimits,
 }
@@ -29,7 +28,7 @@ impl PlacedJoint {
     /// The axis of a turn or slide in the world; zero for other kinds.
     pub(super) fn axis(&self) -> DVec3 {
         match self.free_motion {
-            FreeMotion::Revolute { axis, .. } | FreeMotion::Prismatic { axis, .. } => self.ends[0].rotation * axis,
+            JointKind::Revolute { axis, .. } | JointKind::Prismatic { axis, .. } => self.ends[0].rotation * axis,
             _ => DVec3::ZERO,
         }
     }
@@ -54,33 +53,31 @@ pub(super) fn check_start(c: &mut Checker<'_, '_>, joint: &PlacedJoint) -> bool 
     let apart = joint.anchors[1] - joint.anchors[0];
     let along = apart.dot(joint.axis());
     let (key, what, expected) = match joint.free_motion {
-        FreeMotion::Spring { .. } => return true,
-        FreeMotion::Rope { length_m } => match length_m {
-            Some(length) if apart.length() > length + GAP_MAX_M => (
-                "length_m",
-                format!("is {length}, but its ends start {:.4} m apart", apart.length()),
-                "expected a length of at least that".to_owned(),
-            ),
-            _ => return true,
-        },
-        FreeMotion::Prismatic { .. } if (apart - along * joint.axis()).length() > GAP_MAX_M => (
+        JointKind::Spring { .. } => return true,
+        JointKind::Rope { length_m } if apart.length() > length_m + GAP_MAX_M => (
+            "length_m",
+            format!("is {length_m}, but its ends start {:.4} m apart", apart.length()),
+            "expected a length of at least that".to_owned(),
+        ),
+        JointKind::Rope { .. } => return true,
+        JointKind::Prismatic { .. } if (apart - along * joint.axis()).length() > GAP_MAX_M => (
             "at_b_m",
             format!("is {:.4} m off the axis through `at_a_m` at the start", (apart - along * joint.axis()).length()),
             format!("expected at most {GAP_MAX_M} m"),
         ),
-        FreeMotion::Prismatic { range_m: Some([least, greatest]), .. }
+        JointKind::Prismatic { range_m: Some([least, greatest]), .. }
             if !(least - GAP_MAX_M..=greatest + GAP_MAX_M).contains(&along) =>
         {
             let what = format!("is [{least}, {greatest}], but the objects start at {along:.4} m");
             ("range_m", what, "expected a range that contains that position".to_owned())
         }
-        FreeMotion::Prismatic { .. } => return true,
-        FreeMotion::Fixed | FreeMotion::Revolute { .. } | FreeMotion::Spherical if apart.length() > GAP_MAX_M => (
+        JointKind::Prismatic { .. } => return true,
+        JointKind::Fixed | JointKind::Revolute { .. } | JointKind::Spherical if apart.length() > GAP_MAX_M => (
             "at_b_m",
             format!("is {:.4} m away from `at_a_m` at the start", apart.length()),
             format!("expected the same point of space, within {GAP_MAX_M} m, which is the default"),
         ),
-        FreeMotion::Fixed | FreeMotion::Revolute { .. } | FreeMotion::Spherical => return true,
+        JointKind::Fixed | JointKind::Revolute { .. } | JointKind::Spherical => return true,
     };
     c.wrong(&joint.place, key, what, expected);
     false
@@ -101,7 +98,7 @@ pub(super) fn contradictions(c: &mut Checker<'_, '_>, all: &[PlacedJoint]) {
 
 /// Why two joints of the same pair contradict each other.
 fn contradiction(first: &PlacedJoint, second: &PlacedJoint) -> Option<&'static str> {
-    use FreeMotion::{Fixed, Prismatic, Revolute, Rope, Spherical, Spring};
+    use JointKind::{Fixed, Prismatic, Revolute, Rope, Spherical, Spring};
     match (first.free_motion, second.free_motion) {
         (Fixed, Fixed) => Some("connects a pair that a fixed joint connects already"),
         (Fixed, _) | (_, Fixed) => {

@@ -3,7 +3,7 @@
 //! In: [`MotorFile`]s. Out: [`Motor`]s, in radians; problems to the [`Checker`]. Never here: the joint's other keys.
 
 use crate::check::{Checker, Place};
-use crate::format::{MOTOR, MotorFile};
+use crate::format::MotorFile;
 use metachron_models::rigid::{Motor, MotorGoal};
 
 /// The motors of hinges and slides: their keys, and how far either goes.
@@ -51,13 +51,13 @@ impl MotorKeys {
         range: Option<[f64; 2]>,
     ) -> Option<Motor> {
         let place = &place.table("motor");
-        let file = file?;
+        file?;
         let before = c.count();
-        self.check_keys(c, place, file);
+        self.check_keys(c, place);
         if c.count() > before {
             return None;
         }
-        let mut read = |key: &str| c.optional(place, key, file.get(key), MOTOR);
+        let read = |key: &str| c.found(place, key);
         let (position, velocity) = (read(self.position), read(self.velocity));
         let (stiffness, damping) = (read(self.stiffness), read(self.damping));
         let max_effort = read(self.effort).unwrap_or(f64::INFINITY);
@@ -89,16 +89,15 @@ impl MotorKeys {
     }
 
     /// Reports keys that belong to another kind of joint, and missing keys.
-    fn check_keys(&self, c: &mut Checker<'_, '_>, place: &Place, file: &MotorFile) {
+    fn check_keys(&self, c: &mut Checker<'_, '_>, place: &Place) {
         let own = [self.position, self.velocity, self.effort, self.stiffness, self.damping];
         let list = own.map(|key| format!("`{key}`")).join(", ");
-        for key in MotorFile::KEYS {
-            if file.get(key).is_some() && !own.contains(&key) {
-                let expected = format!("the motor of {} has {list}", self.joint);
-                c.wrong(place, key, format_args!("does not belong to the motor of {}", self.joint), expected);
-            }
-        }
-        let has = |key: &str| file.get(key).is_some();
+        let keys = c.keys::<MotorFile>();
+        let foreign: Vec<_> = keys.iter().map(String::as_str).filter(|key| !own.contains(key)).collect();
+        let what = format_args!("does not belong to the motor of {}", self.joint);
+        c.refuse(place, &foreign, what, &format!("the motor of {} has {list}", self.joint));
+        let given = c.given(place, &own);
+        let has = |key: &str| given.contains(&key);
         let mut missing = |key: &str, why: String| c.wrong(place, key, "is missing", why);
         if !(has(self.position) || has(self.velocity)) {
             missing(self.velocity, format!("expected `{}` or `{}`", self.position, self.velocity));

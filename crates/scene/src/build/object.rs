@@ -5,13 +5,14 @@ use super::contact::{self, GroupNames};
 use super::grid::{Copies, copies};
 use super::joint::WORLD;
 use super::objects::{
-    AGENTS_MAX, Entry, ModelContext, ModelFile, NamedObject, Names, OBSTACLES_MAX, Objects, SceneContext, too_many,
+    AGENTS_MAX, Entry, ModelContext, ModelFile, NamedObject, Names, OBSTACLES_MAX, Objects, RigidFiles, SceneContext,
+    too_many,
 };
 use super::{rigid, scenery, soft, synthetic, tool, tube};
 use crate::check::{Checker, Place};
 use crate::demand::Cost;
 use crate::diagnostic::{Problem, did_you_mean};
-use crate::format::{COMMON_KEYS, CommonFile, MODELS, model_named};
+use crate::format::{CommonFile, MODELS, model_named};
 use crate::source::Source;
 use metachron_core::{AgentId, Resolution, ResolutionRange};
 use metachron_geometry::Obstacle;
@@ -23,6 +24,7 @@ use metachron_models::synthetic::Synthetic;
 use metachron_models::tool::Tool;
 use metachron_world::kinds::Material;
 use metachron_world::{Appearance, Member, Spec};
+use schemars::JsonSchema;
 use serde::de::DeserializeOwned;
 use std::collections::BTreeMap;
 use std::ops::Range;
@@ -99,31 +101,68 @@ fn read_entry(c: &mut Checker<'_, '_>, index: usize, item: &Spanned<DeValue<'_>>
         return None;
     };
     let model = model_name(c, table, item.span())?;
-    let (mut common, mut own) = (DeTable::new(), DeTable::new());
-    for (key, value) in table {
-        // `hold` with a list of sides is a key of the soft models, not the common one
-        let sides = key.get_ref() == "hold" && matches!(value.get_ref(), DeValue::Array(_));
-        let shared = COMMON_KEYS.contains(&key.get_ref().as_ref()) && !sides;
-        let into = if shared { &mut common } else { &mut own };
-        into.insert(key.clone(), value.clone());
-    }
+    let place = c.place(&path);
+    let mut own = table.clone();
     own.remove("model");
-    let span = item.span();
-    let common = read::<CommonFile>(c, common, span.clone());
+    // `hold` with a list of sides is a key of the soft models, not the common one
+    let sides = own.remove("hold").filter(|hold| matches!(hold.get_ref(), DeValue::Array(_)));
+    if let (None, Some((key, hold))) = (&sides, table.get_key_value("hold")) {
+        own.insert(key.clone(), hold.clone());
+    }
+    let mut parts = Parts { place: &place, keys: vec!["model".to_owned()], rest: own };
+    let common = parts.take::<CommonFile>(c);
+    if let (Some(hold), Some((key, _))) = (sides, table.get_key_value("hold")) {
+        parts.rest.insert(key.clone(), hold);
+    }
     let own = match model {
-        "tube" => read(c, own, span).map(ModelFile::Tube),
-        "rigid" => read(c, own, span).map(ModelFile::Rigid),
-        "sheet" => read(c, own, span).map(ModelFile::Sheet),
-        "solid" => read(c, own, span).map(ModelFile::Solid),
-        "rope" => read(c, own, span).map(ModelFile::Rope),
-        "tool" => read(c, own, span).map(ModelFile::Tool),
-        "mesh" => read(c, own, span).map(ModelFile::Mesh),
-        "tree" => read(c, own, span).map(ModelFile::Tree),
-        _ => read(c, own, span).map(ModelFile::Synthetic),
+        "tube" => parts.rest(c).map(ModelFile::Tube),
+        "rigid" => parts.both(c).map(|(solid, body)| ModelFile::Rigid(RigidFiles { solid, body })),
+        "sheet" => parts.both(c).map(|(soft, file)| ModelFile::Sheet(soft, file)),
+        "solid" => parts.both(c).map(|(soft, file)| ModelFile::Solid(soft, file)),
+        "rope" => parts.both(c).map(|(soft, file)| ModelFile::Rope(soft, file)),
+        "tool" => parts.rest(c).map(ModelFile::Tool),
+        "mesh" => parts.rest(c).map(ModelFile::Mesh),
+        "tree" => parts.rest(c).map(ModelFile::Tree),
+        _ => parts.rest(c).map(ModelFile::Synthetic),
     };
-    let common = common?;
-    let place = Place::new(path, format!("of `{}`", common.name.chars().take(NAME_MAX).collect::<String>()));
-    Some(Entry { place, common, model: own?, fixed: false, copies: Copies::single() })
+    let (common, model) = (common?, own?);
+    Some(Entry { place, common, model, fixed: false, copies: Copies::single() })
+}
+
+/// A table that is read as several types, each of which takes its own keys of it.
+struct Parts<'a, 't> {
+    place: &'a Place,
+    /// Those of the types before.
+    keys: Vec<String>,
+    /// The keys that no type has taken yet.
+    rest: DeTable<'t>,
+}
+
+impl Parts<'_, '_> {
+    /// Reads the keys of `T`, which are then taken.
+    fn take<T: DeserializeOwned + JsonSchema + 'static>(&mut self, c: &mut Checker<'_, '_>) -> Option<T> {
+        let keys = c.keys::<T>();
+        let all = std::mem::take(&mut self.rest);
+        let (own, rest) = all.into_iter().partition(|(key, _)| keys.iter().any(|own| own == key.get_ref()));
+        self.rest = rest;
+        self.keys.extend(keys);
+        c.read(self.place, own, &[])
+    }
+
+    /// Reads all that is left as `T`.
+    fn rest<T: DeserializeOwned + JsonSchema + 'static>(self, c: &mut Checker<'_, '_>) -> Option<T> {
+        c.read(self.place, self.rest, &self.keys.iter().map(String::as_str).collect::<Vec<_>>())
+    }
+
+    /// Reads the keys of `T`, and all others as `U`.
+    fn both<T, U>(mut self, c: &mut Checker<'_, '_>) -> Option<(T, U)>
+    where
+        T: DeserializeOwned + JsonSchema + 'static,
+        U: DeserializeOwned + JsonSchema + 'static,
+    {
+        let (first, rest) = (self.take(c), self.rest(c));
+        first.zip(rest)
+    }
 }
 
 fn model_name(c: &mut Checker<'_, '_>, table: &DeTable<'_>, span: Range<usize>) -> Option<&'static str> {
@@ -146,10 +185,6 @@ fn model_name(c: &mut Checker<'_, '_>, table: &DeTable<'_>, span: Range<usize>) 
     None
 }
 
-fn read<T: DeserializeOwned>(c: &mut Checker<'_, '_>, table: DeTable<'_>, span: Range<usize>) -> Option<T> {
-    c.read(table, span, &[&COMMON_KEYS[..], &["model"]].concat())
-}
-
 /// Gives every object its name and every agent its id, in the order of the file.
 fn assign_names(c: &mut Checker<'_, '_>, entries: &[Entry]) -> Names {
     let mut names = Names::default();
@@ -161,7 +196,7 @@ fn assign_names(c: &mut Checker<'_, '_>, entries: &[Entry]) -> Names {
             (_, true) => NamedObject::Fixed,
             (ModelFile::Tube(_), _) => NamedObject::Tube(id),
             (ModelFile::Rigid(_), _) => NamedObject::Rigid(id),
-            (ModelFile::Sheet(_) | ModelFile::Solid(_) | ModelFile::Rope(_), _) => NamedObject::Soft(id),
+            (ModelFile::Sheet(..) | ModelFile::Solid(..) | ModelFile::Rope(..), _) => NamedObject::Soft(id),
             (ModelFile::Tool(_), _) => NamedObject::Tool(id),
             (ModelFile::Synthetic(_), _) => NamedObject::Synthetic(id),
         };
@@ -170,12 +205,12 @@ fn assign_names(c: &mut Checker<'_, '_>, entries: &[Entry]) -> Names {
         let length = name.chars().count();
         if name.trim().is_empty() || length > NAME_MAX || name.chars().any(char::is_control) {
             let expected = format!("expected 1 to {NAME_MAX} printable characters");
-            c.wrong(&Place::new(entry.place.path.clone(), ""), "name", "is not a valid name", expected);
+            c.wrong(&entry.place.unnamed(), "name", "is not a valid name", expected);
             continue;
         }
         if name == WORLD {
             let what = format!("is `{WORLD}`, the name of the fixed world in joints");
-            c.wrong(&Place::new(entry.place.path.clone(), ""), "name", what, "expected another name");
+            c.wrong(&entry.place.unnamed(), "name", what, "expected another name");
         }
         let taken = (first..).zip(entry.copies.names(name)).filter_map(|(id, name)| {
             let before = names.0.insert(name.clone(), named(AgentId(id)));
@@ -183,7 +218,7 @@ fn assign_names(c: &mut Checker<'_, '_>, entries: &[Entry]) -> Names {
         });
         if let Some(name) = taken.collect::<Vec<_>>().first() {
             let what = format!("is `{name}`, the name of another object");
-            c.wrong(&Place::new(entry.place.path.clone(), ""), "name", what, "expected a unique name");
+            c.wrong(&entry.place.unnamed(), "name", what, "expected a unique name");
         }
     }
     names
@@ -202,7 +237,6 @@ fn fixed_objects(
         // checked although not used: a fixed object has no steps, but a wrong rate is still wrong
         pace(c, &entry.place, &entry.common);
         refuse_tolerance(c, &entry.place, &entry.common);
-        levels(c, &entry.place, &entry.common);
         let appearance = appearance(c, &entry.place, &entry.common, Material::Plastic);
         let traits = groups.traits(c, &entry.place, entry.common.contact.as_ref());
         if let Some(obstacle) = rigid::obstacle(c, &entry.place, file, source) {
@@ -285,14 +319,14 @@ fn member(
         place,
         source: context.source,
         gravity: context.gravity,
-        levels: levels(c, place, common),
+        levels: levels(common),
         sleep: common.sleep.unwrap_or(true),
         traits: known.groups.traits(c, place, common.contact.as_ref()),
     };
     let pace = pace(c, place, common);
-    let faults = faults(c, place, common.faults.as_ref(), context.faults);
+    let faults = faults(common.faults.as_ref(), context.faults);
     let material = match model {
-        ModelFile::Tube(_) | ModelFile::Sheet(_) | ModelFile::Solid(_) => Material::Tissue,
+        ModelFile::Tube(_) | ModelFile::Sheet(..) | ModelFile::Solid(..) => Material::Tissue,
         ModelFile::Tool(_) => Material::Metal,
         _ => Material::Plastic,
     };
@@ -308,11 +342,11 @@ fn member(
             (Spec::Tube(built.spec), start, range, built.picture)
         }
         ModelFile::Rigid(file) => (Spec::Rigid(rigid::build(c, file, &model_context)?), unit, flat, flat),
-        ModelFile::Sheet(_) | ModelFile::Solid(_) | ModelFile::Rope(_) => {
+        ModelFile::Sheet(..) | ModelFile::Solid(..) | ModelFile::Rope(..) => {
             let built = match model {
-                ModelFile::Sheet(file) => soft::sheet(c, file, &model_context)?,
-                ModelFile::Solid(file) => soft::solid(c, file, &model_context)?,
-                ModelFile::Rope(file) => soft::rope(c, file, &model_context),
+                ModelFile::Sheet(shared, file) => soft::sheet(c, shared, file, &model_context)?,
+                ModelFile::Solid(shared, file) => soft::solid(c, shared, file, &model_context)?,
+                ModelFile::Rope(shared, file) => soft::rope(c, shared, file, &model_context),
                 _ => return None,
             };
             let range = ResolutionRange { eps_m: built.eps_m.unwrap_or(flat.eps_m), n: levels };
@@ -321,7 +355,8 @@ fn member(
         ModelFile::Tool(file) => (Spec::Tool(tool::build(c, file, &model_context, known.names)), unit, flat, flat),
         ModelFile::Synthetic(file) => {
             contact::refuse(c, place, common.contact.as_ref());
-            let (spec, range) = synthetic::build(c, file, &model_context);
+            let (spec, eps_m) = synthetic::build(file);
+            let range = ResolutionRange { eps_m, n: levels };
             (Spec::Synthetic(spec), Resolution { eps_m: range.eps_m.1, n: levels.1 }, range, flat)
         }
         ModelFile::Mesh(_) | ModelFile::Tree(_) => return None,

@@ -6,8 +6,8 @@ use super::grid::{Copies, Repeats};
 use crate::check::{Checker, Place};
 use crate::diagnostic::Problem;
 use crate::format::{
-    CommonFile, FaultsFile, MeshFile, RigidFile, RopeFile, SheetFile, SolidFile, SyntheticFile, ToolFile, TreeFile,
-    TubeFile,
+    CommonFile, FaultsFile, MeshFile, RigidFile, RopeFile, SheetFile, SoftFile, SolidFile, SolidShapeFile,
+    SyntheticFile, ToolFile, TreeFile, TubeFile,
 };
 use crate::source::Source;
 use glam::DVec3;
@@ -122,12 +122,18 @@ pub(super) struct Entry {
     pub(super) copies: Copies,
 }
 
+/// A rigid object as a file has it: its solid, and the rest.
+pub(super) struct RigidFiles {
+    pub(super) solid: SolidShapeFile,
+    pub(super) body: RigidFile,
+}
+
 pub(super) enum ModelFile {
     Tube(TubeFile),
-    Rigid(RigidFile),
-    Sheet(SheetFile),
-    Solid(SolidFile),
-    Rope(RopeFile),
+    Rigid(RigidFiles),
+    Sheet(SoftFile, SheetFile),
+    Solid(SoftFile, SolidFile),
+    Rope(SoftFile, RopeFile),
     Tool(ToolFile),
     Synthetic(SyntheticFile),
     Mesh(MeshFile),

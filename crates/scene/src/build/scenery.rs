@@ -2,16 +2,15 @@
 //!
 //! In: entries of these models. Out: [`Scenery`], copies sharing one model. Never here: groups, drawing.
 
-use super::common::{appearance, levels, pace, painted_appearance, parse_colour};
-use super::common::{point_or_zero, rotation};
+use super::common::{appearance, pace, painted_appearance, parse_colour, point, rotation};
 use super::contact;
+use super::mesh;
 use super::objects::{Entry, ModelFile};
 use super::texture;
 use super::texture::Textures;
-use super::{POSITION_MAX_M, ROTATION_MAX_DEG, SPEED_MAX, mesh};
 use crate::check::{Checker, Place};
 use crate::demand::Cost;
-use crate::format::{MESH, MOTION, MeshFile, MotionFile, Point, TREE, TreeFile, TreeLod};
+use crate::format::{MeshFile, MotionFile, Point, TreeFile, TreeLod};
 use crate::source::Source;
 use glam::{DQuat, DVec3};
 use metachron_drawable::{
@@ -107,11 +106,8 @@ fn mesh_of(
     file: &MeshFile,
     meshes: &mut Meshes<'_>,
 ) -> Option<(Arc<ProgressiveMesh>, Placement)> {
-    let count = |n: u32| f64::from(n);
-    let triangles = file.triangles.map(|n| c.number(place, "triangles", count(n), MESH) as u32);
-    let least = file.least_triangles.map(|n| c.number(place, "least_triangles", count(n), MESH) as u32);
-    let scale = c.optional(place, "scale", file.scale, MESH).unwrap_or(1.0);
-    let at = Placement { scale, ..placement(c, place, file.position_m, file.rotation_deg) };
+    let (triangles, least, scale) = (file.triangles, file.least_triangles, file.scale.unwrap_or(1.0));
+    let at = Placement { scale, ..placement(file.position_m, file.rotation_deg) };
     if file.seed.is_some() && file.generate.is_none() {
         c.wrong(place, "seed", "has no effect alone", "expected `generate` beside it");
     }
@@ -202,39 +198,26 @@ pub(super) fn surface_source<'a>(
     None
 }
 
-fn placement(
-    c: &mut Checker<'_, '_>,
-    place: &Place,
-    position: Option<Point>,
-    rotation_deg: Option<Point>,
-) -> Placement {
-    let position = point_or_zero(c, place, "position_m", position, POSITION_MAX_M);
-    let rotation = rotation(point_or_zero(c, place, "rotation_deg", rotation_deg, ROTATION_MAX_DEG)).normalize();
-    Placement { position, rotation, scale: 1.0 }
+fn placement(position: Option<Point>, rotation_deg: Option<Point>) -> Placement {
+    Placement { position: point(position), rotation: rotation(rotation_deg).normalize(), scale: 1.0 }
 }
 
 /// The parts of one copy, each with the suffix of its name.
 pub(super) type Parts = Vec<(String, Scenery)>;
 
-/// Checks common keys that scenery does not use: it has no steps, but a wrong rate is still wrong.
-fn check_unused_keys(c: &mut Checker<'_, '_>, entry: &Entry) {
-    pace(c, &entry.place, &entry.common);
-    levels(c, &entry.place, &entry.common);
-}
-
 fn mesh_parts(c: &mut Checker<'_, '_>, entry: &Entry, file: &MeshFile, meshes: &mut Meshes<'_>) -> Parts {
-    check_unused_keys(c, entry);
+    // scenery has no steps, but a wrong rate is still wrong
+    pace(c, &entry.place, &entry.common);
     let appearance = painted_appearance(c, &entry.place, &entry.common, Material::Plastic);
     if file.dome_m.is_some() && file.scale.is_some() {
         c.wrong(&entry.place, "scale", "contradicts `dome_m`", "expected one of them");
     }
-    let dome = file.dome_m.map(|radius| c.number(&entry.place, "dome_m", radius, MESH));
     let motion = file.motion.as_ref().map(|file| motion(c, &entry.place.table("motion"), file));
     let Some((mesh, at)) = mesh_of(c, &entry.place, file, meshes) else { return Parts::new() };
     let motion = motion.map(|motion| Motion { about_m: at.position, ..motion });
     let model = Model::Mesh(Arc::clone(&mesh));
     let part = |at| Scenery { name: String::new(), model: model.clone(), at, appearance, texture: None, motion };
-    match dome {
+    match file.dome_m {
         None => vec![(String::new(), part(at))],
         Some(radius_m) => {
             let places: Vec<Placement> = dome_places(at, radius_m).collect();
@@ -252,38 +235,32 @@ fn motion(c: &mut Checker<'_, '_>, place: &Place, file: &MotionFile) -> Motion {
     }
     Motion {
         about_m: DVec3::ZERO,
-        spin_rad_s: point_or_zero(c, place, "spin_rad_s", file.spin_rad_s, SPEED_MAX),
-        swing_m: point_or_zero(c, place, "swing_m", file.swing_m, POSITION_MAX_M),
-        swing_hz: c.optional(place, "swing_hz", file.swing_hz, MOTION).unwrap_or(SWING_HZ),
+        spin_rad_s: point(file.spin_rad_s),
+        swing_m: point(file.swing_m),
+        swing_hz: file.swing_hz.unwrap_or(SWING_HZ),
     }
 }
 
 fn tree_parts(c: &mut Checker<'_, '_>, entry: &Entry, file: &TreeFile) -> Parts {
     let place = &entry.place;
-    check_unused_keys(c, entry);
+    pace(c, place, &entry.common);
     let bark = appearance(c, place, &entry.common, Material::Skin);
-    let mut count = |key: &str, given: Option<u32>, usual: u32| {
-        c.optional(place, key, given.map(f64::from), TREE).unwrap_or(f64::from(usual)) as u32
-    };
-    let (branches, leaves) =
-        (count("branches", file.branches, TREE_DEFAULT.0), count("leaves", file.leaves, TREE_DEFAULT.1));
     let spec = TreeSpec {
         seed: u64::from(file.seed.unwrap_or(0)),
-        height_m: c.number(place, "height_m", file.height_m, TREE),
-        branches,
-        leaves,
+        height_m: file.height_m,
+        branches: file.branches.unwrap_or(TREE_DEFAULT.0),
+        leaves: file.leaves.unwrap_or(TREE_DEFAULT.1),
         prefix: file.lod == Some(TreeLod::Prefix),
     };
-    let share = c.optional(place, "leaves_importance", file.leaves_importance, TREE);
-    let share = share.unwrap_or(LEAVES_IMPORTANCE);
+    let share = file.leaves_importance.unwrap_or(LEAVES_IMPORTANCE);
     let colour = file.leaves_colour.as_deref().map_or(Some(LEAF), parse_colour).unwrap_or_else(|| {
         c.wrong(place, "leaves_colour", "is not a colour", "expected `#rrggbb`, such as `#5a8a42`");
         LEAF
     });
     let leaf = Appearance { colour, importance: bark.importance * share, ..bark };
     let bark = Appearance { colour: if entry.common.colour.is_some() { bark.colour } else { BARK }, ..bark };
-    let at = placement(c, place, file.position_m, file.rotation_deg);
-    if !c.may_make(place, "leaves", Cost::tree(u64::from(branches), u64::from(leaves))) {
+    let at = placement(file.position_m, file.rotation_deg);
+    if !c.may_make(place, "leaves", Cost::tree(u64::from(spec.branches), u64::from(spec.leaves))) {
         return Parts::new();
     }
     let [trunk, crown] = tree(&spec).map(|foliage| Model::Foliage(Arc::new(foliage)));

@@ -3,17 +3,13 @@
 //! In: [`SensorFile`]s, the objects and joints of the scene. Out: [`Sensor`]s; problems to the [`Checker`]. Never here:
 //! readings.
 
-use super::common::{point_or_zero, rotation};
+use super::common::{point, rotation};
 use super::objects::{NamedObject, Objects};
-use super::{POSITION_MAX_M, ROTATION_MAX_DEG};
 use crate::check::{Checker, Place};
 use crate::format::{JointFile, SensorFile, SensorFileKind as Kind};
 use glam::DVec3;
 use metachron_core::{AgentId, ContactPartner};
 use metachron_world::{Sensor, SensorKind, Site, Spec};
-
-/// Most sensors of a scene.
-const SENSORS_MAX: usize = 1000;
 
 /// Everything that sensors may be on.
 struct Mounts<'a> {
@@ -26,7 +22,7 @@ struct Mounts<'a> {
 pub(crate) fn joint_names(c: &mut Checker<'_, '_>, files: &[JointFile]) -> Vec<String> {
     let names: Vec<String> = files.iter().map(|file| file.name.clone().unwrap_or_default()).collect();
     for (i, name) in names.iter().enumerate().filter(|(i, _)| files[*i].name.is_some()) {
-        let place = Place::new(format!("joint.{i}"), "of a joint");
+        let place = c.place(&format!("joint.{i}"));
         check_name(c, &place, name, &names[..i]);
     }
     names
@@ -47,16 +43,11 @@ pub(crate) fn sensors(
     objects: &Objects,
     joints: &[String],
 ) -> Vec<Sensor> {
-    if files.len() > SENSORS_MAX {
-        let expected = format!("expected at most {SENSORS_MAX}");
-        c.wrong(&Place::new("", ""), "sensor", format_args!("has {} entries", files.len()), expected);
-        return Vec::new();
-    }
     let names: Vec<String> = files.iter().map(|file| file.name.clone()).collect();
     let mounts = Mounts { objects, joints };
     let mut sensors = Vec::with_capacity(files.len());
     for (i, file) in files.iter().enumerate() {
-        let place = Place::new(format!("sensor.{i}"), format!("of the sensor `{}`", file.name));
+        let place = c.place(&format!("sensor.{i}"));
         check_name(c, &place, &file.name, &names[..i]);
         let kind = mounts.kind(c, &place, file);
         sensors.extend(kind.map(|kind| Sensor { name: file.name.clone(), kind }));
@@ -93,12 +84,9 @@ impl Mounts<'_> {
                     c.wrong(place, "object", "is kinematic, and has no acceleration of its own", expected);
                     return None;
                 }
-                SensorKind::Imu { object, gravity_m_s2: spec.gravity, site: site(c, place, file) }
+                SensorKind::Imu { object, gravity_m_s2: spec.gravity, site: site(file) }
             }
-            Kind::Pose => {
-                let at_m = file.at_m.map_or(DVec3::ZERO, |at| c.point(place, "at_m", at, POSITION_MAX_M));
-                SensorKind::Pose { object: self.rigid(c, place, file)?, at_m }
-            }
+            Kind::Pose => SensorKind::Pose { object: self.rigid(c, place, file)?, at_m: point(file.at_m) },
         })
     }
 
@@ -155,9 +143,8 @@ impl Mounts<'_> {
 }
 
 /// Where on its object a sensor is.
-fn site(c: &mut Checker<'_, '_>, place: &Place, file: &SensorFile) -> Site {
-    let at_m = file.at_m.map(|at| c.point(place, "at_m", at, POSITION_MAX_M));
-    Site { at_m, rotation: rotation(point_or_zero(c, place, "rotation_deg", file.rotation_deg, ROTATION_MAX_DEG)) }
+fn site(file: &SensorFile) -> Site {
+    Site { at_m: file.at_m.map(DVec3::from), rotation: rotation(file.rotation_deg) }
 }
 
 fn required<'a>(c: &mut Checker<'_, '_>, place: &Place, key: &str, given: Option<&'a String>) -> Option<&'a String> {
@@ -169,15 +156,11 @@ fn required<'a>(c: &mut Checker<'_, '_>, place: &Place, key: &str, given: Option
 
 /// Reports keys that belong to another kind.
 fn check_keys(c: &mut Checker<'_, '_>, place: &Place, file: &SensorFile) {
-    let of_joint = matches!(file.kind, Kind::JointPosition | Kind::JointVelocity | Kind::JointEffort);
-    let given = [
-        ("joint", file.joint.is_some(), of_joint),
-        ("object", file.object.is_some(), !of_joint),
-        ("with", file.with.is_some(), file.kind == Kind::ContactForce),
-        ("at_m", file.at_m.is_some(), matches!(file.kind, Kind::Pose | Kind::Imu)),
-        ("rotation_deg", file.rotation_deg.is_some(), file.kind == Kind::Imu),
-    ];
-    for (key, ..) in given.into_iter().filter(|(_, given, takes)| *given && !takes) {
-        c.wrong(place, key, "does not belong to a sensor of this kind", "expected no such key");
-    }
+    let foreign: &[&str] = match file.kind {
+        Kind::JointPosition | Kind::JointVelocity | Kind::JointEffort => &["object", "with", "at_m", "rotation_deg"],
+        Kind::ContactForce => &["joint", "at_m", "rotation_deg"],
+        Kind::Pose => &["joint", "with", "rotation_deg"],
+        Kind::Imu => &["joint", "with"],
+    };
+    c.refuse(place, foreign, "does not belong to a sensor of this kind", "expected no such key");
 }

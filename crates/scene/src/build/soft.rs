@@ -1,24 +1,18 @@
 //! Reads a sheet, solid or rope of a scene file as a [`SoftSpec`].
 
-use super::common::rotation;
+use super::common::{point, rotation};
 use super::mesh::{self, Mesh};
 use super::objects::ModelContext;
 use super::scenery::{SurfaceSource, surface_source};
 use super::soft_mesh;
-use super::{POSITION_MAX_M, ROTATION_MAX_DEG, SPEED_MAX};
 use crate::check::{Checker, Place};
 use crate::demand::Cost;
-use crate::format::{
-    OneOrRange, Point, RopeEnd, RopeFile, SOFT, SheetFile, SheetSide, SoftShapeKind, SolidFile, SolidSide,
-};
+use crate::format::{OneOrRange, RopeEnd, RopeFile, SheetFile, SheetSide, SoftFile, SoftShapeKind, SolidFile};
 use glam::{DQuat, DVec3};
 use metachron_core::{Anchor, Body};
 use metachron_drawable::generate_surface;
 use metachron_geometry::{Aabb, Cage, Triangles, open_edge, subdivided};
-use metachron_models::soft::MATTER;
-use metachron_models::soft::Side;
-use metachron_models::soft::SoftBody;
-use metachron_models::soft::{MaterialLaw, SoftMatter, SoftShape, SoftSpec, VERTICES_MAX};
+use metachron_models::soft::{MaterialLaw, Side, SoftBody, SoftMatter, SoftShape, SoftSpec, VERTICES_MAX};
 use std::sync::Arc;
 
 const POISSON_DEFAULT: f64 = 0.4;
@@ -31,22 +25,13 @@ const COARSE_TRIANGLES: u32 = 500;
 const TOO_FINE: &str = "expected a larger finest ε";
 /// A soft solid from a file is hardly longer than this, metres: a file with no scale that is was drawn in millimetres.
 const LARGE_M: f64 = 10.0;
-/// The keys that all soft bodies share.
-struct Shared {
-    young_pa: f64,
-    poisson: Option<f64>,
-    density_kg_m3: Option<f64>,
-    damping_per_s: Option<f64>,
-    damping_s: Option<f64>,
-    self_contact: bool,
-    velocity_m_s: Option<Point>,
-    friction: Option<f64>,
-    held: Vec<Side>,
-    law: MaterialLaw,
-}
-
 /// Reads a sheet; `None` where its shape is missing or cannot be used.
-pub(super) fn sheet(c: &mut Checker<'_, '_>, file: &SheetFile, context: &ModelContext<'_>) -> Option<BuiltSoft> {
+pub(super) fn sheet(
+    c: &mut Checker<'_, '_>,
+    soft: &SoftFile,
+    file: &SheetFile,
+    context: &ModelContext<'_>,
+) -> Option<BuiltSoft> {
     let place = context.place;
     let is_mesh = file.file.is_some();
     let eps_m = if is_mesh { None } else { one_division(c, place, file.segments.is_some(), file.eps_m) };
@@ -57,25 +42,16 @@ pub(super) fn sheet(c: &mut Checker<'_, '_>, file: &SheetFile, context: &ModelCo
         SheetSide::Near => Side::Near,
         SheetSide::Far => Side::Far,
     };
-    let shared = Shared {
-        young_pa: file.young_pa,
-        poisson: file.poisson,
-        density_kg_m3: file.density_kg_m3,
-        damping_per_s: file.damping_per_s,
-        damping_s: file.damping_s,
-        self_contact: file.self_contact.unwrap_or(true),
-        velocity_m_s: file.velocity_m_s,
-        friction: file.friction,
-        held: file.hold.iter().flatten().map(side).collect(),
-        law: MaterialLaw::default(),
-    };
+    let held = file.hold.iter().flatten().map(side).collect();
     let half = if let SoftShape::Sheet { size_m: [x, y], .. } = shape {
         DVec3::new(0.5 * x, 0.5 * y, 0.0)
     } else {
         DVec3::ZERO
     };
-    let pose = pose(c, place, file.position_m, file.rotation_deg, half);
-    let spec = spec(c, context, shape, pose, shared);
+    let matter = SoftMatter { poisson: file.poisson.unwrap_or(POISSON_DEFAULT), ..matter(soft) };
+    let rotation = rotation(file.rotation_deg);
+    let position = point(file.position_m) - rotation * half;
+    let spec = SoftSpec { position, rotation, matter, held, ..spec(context, shape, soft) };
     Some(divided(c, place, spec, eps_m))
 }
 
@@ -84,15 +60,11 @@ fn flat_sheet(c: &mut Checker<'_, '_>, place: &Place, file: &SheetFile) -> Optio
     if file.scale.is_some() {
         c.wrong(place, "scale", "has no `file` that it belongs to", "expected no such key here");
     }
-    let thickness_m = c.number(place, "thickness_m", file.thickness_m, SOFT);
     let Some(size_m) = file.size_m else {
         c.wrong(place, "size_m", "is missing", "a sheet needs it, or `file`: expected `size_m` in this table");
         return None;
     };
-    let size_m = std::array::from_fn(|i| c.number(place, &format!("size_m.{i}"), size_m[i], SOFT));
-    let given = file.segments.unwrap_or([1; 2]);
-    let segments = std::array::from_fn(|i| segments(c, place, &format!("segments.{i}"), given[i]));
-    Some(SoftShape::Sheet { size_m, thickness_m, segments })
+    Some(SoftShape::Sheet { size_m, thickness_m: file.thickness_m, segments: file.segments.unwrap_or([1; 2]) })
 }
 
 /// A soft body and the spacings that it may take; none where its division never changes.
@@ -102,40 +74,24 @@ pub(super) struct BuiltSoft {
 }
 
 /// Reads a solid; `None` where its dimensions are missing.
-pub(super) fn solid(c: &mut Checker<'_, '_>, file: &SolidFile, context: &ModelContext<'_>) -> Option<BuiltSoft> {
+pub(super) fn solid(
+    c: &mut Checker<'_, '_>,
+    soft: &SoftFile,
+    file: &SolidFile,
+    context: &ModelContext<'_>,
+) -> Option<BuiltSoft> {
     let place = context.place;
     check_solid_keys(c, place, file);
-    let eps_m = file.eps_m.map(|eps| c.ends(place, "eps_m", eps, SOFT));
-    let shape = solid_shape(c, file, context, eps_m)?;
-    let side = |side: &SolidSide| match side {
-        SolidSide::Left => Side::Left,
-        SolidSide::Right => Side::Right,
-        SolidSide::Near => Side::Near,
-        SolidSide::Far => Side::Far,
-        SolidSide::Bottom => Side::Bottom,
-        SolidSide::Top => Side::Top,
-    };
-    let held: Vec<Side> = file.hold.iter().flatten().map(side).collect();
+    let eps_m = file.eps_m.map(OneOrRange::ends);
+    let mut shape = solid_shape(c, file, context, eps_m)?;
+    let held = file.hold.clone().unwrap_or_default();
     if file.shape == SoftShapeKind::Ball && !held.is_empty() {
         c.wrong(place, "hold", "names faces, which a ball does not have", "expected no such key for a ball");
     }
-    let shared = Shared {
-        young_pa: file.young_pa,
-        poisson: file.poisson,
-        density_kg_m3: file.density_kg_m3,
-        damping_per_s: file.damping_per_s,
-        damping_s: file.damping_s,
-        self_contact: file.self_contact.unwrap_or(false),
-        velocity_m_s: file.velocity_m_s,
-        friction: file.friction,
-        held,
-        law: soft_mesh::law(c, place, file.law, file.exponent, file.poisson.unwrap_or(POISSON_DEFAULT)),
-    };
-    let half = if let SoftShape::Box { size_m, .. } = shape { 0.5 * size_m } else { DVec3::ZERO };
-    let pose = pose(c, place, file.position_m, file.rotation_deg, half);
-    let mut spec = spec(c, context, shape, pose, shared);
-    let matter = spec.matter;
-    match (&mut spec.shape, &file.regions) {
+    let poisson = file.poisson.unwrap_or(POISSON_DEFAULT);
+    let law = soft_mesh::law(c, place, file.law, file.exponent, poisson);
+    let matter = SoftMatter { poisson, law, ..matter(soft) };
+    match (&mut shape, &file.regions) {
         (SoftShape::Tetrahedra { mesh, regions }, Some(files)) => {
             *regions = soft_mesh::regions(c, place, files, mesh, &matter);
         }
@@ -144,44 +100,29 @@ pub(super) fn solid(c: &mut Checker<'_, '_>, file: &SolidFile, context: &ModelCo
         }
         _ => {}
     }
+    let half = if let SoftShape::Box { size_m, .. } = shape { 0.5 * size_m } else { DVec3::ZERO };
+    let (rotation, self_contact) = (rotation(file.rotation_deg), soft.self_contact.unwrap_or(false));
+    let position = point(file.position_m) - rotation * half;
+    let spec = SoftSpec { position, rotation, matter, held, self_contact, ..spec(context, shape, soft) };
     Some(BuiltSoft { spec, eps_m })
 }
 
 /// Reports keys that belong to another shape, and missing keys.
 fn check_solid_keys(c: &mut Checker<'_, '_>, place: &Place, file: &SolidFile) {
-    let [is_box, is_ball, is_mesh] =
-        [SoftShapeKind::Box, SoftShapeKind::Ball, SoftShapeKind::Mesh].map(|shape| file.shape == shape);
-    let name = if is_box {
-        "box"
-    } else if is_ball {
-        "ball"
-    } else {
-        "mesh"
+    let (name, needed, foreign): (_, Option<&str>, &[&str]) = match file.shape {
+        SoftShapeKind::Box => ("box", Some("size_m"), &["radius_m", "file", "generate", "seed", "triangles", "scale"]),
+        SoftShapeKind::Ball => {
+            ("ball", Some("radius_m"), &["size_m", "file", "generate", "seed", "triangles", "scale"])
+        }
+        SoftShapeKind::Mesh => ("mesh", None, &["size_m", "radius_m", "segments"]),
     };
-    for (key, is_given, belongs) in [
-        ("size_m", file.size_m.is_some(), is_box),
-        ("radius_m", file.radius_m.is_some(), is_ball),
-        ("segments", file.segments.is_some(), !is_mesh),
-        ("file", file.file.is_some(), is_mesh),
-        ("generate", file.generate.is_some(), is_mesh),
-        ("seed", file.seed.is_some(), is_mesh),
-        ("triangles", file.triangles.is_some(), is_mesh),
-        ("scale", file.scale.is_some(), is_mesh),
-    ] {
-        if is_given && !belongs {
-            c.wrong(place, key, format_args!("does not belong to a {name}"), "expected no such key here");
-        }
-    }
-    for (key, is_missing) in
-        [("size_m", is_box && file.size_m.is_none()), ("radius_m", is_ball && file.radius_m.is_none())]
-    {
-        if is_missing {
-            c.wrong(place, key, "is missing", format!("a {name} needs it: expected `{key}` in this table"));
-        }
+    c.refuse(place, foreign, format_args!("does not belong to a {name}"), "expected no such key here");
+    for key in needed.into_iter().filter(|key| c.given(place, &[key]).is_empty()).collect::<Vec<_>>() {
+        c.wrong(place, key, "is missing", format!("a {name} needs it: expected `{key}` in this table"));
     }
     match (file.segments, file.eps_m) {
         (Some(_), Some(_)) => c.wrong(place, "segments", "contradicts `eps_m`", "expected one of them"),
-        (None, None) if !is_mesh => c.wrong(place, "segments", "is missing", "expected `segments` or `eps_m`"),
+        (None, None) if name != "mesh" => c.wrong(place, "segments", "is missing", "expected `segments` or `eps_m`"),
         _ => {}
     }
 }
@@ -209,16 +150,13 @@ fn solid_shape(
     }
     // so is the skin of a box or ball with an ε as fine as its finest cage
     let fitted = |size: f64| eps_m.map(|range| (size / range.0).ceil().clamp(1.0, 2047.0) as u32);
-    let given =
-        file.segments.map(|cells| std::array::from_fn(|i| segments(c, place, &format!("segments.{i}"), cells[i])));
     let lattice = if file.shape == SoftShapeKind::Box {
         let size = file.size_m?;
-        let size = std::array::from_fn(|i| c.number(place, &format!("size_m.{i}"), size[i], SOFT));
-        let segments = given.or_else(|| Some([fitted(size[0])?, fitted(size[1])?, fitted(size[2])?]))?;
-        SoftShape::Box { size_m: DVec3::from_array(size), segments }
+        let segments = file.segments.or_else(|| Some([fitted(size[0])?, fitted(size[1])?, fitted(size[2])?]))?;
+        SoftShape::Box { size_m: size.into(), segments }
     } else {
-        let radius_m = c.number(place, "radius_m", file.radius_m?, SOFT);
-        let cells: [u32; 3] = given.or_else(|| Some([fitted(2.0 * radius_m)?.max(2); 3]))?;
+        let radius_m = file.radius_m?;
+        let cells: [u32; 3] = file.segments.or_else(|| Some([fitted(2.0 * radius_m)?.max(2); 3]))?;
         if cells.iter().any(|n| *n != cells[0] || *n < 2) {
             let expected = "expected the same number, at least 2, three times: a ball has no long side";
             c.wrong(place, "segments", format_args!("is {cells:?}"), expected);
@@ -238,15 +176,14 @@ fn solid_shape(
 /// The closed surface of a file or a generator, metres; `None` where there is none, which is reported.
 fn closed_surface(c: &mut Checker<'_, '_>, file: &SolidFile, context: &ModelContext<'_>) -> Option<Triangles> {
     let place = context.place;
-    let scale = c.optional(place, "scale", file.scale, SOFT).unwrap_or(1.0);
-    let count = file.triangles.map(|n| c.number(place, "triangles", f64::from(n), SOFT) as u32);
+    let scale = file.scale.unwrap_or(1.0);
     let (key, read) = match surface_source(c, place, file.file.as_deref(), file.generate)? {
         SurfaceSource::File(name) if !c.may_read(place, "file", context.source.head(name), Cost::soft_of_file) => {
             return None;
         }
         SurfaceSource::File(name) => ("file", context.source.sibling(name).and_then(|bytes| mesh::read(&bytes, scale))),
         SurfaceSource::Generated(kind) => {
-            let triangles = count.unwrap_or(4000);
+            let triangles = file.triangles.unwrap_or(4000);
             let seed = u64::from(file.seed.unwrap_or(0));
             if c.is_draft() {
                 let coarse = generate_surface(kind, seed, triangles.min(COARSE_TRIANGLES));
@@ -319,32 +256,13 @@ pub(super) fn too_large(size_m: f64, scale_is_missing: bool) -> Result<(), Strin
 }
 
 /// Reads a rope.
-pub(super) fn rope(c: &mut Checker<'_, '_>, file: &RopeFile, context: &ModelContext<'_>) -> BuiltSoft {
-    let place = context.place;
-    if file.path_m.len() < 2 {
-        c.wrong(place, "path_m", format_args!("has {} points", file.path_m.len()), "expected at least 2 points");
-    }
-    let path_m = (0..).zip(&file.path_m).map(|(i, at)| c.point(place, &format!("path_m.{i}"), *at, POSITION_MAX_M));
-    let path_m: Vec<DVec3> = path_m.collect();
+pub(super) fn rope(c: &mut Checker<'_, '_>, soft: &SoftFile, file: &RopeFile, context: &ModelContext<'_>) -> BuiltSoft {
+    let path_m = file.path_m.iter().map(|at| DVec3::from(*at)).collect();
     let end = |end: &RopeEnd| if *end == RopeEnd::Start { Side::Left } else { Side::Right };
-    let shared = Shared {
-        young_pa: file.young_pa,
-        poisson: None,
-        density_kg_m3: file.density_kg_m3,
-        damping_per_s: file.damping_per_s,
-        damping_s: file.damping_s,
-        self_contact: file.self_contact.unwrap_or(true),
-        velocity_m_s: file.velocity_m_s,
-        friction: file.friction,
-        held: file.hold.iter().flatten().map(end).collect(),
-        law: MaterialLaw::default(),
-    };
-    let radius_m = c.number(place, "radius_m", file.radius_m, SOFT);
-    let eps_m = one_division(c, place, file.segments.is_some(), file.eps_m);
-    let segments = segments(c, place, "segments", file.segments.unwrap_or(1));
-    let pose = Pose { position: DVec3::ZERO, rotation: DQuat::IDENTITY };
-    let spec = spec(c, context, SoftShape::Rope { path_m, radius_m, segments }, pose, shared);
-    divided(c, place, spec, eps_m)
+    let held = file.hold.iter().flatten().map(end).collect();
+    let eps_m = one_division(c, context.place, file.segments.is_some(), file.eps_m);
+    let shape = SoftShape::Rope { path_m, radius_m: file.radius_m, segments: file.segments.unwrap_or(1) };
+    divided(c, context.place, SoftSpec { held, ..spec(context, shape, soft) }, eps_m)
 }
 
 /// The range of ε of a sheet or a rope; none of one with segments. It has either, or that is reported.
@@ -359,10 +277,7 @@ fn one_division(
         (false, None) => c.wrong(place, "segments", "is missing", "expected `segments` or `eps_m`"),
         _ => {}
     }
-    let before = c.count();
-    let range = eps_m.map(|eps| c.ends(place, "eps_m", eps, SOFT));
-    // a range that was reported says nothing of one that would fit
-    range.filter(|_| c.count() == before)
+    eps_m.map(OneOrRange::ends)
 }
 
 /// Gives a sheet or a rope with a range of ε the lattice of its finest as its skin, and nodes that start there.
@@ -380,52 +295,32 @@ fn divided(c: &mut Checker<'_, '_>, place: &Place, spec: SoftSpec, eps_m: Option
     BuiltSoft { spec, eps_m }
 }
 
-fn segments(c: &mut Checker<'_, '_>, place: &Place, key: &str, count: u32) -> u32 {
-    c.number(place, key, f64::from(count), SOFT) as u32
+/// The material of a soft body, as far as all have it.
+fn matter(soft: &SoftFile) -> SoftMatter {
+    SoftMatter {
+        young_pa: soft.young_pa,
+        poisson: POISSON_DEFAULT,
+        density_kg_m3: soft.density_kg_m3.unwrap_or(1050.0),
+        damping_per_s: soft.damping_per_s.unwrap_or(0.0),
+        damping_s: soft.damping_s.unwrap_or(0.0),
+        law: MaterialLaw::default(),
+    }
 }
 
-/// Position of the first corner and rotation of a body at the start.
-struct Pose {
-    position: DVec3,
-    rotation: DQuat,
-}
-
-/// The pose of a body whose middle is `half` from its first corner in its own axes.
-fn pose(
-    c: &mut Checker<'_, '_>,
-    place: &Place,
-    position_m: Option<Point>,
-    rotation_deg: Option<Point>,
-    half: DVec3,
-) -> Pose {
-    let position = position_m.map_or(DVec3::ZERO, |at| c.point(place, "position_m", at, POSITION_MAX_M));
-    let rotation =
-        rotation_deg.map_or(DQuat::IDENTITY, |deg| rotation(c.point(place, "rotation_deg", deg, ROTATION_MAX_DEG)));
-    Pose { position: position - rotation * half, rotation }
-}
-
-fn spec(c: &mut Checker<'_, '_>, context: &ModelContext<'_>, shape: SoftShape, pose: Pose, shared: Shared) -> SoftSpec {
-    let place = context.place;
-    let matter = SoftMatter {
-        young_pa: c.number(place, "young_pa", shared.young_pa, MATTER),
-        poisson: c.optional(place, "poisson", shared.poisson, MATTER).unwrap_or(POISSON_DEFAULT),
-        density_kg_m3: c.optional(place, "density_kg_m3", shared.density_kg_m3, MATTER).unwrap_or(1050.0),
-        damping_per_s: c.optional(place, "damping_per_s", shared.damping_per_s, MATTER).unwrap_or(0.0),
-        damping_s: c.optional(place, "damping_s", shared.damping_s, MATTER).unwrap_or(0.0),
-        law: shared.law,
-    };
+/// A soft body in its own axes.
+fn spec(context: &ModelContext<'_>, shape: SoftShape, soft: &SoftFile) -> SoftSpec {
     SoftSpec {
         shape,
         nodes: None,
-        matter,
-        position: pose.position,
-        rotation: pose.rotation,
-        velocity: shared.velocity_m_s.map_or(DVec3::ZERO, |v| c.point(place, "velocity_m_s", v, SPEED_MAX)),
-        held: shared.held,
-        friction: c.optional(place, "friction", shared.friction, SOFT).unwrap_or(0.3),
+        matter: matter(soft),
+        position: DVec3::ZERO,
+        rotation: DQuat::IDENTITY,
+        velocity: point(soft.velocity_m_s),
+        held: Vec::new(),
+        friction: soft.friction.unwrap_or(0.3),
         traits: context.traits,
         gravity: context.gravity,
-        self_contact: shared.self_contact,
+        self_contact: soft.self_contact.unwrap_or(true),
         sleep: context.sleep,
     }
 }

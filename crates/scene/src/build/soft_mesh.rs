@@ -9,10 +9,9 @@ use super::soft::too_large;
 use super::tetrahedra;
 use crate::check::{Checker, Place};
 use crate::demand::Cost;
-use crate::format::{LawKind, RegionFile, SOFT, SheetFile, SolidFile};
+use crate::format::{LawKind, RegionFile, SheetFile, SolidFile};
 use metachron_core::NumberRange;
 use metachron_geometry::{Aabb, Tetrahedra, Triangles, branch, opposed, pieces, welded};
-use metachron_models::soft::MATTER;
 use metachron_models::soft::{MaterialLaw, RegionMatter, SoftMatter, SoftShape, VERTICES_MAX};
 use std::sync::Arc;
 
@@ -65,18 +64,10 @@ pub(super) fn tetrahedra_of(
     if !tetrahedra::is_volume(name, &head.start) {
         return None;
     }
-    for (key, is_given) in [
-        ("eps_m", file.eps_m.is_some()),
-        ("generate", file.generate.is_some()),
-        ("seed", file.seed.is_some()),
-        ("triangles", file.triangles.is_some()),
-    ] {
-        if is_given {
-            let what = format!("does not belong to {name}: a mesh of tetrahedra is taken as it is");
-            c.wrong(place, key, what, "expected no such key, or a closed surface of triangles as the file");
-        }
-    }
-    let scale = c.optional(place, "scale", file.scale, SOFT).unwrap_or(1.0);
+    let what = format_args!("does not belong to {name}: a mesh of tetrahedra is taken as it is");
+    let expected = "expected no such key, or a closed surface of triangles as the file";
+    c.refuse(place, &["eps_m", "generate", "seed", "triangles"], what, expected);
+    let scale = file.scale.unwrap_or(1.0);
     if !c.may_make(place, "file", Cost::soft_of_file(&head)) {
         return Some(None);
     }
@@ -129,15 +120,13 @@ pub(super) fn regions(
         if regions.iter().any(|known| known.region == region) {
             c.wrong(&here, "region", format!("is {region}, which has a material already"), "expected each region once");
         }
-        let poisson = c.optional(&here, "poisson", file.poisson, MATTER).unwrap_or(matter.poisson);
+        let poisson = file.poisson.unwrap_or(matter.poisson);
         let own = law(c, &here, file.law, file.exponent, poisson);
         let law = if file.law.is_some() { own } else { matter.law };
         let matter = SoftMatter {
-            young_pa: c.number(&here, "young_pa", file.young_pa, MATTER),
+            young_pa: file.young_pa,
             poisson,
-            density_kg_m3: c
-                .optional(&here, "density_kg_m3", file.density_kg_m3, MATTER)
-                .unwrap_or(matter.density_kg_m3),
+            density_kg_m3: file.density_kg_m3.unwrap_or(matter.density_kg_m3),
             law,
             ..*matter
         };
@@ -149,15 +138,9 @@ pub(super) fn regions(
 /// The shape of a sheet that is a mesh; `None` where it cannot be used, which is reported.
 pub(super) fn shell(c: &mut Checker<'_, '_>, file: &SheetFile, context: &ModelContext<'_>) -> Option<SoftShape> {
     let (place, name) = (context.place, file.file.as_deref()?);
-    for (key, is_given) in
-        [("size_m", file.size_m.is_some()), ("segments", file.segments.is_some()), ("eps_m", file.eps_m.is_some())]
-    {
-        if is_given {
-            c.wrong(place, key, "contradicts `file`", "expected one of them: a mesh is taken as it is");
-        }
-    }
-    let scale = c.optional(place, "scale", file.scale, SOFT).unwrap_or(1.0);
-    let thickness_m = c.number(place, "thickness_m", file.thickness_m, SOFT);
+    let keys = ["size_m", "segments", "eps_m"];
+    c.refuse(place, &keys, "contradicts `file`", "expected one of them: a mesh is taken as it is");
+    let (scale, thickness_m) = (file.scale.unwrap_or(1.0), file.thickness_m);
     if !c.may_read(place, "file", context.source.head(name), Cost::sheet_of_file) {
         return None;
     }

@@ -8,7 +8,7 @@ use super::objects::Entry;
 use super::scenery::Parts;
 use crate::check::Checker;
 use crate::demand::{Cost, FileHead};
-use crate::format::{MESH, MeshFile};
+use crate::format::MeshFile;
 use crate::source::Source;
 use glam::Vec2;
 #[cfg(feature = "images")]
@@ -81,7 +81,7 @@ fn texture_of(
     if file.texture_m.is_some() && file.texture.is_none() {
         c.wrong(place, "texture_m", "has no effect alone", "expected `texture` beside it");
     }
-    let metres = c.optional(place, "texture_m", file.texture_m, MESH).unwrap_or(1.0);
+    let metres = file.texture_m.unwrap_or(1.0);
     let (key, name) = match (&file.texture, &file.file) {
         (Some(name), _) => ("texture", name),
         // errors of a file that gave no mesh have been reported

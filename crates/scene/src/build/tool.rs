@@ -3,9 +3,8 @@
 use super::common::rotation;
 use super::common::rounded;
 use super::objects::{ModelContext, NamedObject, Names};
-use super::{KEYFRAMES_MAX, POSITION_MAX_M, ROTATION_MAX_DEG};
 use crate::check::{Checker, Place};
-use crate::format::{KEYFRAME, KeyframeFile, Point, TOOL, ToolFile};
+use crate::format::{KeyframeFile, Point, ToolFile};
 use glam::{DQuat, DVec3};
 use metachron_core::AgentId;
 use metachron_models::tool::{Keyframe, ToolSpec};
@@ -22,10 +21,10 @@ pub(super) fn build(c: &mut Checker<'_, '_>, file: &ToolFile, context: &ModelCon
         pivot_m: file.pivot_m.and_then(|pivot| pivot_of(c, place, pivot, &keyframes)),
         keyframes,
         repeat: file.repeat.unwrap_or(false),
-        reach_m: c.optional(place, "reach_m", file.reach_m, TOOL).unwrap_or(REACH_DEFAULT_M),
-        stiffness_n_m: c.optional(place, "stiffness_n_m", file.stiffness_n_m, TOOL).unwrap_or(200.0),
-        damping_n_s_m: c.optional(place, "damping_n_s_m", file.damping_n_s_m, TOOL).unwrap_or(1.0),
-        max_force_n: c.optional(place, "max_force_n", file.max_force_n, TOOL).unwrap_or(FORCE_DEFAULT_N),
+        reach_m: file.reach_m.unwrap_or(REACH_DEFAULT_M),
+        stiffness_n_m: file.stiffness_n_m.unwrap_or(200.0),
+        damping_n_s_m: file.damping_n_s_m.unwrap_or(1.0),
+        max_force_n: file.max_force_n.unwrap_or(FORCE_DEFAULT_N),
         graspable: graspable(c, place, file, names),
         starts_off_m: DVec3::ZERO,
         traits: context.traits,
@@ -34,10 +33,7 @@ pub(super) fn build(c: &mut Checker<'_, '_>, file: &ToolFile, context: &ModelCon
 
 /// The pivot, where the shaft passes through it in every keyframe.
 fn pivot_of(c: &mut Checker<'_, '_>, place: &Place, file: Point, keyframes: &[Keyframe]) -> Option<DVec3> {
-    let pivot = c.point(place, "pivot_m", file, POSITION_MAX_M);
-    if pivot.to_array() != file {
-        return None;
-    }
+    let pivot = DVec3::from(file);
     let reached = ToolSpec::insertion_m();
     let far = keyframes.iter().enumerate().find(|(_, key)| !reached.contains(&key.tip_m.distance(pivot)));
     let Some((number, key)) = far else { return Some(pivot) };
@@ -82,15 +78,10 @@ const fn ungraspable(named: NamedObject) -> Option<&'static str> {
 
 fn keyframes(c: &mut Checker<'_, '_>, place: &Place, files: &[KeyframeFile]) -> Vec<Keyframe> {
     let still = Keyframe { at_s: 0.0, tip_m: DVec3::ZERO, rotation: DQuat::IDENTITY, jaw: 1.0 };
-    if !(1..=KEYFRAMES_MAX).contains(&files.len()) {
-        let expected = format!("expected 1 … {KEYFRAMES_MAX}; with one keyframe the tool waits for the user");
-        c.wrong(place, "keyframe", format_args!("has {} entries", files.len()), expected);
-        return vec![still];
-    }
     let mut out: Vec<Keyframe> = Vec::with_capacity(files.len());
     for (i, file) in files.iter().enumerate() {
         let before = out.last().copied();
-        let key = keyframe(c, &place.entry("keyframe", i), file, before.unwrap_or(still));
+        let key = keyframe(file, before.unwrap_or(still));
         if let (None, Some(before)) = (file.at_s, before) {
             let expected = format!("expected `at_s` above {} in this table", before.at_s);
             c.wrong(&place.entry("keyframe", i), "at_s", "is missing", expected);
@@ -103,13 +94,11 @@ fn keyframes(c: &mut Checker<'_, '_>, place: &Place, files: &[KeyframeFile]) -> 
     out
 }
 
-fn keyframe(c: &mut Checker<'_, '_>, place: &Place, file: &KeyframeFile, before: Keyframe) -> Keyframe {
+fn keyframe(file: &KeyframeFile, before: Keyframe) -> Keyframe {
     Keyframe {
-        at_s: c.optional(place, "at_s", file.at_s, KEYFRAME).unwrap_or(0.0),
-        tip_m: c.point(place, "tip_m", file.tip_m, POSITION_MAX_M),
-        rotation: file
-            .rotation_deg
-            .map_or(before.rotation, |deg| rotation(c.point(place, "rotation_deg", deg, ROTATION_MAX_DEG))),
-        jaw: c.optional(place, "jaw", file.jaw, KEYFRAME).unwrap_or(before.jaw),
+        at_s: file.at_s.unwrap_or(0.0),
+        tip_m: file.tip_m.into(),
+        rotation: file.rotation_deg.map_or(before.rotation, |deg| rotation(Some(deg))),
+        jaw: file.jaw.unwrap_or(before.jaw),
     }
 }

@@ -1,21 +1,18 @@
 //! Reads a tube of a scene file as a [`TubeSpec`].
 
-use super::POSITION_MAX_M;
-use super::force_limits::{ForceLimits, ForceLimitsFile};
+use super::force_limits::ForceLimits;
 use super::objects::ModelContext;
 use crate::check::{Checker, Place};
-use crate::format::ranges::TIME;
-use crate::format::{ATTACH, AttachFile, End, PERISTALSIS, PeristalsisFile, PressureFile, TUBE, TubeFile};
+use crate::format::{End, OneOrRange, PressureFile, TubeFile};
 use glam::DVec3;
-use metachron_core::NumberRange;
-use metachron_core::{Resolution, ResolutionRange};
-use metachron_models::rod::Integrator;
-use metachron_models::rod::SUBSTEPS_MAX;
-use metachron_models::rod::Tube;
-use metachron_models::rod::{Attachment, Material, Peristalsis, PressureKey, Section, TubeSpec, WallModel};
+use metachron_core::{NumberRange, Resolution, ResolutionRange};
+use metachron_models::rod::{
+    Attachment, Integrator, Material, PressureKey, SUBSTEPS_MAX, Section, Tube, TubeSpec, WallModel,
+};
 
-/// Most points of a path.
-const PATH_MAX: usize = 100_000;
+/// The keys of a pressure over time.
+const TIME: NumberRange = NumberRange::new(0.0, 1e6, "s");
+const PRESSURE: NumberRange = NumberRange::new(0.0, 1e7, "Pa");
 /// Most segments of a tube.
 const SEGMENTS_MAX: u32 = 4096;
 /// Default number of segments, where a scene gives neither ε nor their number.
@@ -24,11 +21,6 @@ const SEGMENTS_DEFAULT: f64 = 64.0;
 const PICTURE_INTERVALS: (f64, f64) = (400.0, 8.0);
 /// Points nearer than this are the same point, metres.
 const SAME_POINT_M: f64 = 1e-9;
-/// Most keys of a pressure over time.
-const PRESSURE_KEYS_MAX: usize = 10_000;
-/// Most attached parts of a tube (stretches of a mesentery).
-const ATTACH_MAX: usize = 1000;
-
 /// A tube and the resolutions that its picture may take.
 pub(super) struct BuiltTube {
     pub(super) spec: TubeSpec,
@@ -43,27 +35,29 @@ pub(super) fn build(c: &mut Checker<'_, '_>, file: &TubeFile, context: &ModelCon
     let section = section(c, place, file);
     let (resolution, range, picture) = resolutions(c, place, file, context.levels, length_m);
     let (clamp, pin) = ends(c, place, file);
+    let attachments = file.attach.clone().unwrap_or_default();
+    (0..).zip(&attachments).for_each(|(i, spring)| check_attachment(c, &place.entry("attach", i), spring));
     let spec = TubeSpec {
         path_m,
         straight: file.straight.unwrap_or(false),
-        twist_rad: c.optional(place, "twist_deg", file.twist_deg, TUBE).unwrap_or(0.0).to_radians(),
+        twist_rad: file.twist_deg.unwrap_or(0.0).to_radians(),
         section,
         resolution,
         range,
-        segments: file.segments.map(|n| n.clamp(2, SEGMENTS_MAX) as usize),
+        segments: file.segments.map(|n| n as usize),
         integrator: file.integrator.unwrap_or_default(),
-        substeps: c.optional(place, "substeps", file.substeps.map(f64::from), TUBE).unwrap_or(1.0) as u32,
-        damping_per_s: c.optional(place, "damping_per_s", file.damping_per_s, TUBE).unwrap_or(0.0),
+        substeps: file.substeps.unwrap_or(1),
+        damping_per_s: file.damping_per_s.unwrap_or(0.0),
         clamp,
         pin,
-        attachments: attachments(c, place, file.attach.as_deref().unwrap_or_default()),
-        peristalsis: file.peristalsis.map(|wave| peristalsis(c, &place.table("peristalsis"), wave)),
+        attachments,
+        peristalsis: file.peristalsis,
         wall: wall(c, place, file),
         sealed: sealed(c, place, file, &section),
-        pressure_pa: pressure_pa(c, place, file),
+        pressure_pa: if let Some(PressureFile::Constant(pressure_pa)) = file.pressure_pa { pressure_pa } else { 0.0 },
         pressure_keys: pressure_keys(c, place, file),
         self_contact: file.self_contact.unwrap_or(true),
-        friction: c.optional(place, "friction", file.friction, TUBE).unwrap_or(0.2),
+        friction: file.friction.unwrap_or(0.2),
         traits: context.traits,
         gravity: context.gravity,
         sleep: context.sleep,
@@ -83,27 +77,14 @@ fn wall(c: &mut Checker<'_, '_>, place: &Place, file: &TubeFile) -> WallModel {
     WallModel::Gives
 }
 
-/// The pressure, where it is one number.
-fn pressure_pa(c: &mut Checker<'_, '_>, place: &Place, file: &TubeFile) -> f64 {
-    match file.pressure_pa {
-        Some(PressureFile::Constant(pressure_pa)) => c.number(place, "pressure_pa", pressure_pa, TUBE),
-        _ => 0.0,
-    }
-}
-
 /// The pressure over time, by rising times.
 fn pressure_keys(c: &mut Checker<'_, '_>, place: &Place, file: &TubeFile) -> Vec<PressureKey> {
     let Some(PressureFile::Keys(list)) = &file.pressure_pa else { return Vec::new() };
-    if !(1..=PRESSURE_KEYS_MAX).contains(&list.len()) {
-        let expected = format!("expected 1 … {PRESSURE_KEYS_MAX} times with their pressures, or one number");
-        c.wrong(place, "pressure_pa", format_args!("has {} entries", list.len()), expected);
-        return Vec::new();
-    }
     let mut keys: Vec<PressureKey> = Vec::with_capacity(list.len());
-    for (at, &[at_s, pressure_pa]) in list.iter().enumerate() {
+    for (at, &(at_s, pressure_pa)) in list.iter().enumerate() {
         let [time, pressure] = [0, 1].map(|part| format!("pressure_pa.{at}.{part}"));
         let at_s = c.number(place, &time, at_s, TIME);
-        let pressure_pa = c.number(place, &pressure, pressure_pa, TUBE);
+        let pressure_pa = c.number(place, &pressure, pressure_pa, PRESSURE);
         if let Some(before) = keys.last().filter(|before| at_s <= before.at_s) {
             let expected = format!("expected a time after the one before, {} s", before.at_s);
             c.wrong(place, &time, format_args!("is {at_s}"), expected);
@@ -145,16 +126,6 @@ pub(super) fn check_step(c: &mut Checker<'_, '_>, place: &Place, tube: &Tube, lo
 }
 
 fn path(c: &mut Checker<'_, '_>, place: &Place, points: &[[f64; 3]]) -> Vec<DVec3> {
-    if !(2..=PATH_MAX).contains(&points.len()) {
-        let expected = format!("expected 2 … {PATH_MAX} points");
-        c.wrong(place, "path_m", format_args!("has {} points", points.len()), expected);
-        return vec![DVec3::ZERO, DVec3::X];
-    }
-    let bad = points.iter().position(|p| p.iter().any(|x| x.is_nan() || x.abs() > POSITION_MAX_M));
-    if let Some(bad) = bad {
-        c.point(place, &format!("path_m.{bad}"), points[bad], POSITION_MAX_M);
-        return vec![DVec3::ZERO, DVec3::X];
-    }
     let path: Vec<DVec3> = points.iter().map(|p| DVec3::from_array(*p)).collect();
     let same = path.windows(2).position(|p| p[0].distance(p[1]) < SAME_POINT_M);
     if let Some(same) = same {
@@ -166,42 +137,38 @@ fn path(c: &mut Checker<'_, '_>, place: &Place, points: &[[f64; 3]]) -> Vec<DVec
 
 /// The section from modulus, density and dimensions; numbers that the file gives override them.
 fn section(c: &mut Checker<'_, '_>, place: &Place, file: &TubeFile) -> Section {
-    let radius_m = c.number(place, "radius_m", file.radius_m, TUBE);
-    let wall_m = file.wall_m.unwrap_or(radius_m);
-    let sound_wall = wall_m > 0.0 && wall_m <= radius_m;
-    // a wall that is too thick only because the radius is wrong is not reported: one problem, not two
-    if !sound_wall && (radius_m == file.radius_m || wall_m.is_nan() || wall_m <= 0.0) {
+    let radius_m = file.radius_m;
+    let mut wall_m = file.wall_m.unwrap_or(radius_m);
+    if wall_m > radius_m {
         let expected = format!("expected a number above 0 and at most `radius_m`, {radius_m} m");
         c.wrong(place, "wall_m", format_args!("is {wall_m}"), expected);
+        wall_m = radius_m;
     }
-    let wall_m = if sound_wall { wall_m } else { radius_m };
     let unit = Material { young_pa: 1.0, poisson: 0.0, density_kg_m3: 1.0, shear_factor: 1.0 };
     let area_m2 = Section::hollow(radius_m, wall_m, unit).mass_per_length_kg_m;
     let young_pa = modulus(c, place, file, area_m2);
     let density_kg_m3 = density(c, place, file, area_m2);
-    let poisson = c.optional(place, "poisson", file.poisson, TUBE).unwrap_or(0.45);
-    let shear_factor = c.optional(place, "shear_factor", file.shear_factor, TUBE).unwrap_or(27.0 / 28.0);
+    let poisson = file.poisson.unwrap_or(0.45);
+    let shear_factor = file.shear_factor.unwrap_or(27.0 / 28.0);
     let material = Material { young_pa, poisson, density_kg_m3, shear_factor };
     let mut section = Section::hollow(radius_m, wall_m, material);
-    for (key, given, into) in [
-        ("ea_n", file.ea_n, &mut section.ea_n),
-        ("ga_n", file.ga_n, &mut section.ga_n),
-        ("ei_n_m2", file.ei_n_m2, &mut section.ei_n_m2),
-        ("gj_n_m2", file.gj_n_m2, &mut section.gj_n_m2),
+    for (given, into) in [
+        (file.ea_n, &mut section.ea_n),
+        (file.ga_n, &mut section.ga_n),
+        (file.ei_n_m2, &mut section.ei_n_m2),
+        (file.gj_n_m2, &mut section.gj_n_m2),
+        (file.mass_per_length_kg_m, &mut section.mass_per_length_kg_m),
     ] {
-        *into = c.optional(place, key, given, TUBE).unwrap_or(*into);
+        *into = given.unwrap_or(*into);
     }
-    section.mass_per_length_kg_m = c
-        .optional(place, "mass_per_length_kg_m", file.mass_per_length_kg_m, TUBE)
-        .unwrap_or(section.mass_per_length_kg_m);
     section
 }
 
 fn modulus(c: &mut Checker<'_, '_>, place: &Place, file: &TubeFile, area_m2: f64) -> f64 {
     match (file.young_pa, file.ea_n) {
-        (Some(young), _) => c.number(place, "young_pa", young, TUBE),
-        (None, Some(ea)) if ea > 0.0 => ea / area_m2,
-        (None, _) => {
+        (Some(young), _) => young,
+        (None, Some(ea)) => ea / area_m2,
+        (None, None) => {
             c.wrong(
                 place,
                 "young_pa",
@@ -215,9 +182,9 @@ fn modulus(c: &mut Checker<'_, '_>, place: &Place, file: &TubeFile, area_m2: f64
 
 fn density(c: &mut Checker<'_, '_>, place: &Place, file: &TubeFile, area_m2: f64) -> f64 {
     match (file.density_kg_m3, file.mass_per_length_kg_m) {
-        (Some(density), _) => c.number(place, "density_kg_m3", density, TUBE),
-        (None, Some(mass)) if mass > 0.0 => mass / area_m2,
-        (None, _) => {
+        (Some(density), _) => density,
+        (None, Some(mass)) => mass / area_m2,
+        (None, None) => {
             let expected = "expected `density_kg_m3` (or `mass_per_length_kg_m`, from which it follows) in this table";
             c.wrong(place, "density_kg_m3", "is missing", expected);
             1.0
@@ -236,14 +203,17 @@ fn resolutions(
     let finest = length_m / f64::from(SEGMENTS_MAX);
     // an ε as long as the tube is one interval; longer ones mean the same and are accepted up to ten lengths
     let spacing = NumberRange::new(rounded_up(finest), length_m * 10.0, "m (1/4096 … 10 times its length)");
-    let eps = file.eps_m.map(|eps| c.ends(place, "eps_m", eps, spacing));
-    let picture = file.picture_eps_m.map(|eps| c.ends(place, "picture_eps_m", eps, spacing));
+    let mut ends = |key: &str, given: Option<OneOrRange<f64>>| {
+        let ends = given?.ends();
+        let bad = [ends.0, ends.1].into_iter().find(|end| !spacing.contains(*end));
+        bad.iter()
+            .for_each(|bad| c.wrong(place, key, format_args!("has the value {bad}"), format!("expected {spacing}")));
+        bad.is_none().then_some(ends)
+    };
+    let (eps, picture) = (ends("eps_m", file.eps_m), ends("picture_eps_m", file.picture_eps_m));
     let usual = length_m / SEGMENTS_DEFAULT;
     let simulation = match file.segments {
-        Some(n) => {
-            let n = c.number(place, "segments", f64::from(n), TUBE);
-            (length_m / n, length_m / n)
-        }
+        Some(n) => (length_m / f64::from(n), length_m / f64::from(n)),
         None => eps.unwrap_or((usual, usual)),
     };
     let picture = picture.or(eps).unwrap_or((length_m / PICTURE_INTERVALS.0, length_m / PICTURE_INTERVALS.1));
@@ -271,38 +241,11 @@ fn ends(c: &mut Checker<'_, '_>, place: &Place, file: &TubeFile) -> ([bool; 2], 
     (clamp, pin)
 }
 
-fn attachments(c: &mut Checker<'_, '_>, place: &Place, files: &[AttachFile]) -> Vec<Attachment> {
-    if files.len() > ATTACH_MAX {
-        c.wrong(place, "attach", format_args!("has {} entries", files.len()), format!("expected at most {ATTACH_MAX}"));
-        return Vec::new();
-    }
-    files.iter().enumerate().map(|(i, file)| attachment(c, &place.entry("attach", i), file)).collect()
-}
-
-fn attachment(c: &mut Checker<'_, '_>, place: &Place, file: &AttachFile) -> Attachment {
-    let from = c.number(place, "from", file.from, ATTACH);
-    let to = c.number(place, "to", file.to, ATTACH);
+/// Whether an attachment is along a part of the tube, and yields before it tears.
+fn check_attachment(c: &mut Checker<'_, '_>, place: &Place, spring: &Attachment) {
+    let Attachment { from, to, tears_above_n, yields_above_n, .. } = *spring;
     if from >= to {
         c.wrong(place, "to", format_args!("is {to}"), format!("expected a number above `from`, {from}"));
     }
-    let limits =
-        ForceLimits::read(c, place, ForceLimitsFile { tears: file.tears_above_n, yields: file.yields_above_n });
-    let ForceLimits { tears_above_n, yields_above_n } = limits;
-    Attachment {
-        from,
-        to,
-        stiffness_n_m2: c.number(place, "stiffness_n_m2", file.stiffness_n_m2, ATTACH),
-        slack_m: c.optional(place, "slack_m", file.slack_m, ATTACH).unwrap_or(0.0),
-        damping_n_s_m2: c.optional(place, "damping_n_s_m2", file.damping_n_s_m2, ATTACH).unwrap_or(0.0),
-        tears_above_n,
-        yields_above_n,
-    }
-}
-
-fn peristalsis(c: &mut Checker<'_, '_>, place: &Place, file: PeristalsisFile) -> Peristalsis {
-    Peristalsis {
-        amplitude: c.number(place, "amplitude", file.amplitude, PERISTALSIS),
-        wavelength_m: c.number(place, "wavelength_m", file.wavelength_m, PERISTALSIS),
-        speed_m_s: c.number(place, "speed_m_s", file.speed_m_s, PERISTALSIS),
-    }
+    ForceLimits::read(c, place, [Some(tears_above_n), Some(yields_above_n)]);
 }

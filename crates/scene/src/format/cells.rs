@@ -1,19 +1,13 @@
 //! `[[cell]]` and `[[portal]]`: the rooms of a building and the openings between them.
 
 use super::Point;
-use super::ranges::within;
-use metachron_core::{NumberRange, Ranges};
 use metachron_world::kinds::Material;
 use schemars::JsonSchema;
 use serde::Deserialize;
 
-/// Ranges of keys of [`CellFile`].
-pub const CELL: Ranges = Ranges(&[("walls_m", NumberRange::new(1e-3, 100.0, "m"))]);
-
 /// A room: a box along the axes, whose sides hide everything beyond them but for portals. Cells do not overlap.
 #[derive(Debug, Clone, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
-#[schemars(transform = within(CELL))]
 pub struct CellFile {
     /// The cell's name: unique among cells, and not `outside`.
     #[schemars(length(min = 1, max = 64))]

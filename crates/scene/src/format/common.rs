@@ -1,50 +1,13 @@
 //! The keys that objects of every model share.
 
-use super::ranges::within;
 use super::{ContactFile, FaultsFile, OneOrEach, OneOrRange, Point};
-use metachron_core::{NumberRange, Ranges};
 use metachron_world::kinds::{Material, ShadingKind};
 use schemars::JsonSchema;
 use serde::Deserialize;
 
-/// The keys of [`CommonFile`]: they are read apart from the keys of the model.
-pub const COMMON_KEYS: [&str; 20] = [
-    "name",
-    "rate_hz",
-    "dt_ms",
-    "hold",
-    "tolerance_m",
-    "n",
-    "importance",
-    "may_vanish",
-    "colour",
-    "material",
-    "shading",
-    "sleep",
-    "faults",
-    "contact",
-    "grid",
-    "spacing_m",
-    "rise_m",
-    "scatter_m",
-    "scatter_deg",
-    "scatter_seed",
-];
-
-/// Ranges of keys of [`CommonFile`].
-pub const COMMON: Ranges = Ranges(&[
-    ("rate_hz", NumberRange::new(1.0, 1e5, "Hz")),
-    ("dt_ms", NumberRange::new(0.01, 1000.0, "ms")),
-    ("tolerance_m", NumberRange::new(1e-9, 1e3, "m")),
-    ("importance", NumberRange::new(1e-3, 1e3, "")),
-    ("scatter_m", NumberRange::new(0.0, 1e4, "m")),
-    ("scatter_deg", NumberRange::new(0.0, 180.0, "degrees")),
-]);
-
 /// Keys of every object, whatever its model.
 #[derive(Debug, Clone, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
-#[schemars(transform = within(COMMON))]
 pub struct CommonFile {
     /// The object's name: unique in the scene, not empty, at most 64 characters.
     #[schemars(length(min = 1, max = 64))]
@@ -108,20 +71,4 @@ pub enum HoldKind {
     Rate,
     /// The error of its result.
     Error,
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn the_list_of_common_keys_is_the_keys_of_the_type() {
-        let schema = schemars::schema_for!(CommonFile);
-        let mut listed = COMMON_KEYS.to_vec();
-        listed.sort_unstable();
-        let mut keys: Vec<_> =
-            schema.get("properties").unwrap().as_object().unwrap().keys().map(String::as_str).collect();
-        keys.sort_unstable();
-        assert_eq!(listed, keys);
-    }
 }

@@ -1,19 +1,13 @@
 //! `contact` of an object: the groups that it collides with, how a pair shares its coefficients, whether it only
 //! senses.
 
-use super::ranges::within;
-use metachron_core::{NumberRange, Ranges};
 use metachron_geometry::CombineRule;
 use schemars::JsonSchema;
 use serde::Deserialize;
 
-/// Ranges of keys of [`ContactFile`].
-pub const CONTACT: Ranges = Ranges(&[("spin_radius_m", NumberRange::new(0.0, 10.0, "m"))]);
-
 /// The contact traits of an object.
 #[derive(Debug, Clone, Default, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
-#[schemars(transform = within(CONTACT))]
 pub struct ContactFile {
     /// Names of the collision groups that it is in; at most 32 in a scene. Default: all of them.
     pub groups: Option<Vec<String>>,

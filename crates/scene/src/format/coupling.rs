@@ -1,28 +1,12 @@
 //! `[[coupling]]` and `faults`: interactions of two objects other than the default contact, and injected faults.
 
 use super::Point;
-use super::ranges::{DAMPING, REST, STIFFNESS, TEARING, within};
-use metachron_core::{NumberRange, Ranges};
 use schemars::JsonSchema;
 use serde::Deserialize;
-
-/// Ranges of keys of [`CouplingFile`].
-pub const COUPLING: Ranges = Ranges(&[
-    ("stiffness_n_m", STIFFNESS),
-    ("damping_n_s_m", DAMPING),
-    ("rest_m", REST),
-    ("tears_above_n", TEARING),
-    ("yields_above_n", TEARING),
-]);
-
-/// Ranges of keys of [`FaultsFile`].
-pub const FAULTS: Ranges =
-    Ranges(&[("jitter", NumberRange::new(0.0, 0.5, "")), ("loss", NumberRange::new(0.0, 0.9, ""))]);
 
 /// Interaction of two moving objects, other than the default contact.
 #[derive(Debug, Clone, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
-#[schemars(transform = within(COUPLING))]
 pub struct CouplingFile {
     /// Name of a moving object.
     pub a: String,
@@ -82,23 +66,10 @@ pub enum CouplingLaw {
     Off,
 }
 
-impl CouplingLaw {
-    /// The name as scenes write it.
-    #[must_use]
-    pub const fn name(self) -> &'static str {
-        match self {
-            Self::Ledger => "ledger",
-            Self::Penalty => "penalty",
-            Self::PenaltyExtrapolated => "penalty-extrapolated",
-            Self::Tlm => "tlm",
-            Self::Off => "off",
-        }
-    }
-}
-
 /// A material point of an object: a share of the length of a tube or rope, or a point in the object's axes.
 #[derive(Debug, Clone, Copy, PartialEq, Deserialize, JsonSchema)]
 #[serde(untagged, expecting = "a number from 0 to 1 along a tube, or [x, y, z] in an object's axes")]
+#[schemars(inline)]
 pub enum Spot {
     /// 0 start … 1 end of the rest length of a tube or rope.
     Share(f64),
@@ -109,7 +80,6 @@ pub enum Spot {
 /// Faults injected into the clock and the messages of an object, for tests of couplings.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
-#[schemars(transform = within(FAULTS))]
 pub struct FaultsFile {
     /// Every step is longer or shorter by a random share up to this. Default 0.
     pub jitter: Option<f64>,

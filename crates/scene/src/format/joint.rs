@@ -1,44 +1,12 @@
 //! `[[joint]]`: a joint between two rigid objects, or between one and the world.
 
 use super::Point;
-use super::ranges::{DAMPING, REST, STIFFNESS, TEARING, within};
-use metachron_core::{NumberRange, Ranges};
 use schemars::JsonSchema;
 use serde::Deserialize;
-
-/// Most torque or force of a motor.
-const EFFORT: NumberRange = NumberRange::new(1e-9, 1e9, "N·m or N");
-/// Fastest motion, m/s and rad/s.
-const SPEED: NumberRange = NumberRange::new(-1e4, 1e4, "");
-
-/// Ranges of keys of [`JointFile`].
-pub const JOINT: Ranges = Ranges(&[
-    ("stiffness_n_m", STIFFNESS),
-    ("damping_n_s_m", DAMPING),
-    ("rest_m", REST),
-    ("length_m", NumberRange::new(1e-6, 1e4, "m")),
-    ("tears_above_n", TEARING),
-    ("yields_above_n", TEARING),
-]);
-
-/// Ranges of keys of [`MotorFile`].
-pub const MOTOR: Ranges = Ranges(&[
-    ("position_deg", NumberRange::new(-180.0, 180.0, "")),
-    ("velocity_rad_s", SPEED),
-    ("max_torque_n_m", EFFORT),
-    ("stiffness_n_m_rad", STIFFNESS),
-    ("damping_n_m_s_rad", DAMPING),
-    ("position_m", NumberRange::new(-1e4, 1e4, "")),
-    ("velocity_m_s", SPEED),
-    ("max_force_n", EFFORT),
-    ("stiffness_n_m", STIFFNESS),
-    ("damping_n_s_m", DAMPING),
-]);
 
 /// A joint between two rigid objects, or between one and the world.
 #[derive(Debug, Clone, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
-#[schemars(transform = within(JOINT))]
 pub struct JointFile {
     /// Its name, by which programs drive it and sensors read it: unique among the names of joints. Default: none.
     #[schemars(length(min = 1, max = 64))]
@@ -89,7 +57,6 @@ pub struct JointFile {
 /// kept exactly as long as the effort suffices; a position is approached by a spring, with a damper against the velocity (default 0).
 #[derive(Debug, Clone, Copy, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
-#[schemars(transform = within(MOTOR))]
 pub struct MotorFile {
     /// Angle of a `revolute` joint at which its spring rests, degrees; it is reached the shorter way around.
     pub position_deg: Option<f64>,
@@ -115,40 +82,6 @@ pub struct MotorFile {
     pub damping_n_s_m: Option<f64>,
 }
 
-impl MotorFile {
-    /// All of its keys.
-    pub const KEYS: [&str; 10] = [
-        "position_deg",
-        "velocity_rad_s",
-        "max_torque_n_m",
-        "stiffness_n_m_rad",
-        "damping_n_m_s_rad",
-        "position_m",
-        "velocity_m_s",
-        "max_force_n",
-        "stiffness_n_m",
-        "damping_n_s_m",
-    ];
-
-    /// The value of a key; `None` where it is not given or does not exist.
-    #[must_use]
-    pub fn get(&self, key: &str) -> Option<f64> {
-        let values = [
-            self.position_deg,
-            self.velocity_rad_s,
-            self.max_torque_n_m,
-            self.stiffness_n_m_rad,
-            self.damping_n_m_s_rad,
-            self.position_m,
-            self.velocity_m_s,
-            self.max_force_n,
-            self.stiffness_n_m,
-            self.damping_n_s_m,
-        ];
-        Self::KEYS.iter().position(|known| *known == key).and_then(|at| values[at])
-    }
-}
-
 /// Motion that a joint leaves free.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
@@ -165,19 +98,4 @@ pub enum JointKind {
     Spring,
     /// All motion, up to a distance between two points.
     Rope,
-}
-
-impl JointKind {
-    /// The name as scenes write it.
-    #[must_use]
-    pub const fn name(self) -> &'static str {
-        match self {
-            Self::Fixed => "fixed",
-            Self::Revolute => "revolute",
-            Self::Spherical => "spherical",
-            Self::Prismatic => "prismatic",
-            Self::Spring => "spring",
-            Self::Rope => "rope",
-        }
-    }
 }

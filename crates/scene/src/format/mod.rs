@@ -19,25 +19,21 @@ mod tool;
 mod tube;
 mod value;
 
-pub use cells::{CELL, CellFile, PortalFile, SideKind};
-pub use common::{COMMON, COMMON_KEYS, CommonFile, HoldKind};
-pub use contact::{CONTACT, ContactFile};
-pub use coupling::{COUPLING, CouplingFile, CouplingKind, CouplingLaw, FAULTS, FaultsFile, Spot};
-pub use joint::{JOINT, JointFile, JointKind, MOTOR, MotorFile};
-pub use rigid::{Axis, PartFile, PoseKeyFile, RIGID, RigidFile, Shape, TIMES};
+pub use cells::{CellFile, PortalFile, SideKind};
+pub use common::{CommonFile, HoldKind};
+pub use contact::ContactFile;
+pub use coupling::{CouplingFile, CouplingKind, CouplingLaw, FaultsFile, Spot};
+pub use joint::{JointFile, JointKind, MotorFile};
+pub use rigid::{Axis, PoseKeyFile, RigidFile, Shape, SolidShapeFile};
 pub use scene::{
-    CAMERA, COST, CameraFile, CameraFiles, CameraKeyFile, ContactPath, ContactsFile, LOAD, LoadFile, MACHINE,
-    MachineFile, ModelCostFile, PROBE, ProbeFile, SCENE, STEP_COST, SURROUNDINGS, SceneFile, ShadingCostFile,
-    SolvesFile, TARGET, TargetFile, WorldFile,
+    CameraFile, CameraFiles, CameraKeyFile, ContactPath, ContactsFile, ProbeFile, SceneFile, SolvesFile, WorldFile,
 };
-pub use scenery::{GroupFile, MESH, MOTION, MeshFile, MotionFile, TREE, TreeFile, TreeLod};
+pub use scenery::{GroupFile, MeshFile, MotionFile, TreeFile, TreeLod};
 pub use sensor::{SensorFile, SensorFileKind};
-pub use soft::{
-    LawKind, RegionFile, RopeEnd, RopeFile, SOFT, SheetFile, SheetSide, SoftShapeKind, SolidFile, SolidSide,
-};
-pub use synthetic::{SYNTHETIC, SyntheticFile};
-pub use tool::{KEYFRAME, KeyframeFile, TOOL, ToolFile};
-pub use tube::{ATTACH, AttachFile, End, PERISTALSIS, PeristalsisFile, PressureFile, TUBE, TubeFile};
+pub use soft::{LawKind, RegionFile, RopeEnd, RopeFile, SheetFile, SheetSide, SoftFile, SoftShapeKind, SolidFile};
+pub use synthetic::SyntheticFile;
+pub use tool::{KeyframeFile, ToolFile};
+pub use tube::{End, PressureFile, TubeFile};
 pub use value::{OneOrEach, OneOrRange, Point};
 
 /// The models an object can have, as scenes write them.

@@ -1,72 +1,26 @@
 //! `model = "rigid"`: a rigid body, or with `fixed = true` a solid that never moves.
 
 use super::Point;
-use super::ranges::{DENSITY, FRICTION, LENGTH, SCALE, TIME, TRIANGLES, within};
-use metachron_core::{NumberRange, Ranges};
+use super::ranges::within;
 use metachron_drawable::Generator;
 use metachron_models::rigid::LIMITS;
 use schemars::JsonSchema;
 use serde::Deserialize;
 
-/// Ranges of keys of [`RigidFile`] and [`PartFile`].
-pub const RIGID: Ranges = Ranges(&[
-    ("radius_m", LENGTH),
-    ("half_extents_m", LENGTH),
-    ("half_height_m", LENGTH),
-    ("triangles", TRIANGLES),
-    ("scale", SCALE),
-    ("hull_within_m", NumberRange::new(0.0, 0.1, "m")),
-    ("density_kg_m3", DENSITY),
-    ("friction", FRICTION),
-    ("gravity_scale", NumberRange::new(-1000.0, 1000.0, "")),
-]);
-
-/// Ranges of keys of [`PoseKeyFile`].
-pub const TIMES: Ranges = Ranges(&[("at_s", TIME)]);
-
-/// A rigid body, or a static solid that others collide with.
+/// A rigid body, or a static solid that others collide with, beside the keys of its [`SolidShapeFile`].
 #[derive(Debug, Clone, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
-#[schemars(transform = within(LIMITS), transform = within(RIGID))]
+#[schemars(transform = within(LIMITS))]
 pub struct RigidFile {
-    /// Its shape. `ball`: `radius_m`. `box`: `half_extents_m`. `capsule` and `cylinder` (along z): `radius_m`,
-    /// `half_height_m`. `plane`: the half space below z = 0 of its axes, always fixed. `hull` and `mesh`: `file`
-    /// or `generate`. `compound`: several solids as one, one `[[object.part]]` each.
-    pub shape: Shape,
-    /// Radius of a ball, capsule or cylinder, metres.
-    pub radius_m: Option<f64>,
-    /// Half the edges of a box, metres.
-    pub half_extents_m: Option<Point>,
-    /// Half the length of a cylinder, or of a capsule's straight part, metres.
-    pub half_height_m: Option<f64>,
-    /// A .glb file (+y up), an STL or an OBJ file (+z up), its path relative to the scene file: the points of a hull, the triangles of a mesh.
-    pub file: Option<String>,
-    /// A generated surface, about a metre large; not with `file`.
-    pub generate: Option<Generator>,
-    /// Seed of a generated surface. Default 0.
-    pub seed: Option<u32>,
-    /// Triangles of a generated surface. Default 4000.
-    pub triangles: Option<u32>,
-    /// Factor that converts the surface's coordinates to metres. Default 1.
-    pub scale: Option<f64>,
-    /// How far points of a surface may lie above a face of its hull, metres: the hull is simplified so far, and 0 keeps all points.
-    /// Default 1e-4, or a thousandth of the diagonal of the box around the points where that is less.
-    pub hull_within_m: Option<f64>,
     /// The solids of a `compound`, 1 … 16: each has a shape with its keys, and may have `position_m`, `rotation_deg` and `density_kg_m3`.
     #[schemars(length(min = 1, max = 16))]
-    pub part: Option<Vec<PartFile>>,
-    /// Position of the origin of the shape's axes, metres. Default: the world's origin.
-    pub position_m: Option<Point>,
-    /// Rotation by angles about the world's x, then y, then z axis, degrees. Default none.
-    pub rotation_deg: Option<Point>,
+    pub part: Option<Vec<SolidShapeFile>>,
     /// Velocity of the centre of mass at the start, m/s, up to 1e4. Default none.
     pub velocity_m_s: Option<Point>,
     /// Angular velocity at the start about the world's axes, rad/s, up to 1e4. Default none.
     pub spin_rad_s: Option<Point>,
     /// Mass, kilograms. Not together with `density_kg_m3`.
     pub mass_kg: Option<f64>,
-    /// Density, kg/m³. Default 1000 where no mass is given.
-    pub density_kg_m3: Option<f64>,
     /// Centre of mass in the axes of the object, metres; beside `inertia_kg_m2`. Default: the origin of those axes.
     pub centre_of_mass_m: Option<Point>,
     /// Moments and products of inertia about the centre of mass along the axes of the object, kg·m²: `[xx, yy, zz, xy, xz, yz]`, beside
@@ -98,24 +52,13 @@ pub struct RigidFile {
     pub repeat: Option<bool>,
 }
 
-/// An axis of the world.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize, JsonSchema)]
-#[serde(rename_all = "lowercase")]
-pub enum Axis {
-    /// The first.
-    X,
-    /// The second.
-    Y,
-    /// The third: up.
-    Z,
-}
-
-/// A solid of a `compound`.
+/// A solid, alone or as a part of a `compound`: its shape, its place and its density.
 #[derive(Debug, Clone, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
-#[schemars(transform = within(RIGID))]
-pub struct PartFile {
-    /// Its shape; no plane and no compound.
+pub struct SolidShapeFile {
+    /// Its shape. `ball`: `radius_m`. `box`: `half_extents_m`. `capsule` and `cylinder` (along z): `radius_m`,
+    /// `half_height_m`. `plane`: the half space below z = 0 of its axes, always fixed. `hull` and `mesh`: `file`
+    /// or `generate`. `compound`: several solids as one, one `[[object.part]]` each. A part is neither a plane nor a compound.
     pub shape: Shape,
     /// Radius of a ball, capsule or cylinder, metres.
     pub radius_m: Option<f64>,
@@ -123,7 +66,7 @@ pub struct PartFile {
     pub half_extents_m: Option<Point>,
     /// Half the length of a cylinder, or of a capsule's straight part, metres.
     pub half_height_m: Option<f64>,
-    /// A .glb, STL or OBJ file, its path relative to the scene file.
+    /// A .glb file (+y up), an STL or an OBJ file (+z up), its path relative to the scene file: the points of a hull, the triangles of a mesh.
     pub file: Option<String>,
     /// A generated surface, about a metre large; not with `file`.
     pub generate: Option<Generator>,
@@ -136,18 +79,30 @@ pub struct PartFile {
     /// How far points of a surface may lie above a face of its hull, metres: the hull is simplified so far, and 0 keeps all points.
     /// Default 1e-4, or a thousandth of the diagonal of the box around the points where that is less.
     pub hull_within_m: Option<f64>,
-    /// Position of the origin of its axes in the object's axes, metres. Default: their origin.
+    /// Position of the origin of its axes, of a part in those of the object, metres. Default: the world's or the object's origin.
     pub position_m: Option<Point>,
-    /// Rotation by angles about the object's x, then y, then z axis, degrees. Default none.
+    /// Rotation by angles about the x, then y, then z axis of the world, of a part those of the object, degrees. Default none.
     pub rotation_deg: Option<Point>,
-    /// Density, kg/m³; where the object has a mass, the densities of its parts only share it. Default: that of the object.
+    /// Density, kg/m³; where the object has a mass, the densities of its parts only share it. Default 1000 where no mass is given; of a part
+    /// that of the object.
     pub density_kg_m3: Option<f64>,
+}
+
+/// An axis of the world.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize, JsonSchema)]
+#[serde(rename_all = "lowercase")]
+pub enum Axis {
+    /// The first.
+    X,
+    /// The second.
+    Y,
+    /// The third: up.
+    Z,
 }
 
 /// Pose of a kinematic object at one time.
 #[derive(Debug, Clone, Copy, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
-#[schemars(transform = within(TIMES))]
 pub struct PoseKeyFile {
     /// Seconds from the start; later than the keyframe before. Default 0 for the first.
     pub at_s: Option<f64>,

@@ -1,47 +1,48 @@
 //! The tables of a scene other than its objects.
 
-use super::ranges::{SHARE, TIME, within};
-use super::{CellFile, CouplingFile, FaultsFile, GroupFile, JointFile, OneOrRange, Point, PortalFile, SensorFile};
-use metachron_contact::detect::{DEPTH_RANGE_M, LEAST_STEPS_RANGE};
-use metachron_core::{NumberRange, Ranges, gains};
-use metachron_world::RENDER_SCALE;
-use metachron_world::kinds::{EnvironmentKind, ExecutorKind, LawKind, PolicyKind, PriorityKind, StatesKind, ValueKind};
+use super::{CellFile, CouplingFile, FaultsFile, GroupFile, JointFile, Point, PortalFile, SensorFile};
+use metachron_world::kinds::{EnvironmentKind, ExecutorKind, PriorityKind, StatesKind};
+use metachron_world::{Machine, Target};
 use schemars::JsonSchema;
 use serde::de::IgnoredAny;
 use serde::de::value::{MapAccessDeserializer, SeqAccessDeserializer};
 use serde::de::{MapAccess, SeqAccess, Visitor};
 use serde::{Deserialize, Deserializer};
-use std::collections::BTreeMap;
 
 /// A scene file without its `[[object]]` tables, which are read one by one according to their models.
 #[derive(Debug, Clone, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
-#[schemars(transform = within(SCENE))]
 pub struct SceneFile {
     /// Version of this format: 1.
-    #[schemars(range(min = 1, max = 1))]
+    #[schemars(extend("const" = 1))]
     pub format: i64,
     /// One line that describes the scene.
     pub description: Option<String>,
     /// How agents are run. Default `auto`: `threads` for a few, `pool` for many.
     /// `lockstep` runs them on one thread in virtual time, with declared costs.
-    pub executor: Option<ExecutorKind>,
+    #[serde(default)]
+    pub executor: ExecutorKind,
     /// How the operating system schedules the threads of agents. Default `normal`.
-    pub priority: Option<PriorityKind>,
+    #[serde(default)]
+    pub priority: PriorityKind,
     /// How long the turn of an object may last before the object counts as stalled, seconds on the clock of the wall. Default 0.25.
     /// Ten of its steps are always allowed, and a cluster's turn as many times as long as it has members, 25 at most; a checkpoint waits for a stalled turn as long.
     pub stall_s: Option<f64>,
     /// Time at which states are drawn. Default `interpolate`.
-    pub states: Option<StatesKind>,
+    #[serde(default)]
+    pub states: StatesKind,
     /// Surroundings of the objects.
-    pub world: Option<WorldFile>,
+    #[serde(default)]
+    pub world: WorldFile,
     /// The target frame rate and how it is held.
-    pub target: Option<TargetFile>,
+    #[serde(default)]
+    pub target: Target,
     /// The camera, or several as `[[camera]]`; at most 100. Default: far enough away to see the whole scene.
     #[serde(default)]
     pub camera: CameraFiles,
     /// The declared machine: costs that lockstep charges instead of measuring them.
-    pub machine: Option<MachineFile>,
+    #[serde(default)]
+    pub machine: Machine,
     /// Material points whose position and velocity are reported; at most 1000.
     #[serde(default)]
     #[schemars(length(max = 1000))]
@@ -76,83 +77,14 @@ pub struct SceneFile {
     pub object: IgnoredAny,
 }
 
-/// Depths of resting contacts.
-const DEPTH: NumberRange = NumberRange::new(*DEPTH_RANGE_M.start(), *DEPTH_RANGE_M.end(), "m");
-/// Nanoseconds per pixel or object.
-const PER_PIECE: NumberRange = NumberRange::new(0.0, 1e6, "ns");
-
-/// Ranges of keys of [`SceneFile`].
-pub const SCENE: Ranges = Ranges(&[("stall_s", NumberRange::new(1e-3, 3600.0, "s"))]);
-
-/// Ranges of keys of [`WorldFile`].
-pub const SURROUNDINGS: Ranges = Ranges(&[
-    ("contact_depth_m", DEPTH),
-    ("contact_least_steps", NumberRange::new(*LEAST_STEPS_RANGE.start() as f64, *LEAST_STEPS_RANGE.end() as f64, "")),
-]);
-
-/// Ranges of keys of [`TargetFile`].
-pub const TARGET: Ranges = Ranges(&[
-    ("frame_hz", NumberRange::new(1.0, 1000.0, "Hz")),
-    ("alpha", gains::ALPHA),
-    ("beta", gains::BETA),
-    ("kappa", gains::KAPPA),
-    ("lead", gains::LEAD),
-    ("margin", gains::MARGIN),
-    ("agent_refine", gains::REFINE),
-    ("agent_yield", gains::YIELD),
-    ("lag_ms", NumberRange::new(1.0, 1000.0, "ms")),
-    ("optimiser_share", NumberRange::new(1e-3, 0.5, "")),
-    ("focus", SHARE),
-    ("motion", SHARE),
-    ("hysteresis", SHARE),
-    ("render_scale", NumberRange::new(RENDER_SCALE.0, RENDER_SCALE.1, "")),
-]);
-
-/// Ranges of keys of [`CameraFile`] and [`CameraKeyFile`].
-pub const CAMERA: Ranges = Ranges(&[("fov_deg", NumberRange::new(1.0, 150.0, "degrees")), ("at_s", TIME)]);
-
-/// Ranges of keys of [`MachineFile`].
-pub const MACHINE: Ranges = Ranges(&[
-    ("cores", NumberRange::new(1.0, 4096.0, "")),
-    ("draw_setup_ms", NumberRange::new(0.0, 1e4, "ms")),
-    ("draw_object_us", NumberRange::new(0.0, 1e6, "µs")),
-    ("draw_triangle_us", NumberRange::new(0.0, 1e4, "µs")),
-    ("draw_pixel_ns", PER_PIECE),
-    ("draw_enlarge_ns", PER_PIECE),
-    ("cull_object_ns", PER_PIECE),
-    ("choose_object_ns", PER_PIECE),
-    ("noise", SHARE),
-    ("wander", SHARE),
-    ("spikes", SHARE),
-]);
-
-/// Ranges of keys of [`LoadFile`].
-pub const LOAD: Ranges = Ranges(&[("at_s", TIME), ("factor", NumberRange::new(0.01, 100.0, ""))]);
-
-/// Ranges of keys of [`ShadingCostFile`].
-pub const COST: Ranges = Ranges(&[
-    ("object_us", NumberRange::new(0.0, 1e6, "µs")),
-    ("triangle_us", NumberRange::new(0.0, 1e4, "µs")),
-    ("vertex_us", NumberRange::new(0.0, 1e4, "µs")),
-    ("pixel_ns", PER_PIECE),
-]);
-
-/// Ranges of keys of [`ModelCostFile`].
-pub const STEP_COST: Ranges =
-    Ranges(&[("base_us", NumberRange::new(0.0, 1e9, "µs")), ("unit_us", NumberRange::new(0.0, 1e9, "µs"))]);
-
-/// Ranges of keys of [`ProbeFile`].
-pub const PROBE: Ranges = Ranges(&[("at", SHARE), ("every_ms", NumberRange::new(0.01, 1e6, "ms"))]);
-
 /// `[world]`: the surroundings of the objects.
-#[derive(Debug, Clone, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields)]
-#[schemars(transform = within(SURROUNDINGS))]
+#[derive(Debug, Clone, Default, Deserialize, JsonSchema)]
+#[serde(default, deny_unknown_fields)]
 pub struct WorldFile {
     /// Gravity, m/s², up to 1e4. Default `[0, 0, -9.81]`.
     pub gravity_m_s2: Option<Point>,
     /// The light of the scene in pictures, and its background. Default `room`.
-    pub environment: Option<EnvironmentKind>,
+    pub environment: EnvironmentKind,
     /// Whether moving objects collide with each other. Default true; with false only pairs that a `[[coupling]]` names do.
     pub contacts: Option<ContactsFile>,
     /// How deep objects that lie on each other rest, metres: the softness of contacts follows from it. Default 2e-5; smaller
@@ -160,7 +92,7 @@ pub struct WorldFile {
     /// deep.
     pub contact_depth_m: Option<f64>,
     /// How far the solves of contacts go. Default `exact`; at the free pace they are so in any case.
-    pub contact: Option<SolvesFile>,
+    pub contact: SolvesFile,
     /// How many steps a solve makes in any case where it goes by `budget` and has not come to its end before. Default 5, after which an
     /// answer is safe; with more contacts are less deep while bodies land, and turns may take longer than there is time.
     pub contact_least_steps: Option<u32>,
@@ -199,58 +131,6 @@ pub enum ContactPath {
     Pairs,
     /// All that touch as one problem.
     Clusters,
-}
-
-/// `[target]`: the target frame rate and how it is held.
-#[derive(Debug, Clone, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields)]
-#[schemars(transform = within(TARGET))]
-pub struct TargetFile {
-    /// Target frames per second. Default 60.
-    pub frame_hz: Option<f64>,
-    /// Policy that chooses the level of every visible object. Default `adaptive`.
-    pub policy: Option<PolicyKind>,
-    /// How `robin-hood` values an object. Default `plain`.
-    pub value: Option<ValueKind>,
-    /// Feedback law. Default `corrected`.
-    pub law: Option<LawKind>,
-    /// Gain α of the printed law. Default 1e-4.
-    pub alpha: Option<f64>,
-    /// Gain β of the printed law. Default 5.
-    pub beta: Option<f64>,
-    /// Gain κ of the corrected law; below 1 it is stable for every scene. Default: the law's own.
-    pub kappa: Option<f64>,
-    /// Gain λ of the corrected law on the error's change. Default: the law's own.
-    pub lead: Option<f64>,
-    /// Share of the frame time that is left free. Default: for feedback its law's own, for policies that predict 0.02.
-    pub margin: Option<f64>,
-    /// Gain of the agents' own loops: share of the way to a finer level that one demand goes. Default 0.5.
-    pub agent_refine: Option<f64>,
-    /// Gain of the agents' own loops: share of a delay by others that one demand removes. Default 0.5.
-    pub agent_yield: Option<f64>,
-    /// Greatest lag from reading the camera to the finished picture, milliseconds: levels are chosen so that it is kept, and the
-    /// camera is drawn at its predicted pose for that time. Default: no bound, and the camera is drawn where it was read.
-    pub lag_ms: Option<f64>,
-    /// Share reserved for choosing levels, of the part that culling leaves of `lag_ms`. Default 0.05.
-    pub optimiser_share: Option<f64>,
-    /// Whether `adaptive` and `robin-hood` spend time left over when everything is at its finest on still smoother shapes and softer
-    /// shadows. Default false.
-    pub raise: Option<bool>,
-    /// Whether policies that choose by cost may leave objects out of the picture where not even the coarsest of everything fits: for objects without a `may_vanish` of their own. Default false.
-    pub may_vanish: Option<bool>,
-    /// How much a level's benefit falls with the distance from the middle of the picture. Default 0. This and the next two are for
-    /// policies that choose by cost.
-    pub focus: Option<f64>,
-    /// How much it falls with speed across the picture. Default 0 for `greedy`, `greedy-incremental` and `greedy-repaired`, 0.5 for
-    /// the others.
-    pub motion: Option<f64>,
-    /// How much it falls with the distance from the level of the frame before: for `greedy`, `greedy-incremental`,
-    /// `greedy-repaired`, and in addition to its own for `adaptive`. Default 0.
-    pub hysteresis: Option<f64>,
-    /// Fraction of its width and height that the picture is drawn with, `[least, most]` or one number for both; in steps of 0.05. Then it is
-    /// enlarged.
-    /// Fewer pixels are drawn where all else is at its coarsest and frames are late still. Default `[0.35, 1.0]`.
-    pub render_scale: Option<OneOrRange<f64>>,
 }
 
 /// One camera as a table, or several as a list of tables.
@@ -295,7 +175,6 @@ impl<'de> Deserialize<'de> for CameraFiles {
 /// `[camera]`, or one of `[[camera]]`: a still view; with `period_s` an orbit about `look_at_m`; with `keyframe` a path.
 #[derive(Debug, Clone, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
-#[schemars(transform = within(CAMERA))]
 pub struct CameraFile {
     /// Its name, by which it is chosen; each camera has another. Default: `camera`, and of several `camera 1` and so on.
     pub name: Option<String>,
@@ -308,6 +187,7 @@ pub struct CameraFile {
     /// Seconds per turn about `look_at_m`, 0.1 … 1e5 in magnitude; negative turns clockwise seen from above.
     pub period_s: Option<f64>,
     /// A path: 2 … 10000 keyframes.
+    #[schemars(length(min = 2, max = 10_000))]
     pub keyframe: Option<Vec<CameraKeyFile>>,
     /// Whether the path repeats. Default false.
     pub repeat: Option<bool>,
@@ -318,7 +198,6 @@ pub struct CameraFile {
 /// View of the camera at one time.
 #[derive(Debug, Clone, Copy, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
-#[schemars(transform = within(CAMERA))]
 pub struct CameraKeyFile {
     /// Seconds from the start; later than the keyframe before.
     pub at_s: f64,
@@ -330,115 +209,9 @@ pub struct CameraKeyFile {
     pub fov_deg: Option<f64>,
 }
 
-/// `[machine]`: a preset, and the values that differ from it.
-#[derive(Debug, Clone, Default, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields)]
-#[schemars(transform = within(MACHINE))]
-pub struct MachineFile {
-    /// The preset to start from: `two-cores-software` (default) or `workstation`.
-    pub preset: Option<String>,
-    /// Cores that agents and frames share.
-    pub cores: Option<u32>,
-    /// Costs of a step of each model, by the model's name, and of a factor of contacts that are solved as one problem, by `factor`.
-    #[serde(default)]
-    pub step: BTreeMap<String, ModelCostFile>,
-    /// Milliseconds per frame before anything is drawn.
-    pub draw_setup_ms: Option<f64>,
-    /// Microseconds per drawn object.
-    pub draw_object_us: Option<f64>,
-    /// Microseconds per triangle.
-    pub draw_triangle_us: Option<f64>,
-    /// Nanoseconds per pixel of the picture as drawn.
-    pub draw_pixel_ns: Option<f64>,
-    /// Nanoseconds per pixel that a picture of fewer pixels is enlarged to.
-    pub draw_enlarge_ns: Option<f64>,
-    /// Whether a graphics card draws, and not the cores that agents step on. Default: as the preset has it, a card in `workstation`.
-    pub graphics_card: Option<bool>,
-    /// Nanoseconds per object for culling. Default 0.
-    pub cull_object_ns: Option<f64>,
-    /// Nanoseconds per object in view for choosing its level. Default 0.
-    pub choose_object_ns: Option<f64>,
-    /// Costs of objects by their shading, where they differ from `draw_object_us`, `draw_triangle_us` and the preset.
-    pub shading: Option<ShadingCostsFile>,
-    /// Relative standard deviation of every cost.
-    pub noise: Option<f64>,
-    /// Relative standard deviation of a slowly varying factor on the frame time; it keeps nine tenths of itself from frame to frame.
-    /// Default 0.
-    pub wander: Option<f64>,
-    /// Share of frames that take 1.5 times as long. Default 0.
-    pub spikes: Option<f64>,
-    /// Additional load of the machine while frames are drawn, by rising time; at most 1000 entries.
-    #[serde(default)]
-    #[schemars(length(max = 1000))]
-    pub load: Vec<LoadFile>,
-    /// Additional load of the machine while agents step, by rising time; at most 1000 entries.
-    #[serde(default)]
-    #[schemars(length(max = 1000))]
-    pub step_load: Vec<LoadFile>,
-    /// Seed of the noise.
-    pub seed: Option<u32>,
-}
-
-/// `[[machine.load]]` and `[[machine.step_load]]`: from a time on every frame, or every step, takes a factor times its declared time.
-#[derive(Debug, Clone, Copy, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields)]
-#[schemars(transform = within(LOAD))]
-pub struct LoadFile {
-    /// Wall-clock seconds after the start; later than the entry before.
-    pub at_s: f64,
-    /// The factor from then on: 2.5 is a machine 2.5 times as slow, 0.4 one 2.5 times as fast.
-    pub factor: f64,
-}
-
-/// `[machine.shading]`: costs of objects by their shading.
-#[derive(Debug, Clone, Copy, Default, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields, rename_all = "kebab-case")]
-pub struct ShadingCostsFile {
-    /// One colour per triangle.
-    pub flat: Option<ShadingCostFile>,
-    /// Colours at vertices, interpolated between them.
-    pub gouraud: Option<ShadingCostFile>,
-    /// Lighting at every pixel.
-    pub per_pixel: Option<ShadingCostFile>,
-    /// Lighting at every pixel of a textured surface.
-    pub textured: Option<ShadingCostFile>,
-    /// Leaves drawn as points instead of shaded triangles.
-    pub points: Option<ShadingCostFile>,
-    /// Boughs drawn as lines.
-    pub lines: Option<ShadingCostFile>,
-}
-
-/// Cost of an object: object + max(triangle · triangles + vertex · vertices, pixel · pixels that it covers).
-#[derive(Debug, Clone, Copy, Default, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields)]
-#[schemars(transform = within(COST))]
-pub struct ShadingCostFile {
-    /// Microseconds per object.
-    pub object_us: Option<f64>,
-    /// Microseconds per triangle.
-    pub triangle_us: Option<f64>,
-    /// Microseconds per vertex. Default 0.
-    pub vertex_us: Option<f64>,
-    /// Nanoseconds per pixel that the object covers. Default 0.
-    pub pixel_ns: Option<f64>,
-}
-
-/// Cost of a step of a model: base + unit · work.
-#[derive(Debug, Clone, Copy, Default, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields)]
-#[schemars(transform = within(STEP_COST))]
-pub struct ModelCostFile {
-    /// Microseconds per step.
-    pub base_us: Option<f64>,
-    /// Microseconds per unit of work; that is of a tube one segment in one solved system, with one or more systems per substep, of a synthetic
-    /// agent a declared microsecond, of `factor` a contact, of others a step.
-    pub unit_us: Option<f64>,
-}
-
 /// `[[probe]]`: a material point whose position and velocity are reported.
 #[derive(Debug, Clone, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
-#[schemars(transform = within(PROBE))]
 pub struct ProbeFile {
     /// Name of the object.
     pub object: String,

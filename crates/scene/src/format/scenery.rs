@@ -1,39 +1,14 @@
 //! `model = "mesh"` and `model = "tree"`: scenery that is only drawn; and `[[group]]`, objects drawn as one mesh from afar.
 
 use super::Point;
-use super::ranges::{SCALE, within};
-use metachron_core::{NumberRange, Ranges};
 use metachron_drawable::Generator;
 use schemars::JsonSchema;
 use serde::Deserialize;
-
-const PIECES: NumberRange = NumberRange::new(1.0, 1e5, "");
-
-/// Ranges of keys of [`MeshFile`].
-pub const MESH: Ranges = Ranges(&[
-    ("triangles", NumberRange::new(4.0, 1e6, "")),
-    ("least_triangles", NumberRange::new(1.0, 1e6, "")),
-    ("scale", SCALE),
-    ("texture_m", NumberRange::new(1e-3, 1e3, "m")),
-    ("dome_m", NumberRange::new(1e-3, 1e4, "m")),
-]);
-
-/// Ranges of keys of [`MotionFile`].
-pub const MOTION: Ranges = Ranges(&[("swing_hz", NumberRange::new(1e-4, 100.0, "Hz"))]);
-
-/// Ranges of keys of [`TreeFile`].
-pub const TREE: Ranges = Ranges(&[
-    ("height_m", NumberRange::new(0.01, 1e3, "m")),
-    ("branches", PIECES),
-    ("leaves", PIECES),
-    ("leaves_importance", NumberRange::new(1e-3, 1.0, "")),
-]);
 
 /// A triangle mesh that is drawn with as many triangles as the frame has time for. It is only drawn: nothing collides with it
 /// (a `rigid` object of shape `mesh` with `fixed = true` does collide).
 #[derive(Debug, Clone, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
-#[schemars(transform = within(MESH))]
 pub struct MeshFile {
     /// A file of triangles, binary glTF (.glb, +y up), STL or OBJ (+z up), its path relative to the scene file; not with `generate`. The surface
     /// may be open, but no edge may be shared by more than two triangles, and no coordinate may be past ± 1e5 m.
@@ -44,6 +19,7 @@ pub struct MeshFile {
     pub seed: Option<u32>,
     /// Triangles of the full mesh: of a generated mesh, or the number to which a file with more is reduced. Default: 1000 for
     /// a generated mesh, all for a file.
+    #[schemars(range(min = 4, max = 1_000_000), extend("x-unit" = ""))]
     pub triangles: Option<u32>,
     /// Fewest triangles that it is drawn with; a mesh with fewer has all drawn. Default: as few as it can be reduced to.
     pub least_triangles: Option<u32>,
@@ -70,7 +46,6 @@ pub struct MeshFile {
 /// The motion of a mesh: it turns about its own origin, which swings along a line.
 #[derive(Debug, Clone, Copy, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
-#[schemars(transform = within(MOTION))]
 pub struct MotionFile {
     /// Angular velocity about the origin of the mesh's axes (of a dome: about its centre), rad/s, each −1e4 … 1e4. Default none.
     pub spin_rad_s: Option<Point>,
@@ -83,7 +58,6 @@ pub struct MotionFile {
 /// A tree of boughs and leaves: two drawn objects, `NAME` and `NAME.leaves`, with levels from points and lines up to triangles.
 #[derive(Debug, Clone, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
-#[schemars(transform = within(TREE))]
 pub struct TreeFile {
     /// Seed of its shape. Default 0.
     pub seed: Option<u32>,

@@ -1,30 +1,38 @@
 //! `model = "sheet"`, `"solid"` and `"rope"`: soft bodies of finite elements.
 
 use super::Point;
-use super::ranges::{FRICTION, LENGTH, SCALE, TRIANGLES, within};
+use super::ranges::within;
 use super::value::OneOrRange;
-use metachron_core::Ranges;
 use metachron_drawable::Generator;
-use metachron_models::soft::{MATTER, SEGMENTS};
+use metachron_models::soft::{MATTER, Side};
 use schemars::JsonSchema;
 use serde::Deserialize;
 
-/// Ranges of keys of sheets, solids and ropes.
-pub const SOFT: Ranges = Ranges(&[
-    ("size_m", LENGTH),
-    ("radius_m", LENGTH),
-    ("thickness_m", LENGTH),
-    ("eps_m", LENGTH),
-    ("segments", SEGMENTS),
-    ("scale", SCALE),
-    ("triangles", TRIANGLES),
-    ("friction", FRICTION),
-]);
+/// The keys of a sheet, solid or rope alike.
+#[derive(Debug, Clone, Copy, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+#[schemars(transform = within(MATTER))]
+pub struct SoftFile {
+    /// Young's modulus, Pa.
+    pub young_pa: f64,
+    /// Density, kg/m³. Default 1050.
+    pub density_kg_m3: Option<f64>,
+    /// Mass-proportional damping, 1/s. Default 0.
+    pub damping_per_s: Option<f64>,
+    /// Stiffness-proportional damping (Rayleigh), s: high frequencies fade first. Default 0.
+    pub damping_s: Option<f64>,
+    /// Velocity of all of it at the start, m/s. Default: none.
+    pub velocity_m_s: Option<Point>,
+    /// Coulomb friction coefficient; a pair takes the geometric mean. Default 0.3.
+    pub friction: Option<f64>,
+    /// Whether it touches itself. Default: a sheet and a rope do, a solid does not.
+    pub self_contact: Option<bool>,
+}
 
 /// A soft sheet that stretches and bends: flat, or of the shape of a mesh.
 #[derive(Debug, Clone, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
-#[schemars(transform = within(MATTER), transform = within(SOFT))]
+#[schemars(transform = within(MATTER))]
 pub struct SheetFile {
     /// Length along its x and y axes, metres. Needed without `file`.
     pub size_m: Option<[f64; 2]>,
@@ -41,34 +49,20 @@ pub struct SheetFile {
     pub scale: Option<f64>,
     /// Thickness, metres.
     pub thickness_m: f64,
-    /// Young's modulus, Pa.
-    pub young_pa: f64,
     /// Poisson's ratio. Default 0.4.
     pub poisson: Option<f64>,
-    /// Density, kg/m³. Default 1050.
-    pub density_kg_m3: Option<f64>,
-    /// Mass-proportional damping, 1/s. Default 0.
-    pub damping_per_s: Option<f64>,
-    /// Stiffness-proportional damping (Rayleigh), s: high frequencies fade first. Default 0.
-    pub damping_s: Option<f64>,
     /// Position of its middle, metres. Default: the origin.
     pub position_m: Option<Point>,
     /// Rotation about its middle by angles about the world's x, then y, then z axis, degrees. Default none.
     pub rotation_deg: Option<Point>,
-    /// Velocity of the whole sheet at the start, m/s, up to 1e4. Default: none.
-    pub velocity_m_s: Option<Point>,
     /// Sides whose vertices never move. Default none.
     pub hold: Option<Vec<SheetSide>>,
-    /// Coulomb friction coefficient; a pair takes the geometric mean. Default 0.3.
-    pub friction: Option<f64>,
-    /// Whether it touches itself. Default true.
-    pub self_contact: Option<bool>,
 }
 
 /// A soft solid: a box, a ball, or the volume within a closed surface.
 #[derive(Debug, Clone, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
-#[schemars(transform = within(MATTER), transform = within(SOFT))]
+#[schemars(transform = within(MATTER))]
 pub struct SolidFile {
     /// Its shape. `box`: `size_m`. `ball`: `radius_m`. `mesh`: `file` or `generate`.
     pub shape: SoftShapeKind,
@@ -94,8 +88,6 @@ pub struct SolidFile {
     pub triangles: Option<u32>,
     /// Factor that converts the surface's coordinates to metres. Default 1.
     pub scale: Option<f64>,
-    /// Young's modulus, Pa.
-    pub young_pa: f64,
     /// Poisson's ratio. Default 0.4. Tetrahedra lock near 0.5: above 0.45 a cage (`eps_m`) bends more truly.
     pub poisson: Option<f64>,
     /// How stress follows from strain. Default `corotational`.
@@ -104,33 +96,21 @@ pub struct SolidFile {
     pub exponent: Option<f64>,
     /// Regions of a mesh of tetrahedra that are of another material.
     pub regions: Option<Vec<RegionFile>>,
-    /// Density, kg/m³. Default 1050.
-    pub density_kg_m3: Option<f64>,
-    /// Mass-proportional damping, 1/s. Default 0.
-    pub damping_per_s: Option<f64>,
-    /// Stiffness-proportional damping (Rayleigh), s: high frequencies fade first. Default 0.
-    pub damping_s: Option<f64>,
     /// Position of its middle, of a mesh that of the origin of its axes, metres. Default: the origin.
     pub position_m: Option<Point>,
     /// Rotation about that point by angles about the world's x, then y, then z axis, degrees. Default none.
     pub rotation_deg: Option<Point>,
-    /// Velocity of the whole solid at the start, m/s, up to 1e4. Default: none.
-    pub velocity_m_s: Option<Point>,
     /// Faces of a box whose vertices never move; of a mesh, sides of the box around it: the vertices of its cage there,
     /// of tetrahedra the vertices within half a mean edge. Default none.
-    pub hold: Option<Vec<SolidSide>>,
-    /// Coulomb friction coefficient; a pair takes the geometric mean. Default 0.3.
-    pub friction: Option<f64>,
-    /// Whether it touches itself. Default false.
-    pub self_contact: Option<bool>,
+    pub hold: Option<Vec<Side>>,
 }
 
 /// A rope: it stretches, and has no stiffness against bending or twisting.
 #[derive(Debug, Clone, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
-#[schemars(transform = within(MATTER), transform = within(SOFT))]
 pub struct RopeFile {
     /// Points of its centre line at rest, metres: at least two.
+    #[schemars(length(min = 2))]
     pub path_m: Vec<Point>,
     /// Radius, metres.
     pub radius_m: f64,
@@ -140,22 +120,8 @@ pub struct RopeFile {
     /// while it runs. Its line in contacts, grasps and pictures is the line of the finest. At most 2047 segments at the
     /// finest.
     pub eps_m: Option<OneOrRange<f64>>,
-    /// Young's modulus, Pa.
-    pub young_pa: f64,
-    /// Density, kg/m³. Default 1050.
-    pub density_kg_m3: Option<f64>,
-    /// Mass-proportional damping, 1/s. Default 0.
-    pub damping_per_s: Option<f64>,
-    /// Stiffness-proportional damping (Rayleigh), s: high frequencies fade first. Default 0.
-    pub damping_s: Option<f64>,
-    /// Velocity of the whole rope at the start, m/s, up to 1e4. Default: none.
-    pub velocity_m_s: Option<Point>,
     /// Ends that never move. Default none.
     pub hold: Option<Vec<RopeEnd>>,
-    /// Coulomb friction coefficient; a pair takes the geometric mean. Default 0.3.
-    pub friction: Option<f64>,
-    /// Whether it touches itself. Default true.
-    pub self_contact: Option<bool>,
 }
 
 /// How the stress of a solid follows from its strain; near rest all are the law of Hooke.
@@ -214,24 +180,6 @@ pub enum SheetSide {
     Near,
     /// Where y is largest.
     Far,
-}
-
-/// A face of a box, in its own axes.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize, JsonSchema)]
-#[serde(rename_all = "kebab-case")]
-pub enum SolidSide {
-    /// Where x is least.
-    Left,
-    /// Where x is largest.
-    Right,
-    /// Where y is least.
-    Near,
-    /// Where y is largest.
-    Far,
-    /// Where z is least.
-    Bottom,
-    /// Where z is largest.
-    Top,
 }
 
 /// An end of a rope.

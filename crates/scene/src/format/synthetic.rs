@@ -1,24 +1,12 @@
 //! `model = "synthetic"`: an agent with declared cost and error and without matter.
 
 use super::OneOrRange;
-use super::ranges::within;
-use metachron_core::{NumberRange, Ranges};
 use schemars::JsonSchema;
 use serde::Deserialize;
-
-/// Ranges of keys of [`SyntheticFile`].
-pub const SYNTHETIC: Ranges = Ranges(&[
-    ("cost_us", NumberRange::new(0.0, 1e6, "µs")),
-    ("cost_order", NumberRange::new(0.0, 4.0, "")),
-    ("error_m", NumberRange::new(0.0, 1e3, "m")),
-    ("error_order", NumberRange::new(0.0, 8.0, "")),
-    ("eps_m", NumberRange::new(1e-6, 1e3, "m")),
-]);
 
 /// An agent with declared cost and error curves, for controllers and tests.
 #[derive(Debug, Clone, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
-#[schemars(transform = within(SYNTHETIC))]
 pub struct SyntheticFile {
     /// Cost of one step at the coarsest `eps_m`, microseconds.
     pub cost_us: f64,

@@ -1,26 +1,15 @@
 //! `model = "tool"`: a driven tool with jaws.
 
 use super::Point;
-use super::ranges::{SHARE, TIME, within};
-use metachron_core::{NumberRange, Ranges};
+use super::ranges::within;
+use metachron_models::tool::LIMITS;
 use schemars::JsonSchema;
 use serde::Deserialize;
-
-/// Ranges of keys of [`ToolFile`].
-pub const TOOL: Ranges = Ranges(&[
-    ("reach_m", NumberRange::new(1e-6, 100.0, "m")),
-    ("stiffness_n_m", NumberRange::new(1e-3, 1e7, "N/m")),
-    ("damping_n_s_m", NumberRange::new(0.0, 1e5, "N·s/m")),
-    ("max_force_n", NumberRange::new(1e-3, 1e3, "N: a stronger drive would push light objects into their support")),
-]);
-
-/// Ranges of keys of [`KeyframeFile`].
-pub const KEYFRAME: Ranges = Ranges(&[("at_s", TIME), ("jaw", SHARE)]);
 
 /// A driven tool: it follows its keyframes, or the user who drags it, and grasps tubes, soft and rigid bodies.
 #[derive(Debug, Clone, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
-#[schemars(transform = within(TOOL))]
+#[schemars(transform = within(LIMITS))]
 pub struct ToolFile {
     /// Its motion: 1 … 10000 keyframes. With one keyframe the tool stays there until the user drags it.
     #[schemars(length(min = 1, max = 10_000))]
@@ -47,7 +36,6 @@ pub struct ToolFile {
 /// Pose of a tool at one time of its script.
 #[derive(Debug, Clone, Copy, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
-#[schemars(transform = within(KEYFRAME))]
 pub struct KeyframeFile {
     /// Seconds from the start of the script; later than the keyframe before. Default 0 for the first.
     pub at_s: Option<f64>,

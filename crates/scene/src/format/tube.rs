@@ -1,56 +1,15 @@
 //! `model = "tube"`: a soft tube, cable or rod.
 
-use super::ranges::{DAMPING_RATE, DENSITY, FRICTION, SHARE, TEARING, within};
+use super::ranges::within;
 use super::{OneOrRange, Point};
-use metachron_core::{NumberRange, Ranges};
-use metachron_models::rod::{Integrator, WallModel};
+use metachron_models::rod::{Attachment, Integrator, LIMITS, Peristalsis, WallModel};
 use schemars::JsonSchema;
 use serde::Deserialize;
-
-const RIGIDITY: NumberRange = NumberRange::new(1e-15, 1e15, "");
-
-/// Ranges of keys of [`TubeFile`].
-pub const TUBE: Ranges = Ranges(&[
-    ("twist_deg", NumberRange::new(-36_000.0, 36_000.0, "°")),
-    ("radius_m", NumberRange::new(1e-6, 100.0, "m")),
-    ("young_pa", NumberRange::new(1.0, 1e13, "Pa")),
-    ("poisson", NumberRange::new(-0.999, 0.5, "")),
-    ("density_kg_m3", DENSITY),
-    ("shear_factor", NumberRange::new(1e-3, 2.0, "")),
-    ("ea_n", RIGIDITY),
-    ("ga_n", RIGIDITY),
-    ("ei_n_m2", RIGIDITY),
-    ("gj_n_m2", RIGIDITY),
-    ("mass_per_length_kg_m", NumberRange::new(1e-9, 1e9, "kg/m")),
-    ("segments", NumberRange::new(2.0, 4096.0, "")),
-    ("substeps", NumberRange::new(1.0, 1000.0, "")),
-    ("damping_per_s", DAMPING_RATE),
-    ("pressure_pa", NumberRange::new(0.0, 1e7, "Pa")),
-    ("friction", FRICTION),
-]);
-
-/// Ranges of keys of [`AttachFile`].
-pub const ATTACH: Ranges = Ranges(&[
-    ("from", SHARE),
-    ("to", SHARE),
-    ("stiffness_n_m2", NumberRange::new(0.0, 1e9, "N/m²")),
-    ("slack_m", NumberRange::new(0.0, 100.0, "m")),
-    ("damping_n_s_m2", NumberRange::new(0.0, 1e6, "N·s/m²")),
-    ("tears_above_n", TEARING),
-    ("yields_above_n", TEARING),
-]);
-
-/// Ranges of keys of [`PeristalsisFile`].
-pub const PERISTALSIS: Ranges = Ranges(&[
-    ("amplitude", NumberRange::new(0.0, 0.95, "")),
-    ("wavelength_m", NumberRange::new(1e-4, 100.0, "m")),
-    ("speed_m_s", NumberRange::new(-100.0, 100.0, "m/s")),
-]);
 
 /// A soft tube, cable or rod: a Cosserat rod with a radius.
 #[derive(Debug, Clone, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
-#[schemars(transform = within(TUBE))]
+#[schemars(transform = within(LIMITS))]
 pub struct TubeFile {
     /// Points of the centre line at the start, metres: 2 … 100000, no two consecutive ones equal; free of stress unless
     /// `straight` or `twist_deg` is given. Two points make a straight line, more a smooth curve through all of them.
@@ -85,6 +44,8 @@ pub struct TubeFile {
     pub mass_per_length_kg_m: Option<f64>,
     /// Spacing ε of the simulation along the tube, metres, length / 4096 … 10 lengths: one number fixes it; `[finest, coarsest]` is the
     /// range that the controller may use, starting at the finest. Default: length / 64, fixed.
+    // its range depends on the length
+    #[schemars(extend("x-unit" = "m"))]
     pub eps_m: Option<OneOrRange<f64>>,
     /// Fixed number of segments of the simulation; `eps_m` then applies to the picture only.
     pub segments: Option<u32>,
@@ -101,9 +62,10 @@ pub struct TubeFile {
     /// Ends held in place, free to turn. Default none.
     pub pin: Option<Vec<End>>,
     /// Springs between parts of the tube and their rest positions (a mesentery).
-    pub attach: Option<Vec<AttachFile>>,
+    #[schemars(length(max = 1000))]
+    pub attach: Option<Vec<Attachment>>,
     /// A travelling wave of the radius; where the wall gives, of the tension that would narrow it so if nothing resisted.
-    pub peristalsis: Option<PeristalsisFile>,
+    pub peristalsis: Option<Peristalsis>,
     /// The motion of the sections. Default `prescribed`.
     pub wall: Option<WallModel>,
     /// Pressure inside relative to outside, Pa: widens the tube. One number, or times in seconds, each above the one before, with
@@ -121,11 +83,12 @@ pub struct TubeFile {
 /// A tube's pressure: constant, or over time.
 #[derive(Debug, Clone, PartialEq, Deserialize, JsonSchema)]
 #[serde(untagged, expecting = "a number of pascals, or times and pressures as [[0.0, 0.0], [1.0, 4000.0]]")]
+#[schemars(inline)]
 pub enum PressureFile {
     /// One pressure, Pa.
     Constant(f64),
     /// Times, seconds, 0 … 1e6, each with the pressure then, Pa.
-    Keys(Vec<[f64; 2]>),
+    Keys(#[schemars(length(min = 1, max = 10_000))] Vec<(f64, f64)>),
 }
 
 /// An end of a tube.
@@ -136,40 +99,4 @@ pub enum End {
     Start,
     /// Where the path ends.
     End,
-}
-
-/// Springs along a part of a tube.
-#[derive(Debug, Clone, Copy, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields)]
-#[schemars(transform = within(ATTACH))]
-pub struct AttachFile {
-    /// Start of the part, as a share of the rest length.
-    pub from: f64,
-    /// End of the part, likewise; above `from`.
-    pub to: f64,
-    /// Stiffness per length, N/m².
-    pub stiffness_n_m2: f64,
-    /// Distance within which the spring does not act, metres. Default 0.
-    pub slack_m: Option<f64>,
-    /// Damping per length, N·s/m². Default 0.
-    pub damping_n_s_m2: Option<f64>,
-    /// Force of the whole part above which all of it tears off, N: the mean over a common step of the
-    /// bodies that the tube touches. It is gone then for good, and the report has it under `events`. Default: never.
-    pub tears_above_n: Option<f64>,
-    /// Greatest force that the whole part gives, N; below `tears_above_n`, spread evenly along it: where more would be taken it
-    /// slips, and holds from then on where it has come to. Default: as much as it takes.
-    pub yields_above_n: Option<f64>,
-}
-
-/// A travelling wave of contraction: r = r₀ (1 − a (1 + cos(2π (s − c t)/λ))/2).
-#[derive(Debug, Clone, Copy, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields)]
-#[schemars(transform = within(PERISTALSIS))]
-pub struct PeristalsisFile {
-    /// Deepest contraction a as a share of the radius.
-    pub amplitude: f64,
-    /// Wave length λ, metres.
-    pub wavelength_m: f64,
-    /// Wave speed c, m/s; negative runs from the end to the start.
-    pub speed_m_s: f64,
 }

@@ -11,7 +11,7 @@ impl Session {
     pub fn predict_camera(&mut self, camera: Camera) -> Camera {
         let now = self.now();
         let before = self.last_camera.replace((now, camera));
-        let (Some((most_s, _)), Some((then, before))) = (self.scene.target.lag, before) else { return camera };
+        let (Some((most_s, _)), Some((then, before))) = (self.scene.target.lag(), before) else { return camera };
         let (passed_s, lag_s) = (now.saturating_sub(then).as_secs_f64(), self.lag_s.min(most_s));
         // assumes that the next frame follows this one after the same interval as this one followed the last
         self.next_camera = Some(camera.extrapolated(&before, (lag_s + passed_s) / passed_s));
@@ -22,7 +22,7 @@ impl Session {
     /// costs. To be called between the start of the drawing and the wait for its end.
     pub fn choose_next_frame(&mut self, camera: &Camera, size: Size) {
         self.chosen.select_next = None;
-        if self.scene.target.lag.is_none() || !self.control.policy().predicts() {
+        if self.scene.target.lag_ms.is_none() || !self.control.policy().predicts() {
             return;
         }
         let started = self.now();

@@ -3,6 +3,18 @@
 //! In: parts with their measures, by name. Out: a [`Scene`] with the defaults that scene files have.
 //! Never here: files.
 
+/// Methods that set one value each, which becomes what its place holds.
+macro_rules! setters {
+    ($($(#[$doc:meta])* $name:ident: $type:ty => $($place:ident).+;)*) => {$(
+        $(#[$doc])*
+        #[must_use]
+        pub fn $name(mut self, $name: $type) -> Self {
+            self.$($place).+ = $name.into();
+            self
+        }
+    )*};
+}
+
 mod rigid;
 mod sensors;
 mod soft;
@@ -10,10 +22,9 @@ mod tube;
 
 use super::appearance::Appearance;
 use super::couplings::Faults;
-use super::kinds::{
-    EnvironmentKind, ExecutorKind, LawKind, Material, PolicyKind, PriorityKind, ShadingKind, StatesKind, ValueKind,
-};
-use super::scene::{Factors, Gains, Machine, Member, PaceWish, RENDER_SCALE, Scene, Spec, Target};
+use super::kinds::{EnvironmentKind, ExecutorKind, Material, PriorityKind, ShadingKind, StatesKind};
+use super::scene::{Machine, Member, PaceWish, Scene, Spec};
+use super::target::Target;
 use glam::{DQuat, DVec3};
 use metachron_contact::Agent;
 use metachron_contact::detect::{ClusterScene, SolveBudget};
@@ -176,11 +187,9 @@ impl Custom {
         Self { make: Arc::new(make), rate_hz: RATE_DEFAULT_HZ }
     }
 
-    /// Steps a simulated second, 1 … 100000.
-    #[must_use]
-    pub fn rate_hz(mut self, rate_hz: f64) -> Self {
-        self.rate_hz = rate_hz;
-        self
+    setters! {
+        /// Steps a simulated second, 1 … 100000.
+        rate_hz: f64 => rate_hz;
     }
 
     pub(crate) fn build(&self, id: AgentId) -> Box<dyn Agent> {
@@ -194,29 +203,17 @@ impl std::fmt::Debug for Custom {
     }
 }
 
-impl From<Custom> for Part {
-    fn from(custom: Custom) -> Self {
-        Self::Custom(custom)
-    }
+macro_rules! parts {
+    ($($part:ident)*) => {$(
+        impl From<$part> for Part {
+            fn from(part: $part) -> Self {
+                Self::$part(part)
+            }
+        }
+    )*};
 }
 
-impl From<Rigid> for Part {
-    fn from(rigid: Rigid) -> Self {
-        Self::Rigid(rigid)
-    }
-}
-
-impl From<Soft> for Part {
-    fn from(soft: Soft) -> Self {
-        Self::Soft(soft)
-    }
-}
-
-impl From<Tube> for Part {
-    fn from(tube: Tube) -> Self {
-        Self::Tube(tube)
-    }
-}
+parts! { Custom Rigid Soft Tube }
 
 impl SceneBuilder {
     /// An empty scene with gravity along −z.
@@ -232,26 +229,14 @@ impl SceneBuilder {
         }
     }
 
-    /// Gravity, m/s².
-    #[must_use]
-    pub fn gravity(mut self, gravity_m_s2: [f64; 3]) -> Self {
-        self.gravity = gravity_m_s2.into();
-        self
-    }
-
-    /// The depth of a resting contact, metres, 1e-6 … 1e-3; default 2e-5. A ten-thousandth of the smallest body is not
-    /// seen.
-    #[must_use]
-    pub fn contact_depth_m(mut self, contact_depth_m: f64) -> Self {
-        self.contact_depth_m = contact_depth_m;
-        self
-    }
-
-    /// How far the solves of contacts go in a run that goes by a clock; default: to the end.
-    #[must_use]
-    pub fn contact_budget(mut self, contact_budget: SolveBudget) -> Self {
-        self.contact_budget = contact_budget;
-        self
+    setters! {
+        /// Gravity, m/s².
+        gravity: [f64; 3] => gravity;
+        /// The depth of a resting contact, metres, 1e-6 … 1e-3; default 2e-5. A ten-thousandth of the smallest body is not
+        /// seen.
+        contact_depth_m: f64 => contact_depth_m;
+        /// How far the solves of contacts go in a run that goes by a clock; default: to the end.
+        contact_budget: SolveBudget => contact_budget;
     }
 
     /// A solid that never moves, with its axes at the origin.
@@ -338,18 +323,7 @@ impl SceneBuilder {
             states: StatesKind::default(),
             environment: EnvironmentKind::default(),
             gravity,
-            target: Target {
-                frame_hz: 60.0,
-                policy: PolicyKind::default(),
-                value: ValueKind::default(),
-                law: LawKind::default(),
-                gains: Gains::default(),
-                lag: None,
-                raise: false,
-                may_vanish: false,
-                factors: Factors::default(),
-                render_scale: RENDER_SCALE,
-            },
+            target: Target::default(),
             cameras: Vec::new(),
             machine: Machine::default(),
             agents,

@@ -6,11 +6,12 @@
 use super::appearance::Appearance;
 use super::builder::{Custom, SceneBuilder};
 use super::couplings::{Coupling, Faults};
-use super::kinds::{EnvironmentKind, ExecutorKind, LawKind, PolicyKind, PriorityKind, StatesKind, ValueKind};
+use super::kinds::{EnvironmentKind, ExecutorKind, PriorityKind, StatesKind};
 use super::placement::{Moved, Overlap};
 #[cfg(feature = "scenery")]
 use super::scenery::{Group, Scenery};
 use super::sensor::Sensor;
+use super::target::Target;
 use glam::DVec3;
 #[cfg(doc)]
 use metachron_contact::detect::DEPTH_RANGE_M;
@@ -23,6 +24,7 @@ use metachron_models::rod::TubeSpec;
 use metachron_models::soft::SoftSpec;
 use metachron_models::synthetic::SyntheticSpec;
 use metachron_models::tool::ToolSpec;
+use std::collections::BTreeMap;
 use std::ops::Range;
 use std::sync::Arc;
 use std::time::Duration;
@@ -92,66 +94,6 @@ pub struct Scene {
     pub moved: Vec<Moved>,
 }
 
-/// The target frame rate and how it is held.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Target {
-    /// Frames per second, 1 … 1000.
-    pub frame_hz: f64,
-    /// The policy that chooses levels.
-    pub policy: PolicyKind,
-    /// How `robin-hood` values an object.
-    pub value: ValueKind,
-    /// The feedback law.
-    pub law: LawKind,
-    /// Gains of the laws.
-    pub gains: Gains,
-    /// The greatest lag from reading the camera to the finished picture, seconds, and the share reserved for choosing
-    /// levels of the part that culling leaves of it; `None` where the scene sets no bound.
-    pub lag: Option<(f64, f64)>,
-    /// Whether time left over when everything is at its finest is spent on still smoother shapes and softer shadows.
-    pub raise: bool,
-    /// Whether objects that do not say may be left out of the picture where time is short.
-    pub may_vanish: bool,
-    /// How much some factors count in the benefit of a level.
-    pub factors: Factors,
-    /// Least and most fraction of its width and height that the picture is drawn with, 0.35 … 1: fewer pixels where all else is at its coarsest
-    /// and frames are late.
-    pub render_scale: (f64, f64),
-}
-
-/// The range of [`Target::render_scale`], and its default.
-pub const RENDER_SCALE: (f64, f64) = (0.35, 1.0);
-
-/// How much some factors count in the benefit of a level (FS93, §5), 0 … 1; `None` is the policy's own default.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub struct Factors {
-    /// Away from the middle of the picture.
-    pub focus: Option<f64>,
-    /// Blurred by motion.
-    pub motion: Option<f64>,
-    /// Unlike the frame before.
-    pub hysteresis: Option<f64>,
-}
-
-/// Gains of the laws that hold frames and agents at their times, with the ranges of [`metachron_core::gains`]; `None` is the law's own default.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub struct Gains {
-    /// α of the printed law.
-    pub alpha: Option<f64>,
-    /// β of the printed law.
-    pub beta: Option<f64>,
-    /// κ of the corrected law; below 1 it is stable for every scene.
-    pub kappa: Option<f64>,
-    /// λ of the corrected law.
-    pub lead: Option<f64>,
-    /// Share of the frame time that is left free.
-    pub margin: Option<f64>,
-    /// Of the agents' own loops: share of the way to a finer level that one demand goes.
-    pub agent_refine: Option<f64>,
-    /// Of the agents' own loops: share of a delay by others that one demand removes.
-    pub agent_yield: Option<f64>,
-}
-
 /// A camera of a scene, by its name.
 #[derive(Debug, Clone, PartialEq)]
 pub struct NamedCamera {
@@ -195,60 +137,106 @@ pub struct View {
     pub fov_deg: f64,
 }
 
-/// Values that a scene declares for its machine; `None` is the preset's.
+/// The declared machine: a preset, and the values that differ from it.
 #[derive(Debug, Clone, PartialEq, Default)]
+#[cfg_attr(feature = "serde", derive(serde::Deserialize, schemars::JsonSchema), serde(default, deny_unknown_fields))]
 pub struct Machine {
-    /// The preset to start from.
+    /// The preset to start from: `two-cores-software` (default) or `workstation`.
     pub preset: String,
-    /// Cores shared by agents and frames, 1 … 4096.
+    /// Cores that agents and frames share.
     pub cores: Option<u32>,
-    /// Costs of steps by model, and of factors of contacts by [`metachron_runtime::FACTOR`]: (name, base in µs, µs per unit of work).
-    pub steps: Vec<(String, Option<f64>, Option<f64>)>,
-    /// Milliseconds per frame.
+    /// Costs of a step of each model, by the model's name, and of a factor of contacts that are solved as one problem, by `factor`.
+    pub step: BTreeMap<String, StepCost>,
+    /// Milliseconds per frame before anything is drawn.
     pub draw_setup_ms: Option<f64>,
     /// Microseconds per drawn object.
     pub draw_object_us: Option<f64>,
     /// Microseconds per triangle.
     pub draw_triangle_us: Option<f64>,
-    /// Nanoseconds per pixel drawn.
+    /// Nanoseconds per pixel of the picture as drawn.
     pub draw_pixel_ns: Option<f64>,
     /// Nanoseconds per pixel that a picture of fewer pixels is enlarged to.
     pub draw_enlarge_ns: Option<f64>,
-    /// Whether a graphics card draws, and not the cores that agents step on.
+    /// Whether a graphics card draws, and not the cores that agents step on. Default: as the preset has it, a card in `workstation`.
     pub graphics_card: Option<bool>,
-    /// Nanoseconds per object for culling.
+    /// Nanoseconds per object for culling. Default 0.
     pub cull_object_ns: Option<f64>,
-    /// Nanoseconds per object in view for choosing its level.
+    /// Nanoseconds per object in view for choosing its level. Default 0.
     pub choose_object_ns: Option<f64>,
-    /// Costs of objects by their shading: flat, Gouraud, per pixel, textured.
-    pub shading: [ObjectCost; 4],
-    /// Costs of objects drawn as points, and as lines.
-    pub strokes: [ObjectCost; 2],
-    /// Relative standard deviation of every cost, 0 … 1.
+    /// Costs of objects by their shading, where they differ from `draw_object_us`, `draw_triangle_us` and the preset.
+    pub shading: ShadingCosts,
+    /// Relative standard deviation of every cost.
     pub noise: Option<f64>,
-    /// Relative standard deviation of a slowly varying factor on the frame time, 0 … 1.
+    /// Relative standard deviation of a slowly varying factor on the frame time; it keeps nine tenths of itself from frame to frame.
+    /// Default 0.
     pub wander: Option<f64>,
-    /// Share of frames that take 1.5 times as long, 0 … 1.
+    /// Share of frames that take 1.5 times as long. Default 0.
     pub spikes: Option<f64>,
-    /// (seconds, factor): from this wall-clock time on a frame takes this factor times its declared time; by rising time.
-    pub load: Vec<(f64, f64)>,
-    /// The same for a step.
-    pub step_load: Vec<(f64, f64)>,
+    /// Additional load of the machine while frames are drawn, by rising time; at most 1000 entries.
+    #[cfg_attr(feature = "serde", schemars(length(max = 1000)))]
+    pub load: Vec<Load>,
+    /// Additional load of the machine while agents step, by rising time; at most 1000 entries.
+    #[cfg_attr(feature = "serde", schemars(length(max = 1000)))]
+    pub step_load: Vec<Load>,
     /// Seed of the noise.
-    pub seed: Option<u64>,
+    pub seed: Option<u32>,
 }
 
-/// Costs of an object, where the scene declares them.
+/// From a time on every frame, or every step, takes a factor times its declared time.
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Deserialize, schemars::JsonSchema), serde(deny_unknown_fields))]
+pub struct Load {
+    /// Wall-clock seconds after the start; later than the entry before.
+    pub at_s: f64,
+    /// The factor from then on: 2.5 is a machine 2.5 times as slow, 0.4 one 2.5 times as fast.
+    pub factor: f64,
+}
+
+/// Costs of objects by their shading.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
+#[cfg_attr(
+    feature = "serde",
+    derive(serde::Deserialize, schemars::JsonSchema),
+    serde(default, deny_unknown_fields, rename_all = "kebab-case")
+)]
+pub struct ShadingCosts {
+    /// One colour per triangle.
+    pub flat: ObjectCost,
+    /// Colours at vertices, interpolated between them.
+    pub gouraud: ObjectCost,
+    /// Lighting at every pixel.
+    pub per_pixel: ObjectCost,
+    /// Lighting at every pixel of a textured surface.
+    pub textured: ObjectCost,
+    /// Leaves drawn as points instead of shaded triangles.
+    pub points: ObjectCost,
+    /// Boughs drawn as lines.
+    pub lines: ObjectCost,
+}
+
+/// Cost of an object: object + max(triangle · triangles + vertex · vertices, pixel · pixels that it covers); `None` is the preset's.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+#[cfg_attr(feature = "serde", derive(serde::Deserialize, schemars::JsonSchema), serde(default, deny_unknown_fields))]
 pub struct ObjectCost {
     /// Microseconds per object.
     pub object_us: Option<f64>,
     /// Microseconds per triangle.
     pub triangle_us: Option<f64>,
-    /// Microseconds per vertex.
+    /// Microseconds per vertex. Default 0.
     pub vertex_us: Option<f64>,
-    /// Nanoseconds per pixel that it covers.
+    /// Nanoseconds per pixel that the object covers. Default 0.
     pub pixel_ns: Option<f64>,
+}
+
+/// Cost of a step of a model: base + unit · work; `None` is the preset's.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+#[cfg_attr(feature = "serde", derive(serde::Deserialize, schemars::JsonSchema), serde(default, deny_unknown_fields))]
+pub struct StepCost {
+    /// Microseconds per step.
+    pub base_us: Option<f64>,
+    /// Microseconds per unit of work; that is of a tube one segment in one solved system, with one or more systems per substep, of a synthetic
+    /// agent a declared microsecond, of `factor` a contact, of others a step.
+    pub unit_us: Option<f64>,
 }
 
 /// An agent of the scene.

@@ -4,6 +4,7 @@
 
 use super::ties::{Ties, faults};
 use crate::description::kinds::{ExecutorKind, PriorityKind};
+use crate::description::scene::{Load, ShadingCosts};
 use crate::error::WorldError;
 use crate::{Member, Scene, Spec};
 use metachron_contact::Agent;
@@ -143,22 +144,23 @@ pub fn machine(scene: &Scene) -> Machine {
     let wish = &scene.machine;
     let mut machine = Machine::preset(&wish.preset).unwrap_or_else(Machine::two_cores_software);
     machine.cores = wish.cores.unwrap_or(machine.cores);
-    for (model, base_us, unit_us) in &wish.steps {
+    for (model, cost) in &wish.step {
         let known = machine.steps.iter().position(|price| price.model == *model);
         let at = known.unwrap_or_else(|| {
             machine.steps.push(StepPrice { model: Cow::Owned(model.clone()), base_us: 0.0, unit_us: 0.0 });
             machine.steps.len() - 1
         });
         let price = &mut machine.steps[at];
-        price.base_us = base_us.unwrap_or(price.base_us);
-        price.unit_us = unit_us.unwrap_or(price.unit_us);
+        price.base_us = cost.base_us.unwrap_or(price.base_us);
+        price.unit_us = cost.unit_us.unwrap_or(price.unit_us);
     }
     let draw = &mut machine.draw;
     draw.setup_ms = wish.draw_setup_ms.unwrap_or(draw.setup_ms);
     draw.pixel_ns = wish.draw_pixel_ns.unwrap_or(draw.pixel_ns);
     draw.enlarge_ns = wish.draw_enlarge_ns.unwrap_or(draw.enlarge_ns);
-    let strokes = draw.strokes.iter_mut().zip(&wish.strokes);
-    for (price, own) in draw.objects.iter_mut().zip(&wish.shading).chain(strokes) {
+    let ShadingCosts { flat, gouraud, per_pixel, textured, points, lines } = wish.shading;
+    let strokes = draw.strokes.iter_mut().zip([points, lines]);
+    for (price, own) in draw.objects.iter_mut().zip([flat, gouraud, per_pixel, textured]).chain(strokes) {
         price.setup_us = own.object_us.or(wish.draw_object_us).unwrap_or(price.setup_us);
         price.triangle_us = own.triangle_us.or(wish.draw_triangle_us).unwrap_or(price.triangle_us);
         price.vertex_us = own.vertex_us.unwrap_or(price.vertex_us);
@@ -169,8 +171,8 @@ pub fn machine(scene: &Scene) -> Machine {
     machine.noise_sd = wish.noise.unwrap_or(machine.noise_sd);
     machine.wander_sd = wish.wander.unwrap_or(machine.wander_sd);
     machine.spikes = wish.spikes.unwrap_or(machine.spikes);
-    machine.load.clone_from(&wish.load);
-    machine.step_load.clone_from(&wish.step_load);
-    machine.seed = wish.seed.unwrap_or(machine.seed);
+    let load = |entries: &[Load]| entries.iter().map(|entry| (entry.at_s, entry.factor)).collect();
+    (machine.load, machine.step_load) = (load(&wish.load), load(&wish.step_load));
+    machine.seed = wish.seed.map_or(machine.seed, u64::from);
     machine
 }

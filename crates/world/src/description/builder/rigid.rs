@@ -49,60 +49,31 @@ impl Rigid {
         Self::new(Solid::Box { half_extents_m: half_extents_m.into() })
     }
 
-    /// Its mass, kilograms, within [`MASS`](metachron_models::rigid::MASS).
-    #[must_use]
-    pub const fn mass_kg(mut self, mass_kg: f64) -> Self {
-        self.spec.mass_kg = mass_kg;
-        self
-    }
-
-    /// Where its mass is, in place of evenly inside its shape.
-    #[must_use]
-    pub const fn inertia(mut self, given: GivenInertia) -> Self {
-        self.spec.inertia = Some(given);
-        self
-    }
-
-    /// Position of its shape's origin, metres.
-    #[must_use]
-    pub fn at(mut self, position_m: [f64; 3]) -> Self {
-        self.spec.position = position_m.into();
-        self
-    }
-
-    /// Rotation from its shape's axes to the world's.
-    #[must_use]
-    pub const fn turned(mut self, rotation: DQuat) -> Self {
-        self.spec.rotation = rotation;
-        self
-    }
-
-    /// Velocity at the start, m/s.
-    #[must_use]
-    pub fn velocity_m_s(mut self, velocity: [f64; 3]) -> Self {
-        self.spec.velocity = velocity.into();
-        self
-    }
-
-    /// Coefficient of restitution, within [`RESTITUTION`](metachron_geometry::RESTITUTION).
-    #[must_use]
-    pub const fn restitution(mut self, restitution: f64) -> Self {
-        self.spec.restitution = restitution;
-        self
-    }
-
-    /// Coulomb friction coefficient, within [`FRICTION`](metachron_geometry::FRICTION).
-    #[must_use]
-    pub const fn friction(mut self, friction: f64) -> Self {
-        self.spec.friction = friction;
-        self
-    }
-
-    /// How many times as strong gravity is for it; below zero it rises.
-    #[must_use]
-    pub const fn gravity_scale(mut self, gravity_scale: f64) -> Self {
-        self.gravity_scale = gravity_scale;
-        self
+    setters! {
+        /// Its mass, kilograms, within [`MASS`](metachron_models::rigid::MASS).
+        mass_kg: f64 => spec.mass_kg;
+        /// Where its mass is, in place of evenly inside its shape.
+        inertia: GivenInertia => spec.inertia;
+        /// Position of its shape's origin, metres.
+        at: [f64; 3] => spec.position;
+        /// Rotation from its shape's axes to the world's.
+        turned: DQuat => spec.rotation;
+        /// Velocity at the start, m/s.
+        velocity_m_s: [f64; 3] => spec.velocity;
+        /// Coefficient of restitution, within [`RESTITUTION`](metachron_geometry::RESTITUTION).
+        restitution: f64 => spec.restitution;
+        /// Coulomb friction coefficient, within [`FRICTION`](metachron_geometry::FRICTION).
+        friction: f64 => spec.friction;
+        /// How many times as strong gravity is for it; below zero it rises.
+        gravity_scale: f64 => gravity_scale;
+        /// Along which axes of the world it does not move: x, y, z.
+        lock_translation: [bool; 3] => spec.restraint.locked_translation;
+        /// About which axes of the world it does not turn: x, y, z.
+        lock_rotation: [bool; 3] => spec.restraint.locked_rotation;
+        /// Its contact traits: the groups that it collides with, rules of pairs, whether it only senses.
+        contact: ContactTraits => spec.traits;
+        /// Steps a simulated second, 1 … 100000.
+        rate_hz: f64 => rate_hz;
     }
 
     /// By which rates its velocity and its angular momentum decay, 1/s, within the range of [`LIMITS`](metachron_models::rigid::LIMITS).
@@ -110,27 +81,6 @@ impl Rigid {
     pub const fn damping_per_s(mut self, linear_per_s: f64, angular_per_s: f64) -> Self {
         let restraint = &mut self.spec.restraint;
         (restraint.linear_damping_per_s, restraint.angular_damping_per_s) = (linear_per_s, angular_per_s);
-        self
-    }
-
-    /// Along which axes of the world it does not move: x, y, z.
-    #[must_use]
-    pub const fn lock_translation(mut self, axes: [bool; 3]) -> Self {
-        self.spec.restraint.locked_translation = axes;
-        self
-    }
-
-    /// About which axes of the world it does not turn: x, y, z.
-    #[must_use]
-    pub const fn lock_rotation(mut self, axes: [bool; 3]) -> Self {
-        self.spec.restraint.locked_rotation = axes;
-        self
-    }
-
-    /// Its contact traits: the groups that it collides with, rules of pairs, whether it only senses.
-    #[must_use]
-    pub const fn contact(mut self, traits: ContactTraits) -> Self {
-        self.spec.traits = traits;
         self
     }
 
@@ -160,13 +110,6 @@ impl Rigid {
     #[must_use]
     pub fn repeating(mut self) -> Self {
         self.spec.led.get_or_insert_default().repeat = true;
-        self
-    }
-
-    /// Steps a simulated second, 1 … 100000.
-    #[must_use]
-    pub const fn rate_hz(mut self, rate_hz: f64) -> Self {
-        self.rate_hz = rate_hz;
         self
     }
 }

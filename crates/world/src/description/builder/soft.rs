@@ -92,46 +92,31 @@ impl Soft {
         Self::new(SoftShape::Rope { path_m, radius_m, segments })
     }
 
-    /// Position of its middle, metres; of a rope or a mesh of the origin of its points.
-    #[must_use]
-    pub fn at(mut self, position_m: [f64; 3]) -> Self {
-        self.spec.position = position_m.into();
-        self
-    }
-
-    /// Rotation from its own axes to the world's, about its middle.
-    #[must_use]
-    pub const fn turned(mut self, rotation: DQuat) -> Self {
-        self.spec.rotation = rotation;
-        self
-    }
-
-    /// Velocity at the start, m/s.
-    #[must_use]
-    pub fn velocity_m_s(mut self, velocity: [f64; 3]) -> Self {
-        self.spec.velocity = velocity.into();
-        self
-    }
-
-    /// Young's modulus, Pa; its range is in [`MATTER`](metachron_models::soft::MATTER), as are the next three.
-    #[must_use]
-    pub const fn young_pa(mut self, young_pa: f64) -> Self {
-        self.spec.matter.young_pa = young_pa;
-        self
-    }
-
-    /// Poisson's ratio.
-    #[must_use]
-    pub const fn poisson(mut self, poisson: f64) -> Self {
-        self.spec.matter.poisson = poisson;
-        self
-    }
-
-    /// Density, kg/m³.
-    #[must_use]
-    pub const fn density_kg_m3(mut self, density_kg_m3: f64) -> Self {
-        self.spec.matter.density_kg_m3 = density_kg_m3;
-        self
+    setters! {
+        /// Position of its middle, metres; of a rope or a mesh of the origin of its points.
+        at: [f64; 3] => spec.position;
+        /// Rotation from its own axes to the world's, about its middle.
+        turned: DQuat => spec.rotation;
+        /// Velocity at the start, m/s.
+        velocity_m_s: [f64; 3] => spec.velocity;
+        /// Young's modulus, Pa; its range is in [`MATTER`](metachron_models::soft::MATTER), as are the next three.
+        young_pa: f64 => spec.matter.young_pa;
+        /// Poisson's ratio.
+        poisson: f64 => spec.matter.poisson;
+        /// Density, kg/m³.
+        density_kg_m3: f64 => spec.matter.density_kg_m3;
+        /// How the stress of a solid follows from its strain.
+        law: MaterialLaw => spec.matter.law;
+        /// The sides that never move; of a rope left is its start and right its end.
+        hold: &[Side] => spec.held;
+        /// Coulomb friction coefficient of its skin, within [`FRICTION`](metachron_geometry::FRICTION).
+        friction: f64 => spec.friction;
+        /// Whether it touches itself; by default sheets and ropes do.
+        self_contact: bool => spec.self_contact;
+        /// Its contact traits.
+        contact: ContactTraits => spec.traits;
+        /// Steps a simulated second, 1 … 100000.
+        rate_hz: f64 => rate_hz;
     }
 
     /// Damping of its motion, 1/s, and of its strains, s.
@@ -141,52 +126,10 @@ impl Soft {
         self
     }
 
-    /// How the stress of a solid follows from its strain.
-    #[must_use]
-    pub const fn law(mut self, law: MaterialLaw) -> Self {
-        self.spec.matter.law = law;
-        self
-    }
-
-    /// The sides that never move; of a rope left is its start and right its end.
-    #[must_use]
-    pub fn hold(mut self, sides: &[Side]) -> Self {
-        self.spec.held = sides.to_vec();
-        self
-    }
-
-    /// Coulomb friction coefficient of its skin, within [`FRICTION`](metachron_geometry::FRICTION).
-    #[must_use]
-    pub const fn friction(mut self, friction: f64) -> Self {
-        self.spec.friction = friction;
-        self
-    }
-
-    /// Whether it touches itself; by default sheets and ropes do.
-    #[must_use]
-    pub const fn self_contact(mut self, touches: bool) -> Self {
-        self.spec.self_contact = touches;
-        self
-    }
-
-    /// Its contact traits.
-    #[must_use]
-    pub const fn contact(mut self, traits: ContactTraits) -> Self {
-        self.spec.traits = traits;
-        self
-    }
-
     /// The finest and the coarsest spacing of its nodes, metres, instead of a fixed number of cells: it begins with the finest.
     #[must_use]
     pub const fn eps_m(mut self, range_m: (f64, f64)) -> Self {
         self.eps_m = Some(range_m);
-        self
-    }
-
-    /// Steps a simulated second, 1 … 100000.
-    #[must_use]
-    pub const fn rate_hz(mut self, rate_hz: f64) -> Self {
-        self.rate_hz = rate_hz;
         self
     }
 

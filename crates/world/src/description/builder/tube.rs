@@ -46,60 +46,23 @@ impl Tube {
         }
     }
 
-    /// Outer radius, metres, > 0.
-    #[must_use]
-    pub const fn radius_m(mut self, radius_m: f64) -> Self {
-        self.radius_m = radius_m;
-        self
-    }
-
-    /// Thickness of its wall, metres, above 0 and at most its radius; without it the tube is solid.
-    #[must_use]
-    pub const fn wall_m(mut self, wall_m: f64) -> Self {
-        self.wall_m = Some(wall_m);
-        self
-    }
-
-    /// Young's modulus, Pa, > 0.
-    #[must_use]
-    pub const fn young_pa(mut self, young_pa: f64) -> Self {
-        self.young_pa = young_pa;
-        self
-    }
-
-    /// Density, kg/m³, > 0.
-    #[must_use]
-    pub const fn density_kg_m3(mut self, density_kg_m3: f64) -> Self {
-        self.density_kg_m3 = density_kg_m3;
-        self
-    }
-
-    /// Number of equal parts, 2 … 4096.
-    #[must_use]
-    pub const fn segments(mut self, segments: usize) -> Self {
-        self.segments = segments;
-        self
-    }
-
-    /// Which ends are held in position and direction: start, end.
-    #[must_use]
-    pub const fn clamp(mut self, ends: [bool; 2]) -> Self {
-        self.clamp = ends;
-        self
-    }
-
-    /// Mass-proportional damping, 1/s, ≥ 0.
-    #[must_use]
-    pub const fn damping_per_s(mut self, damping_per_s: f64) -> Self {
-        self.damping_per_s = damping_per_s;
-        self
-    }
-
-    /// Steps a simulated second, 1 … 100000.
-    #[must_use]
-    pub const fn rate_hz(mut self, rate_hz: f64) -> Self {
-        self.rate_hz = rate_hz;
-        self
+    setters! {
+        /// Outer radius, metres, > 0.
+        radius_m: f64 => radius_m;
+        /// Thickness of its wall, metres, above 0 and at most its radius; without it the tube is solid.
+        wall_m: f64 => wall_m;
+        /// Young's modulus, Pa, > 0.
+        young_pa: f64 => young_pa;
+        /// Density, kg/m³, > 0.
+        density_kg_m3: f64 => density_kg_m3;
+        /// Number of equal parts, 2 … 4096.
+        segments: usize => segments;
+        /// Which ends are held in position and direction: start, end.
+        clamp: [bool; 2] => clamp;
+        /// Mass-proportional damping, 1/s, ≥ 0.
+        damping_per_s: f64 => damping_per_s;
+        /// Steps a simulated second, 1 … 100000.
+        rate_hz: f64 => rate_hz;
     }
 
     pub(super) fn spec(self, gravity: DVec3) -> TubeSpec {
