@@ -2,6 +2,7 @@
 //!
 //! In: cells. Out: aligned text, or JSON. Never here: where it is printed.
 
+use anyhow::Context;
 use serde::ser::{Serialize, SerializeMap, SerializeSeq, Serializer};
 
 /// The content of a cell.
@@ -58,16 +59,53 @@ impl Table {
             std::iter::once(self.columns.clone()).chain(self.rows.iter().map(cells)).collect();
         let width = |k: usize| lines.iter().filter_map(|l| Some(l.get(k)?.chars().count())).max().unwrap_or(0);
         let widths: Vec<usize> = (0..self.columns.len()).map(width).collect();
-        let number = |k: usize| self.rows.iter().any(|r| matches!(r.get(k), Some(Cell::Number(..))));
         let mut out = String::new();
         for line in &lines {
             let padded = line.iter().zip(&widths).enumerate().map(|(k, (cell, &width))| {
-                if number(k) { format!("{cell:>width$}") } else { format!("{cell:<width$}") }
+                if self.is_number(k) { format!("{cell:>width$}") } else { format!("{cell:<width$}") }
             });
             out += padded.collect::<Vec<_>>().join("  ").trim_end();
             out.push('\n');
         }
         out
+    }
+
+    /// The rows with one of these values in a column.
+    ///
+    /// # Errors
+    /// A column that there is not.
+    pub fn only(&self, column: &str, values: &[&str]) -> anyhow::Result<Self> {
+        let k = self.place(column)?;
+        let named = |row: &&Vec<Cell>| row.get(k).is_some_and(|cell| values.contains(&cell.text().as_str()));
+        Ok(Self { columns: self.columns.clone(), rows: self.rows.iter().filter(named).cloned().collect() })
+    }
+
+    /// These columns, in this order.
+    ///
+    /// # Errors
+    /// A column that there is not.
+    pub fn columns(&self, names: &[&str]) -> anyhow::Result<Self> {
+        let places = names.iter().map(|name| self.place(name)).collect::<anyhow::Result<Vec<_>>>()?;
+        let mut table = Self::new(names);
+        table.rows.extend(self.rows.iter().map(|row| places.iter().filter_map(|&k| row.get(k).cloned()).collect()));
+        Ok(table)
+    }
+
+    fn place(&self, column: &str) -> anyhow::Result<usize> {
+        let place = self.columns.iter().position(|name| name == column);
+        place.with_context(|| format!("there is no column `{column}` (there are: {})", self.columns.join(", ")))
+    }
+
+    /// The table in Markdown, numbers to the right.
+    pub fn markdown(&self) -> String {
+        let line = |cells: Vec<String>| format!("| {} |\n", cells.join(" | "));
+        let rule = (0..self.columns.len()).map(|k| if self.is_number(k) { "--:" } else { "---" }.to_owned());
+        let cells = |row: &Vec<Cell>| line(row.iter().map(|cell| cell.text().replace('|', "\\|")).collect());
+        line(self.columns.clone()) + &line(rule.collect()) + &self.rows.iter().map(cells).collect::<String>()
+    }
+
+    fn is_number(&self, column: usize) -> bool {
+        self.rows.iter().any(|row| matches!(row.get(column), Some(Cell::Number(..))))
     }
 }
 
@@ -164,6 +202,13 @@ mod tests {
     #[test]
     fn text_is_left_aligned_and_numbers_right() {
         assert_eq!(table().text(), "law       peak\nledger    1.50\npenalty  2.0e9\n");
+    }
+
+    #[test]
+    fn markdown_has_the_rows_and_columns_that_are_asked_for() {
+        let some = table().only("law", &["penalty"]).unwrap().columns(&["peak", "law"]).unwrap();
+        assert_eq!(some.markdown(), "| peak | law |\n| --: | --- |\n| 2.0e9 | penalty |\n");
+        assert!(table().columns(&["depth"]).unwrap_err().to_string().contains("there are: law, peak"));
     }
 
     #[test]

@@ -5,7 +5,6 @@ use crate::chart::{Axis, Column, Experiment, Figure, Finding, Layer, Measured, l
 use metachron_lod::adaptive::{Adaptive, Offer, Settings, Time};
 use metachron_lod::select::{Entry, Level, Mode, Problem, funkhouser, incremental, marginal};
 use serde::{Deserialize, Serialize};
-use std::sync::{Mutex, PoisonError};
 use std::time::Instant;
 
 /// The experiment.
@@ -19,8 +18,6 @@ const FRAMES: usize = 51;
 const FRAME_MS: f64 = 1e3 / 60.0;
 const SHARE: f64 = 0.01;
 const GOAL_OBJECTS: usize = 10_000;
-/// One measurement at a time: others would slow it down.
-static ALONE: Mutex<()> = Mutex::new(());
 
 type Time1 = fn(usize) -> Vec<f64>;
 
@@ -54,6 +51,7 @@ impl Experiment for Selection {
     type Row = Row;
     const NAME: &'static str = "selection";
     const TITLE: &'static str = "wall time of one selection, five levels per object, new weights in every frame";
+    const ALONE: bool = true;
     const COLUMNS: &'static [Column<Row>] = &[
         ("objects", |r| (r.case.objects as f64, 0).into()),
         ("policy", |r| (&r.case.policy).into()),
@@ -70,7 +68,6 @@ impl Experiment for Selection {
 
     fn measure(case: &Case) -> Row {
         let time = POLICIES.iter().find(|p| p.0 == case.policy).map_or(POLICIES[0].1, |p| p.1);
-        let _alone = ALONE.lock().unwrap_or_else(PoisonError::into_inner);
         let times = time(case.objects);
         let least_ms = times.iter().copied().fold(f64::INFINITY, f64::min);
         Row { case: case.clone(), found: Found { median_ms: median(times), least_ms } }
