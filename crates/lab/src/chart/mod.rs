@@ -43,7 +43,7 @@ pub(super) use experiment::{Experiment, Finding, Measured, Record, worst};
 pub(super) use figure::{Axis, Colour, Figure, Layer, Mark, Panel, lines, span};
 pub(super) use policies::compared::selection::Selection;
 pub(super) use power::exponent;
-pub(super) use table::{Cell, Column, Table};
+pub(super) use table::{Cell, Table, fields};
 pub(super) use timing::{calibration_us, floor_us, least_us, median, pace_for_goals};
 
 /// Settings that the experiments of a command share.

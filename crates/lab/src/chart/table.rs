@@ -4,6 +4,7 @@
 
 use anyhow::Context;
 use serde::ser::{Serialize, SerializeMap, SerializeSeq, Serializer};
+use serde_json::{Map, Value};
 
 /// The content of a cell.
 #[derive(Debug, Clone, PartialEq)]
@@ -13,9 +14,6 @@ pub enum Cell {
     /// A number, and its digits after the point in text.
     Number(f64, usize),
 }
-
-/// A column: its name, and its cell in a row.
-pub type Column<R> = (&'static str, fn(&R) -> Cell);
 
 /// Rows of cells under column names.
 #[derive(Debug, Clone, PartialEq)]
@@ -32,13 +30,24 @@ impl Table {
         Self { columns: columns.iter().map(|&c| c.to_owned()).collect(), rows: Vec::new() }
     }
 
-    /// A line for each row, with the cells of the columns.
-    pub fn of<'a, R: 'a>(rows: impl IntoIterator<Item = &'a R>, columns: &[Column<R>]) -> Self {
-        let line = |row: &R| columns.iter().map(|(_, cell)| cell(row)).collect();
-        Self {
-            columns: columns.iter().map(|(name, _)| (*name).to_owned()).collect(),
-            rows: rows.into_iter().map(line).collect(),
-        }
+    /// A line for each row, with the fields that `columns` names, each with its digits after the point if it is a number: `mean.3, limit`.
+    /// `depth_m*1e3.2 as depth_mm` shows a multiple under another name, `measured/theory.2` a ratio of two fields.
+    pub fn of<'a, R: Serialize + 'a>(rows: impl IntoIterator<Item = &'a R>, columns: &str) -> Self {
+        let own = |column| str::split(column, ['.', '*', '/']).next().unwrap_or(column);
+        let named = |column| str::split_once(column, " as ").unwrap_or((column, own(column)));
+        let (shown, names): (Vec<&str>, Vec<&str>) = columns.split(", ").map(named).unzip();
+        let line = |row: &R| {
+            let fields = fields(row);
+            shown.iter().map(|column| Cell::of(&fields, column)).collect()
+        };
+        Self { rows: rows.into_iter().map(line).collect(), ..Self::new(&names) }
+    }
+
+    /// The same with a column more of numbers, one for each row.
+    pub fn with(mut self, name: &str, digits: usize, numbers: impl IntoIterator<Item = f64>) -> Self {
+        self.columns.push(name.to_owned());
+        self.rows.iter_mut().zip(numbers).for_each(|(row, number)| row.push(Cell::Number(number, digits)));
+        self
     }
 
     /// Lines of cells with the names of their columns, the same in every line.
@@ -109,7 +118,37 @@ impl Table {
     }
 }
 
+/// A row's fields by their names; those of a case and of its measurements together.
+pub fn fields(row: &impl Serialize) -> Map<String, Value> {
+    match serde_json::to_value(row) {
+        Ok(Value::Object(fields)) => fields,
+        Ok(Value::Array(parts)) => parts.iter().filter_map(Value::as_object).cloned().flatten().collect(),
+        _ => Map::new(),
+    }
+}
+
 impl Cell {
+    /// What a column shows of a row's fields.
+    fn of(fields: &Map<String, Value>, column: &str) -> Self {
+        let (what, digits) = column.rsplit_once('.').unwrap_or((column, ""));
+        let number = |name: &str| fields.get(name).and_then(Value::as_f64).unwrap_or(f64::NAN);
+        if let Ok(digits) = digits.parse() {
+            return Self::Number(
+                match (what.split_once('*'), what.split_once('/')) {
+                    (Some((name, factor)), _) => number(name) * factor.parse().unwrap_or(f64::NAN),
+                    (None, Some((over, under))) => number(over) / number(under),
+                    (None, None) => number(what),
+                },
+                digits,
+            );
+        }
+        match fields.get(column) {
+            Some(Value::String(text)) if !text.is_empty() => Self::Text(text.clone()),
+            Some(Value::Bool(whether)) => if *whether { "yes" } else { "no" }.into(),
+            _ => "–".into(),
+        }
+    }
+
     fn text(&self) -> String {
         match self {
             Self::Text(text) => text.clone(),
@@ -202,6 +241,15 @@ mod tests {
     #[test]
     fn text_is_left_aligned_and_numbers_right() {
         assert_eq!(table().text(), "law       peak\nledger    1.50\npenalty  2.0e9\n");
+    }
+
+    #[test]
+    fn columns_show_fields_multiples_and_ratios() {
+        let row = |limit_m: Option<f64>| serde_json::json!([{ "law": "ledger", "fast": true }, { "depth_m": 0.0025, "limit_m": limit_m }]);
+        let columns = "law, fast, depth_m*1e3.1 as depth_mm, depth_m/limit_m.2 as share, limit_m.3";
+        let table = Table::of(&[row(Some(0.005)), row(None)], columns);
+        let text = "law     fast  depth_mm  share  limit_m\nledger  yes        2.5   0.50    0.005\nledger  yes        2.5      –        –\n";
+        assert_eq!(table.text(), text);
     }
 
     #[test]

@@ -1,7 +1,7 @@
 //! Wall time of a choice, from 100 objects to 100,000: the only experiment here that reads a clock.
 
 use crate::chart::policies::numeric::common::LEVEL_PARTS;
-use crate::chart::{Axis, Column, Experiment, Figure, Finding, Layer, Measured, lines, median};
+use crate::chart::{Axis, Experiment, Figure, Finding, Layer, Measured, lines, median};
 use metachron_lod::adaptive::{Adaptive, Offer, Settings, Time};
 use metachron_lod::select::{Entry, Level, Mode, Problem, funkhouser, incremental, marginal};
 use serde::{Deserialize, Serialize};
@@ -47,18 +47,11 @@ pub struct Found {
 type Row = Measured<Case, Found>;
 
 impl Experiment for Selection {
-    type Case = Case;
     type Row = Row;
     const NAME: &'static str = "selection";
     const TITLE: &'static str = "wall time of one selection, five levels per object, new weights in every frame";
     const ALONE: bool = true;
-    const COLUMNS: &'static [Column<Row>] = &[
-        ("objects", |r| (r.case.objects as f64, 0).into()),
-        ("policy", |r| (&r.case.policy).into()),
-        ("median_ms", |r| (r.median_ms, 4).into()),
-        ("least_ms", |r| (r.least_ms, 4).into()),
-        ("share_of_60_hz", |r| (r.least_ms / FRAME_MS, 4).into()),
-    ];
+    const COLUMNS: &'static str = "objects.0, policy, median_ms.4, least_ms.4, least_ms*0.06.4 as share_of_60_hz";
 
     fn cases(quick: bool) -> Vec<Case> {
         let counts = if quick { &QUICK_OBJECTS[..] } else { &OBJECTS[..] };
