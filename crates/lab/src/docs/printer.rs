@@ -10,6 +10,7 @@ use super::blocks::{Block, View};
 use anyhow::{Context, bail, ensure};
 use clap::{Args, Command, FromArgMatches};
 use std::collections::BTreeMap;
+use std::collections::btree_map::Entry;
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::process;
@@ -57,7 +58,7 @@ impl<'a> Printer<'a> {
             return Ok(Some(Said { body: block.body.to_owned(), files: Vec::new() }));
         }
         let said = match chart {
-            Some(chart) => self.charted(chart, block, beside)?,
+            Some(chart) => self.charted(&chart, block, beside)?,
             None => Some(Said { body: self.spoken(&block.words)?, files: Vec::new() }),
         };
         Ok(said.map(|said| if live { Said { body: stamp() + &said.body, ..said } } else { said }))
@@ -75,16 +76,17 @@ impl<'a> Printer<'a> {
         Chart::new(&args)
     }
 
-    fn charted(&mut self, chart: Chart, block: &Block<'_>, beside: &Path) -> anyhow::Result<Option<Said>> {
-        let key = block.words.join(" ");
-        if !self.done.contains_key(&key) {
-            let done = chart.run(self.stopped, &mut |_| Ok(()))?.pop().context("the experiment was not run")?;
-            self.done.insert(key.clone(), done);
-        }
+    fn charted(&mut self, chart: &Chart, block: &Block<'_>, beside: &Path) -> anyhow::Result<Option<Said>> {
+        let done = match self.done.entry(block.words.join(" ")) {
+            Entry::Occupied(known) => known.into_mut(),
+            Entry::Vacant(open) => {
+                let done = chart.run(self.stopped, &mut |_| Ok(()))?.pop();
+                open.insert(done.context("the experiment was not run")?)
+            }
+        };
         if self.stopped.load(Ordering::Relaxed) {
             return Ok(None);
         }
-        let done = &self.done[&key];
         let figures =
             ["figures", "../figures", "docs/figures"].map(|f| beside.join(f)).into_iter().find(|f| f.is_dir());
         let mut table = done.table.clone();

@@ -73,7 +73,7 @@ impl Trials {
 }
 
 /// Ends a line: one that was cut off is no verdict.
-const END: &str = ".";
+const END: &str = ";";
 
 /// A verdict as a line of numbers, each with the digits that tell it from every other.
 fn line(verdict: &Verdict) -> String {
