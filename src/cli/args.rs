@@ -7,7 +7,8 @@ use clap::{Args, Parser, Subcommand, ValueHint};
 use metachron_console::values::{CommonArgs, LimitArgs, assignment, seconds, size, target_fps};
 #[cfg(feature = "lab")]
 use metachron_lab::args::{
-    BENCH_EXAMPLES, BenchArgs, CHART_EXAMPLES, ChartArgs, FIT_EXAMPLES, FitArgs, TUNE_EXAMPLES, TuneArgs,
+    BENCH_EXAMPLES, BenchArgs, CHART_EXAMPLES, ChartArgs, DOCS_EXAMPLES, DocsArgs, FIT_EXAMPLES, FitArgs,
+    TUNE_EXAMPLES, TuneArgs,
 };
 use metachron_scene::papers::Paper;
 use metachron_session::report::Goal;
@@ -116,6 +117,10 @@ pub enum Command {
     #[cfg(feature = "lab")]
     #[command(after_help = BENCH_EXAMPLES)]
     Bench(BenchArgs),
+    /// Compare documents with what their commands print, or print it into them
+    #[cfg(feature = "lab")]
+    #[command(after_help = DOCS_EXAMPLES)]
+    Docs(DocsArgs),
     /// Show what drawing costs on this machine's adapter, as policies reckon with it; measure it anew, write it to a file, or read it
     #[cfg(feature = "render")]
     #[command(after_help = CALIBRATE_EXAMPLES)]

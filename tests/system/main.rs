@@ -6,6 +6,7 @@ mod chart;
 mod chart_policies;
 mod cli;
 mod coupling;
+mod docs;
 mod fit;
 mod golden;
 mod groups;

@@ -490,6 +490,39 @@ fn an_interrupt_keeps_the_best_gains_so_far() {
 }
 
 #[test]
+fn a_search_that_was_killed_goes_on_from_where_it_was_and_finds_the_same_to_the_bit() {
+    let folder = dear_ball();
+    let out = folder.file("charts");
+    let arguments = |gains| ["tune", folder.scene(), "--quick", "--json", "-q", "--out", &out, "--gains", gains];
+    let [whole, killed, other] = ["whole.toml", "killed.toml", "other.toml"].map(|name| folder.file(name));
+    let told = |gains, more: &[&str]| {
+        let done = metachron(&[&arguments(gains)[..], more].concat());
+        let said = String::from_utf8(done.stderr).unwrap();
+        assert_eq!(done.status.code(), Some(0), "{said}");
+        (serde_json::from_slice::<Value>(&done.stdout).unwrap(), said)
+    };
+    let trials = folder.file("killed.trials");
+    let mut child = program().args(arguments(&killed)).stdout(Stdio::null()).stderr(Stdio::null()).spawn().unwrap();
+    while std::fs::read_to_string(&trials).map_or(0, |text| text.lines().count()) < 6 {
+        assert!(child.try_wait().unwrap().is_none(), "it ended by itself");
+        std::thread::yield_now();
+    }
+    child.kill().unwrap();
+    child.wait().unwrap();
+    std::fs::copy(&trials, folder.file("other.trials")).unwrap();
+    let (found, said) = told(&killed, &[]);
+    assert!(said.contains("going on after the ") && !Path::new(&trials).exists(), "{said}");
+    let (straight, said) = told(&whole, &[]);
+    assert_eq!(said, "");
+    for key in ["gains", "objective", "laws", "tried", "agents", "checked", "plant"] {
+        assert_eq!(found[key], straight[key], "{key}");
+    }
+    assert_eq!(std::fs::read(&killed).unwrap(), std::fs::read(&whole).unwrap());
+    let (_, said) = told(&other, &["--target-fps", "50"]);
+    assert!(said.contains("other settings") && said.contains("begins anew"), "{said}");
+}
+
+#[test]
 fn equal_seeds_find_equal_gains() {
     let ball = dear_ball();
     let more = ["--seed", "3", "--set", "machine.noise=0.01"].map(str::to_owned);

@@ -1,4 +1,4 @@
-//! The arguments of `chart`, `bench`, `tune` and `fit`.
+//! The arguments of `chart`, `bench`, `docs`, `tune` and `fit`.
 
 use clap::builder::PossibleValuesParser;
 use clap::{Args, ValueHint};
@@ -48,6 +48,20 @@ Examples:
   metachron chart stability --json -q | jq '.experiments[].findings'
 
 Ctrl-C ends a sweep after the rows in progress; run the same command again to continue.";
+
+/// Examples for the help of the command.
+pub const DOCS_EXAMPLES: &str = "\
+Examples:
+  metachron docs                                       README.md and docs/ against what their commands print
+  metachron docs --write docs/policies.md              prints its tables and figures anew
+  metachron docs --write --live docs/accuracy.md       also what is measured on this machine
+
+A block is what stands between two comments:
+  <!-- metachron chart policies --only auditorium | policy = greedy, adaptive | policy, mean, max | claims | figure -->
+  <!-- end -->
+The command comes first, and names one experiment if it is a chart. Then, after each |, rows (column = values), columns,
+`claims`, or `figure`, which is kept in the folder figures. Other commands stand as words under their prompt.
+Exit codes: 0 all the same, 1 a document says something else, 2 a document that cannot be read.";
 
 /// `tune`.
 #[derive(Debug, Args)]
@@ -111,6 +125,26 @@ pub struct FitArgs {
     /// The arguments common to `check`, `tune` and `fit`.
     #[command(flatten)]
     pub common: CommonArgs,
+}
+
+/// `docs`.
+#[derive(Debug, Args)]
+pub struct DocsArgs {
+    /// Documents and folders of documents; README.md and docs where none is named
+    #[arg(value_hint = ValueHint::AnyPath)]
+    pub files: Vec<PathBuf>,
+    /// Print into the documents what their commands print, instead of comparing them
+    #[arg(long)]
+    pub write: bool,
+    /// Also print what is measured on this machine, with date, commit and processor
+    #[arg(long, requires = "write")]
+    pub live: bool,
+    /// Where the commands write their files; the folder is created where it does not exist
+    #[arg(long, value_name = "FOLDER", default_value = "charts", value_hint = ValueHint::DirPath)]
+    pub out: PathBuf,
+    /// No progress
+    #[arg(short, long)]
+    pub quiet: bool,
 }
 
 /// `chart`.

@@ -19,10 +19,12 @@
 pub mod args;
 mod bench;
 mod chart;
+mod docs;
 mod fit;
 mod tune;
 
 pub use bench::command as bench;
 pub use chart::command as chart;
+pub use docs::command as docs;
 pub use fit::command as fit;
 pub use tune::command as tune;

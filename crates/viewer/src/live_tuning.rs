@@ -5,7 +5,7 @@
 //! ([`metachron_lod::tune`] has it).
 
 use metachron_lod::control::{Law, PictureControl, Policy};
-use metachron_lod::tune::{Candidate, Extent, Family, Observed, Plant, Search, Verdict, refusal, search};
+use metachron_lod::tune::{Candidate, Extent, Family, Observed, Plant, Search, Verdict, judge, refusal, search};
 use metachron_session::Design;
 use metachron_session::Session;
 use std::num::NonZero;
@@ -159,8 +159,8 @@ fn find(plant: &Plant, present: Law, target_hz: f64, shared: &SearchState) -> Re
         *shared.progress.lock().unwrap_or_else(PoisonError::into_inner) = (share, verdict_text(best));
         !shared.stopped.load(Ordering::Relaxed)
     };
-    let mut setting = Search { plant, target_hz, extent: EXTENT, go_on: &mut go_on };
-    search(&mut setting, Family::Corrected, &[present.into()])
+    let mut judge = |candidate| judge(plant, candidate, target_hz, EXTENT);
+    search(&mut Search { judge: &mut judge, go_on: &mut go_on }, Family::Corrected, &[present.into()])
         .map(|found| found.best)
         .ok_or_else(|| "no candidate could be evaluated".to_owned())
 }

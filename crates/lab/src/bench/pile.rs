@@ -10,7 +10,7 @@ use super::super::args::BenchArgs;
 use super::rig::machine::{others_cpu, own_cpu};
 use super::rig::plain_world::{Frame, Settings, world_of};
 use super::subject::{Progress, Subject};
-use crate::chart::{Axis, Colour, Column, Figure, Layer};
+use crate::chart::{Axis, Colour, Figure, Layer};
 use anyhow::bail;
 use metachron_render::{Size, Style};
 use metachron_runtime::AgentStats;
@@ -40,6 +40,7 @@ pub(super) struct Row {
     /// Whether it was measured in this run; otherwise it was measured elsewhere, with boxes in columns.
     pub here: bool,
     pub boxes: usize,
+    /// NaN, as the times after it, of what was measured elsewhere.
     pub sim_s: f64,
     /// Simulated time given up, mean over the boxes.
     pub dropped_s: f64,
@@ -47,13 +48,6 @@ pub(super) struct Row {
     pub steps_per_cpu_s: f64,
     /// Ratio to the plain world's rate over as many steps.
     pub share: f64,
-}
-
-impl Row {
-    /// A number of this run; NaN where it was measured elsewhere.
-    const fn if_here(&self, value: f64) -> f64 {
-        if self.here { value } else { f64::NAN }
-    }
 }
 
 /// A measurement of one row.
@@ -65,16 +59,7 @@ type Spent = Vec<f64>;
 impl Subject for Pile {
     type Row = Row;
     const NAME: &'static str = "pile";
-    const COLUMNS: &'static [Column<Row>] = &[
-        ("who", |row| (&row.who).into()),
-        ("here", |row| if row.here { "yes" } else { "no" }.into()),
-        ("boxes", |row| (row.boxes as f64, 0).into()),
-        ("sim_s", |row| (row.if_here(row.sim_s), 1).into()),
-        ("dropped_s", |row| (row.if_here(row.dropped_s), 2).into()),
-        ("cpu_s", |row| (row.if_here(row.cpu_s), 2).into()),
-        ("steps_per_cpu_s", |row| (row.steps_per_cpu_s, 1).into()),
-        ("share", |row| (row.share, 2).into()),
-    ];
+    const COLUMNS: &'static str = "who, here, boxes.0, sim_s.1, dropped_s.2, cpu_s.2, steps_per_cpu_s.1, share.2";
 
     fn measure(args: &BenchArgs, progress: &Progress) -> anyhow::Result<Vec<Row>> {
         let sim_s = args.seconds.unwrap_or(SECONDS[usize::from(args.quick)]);
@@ -94,6 +79,9 @@ impl Subject for Pile {
         let others = OTHERS.map(|(who, steps)| Row {
             who: who.to_owned(),
             here: false,
+            sim_s: f64::NAN,
+            dropped_s: f64::NAN,
+            cpu_s: f64::NAN,
             steps_per_cpu_s: steps,
             ..plain.clone()
         });

@@ -4,7 +4,7 @@
 
 use super::super::args::BenchArgs;
 use super::subject::{Progress, Subject};
-use crate::chart::{Axis, Colour, Column, Figure, Layer, Panel, span};
+use crate::chart::{Axis, Colour, Figure, Layer, Panel, span};
 use anyhow::Context;
 use metachron_drawable::PieceKind;
 use metachron_lod::control::AREAS_PX;
@@ -32,15 +32,8 @@ pub(super) struct Row {
 impl Subject for Render {
     type Row = Row;
     const NAME: &'static str = "render";
-    const COLUMNS: &'static [Column<Row>] = &[
-        ("picture_px", |row| (row.picture_px, 0).into()),
-        ("objects", |row| (f64::from(row.objects), 0).into()),
-        ("shading", |row| (&row.shading).into()),
-        ("triangles", |row| (row.triangles, 0).into()),
-        ("pixels", |row| (row.pixels, 0).into()),
-        ("picture_ms", |row| (row.picture_ms, 3).into()),
-        ("ns_per_triangle", |row| (row.ns_per_triangle, 1).into()),
-    ];
+    const COLUMNS: &'static str =
+        "picture_px.0, objects.0, shading, triangles.0, pixels.0, picture_ms.3, ns_per_triangle.1";
 
     fn measure(_args: &BenchArgs, progress: &Progress) -> anyhow::Result<Vec<Row>> {
         let gpu = Gpu::headless().context("what drawing costs cannot be measured")?;

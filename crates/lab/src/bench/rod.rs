@@ -7,7 +7,7 @@ use super::rig::bare::step;
 use super::rig::cast::{ROD_SEGMENTS, rod};
 use super::rig::machine::own_cpu;
 use super::subject::{Progress, Subject};
-use crate::chart::{Axis, Colour, Column, Figure, Layer, exponent, span};
+use crate::chart::{Axis, Colour, Figure, Layer, exponent, span};
 use glam::DVec3;
 use metachron_contact::step::LoneStepper;
 use metachron_core::SimSpan;
@@ -41,13 +41,7 @@ pub(super) struct Row {
 impl Subject for Rod {
     type Row = Row;
     const NAME: &'static str = "rod";
-    const COLUMNS: &'static [Column<Row>] = &[
-        ("segments", |row| (row.segments as f64, 0).into()),
-        ("self_contact", |row| if row.self_contact { "yes" } else { "no" }.into()),
-        ("us_per_step", |row| (row.us_per_step, 2).into()),
-        ("ns_per_segment", |row| (row.ns_per_segment, 0).into()),
-        ("steps_per_s", |row| (row.steps_per_s, 0).into()),
-    ];
+    const COLUMNS: &'static str = "segments.0, self_contact, us_per_step.2, ns_per_segment.0, steps_per_s.0";
 
     fn measure(args: &BenchArgs, progress: &Progress) -> anyhow::Result<Vec<Row>> {
         let span = Duration::from_secs_f64(args.seconds.unwrap_or(SPANS_S[usize::from(args.quick)]));

@@ -5,7 +5,7 @@
 use super::super::args::BenchArgs;
 use super::rig::machine::processor;
 use super::subject::{Progress, Subject};
-use crate::chart::{Axis, Colour, Column, Figure, Layer, Panel, median, span};
+use crate::chart::{Axis, Colour, Figure, Layer, Panel, median, span};
 use anyhow::Context;
 use metachron_console::output::{BadInput, message};
 use serde::{Deserialize, Serialize};
@@ -100,13 +100,7 @@ fn row(scene: &str, reports: &[Vec<Report>]) -> Row {
 impl Subject for Scenes {
     type Row = Row;
     const NAME: &'static str = "scenes";
-    const COLUMNS: &'static [Column<Row>] = &[
-        ("scene", |row| (&row.scene).into()),
-        ("cpu_s", |row| (row.cpu_s, 2).into()),
-        ("other_cpu_s", |row| (row.other_cpu_s, 2).into()),
-        ("over_other", |row| (row.over_other, 2).into()),
-        ("same_state", |row| row.same_state.map_or("–", |same| if same { "yes" } else { "no" }).into()),
-    ];
+    const COLUMNS: &'static str = "scene, cpu_s.2, other_cpu_s.2, over_other.2, same_state";
 
     fn measure(args: &BenchArgs, progress: &Progress) -> anyhow::Result<Vec<Row>> {
         let own = std::env::current_exe().context("this program's own file")?;

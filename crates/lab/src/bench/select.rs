@@ -4,7 +4,7 @@
 
 use super::super::args::BenchArgs;
 use super::subject::{Progress, Subject};
-use crate::chart::{Column, Experiment, Figure, Selection};
+use crate::chart::{Experiment, Figure, Selection};
 
 /// The subject.
 pub(super) struct Select;
@@ -12,7 +12,7 @@ pub(super) struct Select;
 impl Subject for Select {
     type Row = <Selection as Experiment>::Row;
     const NAME: &'static str = "select";
-    const COLUMNS: &'static [Column<Self::Row>] = Selection::COLUMNS;
+    const COLUMNS: &'static str = Selection::COLUMNS;
 
     fn measure(args: &BenchArgs, progress: &Progress) -> anyhow::Result<Vec<Self::Row>> {
         progress.rows(Selection::cases(args.quick), |_| String::new(), |case| Ok(Selection::measure(&case)))

@@ -6,7 +6,7 @@ use super::super::args::BenchArgs;
 use super::agents::{Case, Executor, Row, TENTH_HZ, UNPACED_HZ, cases, measure};
 use super::rig::cast::Model;
 use super::subject::{Progress, Subject};
-use crate::chart::{Axis, Colour, Column, Figure, Layer, Panel, exponent, span};
+use crate::chart::{Axis, Colour, Figure, Layer, Panel, exponent, span};
 use metachron_console::output::{BadInput, message};
 use metachron_runtime::Priority;
 use std::time::Duration;
@@ -20,7 +20,7 @@ const SPANS: [Duration; 2] = [Duration::from_secs(4), Duration::from_secs(1)];
 impl Subject for Agents {
     type Row = Row;
     const NAME: &'static str = "agents";
-    const COLUMNS: &'static [Column<Row>] = &COLUMNS;
+    const COLUMNS: &'static str = COLUMNS;
 
     fn measure(args: &BenchArgs, progress: &Progress) -> anyhow::Result<Vec<Row>> {
         let granted = Priority::Realtime.ask();
@@ -54,36 +54,14 @@ fn is_selected(args: &BenchArgs, case: &Case) -> bool {
         && args.agents.is_none_or(|agents| case.agents <= agents)
 }
 
-/// A number, or NaN for none.
-fn or_nan(number: Option<f64>) -> f64 {
-    number.unwrap_or(f64::NAN)
-}
-
 /// The columns of the table.
-const COLUMNS: [Column<Row>; 22] = [
-    ("executor", |row| row.executor.name().into()),
-    ("model", |row| row.model.name().into()),
-    ("priority", |row| if row.realtime { "realtime" } else { "normal" }.into()),
-    ("agents", |row| (row.agents as f64, 0).into()),
-    ("rate_hz", |row| (row.rate_hz, 1).into()),
-    ("cpu_us", |row| (row.cpu_us_per_step, 2).into()),
-    ("cores", |row| (row.cores, 3).into()),
-    ("bare_us", |row| (row.bare_us_per_step, 2).into()),
-    ("sleeping_us", |row| (row.sleeping_us_per_step, 2).into()),
-    ("thread_us", |row| (or_nan(row.thread_us_per_step), 2).into()),
-    ("over_thread", |row| (or_nan(row.over_thread), 2).into()),
-    ("steps_per_s", |row| (row.steps_per_s, 0).into()),
-    ("age_p99_ms", |row| (row.age_ms_p99, 2).into()),
-    ("late_p50_ms", |row| (row.late_ms_p50, 2).into()),
-    ("late_p99_ms", |row| (row.late_ms_p99, 2).into()),
-    ("dropped_ms", |row| (row.dropped_ms, 1).into()),
-    ("bytes", |row| (or_nan(row.bytes_per_agent), 0).into()),
-    ("switches", |row| (or_nan(row.switches_per_step), 2).into()),
-    ("frame_p99_ms", |row| (row.frame_late_ms_p99, 2).into()),
-    ("read_ns", |row| (row.read_ns_per_agent, 0).into()),
-    ("start_ms", |row| (row.start_ms, 1).into()),
-    ("end_ms", |row| (row.shutdown_ms, 1).into()),
-];
+const COLUMNS: &str = "\
+    executor, model, realtime, agents.0, rate_hz.1, cpu_us_per_step.2 as cpu_us, cores.3, \
+    bare_us_per_step.2 as bare_us, sleeping_us_per_step.2 as sleeping_us, \
+    thread_us_per_step.2 as thread_us, over_thread.2, steps_per_s.0, age_ms_p99.2 as age_p99_ms, \
+    late_ms_p50.2 as late_p50_ms, late_ms_p99.2 as late_p99_ms, dropped_ms.1, bytes_per_agent.0 as bytes, \
+    switches_per_step.2 as switches, frame_late_ms_p99.2 as frame_p99_ms, read_ns_per_agent.0 as read_ns, \
+    start_ms.1, shutdown_ms.1 as end_ms";
 
 /// CPU per step and lateness over the number of agents, and the cost of a round where agents are unpaced.
 fn figure_of(all: &[Row]) -> Figure {

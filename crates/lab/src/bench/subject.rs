@@ -4,12 +4,13 @@
 
 use super::super::args::BenchArgs;
 use super::super::chart::figure;
-use crate::chart::{Column, Figure, Table, prepared, stopper};
+use crate::chart::{Figure, Table, fields, prepared, stopper};
 use anyhow::Context;
 use metachron_console::exit::Exit;
 use metachron_console::output::{data, message};
 use metachron_console::progress::Bar;
 use serde::Serialize;
+use serde_json::{Map, Value};
 use std::path::Path;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -22,7 +23,7 @@ pub(super) trait Subject {
     const NAME: &'static str;
 
     /// The columns of the table that is printed.
-    const COLUMNS: &'static [Column<Self::Row>];
+    const COLUMNS: &'static str;
 
     /// Measures the requested cases one by one while `progress` says to go on; returns the finished rows.
     fn measure(args: &BenchArgs, progress: &Progress) -> anyhow::Result<Vec<Self::Row>>;
@@ -93,24 +94,17 @@ pub(super) fn write<S: Subject>(folder: &Path, rows: &[S::Row]) -> anyhow::Resul
 }
 
 fn json<S: Subject>(rows: &[S::Row]) -> anyhow::Result<String> {
-    let rows = rows.iter().map(|row| Ok(paired(serde_json::to_value(row)?))).collect::<anyhow::Result<Vec<_>>>()?;
+    let rows: Vec<_> = rows.iter().map(|row| paired(fields(row))).collect();
     Ok(serde_json::to_string_pretty(&serde_json::json!({ "bench": S::NAME, "rows": rows }))?)
 }
 
-/// The row with each pair of percentiles under one name; one of a case and its measurements as one object.
-fn paired(row: serde_json::Value) -> serde_json::Value {
-    let mut row = match row {
-        serde_json::Value::Array(parts) => {
-            parts.into_iter().filter_map(|part| part.as_object().cloned()).flatten().collect()
-        }
-        row => row,
-    };
-    let Some(fields) = row.as_object_mut() else { return row };
+/// The fields of a row with each pair of percentiles under one name.
+fn paired(mut fields: Map<String, Value>) -> Map<String, Value> {
     let names: Vec<String> = fields.keys().filter_map(|key| Some(key.strip_suffix("_p50")?.to_owned())).collect();
     for name in names {
         let mut part = |end: &str| fields.remove(&format!("{name}_{end}"));
         let pair = serde_json::json!({ "p50": part("p50"), "p99": part("p99") });
         fields.insert(name, pair);
     }
-    row
+    fields
 }

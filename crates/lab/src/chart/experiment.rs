@@ -3,7 +3,7 @@
 //! In: whether to be quick. Out: cases, rows, a figure, a table, findings. Never here: files, threads, drawing.
 
 use super::figure::Figure;
-use super::table::{Column, Table};
+use super::table::Table;
 use csv::StringRecord;
 use metachron_render::PictureFile;
 use serde::de::DeserializeOwned;
@@ -12,27 +12,25 @@ use std::ops::Deref;
 
 /// One measurement, made for many cases.
 pub trait Experiment: Sync {
-    /// Identifies a row: rows of the same case are the same measurement.
-    type Case: PartialEq + Sync;
     /// A case with its measurements: [`Measured`], where the fields of a case are the first columns.
-    type Row: Record<Self::Case> + 'static;
+    type Row: Record + 'static;
 
     /// The name that `--only` takes; the files are called after it.
     const NAME: &'static str;
     /// One sentence that says what the experiment shows.
     const TITLE: &'static str;
 
-    /// The columns of the table that is printed; none where a line is no row.
-    const COLUMNS: &'static [Column<Self::Row>] = &[];
+    /// The columns of the table that is printed, as [`Table::of`] takes them; none where a line is no row.
+    const COLUMNS: &'static str = "";
 
     /// Whether cases are measured one at a time, because they measure the time of this machine.
     const ALONE: bool = false;
 
     /// The cases in the order of the rows; `quick`: a small part of them, or shorter runs.
-    fn cases(quick: bool) -> Vec<Self::Case>;
+    fn cases(quick: bool) -> Vec<CaseOf<Self>>;
 
     /// Measures one case. The same case gives the same row, whenever and on whichever thread, except for times of this machine.
-    fn measure(case: &Self::Case) -> Self::Row;
+    fn measure(case: &CaseOf<Self>) -> Self::Row;
 
     /// The picture of the rows so far.
     fn figure(rows: &[Self::Row]) -> Figure;
@@ -54,10 +52,16 @@ pub trait Experiment: Sync {
     fn findings(rows: &[Self::Row]) -> Vec<Finding>;
 }
 
+/// What an experiment measures once.
+pub type CaseOf<E> = <<E as Experiment>::Row as Record>::Case;
+
 /// A line of the CSV file of an experiment.
-pub trait Record<C>: Serialize + Clone + Send + Sync {
+pub trait Record: Serialize + Clone + Send + Sync {
+    /// Identifies a row: rows of the same case are the same measurement.
+    type Case: PartialEq + Sync;
+
     /// The case that was measured.
-    fn case(&self) -> C;
+    fn case(&self) -> Self::Case;
 
     /// The same from a line of the file.
     ///
@@ -89,11 +93,13 @@ impl<C: Serialize, M: Serialize> Serialize for Measured<C, M> {
     }
 }
 
-impl<C, M> Record<C> for Measured<C, M>
+impl<C, M> Record for Measured<C, M>
 where
-    C: Serialize + DeserializeOwned + Clone + Send + Sync,
+    C: Serialize + DeserializeOwned + Clone + PartialEq + Send + Sync,
     M: Serialize + DeserializeOwned + Clone + Send + Sync,
 {
+    type Case = C;
+
     fn case(&self) -> C {
         self.case.clone()
     }

@@ -43,7 +43,7 @@ pub(super) use experiment::{Experiment, Finding, Measured, Record, worst};
 pub(super) use figure::{Axis, Colour, Figure, Layer, Mark, Panel, lines, span};
 pub(super) use policies::compared::selection::Selection;
 pub(super) use power::exponent;
-pub(super) use table::{Cell, Column, Table};
+pub(super) use table::{Cell, Table, fields};
 pub(super) use timing::{calibration_us, floor_us, least_us, median, pace_for_goals};
 
 /// Settings that the experiments of a command share.
@@ -57,24 +57,26 @@ struct Setting<'a> {
 
 /// The result of an experiment.
 #[derive(Serialize)]
-struct Done {
+pub(crate) struct Done {
     name: &'static str,
-    title: &'static str,
+    pub(crate) title: &'static str,
     complete: bool,
     rows: usize,
-    files: Vec<PathBuf>,
-    table: Table,
+    pub(crate) files: Vec<PathBuf>,
+    pub(crate) table: Table,
     findings: Vec<Finding>,
 }
 
 /// An experiment that can be run by its name.
 struct Entry {
     name: &'static str,
+    /// Whether it measures times of this machine.
+    alone: bool,
     run: fn(&Setting<'_>) -> anyhow::Result<Done>,
 }
 
 const fn entry<E: Experiment>() -> Entry {
-    Entry { name: E::NAME, run: run::<E> }
+    Entry { name: E::NAME, alone: E::ALONE, run: run::<E> }
 }
 
 const STABILITY: &[Entry] = &[
@@ -154,43 +156,82 @@ const POLICIES_LIVE: &[Entry] = &[
     entry::<policies::live::traversal::Traversal>(),
 ];
 
+/// Some experiments of a subject, and where their files go.
+pub(crate) struct Chart {
+    subject: &'static str,
+    chosen: Vec<&'static Entry>,
+    folder: PathBuf,
+    quick: bool,
+    quiet: bool,
+    live: bool,
+}
+
+impl Chart {
+    /// The experiments that arguments name.
+    ///
+    /// # Errors
+    /// An experiment that there is not, pictures of what draws none.
+    pub(crate) fn new(args: &ChartArgs) -> anyhow::Result<Self> {
+        let (subject, all) = match (args.subject, args.live) {
+            (Subject::Accuracy, false) => ("accuracy", ACCURACY),
+            (Subject::Contact, false) => ("contact", CONTACT),
+            (Subject::Scaling, false) => ("scaling", SCALING),
+            (Subject::Stability, false) => ("stability", STABILITY),
+            (Subject::Coupling, false) => ("coupling", COUPLING),
+            (Subject::Policies, false) => ("policies", POLICIES),
+            (Subject::Policies, true) => ("policies-live", POLICIES_LIVE),
+            _ => return Err(BadInput("--live applies to `chart policies` only".to_owned()).into()),
+        };
+        let chosen = chosen(all, &args.only)?;
+        let (folder, quick, quiet, live) = (args.out.clone(), args.quick, args.quiet, args.live);
+        Ok(Self { subject, chosen, folder, quick, quiet, live })
+    }
+
+    /// Whether something of it is measured on this machine, so that no two runs print the same.
+    pub(crate) fn is_live(&self) -> bool {
+        self.live || self.chosen.iter().any(|entry| entry.alone)
+    }
+
+    /// Runs the experiments until it is stopped; `each` is called after every one.
+    ///
+    /// # Errors
+    /// A file that cannot be written, an adapter that failed, an error of `each`.
+    pub(crate) fn run(
+        &self,
+        stopped: &AtomicBool,
+        each: &mut dyn FnMut(&Done) -> anyhow::Result<()>,
+    ) -> anyhow::Result<Vec<Done>> {
+        if self.live {
+            // fails here rather than in the rows of the first experiment
+            Gpu::headless()?;
+        }
+        let folder = prepared(&self.folder)?;
+        let setting = Setting { subject: self.subject, folder, quick: self.quick, quiet: self.quiet, stopped };
+        let mut done = Vec::new();
+        for entry in &self.chosen {
+            let one = (entry.run)(&setting)?;
+            each(&one)?;
+            done.push(one);
+            if stopped.load(Ordering::Relaxed) {
+                break;
+            }
+        }
+        Ok(done)
+    }
+}
+
 /// Runs the experiments of a subject.
 ///
 /// # Errors
 /// Bad input, a file that cannot be written, an adapter that failed.
 pub fn command(args: &ChartArgs) -> anyhow::Result<Exit> {
-    let (subject, all) = match (args.subject, args.live) {
-        (Subject::Accuracy, false) => ("accuracy", ACCURACY),
-        (Subject::Contact, false) => ("contact", CONTACT),
-        (Subject::Scaling, false) => ("scaling", SCALING),
-        (Subject::Stability, false) => ("stability", STABILITY),
-        (Subject::Coupling, false) => ("coupling", COUPLING),
-        (Subject::Policies, false) => ("policies", POLICIES),
-        (Subject::Policies, true) => ("policies-live", POLICIES_LIVE),
-        _ => return Err(BadInput("--live applies to `chart policies` only".to_owned()).into()),
-    };
-    if args.live {
-        // fails here rather than in the rows of the first experiment
-        Gpu::headless()?;
-    }
-    let chosen = chosen(all, &args.only)?;
-    let folder = prepared(&args.out)?;
+    let chart = Chart::new(args)?;
     let stopped = stopper()?;
     let quiet = args.quiet || args.json;
-    let setting = Setting { subject, folder, quick: args.quick, quiet: args.quiet, stopped: &stopped };
-    let mut done = Vec::new();
-    for entry in chosen {
-        let one = (entry.run)(&setting)?;
-        if !quiet {
-            data(&summary(&one))?;
-        }
-        done.push(one);
-        if stopped.load(Ordering::Relaxed) {
-            break;
-        }
-    }
+    let done = chart.run(&stopped, &mut |one| if quiet { Ok(()) } else { data(&summary(one)) })?;
     let interrupted = stopped.load(Ordering::Relaxed);
     if args.json {
+        let subject = chart.subject;
         let whole = serde_json::json!({ "chart": subject, "quick": args.quick, "interrupted": interrupted, "experiments": done });
         data(&format!("{}\n", serde_json::to_string_pretty(&whole)?))?;
     }
@@ -201,7 +242,7 @@ pub fn command(args: &ChartArgs) -> anyhow::Result<Exit> {
 }
 
 /// The experiments that were named, or all of them.
-fn chosen<'a>(all: &'a [Entry], only: &[String]) -> anyhow::Result<Vec<&'a Entry>> {
+fn chosen(all: &'static [Entry], only: &[String]) -> anyhow::Result<Vec<&'static Entry>> {
     let find = |name: &String| all.iter().find(|e| e.name == name).ok_or_else(|| unknown(all, name));
     if only.is_empty() { Ok(all.iter().collect()) } else { only.iter().map(find).collect() }
 }
@@ -267,8 +308,13 @@ fn run<E: Experiment>(setting: &Setting<'_>) -> anyhow::Result<Done> {
 
 /// Identifies rows that may be reused: the experiment, its extent, and the program that measured them.
 fn settings<E: Experiment>(quick: bool) -> String {
+    format!("{} quick={quick} {}\n", E::NAME, build())
+}
+
+/// Identifies the program.
+pub(super) fn build() -> String {
     let built = std::env::current_exe().and_then(std::fs::metadata).and_then(|m| Ok((m.len(), m.modified()?)));
-    format!("{} quick={quick} version={} built={:?}\n", E::NAME, env!("CARGO_PKG_VERSION"), built.ok())
+    format!("version={} built={:?}", env!("CARGO_PKG_VERSION"), built.ok())
 }
 
 /// Writes the pictures next to the figure.
@@ -281,24 +327,25 @@ fn pictured<E: Experiment>(folder: &Path, stem: &str, rows: &[E::Row]) -> anyhow
     E::pictures(rows)?.into_iter().map(write).collect()
 }
 
-/// An experiment's table, findings and files as text.
-fn summary(done: &Done) -> String {
-    let mut findings = Table::new(&["", "claim", "measured", "limit"]);
-    let (so_far, state) = if done.complete { ("", "") } else { (" so far", " (unfinished)") };
+/// An experiment's claims, with what was measured and whether they hold.
+pub(crate) fn claims(done: &Done) -> Table {
+    let mut claims = Table::new(&["", "claim", "measured", "limit"]);
+    let so_far = if done.complete { "" } else { " so far" };
     for Finding { claim, measured, limit, holds } in &done.findings {
         let word = match holds {
             Some(true) => format!("holds{so_far}"),
             Some(false) => format!("FAILS{so_far}"),
             None => "not measured".to_owned(),
         };
-        findings.rows.push(vec![
-            word.into(),
-            claim.clone().into(),
-            Cell::Number(*measured, 4),
-            Cell::Number(*limit, 4),
-        ]);
+        claims.rows.push(vec![word.into(), claim.into(), Cell::Number(*measured, 4), Cell::Number(*limit, 4)]);
     }
+    claims
+}
+
+/// An experiment's table, claims and files as text.
+fn summary(done: &Done) -> String {
     let files: Vec<_> = done.files.iter().map(|f| f.display().to_string()).collect();
     let Done { name, title, table, .. } = done;
-    format!("{name}: {title}{state}\n\n{}\n{}\nfiles: {}\n\n", table.text(), findings.text(), files.join(", "))
+    let (state, claims) = (if done.complete { "" } else { " (unfinished)" }, claims(done).text());
+    format!("{name}: {title}{state}\n\n{}\n{claims}\nfiles: {}\n\n", table.text(), files.join(", "))
 }

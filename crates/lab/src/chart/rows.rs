@@ -3,7 +3,7 @@
 //! In: rows as they come. Out: a file that contains every finished row at any moment, in the order of the cases once it is
 //! complete. While rows are missing, a mark file next to it holds the settings of the run. Never here: what a row means.
 
-use super::experiment::{Experiment, Record};
+use super::experiment::{CaseOf, Experiment, Record};
 use anyhow::Context;
 use std::fs::{self, File, OpenOptions};
 use std::path::{Path, PathBuf};
@@ -24,7 +24,7 @@ impl RowFile {
         folder: &Path,
         stem: &str,
         settings: &str,
-        cases: &[E::Case],
+        cases: &[CaseOf<E>],
     ) -> anyhow::Result<(Self, Vec<E::Row>)> {
         let (path, mark) = (folder.join(format!("{stem}.csv")), folder.join(format!("{stem}.unfinished")));
         let same = fs::read_to_string(&mark).is_ok_and(|text| text == settings);
@@ -71,10 +71,10 @@ fn replace<E: Experiment>(path: &Path, rows: &[E::Row]) -> anyhow::Result<()> {
 }
 
 /// The rows of a file that belong to these cases, one per case; a last line that was cut off is skipped.
-fn read<E: Experiment>(path: &Path, cases: &[E::Case]) -> Vec<E::Row> {
+fn read<E: Experiment>(path: &Path, cases: &[CaseOf<E>]) -> Vec<E::Row> {
     let Ok(mut file) = csv::Reader::from_path(path) else { return Vec::new() };
     let Ok(names) = file.headers().cloned() else { return Vec::new() };
-    let mut seen: Vec<E::Case> = Vec::new();
+    let mut seen: Vec<CaseOf<E>> = Vec::new();
     let mut rows = Vec::new();
     for row in file.records().flatten().filter_map(|line| E::Row::read(&names, &line).ok()) {
         let case = row.case();

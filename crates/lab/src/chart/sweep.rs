@@ -3,7 +3,7 @@
 //! In: cases, rows that exist already, a flag that stops it. Out: rows in the order of the cases, each in the file as soon
 //! as it is measured. The core that measures a case is left to chance; the rows do not depend on it. Never here: measurements.
 
-use super::experiment::{Experiment, Record};
+use super::experiment::{CaseOf, Experiment, Record};
 use super::rows::RowFile;
 use anyhow::Context;
 use std::panic::{AssertUnwindSafe, catch_unwind};
@@ -25,7 +25,7 @@ pub(super) struct Swept<R> {
 /// # Errors
 /// Errors of the file system; a case that panicked.
 pub(super) fn sweep<E: Experiment>(
-    cases: &[E::Case],
+    cases: &[CaseOf<E>],
     mut file: RowFile,
     kept: Vec<E::Row>,
     stopped: &AtomicBool,

@@ -2,7 +2,9 @@
 //!
 //! In: cells. Out: aligned text, or JSON. Never here: where it is printed.
 
+use anyhow::Context;
 use serde::ser::{Serialize, SerializeMap, SerializeSeq, Serializer};
+use serde_json::{Map, Value};
 
 /// The content of a cell.
 #[derive(Debug, Clone, PartialEq)]
@@ -12,9 +14,6 @@ pub enum Cell {
     /// A number, and its digits after the point in text.
     Number(f64, usize),
 }
-
-/// A column: its name, and its cell in a row.
-pub type Column<R> = (&'static str, fn(&R) -> Cell);
 
 /// Rows of cells under column names.
 #[derive(Debug, Clone, PartialEq)]
@@ -31,13 +30,24 @@ impl Table {
         Self { columns: columns.iter().map(|&c| c.to_owned()).collect(), rows: Vec::new() }
     }
 
-    /// A line for each row, with the cells of the columns.
-    pub fn of<'a, R: 'a>(rows: impl IntoIterator<Item = &'a R>, columns: &[Column<R>]) -> Self {
-        let line = |row: &R| columns.iter().map(|(_, cell)| cell(row)).collect();
-        Self {
-            columns: columns.iter().map(|(name, _)| (*name).to_owned()).collect(),
-            rows: rows.into_iter().map(line).collect(),
-        }
+    /// A line for each row, with the fields that `columns` names, each with its digits after the point if it is a number: `mean.3, limit`.
+    /// `depth_m*1e3.2 as depth_mm` shows a multiple under another name, `measured/theory.2` a ratio of two fields.
+    pub fn of<'a, R: Serialize + 'a>(rows: impl IntoIterator<Item = &'a R>, columns: &str) -> Self {
+        let own = |column| str::split(column, ['.', '*', '/']).next().unwrap_or(column);
+        let named = |column| str::split_once(column, " as ").unwrap_or((column, own(column)));
+        let (shown, names): (Vec<&str>, Vec<&str>) = columns.split(", ").map(named).unzip();
+        let line = |row: &R| {
+            let fields = fields(row);
+            shown.iter().map(|column| Cell::of(&fields, column)).collect()
+        };
+        Self { rows: rows.into_iter().map(line).collect(), ..Self::new(&names) }
+    }
+
+    /// The same with a column more of numbers, one for each row.
+    pub fn with(mut self, name: &str, digits: usize, numbers: impl IntoIterator<Item = f64>) -> Self {
+        self.columns.push(name.to_owned());
+        self.rows.iter_mut().zip(numbers).for_each(|(row, number)| row.push(Cell::Number(number, digits)));
+        self
     }
 
     /// Lines of cells with the names of their columns, the same in every line.
@@ -58,20 +68,87 @@ impl Table {
             std::iter::once(self.columns.clone()).chain(self.rows.iter().map(cells)).collect();
         let width = |k: usize| lines.iter().filter_map(|l| Some(l.get(k)?.chars().count())).max().unwrap_or(0);
         let widths: Vec<usize> = (0..self.columns.len()).map(width).collect();
-        let number = |k: usize| self.rows.iter().any(|r| matches!(r.get(k), Some(Cell::Number(..))));
         let mut out = String::new();
         for line in &lines {
             let padded = line.iter().zip(&widths).enumerate().map(|(k, (cell, &width))| {
-                if number(k) { format!("{cell:>width$}") } else { format!("{cell:<width$}") }
+                if self.is_number(k) { format!("{cell:>width$}") } else { format!("{cell:<width$}") }
             });
             out += padded.collect::<Vec<_>>().join("  ").trim_end();
             out.push('\n');
         }
         out
     }
+
+    /// The rows with one of these values in a column.
+    ///
+    /// # Errors
+    /// A column that there is not.
+    pub fn only(&self, column: &str, values: &[&str]) -> anyhow::Result<Self> {
+        let k = self.place(column)?;
+        let named = |row: &&Vec<Cell>| row.get(k).is_some_and(|cell| values.contains(&cell.text().as_str()));
+        Ok(Self { columns: self.columns.clone(), rows: self.rows.iter().filter(named).cloned().collect() })
+    }
+
+    /// These columns, in this order.
+    ///
+    /// # Errors
+    /// A column that there is not.
+    pub fn columns(&self, names: &[&str]) -> anyhow::Result<Self> {
+        let places = names.iter().map(|name| self.place(name)).collect::<anyhow::Result<Vec<_>>>()?;
+        let mut table = Self::new(names);
+        table.rows.extend(self.rows.iter().map(|row| places.iter().filter_map(|&k| row.get(k).cloned()).collect()));
+        Ok(table)
+    }
+
+    fn place(&self, column: &str) -> anyhow::Result<usize> {
+        let place = self.columns.iter().position(|name| name == column);
+        place.with_context(|| format!("there is no column `{column}` (there are: {})", self.columns.join(", ")))
+    }
+
+    /// The table in Markdown, numbers to the right.
+    pub fn markdown(&self) -> String {
+        let line = |cells: Vec<String>| format!("| {} |\n", cells.join(" | "));
+        let rule = (0..self.columns.len()).map(|k| if self.is_number(k) { "--:" } else { "---" }.to_owned());
+        let cells = |row: &Vec<Cell>| line(row.iter().map(|cell| cell.text().replace('|', "\\|")).collect());
+        line(self.columns.clone()) + &line(rule.collect()) + &self.rows.iter().map(cells).collect::<String>()
+    }
+
+    fn is_number(&self, column: usize) -> bool {
+        self.rows.iter().any(|row| matches!(row.get(column), Some(Cell::Number(..))))
+    }
+}
+
+/// A row's fields by their names; those of a case and of its measurements together.
+pub fn fields(row: &impl Serialize) -> Map<String, Value> {
+    match serde_json::to_value(row) {
+        Ok(Value::Object(fields)) => fields,
+        Ok(Value::Array(parts)) => parts.iter().filter_map(Value::as_object).cloned().flatten().collect(),
+        _ => Map::new(),
+    }
 }
 
 impl Cell {
+    /// What a column shows of a row's fields.
+    fn of(fields: &Map<String, Value>, column: &str) -> Self {
+        let (what, digits) = column.rsplit_once('.').unwrap_or((column, ""));
+        let number = |name: &str| fields.get(name).and_then(Value::as_f64).unwrap_or(f64::NAN);
+        if let Ok(digits) = digits.parse() {
+            return Self::Number(
+                match (what.split_once('*'), what.split_once('/')) {
+                    (Some((name, factor)), _) => number(name) * factor.parse().unwrap_or(f64::NAN),
+                    (None, Some((over, under))) => number(over) / number(under),
+                    (None, None) => number(what),
+                },
+                digits,
+            );
+        }
+        match fields.get(column) {
+            Some(Value::String(text)) if !text.is_empty() => Self::Text(text.clone()),
+            Some(Value::Bool(whether)) => if *whether { "yes" } else { "no" }.into(),
+            _ => "–".into(),
+        }
+    }
+
     fn text(&self) -> String {
         match self {
             Self::Text(text) => text.clone(),
@@ -164,6 +241,22 @@ mod tests {
     #[test]
     fn text_is_left_aligned_and_numbers_right() {
         assert_eq!(table().text(), "law       peak\nledger    1.50\npenalty  2.0e9\n");
+    }
+
+    #[test]
+    fn columns_show_fields_multiples_and_ratios() {
+        let row = |limit_m: Option<f64>| serde_json::json!([{ "law": "ledger", "fast": true }, { "depth_m": 0.0025, "limit_m": limit_m }]);
+        let columns = "law, fast, depth_m*1e3.1 as depth_mm, depth_m/limit_m.2 as share, limit_m.3";
+        let table = Table::of(&[row(Some(0.005)), row(None)], columns);
+        let text = "law     fast  depth_mm  share  limit_m\nledger  yes        2.5   0.50    0.005\nledger  yes        2.5      –        –\n";
+        assert_eq!(table.text(), text);
+    }
+
+    #[test]
+    fn markdown_has_the_rows_and_columns_that_are_asked_for() {
+        let some = table().only("law", &["penalty"]).unwrap().columns(&["peak", "law"]).unwrap();
+        assert_eq!(some.markdown(), "| peak | law |\n| --: | --- |\n| 2.0e9 | penalty |\n");
+        assert!(table().columns(&["depth"]).unwrap_err().to_string().contains("there are: law, peak"));
     }
 
     #[test]

@@ -7,6 +7,7 @@ mod agents;
 mod checked;
 mod figures;
 mod report;
+mod trials;
 
 use super::args::TuneArgs;
 use anyhow::Context;
@@ -25,6 +26,7 @@ use metachron_world::kinds::ExecutorKind;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
+use trials::Trials;
 
 /// Frames of the experiment, in full and with `--quick`.
 const FRAMES: [u64; 2] = [360, 150];
@@ -131,9 +133,11 @@ fn find(args: &TuneArgs, on: &Identified, fragment: &Path, stopped: &AtomicBool)
     let folder = &args.out;
     std::fs::create_dir_all(folder)
         .map_err(|why| BadInput(format!("the folder {} cannot be written: {why}", folder.display())))?;
-    let tuned = look_for_gains(args, on, stopped)?;
+    let mut trials = Trials::open(args, on, fragment)?;
+    let tuned = look_for_gains(args, on, &mut trials, stopped)?;
     let agents = agents::tune(args, &on.scene, stopped)?;
     gains::write(fragment, &gains::fragment(tuned.law, agents.gains(), &report::comment(on, &tuned)))?;
+    trials.close(!tuned.interrupted)?;
     let mut files = vec![fragment.to_owned()];
     let mut checked = Vec::new();
     // after an interrupt the user does not wait for figures
@@ -147,7 +151,7 @@ fn find(args: &TuneArgs, on: &Identified, fragment: &Path, stopped: &AtomicBool)
         report::text(on, &report::Found { tuned: &tuned, agents: &agents, checked: &checked, files: &files })
     })?;
     if tuned.interrupted {
-        message("interrupted: the best gains so far were written");
+        message("interrupted: the best gains so far were written; the same command with --force goes on from here");
         return Ok(Exit::Interrupted);
     }
     Ok(Exit::Ok)
@@ -159,15 +163,21 @@ fn refuse_out_of_reach(on: &Identified) -> anyhow::Result<()> {
 }
 
 /// Searches every family, from the laws for comparison.
-fn look_for_gains(args: &TuneArgs, on: &Identified, stopped: &AtomicBool) -> anyhow::Result<Tuning> {
+fn look_for_gains(
+    args: &TuneArgs,
+    on: &Identified,
+    trials: &mut Trials,
+    stopped: &AtomicBool,
+) -> anyhow::Result<Tuning> {
     let one = |family: Family, starts: &[Candidate]| {
         let bar = Bar::new(origin_name(Origin::Found(family)), args.common.quiet || args.common.json);
         let mut go_on = |share: f64, best: &Verdict| {
             bar.set(share, format!("best so far {}: {:.3}", gains::gains_text(best.candidate), best.objective));
             !stopped.load(Ordering::Relaxed)
         };
-        let mut setting = Search { plant: &on.plant, target_hz: on.target_hz, extent: extent(args), go_on: &mut go_on };
-        search(&mut setting, family, starts)
+        let on_plant = |candidate| judge(&on.plant, candidate, on.target_hz, extent(args));
+        let mut judge = |candidate| trials.verdict(candidate, || on_plant(candidate));
+        search(&mut Search { judge: &mut judge, go_on: &mut go_on }, family, starts)
     };
     tune(&on.plant, on.target_hz, one).context("no candidate could be evaluated")
 }

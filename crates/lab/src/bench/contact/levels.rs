@@ -8,7 +8,7 @@ use super::peer::PeerRun;
 use super::stage::Stage;
 use super::{Case as BenchCase, Row as BenchRow, cases, peer_row, row};
 use crate::bench::rig::peers::Peers;
-use crate::chart::{Axis, Column, Experiment, Figure, Finding, Mark, Measured, Panel, lines, span, worst};
+use crate::chart::{Axis, Experiment, Figure, Finding, Mark, Measured, Panel, lines, span, worst};
 use anyhow::Context;
 use metachron_console::output::message;
 use serde::{Deserialize, Serialize};
@@ -164,24 +164,13 @@ fn name(peer: &Peers<PeerRun>) -> String {
 }
 
 impl Experiment for SolveLevels {
-    type Case = Case;
     type Row = Row;
     const NAME: &'static str = "levels";
     const TITLE: &'static str = "Error of contacts over their cost, by levels of the solve";
     const ALONE: bool = true;
-    const COLUMNS: &'static [Column<Row>] = &[
-        ("test", |row| (&row.case.test).into()),
-        ("engine", |row| (&row.case.engine).into()),
-        ("level", |row| (&row.case.level).into()),
-        ("ms_per_s", |row| (row.cpu_ms_per_s, 1).into()),
-        ("p50_ms", |row| (row.ms_p50, 3).into()),
-        ("p99_ms", |row| (row.ms_p99, 3).into()),
-        ("landing_mm", |row| (row.landing_mm, 3).into()),
-        ("rest_mm", |row| (row.rest_mm, 3).into()),
-        ("drift_mm", |row| (row.drift_mm, 4).into()),
-        ("sank_mm", |row| (row.sank_mm, 2).into()),
-        ("made_j", |row| (row.made_j, 5).into()),
-    ];
+    const COLUMNS: &'static str = "\
+        test, engine, level, cpu_ms_per_s.1 as ms_per_s, ms_p50.3 as p50_ms, ms_p99.3 as p99_ms, \
+        landing_mm.3, rest_mm.3, drift_mm.4, sank_mm.2, made_j.5";
 
     fn cases(quick: bool) -> Vec<Case> {
         let mut all = Vec::new();

@@ -14,7 +14,7 @@ use super::super::args::BenchArgs;
 use super::rig::machine::processor;
 use super::rig::peers::Peers;
 use super::subject::{Progress, Subject};
-use crate::chart::{Axis, Colour, Column, Figure, Layer, span};
+use crate::chart::{Axis, Colour, Figure, Layer, span};
 use anyhow::Context;
 use course::Course;
 pub(crate) use levels::SolveLevels;
@@ -262,26 +262,11 @@ fn peer_row(peers: &Peers<PeerRun>, run: &PeerRun) -> Row {
 impl Subject for Contact {
     type Row = Row;
     const NAME: &'static str = "contact";
-    const COLUMNS: &'static [Column<Row>] = &[
-        ("test", |row| (&row.test).into()),
-        ("engine", |row| (&row.engine).into()),
-        ("p50_ms", |row| (row.ms_per_step_p50, 3).into()),
-        ("p99_ms", |row| (row.ms_per_step_p99, 3).into()),
-        ("most_ms", |row| (row.ms_most, 2).into()),
-        ("cpu_s", |row| (row.cpu_s, 3).into()),
-        ("over_peer", |row| (row.over_peer, 2).into()),
-        ("fine", |row| (row.fine_steps, 2).into()),
-        ("solves", |row| (row.solves, 2).into()),
-        ("factors", |row| (row.factors, 2).into()),
-        ("products", |row| (row.products, 1).into()),
-        ("unfinished", |row| (f64::from(row.unfinished), 0).into()),
-        ("landing_mm", |row| (row.landing_m * 1e3, 3).into()),
-        ("rest_mm", |row| (row.rest_m * 1e3, 3).into()),
-        ("drift_mm", |row| (row.drift_mean_m * 1e3, 3).into()),
-        ("most_mm", |row| (row.drift_most_m * 1e3, 3).into()),
-        ("sank_mm", |row| (row.sank_m * 1e3, 2).into()),
-        ("made_j", |row| (row.made_j, 5).into()),
-    ];
+    const COLUMNS: &'static str = "\
+        test, engine, ms_per_step_p50.3 as p50_ms, ms_per_step_p99.3 as p99_ms, ms_most.2 as most_ms, \
+        cpu_s.3, over_peer.2, fine_steps.2 as fine, solves.2, factors.2, products.1, unfinished.0, \
+        landing_m*1e3.3 as landing_mm, rest_m*1e3.3 as rest_mm, drift_mean_m*1e3.3 as drift_mm, \
+        drift_most_m*1e3.3 as most_mm, sank_m*1e3.2 as sank_mm, made_j.5";
 
     fn measure(args: &BenchArgs, progress: &Progress) -> anyhow::Result<Vec<Row>> {
         let names: Vec<_> = cases(false).iter().map(Case::name).collect();

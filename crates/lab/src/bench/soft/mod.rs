@@ -12,7 +12,7 @@ use super::rig::peers::Peers;
 use super::rig::play::{Bound, Play, Series};
 use super::rig::shaken_floor::ShakenFloor;
 use super::subject::{Progress, Subject};
-use crate::chart::{Axis, Colour, Column, Figure, Layer, exponent, span};
+use crate::chart::{Axis, Colour, Figure, Layer, exponent, span};
 use anyhow::Context;
 use bodies::{CUBE_M, DemoTube};
 use glam::DVec3;
@@ -107,19 +107,9 @@ pub(super) struct Row {
 impl Subject for Soft {
     type Row = Row;
     const NAME: &'static str = "soft";
-    const COLUMNS: &'static [Column<Row>] = &[
-        ("test", |row| (&row.test).into()),
-        ("nodes", |row| (row.nodes as f64, 0).into()),
-        ("contacts", |row| (f64::from(row.contacts), 0).into()),
-        ("ms_per_step_p50", |row| (row.ms_per_step_p50, 3).into()),
-        ("ms_per_step_p99", |row| (row.ms_per_step_p99, 3).into()),
-        ("over_plain", |row| (row.over_plain, 2).into()),
-        ("exponent", |row| (row.exponent, 2).into()),
-        ("sag_mm", |row| (row.sag_m * 1e3, 3).into()),
-        ("shape_error", |row| (row.shape_error, 5).into()),
-        ("peer_ms", |row| (row.peer_ms_per_step, 2).into()),
-        ("peer_sag_mm", |row| (row.peer_sag_m * 1e3, 3).into()),
-    ];
+    const COLUMNS: &'static str = "\
+        test, nodes.0, contacts.0, ms_per_step_p50.3, ms_per_step_p99.3, over_plain.2, exponent.2, \
+        sag_m*1e3.3 as sag_mm, shape_error.5, peer_ms_per_step.2 as peer_ms, peer_sag_m*1e3.3 as peer_sag_mm";
 
     fn measure(args: &BenchArgs, progress: &Progress) -> anyhow::Result<Vec<Row>> {
         let peers = args.peers.as_deref().map(|path| Peers::<Cube>::read(path, &TESTS)).transpose()?;

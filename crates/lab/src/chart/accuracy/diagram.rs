@@ -107,7 +107,6 @@ pub(in super::super) type Row = Measured<Case, Found>;
 pub(in super::super) struct Diagram<B>(PhantomData<B>);
 
 impl<B: Benchmark> Experiment for Diagram<B> {
-    type Case = Case;
     type Row = Row;
     const NAME: &'static str = B::NAME;
     const TITLE: &'static str = B::TITLE;

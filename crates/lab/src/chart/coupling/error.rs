@@ -5,7 +5,7 @@
 
 use super::super::energy_bench::Play;
 use super::super::scenes::{Scene, scene};
-use crate::chart::{Axis, Colour, Column, Experiment, Figure, Finding, Layer, Measured, Panel, span, worst};
+use crate::chart::{Axis, Colour, Experiment, Figure, Finding, Layer, Measured, Panel, span, worst};
 use glam::DVec3;
 use metachron_core::{AgentId, Anchor};
 use serde::{Deserialize, Serialize};
@@ -60,20 +60,12 @@ impl Default for Found {
 type Row = Measured<Case, Found>;
 
 impl Experiment for CouplingError {
-    type Case = Case;
     type Row = Row;
     const NAME: &'static str = "error";
     const TITLE: &'static str = "coupling error: the same scene with unequal steps and with very fine ones for all";
-    const COLUMNS: &'static [Column<Row>] = &[
-        ("scene", |r| (&r.case.scene).into()),
-        ("ratio", |r| (f64::from(r.case.ratio), 0).into()),
-        ("first", |r| if r.case.first_is_fast { "fast" } else { "slow" }.into()),
-        ("looks", |r| (r.looks as f64, 0).into()),
-        ("rms_mm", |r| (1e3 * r.position_rms_m, 4).into()),
-        ("max_mm", |r| (1e3 * r.position_max_m, 4).into()),
-        ("momentum_error", |r| (r.momentum, 6).into()),
-        ("impulse_error", |r| (r.impulse, 6).into()),
-    ];
+    const COLUMNS: &'static str = "\
+        scene, ratio.0, first_is_fast, looks.0, position_rms_m*1e3.4 as rms_mm, \
+        position_max_m*1e3.4 as max_mm, momentum.6 as momentum_error, impulse.6 as impulse_error";
 
     fn cases(quick: bool) -> Vec<Case> {
         let (ratios, seconds) = if quick { (&QUICK_RATIOS[..], QUICK_SECONDS) } else { (&RATIOS[..], SECONDS) };

@@ -103,7 +103,6 @@ pub(super) fn pace(rows: &[Row]) -> f64 {
 pub(in super::super) struct Scaling<G>(PhantomData<G>);
 
 impl<G: Growth> Experiment for Scaling<G> {
-    type Case = Case;
     type Row = Row;
     const NAME: &'static str = G::NAME;
     const TITLE: &'static str = G::TITLE;

@@ -6,7 +6,7 @@
 
 use super::super::bench::StepHarness;
 use super::common::{dead_load, plain_tube};
-use crate::chart::{Axis, Colour, Column, Experiment, Figure, Finding, Layer, Measured, worst};
+use crate::chart::{Axis, Colour, Experiment, Figure, Finding, Layer, Measured, worst};
 use glam::{DQuat, DVec3};
 use metachron_geometry::{Obstacle, Solid};
 use metachron_models::rod::{Tube, TubeSpec};
@@ -34,11 +34,12 @@ const TAIL_M: f64 = 0.05;
 const SEGMENTS_A_RADIAN: f64 = 24.0;
 /// The load at the end that is not raised, newtons.
 const LOAD_N: f64 = 2.0;
-/// The other load starts at the first share of the theoretical one and rises by the second share per second up to the third.
-const RAMP: [f64; 3] = [0.7, 0.1, 1.4];
+/// The other load starts at the first share of the theoretical one, below all that the claim allows, and rises by the second share per second up to
+/// the third.
+const RAMP: [f64; 3] = [0.92, 0.2, 1.4];
 const DT_S: f64 = 0.002;
 /// Seconds for both loads to come on and the tube to settle.
-const SETTLE_S: f64 = 0.5;
+const SETTLE_S: f64 = 0.4;
 /// The end that is not raised has slipped when it moved so far, metres.
 const SLIP_M: f64 = 5e-4;
 
@@ -67,17 +68,11 @@ impl Found {
 }
 
 impl Experiment for Capstan {
-    type Case = Case;
     type Row = Row;
     const NAME: &'static str = "capstan";
     const TITLE: &'static str = "capstan: tension ratio at which a tube around a fixed cylinder slips";
-    const COLUMNS: &'static [Column<Row>] = &[
-        ("friction", |r| (r.case.friction, 1).into()),
-        ("wrap_rad", |r| (r.case.wrap_rad, 4).into()),
-        ("exp(μφ)", |r| (r.theory, 4).into()),
-        ("ratio", |r| (r.ratio.unwrap_or(f64::NAN), 4).into()),
-        ("error", |r| (r.error(), 4).into()),
-    ];
+    const COLUMNS: &'static str =
+        "friction.1, wrap_rad.4, theory.4 as exp(μφ), ratio.4, ratio/theory.4 as ratio / exp(μφ)";
 
     fn cases(quick: bool) -> Vec<Case> {
         let frictions = if quick { &[CLAIMED_FRICTION][..] } else { &FRICTIONS[..] };

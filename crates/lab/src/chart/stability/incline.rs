@@ -2,7 +2,7 @@
 
 use super::super::bench::StepHarness;
 use super::common::{GRAVITY, plain_body, plain_tube};
-use crate::chart::{Axis, Colour, Column, Experiment, Figure, Finding, Layer, Measured, span, worst};
+use crate::chart::{Axis, Colour, Experiment, Figure, Finding, Layer, Measured, span, worst};
 use glam::{DQuat, DVec3};
 use metachron_contact::Agent;
 use metachron_core::{Body, Snapshot};
@@ -46,16 +46,10 @@ pub(in super::super) struct Found {
 type Row = Measured<Case, Found>;
 
 impl Experiment for Incline {
-    type Case = Case;
     type Row = Row;
     const NAME: &'static str = "incline";
     const TITLE: &'static str = "box and tube on a slope: angle at which sliding begins, μ = 0.3";
-    const COLUMNS: &'static [Column<Row>] = &[
-        ("body", |r| (&r.case.body).into()),
-        ("tan/μ", |r| (r.case.slope, 2).into()),
-        ("slid_mm", |r| (1e3 * r.slid_m.unwrap_or(f64::NAN), 3).into()),
-        ("Coulomb_mm", |r| (1e3 * r.theory_m, 3).into()),
-    ];
+    const COLUMNS: &'static str = "body, slope.2 as tan/μ, slid_m*1e3.3 as slid_mm, theory_m*1e3.3 as Coulomb_mm";
 
     fn cases(quick: bool) -> Vec<Case> {
         let slopes = if quick { &QUICK_SLOPES[..] } else { &SLOPES[..] };

@@ -3,7 +3,7 @@
 use super::super::energy_bench::Play;
 use super::super::scenes::{Scene, WITH_TUBES, scene};
 use super::common::COMMON_ENERGY_MAX;
-use crate::chart::{Axis, Colour, Column, Experiment, Figure, Finding, Layer, Measured, Panel, worst};
+use crate::chart::{Axis, Colour, Experiment, Figure, Finding, Layer, Measured, Panel, worst};
 use glam::DVec3;
 use metachron_core::{AgentId, Anchor};
 use serde::{Deserialize, Serialize};
@@ -43,19 +43,12 @@ pub(in super::super) struct Found {
 type Row = Measured<Case, Found>;
 
 impl Experiment for Pairs {
-    type Case = Case;
     type Row = Row;
     const NAME: &'static str = "tubes";
     const TITLE: &'static str = "tubes on a bar, in a gripper and across each other, step rates 1:1 to 1:100";
-    const COLUMNS: &'static [Column<Row>] = &[
-        ("scene", |r| (&r.case.scene).into()),
-        ("ratio", |r| (r.case.ratio, 0).into()),
-        ("tube", |r| if r.case.first_is_fast { "fast" } else { "slow" }.into()),
-        ("peak", |r| (r.peak, 4).into()),
-        ("depth_mm", |r| (1e3 * r.depth_m, 4).into()),
-        ("creep_mm_s", |r| (1e3 * r.creep_m_s, 4).into()),
-        ("contacts", |r| (f64::from(r.contacts), 0).into()),
-    ];
+    const COLUMNS: &'static str = "\
+        scene, ratio.0, first_is_fast, peak.4, depth_m*1e3.4 as depth_mm, creep_m_s*1e3.4 as creep_mm_s, \
+        contacts.0";
 
     fn cases(quick: bool) -> Vec<Case> {
         let ratios = if quick { &RATIOS[3..4] } else { &RATIOS[..] };

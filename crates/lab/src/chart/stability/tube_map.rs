@@ -70,7 +70,6 @@ enum Verdict {
 }
 
 impl Experiment for TubeMap {
-    type Case = Case;
     type Row = Row;
     const NAME: &'static str = "tube-map";
     const TITLE: &'static str = "dt × stiffness of the tube: stable, bounded but wrong, or blown up";

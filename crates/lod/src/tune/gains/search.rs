@@ -1,24 +1,19 @@
 //! Search for the best gains: given laws and a coarse grid, then Nelder and Mead's simplex from the best of these (NM65).
 //!
-//! In: a plant, a target, the extent of the trials, laws to start from. Out: the best verdict so far, whenever it is stopped; it is never
+//! In: how a candidate is judged, laws to start from. Out: the best verdict so far, whenever it is stopped; it is never
 //! after that of a law it started from ([`Verdict::compare`]). Deterministic. Never here: the objective ([`crate::tune::judge`] has it).
 
-use super::trials::{Extent, Verdict, judge};
+use super::trials::Verdict;
 use crate::adaptive::MARGIN_MAX;
 use crate::control::Law;
 use crate::tune::loops::candidate::Candidate;
-use crate::tune::loops::plant::Plant;
 use metachron_core::{NumberRange, gains};
 use std::cmp::Ordering;
 
 /// A search.
 pub struct Search<'a> {
-    /// The plant to be controlled.
-    pub plant: &'a Plant,
-    /// Frames a second, > 0.
-    pub target_hz: f64,
-    /// The extent of the trials for each candidate.
-    pub extent: Extent,
+    /// Judges a candidate, each by the same trials: [`crate::tune::judge`] on a plant, at a target, of an extent.
+    pub judge: &'a mut dyn FnMut(Candidate) -> Verdict,
     /// Called after every candidate with the fraction done and the best so far; returns whether to continue.
     pub go_on: &'a mut dyn FnMut(f64, &Verdict) -> bool,
 }
@@ -146,7 +141,7 @@ impl SearchState<'_, '_> {
         if self.interrupted {
             return None;
         }
-        let verdict = judge(self.search.plant, candidate, self.search.target_hz, self.search.extent);
+        let verdict = (self.search.judge)(candidate);
         let rank = verdict.rank();
         let best = self.best.take().filter(|best| best.compare(&verdict).is_le()).unwrap_or_else(|| verdict.clone());
         self.tried.push(verdict);
@@ -255,9 +250,11 @@ fn spread(simplex: &[Vertex]) -> f64 {
 
 #[cfg(test)]
 mod tests {
+    use super::super::trials::{Extent, judge};
     use super::*;
     use crate::tune::loops::margins::Loop;
     use crate::tune::loops::plant::DEAD_TIME_MAX;
+    use crate::tune::loops::plant::Plant;
     use crate::tune::loops::plant::tests::observed;
 
     fn found(family: Family, stop_after: usize) -> SearchResult {
@@ -268,8 +265,8 @@ mod tests {
             calls < stop_after
         };
         let extent = Extent { seeds: 1, millis: 1500, threads: None };
-        let mut setting = Search { plant: &plant, target_hz: 30.0, extent, go_on: &mut go_on };
-        search(&mut setting, family, &[]).unwrap()
+        let mut judge = |candidate| judge(&plant, candidate, 30.0, extent);
+        search(&mut Search { judge: &mut judge, go_on: &mut go_on }, family, &[]).unwrap()
     }
 
     #[test]

@@ -134,7 +134,8 @@ mod tests {
         let plant = Plant { dead_time, ..plant_of(vec![tube_alone()], fixed_s, 1e-6) };
         let one = |family: Family, starts: &[Candidate]| {
             let mut go_on = |_: f64, _: &Verdict| true;
-            search(&mut Search { plant: &plant, target_hz, extent: EXTENT, go_on: &mut go_on }, family, starts)
+            let mut judge = |candidate| judge(&plant, candidate, target_hz, EXTENT);
+            search(&mut Search { judge: &mut judge, go_on: &mut go_on }, family, starts)
         };
         let tuning = tune(&plant, target_hz, one).unwrap();
         (plant, tuning)
@@ -169,8 +170,8 @@ mod tests {
         assert!(order[1].is_safe() && !order[2].is_safe());
         // a filter without noise corrects nearly all of an error at once: no margin of this policy bears two frames of delay
         let mut go_on = |_: f64, _: &Verdict| true;
-        let mut setting = Search { plant: &plant, target_hz: 30.0, extent: EXTENT, go_on: &mut go_on };
-        let least = search(&mut setting, Family::Adaptive, &[]).unwrap().best;
+        let mut judged = |candidate| judge(&plant, candidate, 30.0, EXTENT);
+        let least = search(&mut Search { judge: &mut judged, go_on: &mut go_on }, Family::Adaptive, &[]).unwrap().best;
         assert!(!least.is_safe(), "{least:?}");
         for margin in [0.01, 0.05, 0.1, 0.2, 0.4] {
             let other = judge(&plant, Candidate::Adaptive { margin }, 30.0, EXTENT);

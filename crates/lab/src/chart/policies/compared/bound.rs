@@ -3,7 +3,7 @@
 use crate::chart::policies::numeric::common::LEVEL_PARTS;
 use crate::chart::policies::numeric::machine::RandomSource;
 use crate::chart::policies::numeric::metrics::mean;
-use crate::chart::{Axis, Colour, Column, Experiment, Figure, Finding, Layer, Measured};
+use crate::chart::{Axis, Colour, Experiment, Figure, Finding, Layer, Measured};
 use metachron_lod::adaptive::{Adaptive, Offer, Settings, Time};
 use metachron_lod::select::{Entry, Mode, Problem, funkhouser, incremental, linear, marginal};
 use serde::{Deserialize, Serialize};
@@ -49,17 +49,10 @@ pub(crate) struct Found {
 type Row = Measured<Case, Found>;
 
 impl Experiment for Bound {
-    type Case = Case;
     type Row = Row;
     const NAME: &'static str = "bound";
     const TITLE: &'static str = "benefit over the bound of the linear relaxation, which no selection can exceed";
-    const COLUMNS: &'static [Column<Row>] = &[
-        ("set", |r| (&r.case.set).into()),
-        ("objects", |r| (r.case.objects as f64, 0).into()),
-        ("policy", |r| (&r.case.policy).into()),
-        ("mean", |r| (r.mean, 5).into()),
-        ("least", |r| (r.least, 5).into()),
-    ];
+    const COLUMNS: &'static str = "set, objects.0, policy, mean.5, least.5";
 
     fn cases(quick: bool) -> Vec<Case> {
         let instances = if quick { QUICK_INSTANCES } else { INSTANCES };

@@ -31,7 +31,6 @@ fn disturbed(spikes: f64) -> Show {
 }
 
 impl Experiment for Disturbed {
-    type Case = Case;
     type Row = Row;
     const NAME: &'static str = "disturbed";
     const TITLE: &'static str =
@@ -63,7 +62,7 @@ impl Experiment for Disturbed {
     }
 
     fn table(rows: &[Row]) -> Table {
-        Table::of(rows, &[&COLUMNS[..], &[("settled", |r| (r.settled, 0).into())]].concat())
+        Table::of(rows, COLUMNS).with("settled", 0, rows.iter().map(|row| row.settled))
     }
 
     fn findings(rows: &[Row]) -> Vec<Finding> {

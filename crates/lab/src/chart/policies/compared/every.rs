@@ -5,8 +5,8 @@
 
 use crate::chart::policies::numeric::common::number;
 use crate::chart::policies::numeric::metrics::Row;
-use crate::chart::policies::played::{Case, PLAYS, Times, curves, table};
-use crate::chart::{Experiment, Figure, Finding, Table};
+use crate::chart::policies::played::{COLUMNS, Case, PLAYS, Times, curves};
+use crate::chart::{Experiment, Figure, Finding};
 
 /// The experiment.
 pub(crate) struct Every;
@@ -15,17 +15,17 @@ pub(crate) struct Every;
 const SHOWN: [&str; 5] = ["threshold", "feedback", "robin-hood", "greedy", "adaptive"];
 
 impl Experiment for Every {
-    type Case = Case;
     type Row = Row;
     const NAME: &'static str = "every";
     const TITLE: &'static str = "every policy on every scene of the papers, through the frame loop in lockstep";
+    const COLUMNS: &'static str = COLUMNS;
 
     fn cases(quick: bool) -> Vec<Case> {
         PLAYS.iter().flat_map(|play| play.cases(quick, 0)).collect()
     }
 
     fn measure(case: &Case) -> Row {
-        case.measure(Times::Declared)
+        case.play(Times::Declared)
     }
 
     fn figure(rows: &[Row]) -> Figure {
@@ -35,10 +35,6 @@ impl Experiment for Every {
         };
         let panels = PLAYS.iter().map(|play| panel(play.paper.name())).collect();
         Figure::new("The papers' scenes in lockstep", 2, panels)
-    }
-
-    fn table(rows: &[Row]) -> Table {
-        table(rows)
     }
 
     fn findings(rows: &[Row]) -> Vec<Finding> {

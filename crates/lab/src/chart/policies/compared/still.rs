@@ -7,7 +7,7 @@ use crate::chart::policies::numeric::closed_loop::Show;
 use crate::chart::policies::numeric::common::{COLUMNS, Case, curves, number};
 use crate::chart::policies::numeric::machine::Fault;
 use crate::chart::policies::numeric::metrics::Row;
-use crate::chart::{Column, Experiment, Figure, Finding};
+use crate::chart::{Experiment, Figure, Finding};
 
 /// The experiment.
 pub(crate) struct Still;
@@ -33,11 +33,10 @@ fn still(setting: &str) -> Show {
 }
 
 impl Experiment for Still {
-    type Case = Case;
     type Row = Row;
     const NAME: &'static str = "still";
     const TITLE: &'static str = "static scene: changes of level by policy";
-    const COLUMNS: &'static [Column<Row>] = &COLUMNS;
+    const COLUMNS: &'static str = COLUMNS;
 
     fn cases(quick: bool) -> Vec<Case> {
         let seeds = if quick { 1 } else { SEEDS };

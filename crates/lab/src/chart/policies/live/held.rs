@@ -5,7 +5,7 @@
 //! window. Policies and loads take turns, round by round, so that other work of the machine meets all of them.
 
 use crate::chart::policies::numeric::metrics::{deviation95, error_over_allowed, mean, predicts, within};
-use crate::chart::{Axis, Colour, Column, Experiment, Figure, Finding, Layer, Measured, Panel, worst};
+use crate::chart::{Axis, Colour, Experiment, Figure, Finding, Layer, Measured, Panel, Table, worst};
 use anyhow::Context;
 use metachron_lod::control::Policy;
 use metachron_render::{Camera, Gpu, Offscreen, RendererOptions, SceneView, Size, Style};
@@ -237,27 +237,13 @@ impl Found {
 }
 
 impl Experiment for Held {
-    type Case = Case;
     type Row = Row;
     const NAME: &'static str = "held";
     const TITLE: &'static str = "late frames at 30 Hz and 1280 x 720 on this adapter, alone and beside busy threads";
     const ALONE: bool = true;
-    const COLUMNS: &'static [Column<Row>] = &[
-        ("scene", |r| (&r.case.scene).into()),
-        ("policy", |r| (&r.case.policy).into()),
-        ("busy", |r| (r.case.busy as f64, 0).into()),
-        ("round", |r| (r.case.round as f64, 0).into()),
-        ("late_%", |r| (100.0 * r.late, 1).into()),
-        ("work_ms", |r| (r.work_ms, 1).into()),
-        ("work95_ms", |r| (r.work95_ms, 1).into()),
-        ("empty_ms", |r| (r.empty_ms, 1).into()),
-        ("spread95", |r| (r.spread95, 2).into()),
-        ("error95", |r| (r.error95, 2).into()),
-        ("error", |r| (r.error(), 2).into()),
-        ("triangles", |r| (r.triangles, 0).into()),
-        ("scale", |r| (r.scale, 2).into()),
-        ("value", |r| (r.value, 3).into()),
-    ];
+    const COLUMNS: &'static str = "\
+        scene, policy, busy.0, round.0, late*100.1 as late_%, work_ms.1, work95_ms.1, empty_ms.1, \
+        spread95.2, error95.2, triangles.0, scale.2, value.3";
 
     fn cases(quick: bool) -> Vec<Case> {
         let scenes = if quick { &SCENES[..1] } else { &SCENES[..] };
@@ -300,6 +286,10 @@ impl Experiment for Held {
         };
         let adapter = rows.first().map_or("", |row| &row.adapter);
         Figure::new(format!("{} ({adapter})", Self::TITLE), 2, BUSY.map(panel).to_vec())
+    }
+
+    fn table(rows: &[Row]) -> Table {
+        Table::of(rows, Self::COLUMNS).with("error", 2, rows.iter().map(|row| row.error()))
     }
 
     fn findings(rows: &[Row]) -> Vec<Finding> {

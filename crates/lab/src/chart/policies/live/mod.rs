@@ -31,7 +31,6 @@ const KINDS: [(&str, &[&str]); 4] = [
 ];
 
 impl<const P: usize> Experiment for Live<P> {
-    type Case = Case;
     type Row = Row;
     const NAME: &'static str = PLAYS[P].paper.name();
     const TITLE: &'static str = "the papers' scene on this adapter: frame-time control and similarity to full detail";
@@ -43,7 +42,7 @@ impl<const P: usize> Experiment for Live<P> {
     }
 
     fn measure(case: &Case) -> Row {
-        case.measure(Times::Measured)
+        case.play(Times::Measured)
     }
 
     fn figure(rows: &[Row]) -> Figure {

@@ -8,7 +8,7 @@ use super::super::played::walk;
 use super::super::played::walk::{PathPoint, Predicted};
 use crate::chart::policies::numeric::machine::RandomSource;
 use crate::chart::policies::numeric::metrics::within;
-use crate::chart::{Axis, Colour, Column, Experiment, Figure, Finding, Layer, Panel, Record, span, worst};
+use crate::chart::{Axis, Colour, Experiment, Figure, Finding, Layer, Panel, Record, span, worst};
 use csv::StringRecord;
 use metachron_lod::control::Policy;
 use metachron_scene::papers::Paper;
@@ -56,7 +56,9 @@ pub(in super::super::super) struct Row {
     pairs: String,
 }
 
-impl Record<Case> for Row {
+impl Record for Row {
+    type Case = Case;
+
     fn case(&self) -> Case {
         Case { scene: self.scene.clone(), prices: self.prices.clone(), pictures: self.pictures }
     }
@@ -108,21 +110,12 @@ fn scatter95(pictures: &[Predicted]) -> f64 {
 }
 
 impl Experiment for Prediction {
-    type Case = Case;
     type Row = Row;
     const NAME: &'static str = "prediction";
     const TITLE: &'static str = "predicted and measured drawing times, by the adapter's cost model";
     const ALONE: bool = true;
-    const COLUMNS: &'static [Column<Row>] = &[
-        ("scene", |r| (&r.scene).into()),
-        ("prices", |r| (&r.prices).into()),
-        ("pictures", |r| (r.pictures as f64, 0).into()),
-        ("error", |r| (r.error, 3).into()),
-        ("error95", |r| (r.error95, 3).into()),
-        ("factor", |r| (r.factor, 3).into()),
-        ("scaled95", |r| (r.scaled_error95, 3).into()),
-        ("scatter95", |r| (r.scatter95, 3).into()),
-    ];
+    const COLUMNS: &'static str =
+        "scene, prices, pictures.0, error.3, error95.3, factor.3, scaled_error95.3 as scaled95, scatter95.3";
 
     fn cases(quick: bool) -> Vec<Case> {
         let pictures = PICTURES[usize::from(quick)];

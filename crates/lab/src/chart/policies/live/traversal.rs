@@ -3,7 +3,7 @@
 //!
 //! In: a mesh of 100,000 triangles. Out: triangles per second at each resolution. Never here: drawing.
 
-use crate::chart::{Axis, Colour, Column, Experiment, Figure, Finding, Layer, Measured, Panel, span, worst};
+use crate::chart::{Axis, Colour, Experiment, Figure, Finding, Layer, Measured, Panel, span, worst};
 use metachron_drawable::{Generator, ProgressiveMesh, generate};
 use serde::{Deserialize, Serialize};
 use std::sync::OnceLock;
@@ -42,16 +42,11 @@ fn mesh() -> Option<&'static ProgressiveMesh> {
 }
 
 impl Experiment for Traversal {
-    type Case = Case;
     type Row = Row;
     const NAME: &'static str = "traversal";
     const TITLE: &'static str = "traversal speed of a cut's triangles, by resolution";
     const ALONE: bool = true;
-    const COLUMNS: &'static [Column<Row>] = &[
-        ("triangles", |r| (f64::from(r.triangles), 0).into()),
-        ("micros", |r| (r.micros, 2).into()),
-        ("million_a_second", |r| (r.rate, 1).into()),
-    ];
+    const COLUMNS: &'static str = "triangles.0, micros.2, rate.1 as million_a_second";
 
     fn cases(_: bool) -> Vec<Case> {
         (0..=HALVINGS).rev().map(|k| Case { asked: TRIANGLES >> k }).collect()

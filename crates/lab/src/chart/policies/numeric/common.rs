@@ -3,25 +3,26 @@
 use super::chooser::Policy;
 use super::closed_loop::Show;
 use super::metrics::Row;
-use crate::chart::{Axis, Colour, Column, Layer, Panel, Record};
+use crate::chart::{Axis, Colour, Layer, Panel, Record};
 use csv::StringRecord;
 
 /// Polygons of each of an object's five levels, as fractions of the polygons at full detail.
 pub(crate) const LEVEL_PARTS: [f64; 5] = [0.02, 0.06, 0.18, 0.45, 1.0];
 
-/// A setting and a policy.
+/// A setting or scene, and a policy, in one of some equal rounds.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Case {
     pub(crate) setting: String,
     pub(crate) policy: String,
     /// Frames of all runs together, each run with a machine of another seed.
     pub(crate) frames: usize,
+    pub(crate) round: usize,
 }
 
 impl Case {
     /// A case of some runs.
     pub(crate) fn new(setting: &str, policy: Policy, seeds: usize, frames: usize) -> Self {
-        Self { setting: setting.to_owned(), policy: policy.name().to_owned(), frames: seeds * frames }
+        Self { setting: setting.to_owned(), policy: policy.name().to_owned(), frames: seeds * frames, round: 0 }
     }
 
     /// The policy of `policies` that the case names; the last one where it names none of them.
@@ -38,9 +39,11 @@ impl Case {
     }
 }
 
-impl Record<Case> for Row {
+impl Record for Row {
+    type Case = Case;
+
     fn case(&self) -> Case {
-        Case { setting: self.setting.clone(), policy: self.policy.clone(), frames: self.frames }
+        Case { setting: self.setting.clone(), policy: self.policy.clone(), frames: self.asked, round: self.round }
     }
 
     fn read(names: &StringRecord, line: &StringRecord) -> csv::Result<Self> {
@@ -49,23 +52,10 @@ impl Record<Case> for Row {
 }
 
 /// The columns in which policies differ.
-pub(crate) const COLUMNS: [Column<Row>; 15] = [
-    ("setting", |r| (&r.setting).into()),
-    ("policy", |r| (&r.policy).into()),
-    ("mean", |r| (r.mean, 3).into()),
-    ("max", |r| (r.max, 3).into()),
-    ("stddev", |r| (r.stddev, 4).into()),
-    ("binding", |r| (r.binding, 2).into()),
-    ("b_stddev", |r| (r.binding_stddev, 4).into()),
-    ("avg_err", |r| (r.avg_err, 4).into()),
-    ("miss", |r| (r.misses, 4).into()),
-    ("model", |r| (r.model_error, 4).into()),
-    ("value", |r| (r.value_over_bound, 4).into()),
-    ("proven", |r| (r.certified, 3).into()),
-    ("changes", |r| (r.changes, 4).into()),
-    ("reversals", |r| (r.reversals, 5).into()),
-    ("holes", |r| (r.holes, 4).into()),
-];
+pub(crate) const COLUMNS: &str = "\
+    setting, policy, mean.3, max.3, stddev.4, binding.2, binding_stddev.4 as b_stddev, avg_err.4, \
+    misses.4 as miss, model_error.4 as model, value_over_bound.4 as value, certified.3 as proven, \
+    changes.4, reversals.5, holes.4";
 
 /// A number of the row of a setting and a policy; NaN where there is no such row.
 pub(crate) fn number(rows: &[Row], setting: &str, policy: &str, of: fn(&Row) -> f64) -> f64 {

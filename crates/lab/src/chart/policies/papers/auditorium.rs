@@ -5,7 +5,7 @@ use crate::chart::policies::numeric::chooser::Policy;
 use crate::chart::policies::numeric::common::{COLUMNS, Case, curves, number};
 use crate::chart::policies::numeric::machine::Fault;
 use crate::chart::policies::numeric::metrics::Row;
-use crate::chart::{Column, Experiment, Figure, Finding};
+use crate::chart::{Experiment, Figure, Finding};
 use metachron_lod::cost::value::Value;
 
 /// The experiment.
@@ -26,11 +26,10 @@ const SEEDS: usize = 5;
 const SETTING: &str = "walk";
 
 impl Experiment for Auditorium {
-    type Case = Case;
     type Row = Row;
     const NAME: &'static str = "auditorium";
     const TITLE: &'static str = "frame-time control on a walkthrough of 384 seats with half a turn in six frames";
-    const COLUMNS: &'static [Column<Row>] = &COLUMNS;
+    const COLUMNS: &'static str = COLUMNS;
 
     fn cases(quick: bool) -> Vec<Case> {
         let seeds = if quick { 1 } else { SEEDS };

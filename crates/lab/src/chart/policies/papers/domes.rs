@@ -3,7 +3,7 @@
 use crate::chart::policies::numeric::geodesic;
 use crate::chart::policies::numeric::geodesic::{DOMES, STRUTS};
 use crate::chart::policies::numeric::metrics::mean;
-use crate::chart::{Axis, Column, Experiment, Figure, Finding, Measured, Panel, lines};
+use crate::chart::{Axis, Experiment, Figure, Finding, Measured, Panel, lines};
 use metachron_lod::select::incremental::Keep;
 use metachron_lod::select::tree::{Node, Tree};
 use metachron_lod::select::{Entry, Level, Mode, Problem, funkhouser, mason, mason_flat, tree_exact};
@@ -70,20 +70,11 @@ pub(crate) struct Found {
 type Row = Measured<Case, Found>;
 
 impl Experiment for Domes {
-    type Case = Case;
     type Row = Row;
     const NAME: &'static str = "domes";
     const TITLE: &'static str =
         "eight domes of 120 struts at half, one and two times the nominal cost: groups or holes";
-    const COLUMNS: &'static [Column<Row>] = &[
-        ("limit", |r| (r.case.limit as f64, 0).into()),
-        ("policy", |r| (&r.case.policy).into()),
-        ("holes", |r| (r.holes, 4).into()),
-        ("error", |r| (r.error, 4).into()),
-        ("balls", |r| (r.balls, 4).into()),
-        ("changes", |r| (r.changes, 4).into()),
-        ("spent", |r| (r.spent, 4).into()),
-    ];
+    const COLUMNS: &'static str = "limit.0, policy, holes.4, error.4, balls.4, changes.4, spent.4";
 
     fn cases(quick: bool) -> Vec<Case> {
         let frames = if quick { QUICK_FRAMES } else { FRAMES };

@@ -80,7 +80,6 @@ impl Setting {
 }
 
 impl Experiment for Grove {
-    type Case = Case;
     type Row = Row;
     const NAME: &'static str = "grove";
     const TITLE: &'static str = "600 to 2000 trees, five targets, two paths, with levels and without";
@@ -118,7 +117,7 @@ impl Experiment for Grove {
     }
 
     fn table(rows: &[Row]) -> Table {
-        Table::of(rows, &[&COLUMNS[..], &[("paper_avg_err", |r| (paper_error(r), 4).into())]].concat())
+        Table::of(rows, COLUMNS).with("paper_avg_err", 4, rows.iter().map(paper_error))
     }
 
     fn findings(rows: &[Row]) -> Vec<Finding> {

@@ -5,8 +5,8 @@
 
 use crate::chart::policies::numeric::common::number;
 use crate::chart::policies::numeric::metrics::Row;
-use crate::chart::policies::played::{Case, Shown, Times, curves, table, walk};
-use crate::chart::{Experiment, Figure, Finding, Table};
+use crate::chart::policies::played::{COLUMNS, Case, Shown, Times, curves, walk};
+use crate::chart::{Experiment, Figure, Finding};
 use metachron_lod::control::Policy;
 use std::fmt::Write;
 
@@ -68,15 +68,15 @@ fn settings() -> impl Iterator<Item = (String, &'static str, f64)> {
 }
 
 impl Experiment for Levels {
-    type Case = Case;
     type Row = Row;
     const NAME: &'static str = "levels";
     const TITLE: &'static str = "impostors for whole woods: benefit of levels of groups";
+    const COLUMNS: &'static str = COLUMNS;
 
     fn cases(quick: bool) -> Vec<Case> {
         let frames = FRAMES[usize::from(quick)];
-        let case = |scene: &str, policy: Policy| Case {
-            scene: scene.to_owned(),
+        let case = |setting: &str, policy: Policy| Case {
+            setting: setting.to_owned(),
             policy: policy.name().to_owned(),
             frames,
             round: 0,
@@ -85,8 +85,8 @@ impl Experiment for Levels {
     }
 
     fn measure(case: &Case) -> Row {
-        let Some((_, levels, times_over)) = settings().find(|setting| setting.0 == case.scene) else {
-            return Row::of(&case.scene, &case.policy, &[]);
+        let Some((_, levels, times_over)) = settings().find(|setting| setting.0 == case.setting) else {
+            return Row::of(&case.setting, &case.policy, &[]);
         };
         walk::measure(&Shown { name: "woods", text: &text(levels), times_over }, case, Times::Declared)
     }
@@ -100,10 +100,6 @@ impl Experiment for Levels {
             )
         };
         Figure::new("Levels of groups", 3, TIMES_OVER.map(panel).to_vec())
-    }
-
-    fn table(rows: &[Row]) -> Table {
-        table(rows)
     }
 
     fn findings(rows: &[Row]) -> Vec<Finding> {

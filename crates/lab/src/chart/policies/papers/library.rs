@@ -8,7 +8,7 @@ use crate::chart::policies::numeric::common::{Case, curves};
 use crate::chart::policies::numeric::machine::{Fault, RandomSource};
 use crate::chart::policies::numeric::metrics::Row;
 use crate::chart::policies::numeric::scene::{BenefitModel, ObjectLevel, Scene, SceneObject};
-use crate::chart::{Axis, Colour, Column, Experiment, Figure, Finding, Layer, Panel};
+use crate::chart::{Axis, Colour, Experiment, Figure, Finding, Layer, Panel, Table};
 use glam::DVec3;
 use metachron_lod::cost::stages::Stages;
 
@@ -76,21 +76,12 @@ fn forms(polygons: f64, textured: bool) -> Vec<ObjectLevel> {
 }
 
 impl Experiment for Library {
-    type Case = Case;
     type Row = Row;
     const NAME: &'static str = "library";
     const TITLE: &'static str = "textured room of about 20,000 polygons: levels and shading chosen together";
-    const COLUMNS: &'static [Column<Row>] = &[
-        ("target", |r| (&r.setting).into()),
-        ("policy", |r| (&r.policy).into()),
-        ("mean", |r| (r.mean, 3).into()),
-        ("max", |r| (r.max, 3).into()),
-        ("miss", |r| (r.misses, 4).into()),
-        ("polygons", |r| (r.polygons, 0).into()),
-        ("paper", |r| (paper_polygons(r), 0).into()),
-        ("value", |r| (r.value_over_bound, 4).into()),
-        ("proven", |r| (r.certified, 3).into()),
-    ];
+    const COLUMNS: &'static str = "\
+        setting as target, policy, mean.3, max.3, misses.4 as miss, polygons.0, \
+        value_over_bound.4 as value, certified.3 as proven";
 
     fn cases(_: bool) -> Vec<Case> {
         TARGETS.iter().flat_map(|t| POLICIES.map(|policy| Case::new(t.0, policy, 1, FRAMES))).collect()
@@ -105,6 +96,10 @@ impl Experiment for Library {
         let mut panels: Vec<Panel> = TARGETS.iter().map(|t| shares(t.0, &show(t.1))).collect();
         panels.extend(TARGETS.iter().map(|t| curves(t.0, &show(t.1), &[Policy::Greedy, Policy::Adaptive], 1.5)));
         Figure::new("The library: shading of the drawn objects (FS93, fig. 11)", 2, panels)
+    }
+
+    fn table(rows: &[Row]) -> Table {
+        Table::of(rows, Self::COLUMNS).with("paper", 0, rows.iter().map(paper_polygons))
     }
 
     fn findings(rows: &[Row]) -> Vec<Finding> {

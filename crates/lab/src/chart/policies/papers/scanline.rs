@@ -2,7 +2,7 @@
 //!
 //! A diffuse cylinder under one directional light, in an orthographic projection: the meaning of the printed accuracy of a level.
 
-use crate::chart::{Axis, Colour, Column, Experiment, Figure, Finding, Layer, Measured, Panel};
+use crate::chart::{Axis, Colour, Experiment, Figure, Finding, Layer, Measured, Panel};
 use serde::{Deserialize, Serialize};
 use std::f64::consts::PI;
 
@@ -89,16 +89,10 @@ impl Shading {
 type Row = Measured<Case, Found>;
 
 impl Experiment for Scanline {
-    type Case = Case;
     type Row = Row;
     const NAME: &'static str = "scanline";
     const TITLE: &'static str = "intensity along a scan line of a cylinder: flat and Gouraud shaded prisms";
-    const COLUMNS: &'static [Column<Row>] = &[
-        ("picture", |r| (&r.case.picture).into()),
-        ("colours", |r| (r.colours as f64, 0).into()),
-        ("rms error", |r| (r.rms, 4).into()),
-        ("greatest error", |r| (r.greatest, 4).into()),
-    ];
+    const COLUMNS: &'static str = "picture, colours.0, rms.4 as rms error, greatest.4 as greatest error";
 
     fn cases(_: bool) -> Vec<Case> {
         PICTURES.map(|(name, _)| Case { picture: name.to_owned() }).to_vec()

@@ -6,7 +6,7 @@ use crate::chart::policies::numeric::forest;
 use crate::chart::policies::numeric::forest::{CameraPath, Forms};
 use crate::chart::policies::numeric::machine::Fault;
 use crate::chart::policies::numeric::metrics::mean;
-use crate::chart::{Axis, Colour, Column, Experiment, Figure, Finding, Layer, Measured, Panel};
+use crate::chart::{Axis, Colour, Experiment, Figure, Finding, Layer, Measured, Panel};
 use metachron_lod::cost::value::Value;
 use serde::{Deserialize, Serialize};
 
@@ -61,17 +61,10 @@ fn drawn(value: Value) -> (Vec<(f64, f64)>, f64) {
 type Row = Measured<Case, Found>;
 
 impl Experiment for Values {
-    type Case = Case;
     type Row = Row;
     const NAME: &'static str = "values";
     const TITLE: &'static str = "Robin Hood's value functions: detail of near and far trees";
-    const COLUMNS: &'static [Column<Row>] = &[
-        ("value", |r| (&r.case.value).into()),
-        ("near", |r| (r.near, 3).into()),
-        ("between", |r| (r.between, 3).into()),
-        ("far", |r| (r.far, 3).into()),
-        ("spent", |r| (r.spent, 3).into()),
-    ];
+    const COLUMNS: &'static str = "value, near.3, between.3, far.3, spent.3";
 
     fn cases(_: bool) -> Vec<Case> {
         VALUES.map(|v| Case { value: v.0.to_owned() }).to_vec()

@@ -7,7 +7,7 @@ use crate::chart::policies::numeric::common::{COLUMNS, Case, curves, number};
 use crate::chart::policies::numeric::machine::{Fault, RandomSource};
 use crate::chart::policies::numeric::metrics::Row;
 use crate::chart::policies::numeric::scene::{BenefitModel, ObjectLevel, Scene, SceneObject};
-use crate::chart::{Column, Experiment, Figure, Finding};
+use crate::chart::{Experiment, Figure, Finding};
 use glam::DVec3;
 use metachron_lod::cost::stages::Stages;
 
@@ -66,12 +66,11 @@ fn path(frames: usize) -> Path {
 }
 
 impl Experiment for Walkthrough {
-    type Case = Case;
     type Row = Row;
     const NAME: &'static str = "walkthrough";
     const TITLE: &'static str =
         "200 meshes of 1.5 million triangles and a sudden turn: prediction, measurement and certificate";
-    const COLUMNS: &'static [Column<Row>] = &COLUMNS;
+    const COLUMNS: &'static str = COLUMNS;
 
     fn cases(quick: bool) -> Vec<Case> {
         let frames = FRAMES / if quick { QUICK_PART } else { 1 };

@@ -8,7 +8,7 @@ mod sheet;
 
 use super::played::still::{Approach, Sight, Still, StillRequest, still};
 use super::played::walk::{ALIKE_DB, Opening, Times};
-use crate::chart::{Axis, Colour, Column, Experiment, Figure, Finding, Layer, Record, worst};
+use crate::chart::{Axis, Colour, Experiment, Figure, Finding, Layer, Record, worst};
 use csv::StringRecord;
 use figures::{Changes, Limit, PLATES, Panel, Plate};
 use metachron_lod::control::Policy;
@@ -50,7 +50,9 @@ pub(in super::super) struct Row {
     psnr_db: f64,
 }
 
-impl Record<Case> for Row {
+impl Record for Row {
+    type Case = Case;
+
     fn case(&self) -> Case {
         Case { panel: self.panel.clone(), frames: self.frames }
     }
@@ -109,24 +111,14 @@ impl Plate {
 }
 
 impl<const F: usize, const LIVE: bool> Experiment for Figures<F, LIVE> {
-    type Case = Case;
     type Row = Row;
     const NAME: &'static str = PLATES[F].name;
     const TITLE: &'static str = PLATES[F].title;
     // full detail is played once for all of them
     const ALONE: bool = true;
-    const COLUMNS: &'static [Column<Row>] = &[
-        ("panel", |r| (&r.panel).into()),
-        ("policy", |r| (&r.policy).into()),
-        ("T_ms", |r| (r.target_ms, 3).into()),
-        ("frame_ms", |r| (r.frame_ms, 3).into()),
-        ("triangles", |r| (r.triangles as f64, 0).into()),
-        ("paper", |r| (r.paper_triangles, 0).into()),
-        ("left_out", |r| (f64::from(r.holes), 0).into()),
-        ("impostors", |r| (r.impostors as f64, 0).into()),
-        ("ssim", |r| (r.ssim, 4).into()),
-        ("psnr_db", |r| (r.psnr_db, 1).into()),
-    ];
+    const COLUMNS: &'static str = "\
+        panel, policy, target_ms.3 as T_ms, frame_ms.3, triangles.0, paper_triangles.0 as paper, \
+        holes.0 as left_out, impostors.0, ssim.4, psnr_db.1";
 
     fn cases(quick: bool) -> Vec<Case> {
         let frames = PLATES[F].approach(quick).frames;

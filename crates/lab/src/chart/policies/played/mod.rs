@@ -6,12 +6,12 @@ mod row;
 pub(super) mod still;
 pub(super) mod walk;
 
+pub(super) use super::numeric::common::Case;
 use super::numeric::metrics::Row;
-use crate::chart::{Axis, Colour, Layer, Panel, Record};
-use csv::StringRecord;
+use crate::chart::{Axis, Colour, Layer, Panel};
 use metachron_lod::control::Policy;
 use metachron_scene::papers::{Choices, Paper};
-pub(super) use row::table;
+pub(super) use row::COLUMNS;
 pub(super) use walk::{Shown, Times};
 
 /// A scene, its frames, and the ratio of full detail's time to the target.
@@ -33,34 +33,15 @@ pub(super) const PLAYS: [Play; 5] = [
     Play { paper: Paper::Library, frames: [60, 10], times_over: 2.5 },
 ];
 
-/// A policy on a scene, of so many frames, in one of some equal rounds.
-#[derive(Debug, Clone, PartialEq)]
-pub(crate) struct Case {
-    pub(super) scene: String,
-    pub(super) policy: String,
-    pub(super) frames: usize,
-    pub(super) round: usize,
-}
-
-impl Record<Case> for Row {
-    fn case(&self) -> Case {
-        Case { scene: self.setting.clone(), policy: self.policy.clone(), frames: self.asked, round: self.round }
-    }
-
-    fn read(names: &StringRecord, line: &StringRecord) -> csv::Result<Self> {
-        line.deserialize(Some(names))
-    }
-}
-
 impl Case {
     /// Measures the row; one without frames where the case could not be played.
-    pub(super) fn measure(&self, times: Times) -> Row {
-        let play = PLAYS.iter().find(|play| play.paper.name() == self.scene);
+    pub(super) fn play(&self, times: Times) -> Row {
+        let play = PLAYS.iter().find(|play| play.paper.name() == self.setting);
         let measure = |play: &Play| {
             let text = play.paper.text(&Choices::default());
             walk::measure(&play.shown(&text), self, times)
         };
-        let row = play.map_or_else(|| Row::of(&self.scene, &self.policy, &[]), measure);
+        let row = play.map_or_else(|| Row::of(&self.setting, &self.policy, &[]), measure);
         Row { asked: self.frames, round: self.round, ..row }
     }
 }
@@ -72,9 +53,9 @@ impl Play {
 
     /// One case for every policy of the program in one round.
     pub(super) fn cases(&self, quick: bool, round: usize) -> impl Iterator<Item = Case> {
-        let (scene, frames) = (self.paper.name(), self.frames[usize::from(quick)]);
+        let (setting, frames) = (self.paper.name(), self.frames[usize::from(quick)]);
         let case =
-            move |policy: Policy| Case { scene: scene.to_owned(), policy: policy.name().to_owned(), frames, round };
+            move |policy: Policy| Case { setting: setting.to_owned(), policy: policy.name().to_owned(), frames, round };
         Policy::ALL.into_iter().map(case)
     }
 }
@@ -94,10 +75,11 @@ pub(super) fn curves<'a>(title: &str, rows: impl Iterator<Item = &'a Row> + Clon
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::chart::{Cell, Table};
     use metachron_render::Gpu;
 
     fn row(scene: &str, policy: &str) -> Row {
-        Case { scene: scene.to_owned(), policy: policy.to_owned(), frames: 6, round: 0 }.measure(Times::Declared)
+        Case { setting: scene.to_owned(), policy: policy.to_owned(), frames: 6, round: 0 }.play(Times::Declared)
     }
 
     #[test]
@@ -111,7 +93,10 @@ mod tests {
         }
         let drawn = Gpu::headless().is_ok();
         for row in &rows {
-            let unknown: Vec<_> = row::COLUMNS.iter().filter(|(_, of, _)| of(row).is_nan()).map(|c| c.0).collect();
+            let Table { columns, rows } = Table::of([row], COLUMNS);
+            let is_nan = |cell: &Cell| matches!(cell, Cell::Number(value, _) if value.is_nan());
+            let unknown: Vec<_> =
+                columns.iter().zip(&rows[0]).filter(|(_, cell)| is_nan(cell)).map(|(name, _)| name.as_str()).collect();
             // only a policy with a bound has `value` and `proven`, and only measured times have a spread
             let mut expected = vec!["spread95"];
             expected.extend(["value", "proven"].iter().filter(|_| row.policy == "robin-hood"));

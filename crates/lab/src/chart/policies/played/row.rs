@@ -2,7 +2,6 @@
 //!
 //! In: records of frames, times of full detail, likenesses. Out: a row, by the definitions of [`crate::chart::policies::numeric::metrics`].
 
-use super::super::super::table::{Cell, Table};
 use crate::chart::policies::numeric::closed_loop::Frame;
 use crate::chart::policies::numeric::metrics::{Row, deviation95, mean};
 use metachron_session::FrameRecord;
@@ -64,50 +63,9 @@ fn frame(row: &FrameRecord, full: f64, target_ms: f64) -> Frame {
     }
 }
 
-/// A column: its name, its number, and its digits after the point in the table.
-pub(super) type Column = (&'static str, fn(&Row) -> f64, usize);
-
 /// The numbers of a row that compare policies.
-pub(super) const COLUMNS: [Column; 30] = [
-    ("round", |r| r.round as f64, 0),
-    ("T_ms", |r| r.target_ms, 2),
-    ("mean", |r| r.mean, 3),
-    ("min", |r| r.min, 3),
-    ("max", |r| r.max, 3),
-    ("stddev", |r| r.stddev, 4),
-    ("p50", |r| r.p50, 3),
-    ("p95", |r| r.p95, 3),
-    ("p99", |r| r.p99, 3),
-    ("binding", |r| r.binding, 2),
-    ("b_stddev", |r| r.binding_stddev, 4),
-    ("avg_err", |r| r.avg_err, 4),
-    ("late", |r| r.late, 4),
-    ("miss", |r| r.misses, 4),
-    ("run", |r| r.miss_run as f64, 0),
-    ("overshoot", |r| r.overshoot, 3),
-    ("model", |r| r.model_error, 4),
-    ("model95", |r| r.model_error95, 4),
-    ("spread95", |r| r.spread95, 3),
-    ("value", |r| r.value_over_bound, 4),
-    ("proven", |r| r.certified, 3),
-    ("changes", |r| r.changes, 4),
-    ("reversals", |r| r.reversals, 5),
-    ("holes", |r| r.holes, 4),
-    ("triangles", |r| r.polygons, 0),
-    ("choosing", |r| r.choosing, 4),
-    ("ssim", |r| r.ssim, 4),
-    ("ssim_least", |r| r.ssim_least, 4),
-    ("psnr_db", |r| r.psnr_db, 1),
-    ("frames", |r| r.frames as f64, 0),
-];
-
-/// The table of all numbers of all rows.
-pub(in super::super) fn table(rows: &[Row]) -> Table {
-    let names: Vec<_> = ["scene", "policy"].into_iter().chain(COLUMNS.map(|column| column.0)).collect();
-    let mut table = Table::new(&names);
-    table.rows.extend(rows.iter().map(|row| {
-        let words = [row.setting.clone().into(), row.policy.clone().into()];
-        words.into_iter().chain(COLUMNS.map(|(_, of, digits)| Cell::Number(of(row), digits))).collect()
-    }));
-    table
-}
+pub(in super::super) const COLUMNS: &str = "\
+    setting as scene, policy, round.0, target_ms.2 as T_ms, mean.3, min.3, max.3, stddev.4, p50.3, p95.3, p99.3, \
+    binding.2, binding_stddev.4 as b_stddev, avg_err.4, late.4, misses.4 as miss, miss_run.0 as run, overshoot.3, \
+    model_error.4 as model, model_error95.4 as model95, spread95.3, value_over_bound.4 as value, certified.3 as proven, \
+    changes.4, reversals.5, holes.4, polygons.0 as triangles, choosing.4, ssim.4, ssim_least.4, psnr_db.1, frames.0";

@@ -107,7 +107,7 @@ pub(in super::super) fn measure(shown: &Shown<'_>, case: &Case, times: Times) ->
     let likeness: Vec<_> = pairs.filter_map(|(a, b)| Some((ssim(a, b)?, psnr_db(a, b)?.min(ALIKE_DB)))).collect();
     let full_ms: Vec<f64> = full.frames.iter().map(|row| row.frame_ms).collect();
     let played = Played {
-        scene: &case.scene,
+        scene: &case.setting,
         policy: &case.policy,
         adapter: &own.adapter,
         target_ms: 1e3 * target_s,
@@ -135,7 +135,7 @@ fn reference(shown: &Shown<'_>, frames: usize, times: Times) -> anyhow::Result<A
         return Ok(Arc::clone(played));
     }
     let in_time = if times == Times::Measured { frames_in_time(shown, frames)? } else { frames };
-    let case = Case { scene: shown.name.to_owned(), policy: "full".to_owned(), frames: in_time, round: 0 };
+    let case = Case { setting: shown.name.to_owned(), policy: "full".to_owned(), frames: in_time, round: 0 };
     // the target has no effect on full detail
     let full = Arc::new(played(shown, &case, 1.0, times)?);
     known.push((shown.name, frames, times, Arc::clone(&full)));

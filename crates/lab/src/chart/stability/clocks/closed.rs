@@ -9,7 +9,7 @@
 use super::closed_system::{ROOM_M, SYSTEMS, system};
 use crate::chart::asynchronous::play::Play;
 use crate::chart::stability::common::COMMON_ENERGY_MAX;
-use crate::chart::{Axis, Colour, Column, Experiment, Figure, Finding, Layer, Measured, Panel, span, worst};
+use crate::chart::{Axis, Colour, Experiment, Figure, Finding, Layer, Measured, Panel, span, worst};
 use glam::DVec3;
 use metachron_contact::audit::{Audit, audit};
 use metachron_core::{AgentId, SimTime};
@@ -73,26 +73,14 @@ pub(crate) struct Found {
 type Row = Measured<Case, Found>;
 
 impl Experiment for Closed {
-    type Case = Case;
     type Row = Row;
     const NAME: &'static str = "closed";
     const TITLE: &'static str =
         "closed system of three rigid bodies and two tubes on five clocks: momentum and energy at a common time";
-    const COLUMNS: &'static [Column<Row>] = &[
-        ("system", |r| (&r.case.system).into()),
-        ("turn", |r| (r.case.turn as f64, 0).into()),
-        ("seed", |r| (r.case.seed as f64, 0).into()),
-        ("seconds", |r| (r.case.seconds, 0).into()),
-        ("energy peak", |r| (r.energy_peak, 4).into()),
-        ("energy end", |r| (r.energy_end, 4).into()),
-        ("raw peak", |r| (r.raw_peak, 4).into()),
-        ("drift", |r| (r.drift, 4).into()),
-        ("angular", |r| (r.angular_drift, 4).into()),
-        ("raw drift", |r| (r.raw_drift, 4).into()),
-        ("in flight", |r| (r.in_flight, 4).into()),
-        ("blows", |r| (f64::from(r.impacts), 0).into()),
-        ("pause_s", |r| (r.pause_s, 1).into()),
-    ];
+    const COLUMNS: &'static str = "\
+        system, turn.0, seed.0, seconds.0, energy_peak.4 as energy peak, energy_end.4 as energy end, \
+        raw_peak.4 as raw peak, drift.4, angular_drift.4 as angular, raw_drift.4 as raw drift, \
+        in_flight.4 as in flight, impacts.0, pause_s.1";
 
     fn cases(quick: bool) -> Vec<Case> {
         let (turns, seeds, seconds) =

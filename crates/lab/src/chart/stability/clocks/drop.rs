@@ -85,7 +85,6 @@ pub(crate) struct Found {
 type Row = Measured<Case, Found>;
 
 impl Experiment for Drop {
-    type Case = Case;
     type Row = Row;
     const NAME: &'static str = "drop";
     const TITLE: &'static str = "50 g fall on 100 g on springs, separate clocks: peak energy of every contact law";

@@ -61,7 +61,6 @@ impl Default for Found {
 type Row = Measured<Case, Found>;
 
 impl Experiment for Impact {
-    type Case = Case;
     type Row = Row;
     const NAME: &'static str = "impact";
     const TITLE: &'static str = "impact of two balls on different clocks: velocities against the closed form";

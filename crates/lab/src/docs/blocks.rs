@@ -1,0 +1,115 @@
+//! Blocks of a document: what stands between `<!-- metachron … -->` and `<!-- end -->` is what that command prints.
+//!
+//! In: the text of a document. Out: its prose and its blocks, in order. Never here: what a command prints.
+
+use anyhow::{Context, bail};
+
+/// Begins a block; the command follows, then, each after a `|`, what of it is shown.
+const OPENS: &str = "<!-- metachron ";
+const CLOSES: &str = "<!-- end -->";
+
+/// A part of a document.
+#[derive(Debug, PartialEq)]
+pub(super) enum Part<'a> {
+    /// Lines that people write.
+    Prose(&'a str),
+    /// Lines that a command prints.
+    Block(Block<'a>),
+}
+
+/// Lines that a command prints.
+#[derive(Debug, PartialEq)]
+pub(super) struct Block<'a> {
+    /// The line that names the command, and its number from 1.
+    pub(super) opening: &'a str,
+    pub(super) line: usize,
+    /// The command's words after `metachron`.
+    pub(super) words: Vec<&'a str>,
+    /// Only rows with one of these values in this column.
+    pub(super) only: Vec<(&'a str, Vec<&'a str>)>,
+    /// What is shown; the whole table where nothing is named.
+    pub(super) views: Vec<View<'a>>,
+    /// What stands in the document.
+    pub(super) body: &'a str,
+}
+
+/// What is shown of an experiment.
+#[derive(Debug, PartialEq)]
+pub(super) enum View<'a> {
+    /// These columns of its table.
+    Columns(Vec<&'a str>),
+    /// Its claims, what was measured and whether they hold.
+    Claims,
+    /// Its figure, which stands beside the document in `figures`.
+    Figure,
+}
+
+/// A document as prose and blocks.
+///
+/// # Errors
+/// A block that is not closed.
+pub(super) fn parts(text: &str) -> anyhow::Result<Vec<Part<'_>>> {
+    let (mut parts, mut rest, mut line) = (Vec::new(), text, 1);
+    while let Some(from) = rest.match_indices(OPENS).map(|m| m.0).find(|&k| k == 0 || rest[..k].ends_with('\n')) {
+        let (prose, block) = rest.split_at(from);
+        line += prose.matches('\n').count();
+        let place = || format!("line {line}: `{}`", block.lines().next().unwrap_or_default());
+        let (opening, after) = block.split_once('\n').with_context(|| format!("{} has no end", place()))?;
+        let end = after.find(CLOSES).with_context(|| format!("{} is not closed by `{CLOSES}`", place()))?;
+        let body = &after[..end];
+        if body.contains(OPENS) {
+            bail!("{} is not closed by `{CLOSES}` before the next", place());
+        }
+        parts.extend([Part::Prose(prose), Part::Block(read(opening, line, body).with_context(place)?)]);
+        line += 1 + body.matches('\n').count();
+        rest = &after[end..];
+    }
+    parts.push(Part::Prose(rest));
+    Ok(parts)
+}
+
+/// A block from the line that opens it.
+fn read<'a>(opening: &'a str, line: usize, body: &'a str) -> anyhow::Result<Block<'a>> {
+    let inner = opening.trim_end().strip_prefix(OPENS).and_then(|rest| rest.strip_suffix("-->"));
+    let mut told = inner.context("a block begins with one line, `<!-- metachron … -->`")?.split('|').map(str::trim);
+    let words = told.next().unwrap_or_default().split_whitespace().collect();
+    let list = |text: &'a str| text.split(',').map(str::trim).collect::<Vec<_>>();
+    let (mut only, mut views) = (Vec::new(), Vec::new());
+    for one in told {
+        match (one, one.split_once(" = ")) {
+            (_, Some((column, values))) => only.push((column.trim(), list(values))),
+            ("claims", None) => views.push(View::Claims),
+            ("figure", None) => views.push(View::Figure),
+            (columns, None) => views.push(View::Columns(list(columns))),
+        }
+    }
+    Ok(Block { opening, line, words, only, views, body })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_document_is_its_prose_and_its_blocks() {
+        let text = "A\n<!-- metachron chart stability --only incline | body = box, tube | body, tan/μ | claims -->\nold\n<!-- end -->\nB\n";
+        let parts = parts(text).unwrap();
+        let [Part::Prose("A\n"), Part::Block(block), Part::Prose("<!-- end -->\nB\n")] = &parts[..] else {
+            panic!("{parts:?}")
+        };
+        assert_eq!((block.line, block.body, block.words.len()), (2, "old\n", 4));
+        assert_eq!(block.only, [("body", vec!["box", "tube"])]);
+        assert_eq!(block.views, [View::Columns(vec!["body", "tan/μ"]), View::Claims]);
+    }
+
+    #[test]
+    fn an_open_block_is_refused_with_its_line() {
+        for text in
+            ["A\n<!-- metachron list -->\nB\n", "A\n<!-- metachron list -->\n<!-- metachron list -->\n<!-- end -->\n"]
+        {
+            let why = parts(text).unwrap_err().to_string();
+            assert!(why.starts_with("line 2: `<!-- metachron list -->` is not closed"), "{why}");
+        }
+        assert_eq!(parts("in `<!-- metachron list -->` prose\n").unwrap().len(), 1);
+    }
+}
