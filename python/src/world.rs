@@ -423,16 +423,22 @@ impl World {
         self.pictures.depths(py, &self.inner, &Shot::new(size, camera)?)
     }
 
-    /// Begins files for other programs: moments as MCAP for Foxglove, Lichtblick and Rerun, or in a folder as a VTK series for ParaView; for
-    /// ui.perfetto.dev when each object stepped.
-    #[pyo3(signature = (*, mcap = None, vtk = None, perfetto = None))]
-    fn export(&self, mcap: Option<PathBuf>, vtk: Option<PathBuf>, perfetto: Option<PathBuf>) -> PyResult<Export> {
-        Export::create(&self.inner, &self.fixed_surface, Paths { mcap, vtk, perfetto })
+    /// Begins files for other programs: moments as MCAP for Foxglove, Lichtblick and Rerun, in a folder as VTK series for ParaView, or as one
+    /// animated binary glTF (.glb) for Blender and three.js; for ui.perfetto.dev when each object stepped.
+    #[pyo3(signature = (*, mcap = None, vtk = None, glb = None, perfetto = None))]
+    fn export(
+        &self,
+        mcap: Option<PathBuf>,
+        vtk: Option<PathBuf>,
+        glb: Option<PathBuf>,
+        perfetto: Option<PathBuf>,
+    ) -> PyResult<Export> {
+        Export::create(&self.inner, &self.fixed_surface, Paths { mcap, vtk, glb, perfetto })
     }
 
     /// Writes the surfaces of all objects, as they are now, as binary glTF (.glb). Raises `OSError`.
     fn write_glb(&self, py: Python<'_>, path: PathBuf) -> PyResult<()> {
-        let write = || write_glb(&path, &Moments::default().take(&self.inner), &self.fixed_surface);
+        let write = || write_glb(&path, &Moments::of(&self.inner).take(), &self.fixed_surface);
         py.detach(write).map_err(raised::export)
     }
 

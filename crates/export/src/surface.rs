@@ -61,6 +61,12 @@ impl Surface {
         }
     }
 
+    /// The mean of its points, and of their velocities; `None` without points.
+    pub(super) fn middle(&self) -> Option<[DVec3; 2]> {
+        let mean = |all: &[DVec3]| all.iter().sum::<DVec3>() / all.len() as f64;
+        (!self.points.is_empty()).then(|| [mean(&self.points), mean(&self.velocities)])
+    }
+
     /// A rigid body's triangles where it is.
     pub(super) fn moved(local: &LocalMesh, state: &RigidState) -> Self {
         let arms: Vec<DVec3> = local.points.iter().map(|p| state.rotation * *p).collect();

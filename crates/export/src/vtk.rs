@@ -1,24 +1,31 @@
-//! A series of VTK files for ParaView: one of all surfaces at each moment, and an index of them with their times.
+//! A series of VTK files for ParaView: at each moment one of all surfaces, one of all objects as points and one of all contacts, and indices of
+//! them with their times.
 //!
-//! In: moments. Out: `series.pvd`, `000000.vtu` …, `fixed.vtu`, `objects.csv` in a folder. Never here: compression, partitions.
+//! In: moments. Out: `series.pvd`, `000000.vtu` …, `objects.pvd`, `contacts.pvd` and their files, `fixed.vtu`, `objects.csv` in a folder.
+//! Never here: the words of VTK's files (`grid.rs`), compression, partitions.
 
-use super::moment::ObjectMoment;
+mod grid;
+
+use super::moment::{ContactMoment, ObjectMoment};
 use super::surface::Surface;
 use super::{ExportError, Moment, MomentWriter};
-use metachron_core::AgentId;
+use glam::DVec3;
+use grid::{Array, Grid};
+use metachron_core::{AgentId, Body, ContactPartner};
 use std::collections::BTreeSet;
 use std::fs::File;
 use std::io::{BufWriter, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
 
-/// The number that VTK gives a triangle among its cells.
-const VTK_TRIANGLE: u8 = 5;
-/// The index of a series, the names of its objects, and its solids that never move.
-const INDEX: &str = "series.pvd";
+/// The indices of surfaces, of objects and of contacts.
+const INDICES: [&str; 3] = ["series.pvd", "objects.pvd", "contacts.pvd"];
+/// The beginnings of the names of their files.
+const PREFIXES: [&str; 3] = ["", "objects", "contacts"];
+/// The names of the objects, and the solids that never move.
 const NAMES: &str = "objects.csv";
 const FIXED: &str = "fixed.vtu";
-/// The ending of the files of surfaces.
-const SURFACES: &str = ".vtu";
+/// The ending of the files of moments.
+const ENDING: &str = ".vtu";
 const INDEX_HEAD: &str = "<?xml version=\"1.0\"?>\n<VTKFile type=\"Collection\" version=\"0.1\">\n<Collection>\n";
 const INDEX_FOOT: &str = "</Collection>\n</VTKFile>\n";
 
@@ -26,20 +33,24 @@ const INDEX_FOOT: &str = "</Collection>\n</VTKFile>\n";
 ///
 /// Points have `velocity` (m/s); triangles have `object` (the number of their agent, by which `objects.csv` names it), `eps_m` (the spacing
 /// that it is simulated at, metres, NaN where it has none) and `residual_m` (its estimate of its own error, metres).
-/// The index is complete after every moment, so that a run that was cut short opens as far as it went.
+/// `objects.pvd` has a point in the middle of every object, with its `name`, its number as `object`, its `velocity` (m/s), the sum of its contact
+/// forces as `contact_force` (N) and its `energy_j`. `contacts.pvd` has a point where every contact bears most, with the names `object_name` and
+/// `with_name`, the numbers `object` and `with` (−1 of a static solid), the `normal` towards the object, the `contact_force` on it (N: the mean of
+/// its last step) and `depth_m`; a contact whose place is not known is left out.
+/// The indices are complete after every moment, so that a run that was cut short opens as far as it went.
 #[derive(Debug)]
 pub struct VtkSeries {
     folder: PathBuf,
-    index: File,
+    indices: [File; 3],
     names: BufWriter<File>,
     named: BTreeSet<AgentId>,
     moments: u64,
 }
 
 impl VtkSeries {
-    /// Files of every series except the files of its moments, which are called by their numbers,
+    /// Files of every series except the files of its moments, whose names end in their numbers,
     /// [`VtkSeries::MOMENT_DIGITS`] digits or more.
-    pub const FILES: [&str; 3] = [INDEX, NAMES, FIXED];
+    pub const FILES: [&str; 5] = [INDICES[0], INDICES[1], INDICES[2], NAMES, FIXED];
     /// Digits of the number of a moment, at least.
     pub const MOMENT_DIGITS: usize = 6;
 
@@ -70,22 +81,20 @@ impl VtkSeries {
     pub fn create(folder: &Path, fixed: &Surface) -> Result<Self, ExportError> {
         Self::check(folder)?;
         std::fs::create_dir_all(folder).map_err(ExportError::at(folder))?;
-        let path = folder.join(INDEX);
-        let mut index = File::create(&path).map_err(ExportError::at(&path))?;
-        index.write_all(format!("{INDEX_HEAD}{INDEX_FOOT}").as_bytes()).map_err(ExportError::at(&path))?;
+        let index = |name: &str| {
+            let path = folder.join(name);
+            let mut index = File::create(&path).map_err(ExportError::at(&path))?;
+            index.write_all(format!("{INDEX_HEAD}{INDEX_FOOT}").as_bytes()).map_err(ExportError::at(&path))?;
+            Ok(index)
+        };
+        let [surfaces, objects, contacts] = INDICES.map(index);
+        let indices = [surfaces?, objects?, contacts?];
         let names = folder.join(NAMES);
         let mut names = BufWriter::new(File::create(&names).map_err(ExportError::at(&names))?);
         writeln!(names, "object,name").map_err(ExportError::at(folder))?;
-        let path = folder.join(FIXED);
-        write_file(&path, &[Part { object: -1, eps_m: f64::NAN, residual_m: 0.0, surface: fixed }])?;
-        Ok(Self { folder: folder.to_owned(), index, names, named: BTreeSet::new(), moments: 0 })
-    }
-
-    /// Adds a file to the index, in the place of its end.
-    fn enter(&mut self, time_s: f64, file: &str) -> std::io::Result<()> {
-        let entry = format!("<DataSet timestep=\"{time_s}\" part=\"0\" file=\"{file}\"/>\n{INDEX_FOOT}");
-        self.index.seek(SeekFrom::End(-(INDEX_FOOT.len() as i64)))?;
-        self.index.write_all(entry.as_bytes())
+        surfaces_of(&[Part { object: -1, eps_m: f64::NAN, residual_m: 0.0, surface: fixed }])
+            .save(&folder.join(FIXED))?;
+        Ok(Self { folder: folder.to_owned(), indices, names, named: BTreeSet::new(), moments: 0 })
     }
 
     fn name(&mut self, object: &ObjectMoment) -> std::io::Result<()> {
@@ -98,17 +107,20 @@ impl VtkSeries {
 
 impl MomentWriter for VtkSeries {
     fn write(&mut self, moment: &Moment) -> Result<(), ExportError> {
-        let file = format!("{:0width$}{SURFACES}", self.moments, width = Self::MOMENT_DIGITS);
         let parts = moment.objects.iter().map(|object| Part {
-            object: object.id.0.cast_signed(),
+            object: number(object.id),
             eps_m: object.state.resolution.map_or(f64::NAN, |resolution| resolution.eps_m),
             residual_m: object.state.residual_m,
             surface: &object.surface,
         });
-        write_file(&self.folder.join(&file), &parts.collect::<Vec<_>>())?;
+        let grids = [surfaces_of(&parts.collect::<Vec<_>>()), objects_of(moment), contacts_of(&moment.contacts)];
+        for ((grid, prefix), index) in grids.iter().zip(PREFIXES).zip(&mut self.indices) {
+            let file = format!("{prefix}{:0width$}{ENDING}", self.moments, width = Self::MOMENT_DIGITS);
+            grid.save(&self.folder.join(&file))?;
+            enter(index, moment.time.as_secs_f64(), &file).map_err(ExportError::at(&self.folder))?;
+        }
         moment.objects.iter().try_for_each(|object| self.name(object)).map_err(ExportError::at(&self.folder))?;
         self.names.flush().map_err(ExportError::at(&self.folder))?;
-        self.enter(moment.time.as_secs_f64(), &file).map_err(ExportError::at(&self.folder))?;
         self.moments += 1;
         Ok(())
     }
@@ -118,11 +130,23 @@ impl MomentWriter for VtkSeries {
     }
 }
 
+/// Adds a file to an index, in the place of its end.
+fn enter(index: &mut File, time_s: f64, file: &str) -> std::io::Result<()> {
+    let entry = format!("<DataSet timestep=\"{time_s}\" part=\"0\" file=\"{file}\"/>\n{INDEX_FOOT}");
+    index.seek(SeekFrom::End(-(INDEX_FOOT.len() as i64)))?;
+    index.write_all(entry.as_bytes())
+}
+
 /// Whether a series may have a file of this name.
 fn is_of_a_series(name: &str) -> bool {
-    let is_moment =
+    let is_number =
         |number: &str| number.len() >= VtkSeries::MOMENT_DIGITS && number.bytes().all(|digit| digit.is_ascii_digit());
-    VtkSeries::FILES.contains(&name) || name.strip_suffix(SURFACES).is_some_and(is_moment)
+    let is_moment = |stem: &str| PREFIXES.iter().any(|prefix| stem.strip_prefix(prefix).is_some_and(is_number));
+    VtkSeries::FILES.contains(&name) || name.strip_suffix(ENDING).is_some_and(is_moment)
+}
+
+fn number(id: AgentId) -> i32 {
+    id.0.cast_signed()
 }
 
 /// The triangles of one object, and the values that all of them share.
@@ -133,80 +157,74 @@ struct Part<'a> {
     surface: &'a Surface,
 }
 
-fn write_file(path: &Path, parts: &[Part<'_>]) -> Result<(), ExportError> {
-    let mut file = BufWriter::new(File::create(path).map_err(ExportError::at(path))?);
-    write_parts(&mut file, parts).and_then(|()| file.flush()).map_err(ExportError::at(path))
-}
-
-/// An unstructured grid of triangles; arrays are appended as they are, each after its length in bytes.
-fn write_parts(file: &mut impl Write, parts: &[Part<'_>]) -> std::io::Result<()> {
-    let points: usize = parts.iter().map(|part| part.surface.points.len()).sum();
-    let triangles: usize = parts.iter().map(|part| part.surface.triangles.len()).sum();
-    let arrays = arrays(parts);
-    let mut offset = 0;
-    let mut declared = arrays.iter().map(|array| {
-        let Array { kind, name, components, bytes } = array;
-        let line = format!(
-            "<DataArray type=\"{kind}\" Name=\"{name}\" NumberOfComponents=\"{components}\" format=\"appended\" offset=\"{offset}\"/>\n"
-        );
-        offset += 8 + bytes.len();
-        line
-    });
-    let mut next = |count: usize| declared.by_ref().take(count).collect::<String>();
-    write!(
-        file,
-        "<?xml version=\"1.0\"?>\n<VTKFile type=\"UnstructuredGrid\" version=\"1.0\" byte_order=\"LittleEndian\" header_type=\"UInt64\">\n\
-         <UnstructuredGrid>\n<Piece NumberOfPoints=\"{points}\" NumberOfCells=\"{triangles}\">\n\
-         <Points>\n{}</Points>\n<Cells>\n{}</Cells>\n<PointData>\n{}</PointData>\n<CellData>\n{}</CellData>\n\
-         </Piece>\n</UnstructuredGrid>\n<AppendedData encoding=\"raw\">\n_",
-        next(1),
-        next(3),
-        next(1),
-        next(3),
-    )?;
-    for array in &arrays {
-        file.write_all(&(array.bytes.len() as u64).to_le_bytes())?;
-        file.write_all(&array.bytes)?;
+fn surfaces_of(parts: &[Part<'_>]) -> Grid {
+    let mut grid = Grid::of_triangles();
+    let (mut velocities, mut objects, mut eps_m, mut residuals_m) = (vec![], vec![], vec![], vec![]);
+    for Part { object, eps_m: own_eps_m, residual_m, surface } in parts {
+        let first = grid.points.len() as u32;
+        grid.points.extend(&surface.points);
+        grid.cells.extend(surface.triangles.iter().flatten().map(|corner| corner + first));
+        velocities.extend(&surface.velocities);
+        let triangles = surface.triangles.len();
+        objects.extend(std::iter::repeat_n(*object, triangles));
+        eps_m.extend(std::iter::repeat_n(*own_eps_m, triangles));
+        residuals_m.extend(std::iter::repeat_n(*residual_m, triangles));
     }
-    write!(file, "\n</AppendedData>\n</VTKFile>\n")
+    grid.of_points = vec![Array::vectors("velocity", &velocities)];
+    grid.of_cells = vec![
+        Array::integers("object", &objects),
+        Array::numbers("eps_m", &eps_m),
+        Array::numbers("residual_m", &residuals_m),
+    ];
+    grid
 }
 
-struct Array {
-    kind: &'static str,
-    name: &'static str,
-    components: u8,
-    bytes: Vec<u8>,
+/// A point in the middle of every object that has a place.
+fn objects_of(moment: &Moment) -> Grid {
+    let middle = |object: &ObjectMoment| match &object.state.body {
+        Body::Rigid(body) => Some([body.position, body.velocity]),
+        _ => object.surface.middle(),
+    };
+    let placed: Vec<_> = moment.objects.iter().filter_map(|object| Some((object, middle(object)?))).collect();
+    let force = |id: AgentId| -> DVec3 {
+        let on_it = |contact: &ContactMoment| match contact.state.with {
+            _ if contact.object == id => contact.state.force_n,
+            ContactPartner::Agent(with) if with == id => -contact.state.force_n,
+            _ => DVec3::ZERO,
+        };
+        moment.contacts.iter().map(on_it).sum()
+    };
+    let of =
+        |value: &dyn Fn(&ObjectMoment) -> DVec3| placed.iter().map(|(object, _)| value(object)).collect::<Vec<_>>();
+    let velocities: Vec<_> = placed.iter().map(|(_, [_, velocity])| *velocity).collect();
+    let mut grid = Grid::of_vertices(placed.iter().map(|(_, [position, _])| *position).collect());
+    grid.of_points = vec![
+        Array::texts("name", placed.iter().map(|(object, _)| &*object.name)),
+        Array::integers("object", &placed.iter().map(|(object, _)| number(object.id)).collect::<Vec<_>>()),
+        Array::vectors("velocity", &velocities),
+        Array::vectors("contact_force", &of(&|object| force(object.id))),
+        Array::numbers("energy_j", &placed.iter().map(|(object, _)| object.state.energy_j).collect::<Vec<_>>()),
+    ];
+    grid
 }
 
-/// Points, three arrays of cells, one of points' data, three of cells' data: in the order in which they are declared.
-fn arrays(parts: &[Part<'_>]) -> [Array; 8] {
-    let vectors = |of: fn(&Surface) -> &[glam::DVec3]| {
-        let all = parts.iter().flat_map(|part| of(part.surface)).flat_map(|v| v.to_array());
-        all.flat_map(f64::to_le_bytes).collect()
+fn contacts_of(contacts: &[ContactMoment]) -> Grid {
+    let placed: Vec<_> = contacts.iter().filter(|contact| contact.state.point_m.is_finite()).collect();
+    let vectors = |of: fn(&ContactMoment) -> DVec3| placed.iter().map(|contact| of(contact)).collect::<Vec<_>>();
+    let integers = |of: fn(&ContactMoment) -> i32| placed.iter().map(|contact| of(contact)).collect::<Vec<_>>();
+    let with = |contact: &ContactMoment| match contact.state.with {
+        ContactPartner::Agent(id) => number(id),
+        ContactPartner::Static(_) => -1,
     };
-    let mut corners = Vec::new();
-    let mut first = 0;
-    for part in parts {
-        let shifted = part.surface.triangles.iter().flatten().map(|corner| i64::from(*corner) + first);
-        corners.extend(shifted.flat_map(i64::to_le_bytes));
-        first += part.surface.points.len() as i64;
-    }
-    let triangles = corners.len() / 24;
-    let ends = (1..=triangles as i64).flat_map(|k| (3 * k).to_le_bytes()).collect();
-    let of_cells = |value: fn(&Part<'_>) -> f64| {
-        let all = parts.iter().flat_map(|part| std::iter::repeat_n(value(part), part.surface.triangles.len()));
-        all.flat_map(f64::to_le_bytes).collect()
-    };
-    let objects = parts.iter().flat_map(|part| std::iter::repeat_n(part.object, part.surface.triangles.len()));
-    let array = |kind, name, components, bytes| Array { kind, name, components, bytes };
-    [
-        array("Float64", "Points", 3, vectors(|surface| &surface.points)),
-        array("Int64", "connectivity", 1, corners),
-        array("Int64", "offsets", 1, ends),
-        array("UInt8", "types", 1, vec![VTK_TRIANGLE; triangles]),
-        array("Float64", "velocity", 3, vectors(|surface| &surface.velocities)),
-        array("Int32", "object", 1, objects.flat_map(i32::to_le_bytes).collect()),
-        array("Float64", "eps_m", 1, of_cells(|part| part.eps_m)),
-        array("Float64", "residual_m", 1, of_cells(|part| part.residual_m)),
-    ]
+    let mut grid = Grid::of_vertices(vectors(|contact| contact.state.point_m));
+    grid.of_points = vec![
+        Array::texts("object_name", placed.iter().map(|contact| &*contact.names[0])),
+        Array::texts("with_name", placed.iter().map(|contact| &*contact.names[1])),
+        Array::integers("object", &integers(|contact| number(contact.object))),
+        Array::integers("with", &integers(with)),
+        Array::vectors("normal", &vectors(|contact| contact.state.normal)),
+        Array::vectors("contact_force", &vectors(|contact| contact.state.force_n)),
+        Array::numbers("depth_m", &placed.iter().map(|contact| contact.state.depth_m).collect::<Vec<_>>()),
+    ];
+    grid
 }
