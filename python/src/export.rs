@@ -4,7 +4,7 @@
 
 use crate::raised;
 use metachron::export::{GlbAnimation, McapFile, MomentWriter, Moments, PerfettoFile, Surface, VtkSeries};
-use metachron::world::World;
+use metachron::world::{Scene, World};
 use pyo3::exceptions::{PyRuntimeError, PyValueError};
 use pyo3::prelude::*;
 use std::path::PathBuf;
@@ -12,10 +12,7 @@ use std::sync::{Mutex, PoisonError};
 
 /// Writes moments of a world; in a `with` block the files are complete at the end.
 #[pyclass(frozen, module = "metachron")]
-pub struct Export {
-    world: World,
-    files: Mutex<Option<Files>>,
-}
+pub struct Export(Mutex<Option<Files>>);
 
 struct Files {
     moments: Moments,
@@ -32,8 +29,9 @@ pub struct Paths {
 }
 
 impl Export {
-    /// Begins the files; `fixed` is the surface of static solids.
-    pub fn create(world: &World, fixed: &Surface, paths: Paths) -> PyResult<Self> {
+    /// Begins the files of a world of this scene.
+    pub fn create(world: &World, scene: &Scene, paths: Paths) -> PyResult<Self> {
+        let fixed = &Surface::fixed(scene);
         let Paths { mcap, vtk, glb, perfetto } = paths;
         let given: Vec<_> = [&mcap, &vtk, &glb, &perfetto].into_iter().flatten().collect();
         if let Some((_, path)) = given.iter().enumerate().find(|(at, path)| given[..*at].contains(path)) {
@@ -44,7 +42,7 @@ impl Export {
             writers.push(Box::new(McapFile::create(&path, fixed).map_err(raised::export)?));
         }
         if let Some(path) = vtk {
-            writers.push(Box::new(VtkSeries::create(&path, fixed).map_err(raised::export)?));
+            writers.push(Box::new(VtkSeries::create(&path, scene).map_err(raised::export)?));
         }
         if let Some(path) = glb {
             writers.push(Box::new(GlbAnimation::create(&path, fixed).map_err(raised::export)?));
@@ -56,7 +54,7 @@ impl Export {
             ));
         }
         let files = Files { moments: Moments::of(world), writers, trace };
-        Ok(Self { world: world.clone(), files: Mutex::new(Some(files)) })
+        Ok(Self(Mutex::new(Some(files))))
     }
 }
 
@@ -65,7 +63,7 @@ impl Export {
     /// Writes the world as it is now. `OSError` where a file cannot be written, `RuntimeError` after `close`.
     fn write(&self, py: Python<'_>) -> PyResult<()> {
         py.detach(|| {
-            let mut files = self.files.lock().unwrap_or_else(PoisonError::into_inner);
+            let mut files = self.0.lock().unwrap_or_else(PoisonError::into_inner);
             let Some(Files { moments, writers, trace }) = &mut *files else {
                 return Err(PyRuntimeError::new_err("the files are complete; nothing more can be written"));
             };
@@ -79,7 +77,7 @@ impl Export {
 
     /// Completes the files.
     fn close(&self) -> PyResult<()> {
-        let files = self.files.lock().unwrap_or_else(PoisonError::into_inner).take();
+        let files = self.0.lock().unwrap_or_else(PoisonError::into_inner).take();
         let Some(Files { mut writers, trace, .. }) = files else { return Ok(()) };
         let moments = writers.iter_mut().try_for_each(|writer| writer.finish());
         let trace = trace.map_or(Ok(()), |mut trace| trace.finish());

@@ -51,6 +51,7 @@ def test_meshio_reads_the_surfaces(tmp_path: Path) -> None:
         radius = np.ptp(points[:, 2]) / 2
         assert volume == pytest.approx(4 / 3 * np.pi * radius**3, rel=0.06)
         assert set(mesh.cell_data) == {"object", "eps_m", "residual_m"}
+        assert np.isnan(mesh.point_data["von_mises_pa"]).all()
         # all points of a body that does not turn move alike
         assert np.ptp(mesh.point_data["velocity"], axis=0) == pytest.approx([0.0, 0.0, 0.0])
 

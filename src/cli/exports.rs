@@ -51,7 +51,7 @@ impl Exports {
             writers.push(Box::new(McapFile::create(path, &fixed)?));
         }
         if let Some(path) = &paths.vtk {
-            writers.push(Box::new(VtkSeries::create(path, &fixed)?));
+            writers.push(Box::new(VtkSeries::create(path, scene)?));
         }
         if let Some(path) = &paths.animation {
             writers.push(Box::new(GlbAnimation::create(path, &fixed)?));

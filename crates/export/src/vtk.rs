@@ -12,6 +12,7 @@ use super::{ExportError, Moment, MomentWriter};
 use glam::DVec3;
 use grid::{Array, Grid};
 use metachron_core::{AgentId, Body, ContactPartner};
+use metachron_world::{Scene, Stresses};
 use std::collections::BTreeSet;
 use std::fs::File;
 use std::io::{BufWriter, Seek, SeekFrom, Write};
@@ -31,7 +32,8 @@ const INDEX_FOOT: &str = "</Collection>\n</VTKFile>\n";
 
 /// A folder of files that ParaView opens by `series.pvd`.
 ///
-/// Points have `velocity` (m/s); triangles have `object` (the number of their agent, by which `objects.csv` names it), `eps_m` (the spacing
+/// Points have `velocity` (m/s) and `von_mises_pa` (the stress of elastic forces in soft bodies and tubes, there the greatest in the section; NaN
+/// elsewhere, in objects that joined later and where cells were removed); triangles have `object` (the number of their agent, by which `objects.csv` names it), `eps_m` (the spacing
 /// that it is simulated at, metres, NaN where it has none) and `residual_m` (its estimate of its own error, metres).
 /// `objects.pvd` has a point in the middle of every object, with its `name`, its number as `object`, its `velocity` (m/s), the sum of its contact
 /// forces as `contact_force` (N) and its `energy_j`. `contacts.pvd` has a point where every contact bears most, with the names `object_name` and
@@ -45,6 +47,7 @@ pub struct VtkSeries {
     names: BufWriter<File>,
     named: BTreeSet<AgentId>,
     moments: u64,
+    stresses: Stresses,
 }
 
 impl VtkSeries {
@@ -74,11 +77,11 @@ impl VtkSeries {
         Ok(())
     }
 
-    /// Begins a series in a folder, which is made where it does not exist; `fixed` are the solids that never move.
+    /// Begins a series of a world of this scene in a folder, which is made where it does not exist.
     ///
     /// # Errors
     /// The errors of [`VtkSeries::check`]; [`ExportError::File`] where the folder cannot be made or written.
-    pub fn create(folder: &Path, fixed: &Surface) -> Result<Self, ExportError> {
+    pub fn create(folder: &Path, scene: &Scene) -> Result<Self, ExportError> {
         Self::check(folder)?;
         std::fs::create_dir_all(folder).map_err(ExportError::at(folder))?;
         let index = |name: &str| {
@@ -92,9 +95,17 @@ impl VtkSeries {
         let names = folder.join(NAMES);
         let mut names = BufWriter::new(File::create(&names).map_err(ExportError::at(&names))?);
         writeln!(names, "object,name").map_err(ExportError::at(folder))?;
-        surfaces_of(&[Part { object: -1, eps_m: f64::NAN, residual_m: 0.0, surface: fixed }])
+        let fixed = Surface::fixed(scene);
+        surfaces_of(&[Part { object: -1, eps_m: f64::NAN, residual_m: 0.0, surface: &fixed, stresses_pa: None }])
             .save(&folder.join(FIXED))?;
-        Ok(Self { folder: folder.to_owned(), indices, names, named: BTreeSet::new(), moments: 0 })
+        Ok(Self {
+            folder: folder.to_owned(),
+            indices,
+            names,
+            named: BTreeSet::new(),
+            moments: 0,
+            stresses: Stresses::of(scene),
+        })
     }
 
     fn name(&mut self, object: &ObjectMoment) -> std::io::Result<()> {
@@ -112,6 +123,7 @@ impl MomentWriter for VtkSeries {
             eps_m: object.state.resolution.map_or(f64::NAN, |resolution| resolution.eps_m),
             residual_m: object.state.residual_m,
             surface: &object.surface,
+            stresses_pa: self.stresses.von_mises_pa(object.id, &object.state),
         });
         let grids = [surfaces_of(&parts.collect::<Vec<_>>()), objects_of(moment), contacts_of(&moment.contacts)];
         for ((grid, prefix), index) in grids.iter().zip(PREFIXES).zip(&mut self.indices) {
@@ -155,22 +167,27 @@ struct Part<'a> {
     eps_m: f64,
     residual_m: f64,
     surface: &'a Surface,
+    /// At the vertices or nodes of the object.
+    stresses_pa: Option<Vec<f64>>,
 }
 
 fn surfaces_of(parts: &[Part<'_>]) -> Grid {
     let mut grid = Grid::of_triangles();
-    let (mut velocities, mut objects, mut eps_m, mut residuals_m) = (vec![], vec![], vec![], vec![]);
-    for Part { object, eps_m: own_eps_m, residual_m, surface } in parts {
+    let (mut velocities, mut stresses, mut objects) = (vec![], vec![], vec![]);
+    let (mut eps_m, mut residuals_m) = (vec![], vec![]);
+    for Part { object, eps_m: own_eps_m, residual_m, surface, stresses_pa } in parts {
         let first = grid.points.len() as u32;
         grid.points.extend(&surface.points);
         grid.cells.extend(surface.triangles.iter().flatten().map(|corner| corner + first));
         velocities.extend(&surface.velocities);
+        let stress = |point: usize| stresses_pa.as_ref()?.get(*surface.follows.get(point)? as usize).copied();
+        stresses.extend((0..surface.points.len()).map(|point| stress(point).unwrap_or(f64::NAN)));
         let triangles = surface.triangles.len();
         objects.extend(std::iter::repeat_n(*object, triangles));
         eps_m.extend(std::iter::repeat_n(*own_eps_m, triangles));
         residuals_m.extend(std::iter::repeat_n(*residual_m, triangles));
     }
-    grid.of_points = vec![Array::vectors("velocity", &velocities)];
+    grid.of_points = vec![Array::vectors("velocity", &velocities), Array::numbers("von_mises_pa", &stresses)];
     grid.of_cells = vec![
         Array::integers("object", &objects),
         Array::numbers("eps_m", &eps_m),

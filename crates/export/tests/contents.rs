@@ -128,7 +128,7 @@ fn texts(bytes: &[u8]) -> Vec<String> {
 #[test]
 fn a_vtk_series_has_names_and_the_forces_of_contacts() {
     let folder = tempfile::tempdir().unwrap();
-    export(&mut VtkSeries::create(folder.path(), &Surface::fixed(&scene())).unwrap());
+    export(&mut VtkSeries::create(folder.path(), &scene()).unwrap());
     for index in ["series.pvd", "objects.pvd", "contacts.pvd"] {
         let text = std::fs::read_to_string(folder.path().join(index)).unwrap();
         assert_eq!(text.matches("<DataSet").count(), 20, "{index}");

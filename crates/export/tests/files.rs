@@ -33,7 +33,7 @@ fn export(into: &mut dyn MomentWriter) -> Vec<Moment> {
 #[test]
 fn surfaces_are_closed_and_hold_the_volume_of_the_solids() {
     let folder = tempfile::tempdir().unwrap();
-    let moments = export(&mut VtkSeries::create(folder.path(), &Surface::fixed(&scene())).unwrap());
+    let moments = export(&mut VtkSeries::create(folder.path(), &scene()).unwrap());
     let volume = |k: usize| {
         let surface = &moments[0].objects[k].surface;
         let mesh = Triangles { points: surface.points.clone(), triangles: surface.triangles.clone() };
@@ -119,8 +119,7 @@ fn an_mcap_file_that_was_cut_short_opens_up_to_its_last_second() {
 #[test]
 fn a_vtk_series_lists_its_moments_and_holds_their_points() {
     let folder = tempfile::tempdir().unwrap();
-    let fixed = Surface::fixed(&scene());
-    let mut series = VtkSeries::create(folder.path(), &fixed).unwrap();
+    let mut series = VtkSeries::create(folder.path(), &scene()).unwrap();
     let moments = export(&mut series);
     series.finish().unwrap();
     let index = std::fs::read_to_string(folder.path().join("series.pvd")).unwrap();
@@ -146,7 +145,7 @@ fn a_vtk_series_lists_its_moments_and_holds_their_points() {
     for name in VtkSeries::FILES {
         std::fs::remove_file(folder.path().join(name)).unwrap();
     }
-    let taken = VtkSeries::create(folder.path(), &fixed).err();
+    let taken = VtkSeries::create(folder.path(), &scene()).err();
     assert!(matches!(&taken, Some(ExportError::Taken { path }) if path.extension().unwrap() == "vtu"), "{taken:?}");
     let plain = folder.path().join("other");
     std::fs::create_dir(&plain).unwrap();

@@ -28,7 +28,7 @@ pub(super) struct FeMesh {
     pub mass_kg: Vec<f64>,
     /// Whether each vertex is fixed.
     pub held: Vec<bool>,
-    bars: Vec<Bar>,
+    pub(super) bars: Vec<Bar>,
     pub(super) membranes: Vec<Membrane>,
     pub(super) bending: Vec<BendingElement>,
     pub(super) shells: Vec<ShellBending>,
@@ -36,7 +36,7 @@ pub(super) struct FeMesh {
     /// The materials of the tetrahedra.
     pub(super) laws: Vec<Law>,
     pub(super) hexahedra: Vec<Hexahedron>,
-    kinds: Vec<HexahedronKind>,
+    pub(super) kinds: Vec<HexahedronKind>,
     /// Three vertices in a row, and the distance of the middle one from the line at rest, metres.
     pub(super) rows: Vec<([u32; 3], f64)>,
     pub(super) triangles: Vec<[u32; 3]>,
