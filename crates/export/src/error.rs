@@ -30,12 +30,12 @@ pub enum ExportError {
         last_s: f32,
     },
     /// An animation that would be too large.
-    #[error("{} would have more than {mib} MiB: it ends after {moments} moments, before {time_s} s; write fewer moments, or a shorter run", path.display())]
+    #[error("{} would have more than {bytes_max} bytes: it ends after {moments} moments, before {time_s} s; write fewer moments, or a shorter run", path.display())]
     TooLong {
         /// The file.
         path: PathBuf,
-        /// The most that it may have.
-        mib: usize,
+        /// The most that it may have, about.
+        bytes_max: usize,
         /// The moments in it.
         moments: usize,
         /// The time of the first that has no room.

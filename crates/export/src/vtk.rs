@@ -13,7 +13,7 @@ use glam::DVec3;
 use grid::{Array, Grid};
 use metachron_core::{AgentId, Body, ContactPartner};
 use metachron_world::{Scene, Stresses};
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 use std::fs::File;
 use std::io::{BufWriter, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
@@ -173,25 +173,22 @@ struct Part<'a> {
 
 fn surfaces_of(parts: &[Part<'_>]) -> Grid {
     let mut grid = Grid::of_triangles();
-    let (mut velocities, mut stresses, mut objects) = (vec![], vec![], vec![]);
-    let (mut eps_m, mut residuals_m) = (vec![], vec![]);
-    for Part { object, eps_m: own_eps_m, residual_m, surface, stresses_pa } in parts {
+    for Part { surface, .. } in parts {
         let first = grid.points.len() as u32;
         grid.points.extend(&surface.points);
         grid.cells.extend(surface.triangles.iter().flatten().map(|corner| corner + first));
-        velocities.extend(&surface.velocities);
-        let stress = |point: usize| stresses_pa.as_ref()?.get(*surface.follows.get(point)? as usize).copied();
-        stresses.extend((0..surface.points.len()).map(|point| stress(point).unwrap_or(f64::NAN)));
-        let triangles = surface.triangles.len();
-        objects.extend(std::iter::repeat_n(*object, triangles));
-        eps_m.extend(std::iter::repeat_n(*own_eps_m, triangles));
-        residuals_m.extend(std::iter::repeat_n(*residual_m, triangles));
     }
-    grid.of_points = vec![Array::vectors("velocity", &velocities), Array::numbers("von_mises_pa", &stresses)];
+    let stresses = parts.iter().flat_map(|Part { surface, stresses_pa, .. }| {
+        let of_point = move |point: usize| stresses_pa.as_ref()?.get(*surface.follows.get(point)? as usize).copied();
+        (0..surface.points.len()).map(move |point| of_point(point).unwrap_or(f64::NAN))
+    });
+    let velocities = parts.iter().flat_map(|part| part.surface.velocities.iter().copied());
+    let of_cells = || parts.iter().flat_map(|part| std::iter::repeat_n(part, part.surface.triangles.len()));
+    grid.of_points = vec![Array::vectors("velocity", velocities), Array::numbers("von_mises_pa", stresses)];
     grid.of_cells = vec![
-        Array::integers("object", &objects),
-        Array::numbers("eps_m", &eps_m),
-        Array::numbers("residual_m", &residuals_m),
+        Array::integers("object", of_cells().map(|part| part.object)),
+        Array::numbers("eps_m", of_cells().map(|part| part.eps_m)),
+        Array::numbers("residual_m", of_cells().map(|part| part.residual_m)),
     ];
     grid
 }
@@ -203,45 +200,40 @@ fn objects_of(moment: &Moment) -> Grid {
         _ => object.surface.middle(),
     };
     let placed: Vec<_> = moment.objects.iter().filter_map(|object| Some((object, middle(object)?))).collect();
-    let force = |id: AgentId| -> DVec3 {
-        let on_it = |contact: &ContactMoment| match contact.state.with {
-            _ if contact.object == id => contact.state.force_n,
-            ContactPartner::Agent(with) if with == id => -contact.state.force_n,
-            _ => DVec3::ZERO,
-        };
-        moment.contacts.iter().map(on_it).sum()
-    };
-    let of =
-        |value: &dyn Fn(&ObjectMoment) -> DVec3| placed.iter().map(|(object, _)| value(object)).collect::<Vec<_>>();
-    let velocities: Vec<_> = placed.iter().map(|(_, [_, velocity])| *velocity).collect();
+    let mut forces_n: BTreeMap<AgentId, DVec3> = BTreeMap::new();
+    for ContactMoment { object, state, .. } in &moment.contacts {
+        *forces_n.entry(*object).or_default() += state.force_n;
+        if let ContactPartner::Agent(with) = state.with {
+            *forces_n.entry(with).or_default() -= state.force_n;
+        }
+    }
+    let objects = || placed.iter().map(|(object, _)| *object);
     let mut grid = Grid::of_vertices(placed.iter().map(|(_, [position, _])| *position).collect());
     grid.of_points = vec![
-        Array::texts("name", placed.iter().map(|(object, _)| &*object.name)),
-        Array::integers("object", &placed.iter().map(|(object, _)| number(object.id)).collect::<Vec<_>>()),
-        Array::vectors("velocity", &velocities),
-        Array::vectors("contact_force", &of(&|object| force(object.id))),
-        Array::numbers("energy_j", &placed.iter().map(|(object, _)| object.state.energy_j).collect::<Vec<_>>()),
+        Array::texts("name", objects().map(|object| &*object.name)),
+        Array::integers("object", objects().map(|object| number(object.id))),
+        Array::vectors("velocity", placed.iter().map(|(_, [_, velocity])| *velocity)),
+        Array::vectors("contact_force", objects().map(|object| forces_n.get(&object.id).copied().unwrap_or_default())),
+        Array::numbers("energy_j", objects().map(|object| object.state.energy_j)),
     ];
     grid
 }
 
 fn contacts_of(contacts: &[ContactMoment]) -> Grid {
-    let placed: Vec<_> = contacts.iter().filter(|contact| contact.state.point_m.is_finite()).collect();
-    let vectors = |of: fn(&ContactMoment) -> DVec3| placed.iter().map(|contact| of(contact)).collect::<Vec<_>>();
-    let integers = |of: fn(&ContactMoment) -> i32| placed.iter().map(|contact| of(contact)).collect::<Vec<_>>();
+    let placed = || contacts.iter().filter(|contact| contact.state.point_m.is_finite());
     let with = |contact: &ContactMoment| match contact.state.with {
         ContactPartner::Agent(id) => number(id),
         ContactPartner::Static(_) => -1,
     };
-    let mut grid = Grid::of_vertices(vectors(|contact| contact.state.point_m));
+    let mut grid = Grid::of_vertices(placed().map(|contact| contact.state.point_m).collect());
     grid.of_points = vec![
-        Array::texts("object_name", placed.iter().map(|contact| &*contact.names[0])),
-        Array::texts("with_name", placed.iter().map(|contact| &*contact.names[1])),
-        Array::integers("object", &integers(|contact| number(contact.object))),
-        Array::integers("with", &integers(with)),
-        Array::vectors("normal", &vectors(|contact| contact.state.normal)),
-        Array::vectors("contact_force", &vectors(|contact| contact.state.force_n)),
-        Array::numbers("depth_m", &placed.iter().map(|contact| contact.state.depth_m).collect::<Vec<_>>()),
+        Array::texts("object_name", placed().map(|contact| &*contact.names[0])),
+        Array::texts("with_name", placed().map(|contact| &*contact.names[1])),
+        Array::integers("object", placed().map(|contact| number(contact.object))),
+        Array::integers("with", placed().map(with)),
+        Array::vectors("normal", placed().map(|contact| contact.state.normal)),
+        Array::vectors("contact_force", placed().map(|contact| contact.state.force_n)),
+        Array::numbers("depth_m", placed().map(|contact| contact.state.depth_m)),
     ];
     grid
 }

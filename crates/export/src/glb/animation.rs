@@ -27,14 +27,15 @@ const TABLE_BYTES: usize = 512;
 /// A run in a file, with a key for every moment.
 ///
 /// The file is written by [`MomentWriter::finish`], and is empty before. Times are simulated time since the start of the run; a moment of the
-/// time of the one before is left out. All moments together may take [`GlbAnimation::BYTES_MAX`] bytes: a tube of 100 nodes takes 30 kB each, a
-/// rigid body 28 bytes.
+/// time of the one before is left out, an earlier one is [`ExportError::Earlier`]. All moments together may take [`GlbAnimation::BYTES_MAX`] bytes,
+/// then [`ExportError::TooLong`]: a tube of 100 nodes takes 30 kB each, a rigid body 28 bytes.
 #[derive(Debug)]
 pub struct GlbAnimation {
     path: PathBuf,
     fixed: Surface,
     times_s: Vec<f32>,
     bytes: usize,
+    bytes_max: usize,
     tracks: BTreeMap<AgentId, Vec<Track>>,
 }
 
@@ -68,7 +69,7 @@ impl GlbAnimation {
     pub fn create(path: &Path, fixed: &Surface) -> Result<Self, ExportError> {
         File::create(path).map_err(ExportError::at(path))?;
         let (times_s, tracks) = (Vec::new(), BTreeMap::new());
-        Ok(Self { path: path.to_owned(), fixed: fixed.clone(), times_s, bytes: 0, tracks })
+        Ok(Self { path: path.to_owned(), fixed: fixed.clone(), times_s, bytes: 0, bytes_max: BYTES_MAX, tracks })
     }
 
     /// Adds a key of an object to its track, or begins another where its triangles are others or the track is full.
@@ -100,9 +101,9 @@ impl MomentWriter for GlbAnimation {
             }
             _ => {}
         }
-        if self.bytes > BYTES_MAX {
-            let (path, mib) = (self.path.clone(), BYTES_MAX >> 20);
-            return Err(ExportError::TooLong { path, mib, time_s, moments: self.times_s.len() });
+        if self.bytes > self.bytes_max {
+            let (path, bytes_max) = (self.path.clone(), self.bytes_max);
+            return Err(ExportError::TooLong { path, bytes_max, time_s, moments: self.times_s.len() });
         }
         let key = self.times_s.len();
         self.times_s.push(time_s);
@@ -200,8 +201,8 @@ impl Track {
                 node["translation"] = json!(translations[0]);
                 node["rotation"] = json!(rotations[0]);
                 if places.iter().any(|place| *place != places[0]) {
-                    file.channel(number, "translation", keys, (translations.as_flattened(), "VEC3"));
-                    file.channel(number, "rotation", keys, (rotations.as_flattened(), "VEC4"));
+                    file.channel(number, "translation", keys, translations.as_flattened());
+                    file.channel(number, "rotation", keys, rotations.as_flattened());
                 }
                 &[]
             }
@@ -211,7 +212,7 @@ impl Track {
                     shown.iter().flat_map(|shown| (1..shapes.len()).map(move |target| weight(*shown, target)));
                 let weights: Vec<f32> = weights.collect();
                 if !weights.is_empty() {
-                    file.channel(number, "weights", keys, (&weights, "SCALAR"));
+                    file.channel(number, "weights", keys, &weights);
                 }
                 &shapes[1..]
             }
@@ -223,7 +224,7 @@ impl Track {
         if ends.len() > 1 {
             node["scale"] = json!(vec![ends[0].1; 3]);
             let (keys, scales): (Vec<_>, Vec<_>) = ends.iter().map(|(key, scale)| (times_s[*key], [*scale; 3])).unzip();
-            file.channel(number, "scale", &keys, (scales.as_flattened(), "VEC3"));
+            file.channel(number, "scale", &keys, scales.as_flattened());
         }
         node
     }
@@ -236,15 +237,50 @@ impl Motion {
 }
 
 impl Glb {
-    /// Animates a property of a node: values of a kind, such as `VEC3`, at times. Sizes change at once, all else goes straight on.
-    fn channel(&mut self, node: usize, path: &str, times_s: &[f32], (values, kind): (&[f32], &str)) {
+    /// Animates a property of a node: its values at times. Sizes change at once, all else goes straight on.
+    fn channel(&mut self, node: usize, path: &str, times_s: &[f32], values: &[f32]) {
+        let (kind, interpolation) = match path {
+            "rotation" => ("VEC4", "LINEAR"),
+            "weights" => ("SCALAR", "LINEAR"),
+            "scale" => ("VEC3", "STEP"),
+            _ => ("VEC3", "LINEAR"),
+        };
         let input = self.floats(times_s, "SCALAR", None);
         (self.accessors[input]["min"], self.accessors[input]["max"]) =
             (json!(times_s[..1]), json!(times_s[times_s.len() - 1..]));
         let output = self.floats(values, kind, None);
-        let interpolation = if path == "scale" { "STEP" } else { "LINEAR" };
         self.samplers.push(json!({ "input": input, "output": output, "interpolation": interpolation }));
         let sampler = self.samplers.len() - 1;
         self.channels.push(json!({ "sampler": sampler, "target": { "node": node, "path": path } }));
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::Moments;
+    use metachron_core::SimSpan;
+    use metachron_world::{Scene, Soft, World, kinds::ExecutorKind};
+
+    #[test]
+    fn a_run_that_is_too_long_is_told_and_what_was_written_is_whole() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("run.glb");
+        let scene = Scene::builder().add("jelly", Soft::ball(0.1, 4)).build().unwrap();
+        let world = World::start(&scene, ExecutorKind::Lockstep).unwrap();
+        let mut moments = Moments::of(&world);
+        let mut file = GlbAnimation { bytes_max: 100_000, ..GlbAnimation::create(&path, &Surface::default()).unwrap() };
+        let mut write = || {
+            world.advance(SimSpan::from_millis(20));
+            file.write(&moments.take())
+        };
+        let (written, refused) = (0..).find_map(|k| Some((k, write().err()?))).unwrap();
+        let said = refused.to_string();
+        assert!(said.contains("run.glb") && said.contains("more than 100000 bytes"), "{said}");
+        assert!(said.contains(&format!("ends after {written} moments")), "{said}");
+        file.finish().unwrap();
+        let bytes = std::fs::read(&path).unwrap();
+        assert!((80_000..140_000).contains(&bytes.len()), "{}", bytes.len());
+        assert_eq!(gltf::Gltf::from_slice(&bytes).unwrap().animations().count(), 1);
     }
 }

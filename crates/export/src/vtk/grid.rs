@@ -32,17 +32,17 @@ pub(super) struct Array {
 }
 
 impl Array {
-    pub fn vectors(name: &'static str, values: &[DVec3]) -> Self {
-        let bytes = values.iter().flat_map(|v| v.to_array()).flat_map(f64::to_le_bytes).collect();
+    pub fn vectors(name: &'static str, values: impl Iterator<Item = DVec3>) -> Self {
+        let bytes = values.flat_map(|v| v.to_array()).flat_map(f64::to_le_bytes).collect();
         Self { kind: "Float64", name, components: 3, bytes }
     }
 
-    pub fn numbers(name: &'static str, values: &[f64]) -> Self {
-        Self { kind: "Float64", name, components: 1, bytes: values.iter().flat_map(|x| x.to_le_bytes()).collect() }
+    pub fn numbers(name: &'static str, values: impl Iterator<Item = f64>) -> Self {
+        Self { kind: "Float64", name, components: 1, bytes: values.flat_map(f64::to_le_bytes).collect() }
     }
 
-    pub fn integers(name: &'static str, values: &[i32]) -> Self {
-        Self { kind: "Int32", name, components: 1, bytes: values.iter().flat_map(|x| x.to_le_bytes()).collect() }
+    pub fn integers(name: &'static str, values: impl Iterator<Item = i32>) -> Self {
+        Self { kind: "Int32", name, components: 1, bytes: values.flat_map(i32::to_le_bytes).collect() }
     }
 
     /// Each ends with a zero, so one of its own is none.
@@ -73,7 +73,7 @@ impl Grid {
         let integers =
             |values: &mut dyn Iterator<Item = usize>| values.flat_map(|k| (k as i64).to_le_bytes()).collect();
         let array = |kind, name, bytes| Array { kind, name, components: 1, bytes };
-        let points = [Array::vectors("Points", &self.points)];
+        let points = [Array::vectors("Points", self.points.iter().copied())];
         let corners = [
             array("Int64", "connectivity", integers(&mut self.cells.iter().map(|k| *k as usize))),
             array("Int64", "offsets", integers(&mut (1..=cells).map(|k| k * self.corners))),
