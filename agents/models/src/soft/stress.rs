@@ -4,10 +4,6 @@
 //! Theory: docs/theory/soft.md, eq. 6, 9, 28.
 
 use super::body::SoftBody;
-use super::fe_mesh::FeMesh;
-use super::material::Law;
-use super::spec::SoftMatter;
-use glam::DVec3;
 use metachron_contact::Agent;
 use metachron_core::Snapshot;
 
@@ -27,33 +23,5 @@ impl SoftBody {
         let carried =
             skin.carried().iter().map(|point| point.terms().map(|(node, share)| of_nodes[node] * share).sum());
         Some(carried.map(|stress: f64| stress.max(0.0)).collect())
-    }
-}
-
-impl FeMesh {
-    fn von_mises_pa(&self, positions: &[DVec3], matter: &SoftMatter) -> Vec<f64> {
-        let mut sums = vec![[0.0; 2]; self.rest.len()];
-        let mut add = |vertices: &[u32], volume: f64, stress_pa: f64| {
-            for vertex in vertices {
-                let [weighted, whole] = &mut sums[*vertex as usize];
-                (*weighted, *whole) = (*weighted + volume * stress_pa, *whole + volume);
-            }
-        };
-        for bar in &self.bars {
-            add(&bar.ends, bar.rest_m, matter.young_pa * bar.strain(positions).abs());
-        }
-        for membrane in &self.membranes {
-            add(membrane.vertices(), membrane.mass_kg().iter().sum(), membrane.von_mises_pa(positions));
-        }
-        let law = Law::of(matter);
-        for cell in &self.hexahedra {
-            let deformation = { *cell }.deformation(&self.kinds[cell.kind], positions);
-            add(&cell.vertices, cell.mass_kg.iter().sum(), deformation.von_mises_pa(&law));
-        }
-        for element in &self.tetrahedra {
-            let deformation = { *element }.follow(positions);
-            add(&element.vertices, element.volume_m3, deformation.von_mises_pa(&self.laws[element.material]));
-        }
-        sums.into_iter().map(|[weighted, whole]| if whole > 0.0 { weighted / whole } else { 0.0 }).collect()
     }
 }
