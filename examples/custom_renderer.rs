@@ -21,11 +21,11 @@ fn main() -> Result<(), Box<dyn Error>> {
     let jelly = Soft::ball(0.06, 5).young_pa(2e4).at([-0.2, 0.0, 0.1]);
     let scene = Scene::builder().fixed("floor", Solid::Plane).add("hose", hose).add("block", block).add("jelly", jelly);
     let world = World::start(&scene.build()?, ExecutorKind::Lockstep)?;
-    let mut moments = Moments::default();
+    let mut moments = Moments::of(&world);
     for _ in 0..3 {
         world.advance(SimSpan::from_millis(300));
         let mut picture = Picture { letters: [[b' '; COLUMNS]; ROWS], depths: [[f64::INFINITY; COLUMNS]; ROWS] };
-        moments.take(&world).objects.iter().for_each(|object| picture.draw(&object.surface));
+        moments.take().objects.iter().for_each(|object| picture.draw(&object.surface));
         picture.letters.iter().for_each(|row| println!("{}", String::from_utf8_lossy(row)));
     }
     Ok(())

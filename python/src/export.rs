@@ -1,10 +1,10 @@
 //! Moments of a world, and when its objects stepped, as files that other programs open.
 //!
-//! In: a world, paths. Out: an MCAP file, a VTK series, a Perfetto trace. Never here: their contents.
+//! In: a world, paths. Out: an MCAP file, VTK series, animated binary glTF, a Perfetto trace. Never here: their contents.
 
 use crate::raised;
-use metachron::export::{McapFile, MomentWriter, Moments, PerfettoFile, Surface, VtkSeries};
-use metachron::world::World;
+use metachron::export::{GlbAnimation, McapFile, MomentWriter, Moments, PerfettoFile, Surface, VtkSeries};
+use metachron::world::{Scene, World};
 use pyo3::exceptions::{PyRuntimeError, PyValueError};
 use pyo3::prelude::*;
 use std::path::PathBuf;
@@ -12,10 +12,7 @@ use std::sync::{Mutex, PoisonError};
 
 /// Writes moments of a world; in a `with` block the files are complete at the end.
 #[pyclass(frozen, module = "metachron")]
-pub struct Export {
-    world: World,
-    files: Mutex<Option<Files>>,
-}
+pub struct Export(Mutex<Option<Files>>);
 
 struct Files {
     moments: Moments,
@@ -27,14 +24,16 @@ struct Files {
 pub struct Paths {
     pub mcap: Option<PathBuf>,
     pub vtk: Option<PathBuf>,
+    pub glb: Option<PathBuf>,
     pub perfetto: Option<PathBuf>,
 }
 
 impl Export {
-    /// Begins the files; `fixed` is the surface of static solids.
-    pub fn create(world: &World, fixed: &Surface, paths: Paths) -> PyResult<Self> {
-        let Paths { mcap, vtk, perfetto } = paths;
-        let given: Vec<_> = [&mcap, &vtk, &perfetto].into_iter().flatten().collect();
+    /// Begins the files of a world of this scene.
+    pub fn create(world: &World, scene: &Scene, paths: Paths) -> PyResult<Self> {
+        let fixed = &Surface::fixed(scene);
+        let Paths { mcap, vtk, glb, perfetto } = paths;
+        let given: Vec<_> = [&mcap, &vtk, &glb, &perfetto].into_iter().flatten().collect();
         if let Some((_, path)) = given.iter().enumerate().find(|(at, path)| given[..*at].contains(path)) {
             return Err(PyValueError::new_err(format!("{} would be written twice: name another path", path.display())));
         }
@@ -43,16 +42,19 @@ impl Export {
             writers.push(Box::new(McapFile::create(&path, fixed).map_err(raised::export)?));
         }
         if let Some(path) = vtk {
-            writers.push(Box::new(VtkSeries::create(&path, fixed).map_err(raised::export)?));
+            writers.push(Box::new(VtkSeries::create(&path, scene).map_err(raised::export)?));
+        }
+        if let Some(path) = glb {
+            writers.push(Box::new(GlbAnimation::create(&path, fixed).map_err(raised::export)?));
         }
         let trace = perfetto.map(|path| PerfettoFile::create(&path, world)).transpose().map_err(raised::export)?;
         if writers.is_empty() && trace.is_none() {
             return Err(PyValueError::new_err(
-                "nothing would be written: name a file for mcap or perfetto, or a folder for vtk",
+                "nothing would be written: name a file for mcap, glb or perfetto, or a folder for vtk",
             ));
         }
-        let files = Files { moments: Moments::default(), writers, trace };
-        Ok(Self { world: world.clone(), files: Mutex::new(Some(files)) })
+        let files = Files { moments: Moments::of(world), writers, trace };
+        Ok(Self(Mutex::new(Some(files))))
     }
 }
 
@@ -61,12 +63,12 @@ impl Export {
     /// Writes the world as it is now. `OSError` where a file cannot be written, `RuntimeError` after `close`.
     fn write(&self, py: Python<'_>) -> PyResult<()> {
         py.detach(|| {
-            let mut files = self.files.lock().unwrap_or_else(PoisonError::into_inner);
+            let mut files = self.0.lock().unwrap_or_else(PoisonError::into_inner);
             let Some(Files { moments, writers, trace }) = &mut *files else {
                 return Err(PyRuntimeError::new_err("the files are complete; nothing more can be written"));
             };
             if !writers.is_empty() {
-                let moment = moments.take(&self.world);
+                let moment = moments.take();
                 writers.iter_mut().try_for_each(|writer| writer.write(&moment)).map_err(raised::export)?;
             }
             trace.as_mut().map_or(Ok(()), |trace| trace.write(None)).map_err(raised::export)
@@ -75,7 +77,7 @@ impl Export {
 
     /// Completes the files.
     fn close(&self) -> PyResult<()> {
-        let files = self.files.lock().unwrap_or_else(PoisonError::into_inner).take();
+        let files = self.0.lock().unwrap_or_else(PoisonError::into_inner).take();
         let Some(Files { mut writers, trace, .. }) = files else { return Ok(()) };
         let moments = writers.iter_mut().try_for_each(|writer| writer.finish());
         let trace = trace.map_or(Ok(()), |mut trace| trace.finish());

@@ -42,7 +42,9 @@ fn exception(error: &WorldError, message: String) -> PyErr {
 pub fn export(error: ExportError) -> PyErr {
     match error {
         ExportError::File { .. } => PyOSError::new_err(error.to_string()),
-        ExportError::Taken { .. } => PyValueError::new_err(error.to_string()),
+        ExportError::Taken { .. } | ExportError::Earlier { .. } | ExportError::TooLong { .. } => {
+            PyValueError::new_err(error.to_string())
+        }
     }
 }
 

@@ -37,8 +37,8 @@ use std::time::{Duration, Instant};
 #[pyclass(frozen, module = "metachron")]
 pub struct World {
     inner: world::World,
-    /// The surface of its static solids.
-    fixed_surface: Surface,
+    /// It was started of this.
+    scene: world::Scene,
     pictures: Pictures,
     /// The text of its scene; `None` of one that was built of parts.
     text: Option<SceneText>,
@@ -71,8 +71,8 @@ fn apart<T: Send>(work: impl FnOnce() -> T + Send) -> T {
 impl World {
     /// A world that was started of this scene.
     pub fn of(inner: world::World, scene: &world::Scene, text: Option<SceneText>) -> Self {
-        let (fixed_surface, pictures) = (Surface::fixed(scene), Pictures::of(scene));
-        Self { inner, fixed_surface, pictures, text, home: Home::here() }
+        let (scene, pictures) = (scene.clone(), Pictures::of(scene));
+        Self { inner, scene, pictures, text, home: Home::here() }
     }
 
     /// Whether the threads that step it are in this process.
@@ -423,16 +423,22 @@ impl World {
         self.pictures.depths(py, &self.inner, &Shot::new(size, camera)?)
     }
 
-    /// Begins files for other programs: moments as MCAP for Foxglove, Lichtblick and Rerun, or in a folder as a VTK series for ParaView; for
-    /// ui.perfetto.dev when each object stepped.
-    #[pyo3(signature = (*, mcap = None, vtk = None, perfetto = None))]
-    fn export(&self, mcap: Option<PathBuf>, vtk: Option<PathBuf>, perfetto: Option<PathBuf>) -> PyResult<Export> {
-        Export::create(&self.inner, &self.fixed_surface, Paths { mcap, vtk, perfetto })
+    /// Begins files for other programs: moments as MCAP for Foxglove, Lichtblick and Rerun, in a folder as VTK series for ParaView, or as one
+    /// animated binary glTF (.glb) for Blender and three.js; for ui.perfetto.dev when each object stepped.
+    #[pyo3(signature = (*, mcap = None, vtk = None, glb = None, perfetto = None))]
+    fn export(
+        &self,
+        mcap: Option<PathBuf>,
+        vtk: Option<PathBuf>,
+        glb: Option<PathBuf>,
+        perfetto: Option<PathBuf>,
+    ) -> PyResult<Export> {
+        Export::create(&self.inner, &self.scene, Paths { mcap, vtk, glb, perfetto })
     }
 
     /// Writes the surfaces of all objects, as they are now, as binary glTF (.glb). Raises `OSError`.
     fn write_glb(&self, py: Python<'_>, path: PathBuf) -> PyResult<()> {
-        let write = || write_glb(&path, &Moments::default().take(&self.inner), &self.fixed_surface);
+        let write = || write_glb(&path, &Moments::of(&self.inner).take(), &Surface::fixed(&self.scene));
         py.detach(write).map_err(raised::export)
     }
 

@@ -5,6 +5,7 @@ import struct
 from pathlib import Path
 
 import meshio
+import metachron as mc
 import numpy as np
 import pytest
 import scenes
@@ -50,6 +51,7 @@ def test_meshio_reads_the_surfaces(tmp_path: Path) -> None:
         radius = np.ptp(points[:, 2]) / 2
         assert volume == pytest.approx(4 / 3 * np.pi * radius**3, rel=0.06)
         assert set(mesh.cell_data) == {"object", "eps_m", "residual_m"}
+        assert np.isnan(mesh.point_data["von_mises_pa"]).all()
         # all points of a body that does not turn move alike
         assert np.ptp(mesh.point_data["velocity"], axis=0) == pytest.approx([0.0, 0.0, 0.0])
 
@@ -84,6 +86,41 @@ def test_glb_has_its_tables(tmp_path: Path) -> None:
     assert top == pytest.approx(gut[:, 2].max() + 0.015, abs=1e-3)
     with pytest.raises(OSError, match="cannot be written"):
         world.write_glb(tmp_path / "no" / "now.glb")
+
+
+def test_an_animation_plays_what_was_written(tmp_path: Path) -> None:
+    heights = []
+    with scenes.falling().start() as world, world.export(glb=tmp_path / "run.glb") as export:
+        for _ in range(MOMENTS):
+            world.advance(0.05)
+            export.write()
+            heights.append(float(world.state("ball").positions[0, 2]))
+    data = (tmp_path / "run.glb").read_bytes()
+    (tables_length,) = struct.unpack_from("<I", data, 12)
+    tables, numbers = json.loads(data[20 : 20 + tables_length]), data[28 + tables_length :]
+
+    def values(accessor: int) -> np.ndarray:
+        table = tables["accessors"][accessor]
+        view = tables["bufferViews"][table["bufferView"]]
+        return np.frombuffer(numbers, np.float32, view["byteLength"] // 4, view["byteOffset"]).reshape(table["count"], -1)
+
+    animation = tables["animations"][0]
+    channels = {channel["target"]["path"]: animation["samplers"][channel["sampler"]] for channel in animation["channels"]}
+    assert values(channels["translation"]["input"])[:, 0] == pytest.approx([0.05 * (k + 1) for k in range(MOMENTS)])
+    assert values(channels["translation"]["output"])[:, 2] == pytest.approx(heights)
+
+
+def test_mcap_and_vtk_have_contacts(tmp_path: Path) -> None:
+    scene = mc.Scene().fixed("floor", mc.Plane()).add("ball", mc.Ball(0.05, mass=0.2, at=[0.0, 0.0, 0.05]))
+    with scene.start() as world, world.export(mcap=tmp_path / "run.mcap", vtk=tmp_path / "vtk") as export:
+        world.advance(0.2)
+        export.write()
+    with (tmp_path / "run.mcap").open("rb") as file:
+        messages = [json.loads(message.data) for _, channel, message in make_reader(file).iter_messages() if channel.topic == "/contacts"]
+    (contact,) = messages[-1]["contacts"]
+    assert (contact["object"], contact["with"]) == ("ball", "floor")
+    assert contact["force"]["z"] == pytest.approx(0.2 * 9.81, rel=1e-3)
+    assert b"floor" in (tmp_path / "vtk" / "contacts000000.vtu").read_bytes()
 
 
 def test_bad_files_are_told(tmp_path: Path) -> None:

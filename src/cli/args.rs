@@ -230,6 +230,7 @@ impl OutputArgs {
             mcap: self.mcap.clone(),
             vtk: self.vtk.clone(),
             glb: self.glb.clone(),
+            animation: self.animation.clone(),
             perfetto: self.perfetto.clone(),
         }
     }
@@ -343,15 +344,19 @@ pub struct OutputArgs {
     /// Write a film of all frames here (YUV4MPEG2, which ffmpeg and most players read); late frames show as on the screen. Not of a window
     #[arg(long, value_name = "FILE", value_hint = ValueHint::FilePath)]
     pub video: Option<PathBuf>,
-    /// Write every frame's states and surfaces here as MCAP, which Foxglove, Lichtblick and Rerun open. Not of a window
+    /// Write every frame's states, surfaces, contacts, joints and events here as MCAP, which Foxglove, Lichtblick and Rerun open. Not of a window
     #[arg(long, value_name = "FILE", value_hint = ValueHint::FilePath)]
     pub mcap: Option<PathBuf>,
-    /// Write every frame's surfaces into this folder as a VTK series, which ParaView opens (series.pvd); nothing is overwritten. Not of a window
+    /// Write every frame's surfaces, objects and contacts into this folder as VTK series, which ParaView opens (series.pvd, objects.pvd,
+    /// contacts.pvd); nothing is overwritten. Not of a window
     #[arg(long, value_name = "FOLDER", value_hint = ValueHint::DirPath)]
     pub vtk: Option<PathBuf>,
     /// Write the last moment's surfaces here as binary glTF, which Blender, browsers and game engines open. Not of a window
     #[arg(long, value_name = "FILE", value_hint = ValueHint::FilePath)]
     pub glb: Option<PathBuf>,
+    /// Write all frames' surfaces here as one animated binary glTF, which Blender, three.js and game engines play; 256 MiB at most. Not of a window
+    #[arg(long, value_name = "FILE", value_hint = ValueHint::FilePath)]
+    pub animation: Option<PathBuf>,
     /// Write here when each object stepped and waited, the frames and their parts, and events (JSON, which ui.perfetto.dev opens); 256 MiB at
     /// most. Not of a window
     #[arg(long, value_name = "FILE", value_hint = ValueHint::FilePath)]

@@ -1,11 +1,11 @@
 //! Files of a run for other programs: one moment a frame, the last moment, a trace.
 //!
-//! In: paths, a world that is played, its frames. Out: an MCAP file, a VTK series, binary glTF, a Perfetto trace. Never
+//! In: paths, a world that is played, its frames. Out: an MCAP file, VTK series, binary glTF, a Perfetto trace. Never
 //! here: their contents ([`metachron_export`]).
 
 use metachron_console::output::message;
 use metachron_export::{
-    ExportError, Frame, McapFile, MomentWriter, Moments, PerfettoFile, Surface, VtkSeries, write_glb,
+    ExportError, Frame, GlbAnimation, McapFile, MomentWriter, Moments, PerfettoFile, Surface, VtkSeries, write_glb,
 };
 use metachron_session::FrameRecord;
 use metachron_world::{Scene, World};
@@ -21,6 +21,8 @@ pub struct ExportPaths {
     pub vtk: Option<PathBuf>,
     /// A file for the last moment, in binary glTF.
     pub glb: Option<PathBuf>,
+    /// A file for all moments, in animated binary glTF.
+    pub animation: Option<PathBuf>,
     /// A file for a trace of turns, frames and events.
     pub perfetto: Option<PathBuf>,
 }
@@ -49,14 +51,17 @@ impl Exports {
             writers.push(Box::new(McapFile::create(path, &fixed)?));
         }
         if let Some(path) = &paths.vtk {
-            writers.push(Box::new(VtkSeries::create(path, &fixed)?));
+            writers.push(Box::new(VtkSeries::create(path, scene)?));
+        }
+        if let Some(path) = &paths.animation {
+            writers.push(Box::new(GlbAnimation::create(path, &fixed)?));
         }
         let perfetto = paths.perfetto.as_deref().map(|path| PerfettoFile::create(path, world)).transpose()?;
         Ok(Self {
             world: world.clone(),
             fixed,
             target_ms: 1e3 / scene.target.frame_hz,
-            moments: Moments::default(),
+            moments: Moments::of(world),
             writers,
             perfetto,
             glb: paths.glb.clone(),
@@ -74,7 +79,7 @@ impl Exports {
 
     fn write(&mut self, frame: &FrameRecord) -> Result<(), ExportError> {
         if !self.writers.is_empty() {
-            let moment = self.moments.take(&self.world);
+            let moment = self.moments.take();
             self.writers.iter_mut().try_for_each(|writer| writer.write(&moment))?;
         }
         let Some(perfetto) = &mut self.perfetto else { return Ok(()) };
@@ -100,7 +105,7 @@ impl Exports {
             }
         }
         if let Some(path) = &self.glb {
-            completed = completed.and(write_glb(path, &self.moments.take(&self.world), &self.fixed));
+            completed = completed.and(write_glb(path, &self.moments.take(), &self.fixed));
         }
         self.failed.map_or(completed, Err)
     }

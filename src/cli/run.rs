@@ -255,6 +255,7 @@ fn check_inputs(args: &RunArgs) -> anyhow::Result<()> {
         ("--mcap", &output.mcap),
         ("--vtk", &output.vtk),
         ("--glb", &output.glb),
+        ("--animation", &output.animation),
         ("--perfetto", &output.perfetto),
     ];
     if let Some((flag, _)) = files.iter().find(|(_, path)| path.is_some() && !args.headless) {
@@ -281,6 +282,7 @@ pub(super) fn check_outputs(
         ("--video", args.video.as_deref()),
         ("--mcap", args.mcap.as_deref()),
         ("--glb", args.glb.as_deref()),
+        ("--animation", args.animation.as_deref()),
         ("--perfetto", args.perfetto.as_deref()),
         ("--frames-csv", args.frames_csv.as_deref()),
         ("--record", record),
@@ -330,6 +332,7 @@ fn check_extension(args: &OutputArgs) -> anyhow::Result<()> {
         ("--depth", &args.depth, "PNG picture", "png"),
         ("--video", &args.video, "YUV4MPEG2 film", "y4m"),
         ("--glb", &args.glb, "binary glTF", "glb"),
+        ("--animation", &args.animation, "binary glTF", "glb"),
     ];
     for (flag, path, what, ending) in outputs {
         let other = |path: &&PathBuf| path.extension().is_some_and(|found| !found.eq_ignore_ascii_case(ending));

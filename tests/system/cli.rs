@@ -316,6 +316,8 @@ fn wrong_usage_ends_with_two_and_says_what_is_right() {
         (&["run", "--headless", "--report", "a.png", "--png", "./a.png"], "--png ./a.png would overwrite --report"),
         (&["run", "--headless", "--png", "a.png", "--frames-csv", "a.png"], "would overwrite --png"),
         (&["run", "--headless", "--png", "a.jpg"], "ends in .png"),
+        (&["run", "--headless", "--animation", "run.gltf"], "ends in .glb"),
+        (&["run", "--headless", "--animation", "a.glb", "--glb", "a.glb"], "would overwrite --glb"),
         (&["run", "--headless", "--vtk", "-"], "--vtk -"),
         (&["run", "--headless", "--vtk", "Cargo.toml/series"], "expects a folder"),
         (&["run", "--headless", "--vtk", "a", "--frames-csv", "a/objects.csv"], "the folder of a/objects.csv"),

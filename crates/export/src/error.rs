@@ -19,6 +19,28 @@ pub enum ExportError {
         /// The file.
         path: PathBuf,
     },
+    /// A moment of an animation that is earlier than the one before, as after [`World::restore`](metachron_world::World::restore).
+    #[error("{}: an animation goes forward, and a moment at {time_s} s came after one at {last_s} s", path.display())]
+    Earlier {
+        /// The file.
+        path: PathBuf,
+        /// The time of the moment.
+        time_s: f32,
+        /// That of the one before.
+        last_s: f32,
+    },
+    /// An animation that would be too large.
+    #[error("{} would have more than {bytes_max} bytes: it ends after {moments} moments, before {time_s} s; write fewer moments, or a shorter run", path.display())]
+    TooLong {
+        /// The file.
+        path: PathBuf,
+        /// The most that it may have, about.
+        bytes_max: usize,
+        /// The moments in it.
+        moments: usize,
+        /// The time of the first that has no room.
+        time_s: f32,
+    },
 }
 
 impl ExportError {

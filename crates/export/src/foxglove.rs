@@ -1,16 +1,19 @@
 //! MCAP files with Foxglove's scenes: opened by Foxglove, Lichtblick and Rerun.
 //!
-//! In: moments. Out: `/scene` (foxglove.SceneUpdate), `/tf` (foxglove.FrameTransform), `/state` (metachron.State), all in JSON,
-//! in chunks that LZ4 makes smaller.
+//! In: moments. Out: `/scene` (foxglove.SceneUpdate), `/tf` (foxglove.FrameTransform), `/joint_states` (foxglove.JointStates), `/events`
+//! (foxglove.Log), `/contacts` (metachron.Contacts), `/state` (metachron.State), all in JSON, in chunks that LZ4 makes smaller.
 //! Never here: other encodings.
 
-use super::moment::ObjectMoment;
+mod schema;
+
+use super::moment::{ContactMoment, JointMoment, ObjectMoment};
 use super::surface::Surface;
 use super::{ExportError, Moment, MomentWriter, colour};
 use glam::{DQuat, DVec3};
 use mcap::records::MessageHeader;
 use mcap::{Compression, McapError, WriteOptions, Writer};
 use metachron_core::{AgentId, Body, SimTime};
+use metachron_world::{Event, Happening};
 use serde_json::{Value, json};
 use std::borrow::Cow;
 use std::collections::{BTreeMap, BTreeSet};
@@ -34,7 +37,12 @@ const FIXED: &str = "fixed";
 /// name, which `/tf` moves, and a deformable's whenever it has a new state.
 /// The frame and the entity of an object are called as it is; one called `world` or `fixed`, as ours are, has `_` behind its name there.
 /// `/state`: `{"name", "time", "snapshot"}` for every object that has a new state, the snapshot with all its fields
-/// (`metachron_core::Snapshot`). A file that was cut short opens up to about its last second.
+/// (`metachron_core::Snapshot`).
+/// `/contacts`: at every moment `{"timestamp", "contacts"}`, each with the names of its `object` and of what it is `with`, the `point` that bears
+/// most, the `normal` there towards the object, the `force` on the object (the mean of its last step) and `depth`.
+/// `/joint_states`: position, velocity and effort of all hinges and slides by name, where there are any.
+/// `/events`: each as a sentence under the name of its object at the time of that object, with its kind as `event` and the other object as `with`.
+/// A file that was cut short opens up to about its last second.
 pub struct McapFile {
     path: PathBuf,
     writer: Writer<BufWriter<File>>,
@@ -53,6 +61,9 @@ struct Channels {
     scene: u16,
     transforms: u16,
     states: u16,
+    contacts: u16,
+    joints: u16,
+    events: u16,
 }
 
 impl std::fmt::Debug for McapFile {
@@ -78,9 +89,12 @@ impl McapFile {
             writer.add_channel(schema, topic, "json", &BTreeMap::new())
         };
         let channels = Channels {
-            scene: channel("/scene", "foxglove.SceneUpdate", &scene_schema()).map_err(&at)?,
-            transforms: channel("/tf", "foxglove.FrameTransform", &transform_schema()).map_err(&at)?,
-            states: channel("/state", "metachron.State", &state_schema()).map_err(&at)?,
+            scene: channel("/scene", "foxglove.SceneUpdate", &schema::scene()).map_err(&at)?,
+            transforms: channel("/tf", "foxglove.FrameTransform", &schema::transform()).map_err(&at)?,
+            states: channel("/state", "metachron.State", &schema::state()).map_err(&at)?,
+            contacts: channel("/contacts", "metachron.Contacts", &schema::contacts()).map_err(&at)?,
+            joints: channel("/joint_states", "foxglove.JointStates", &schema::joint_states()).map_err(&at)?,
+            events: channel("/events", "foxglove.Log", &schema::log()).map_err(&at)?,
         };
         let (rigid, steps, shown) = Default::default();
         let path = path.to_owned();
@@ -161,6 +175,17 @@ impl MomentWriter for McapFile {
             self.state(moment.time, object)?;
         }
         self.put(self.channels.scene, moment.time, &scene)?;
+        let contacts: Vec<_> = moment.contacts.iter().map(contact).collect();
+        let contacts = json!({ "timestamp": stamp(moment.time), "contacts": contacts });
+        self.put(self.channels.contacts, moment.time, &contacts)?;
+        if !moment.joints.is_empty() {
+            let joints: Vec<_> = moment.joints.iter().map(joint).collect();
+            let joints = json!({ "timestamp": stamp(moment.time), "joints": joints });
+            self.put(self.channels.joints, moment.time, &joints)?;
+        }
+        for event in &moment.events {
+            self.put(self.channels.events, event.at, &log(event))?;
+        }
         if moment.time.secs_after(self.flushed) >= CHUNK_S {
             self.flushed = moment.time;
             self.writer.flush().map_err(failed(&self.path))?;
@@ -208,6 +233,33 @@ fn rotation(q: DQuat) -> Value {
     json!({ "x": q.x, "y": q.y, "z": q.z, "w": q.w })
 }
 
+fn contact(ContactMoment { names: [object, with], state, .. }: &ContactMoment) -> Value {
+    json!({
+        "object": **object,
+        "with": **with,
+        "point": if state.point_m.is_finite() { vector(state.point_m) } else { Value::Null },
+        "normal": vector(state.normal),
+        "force": vector(state.force_n),
+        "depth": state.depth_m,
+    })
+}
+
+fn joint(JointMoment { name, position, velocity, effort }: &JointMoment) -> Value {
+    json!({ "name": **name, "position": position, "velocity": velocity, "effort": effort })
+}
+
+fn log(event: &Event) -> Value {
+    let level = match event.what {
+        Happening::Failed => schema::ERROR,
+        Happening::Stalled | Happening::RateMissed | Happening::AttachmentGave => schema::WARNING,
+        _ => schema::INFO,
+    };
+    json!({
+        "timestamp": stamp(event.at), "level": level, "name": *event.name, "message": event.to_string(), "file": "", "line": 0,
+        "event": event.what.name(), "with": event.other.as_deref(),
+    })
+}
+
 /// An entity that stays until another of its id comes.
 fn entity(id: &str, frame: &str, time: SimTime, surface: &Surface) -> Value {
     json!({
@@ -231,70 +283,4 @@ fn entity(id: &str, frame: &str, time: SimTime, surface: &Surface) -> Value {
 fn colour(id: &str) -> Value {
     let [r, g, b] = if id == FIXED { colour::OF_FIXED } else { colour::of_name(id) };
     json!({ "r": r, "g": g, "b": b, "a": 1.0 })
-}
-
-fn object_of(properties: &Value) -> Value {
-    json!({ "type": "object", "properties": properties })
-}
-
-fn time_schema() -> Value {
-    object_of(&json!({ "sec": { "type": "integer" }, "nsec": { "type": "integer" } }))
-}
-
-fn vector_schema() -> Value {
-    object_of(&json!({ "x": { "type": "number" }, "y": { "type": "number" }, "z": { "type": "number" } }))
-}
-
-fn rotation_schema() -> Value {
-    let number = json!({ "type": "number" });
-    object_of(&json!({ "x": number, "y": number, "z": number, "w": number }))
-}
-
-fn transform_schema() -> Value {
-    object_of(&json!({
-        "timestamp": time_schema(),
-        "parent_frame_id": { "type": "string" },
-        "child_frame_id": { "type": "string" },
-        "translation": vector_schema(),
-        "rotation": rotation_schema(),
-    }))
-}
-
-fn state_schema() -> Value {
-    object_of(&json!({
-        "name": { "type": "string" },
-        "time": { "type": "number", "description": "the object's own time, seconds" },
-        "snapshot": { "type": "object", "description": "its published state; metres, kilograms, seconds, newtons, joules" },
-    }))
-}
-
-/// Foxglove's schema of scenes; lists that stay empty are declared as lists of anything.
-fn scene_schema() -> Value {
-    let list = |items: Value| json!({ "type": "array", "items": items });
-    let any = list(json!({}));
-    let number = json!({ "type": "number" });
-    let colour = object_of(&json!({ "r": number, "g": number, "b": number, "a": number }));
-    let triangles = object_of(&json!({
-        "pose": object_of(&json!({ "position": vector_schema(), "orientation": rotation_schema() })),
-        "points": list(vector_schema()),
-        "color": colour,
-        "colors": list(colour.clone()),
-        "indices": list(json!({ "type": "integer" })),
-    }));
-    let entity = object_of(&json!({
-        "timestamp": time_schema(),
-        "frame_id": { "type": "string" },
-        "id": { "type": "string" },
-        "lifetime": time_schema(),
-        "frame_locked": { "type": "boolean" },
-        "metadata": any, "arrows": any, "cubes": any, "spheres": any, "cylinders": any, "lines": any,
-        "triangles": list(triangles),
-        "texts": any, "models": any,
-    }));
-    let deletion = object_of(&json!({
-        "timestamp": time_schema(),
-        "type": { "type": "integer" },
-        "id": { "type": "string" },
-    }));
-    object_of(&json!({ "deletions": list(deletion), "entities": list(entity) }))
 }

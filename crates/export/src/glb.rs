@@ -1,20 +1,23 @@
 //! A moment as one binary glTF file (.glb), which Blender, three.js, game engines and viewers of operating systems open.
 //!
 //! In: a moment, the solids that never move. Out: a node for each object with its mesh, normals and base colour, under one that turns our z up
-//! to glTF's y up; metres. Never here: animation, textures, compression.
+//! to glTF's y up; metres. Never here: animation (`animation.rs`), textures, compression.
 //! Format: glTF 2.0 (Khronos Group 2017), sections 3.6 to 3.9 and 4.4.
+
+mod animation;
+mod corners;
+
+pub use animation::GlbAnimation;
 
 use super::surface::Surface;
 use super::{ExportError, Moment, colour};
+use corners::Corners;
 use glam::DVec3;
 use metachron_core::Body;
 use metachron_geometry::{Triangles, is_closed, welded};
 use serde_json::{Value, json};
-use std::collections::BTreeMap;
 use std::path::Path;
 
-/// The cosine of the greatest angle between triangles that share a normal: wider ones meet in an edge.
-const SMOOTH_COS: f64 = 0.7;
 /// Our axes in glTF's, by columns: x stays, y becomes −z, z becomes y.
 const UPRIGHT: [i32; 16] = [1, 0, 0, 0, 0, 0, -1, 0, 0, 1, 0, 0, 0, 0, 0, 1];
 /// The names that glTF has for numbers and for the contents of a view of the buffer.
@@ -39,11 +42,7 @@ pub fn write_glb(path: &Path, moment: &Moment, fixed: &Surface) -> Result<(), Ex
 /// More than the 4 GiB that a file may have.
 pub fn glb(moment: &Moment, fixed: &Surface) -> std::io::Result<Vec<u8>> {
     let mut file = Glb::default();
-    let name = "fixed";
-    let mut nodes = vec![];
-    if !fixed.triangles.is_empty() {
-        nodes.push(json!({ "name": name, "mesh": file.mesh(name, fixed, colour::OF_FIXED) }));
-    }
+    let mut nodes: Vec<_> = file.fixed(fixed).into_iter().collect();
     for object in &moment.objects {
         let mut node = json!({ "name": *object.name, "extras": { "object": object.id.0 } });
         let placed = match &object.state.body {
@@ -56,7 +55,7 @@ pub fn glb(moment: &Moment, fixed: &Surface) -> std::io::Result<Vec<u8>> {
         };
         let surface = placed.as_ref().unwrap_or(&object.surface);
         if !surface.triangles.is_empty() {
-            node["mesh"] = json!(file.mesh(&object.name, surface, colour::of_name(&object.name)));
+            node["mesh"] = json!(file.mesh(&object.name, surface, colour::of_name(&object.name), &[]));
         }
         nodes.push(node);
     }
@@ -71,33 +70,35 @@ struct Glb {
     accessors: Vec<Value>,
     materials: Vec<Value>,
     meshes: Vec<Value>,
-}
-
-/// Corners of triangles: a point has one for every side of an edge.
-struct Corners {
-    points: Vec<[f32; 3]>,
-    normals: Vec<[f32; 3]>,
-    indices: Vec<u32>,
+    samplers: Vec<Value>,
+    channels: Vec<Value>,
 }
 
 impl Glb {
-    /// Adds a mesh with a colour of its own; its number.
-    fn mesh(&mut self, name: &str, surface: &Surface, colour: [f64; 3]) -> usize {
-        let Corners { points, normals, indices } = Corners::of(surface);
-        let bounds = |pick: fn(f32, f32) -> f32| {
-            let all = points.iter().copied().reduce(|a, b| [0, 1, 2].map(|k| pick(a[k], b[k])));
-            all.unwrap_or_default()
+    /// The node of the solids that never move; `None` where there are none.
+    fn fixed(&mut self, fixed: &Surface) -> Option<Value> {
+        let name = "fixed";
+        let is_there = !fixed.triangles.is_empty();
+        is_there.then(|| json!({ "name": name, "mesh": self.mesh(name, fixed, colour::OF_FIXED, &[]) }))
+    }
+
+    /// Adds a mesh with a colour of its own, and morph targets where its points are elsewhere; its number.
+    fn mesh(&mut self, name: &str, surface: &Surface, colour: [f64; 3], targets: &[Vec<DVec3>]) -> usize {
+        let corners = Corners::of(surface);
+        let (points, normals) = (corners.points(&surface.points), corners.normals(surface, &surface.points));
+        let attributes = self.attributes(&points, &normals);
+        let index = self.view(corners.indices.iter().flat_map(|x| x.to_le_bytes()), Some(INDICES));
+        let index = self.accessor(json!({ "bufferView": index, "componentType": UNSIGNED_INT, "count": corners.indices.len(), "type": "SCALAR" }));
+        let offsets = |from: &[[f32; 3]], to: Vec<[f32; 3]>| {
+            to.iter().zip(from).map(|(to, from)| [0, 1, 2].map(|k| to[k] - from[k])).collect::<Vec<_>>()
         };
-        let (low, high) = (bounds(f32::min), bounds(f32::max));
-        let position = self.view(points.iter().flatten().flat_map(|x| x.to_le_bytes()), VERTICES);
-        let normal = self.view(normals.iter().flatten().flat_map(|x| x.to_le_bytes()), VERTICES);
-        let index = self.view(indices.iter().flat_map(|x| x.to_le_bytes()), INDICES);
-        let first = self.accessors.len();
-        self.accessors.extend([
-            json!({ "bufferView": position, "componentType": FLOAT, "count": points.len(), "type": "VEC3", "min": low, "max": high }),
-            json!({ "bufferView": normal, "componentType": FLOAT, "count": normals.len(), "type": "VEC3" }),
-            json!({ "bufferView": index, "componentType": UNSIGNED_INT, "count": indices.len(), "type": "SCALAR" }),
-        ]);
+        let targets: Vec<_> = targets
+            .iter()
+            .map(|to| {
+                let moved = offsets(&points, corners.points(to));
+                self.attributes(&moved, &offsets(&normals, corners.normals(surface, to)))
+            })
+            .collect();
         let whole = Triangles { points: surface.points.clone(), triangles: surface.triangles.clone() };
         let [r, g, b] = colour.map(|part| ((part + 0.055) / 1.055).powf(2.4)); // sRGB to linear light
         self.materials.push(json!({
@@ -105,24 +106,55 @@ impl Glb {
             "pbrMetallicRoughness": { "baseColorFactor": [r, g, b, 1.0], "metallicFactor": 0.0, "roughnessFactor": 0.7 },
             "doubleSided": !is_closed(&welded(&whole)),
         }));
-        self.meshes.push(json!({
-            "name": name,
-            "primitives": [{
-                "attributes": { "POSITION": first, "NORMAL": first + 1 },
-                "indices": first + 2,
-                "material": self.materials.len() - 1,
-            }],
-        }));
+        let mut part = json!({ "attributes": attributes, "indices": index, "material": self.materials.len() - 1 });
+        // lists that are empty are no glTF
+        if !targets.is_empty() {
+            part["targets"] = json!(targets);
+        }
+        self.meshes.push(json!({ "name": name, "primitives": [part] }));
         self.meshes.len() - 1
     }
 
+    /// Adds points and normals, or how far they are moved.
+    fn attributes(&mut self, points: &[[f32; 3]], normals: &[[f32; 3]]) -> Value {
+        let bounds = |pick: fn(f32, f32) -> f32| {
+            let all = points.iter().copied().reduce(|a, b| [0, 1, 2].map(|k| pick(a[k], b[k])));
+            all.unwrap_or_default()
+        };
+        let (low, high) = (bounds(f32::min), bounds(f32::max));
+        let position = self.floats(points.as_flattened(), "VEC3", Some(VERTICES));
+        (self.accessors[position]["min"], self.accessors[position]["max"]) = (json!(low), json!(high));
+        json!({ "POSITION": position, "NORMAL": self.floats(normals.as_flattened(), "VEC3", Some(VERTICES)) })
+    }
+
+    /// Adds numbers of a kind, such as `VEC3`; the number of their accessor.
+    fn floats(&mut self, values: &[f32], kind: &str, target: Option<u32>) -> usize {
+        let components = match kind {
+            "VEC3" => 3,
+            "VEC4" => 4,
+            _ => 1,
+        };
+        let view = self.view(values.iter().flat_map(|x| x.to_le_bytes()), target);
+        let count = values.len() / components;
+        self.accessor(json!({ "bufferView": view, "componentType": FLOAT, "count": count, "type": kind }))
+    }
+
+    fn accessor(&mut self, accessor: Value) -> usize {
+        self.accessors.push(accessor);
+        self.accessors.len() - 1
+    }
+
     /// Adds bytes, whole words of four; the number of their view.
-    fn view(&mut self, bytes: impl Iterator<Item = u8>, target: u32) -> usize {
+    fn view(&mut self, bytes: impl Iterator<Item = u8>, target: Option<u32>) -> usize {
         let start = self.data.len();
         self.data.extend(bytes);
         let length = self.data.len() - start;
-        self.views.push(json!({ "buffer": 0, "byteOffset": start, "byteLength": length, "target": target }));
-        self.views.len() - 1
+        self.views.push(json!({ "buffer": 0, "byteOffset": start, "byteLength": length }));
+        let number = self.views.len() - 1;
+        if let Some(target) = target {
+            self.views[number]["target"] = json!(target);
+        }
+        number
     }
 
     /// The file: header, tables, data.
@@ -130,7 +162,6 @@ impl Glb {
         let root = nodes.len();
         let children: Vec<usize> = (0..root).collect();
         let mut above = json!({ "name": "metachron", "matrix": UPRIGHT });
-        // lists that are empty are no glTF
         if !children.is_empty() {
             above["children"] = json!(children);
         }
@@ -140,10 +171,15 @@ impl Glb {
             "scenes": [{ "nodes": [root], "extras": { "time_s": time_s } }],
             "nodes": nodes.into_iter().chain([above]).collect::<Vec<_>>(),
         });
-        if !self.meshes.is_empty() {
+        if !self.data.is_empty() {
             tables["buffers"] = json!([{ "byteLength": self.data.len() }]);
-            let lists = [self.views, self.accessors, self.materials, self.meshes];
-            for (name, list) in ["bufferViews", "accessors", "materials", "meshes"].into_iter().zip(lists) {
+        }
+        if !self.channels.is_empty() {
+            tables["animations"] = json!([{ "name": "run", "samplers": self.samplers, "channels": self.channels }]);
+        }
+        let lists = [self.views, self.accessors, self.materials, self.meshes];
+        for (name, list) in ["bufferViews", "accessors", "materials", "meshes"].into_iter().zip(lists) {
+            if !list.is_empty() {
                 tables[name] = Value::Array(list);
             }
         }
@@ -166,37 +202,4 @@ impl Glb {
         }
         Ok(file)
     }
-}
-
-impl Corners {
-    /// The corners of a surface: at a point, triangles that meet smoothly share one, whose normal is the mean of theirs by area.
-    fn of(surface: &Surface) -> Self {
-        let corner = |t: &[u32; 3]| t.map(|p| surface.points[p as usize]);
-        let areas: Vec<DVec3> = surface.triangles.iter().map(|t| doubled_area(corner(t))).collect();
-        let mut around = vec![Vec::new(); surface.points.len()];
-        for (k, triangle) in surface.triangles.iter().enumerate() {
-            triangle.iter().for_each(|p| around[*p as usize].push(k));
-        }
-        let (mut into, mut known) = (Self { points: vec![], normals: vec![], indices: vec![] }, BTreeMap::new());
-        for (triangle, area) in surface.triangles.iter().zip(&areas) {
-            let own = area.normalize_or_zero();
-            for point in triangle {
-                let near = around[*point as usize].iter().map(|k| areas[*k]);
-                let smooth = near.filter(|other| other.normalize_or_zero().dot(own) >= SMOOTH_COS);
-                let normal = smooth.sum::<DVec3>().normalize_or(DVec3::Z).as_vec3().to_array();
-                let place = *known.entry((*point, normal.map(f32::to_bits))).or_insert_with(|| {
-                    into.points.push(surface.points[*point as usize].as_vec3().to_array());
-                    into.normals.push(normal);
-                    into.points.len() as u32 - 1
-                });
-                into.indices.push(place);
-            }
-        }
-        into
-    }
-}
-
-/// Along a triangle's normal, as long as twice its area.
-fn doubled_area([a, b, c]: [DVec3; 3]) -> DVec3 {
-    (b - a).cross(c - a)
 }

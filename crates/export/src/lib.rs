@@ -1,7 +1,7 @@
-//! Runs as files that other programs open: MCAP (Foxglove, Lichtblick, Rerun), VTK series (ParaView), one moment as
-//! binary glTF, a trace of turns (Perfetto).
+//! Runs as files that other programs open: MCAP (Foxglove, Lichtblick, Rerun), VTK series (ParaView), binary glTF of one
+//! moment or animated, a trace of turns (Perfetto).
 //!
-//! In: [`Moment`]s of a world, which hold every object's newest state and its surface; its turns and events. Out: files.
+//! In: [`Moment`]s of a world, which hold every object's newest state and its surface, contacts, joints and events; its turns. Out: files.
 //! Never here: running a world, choosing the moments, drawing.
 
 mod colour;
@@ -15,8 +15,8 @@ mod vtk;
 
 pub use error::ExportError;
 pub use foxglove::McapFile;
-pub use glb::{glb, write_glb};
-pub use moment::{Moment, Moments, ObjectMoment};
+pub use glb::{GlbAnimation, glb, write_glb};
+pub use moment::{ContactMoment, JointMoment, Moment, Moments, ObjectMoment};
 pub use perfetto::{Frame, PerfettoFile};
 pub use surface::Surface;
 pub use vtk::VtkSeries;

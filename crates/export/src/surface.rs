@@ -24,6 +24,8 @@ pub struct Surface {
     pub points: Vec<DVec3>,
     /// Velocity of each point, m/s.
     pub velocities: Vec<DVec3>,
+    /// The vertex or node of the object that each point follows; none of a rigid body or a tool.
+    pub follows: Vec<u32>,
     /// Points of each triangle, counter-clockwise seen from outside.
     pub triangles: Vec<[u32; 3]>,
 }
@@ -61,12 +63,19 @@ impl Surface {
         }
     }
 
+    /// The mean of its points, and of their velocities; `None` without points.
+    pub(super) fn middle(&self) -> Option<[DVec3; 2]> {
+        let mean = |all: &[DVec3]| all.iter().sum::<DVec3>() / all.len() as f64;
+        (!self.points.is_empty()).then(|| [mean(&self.points), mean(&self.velocities)])
+    }
+
     /// A rigid body's triangles where it is.
     pub(super) fn moved(local: &LocalMesh, state: &RigidState) -> Self {
         let arms: Vec<DVec3> = local.points.iter().map(|p| state.rotation * *p).collect();
         Self {
             points: arms.iter().map(|arm| state.position + *arm).collect(),
             velocities: arms.iter().map(|arm| state.velocity + state.spin.cross(*arm)).collect(),
+            follows: vec![],
             triangles: local.triangles.clone(),
         }
     }
@@ -87,6 +96,7 @@ impl Surface {
         Self {
             points: at(&state.positions),
             velocities: at(&state.velocities),
+            follows: skin.vertices.to_vec(),
             triangles: skin.triangles.iter().map(|t| t.map(|v| place[v as usize])).collect(),
         }
     }
@@ -98,6 +108,7 @@ impl Surface {
         }
         let sections: Vec<Section> = (0..curve.positions.len())
             .map(|k| Section {
+                follows: k as u32,
                 centre: curve.positions[k],
                 velocity: curve.velocities[k],
                 axes: of_node(k),
@@ -121,7 +132,14 @@ impl Surface {
                 axes = DQuat::from_rotation_arc((axes * DVec3::Z).normalize(), way(k)) * axes;
                 let node = nodes[k] as usize;
                 let (centre, velocity) = (state.positions[node], state.velocities[node]);
-                Section { centre, velocity, axes, radius_m: rope.radius_m, flattening_m: DVec2::ZERO }
+                Section {
+                    follows: nodes[k],
+                    centre,
+                    velocity,
+                    axes,
+                    radius_m: rope.radius_m,
+                    flattening_m: DVec2::ZERO,
+                }
             })
             .collect();
         Self::swept(&sections)
@@ -131,7 +149,7 @@ impl Surface {
     fn swept(sections: &[Section]) -> Self {
         let mut into = Self::default();
         let (Some(first), Some(last)) = (sections.first(), sections.last()) else { return into };
-        let tip = into.point(first.centre - first.axes * DVec3::Z * first.radius_m, first.velocity);
+        let tip = into.point(first, first.axes * DVec3::Z * -first.radius_m);
         for k in (0..END_RINGS).rev() {
             into.ring(first, -FRAC_PI_2 * f64::from(k + 1) / f64::from(END_RINGS + 1));
         }
@@ -139,7 +157,7 @@ impl Surface {
         for k in 0..END_RINGS {
             into.ring(last, FRAC_PI_2 * f64::from(k + 1) / f64::from(END_RINGS + 1));
         }
-        let end = into.point(last.centre + last.axes * DVec3::Z * last.radius_m, last.velocity);
+        let end = into.point(last, last.axes * DVec3::Z * last.radius_m);
         let rings = (end - tip - 1) / AROUND;
         let at = |ring: u32, k: u32| tip + 1 + ring * AROUND + k % AROUND;
         for k in 0..AROUND {
@@ -153,9 +171,11 @@ impl Surface {
         into
     }
 
-    fn point(&mut self, point: DVec3, velocity: DVec3) -> u32 {
-        self.points.push(point);
-        self.velocities.push(velocity);
+    /// A point of a section, `arm` from its centre.
+    fn point(&mut self, section: &Section, arm: DVec3) -> u32 {
+        self.points.push(section.centre + arm);
+        self.velocities.push(section.velocity);
+        self.follows.push(section.follows);
         self.points.len() as u32 - 1
     }
 
@@ -167,7 +187,7 @@ impl Surface {
             let radius = section.radius_m + section.flattening_m.dot(turned);
             let across = DVec3::new(angle.cos(), angle.sin(), 0.0) * radius * latitude.cos();
             let along = DVec3::Z * section.radius_m * latitude.sin();
-            self.point(section.centre + section.axes * (across + along), section.velocity);
+            self.point(section, section.axes * (across + along));
         }
     }
 
@@ -203,6 +223,7 @@ impl Surface {
 
 /// A section of a tube or rope.
 struct Section {
+    follows: u32,
     centre: DVec3,
     velocity: DVec3,
     /// Its third axis is that of the tube.

@@ -20,10 +20,10 @@ fn scene() -> Scene {
 /// Plays 2.5 s at 20 moments a second into files: the ball falls for 0.63 s of it.
 fn export(into: &mut dyn MomentWriter) -> Vec<Moment> {
     let world = World::start(&scene(), ExecutorKind::Lockstep).unwrap();
-    let mut moments = Moments::default();
+    let mut moments = Moments::of(&world);
     let written = (0..50).map(|_| {
         world.advance(SimSpan::from_millis(50));
-        let moment = moments.take(&world);
+        let moment = moments.take();
         into.write(&moment).unwrap();
         moment
     });
@@ -33,7 +33,7 @@ fn export(into: &mut dyn MomentWriter) -> Vec<Moment> {
 #[test]
 fn surfaces_are_closed_and_hold_the_volume_of_the_solids() {
     let folder = tempfile::tempdir().unwrap();
-    let moments = export(&mut VtkSeries::create(folder.path(), &Surface::fixed(&scene())).unwrap());
+    let moments = export(&mut VtkSeries::create(folder.path(), &scene()).unwrap());
     let volume = |k: usize| {
         let surface = &moments[0].objects[k].surface;
         let mesh = Triangles { points: surface.points.clone(), triangles: surface.triangles.clone() };
@@ -82,7 +82,7 @@ fn what_bends_is_sent_once_while_it_stands_still_and_to_a_micrometre() {
     let scene = scene();
     let world = World::start(&scene, ExecutorKind::Lockstep).unwrap();
     world.advance(SimSpan::from_millis(50));
-    let moment = Moments::default().take(&world);
+    let moment = Moments::of(&world).take();
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("run.mcap");
     let mut file = McapFile::create(&path, &Surface::fixed(&scene)).unwrap();
@@ -119,8 +119,7 @@ fn an_mcap_file_that_was_cut_short_opens_up_to_its_last_second() {
 #[test]
 fn a_vtk_series_lists_its_moments_and_holds_their_points() {
     let folder = tempfile::tempdir().unwrap();
-    let fixed = Surface::fixed(&scene());
-    let mut series = VtkSeries::create(folder.path(), &fixed).unwrap();
+    let mut series = VtkSeries::create(folder.path(), &scene()).unwrap();
     let moments = export(&mut series);
     series.finish().unwrap();
     let index = std::fs::read_to_string(folder.path().join("series.pvd")).unwrap();
@@ -146,7 +145,7 @@ fn a_vtk_series_lists_its_moments_and_holds_their_points() {
     for name in VtkSeries::FILES {
         std::fs::remove_file(folder.path().join(name)).unwrap();
     }
-    let taken = VtkSeries::create(folder.path(), &fixed).err();
+    let taken = VtkSeries::create(folder.path(), &scene()).err();
     assert!(matches!(&taken, Some(ExportError::Taken { path }) if path.extension().unwrap() == "vtu"), "{taken:?}");
     let plain = folder.path().join("other");
     std::fs::create_dir(&plain).unwrap();
@@ -165,7 +164,7 @@ fn objects_called_as_ours_are_have_frames_of_their_own() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("run.mcap");
     let mut file = McapFile::create(&path, &Surface::fixed(&scene())).unwrap();
-    file.write(&Moments::default().take(&world)).unwrap();
+    file.write(&Moments::of(&world).take()).unwrap();
     file.finish().unwrap();
     let (mut frames, mut entities) = (Vec::new(), Vec::new());
     for message in MessageStream::new(&std::fs::read(&path).unwrap()).unwrap().map(Result::unwrap) {
@@ -191,7 +190,7 @@ fn moment_of_all() -> (Moment, Surface) {
     let scene = parts.add("tube", tube).add("sheet", sheet).build().unwrap();
     let world = World::start(&scene, ExecutorKind::Lockstep).unwrap();
     world.advance(SimSpan::from_millis(100));
-    (Moments::default().take(&world), Surface::fixed(&scene))
+    (Moments::of(&world).take(), Surface::fixed(&scene))
 }
 
 fn area_m2(mesh: &Triangles) -> f64 {
@@ -272,6 +271,6 @@ fn a_glb_file_read_as_a_mesh_has_the_same_triangles() {
 fn a_glb_file_of_nothing_is_one() {
     let scene = Scene::builder().build().unwrap();
     let world = World::start(&scene, ExecutorKind::Lockstep).unwrap();
-    let bytes = metachron_export::glb(&Moments::default().take(&world), &Surface::fixed(&scene)).unwrap();
+    let bytes = metachron_export::glb(&Moments::of(&world).take(), &Surface::fixed(&scene)).unwrap();
     assert_eq!(gltf::Gltf::from_slice(&bytes).unwrap().nodes().len(), 1);
 }

@@ -60,5 +60,6 @@ pub use reading::joint_states::JointState;
 pub use reading::object::{Object, Touched};
 pub use reading::queries::{Cast, ContactNow, Hit};
 pub use reading::sensors::{JointRef, ListedJoint, Reading};
+pub use reading::stress::Stresses;
 pub use start::assemble::{Govern, machine};
 pub use world::World;

@@ -8,3 +8,4 @@ pub mod joint_states;
 pub mod object;
 pub mod queries;
 pub mod sensors;
+pub mod stress;

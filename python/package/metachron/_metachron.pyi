@@ -336,10 +336,11 @@ class World:
         *,
         mcap: str | PathLike[str] | None = None,
         vtk: str | PathLike[str] | None = None,
+        glb: str | PathLike[str] | None = None,
         perfetto: str | PathLike[str] | None = None,
     ) -> Export:
-        """Begins files for other programs: moments as MCAP for Foxglove, Lichtblick and Rerun, or in a folder as a VTK series for ParaView; for
-        ui.perfetto.dev when each object stepped.
+        """Begins files for other programs: moments as MCAP for Foxglove, Lichtblick and Rerun, in a folder as VTK series for ParaView, or as one
+        animated binary glTF (.glb) for Blender and three.js; for ui.perfetto.dev when each object stepped.
         """
 
     def write_glb(self, path: str | PathLike[str]) -> None:

@@ -30,6 +30,7 @@ mod second_order;
 mod spec;
 mod state;
 mod step;
+mod stress;
 mod sym3;
 mod system;
 #[cfg(test)]

@@ -254,6 +254,11 @@ impl Joint {
         Self { theta, strain, inverse: division.joint[index] }
     }
 
+    /// Bending and twist beyond rest, world axes, 1/m.
+    pub fn curvature(&self) -> DVec3 {
+        self.strain * self.inverse
+    }
+
     /// The moment that turns the segment before the joint forward and the one after it back (eq. 6, 9).
     #[inline(always)]
     fn moment(&self, matter: &RodMaterial, axis: DVec3, energy_j: &mut f64) -> DVec3 {

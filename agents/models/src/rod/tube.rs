@@ -31,7 +31,7 @@ pub const STRETCH_WARN: f64 = 1.4;
 #[derive(Debug, Clone)]
 pub struct Tube {
     pub(super) spec: TubeSpec,
-    skeleton: RestCurve,
+    pub(super) skeleton: RestCurve,
     pub(super) matter: RodMaterial,
     pub(super) division: Discretization,
     pub(super) now: RodState,

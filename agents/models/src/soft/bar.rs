@@ -38,6 +38,12 @@ impl Bar {
         system.stiffen(b, a, -stiffness);
     }
 
+    /// By which share of its length at rest it is longer.
+    pub fn strain(&self, positions: &[DVec3]) -> f64 {
+        let [a, b] = self.ends.map(|end| positions[end as usize]);
+        (a.distance(b) - self.rest_m) / self.rest_m
+    }
+
     /// Elastic energy, J.
     pub fn energy_j(&self, positions: &[DVec3]) -> f64 {
         let [a, b] = self.ends.map(|end| positions[end as usize]);

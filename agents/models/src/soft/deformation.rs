@@ -73,6 +73,14 @@ impl Deformation {
         self.left * DMat3::from_diagonal(DVec3::from_array(response.slope)) * self.right.transpose()
     }
 
+    /// The von Mises stress of Cauchy, Pa (eq. 28): that of matter which has no volume left is not finite.
+    pub fn von_mises_pa(&self, material: &impl Material) -> f64 {
+        let volume: f64 = self.stretches.iter().product();
+        let slope = material.respond(self.stretches).slope;
+        let [a, b, c] = [0, 1, 2].map(|k| slope[k] * self.stretches[k] / volume);
+        (0.5 * ((a - b).powi(2) + (b - c).powi(2) + (c - a).powi(2))).sqrt()
+    }
+
     /// The stiffness of a unit of volume: how much stress changes with F, without its negative part (eq. 29, 30).
     pub fn stiffness(&self, response: &StretchResponse) -> [Mode; 9] {
         let StretchResponse { slope, curvature, .. } = response;

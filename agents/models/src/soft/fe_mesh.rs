@@ -273,6 +273,33 @@ impl FeMesh {
         bars + membranes + bending + shells + hexahedra.sum::<f64>() + tetrahedra.sum::<f64>()
     }
 
+    /// The von Mises stress of elastic forces at every vertex, Pa: the mean of the elements around it by volume.
+    pub fn von_mises_pa(&self, positions: &[DVec3], matter: &SoftMatter) -> Vec<f64> {
+        let mut sums = vec![[0.0; 2]; self.rest.len()];
+        let mut add = |vertices: &[u32], volume: f64, stress_pa: f64| {
+            for vertex in vertices {
+                let [weighted, whole] = &mut sums[*vertex as usize];
+                (*weighted, *whole) = (*weighted + volume * stress_pa, *whole + volume);
+            }
+        };
+        for bar in &self.bars {
+            add(&bar.ends, bar.rest_m, matter.young_pa * bar.strain(positions).abs());
+        }
+        for membrane in &self.membranes {
+            add(membrane.vertices(), membrane.mass_kg().iter().sum(), membrane.von_mises_pa(positions));
+        }
+        let law = Law::of(matter);
+        for cell in &self.hexahedra {
+            let deformation = { *cell }.deformation(&self.kinds[cell.kind], positions);
+            add(&cell.vertices, cell.mass_kg.iter().sum(), deformation.von_mises_pa(&law));
+        }
+        for element in &self.tetrahedra {
+            let deformation = { *element }.follow(positions);
+            add(&element.vertices, element.volume_m3, deformation.von_mises_pa(&self.laws[element.material]));
+        }
+        sums.into_iter().map(|[weighted, whole]| if whole > 0.0 { weighted / whole } else { 0.0 }).collect()
+    }
+
     /// The largest change of sag of three vertices in a row against rest, metres: the error of straight pieces.
     pub fn residual_m(&self, positions: &[DVec3]) -> f64 {
         // a rope bends freely: the loss of a kink is no error

@@ -223,6 +223,12 @@ impl Hexahedron {
         MeanDeformation { f, firm }
     }
 
+    /// How it is deformed on the mean; updates its rotation.
+    pub fn deformation(&mut self, kind: &HexahedronKind, positions: &[DVec3]) -> Deformation {
+        let MeanDeformation { f, .. } = self.follow(kind, positions);
+        Deformation::of(f, self.turn)
+    }
+
     fn bent(&self, kind: &HexahedronKind, positions: &[DVec3]) -> Bent {
         let turn = DMat3::from_quat(self.turn);
         let back = turn.transpose();

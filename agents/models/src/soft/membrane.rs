@@ -92,6 +92,12 @@ impl Membrane {
         }
     }
 
+    /// The von Mises stress in its plane, Pa.
+    pub fn von_mises_pa(&self, positions: &[DVec3]) -> f64 {
+        let [xx, yy, xy] = self.stress(self.strained(positions).strain);
+        (xx * xx - xx * yy + yy * yy + 3.0 * xy * xy).sqrt()
+    }
+
     /// Elastic energy, J.
     pub fn energy_j(&self, positions: &[DVec3]) -> f64 {
         let strain = self.strained(positions).strain;

@@ -29,6 +29,7 @@ mod shell_bending;
 mod skin;
 mod spec;
 mod step;
+mod stress;
 mod system;
 #[cfg(test)]
 mod tests;
