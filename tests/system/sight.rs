@@ -121,3 +121,30 @@ fn what_is_drawn_as_one_far_away_is_simulated_as_often_as_that_shows_unless_it_m
     assert_eq!(steps_ms(&drifting(GROUP, 5.0)), [50.0, 50.0, 50.0, 5.0]);
     assert_eq!(steps_ms(&drifting(GROUP, 0.401)), [5.0; 4]);
 }
+
+/// The built-in walks with a time that binds.
+const WALKS: [&str; 5] = ["auditorium", "grove", "library", "domes", "walkthrough"];
+
+#[test]
+fn the_motion_of_the_camera_counts_in_a_walk() {
+    for scene in ["auditorium", "grove"] {
+        let triangles = |motion: &str| {
+            let report = lockstep(scene, &["--seconds", "4", "--set", &format!("target.motion={motion}")]);
+            report["budget"]["primitives"]["triangles"].as_f64().expect("frames were drawn")
+        };
+        assert_ne!(triangles("0"), triangles("1"), "{scene}");
+    }
+}
+
+#[test]
+fn no_policy_lets_levels_come_and_go_in_a_walk() {
+    for scene in WALKS {
+        for policy in
+            ["greedy", "greedy-incremental", "hierarchical", "robin-hood", "convex", "marginal-stop", "adaptive"]
+        {
+            let report = lockstep(scene, &["--seconds", "10", "--policy", policy]);
+            let share = report["budget"]["reversals"].as_f64().expect("objects were in view");
+            assert!(share <= 0.005, "{scene}, {policy}: {share}");
+        }
+    }
+}

@@ -9,6 +9,7 @@ use crate::format::{
 };
 use glam::DVec3;
 use metachron_core::SimSpan;
+use metachron_core::kinds::PolicyKind;
 use metachron_world::{
     Camera, FACTOR, Factors, Gains, Machine, NamedCamera, ObjectCost, Probe, RENDER_SCALE, Target, View,
 };
@@ -49,11 +50,22 @@ pub(crate) fn target(c: &mut Checker<'_, '_>, file: Option<&TargetFile>) -> Targ
         motion: gain("motion", f.motion),
         hysteresis: gain("hysteresis", f.hysteresis),
     });
+    let policy = file.and_then(|f| f.policy).unwrap_or_default();
+    let weighs = policy.predicts() && policy != PolicyKind::RobinHood;
+    let Factors { focus, motion, hysteresis } = factors;
+    for (key, value, counts) in
+        [("focus", focus, weighs), ("motion", motion, weighs), ("hysteresis", hysteresis, policy.has_hysteresis())]
+    {
+        if !counts && value.is_some_and(|value| value > 0.0) {
+            let what = format!("has no effect under `policy = \"{}\"`", policy.name());
+            c.wrong(&place, key, what, format!("expected no `{key}`, or another policy"));
+        }
+    }
     let scales = file.and_then(|f| f.render_scale).map(|scales| c.ends(&place, "render_scale", scales, TARGET));
     Target {
         lag: lag(c, &place, file),
         frame_hz: c.optional(&place, "frame_hz", frame_hz, TARGET).unwrap_or(FRAME_DEFAULT_HZ),
-        policy: file.and_then(|f| f.policy).unwrap_or_default(),
+        policy,
         value: file.and_then(|f| f.value).unwrap_or_default(),
         law: file.and_then(|f| f.law).unwrap_or_default(),
         gains: given,
