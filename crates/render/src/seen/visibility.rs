@@ -249,7 +249,7 @@ impl Sight<'_> {
     fn speeds_px_s(&self, at: DVec3, velocities: &[DVec3]) -> (f64, f64) {
         let (camera, from_eye) = (self.camera, self.camera.seen(at));
         let scale = camera.pixels_per_metre((at - camera.eye()).dot(camera.forward()), self.size);
-        // what comes nearer moves away from the middle of the picture; nothing is seen beyond its corners
+        // a point that comes nearer moves away from the middle of the picture; nothing is seen beyond its corners
         let corner = half_diagonal_px(self.size) / camera.pixels_per_metre(1.0, self.size);
         let beside = from_eye.truncate().clamp_length_max(corner * from_eye.z.max(camera.near_m()));
         let beside = beside / from_eye.z.max(camera.near_m());

@@ -37,9 +37,9 @@ pub(crate) struct TwoFrames<'a> {
 /// Objects whose levels can only stay together: one, or all of a group whose cut changes.
 #[derive(Debug, Clone, Copy, Default)]
 struct Part {
-    /// What its changes cost, pixels.
+    /// Price of its changes, pixels.
     changes_px: f64,
-    /// What staying adds to the time, seconds, and to the benefit, pixels.
+    /// Time and benefit that staying adds, seconds and pixels.
     more_s: f64,
     more_px: f64,
     /// Objects that staying leaves out.

@@ -49,7 +49,8 @@ impl LogicBefore {
         // with the point of nothing, the means are a little less
         let spread = squares / all - mean_n * mean_n / (all * all);
         let together = products / all - mean_n * mean_s / (all * all);
-        let slope = if spread > 0.0 { (together / spread).max(0.0) } else { 0.0 };
+        // no objects take no less than no time
+        let slope = if spread > 0.0 { (together / spread).min(mean_s / mean_n).max(0.0) } else { 0.0 };
         (mean_s + slope * (objects as f64 - mean_n)).max(0.0)
     }
 }
