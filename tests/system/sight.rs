@@ -121,3 +121,35 @@ fn what_is_drawn_as_one_far_away_is_simulated_as_often_as_that_shows_unless_it_m
     assert_eq!(steps_ms(&drifting(GROUP, 5.0)), [50.0, 50.0, 50.0, 5.0]);
     assert_eq!(steps_ms(&drifting(GROUP, 0.401)), [5.0; 4]);
 }
+
+/// Walks, and frames a second at which time is short in them.
+const WALKS: [(&str, &str); 3] = [("walkthrough", "60"), ("grove", "100"), ("auditorium", "100")];
+
+fn budget(scene: &str, frame_hz: &str, seconds: &str, more: [&str; 2]) -> Value {
+    let target = format!("target.frame_hz={frame_hz}");
+    lockstep(scene, &[&["--seconds", seconds, "--set", &target], &more[..]].concat())["budget"].clone()
+}
+
+#[test]
+fn the_motion_of_the_camera_counts_in_a_walk() {
+    for (scene, frame_hz) in &WALKS[1..] {
+        let triangles = |motion: &str| {
+            let found = budget(scene, frame_hz, "8", ["--set", motion]);
+            found["primitives"]["triangles"].as_f64().expect("frames were drawn")
+        };
+        assert_ne!(triangles("target.motion=0"), triangles("target.motion=1"), "{scene}");
+    }
+}
+
+#[test]
+fn no_policy_lets_levels_come_and_go_in_a_walk() {
+    let policies =
+        ["greedy", "greedy-incremental", "hierarchical", "robin-hood", "convex", "marginal-stop", "adaptive"];
+    for (scene, frame_hz) in WALKS {
+        for policy in policies {
+            let found = budget(scene, frame_hz, "6", ["--policy", policy]);
+            let share = found["reversals"].as_f64().expect("objects were in view");
+            assert!(share <= 0.005, "{scene}, {policy}: {share}");
+        }
+    }
+}

@@ -68,8 +68,8 @@ pub enum PolicyKind {
     Adaptive,
 }
 
-/// How `robin-hood` values an object (RH05, eq. 8 … 11): from its surface a and its depth z, or its distance d from the point that
-/// the camera looks at.
+/// How `robin-hood` values an object (RH05, eq. 8 … 11): from its surface a, its depth z along the view and its distance d from the
+/// eye, which is greater away from the middle of the picture.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 #[cfg_attr(feature = "schema", derive(serde::Deserialize, schemars::JsonSchema), serde(rename_all = "kebab-case"))]
 pub enum ValueKind {
@@ -188,7 +188,7 @@ impl PolicyKind {
     /// Whether the slider of hysteresis changes the policy's choice.
     #[must_use]
     pub const fn has_hysteresis(self) -> bool {
-        self.has_printed_benefit() || matches!(self, Self::Adaptive)
+        self.has_printed_benefit() || matches!(self, Self::Convex | Self::ConvexBarrier) || self.chooses_groups()
     }
 
     /// Whether the policy takes pixels from the picture where all else is at its coarsest: one that ignores the time of frames does not.

@@ -49,7 +49,7 @@ pub use gpu::offscreen::{DeviceLoss, Gpu, GpuError, Offscreen, PictureFile};
 pub use gpu::upscale::{Upscaled, Upscaler};
 pub use seen::level::{Level, Shading};
 pub use seen::pick::Hit;
-pub use seen::view::{Camera, Frustum, Ray, Size};
+pub use seen::view::{Camera, CameraMotion, Frustum, Ray, Size};
 pub use seen::visibility::{Visibility, VisibleCounts};
 pub use states::membership::History;
 pub use states::scene_view::{Actor, Appearance, Form, Material, SceneView, States, StaticObject};

@@ -103,4 +103,12 @@ fn objects_and_scenes_may_allow_objects_to_vanish() {
     let usual = scene("", "").unwrap();
     assert!(!usual.target.may_vanish && usual.agents[0].appearance.may_vanish.is_none());
     assert!(scene("hysteresis = 1.5", "").unwrap_err().contains("hysteresis"));
+    for ignored in [
+        "policy = \"robin-hood\"\nfocus = 0.5",
+        "policy = \"feedback\"\nmotion = 1.0",
+        "policy = \"marginal-stop\"\nhysteresis = 0.1",
+    ] {
+        assert!(scene(ignored, "").unwrap_err().contains("has no effect under"), "{ignored}");
+    }
+    assert!(scene("policy = \"convex\"\nfocus = 0.5\nhysteresis = 0.1", "").is_ok());
 }

@@ -182,7 +182,7 @@ fn loss(view: &ObjectView, weight: f64, rate_hz: f64) -> f64 {
     if !view.visible || view.pixels.is_nan() || view.pixels < 1.0 {
         return ERROR_LEAST * UNSEEN_PX * view.importance;
     }
-    let off_px = temporal_error_px(Between::Hold, view.speed_px_s, 0.0, rate_hz);
+    let off_px = temporal_error_px(Between::Hold, view.own_speed_px_s, 0.0, rate_hz);
     let wrong = ERROR_LEAST + 2.0 * off_px / view.pixels.sqrt();
     weight * if wrong < 1.0 { wrong } else { 1.0 }
 }

@@ -66,6 +66,20 @@ pub struct FrameRecord {
     pub render_scale: f64,
     /// Whether objects threw shadows in it, where the light does.
     pub shadows: bool,
+    /// Pieces of objects drawn as points.
+    pub points: u64,
+    /// Pieces of objects drawn as lines.
+    pub lines: u64,
+    /// Objects drawn with one colour a triangle.
+    pub flat: u32,
+    /// Objects drawn with colours at vertices.
+    pub gouraud: u32,
+    /// Objects drawn with light at every pixel.
+    pub per_pixel: u32,
+    /// Objects drawn with light at every pixel and their texture.
+    pub textured: u32,
+    /// Objects drawn with soft shadows besides.
+    pub shadowed: u32,
 }
 
 /// A probe's point at the end of the run.

@@ -75,6 +75,8 @@ pub struct Session {
     agents_cpu: (Duration, f64),
     /// Time and position of the camera at its last reading.
     last_camera: Option<(Duration, Camera)>,
+    /// When the last picture began, and the camera that saw it.
+    last_seen_by: Option<(Duration, Camera)>,
     /// Predicted camera of the next frame at the time when its picture is finished.
     next_camera: Option<Camera>,
     /// Time from reading the camera to the finished picture, seconds, smoothed.
@@ -185,6 +187,7 @@ impl Session {
             last_start: None,
             agents_cpu: (Duration::ZERO, 0.0),
             last_camera: None,
+            last_seen_by: None,
             next_camera: None,
             lag_s: 0.0,
             begun: Duration::ZERO,

@@ -102,7 +102,7 @@ impl VisibleResolution {
 fn visible_detail(seen: &Visibility, side_px: Option<f64>, pixel_m: f64) -> VisibleDetail {
     match side_px {
         // nothing finer than a triangle is drawn, and no motion shorter than one tells two steps apart
-        Some(side_px) => VisibleDetail { eps_m: side_px * pixel_m, dt_s: side_px / seen.speed_px_s },
+        Some(side_px) => VisibleDetail { eps_m: side_px * pixel_m, dt_s: side_px / seen.own_speed_px_s },
         None => VisibleDetail { eps_m: pixel_m, dt_s: 0.0 },
     }
 }

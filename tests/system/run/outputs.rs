@@ -21,12 +21,13 @@ fn the_rows_of_frames_are_one_a_frame_with_the_documented_columns() {
     let text = std::fs::read_to_string(path).unwrap();
     let mut rows = text.lines();
     let columns = "frame,sim_s,frame_ms,gpu_ms,interval_ms,full_ms,triangles,objects,potentially_visible,drawn,cull_ms,select_ms,draw_ms,lag_ms,\
-                   predicted_ms,value_over_bound,changes,reversals,holes,passes,eps,n,render_scale,shadows";
+                   predicted_ms,value_over_bound,changes,reversals,holes,passes,eps,n,render_scale,shadows,points,lines,flat,gouraud,\
+                   per_pixel,textured,shadowed";
     assert_eq!(rows.next(), Some(columns));
     let rows: Vec<Vec<&str>> = rows.map(|row| row.split(',').collect()).collect();
     assert_eq!(rows.len(), 7);
     for (k, row) in rows.iter().enumerate() {
-        assert_eq!((row.len(), row[0].parse(), row[22], row[23]), (24, Ok(k), "1.0", "true"));
+        assert_eq!((row.len(), row[0].parse(), row[22], row[23]), (31, Ok(k), "1.0", "true"));
         assert_eq!(row[3], "", "no adapter works in virtual time");
         let shown_s: f64 = row[1].parse().unwrap();
         assert!((shown_s - k as f64 / 60.0).abs() < 1e-8, "{row:?}"); // at most 7 periods, each rounded to a nanosecond

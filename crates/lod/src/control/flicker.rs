@@ -13,6 +13,8 @@ const REMEMBERED: usize = 3;
 struct LevelHistory {
     id: AgentId,
     levels: [Option<LevelDemand>; REMEMBERED],
+    /// Frames since its level changed; many for one that has just come into view.
+    lasted: u8,
 }
 
 /// The last levels of all objects, in the order in which they are given.
@@ -22,9 +24,15 @@ pub(super) struct Changes {
 }
 
 impl Changes {
+    /// The level of object `at` in the frame before and for how many frames it has had it; `None` where it was not in view.
+    pub fn last(&self, at: usize, id: u64) -> Option<(LevelDemand, u8)> {
+        let past = self.past.get(at).filter(|past| u64::from(past.id.0) == id)?;
+        Some((past.levels[0]?, past.lasted))
+    }
+
     /// Stores the levels of a frame; gives how many objects in view changed, and how many of these went back (A, B, A).
     pub fn count(&mut self, views: &[SizedView], levels: &[LevelDemand]) -> (u32, u32) {
-        let unknown = LevelHistory { id: AgentId(0), levels: [None; REMEMBERED] };
+        let unknown = LevelHistory { id: AgentId(0), levels: [None; REMEMBERED], lasted: u8::MAX };
         self.past.resize(views.len(), unknown);
         let (mut changes, mut reversals) = (0, 0);
         for ((SizedView { view, .. }, level), past) in views.iter().zip(levels).zip(&mut self.past) {
@@ -38,6 +46,7 @@ impl Changes {
             let had_it = past.levels[1..].iter().flatten().any(|before| before == level);
             changes += u32::from(changed);
             reversals += u32::from(changed && had_it);
+            past.lasted = if changed { 1 } else { past.lasted.saturating_add(1) };
             past.levels.rotate_right(1);
             past.levels[0] = Some(*level);
         }
@@ -62,9 +71,10 @@ mod tests {
             pixels: 1.0,
             distance_m: 1.0,
             speed_px_s: 0.0,
+            own_speed_px_s: 0.0,
             importance: 1.0,
             off_centre: 0.0,
-            from_focus_m: 0.0,
+            depth_m: 1.0,
             visible,
             group: None,
             may_vanish: false,

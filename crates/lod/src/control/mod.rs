@@ -19,7 +19,7 @@ pub use crate::cost::value::Value;
 pub use agents::rate::{RateControl, RateDemand, RateGains, RateLimits, TurnMeasure, VisibleDetail};
 pub use agents::tolerance::{ErrorControl, ErrorLimits, ErrorMeasure};
 pub use demand::level::{IMPOSTORS_MAX, PRIMITIVE_LEVELS};
-pub use demand::plan::{FrameWork, LevelDemand, Plan, detail};
+pub use demand::plan::{FrameWork, LevelDemand, Plan, Tally, detail};
 pub use demand::policy::{Law, Policy};
 pub use demand::query::Promise;
 pub use demand::status::Status;

@@ -13,17 +13,18 @@ use super::choice::groups::Groups;
 use super::choice::hierarchy::Hierarchy;
 use super::choice::quality_boost::QualityBoost;
 use super::choice::select::Select;
+use super::choice::steady::{TwoFrames, Worth};
 use super::choice::vanish::Vanish;
 use super::demand::level;
 use super::demand::plan::{FrameWork, LevelDemand, Plan, SizedView, in_view, steers};
-use super::demand::policy::{Law, Policy, sliders};
-use super::demand::query::{FrameQuery, Promise, left_out};
+use super::demand::policy::{Law, Policy};
+use super::demand::query::{FrameQuery, PARTS_OF_A_PIXEL, Promise, left_out};
 use super::demand::status::Status;
 use super::demand::view::ObjectView;
 use super::flicker::Changes;
 use super::prices::benefit;
 use super::prices::ladder::{Ladder, Ladders};
-use super::prices::logic::Logic;
+use super::prices::logic::{Logic, LogicBefore};
 use super::prices::price::{Backdrop, Prices};
 use super::render_scale::RenderScale;
 use crate::adaptive::DEFAULT_MARGIN;
@@ -35,9 +36,6 @@ use metachron_core::{AgentId, Resolution};
 
 /// The share of a new measurement in the smoothed speed on the screen: about five frames of memory.
 const SPEED_NEWS: f64 = 0.2;
-
-/// The share of a new measurement in the smoothed time of a frame outside drawing.
-const OVERHEAD_NEWS: f64 = 0.1;
 
 /// A smaller change of a frame's fixed part, as a fraction of the target, is ignored: it fluctuates, and levels should not follow that.
 const FIXED_TREMBLE: f64 = 0.01;
@@ -60,8 +58,8 @@ pub struct PictureControl {
     frozen: bool,
     /// The rule for raising quality beyond the objects' requested ranges, if that is allowed.
     raise: Option<QualityBoost>,
-    /// Time of a frame outside drawing, seconds, smoothed.
-    overhead_s: Option<f64>,
+    /// Time of a frame outside drawing.
+    before: LogicBefore,
     /// Time of a frame that is spent whatever is chosen, seconds, as used for the last choice.
     fixed_s: f64,
     /// Time of the frame used by others, seconds.
@@ -106,7 +104,7 @@ impl PictureControl {
             backdrop: Backdrop::default(),
             frozen: false,
             raise: None,
-            overhead_s: None,
+            before: LogicBefore::default(),
             fixed_s: 0.0,
             reserve_s: 0.0,
             others_s: 0.0,
@@ -140,8 +138,7 @@ impl PictureControl {
         if frame.skip || work_s <= 0.0 {
             return;
         }
-        let overhead_s = work_s - drawn_s;
-        self.overhead_s = Some(self.overhead_s.map_or(overhead_s, |held| held + OVERHEAD_NEWS * (overhead_s - held)));
+        self.before.observe(in_view(&self.views).count(), work_s - drawn_s);
         let target_s = self.target_s();
         // by the prices that the frame was drawn with: its scale and shadows may change now
         let (backdrop_s, objects_s) =
@@ -209,10 +206,10 @@ impl PictureControl {
 
     fn choose_by_cost(&mut self, levels: &mut [LevelDemand]) -> Promise {
         let (raised, prices) = (self.raise.is_some_and(|raise| raise.is_open()), self.picture_prices());
-        let sliders = sliders(self.policy, self.sliders());
+        let sliders = self.sliders();
         self.ladders.update(&self.views, raised, &prices, &sliders);
         self.groups.update(if self.policy.chooses_groups() { &self.views } else { &[] });
-        let (target_s, overhead_s) = (self.target_s(), self.overhead_s.unwrap_or(0.0));
+        let (target_s, overhead_s) = (self.target_s(), self.before.seconds(in_view(&self.views).count()));
         let split = self.pipeline.map(|pipeline| Pipeline { lag: target_s, ..pipeline }.split(self.cull_s));
         let kept_s = split.map_or(0.0, |split| target_s - split.draw - overhead_s);
         self.others_s = self.reserve_s + kept_s;
@@ -257,9 +254,11 @@ impl PictureControl {
             }
             policy => self.select.choose(policy, &query, levels),
         };
+        self.keep_levels(&query, &prices, levels, &mut promise);
         for (at, _) in query.out.iter().enumerate().filter(|(_, out)| **out) {
             levels[at] = left_out(at, query.views, query.ladders.of(at));
             promise.holes += 1;
+            promise.upper = 0.0; // the bound is over choices without this object
         }
         if let (Policy::Adaptive | Policy::RobinHood, Some(raise)) = (self.policy, &mut self.raise) {
             raise.observe(&query, levels, &promise, self.policy);
@@ -267,6 +266,36 @@ impl PictureControl {
         // time reserved for others is not spent by the frame
         promise.predicted_s = (promise.predicted_s - self.others_s).max(0.0);
         promise
+    }
+
+    /// Lets levels of the frame before stay; the default policy does that in its own choice.
+    fn keep_levels(&self, query: &FrameQuery<'_>, prices: &Prices, levels: &mut [LevelDemand], promise: &mut Promise) {
+        if !self.policy.predicts() || self.policy == Policy::Adaptive {
+            return;
+        }
+        let most_px = |at: usize| match query.views[at].view.is_group() {
+            true => self.hierarchy.worth(at),
+            false => query.weight(at),
+        };
+        let of = |at: usize, level: &LevelDemand| {
+            let (SizedView { view, span }, ladder) = (&query.views[at], query.ladders.of(at));
+            let rung = ladder.rung_of(level, prices, query.sliders);
+            match self.policy {
+                Policy::Convex | Policy::ConvexBarrier => {
+                    [ladder.line.at(level.polygons), most_px(at) * libm::sqrt(level.polygons / span.full)]
+                }
+                printed if printed.has_printed_benefit() => {
+                    [rung.cost_s, benefit::printed(view, &rung, 0.0, query.sliders)]
+                }
+                _ => [rung.cost_s, most_px(at) * rung.accuracy],
+            }
+        };
+        let parts = match self.policy {
+            Policy::Convex | Policy::ConvexBarrier | Policy::RobinHood => 1.0,
+            _ => PARTS_OF_A_PIXEL,
+        };
+        let frames = TwoFrames { query, groups: &self.groups, changes: &self.changes };
+        frames.keep_levels(&Worth { of: &of, most_px: &most_px, parts }, levels, promise);
     }
 
     /// The plan of the last frame.

@@ -12,7 +12,7 @@ pub enum Value {
     Plain,
     /// a/z² (RH05, eq. 10): near objects take nearly all; much time stays unspent.
     Steep,
-    /// √(a/d²) by the distance from the focus (RH05, eq. 11, one reading).
+    /// √(a/d²) by the distance from the eye (RH05, eq. 11, one reading).
     Focus,
     /// √a/d² (RH05, eq. 11, the other reading).
     FocusSteep,
@@ -22,7 +22,7 @@ pub enum Value {
 const NEAREST: f64 = 1e-3;
 
 impl Value {
-    /// The value of an instance of unprojected area `a` at depth `z`, at distance `d` from the focus, times its importance.
+    /// The value of an instance of unprojected area `a` at depth `z` along the view, at distance `d` from the eye, times its importance.
     ///
     /// 0 if a number is invalid, the area or the importance is not above 0, or the instance is behind the eye.
     #[must_use]

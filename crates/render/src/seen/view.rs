@@ -99,9 +99,7 @@ impl Camera {
         let turned = libm::remainder(self.yaw_rad - before.yaw_rad, TAU);
         let tilted = self.pitch_rad - before.pitch_rad;
         let nearer = self.distance_m - before.distance_m;
-        let jumped =
-            way.length().max(nearer.abs()) > 0.5 * self.distance_m || turned.abs().max(tilted.abs()) > JUMP_RAD;
-        if jumped || !(times > 0.0 && times.is_finite()) {
+        if self.has_jumped(before) || !(times > 0.0 && times.is_finite()) {
             return *self;
         }
         Self {
@@ -111,6 +109,22 @@ impl Camera {
             pitch_rad: (self.pitch_rad + tilted * times).clamp(-PITCH_MAX_RAD, PITCH_MAX_RAD),
             fov_y_rad: self.fov_y_rad,
         }
+    }
+
+    /// Whether it is elsewhere than a motion from `before` could have brought it within a frame.
+    #[must_use]
+    pub fn has_jumped(&self, before: &Self) -> bool {
+        let turned = libm::remainder(self.yaw_rad - before.yaw_rad, TAU).abs();
+        let tilted = (self.pitch_rad - before.pitch_rad).abs();
+        let nearer = (self.distance_m - before.distance_m).abs();
+        let way = (self.target_m - before.target_m).length().max(nearer);
+        way > 0.5 * self.distance_m || turned.max(tilted) > JUMP_RAD
+    }
+
+    /// A point in the camera's axes, metres: to the right, to the top, forward.
+    pub(crate) fn seen(&self, point_m: DVec3) -> DVec3 {
+        let from_eye = point_m - self.eye();
+        DVec3::new(from_eye.dot(self.right()), from_eye.dot(self.up()), from_eye.dot(self.forward()))
     }
 
     /// From the target to the eye, a unit vector.
@@ -232,6 +246,30 @@ impl Camera {
         let (forward, side) = (self.forward(), |across: DVec3, tan: f64| (across, tan, (1.0 + tan * tan).sqrt()));
         let sides = [side(self.right(), tan_x), side(self.up(), tan_y)];
         Frustum { eye: self.eye(), forward, near_m: self.near_m(), sides }
+    }
+}
+
+/// How a camera moves.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct CameraMotion {
+    /// Where it was, and where it is.
+    pub cameras: [Camera; 2],
+    /// Time in between, seconds, > 0.
+    pub seconds: f64,
+}
+
+impl CameraMotion {
+    /// The motion from `before` to `now` in so many seconds; `None` where it rests or has jumped, and of no time.
+    #[must_use]
+    pub fn between(before: Camera, now: Camera, seconds: f64) -> Option<Self> {
+        let moves = before != now && !now.has_jumped(&before) && seconds > 0.0 && seconds.is_finite();
+        moves.then_some(Self { cameras: [before, now], seconds })
+    }
+
+    /// Velocity of a resting point in the camera's axes (right, top, forward), m/s.
+    pub(crate) fn drift(&self, point_m: DVec3) -> DVec3 {
+        let [before, now] = self.cameras.map(|camera| camera.seen(point_m));
+        (now - before) / self.seconds
     }
 }
 

@@ -4,7 +4,7 @@
 
 use super::bounds_tree::{BoundingBox, BoundsTree};
 use super::portals::{Bounded, Reach};
-use super::view::{Camera, Frustum, Size};
+use super::view::{Camera, CameraMotion, Frustum, Size};
 use crate::states::scene_view::{Bounds, Form, SceneView, StaticShape, Track};
 use glam::DVec3;
 use metachron_core::{AgentId, Body, CurveState};
@@ -21,14 +21,16 @@ pub struct Visibility {
     pub pixels: f64,
     /// Distance of its centre from the eye, metres.
     pub distance_m: f64,
-    /// Speed across the picture, pixels per second of simulated time: the root mean square over its points.
+    /// Speed across the picture, pixels per second, with the motion of the camera: the root mean square over its points.
     pub speed_px_s: f64,
+    /// The same as a camera at rest sees it, per second of simulated time.
+    pub own_speed_px_s: f64,
     /// Rest length and mean radius of a tube, metres.
     pub tube_m: Option<(f64, f64)>,
     /// Distance of its centre from the middle of the picture, as a fraction of half the diagonal.
     pub off_centre: f64,
-    /// Distance of its centre from the camera's target, metres.
-    pub from_focus_m: f64,
+    /// Depth of its centre along the view, metres; at least its radius, for what surrounds the eye is near.
+    pub depth_m: f64,
     /// Centre of a bounding ball, metres.
     pub centre_m: DVec3,
     /// Radius of that ball, metres.
@@ -135,6 +137,13 @@ impl SceneView {
         (self.survey, self.eye) = (Survey { cells, ..Survey::default() }, None);
     }
 
+    /// Says how the camera moves from the next survey on; `None` if it rests.
+    pub fn set_camera_motion(&mut self, motion: Option<CameraMotion>) {
+        if motion != self.camera_motion {
+            (self.camera_motion, self.eye) = (motion, None);
+        }
+    }
+
     /// Updates [`SceneView::seen`]: of the actors that are in view, that came out of it, or that were posed again
     /// ([`SceneView::updated`] lists the updated ones). The others keep their last visibility, of when they were in
     /// view. Stores the visibility for [`SceneView::compose`].
@@ -143,6 +152,7 @@ impl SceneView {
         let moved = self.eye != eye;
         self.eye = eye;
         let frustum = camera.frustum(size);
+        let sight = Sight { camera, size, motion: self.camera_motion.as_ref() };
         let is_first = self.found.len() != self.tracks.len();
         self.survey.refit(&self.tracks, &self.statics);
         if moved {
@@ -158,7 +168,7 @@ impl SceneView {
             if !is_new {
                 continue;
             }
-            let view = visibility_of(track, camera, size, &frustum, in_sight);
+            let view = visibility_of(track, &sight, &frustum, in_sight);
             (track.seen, track.fresh) = (view.visible, false);
             if !track.seen {
                 track.geomorph = None;
@@ -226,38 +236,67 @@ fn is_unseen(track: &Track) -> bool {
     matches!(track.actor.form, Form::Unseen) || matches!(track.pose, Body::Nothing)
 }
 
-fn visibility_of(track: &Track, camera: &Camera, size: Size, frustum: &Frustum, in_sight: bool) -> Visibility {
-    let bounds = track.bounds;
+/// The camera of a survey.
+struct Sight<'a> {
+    camera: &'a Camera,
+    size: Size,
+    motion: Option<&'a CameraMotion>,
+}
+
+impl Sight<'_> {
+    /// Speeds across the picture of points near `at` with these velocities, as a camera at rest and as this one sees them, pixels per second:
+    /// root mean squares.
+    fn speeds_px_s(&self, at: DVec3, velocities: &[DVec3]) -> (f64, f64) {
+        let (camera, from_eye) = (self.camera, self.camera.seen(at));
+        let scale = camera.pixels_per_metre((at - camera.eye()).dot(camera.forward()), self.size);
+        // a point that comes nearer moves away from the middle of the picture; nothing is seen beyond its corners
+        let corner = half_diagonal_px(self.size) / camera.pixels_per_metre(1.0, self.size);
+        let beside = from_eye.truncate().clamp_length_max(corner * from_eye.z.max(camera.near_m()));
+        let beside = beside / from_eye.z.max(camera.near_m());
+        let drift = self.motion.map_or(DVec3::ZERO, |motion| motion.drift(at));
+        let (right, up, forward) = (camera.right(), camera.up(), camera.forward());
+        let (mut own, mut apparent) = (0.0, 0.0);
+        for v in velocities {
+            own += (v - forward * v.dot(forward)).length_squared();
+            let all = DVec3::new(v.dot(right), v.dot(up), v.dot(forward)) + drift;
+            apparent += (all.truncate() - beside * all.z).length_squared();
+        }
+        let mean = |sum: f64| (sum / velocities.len().max(1) as f64).sqrt() * scale;
+        (mean(own), mean(apparent))
+    }
+}
+
+fn visibility_of(track: &Track, sight: &Sight<'_>, frustum: &Frustum, in_sight: bool) -> Visibility {
+    let (bounds, &Sight { camera, size, .. }) = (track.bounds, sight);
     let visible = in_sight && !is_unseen(track) && !size.is_empty();
     let scale = camera.pixels_per_metre((bounds.centre - camera.eye()).dot(camera.forward()), size);
     let across = |v: DVec3| (v - camera.forward() * v.dot(camera.forward())).length_squared();
-    let (area, speed_m_s, tube_m) = match &track.pose {
-        Body::Curve(curve) if !visible => (0.0, 0.0, tube_measures(curve)),
+    let speeds = |velocities: &[DVec3]| sight.speeds_px_s(bounds.centre, velocities);
+    let (area, (own_speed_px_s, speed_px_s), tube_m) = match &track.pose {
+        Body::Curve(curve) if !visible => (0.0, (0.0, 0.0), tube_measures(curve)),
         Body::Curve(curve) => {
-            let sum: f64 = curve.velocities.iter().map(|v| across(*v)).sum();
-            let speed = (sum / curve.velocities.len().max(1) as f64).sqrt();
-            (curve_pixels(curve, camera, size, frustum), speed, tube_measures(curve))
+            (curve_pixels(curve, camera, size, frustum), speeds(&curve.velocities), tube_measures(curve))
         }
-        Body::Rigid(rigid) => (track.body.mean_area_m2 * scale * scale, across(rigid.velocity).sqrt(), None),
-        Body::Tool(tool) => (track.body.mean_area_m2 * scale * scale, across(tool.velocity).sqrt(), None),
+        Body::Rigid(rigid) => (track.body.mean_area_m2 * scale * scale, speeds(&[rigid.velocity]), None),
+        Body::Tool(tool) => (track.body.mean_area_m2 * scale * scale, speeds(&[tool.velocity]), None),
         Body::Soft(soft) => {
-            let sum: f64 = soft.velocities.iter().map(|v| across(*v)).sum();
             let half = bounds.half_m;
             // the mean side of its bounding box: more than a sheet covers, about as much as a ball covers
             let area = 4.0 / 3.0 * (half.x * half.y + half.y * half.z + half.z * half.x);
-            (area * scale * scale, (sum / soft.velocities.len().max(1) as f64).sqrt(), None)
+            (area * scale * scale, speeds(&soft.velocities), None)
         }
-        Body::Nothing => (0.0, 0.0, None),
+        Body::Nothing => (0.0, (0.0, 0.0), None),
     };
     Visibility {
         id: track.actor.id,
         visible,
         pixels: if visible { area.clamp(0.0, size.pixels()) } else { 0.0 },
         distance_m: bounds.centre.distance(camera.eye()),
-        speed_px_s: speed_m_s * scale,
+        speed_px_s,
+        own_speed_px_s,
         tube_m,
         off_centre: across(bounds.centre - camera.eye()).sqrt() * scale / half_diagonal_px(size),
-        from_focus_m: bounds.centre.distance(camera.target_m),
+        depth_m: camera.seen(bounds.centre).z.max(bounds.radius_m),
         centre_m: bounds.centre,
         radius_m: bounds.radius_m,
     }
@@ -308,15 +347,50 @@ mod tests {
 
     const SIZE: Size = Size { width: 800, height: 600 };
 
-    fn ball_at(position: DVec3, velocity: DVec3) -> Visibility {
+    fn scene_view(position: DVec3, velocity: DVec3) -> SceneView {
         let appearance = Appearance { colour: [200; 3], material: Material::Plastic };
         let form = Form::Solid(Solid::Ball { radius_m: 0.1 });
         let mut scene_view = SceneView::new(vec![Actor { id: AgentId(0), form, appearance }], vec![]);
         let body = Body::Rigid(RigidState { position, velocity, ..RigidState::default() });
         scene_view.set_snapshot(AgentId(0), &Arc::new(Snapshot { body, ..Snapshot::default() }), true);
         scene_view.pose(SimTime::ZERO, States::Latest);
+        scene_view
+    }
+
+    fn ball_at(position: DVec3, velocity: DVec3) -> Visibility {
+        let mut scene_view = scene_view(position, velocity);
         scene_view.survey(&Camera::looking(DVec3::new(4.0, 0.0, 0.0), DVec3::ZERO, 0.8), SIZE);
         scene_view.seen()[0]
+    }
+
+    #[test]
+    fn the_camera_s_motion_counts_as_the_projection_moves() {
+        let dt = 1e-4;
+        let place = |i: u32| {
+            let number = |k: u32| f64::from((i * 7919 + k * 104_729) % 1000) / 1000.0 - 0.5;
+            (DVec3::new(number(1), 2.0 * number(2), number(3)), DVec3::new(number(4), number(5), number(6)))
+        };
+        let camera = |eye: DVec3, look_at: DVec3| Camera::looking(eye, look_at, 0.8);
+        for i in 0..40 {
+            let ((at, velocity), (step, turn)) = (place(i), place(i + 100));
+            let (eye, look_at) = (DVec3::new(4.0, 0.3, 0.5), DVec3::ZERO);
+            let before = camera(eye - dt * 3.0 * step, look_at - dt * turn);
+            let now = camera(eye, look_at);
+            let (then_px, _) = before.project(at - dt * velocity, SIZE).unwrap();
+            let (now_px, _) = now.project(at, SIZE).unwrap();
+            let expected = (now_px - then_px).length() / dt;
+            let mut scene_view = scene_view(at, velocity);
+            scene_view.set_camera_motion(CameraMotion::between(before, now, dt));
+            scene_view.survey(&now, SIZE);
+            let seen = scene_view.seen()[0];
+            assert!((seen.speed_px_s - expected).abs() < 1e-2 * expected, "{i}: {} {expected}", seen.speed_px_s);
+            scene_view.set_camera_motion(None);
+            scene_view.survey(&now, SIZE);
+            let (still_px, _) = now.project(at - dt * velocity, SIZE).unwrap();
+            let expected = (now_px - still_px).length() / dt;
+            let speed = scene_view.seen()[0].speed_px_s;
+            assert!((speed - expected).abs() < 1e-2 * expected, "{i}: at rest {speed} {expected}");
+        }
     }
 
     #[test]
@@ -380,7 +454,8 @@ mod tests {
     fn the_corner_of_the_picture_is_one_away_from_its_middle() {
         let scale = 600.0 / (2.0 * 0.4_f64.tan() * 4.0);
         let corner = ball_at(DVec3::new(0.0, 400.0 / scale, 300.0 / scale), DVec3::ZERO);
-        assert!((corner.off_centre - 1.0).abs() < 1e-9 && (corner.from_focus_m - 500.0 / scale).abs() < 1e-9);
+        assert!((corner.off_centre - 1.0).abs() < 1e-9 && (corner.depth_m - 4.0).abs() < 1e-9);
+        assert!((corner.distance_m - 4.0_f64.hypot(500.0 / scale)).abs() < 1e-9);
         assert!(ball_at(DVec3::ZERO, DVec3::ZERO).off_centre < 1e-9);
     }
 

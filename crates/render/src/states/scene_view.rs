@@ -13,7 +13,7 @@ use crate::composition::lod_transition::Geomorph;
 use crate::composition::picture::Picture;
 use crate::composition::skin::SkinForm;
 use crate::composition::texturing::Painting;
-use crate::seen::view::{Camera, Size};
+use crate::seen::view::{Camera, CameraMotion, Size};
 use crate::seen::visibility::{Survey, Visibility};
 use glam::DVec3;
 use metachron_core::{AgentId, Body, CurveState, RigidState, SimTime, Snapshot};
@@ -94,6 +94,8 @@ pub struct SceneView {
     /// The actors that the last survey updated.
     pub(crate) updated: Vec<usize>,
     pub(crate) eye: Option<(Camera, Size)>,
+    /// How the camera moves; `None` if it rests.
+    pub(crate) camera_motion: Option<CameraMotion>,
     /// Metres that the arrow of one newton has.
     pub(crate) force_scale: f64,
     /// Frames over which meshes change their cut.

@@ -7,6 +7,7 @@ use crate::diagnostic::{Problem, did_you_mean};
 use crate::format::{CameraFile, CameraFiles, CameraKeyFile, MODELS, Point, ProbeFile, model_named};
 use glam::DVec3;
 use metachron_core::SimSpan;
+use metachron_core::kinds::PolicyKind;
 use metachron_world::{Camera, FACTOR, Load, Machine, NamedCamera, Probe, Target, View};
 
 /// Default vertical angle of view, degrees.
@@ -16,10 +17,21 @@ const PRESETS: [&str; 2] = ["two-cores-software", "workstation"];
 /// An eye nearer than this to the point it looks at has no direction, metres.
 const EYE_NEAREST_M: f64 = 1e-6;
 
-/// Reports a share of a lag that has no bound.
+/// Reports a share of a lag that has no bound, and factors that the policy does not know.
 pub(crate) fn check_target(c: &mut Checker<'_, '_>, target: &Target) {
+    let place = c.place("target");
     if target.lag_ms.is_none() {
-        c.refuse(&c.place("target"), &["optimiser_share"], "has no effect alone", "expected `lag_ms` beside it");
+        c.refuse(&place, &["optimiser_share"], "has no effect alone", "expected `lag_ms` beside it");
+    }
+    let Target { policy, focus, motion, hysteresis, .. } = *target;
+    let weighs = policy.predicts() && policy != PolicyKind::RobinHood;
+    for (key, value, counts) in
+        [("focus", focus, weighs), ("motion", motion, weighs), ("hysteresis", hysteresis, policy.has_hysteresis())]
+    {
+        if !counts && value.is_some_and(|value| value > 0.0) {
+            let what = format_args!("has no effect under `policy = \"{}\"`", policy.name());
+            c.wrong(&place, key, what, format!("expected no `{key}`, or another policy"));
+        }
     }
 }
 

@@ -41,6 +41,36 @@ pub struct ChoiceSummary {
     pub render_scale: Option<ScaleSummary>,
     /// Share of the frames in which objects threw shadows, where the light does; `None` without a frame.
     pub shadows: Option<f64>,
+    /// Primitives per frame, by kind; `None` without a frame.
+    pub primitives: Option<PrimitiveSummary>,
+    /// Objects per frame by the algorithm that lights them, the rendering algorithm of (FS93); `None` without a frame.
+    pub shadings: Option<ShadingSummary>,
+}
+
+/// Primitives of a frame, means of a run.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize)]
+pub struct PrimitiveSummary {
+    /// Triangles, those of strokes among them.
+    pub triangles: f64,
+    /// Pieces of objects drawn as points.
+    pub points: f64,
+    /// Pieces of objects drawn as lines.
+    pub lines: f64,
+}
+
+/// Objects of a frame, means of a run.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize)]
+pub struct ShadingSummary {
+    /// Drawn with one colour a triangle.
+    pub flat: f64,
+    /// Drawn with colours at vertices.
+    pub gouraud: f64,
+    /// Drawn with light at every pixel.
+    pub per_pixel: f64,
+    /// The same with their texture.
+    pub textured: f64,
+    /// The same with soft shadows.
+    pub shadowed: f64,
 }
 
 /// The scales of a run's pictures.
@@ -62,6 +92,7 @@ pub fn summarise_choices(frames: &[FrameRecord]) -> ChoiceSummary {
     let any = !frames.is_empty();
     let seen = frames.iter().map(|row| row.objects).sum::<u64>().max(1) as f64;
     let total = |of: fn(&FrameRecord) -> u32| frames.iter().map(|row| u64::from(of(row))).sum::<u64>();
+    let mean = |of: fn(&FrameRecord) -> f64| spread(of).map_or(0.0, |s| s.mean);
     let share = |of| any.then(|| total(of) as f64 / seen);
     ChoiceSummary {
         value_over_bound: some(|row| row.value_over_bound).map(|s| s.mean),
@@ -81,6 +112,18 @@ pub fn summarise_choices(frames: &[FrameRecord]) -> ChoiceSummary {
         drawn: spread(|row| row.drawn as f64).map(|s| s.mean),
         render_scale: scales(frames),
         shadows: Spread::of(frames.iter().map(|row| f64::from(u8::from(row.shadows)))).map(|spread| spread.mean),
+        primitives: any.then(|| PrimitiveSummary {
+            triangles: mean(|row| row.triangles as f64),
+            points: mean(|row| row.points as f64),
+            lines: mean(|row| row.lines as f64),
+        }),
+        shadings: any.then(|| ShadingSummary {
+            flat: mean(|row| f64::from(row.flat)),
+            gouraud: mean(|row| f64::from(row.gouraud)),
+            per_pixel: mean(|row| f64::from(row.per_pixel)),
+            textured: mean(|row| f64::from(row.textured)),
+            shadowed: mean(|row| f64::from(row.shadowed)),
+        }),
     }
 }
 

@@ -7,7 +7,7 @@ mod frames;
 mod goal;
 mod summary;
 
-pub use choices::{ChoiceSummary, ScaleSummary, summarise_choices};
+pub use choices::{ChoiceSummary, PrimitiveSummary, ScaleSummary, ShadingSummary, summarise_choices};
 pub use frames::{
     BINDING, FrameSummary, MISS, SETTLE_BAND, SETTLE_HOLD, SETTLE_MEDIAN, Spread, summarise, summarise_undrawn,
 };

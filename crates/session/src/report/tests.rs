@@ -136,6 +136,11 @@ fn the_report_includes_the_choice_summary() {
         "/budget/render_scale/end",
         "/budget/render_scale/mean",
         "/budget/render_scale/least",
+        "/budget/primitives/triangles",
+        "/budget/primitives/points",
+        "/budget/primitives/lines",
+        "/budget/shadings/flat",
+        "/budget/shadings/shadowed",
     ] {
         assert!(json.pointer(path).is_some(), "{path} is missing");
     }

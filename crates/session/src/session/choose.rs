@@ -9,7 +9,7 @@ use super::{Chosen, Session};
 use metachron_lod::adaptive::is_late;
 use metachron_lod::adaptive::joint::Drawing;
 use metachron_lod::control::{Backdrop, ObjectView};
-use metachron_render::{Camera, Hand, Level, Picture, Size, Style};
+use metachron_render::{Camera, CameraMotion, Hand, Level, Picture, Size, Style};
 use metachron_runtime::AgentHandle;
 use std::time::Duration;
 
@@ -20,6 +20,10 @@ impl Session {
         self.gather();
         self.scene_view.set_scale(self.control.render_scale());
         self.scene_view.set_shadows(self.control.shadows());
+        let before = self.last_seen_by.replace((started, *camera));
+        self.scene_view.set_camera_motion(before.and_then(|(then, before)| {
+            CameraMotion::between(before, *camera, started.saturating_sub(then).as_secs_f64())
+        }));
         self.survey(camera, size);
         let of = Seen { actors: self.scene_view.seen(), levels: &self.levels, states: self.reader.newest() };
         self.visible_resolution.update(started, of, camera, size);

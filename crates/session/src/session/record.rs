@@ -4,7 +4,7 @@
 
 use super::super::outcome::{FrameRecord, ProbeOutcome};
 use super::{Chosen, Finished, Session};
-use metachron_lod::control::Shading;
+use metachron_lod::control::{Shading, Tally};
 use metachron_runtime::Agents;
 use metachron_world::{Probe, Scene};
 use std::time::Duration;
@@ -16,6 +16,8 @@ impl Session {
         let ms = |time: Duration| time.as_secs_f64() * 1e3;
         let plan = self.control.last_plan();
         let promise = plan.promise;
+        let Tally { strokes, shadings, .. } = Tally::of(&self.views, &plan.levels);
+        let ([points, lines], [flat, gouraud, per_pixel, textured, shadowed]) = (strokes, shadings);
         let frame_ms = ms(finished.work);
         let interval = self.last_start.map_or(self.period(), |last| started.saturating_sub(last));
         FrameRecord {
@@ -43,6 +45,13 @@ impl Session {
             n,
             render_scale: self.scene_view.picture().scale,
             shadows: self.scene_view.picture().shadows,
+            points: points as u64,
+            lines: lines as u64,
+            flat,
+            gouraud,
+            per_pixel,
+            textured,
+            shadowed,
         }
     }
 

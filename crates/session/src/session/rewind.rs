@@ -82,6 +82,7 @@ struct GoingOn {
     frame_cpu_s: f64,
     last_start: Option<Duration>,
     last_camera: Option<(Duration, Camera)>,
+    last_seen_by: Option<(Duration, Camera)>,
     next_camera: Option<Camera>,
     lag_s: f64,
     finished: u64,
@@ -184,6 +185,7 @@ impl Session {
             frame_cpu_s: self.frame_cpu_s,
             last_start: self.last_start,
             last_camera: self.last_camera,
+            last_seen_by: self.last_seen_by,
             next_camera: self.next_camera,
             lag_s: self.lag_s,
             finished: self.finished,
@@ -296,6 +298,7 @@ impl Session {
         self.frame_cpu_s = there.frame_cpu_s;
         (self.last_start, self.lag_s, self.finished) = (there.last_start, there.lag_s, there.finished);
         (self.last_camera, self.next_camera) = (there.last_camera, there.next_camera);
+        self.last_seen_by = there.last_seen_by;
         let finished = self.finished;
         self.records.truncate(self.records.partition_point(|record| record.frame < finished));
         self.reader = Reader::new(self.world.agents());

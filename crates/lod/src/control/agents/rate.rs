@@ -290,7 +290,9 @@ impl RateControl {
         window.over_s += (work_s - wanted_s).max(0.0);
         window.wanted_s += wanted_s;
         window.late += turn.real_period_s / wanted_s;
-        window.span_s >= WINDOW_S && window.turns >= WINDOW_TURNS
+        // a turn of an agent that takes more than a core lasts long: before anything is known of it, its first turns are enough
+        let is_lost = self.full.mean().is_none() && window.work_s > window.wanted_s;
+        window.span_s >= WINDOW_S && (window.turns >= WINDOW_TURNS || is_lost)
     }
 
     /// Stores the load scaled to the finest level: in both ranges it falls as e⁻ᶻ (control.md, eq. 18). While the agent does less work than

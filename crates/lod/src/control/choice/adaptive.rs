@@ -5,8 +5,8 @@
 //! Never here: the law (`crate::adaptive` has it). Theory: `docs/theory/budget.md`, section 7; `docs/theory/control.md`, section
 //! 6.
 
-use super::groups::Groups;
-use super::hierarchy::leave_out_members;
+use super::groups::{Groups, Impostors};
+use super::hierarchy::{leave_out_members, upper};
 use super::impostors::ImpostorChoice;
 use crate::Bound;
 use crate::adaptive::{Adaptive, Offer, Plan, Settings, Time};
@@ -96,7 +96,12 @@ impl AdaptiveChoice {
         self.plan = self.law.choose(self.frame, time);
         self.write_levels(query, levels);
         leave_out_members(query, groups, levels);
-        self.promise()
+        let promise = self.promise();
+        if groups.all().is_empty() || !self.plan.feasible {
+            promise
+        } else {
+            self.over_all_cuts(query, groups, promise)
+        }
     }
 
     /// Marks the last choice as the one being drawn.
@@ -227,6 +232,22 @@ impl AdaptiveChoice {
                 levels[at] = demand(at, query.views, rung);
             }
         }
+    }
+
+    /// The promise with the bound over all cuts: the law's own bound is over what it was offered, which lacks the members of closed
+    /// groups. Both values are by the present weights, without the law's deadband.
+    fn over_all_cuts(&self, query: &FrameQuery<'_>, groups: &Groups, promise: Promise) -> Promise {
+        let mut impostors = Impostors::default();
+        impostors.update(query, groups);
+        let drawn = |(at, entry): (usize, &ObjectEntry)| {
+            let rung = query.ladders.of(at).rungs.get(self.law.level(u64::from(entry.id.0))? as usize)?;
+            Some(rung.accuracy * if query.views[at].view.is_group() { impostors.worth(at) } else { query.weight(at) })
+        };
+        let offered = self.entries.iter().enumerate().filter(|(_, entry)| entry.version > 0);
+        let budget = self.plan.budget / self.slowness();
+        // a cast of floats saturates
+        let upper = upper(query, groups, &impostors, budget as i64 + 1);
+        Promise { value: offered.filter_map(drawn).sum(), upper, ..promise }
     }
 
     fn promise(&self) -> Promise {

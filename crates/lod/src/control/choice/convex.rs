@@ -14,10 +14,6 @@ use std::collections::BTreeMap;
 /// Time of a Newton step of the interior point per mesh, seconds.
 const NEWTON_S: f64 = 60e-9;
 
-/// A smaller relative change of r is ignored, as long as there is time for the kept resolutions: the optimum moves with
-/// everything in view.
-const SAME_R: f64 = 0.05;
-
 /// State from frame to frame.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Convex {
@@ -40,7 +36,7 @@ impl Convex {
         } else {
             closed_form(budget_s, fixed_s, &meshes)
         };
-        let kept = kept(&last, &found.r, &meshes, budget_s - fixed_s);
+        let kept = kept(&last, &found.r, &meshes, budget_s - fixed_s, query.sliders.hysteresis);
         self.last_r.clear();
         let mut spent_s = 0.0;
         for (&at, r) in objects.iter().zip(kept) {
@@ -54,10 +50,10 @@ impl Convex {
     }
 }
 
-/// The resolutions to draw with: a mesh keeps that of the frame before where the new one is near, as long as all fit
-/// the time; where they do not fit, the kept ones that take most more time than the new ones give way.
-fn kept(last: &[Option<f64>], found: &[f64], meshes: &[Mesh], time_s: f64) -> Vec<f64> {
-    let near = |(last, r): (&Option<f64>, &f64)| last.filter(|last| (r / last - 1.0).abs() <= SAME_R);
+/// The resolutions to draw with: a mesh keeps that of the frame before where the new one differs by no more than this part, as long as all
+/// fit the time, for the optimum moves with everything in view; where they do not fit, the kept ones that take most more time than the new ones give way.
+fn kept(last: &[Option<f64>], found: &[f64], meshes: &[Mesh], time_s: f64, hysteresis: f64) -> Vec<f64> {
+    let near = |(last, r): (&Option<f64>, &f64)| last.filter(|last| (r / last - 1.0).abs() <= hysteresis);
     let mut kept: Vec<Option<f64>> = last.iter().zip(found).map(near).collect();
     let more_s = |at: usize, kept: &[Option<f64>]| kept[at].map_or(0.0, |r| meshes[at].time * (r - found[at]));
     let mut order: Vec<usize> = (0..kept.len()).filter(|&at| more_s(at, &kept) > 0.0).collect();
@@ -122,7 +118,7 @@ mod tests {
     fn resolutions_that_tremble_stay_and_those_that_move_follow() {
         let (meshes, found) = (meshes(3), [0.5, 0.5, 0.3]);
         let last = [Some(0.51), Some(0.4), None];
-        assert_eq!(kept(&last, &found, &meshes, 1.0), [0.51, 0.5, 0.3]);
+        assert_eq!(kept(&last, &found, &meshes, 1.0, 0.05), [0.51, 0.5, 0.3]);
     }
 
     #[test]
@@ -131,10 +127,10 @@ mod tests {
         let new_s: f64 = meshes.iter().map(|mesh| 0.5 * mesh.time).sum();
         // all were finer: without room everything gives way, with room for the smaller ones the largest alone does
         let last = [Some(0.52); 4];
-        assert_eq!(kept(&last, &found, &meshes, new_s), [0.5; 4]);
-        assert_eq!(kept(&last, &found, &meshes, new_s + 0.02 * 6.1e-3), [0.52, 0.52, 0.52, 0.5]);
+        assert_eq!(kept(&last, &found, &meshes, new_s, 0.05), [0.5; 4]);
+        assert_eq!(kept(&last, &found, &meshes, new_s + 0.02 * 6.1e-3, 0.05), [0.52, 0.52, 0.52, 0.5]);
         // meshes that were coarser leave room for meshes that were finer
         let mixed = [Some(0.52), Some(0.48), Some(0.52), Some(0.48)];
-        assert_eq!(kept(&mixed, &found, &meshes, new_s), [0.52, 0.48, 0.52, 0.48]);
+        assert_eq!(kept(&mixed, &found, &meshes, new_s, 0.05), [0.52, 0.48, 0.52, 0.48]);
     }
 }

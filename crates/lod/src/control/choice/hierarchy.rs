@@ -7,18 +7,14 @@ use super::groups::{Groups, Impostors};
 use super::select;
 use crate::control::demand::plan::LevelDemand;
 use crate::control::demand::policy::Policy;
-use crate::control::demand::query::{FrameQuery, Promise, TICKS, left_out};
+use crate::control::demand::query::{FrameQuery, PARTS_OF_A_PIXEL, Promise, TICKS, left_out};
 use crate::control::prices::ladder::Rung;
 use crate::select::half::at_least_half;
 use crate::select::incremental::Keep;
 use crate::select::tree::{Cut, Node, Tree};
-use crate::select::{Entry, Level, maciel, mason, mason_flat};
+use crate::select::{Entry, Level, maciel, mason, mason_flat, tree_exact};
 use metachron_core::AgentId;
 use std::collections::BTreeMap;
-
-/// The part of the benefit that an impostor loses where it was not drawn in the frame before: hysteresis (FS93, §5; MB97, §7). It counts
-/// where rises and falls are compared by benefit per cost; where benefits are, it would keep a level for ever.
-const CHANGED: f64 = 0.05;
 
 /// State of these policies from frame to frame.
 #[derive(Debug, Clone, Default)]
@@ -45,9 +41,6 @@ impl Hierarchy {
         levels: &mut [LevelDemand],
     ) -> Promise {
         self.impostors.update(query, groups);
-        if policy != Policy::Hierarchical {
-            self.last.clear();
-        }
         let forest = Forest::of(query, groups, &self.impostors, &self.last);
         if forest.nodes.len() < 2 {
             let predicted_s = query.fixed_s;
@@ -63,6 +56,11 @@ impl Hierarchy {
         }
         leave_out_members(query, groups, levels);
         Promise { passes, ..promise(query, &cut) }
+    }
+
+    /// Benefit of the finest impostor of a group in the last choice, pixels; 0 before one.
+    pub fn worth(&self, group: usize) -> f64 {
+        self.impostors.worth(group)
     }
 
     /// A cut by `policy`, and the passes that it took; cuts of (MB97) are worth half of the best.
@@ -86,7 +84,8 @@ impl Hierarchy {
 }
 
 impl Forest {
-    /// Benefits include hysteresis by the cut of the frame before.
+    /// Benefits include hysteresis (FS93, §5; MB97, §7): the part that an impostor loses where it was not drawn in the frame before. It counts
+    /// where rises and falls are compared by benefit per cost; where benefits are, it would keep a level for ever.
     fn of(query: &FrameQuery<'_>, groups: &Groups, impostors: &Impostors, last: &BTreeMap<AgentId, Level>) -> Self {
         let entries = |at: usize, rungs: &[Rung], weight: f64| {
             // an open group, and an object in a closed one, was drawn by no level of its own; a new object has no level
@@ -94,7 +93,7 @@ impl Forest {
             let before = last.get(&query.views[at].view.id);
             let stays = |level| before.is_none_or(|before| *before == level);
             let entry = |(level, rung): (u32, &Rung)| {
-                query.entry(if stays(Some(level)) { weight } else { (1.0 - CHANGED) * weight }, rung)
+                query.entry(if stays(Some(level)) { weight } else { (1.0 - query.sliders.hysteresis) * weight }, rung)
             };
             (0..).zip(rungs).map(entry).collect()
         };
@@ -117,6 +116,12 @@ impl Forest {
         self.objects.push(Some(object));
         self.nodes.len() - 1
     }
+}
+
+/// No cut within `budget` ticks has a greater benefit, pixels (budget.md, eq. 20); 0 where no cut fits.
+pub(super) fn upper(query: &FrameQuery<'_>, groups: &Groups, impostors: &Impostors, budget: i64) -> f64 {
+    let forest = Forest::of(query, groups, impostors, &BTreeMap::new());
+    Tree::new(budget, &forest.nodes).map_or(0.0, |tree| tree_exact::upper(&tree) / PARTS_OF_A_PIXEL)
 }
 
 /// Leaves out all members of groups that are drawn by an impostor, in view or not.
@@ -201,7 +206,7 @@ mod tests {
         groups.update(&views);
         let policies = [Policy::Hierarchical, Policy::HierarchicalFlat, Policy::MacielShirley, Policy::Adaptive];
         let mut least = [1.0_f64; 4];
-        let (mut inner, mut outer) = (0, 0);
+        let (mut inner, mut outer, mut closed) = (0, 0, 0);
         for step in 0..60 {
             let budget_s = 10e-6 * 1.1_f64.powi(step);
             let query = query(&views, &ladders, &sliders, budget_s);
@@ -228,6 +233,10 @@ mod tests {
                 );
                 if best.feasible {
                     *least = least.min(promise.value / best.value as f64);
+                    // the certificate: the optimum found by search is below it, also where members of closed groups are hidden
+                    let (upper, hidden) = (promise.upper + 12.0, levels[10].polygons > 0.0);
+                    assert!(upper >= best.value as f64, "{policy:?} at {budget_s}: {upper} of {}", best.value);
+                    closed += usize::from(hidden && promise.upper > 1.05 * promise.value);
                 }
                 assert_eq!(covered(&views, &levels), [1; 9], "{policy:?} at {budget_s}: {levels:?}");
                 inner += usize::from(levels[4].polygons == 48.0 || levels[9].polygons == 48.0);
@@ -238,11 +247,12 @@ mod tests {
         // that would take most of the time has none
         assert!(least[0] > 0.8 && least[1] > 0.6 && least[2] > 0.5, "{least:?}");
         assert!(inner > 0 && outer > 0, "finer impostors are drawn: {inner} {outer}");
+        assert!(closed > 0, "closed groups count as lost");
     }
 
     #[test]
     fn impostors_of_an_open_group_count_less_than_what_is_drawn() {
-        let (views, sliders) = (rows(), Sliders::default());
+        let (views, sliders) = (rows(), Sliders { hysteresis: 0.05, ..Sliders::default() });
         let (mut ladders, mut groups) = (Ladders::default(), Groups::default());
         ladders.update(&views, false, &Prices::default(), &sliders);
         groups.update(&views);
@@ -257,7 +267,7 @@ mod tests {
             let drawn = hierarchy.last[&views[object].view.id];
             open += usize::from(drawn.is_none() && views[object].view.is_group());
             for (level, (entry, full)) in (0..).zip(now.nodes[at].impostors.iter().zip(&fresh.nodes[at].impostors)) {
-                let wanted = if drawn == Some(level) { 1.0 } else { 1.0 - CHANGED };
+                let wanted = if drawn == Some(level) { 1.0 } else { 0.95 };
                 let counts = entry.benefit as f64 / full.benefit as f64;
                 assert!((counts - wanted).abs() < 1e-3, "object {object}, level {level}: {counts}");
             }
@@ -265,7 +275,7 @@ mod tests {
         assert!(open > 0, "{:?}", hierarchy.last);
     }
 
-    /// The default policy after sixty frames; its value in the unit of the others.
+    /// The default policy after sixty frames; its value and bound in the unit of the others.
     fn settled(query: &FrameQuery<'_>, groups: &Groups, levels: &mut [LevelDemand]) -> Promise {
         let (mut choice, mut promise) = (AdaptiveChoice::default(), Promise::default());
         let usual = levels.to_vec();
@@ -275,7 +285,7 @@ mod tests {
             choice.take_up();
             choice.observe(promise.predicted_s, promise.predicted_s, 0.0, query.target_s);
         }
-        Promise { value: 4096.0 * promise.value, ..promise }
+        Promise { value: PARTS_OF_A_PIXEL * promise.value, upper: PARTS_OF_A_PIXEL * promise.upper, ..promise }
     }
 
     /// The number of pictures that show each mesh: its own, its row's, that of both rows.

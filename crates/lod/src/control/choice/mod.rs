@@ -11,4 +11,5 @@ mod impostors;
 pub mod quality_boost;
 mod robin_hood;
 pub mod select;
+pub mod steady;
 pub mod vanish;

@@ -106,7 +106,7 @@ fn instance(query: &FrameQuery<'_>, at: usize, forms: Vec<f64>) -> Instance {
     Instance {
         id: query.id(at),
         complexity: query.ladders.of(at).complexity_s,
-        value: query.value.of(view.surface_m2(), view.distance_m, view.from_focus_m, view.importance),
+        value: query.value.of(view.surface_m2(), view.depth_m, view.distance_m, view.importance),
         forms,
         too_little: TooLittle::Nothing,
     }

@@ -37,6 +37,36 @@ pub struct LevelDemand {
     pub shading: Shading,
 }
 
+/// How the objects of a picture are drawn.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Tally {
+    /// Triangles that are not strokes.
+    pub triangles: f64,
+    /// Pieces drawn as points, and as lines (RH05, §6).
+    pub strokes: [f64; 2],
+    /// Objects by their shading, cheapest first, groups that are drawn by an impostor among them.
+    pub shadings: [u32; 5],
+}
+
+impl Tally {
+    /// Counts the objects in view; both in the same order.
+    #[must_use]
+    pub fn of(views: &[ObjectView], levels: &[LevelDemand]) -> Self {
+        let mut tally = Self::default();
+        for (view, level) in views.iter().zip(levels).filter(|(view, level)| view.visible && level.polygons > 0.0) {
+            tally.shadings[level.shading as usize] += 1;
+            let Some(pieces) = view.pieces else {
+                tally.triangles += level.polygons;
+                continue;
+            };
+            let parts = pieces.parts(level.polygons);
+            tally.triangles += parts.full;
+            tally.strokes[pieces.stroke as usize] += parts.strokes / f64::from(pieces.least.max(1));
+        }
+        tally
+    }
+}
+
 /// Position of the level in the object's range: 0 its coarsest … 1 its finest, by the logarithm of its triangles; for a group by its
 /// levels, of which the members are the finest.
 #[must_use]

@@ -9,20 +9,20 @@ use crate::{grisoni, log_law};
 /// The policy that chooses the level of every visible object. Theory and papers: `docs/theory/budget.md`.
 pub use metachron_core::kinds::PolicyKind as Policy;
 
+/// A difference that the hysteresis of (MB97, §7), of benefits, and of (GB99), of resolutions, ignores.
+const SAME: f64 = 0.05;
+
 /// How much each factor counts in the benefit of a level where neither scene nor user says: size, accuracy and importance in full. With
 /// the benefit as printed that is all, as in the timed test of (FS93, §7); else motion counts by half: moving objects are judged less
-/// strictly than resting ones.
+/// strictly than resting ones. The distance from the middle of the picture counts for (GB99), and hysteresis for it and (MB97).
 pub(crate) const fn usual_sliders(policy: Policy) -> Sliders {
     let motion = if policy.has_printed_benefit() { 0.0 } else { 0.5 };
-    Sliders { size: 1.0, accuracy: 1.0, importance: 1.0, focus: 0.0, motion, hysteresis: 0.0 }
-}
-
-/// The factors of the benefit that the policy uses: the distance from the middle of the picture always counts for (GB99).
-pub(crate) fn sliders(policy: Policy, asked: Sliders) -> Sliders {
-    match policy {
-        Policy::Convex | Policy::ConvexBarrier => Sliders { focus: 1.0, ..asked },
-        _ => asked,
-    }
+    let (focus, hysteresis) = match policy {
+        Policy::Convex | Policy::ConvexBarrier => (1.0, SAME),
+        Policy::Hierarchical => (0.0, SAME),
+        _ => (0.0, 0.0),
+    };
+    Sliders { size: 1.0, accuracy: 1.0, importance: 1.0, focus, motion, hysteresis }
 }
 
 /// The prices that the policy uses: by area for Robin Hood (RH05), else two stages (FS93). The default uses the stages too: areas that

@@ -15,7 +15,7 @@ use metachron_core::Resolution;
 pub(crate) const TICKS: f64 = 1e9;
 
 /// Benefit is given in parts of a pixel, so that the integers of a knapsack resolve fine levels.
-const PARTS_OF_A_PIXEL: f64 = 4096.0;
+pub(crate) const PARTS_OF_A_PIXEL: f64 = 4096.0;
 
 /// A level whose cost is invalid is assumed to cost twice this, ticks: a small object on a slow machine.
 const USUAL: f64 = 1e5;

@@ -111,14 +111,16 @@ pub struct ObjectView {
     pub pixels: f64,
     /// Distance of its centre from the eye, metres, > 0.
     pub distance_m: f64,
-    /// Speed across the picture, pixels per second, ≥ 0.
+    /// Speed across the picture, pixels per second, ≥ 0, with the motion of the camera.
     pub speed_px_s: f64,
+    /// The same as a camera at rest sees it.
+    pub own_speed_px_s: f64,
     /// Weight against the others, > 0; 1 is usual.
     pub importance: f64,
     /// Distance of its centre from the middle of the picture, as a fraction of half the diagonal, ≥ 0.
     pub off_centre: f64,
-    /// Distance of its centre from the point that the camera looks at, metres, ≥ 0.
-    pub from_focus_m: f64,
+    /// Depth of its centre along the view, metres, > 0: at least its radius.
+    pub depth_m: f64,
     /// Whether any part of it may be in the picture.
     pub visible: bool,
     /// Whether it may be left out where not even the coarsest of everything fits (FS93, §3: no polygons at all).
@@ -173,9 +175,10 @@ impl ObjectView {
             pixels: 100.0,
             distance_m: 1.0,
             speed_px_s: 0.0,
+            own_speed_px_s: 0.0,
             importance: 1.0,
             off_centre: 0.0,
-            from_focus_m: 0.0,
+            depth_m: 1.0,
             visible: true,
             may_vanish: false,
         }

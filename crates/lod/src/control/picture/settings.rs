@@ -5,7 +5,8 @@
 use super::super::render_scale::PictureRung;
 use super::PictureControl;
 use crate::control::choice::quality_boost::QualityBoost;
-use crate::control::demand::policy::{Law, Policy, prices, sliders, usual_sliders};
+use crate::control::demand::policy::{Law, Policy, prices, usual_sliders};
+use crate::control::flicker::Changes;
 use crate::control::prices::price::{Backdrop, Prices};
 use crate::cost::benefit::{GivenSliders, Sliders};
 use crate::cost::pipeline::Pipeline;
@@ -17,13 +18,15 @@ impl PictureControl {
     pub fn set_policy(&mut self, policy: Policy) {
         if policy != self.policy {
             self.ahead = None;
-            let before = (prices(self.policy, &self.prices), sliders(self.policy, self.sliders()));
+            let before = (prices(self.policy, &self.prices), self.sliders());
             self.policy = policy;
-            if (prices(self.policy, &self.prices), sliders(self.policy, self.sliders())) != before {
+            if (prices(self.policy, &self.prices), self.sliders()) != before {
                 self.forget_ladders();
             }
             self.raise = self.raise.map(|_| QualityBoost::default());
             self.scale.release();
+            // another policy may draw groups where this one drew their members
+            self.changes = Changes::default();
             self.take_over();
         }
     }

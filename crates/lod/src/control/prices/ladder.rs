@@ -6,7 +6,7 @@
 use super::benefit;
 use super::price::Prices;
 use crate::control::demand::level::{Cut, LastCut, Span, open, polygons};
-use crate::control::demand::plan::SizedView;
+use crate::control::demand::plan::{LevelDemand, SizedView};
 use crate::control::demand::view::{Kind, ObjectView, Pieces, Shading};
 use crate::cost::benefit::Sliders;
 use crate::hysteresis;
@@ -224,6 +224,14 @@ impl Ladder {
         let complexity_s = prices.pieces_s(view.pieces, view.shading.1, span.full, COMPLEXITY_PX);
         let line = CostLine::of(prices, view, *span, key.pixels());
         Self { key, version, rungs, asked, complexity_s, line }
+    }
+
+    /// A level of the object as a rung, which may have been one of an earlier ladder.
+    pub fn rung_of(&self, level: &LevelDemand, prices: &Prices, sliders: &Sliders) -> Rung {
+        let LevelDemand { resolution, polygons, shading, .. } = *level;
+        let same = |rung: &&Rung| rung.polygons == polygons && rung.shading == shading;
+        let own = || self.key.rung(Cut { resolution, polygons }, shading, prices, sliders);
+        self.rungs.iter().find(same).copied().unwrap_or_else(own)
     }
 
     /// Size of a triangle on the screen, pixels across, at the geometric middle of the ladder: used for motion blur.

@@ -93,6 +93,17 @@ fn an_agent_ten_times_too_slow_slows_down_last_and_comes_back_in_the_reverse_ord
 }
 
 #[test]
+fn an_agent_that_takes_many_cores_is_at_its_coarsest_after_a_window() {
+    for times in [10.0, 33.0] {
+        let mut agent = Agent::new(times * PERIOD_S);
+        agent.run(0.5);
+        let (at_s, first) = agent.demands[0];
+        assert!(at_s < 0.25 + times * PERIOD_S && first.eps_m == Some(0.02), "{times}: {:?}", agent.demands);
+        assert!(first.dt_s > 0.9 * 0.016, "{times}: {first:?}");
+    }
+}
+
+#[test]
 fn demands_stop_once_the_load_is_on_target() {
     for full in [0.7, 1.0, 1.7, 3.0, 6.0] {
         let mut agent = Agent::new(full * PERIOD_S);

@@ -8,7 +8,7 @@ use crate::cost::stages::Stages;
 /// A mesh that can be drawn in any part: `id`, pixels, all its triangles.
 fn pieces(id: u32, pixels: f64, most: u32) -> ObjectView {
     let kind = Kind::Counted { radius_m: 0.5, least: 1, most };
-    ObjectView { distance_m: 30.0, kind, ..mesh(id, pixels, most) }
+    ObjectView { distance_m: 30.0, depth_m: 30.0, kind, ..mesh(id, pixels, most) }
 }
 
 /// Draws a frame whose work is as predicted, with `beside_s` of logic meanwhile, on a machine with this z; its time over the target.
@@ -33,8 +33,8 @@ fn robin_hood_draws_a_part_of_everything_and_holds_its_time() {
         // with one object in front the others have shares below a triangle
         let mut views = views.clone();
         if distant {
-            views[0] = ObjectView { distance_m: 0.05, pixels: 9e5, ..pieces(0, 9e5, 900_000) };
-            views[1..].iter_mut().for_each(|view| view.distance_m = 2000.0);
+            views[0] = ObjectView { distance_m: 0.05, depth_m: 0.05, pixels: 9e5, ..pieces(0, 9e5, 900_000) };
+            views[1..].iter_mut().for_each(|view| (view.distance_m, view.depth_m) = (2000.0, 2000.0));
         }
         let x = frame(&mut control, &views, 1.0, 0.0);
         let plan = control.last_plan();
@@ -49,8 +49,9 @@ fn robin_hood_draws_a_part_of_everything_and_holds_its_time() {
 fn robin_hood_with_raising_uses_time_that_it_would_leave() {
     // distant objects come first, with small shares; near ones give most of their share back when nobody comes after
     // them
-    let mut views: Vec<_> = (0..20).map(|i| ObjectView { distance_m: 50.0, ..mesh(i, 2e4, 1000) }).collect();
-    views.extend((20..26).map(|i| ObjectView { distance_m: 0.3, ..mesh(i, 1e5, 1500) }));
+    let mut views: Vec<_> =
+        (0..20).map(|i| ObjectView { distance_m: 50.0, depth_m: 50.0, ..mesh(i, 2e4, 1000) }).collect();
+    views.extend((20..26).map(|i| ObjectView { distance_m: 0.3, depth_m: 0.3, ..mesh(i, 1e5, 1500) }));
     let used = |raise: bool| {
         let mut control = control(Policy::RobinHood, 60.0);
         let object = Stages { setup: 5e-6, polygon: 0.22e-6, pixel: 4e-9, ..Stages::default() };

@@ -97,6 +97,35 @@ fn cost_based_policies_predict_a_frame_within_its_time_and_keep_it() {
     }
 }
 
+/// The hall after `k` frames of a walk: sizes swing slowly, tremble from frame to frame, and every third object goes out of view for a while.
+fn walked(k: u32) -> Vec<ObjectView> {
+    let mut views = hall();
+    for (view, i) in views.iter_mut().zip(0..) {
+        let swing = 0.4 * (0.02 * f64::from(k) + f64::from(i)).sin();
+        let tremble = 0.03 * (f64::from((k * 7919 + i * 104_729) % 1009) / 504.5 - 1.0);
+        view.pixels *= (swing + tremble).exp();
+        view.visible = i % 3 != 0 || (k + 20 * i) % 100 < 70 || i == 44;
+    }
+    views
+}
+
+#[test]
+fn in_a_walk_no_policy_lets_levels_come_and_go() {
+    for policy in HEEDFUL {
+        let (mut control, mut reversals, mut seen) = (control(policy, 60.0), 0, 0);
+        for k in 0..400 {
+            let views = walked(k);
+            let x = frame(&mut control, &views, 1.0);
+            let plan = control.last_plan();
+            assert!(!plan.promise.feasible || x <= 1.02, "{policy:?}, frame {k}: {x}");
+            reversals += plan.reversals;
+            seen += views.iter().filter(|view| view.visible).count();
+        }
+        let share = f64::from(reversals) / seen as f64;
+        assert!(share <= 0.005, "{policy:?}: {reversals} of {seen}, {share}");
+    }
+}
+
 #[test]
 fn with_time_for_everything_every_policy_draws_the_finest() {
     let views: Vec<_> = (0..6).map(|i| mesh(i, 1e5, 2000)).collect();
@@ -354,7 +383,7 @@ proptest! {
         views[6].kind = members;
         for (i, view) in views.iter_mut().enumerate() {
             (view.pixels, view.distance_m, view.speed_px_s) = (at(5 * i), at(5 * i + 1), at(5 * i + 2));
-            (view.importance, view.off_centre, view.from_focus_m) = (at(5 * i + 3), at(5 * i + 4), at(5 * i + 5));
+            (view.importance, view.off_centre, view.depth_m) = (at(5 * i + 3), at(5 * i + 4), at(5 * i + 5));
             (view.visible, view.shading.0) = (visible[i], Shading::Flat);
         }
         for (work, skip) in frames {
