@@ -10,8 +10,8 @@
 
 use crate::constraint::{Arm, ConstraintRows, End, FineStep, ForceAtArms, GeometricStiffness, RowOwner};
 use crate::lists::reset;
-use crate::member::participant::Progress;
 use crate::member::Participant;
+use crate::member::participant::Progress;
 use crate::solve::{Hold, JointRow, Side};
 use glam::{DQuat, DVec3};
 
@@ -203,7 +203,8 @@ fn lacking(asked: f64) -> f64 {
 fn inverse_inertia_across(all: &[Participant<'_>], turns: &Side, arm_m: DVec3) -> Option<f64> {
     let axis = arm_m.try_normalize()?;
     let spin = turns.terms().first()?.block;
-    let own = all[turns.member].member.system().blocks.iter().find(|block| block.row == spin && block.column == spin)?;
+    let own =
+        all[turns.member].member.system().blocks.iter().find(|block| block.row == spin && block.column == spin)?;
     let inverse = own.value.inverse();
     let trace = inverse.x_axis.x + inverse.y_axis.y + inverse.z_axis.z;
     Some(trace - axis.dot(inverse * axis))

@@ -127,7 +127,9 @@ impl Cholesky {
 
     /// Whether the order still serves a matrix of which these blocks change from factor to factor.
     pub fn serves(&self, changes: &[bool]) -> bool {
-        changes.is_empty() || expected_cost(&self.fronts, changes) <= KEEP_ORDER * self.fresh_cost
+        let most = KEEP_ORDER * self.fresh_cost;
+        let at_most = (1.0 + CHANGES) * self.fronts.cost;
+        changes.is_empty() || at_most <= most || expected_cost(&self.fronts, changes) <= most
     }
 
     /// Makes room for a matrix of `size` blocks with these couplings, of which some change from factor to factor (none where the list is
