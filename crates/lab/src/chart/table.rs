@@ -131,7 +131,11 @@ impl Cell {
     /// What a column shows of a row's fields.
     fn of(fields: &Map<String, Value>, column: &str) -> Self {
         let (what, digits) = column.rsplit_once('.').unwrap_or((column, ""));
-        let number = |name: &str| fields.get(name).and_then(Value::as_f64).unwrap_or(f64::NAN);
+        let field = |name: &str| {
+            debug_assert!(fields.contains_key(name), "a row has no field {name}");
+            fields.get(name)
+        };
+        let number = |name: &str| field(name).and_then(Value::as_f64).unwrap_or(f64::NAN);
         if let Ok(digits) = digits.parse() {
             return Self::Number(
                 match (what.split_once('*'), what.split_once('/')) {
@@ -142,7 +146,7 @@ impl Cell {
                 digits,
             );
         }
-        match fields.get(column) {
+        match field(column) {
             Some(Value::String(text)) if !text.is_empty() => Self::Text(text.clone()),
             Some(Value::Bool(whether)) => if *whether { "yes" } else { "no" }.into(),
             _ => "–".into(),
