@@ -124,7 +124,7 @@ impl<'a> Tuned<'a> {
         }
         let schema: Value = serde_json::from_slice(&metachron(&["schema"]).stdout).unwrap();
         for (name, gain) in self.said["gains"].as_object().unwrap() {
-            let end = |which: &str| number(&schema, &format!("/$defs/TargetFile/properties/{name}/{which}"));
+            let end = |which: &str| number(&schema, &format!("/$defs/Target/properties/{name}/{which}"));
             let gain = gain.as_f64().unwrap();
             assert!(end("minimum") <= gain && gain <= end("maximum"), "{}: {name} = {gain}", self.scene);
         }
