@@ -122,7 +122,10 @@ impl Table {
 pub fn fields(row: &impl Serialize) -> Map<String, Value> {
     match serde_json::to_value(row) {
         Ok(Value::Object(fields)) => fields,
-        Ok(Value::Array(parts)) => parts.iter().filter_map(Value::as_object).cloned().flatten().collect(),
+        Ok(Value::Array(parts)) => {
+            let own = |part| if let Value::Object(own) = part { own } else { Map::new() };
+            parts.into_iter().flat_map(own).collect()
+        }
         _ => Map::new(),
     }
 }
