@@ -8,7 +8,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 /// The crates, and the crates of this workspace that each may depend on.
-const ARROWS: [(&str, &[&str]); 18] = [
+const ARROWS: [(&str, &[&str]); 19] = [
     ("agents/core", &[]),
     ("agents/geometry", &["core"]),
     ("agents/contact", &["core", "geometry"]),
@@ -20,6 +20,7 @@ const ARROWS: [(&str, &[&str]); 18] = [
     ("crates/devices", &["core", "geometry", "contact", "models", "runtime", "world"]),
     ("crates/export", &["core", "geometry", "runtime", "world"]),
     ("crates/bevy", &["core", "runtime", "world", "export"]),
+    ("crates/hosts", &["core", "contact", "runtime", "world"]),
     ("crates/import", &["geometry"]),
     ("crates/lod", &["core"]),
     ("crates/render", &["core", "geometry", "drawable"]),
@@ -39,13 +40,16 @@ const ARROWS: [(&str, &[&str]); 18] = [
 ];
 
 /// Text on the right must not stand in the code of the folder on the left.
-const ABSENT: [(&str, &[&str]); 9] = [
+const ABSENT: [(&str, &[&str]); 11] = [
     ("agents", &["std::time", "std::thread", "std::fs", "std::net", "wgpu", "egui"]),
+    // who learns of the network is `crates/hosts` alone
+    ("crates/world", &["zenoh", "std::net"]),
     ("crates/drawable", &["std::time", "std::thread", "std::fs", "wgpu", "egui"]),
     ("crates/runtime", &["std::fs::", "wgpu", "egui"]),
     ("crates/world", &["toml::", "std::fs", "std::thread", "wgpu", "egui"]),
     ("crates/scene", &["std::thread", "wgpu", "egui"]),
     ("crates/bevy", &["std::fs", "std::thread", "wgpu", "winit"]),
+    ("crates/hosts", &["std::fs", "wgpu", "egui", "metachron_models"]),
     ("crates/import", &["std::fs", "std::thread", "wgpu", "egui"]),
     ("crates/render", &["egui", "winit", "std::thread"]),
     ("crates/session", &["egui", "std::thread::spawn"]),
@@ -102,7 +106,7 @@ const DENIED: [&str; 33] = [
 const NOUNS: [&str; 1] = ["presses"];
 
 /// The files of the greatest ring in which files of a crate use each other: ceilings, which only fall.
-const RINGS: [(&str, usize); 19] = [
+const RINGS: [(&str, usize); 20] = [
     ("agents/core", 0),
     ("agents/geometry", 5),
     ("agents/contact", 2),
@@ -114,6 +118,7 @@ const RINGS: [(&str, usize); 19] = [
     ("crates/devices", 0),
     ("crates/export", 0),
     ("crates/bevy", 5),
+    ("crates/hosts", 0),
     ("crates/import", 3),
     ("crates/lod", 5),
     ("crates/render", 7),
@@ -126,7 +131,7 @@ const RINGS: [(&str, usize); 19] = [
 
 /// Most production lines of Rust in all crates and the Python module: neither blank, comment nor test code. Work that needs
 /// more raises it beforehand, in a commit that names what the lines are for.
-const LINES_MAX: usize = 103_300;
+const LINES_MAX: usize = 104_800;
 
 fn root() -> PathBuf {
     PathBuf::from(env!("CARGO_MANIFEST_DIR"))

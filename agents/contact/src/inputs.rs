@@ -4,7 +4,7 @@
 //! does not take, in words. Never here: commands themselves, their effect on a model.
 
 /// A kind of input that users give an agent.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 pub enum Input {
     /// Springs to its material points.
     Spring,
@@ -51,7 +51,7 @@ impl Input {
 }
 
 /// A set of kinds.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, serde::Serialize, serde::Deserialize)]
 pub struct Inputs(u16);
 
 impl Inputs {

@@ -40,7 +40,7 @@ pub use agent::agents::Agents;
 pub use agent::handle::{AgentHandle, state_hash};
 pub use agent::reader::Reader;
 pub use agent::spawn::RunError;
-pub use commands::bounds::{Bound, OutOfBounds};
+pub use commands::bounds::{Bound, OutOfBounds, check_state};
 pub use commands::mailbox::{AwaitedMotion, Command, KEYS, Keyed, SendError};
 pub use executors::archive::Absent;
 pub use executors::follower::Follower;

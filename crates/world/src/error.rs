@@ -53,6 +53,17 @@ pub enum WorldError {
         /// For how long, wall time.
         lasts: Duration,
     },
+    /// The host of a world that runs elsewhere does not answer: its objects stay as they were last seen.
+    #[error("the host of the world \"{world}\" has been silent for {:.1} s", lasts.as_secs_f64())]
+    Silent {
+        /// The world's name.
+        world: String,
+        /// For how long, wall time.
+        lasts: Duration,
+    },
+    /// The host of a world that runs elsewhere refused something, for a reason that has no other form there.
+    #[error("{0}")]
+    Elsewhere(String),
     /// A world that was stopped takes nothing any more.
     #[error("the world has been stopped")]
     Stopped,

@@ -25,6 +25,7 @@
 //! assert_eq!(world.hash(), end); // it did the same again
 //! ```
 
+mod calls;
 mod control;
 mod description;
 mod error;
@@ -33,6 +34,7 @@ mod reading;
 mod start;
 mod world;
 
+pub use calls::{EventReader, WorldCalls};
 pub use control::pace::Pace;
 pub use description::appearance::Appearance;
 pub use description::builder::{
@@ -49,15 +51,15 @@ pub use description::spec::Division;
 pub use description::target::{OneOrRange, RENDER_SCALE, Target};
 pub use description::{couplings, kinds};
 pub use error::WorldError;
-pub use history::checkpoint::{BadCheckpoint, Checkpoint, CheckpointError};
+pub use history::checkpoint::{BadCheckpoint, Checkpoint, CheckpointError, SceneMark};
 pub use history::recording::{BadRecording, RecordError, Recording, SceneText};
 pub use history::recording_file::RecordingFile;
 pub use metachron_contact::detect::SolveBudget;
 pub use metachron_runtime::{Command, FACTOR};
-pub use reading::events::{Contact, Event, EventFilter, Events, Happening};
+pub use reading::events::{Contact, Event, EventFilter, EventSieve, Events, Happening};
 pub use reading::frames::{Frame, Frames};
 pub use reading::joint_states::JointState;
-pub use reading::object::{Object, Touched};
+pub use reading::object::{Object, Touched, WorldTag};
 pub use reading::queries::{Cast, ContactNow, Hit};
 pub use reading::sensors::{JointRef, ListedJoint, Reading};
 pub use reading::stress::Stresses;

@@ -21,6 +21,7 @@ use metachron_contact::{Input, Inputs, Law};
 use metachron_core::{AgentId, Body, HASH_START, SimSpan, SimTime, Snapshot};
 use metachron_geometry::CollisionShape;
 use std::any::Any;
+use std::borrow::Cow;
 use std::sync::atomic::Ordering::Relaxed;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
@@ -106,7 +107,10 @@ impl Shared {
             return Err(SendError::Ended(Arc::clone(name)));
         }
         match inputs.lacks(needs) {
-            Some(lacks) => Err(SendError::NotTaken { name: Arc::clone(name), model, lacks, takes: *inputs }),
+            Some(lacks) => {
+                let model = Cow::Borrowed(*model);
+                Err(SendError::NotTaken { name: Arc::clone(name), model, lacks, takes: *inputs })
+            }
             None => Ok(()),
         }
     }

@@ -95,7 +95,10 @@ pub(super) fn check_pressure(pressure_pa: f64) -> Result<(), OutOfBounds> {
 }
 
 /// Checks the numbers of a state that move something.
-pub(super) fn check_state(state: &Body) -> Result<(), OutOfBounds> {
+///
+/// # Errors
+/// The first that is beyond its bound.
+pub fn check_state(state: &Body) -> Result<(), OutOfBounds> {
     let (positions, velocities, spin) = match state {
         Body::Nothing => return Ok(()),
         Body::Curve(curve) => (&curve.positions[..], &curve.velocities[..], DVec3::ZERO),

@@ -7,6 +7,7 @@ use super::bounds::{self, OutOfBounds};
 use glam::DVec3;
 use metachron_contact::{AnchorForce, AnchorSpring, Carving, Input, Inputs, PoseGoal, SetMotion, SetMotor};
 use metachron_core::{AgentId, Body, Resolution, SimSpan};
+use std::borrow::Cow;
 use std::sync::atomic::{
     AtomicBool,
     Ordering::{Acquire, Release},
@@ -109,7 +110,7 @@ pub enum SendError {
         /// The agent's name.
         name: Arc<str>,
         /// Its model.
-        model: &'static str,
+        model: Cow<'static, str>,
         /// The input that the command needs.
         lacks: Input,
         /// The inputs that the agent takes.

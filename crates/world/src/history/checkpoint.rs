@@ -33,6 +33,16 @@ pub struct Checkpoint {
     pub(crate) state: Vec<u8>,
 }
 
+/// The scene of a world, as one that runs elsewhere is compared with one that is here.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct SceneMark {
+    /// Its name.
+    pub name: String,
+    /// Hash of its objects (names, models, rates) and of the numbers of its fixed solids, joints and couplings: the
+    /// same by which a checkpoint is known. Masses, stiffnesses and sizes are not in it.
+    pub hash: u64,
+}
+
 /// The identity of a scene: its objects, and how many of everything else there are. Values (masses, stiffnesses,
 /// changes by `--set`) are not compared: a state may go on under other ones.
 #[derive(Debug, Clone, PartialEq, Default, serde::Serialize, serde::Deserialize)]
@@ -195,7 +205,8 @@ impl Checkpoint {
     }
 
     /// The bytes of a file.
-    pub(super) fn to_bytes(&self) -> Vec<u8> {
+    #[must_use]
+    pub fn to_bytes(&self) -> Vec<u8> {
         let mut archive = Archive::writer();
         let mut copy = self.clone();
         // plain values of this program can all be written
@@ -290,6 +301,15 @@ impl SceneIdentity {
             joints: scene.joints.len(),
             couplings: scene.couplings.len(),
         }
+    }
+
+    /// It in short.
+    pub fn mark(&self) -> SceneMark {
+        let mut archive = Archive::writer();
+        // plain values of this program can all be written
+        let written = archive.value(&mut self.clone());
+        debug_assert_eq!(written, Ok(()));
+        SceneMark { name: self.name.clone(), hash: checksum(&archive.into_bytes()) }
     }
 
     /// Checks that a checkpoint of the scene `found` is one of this scene. Its name may be another: files are renamed.

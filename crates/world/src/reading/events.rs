@@ -186,11 +186,17 @@ impl EventFilter {
 #[derive(Debug)]
 pub struct Events {
     world: World,
-    filter: EventFilter,
+    sieve: EventSieve,
     /// By their numbers.
     objects: Vec<ReadObject>,
     lost: u64,
     found: Vec<Found>,
+}
+
+/// A filter that sees all events of a world, one after the other.
+#[derive(Debug, Clone)]
+pub struct EventSieve {
+    filter: EventFilter,
     /// Contacts that have begun as the filter sees them.
     begun: Vec<(Object, Touched)>,
 }
@@ -215,7 +221,7 @@ impl Events {
     pub(crate) fn new(world: World, filter: EventFilter) -> Self {
         let rewinds = world.rewinds();
         let objects = world.agents().iter().map(|agent| ReadObject { reader: agent.listen(), rewinds }).collect();
-        Self { world, filter, objects, lost: 0, found: Vec::new(), begun: Vec::new() }
+        Self { world, sieve: EventSieve::new(filter), objects, lost: 0, found: Vec::new() }
     }
 
     /// All events since the last call, by their times; where the world went back meanwhile, the events before that come
@@ -237,14 +243,14 @@ impl Events {
 
     /// Takes in the events of an object, in a world that has gone back so often by now.
     fn read(&mut self, agent: &AgentHandle, rewinds: u64) {
-        let Self { world, filter, objects, lost, found, begun } = self;
+        let Self { world, sieve, objects, lost, found } = self;
         let ReadObject { reader, rewinds: own } = &mut objects[agent.id().0 as usize];
         let (tag, first) = (world.tag(), found.len());
         let object = tag.object(agent.id());
         let overwritten = agent.read_events(reader, |event| {
             let what = happening(tag, &event);
             *own += u64::from(what == Happening::Rewound);
-            if is_news(begun, object, &what, filter) {
+            if sieve.passes(object, &what) {
                 found.push(Found { rewinds: *own, event: named(world, object, event.at, what) });
             }
         });
@@ -260,8 +266,8 @@ impl Events {
         // that event was overwritten before all that was heard now, or the object has left before and came back with the world
         let before = if overwritten > 0 { first } else { found.len() };
         found[before..].iter_mut().for_each(|found| found.rewinds += missed);
-        begun.retain(|(whose, _)| *whose != object);
-        if filter.takes(object, &Happening::Rewound) {
+        sieve.begun.retain(|(whose, _)| *whose != object);
+        if sieve.filter.takes(object, &Happening::Rewound) {
             let event = named(world, object, agent.latest().moment(), Happening::Rewound);
             found.push(Found { rewinds, event });
         }
@@ -274,31 +280,40 @@ impl Events {
     }
 }
 
-/// Whether an event is news under a filter: a filter that has a least force sees contacts begin and end at that force.
-fn is_news(begun: &mut Vec<(Object, Touched)>, object: Object, what: &Happening, filter: &EventFilter) -> bool {
-    if matches!(what, Happening::Rewound | Happening::Gone) {
-        begun.retain(|(whose, _)| *whose != object);
+impl EventSieve {
+    /// One that has seen none.
+    #[must_use]
+    pub const fn new(filter: EventFilter) -> Self {
+        Self { filter, begun: Vec::new() }
     }
-    if !filter.takes(object, what) {
-        return false;
-    }
-    let Happening::Contact(contact) = what else { return true };
-    let name = (object, contact.with);
-    let known = begun.iter().position(|begun| *begun == name);
-    let loud = contact.force_n.length() >= filter.above_n;
-    match (known, contact.begins) {
-        (Some(_), true) => false,
-        (None, true) => {
-            if loud {
-                begun.push(name);
+
+    /// Whether an event is news under the filter: one that has a least force sees contacts begin and end at that force.
+    pub fn passes(&mut self, object: Object, what: &Happening) -> bool {
+        let Self { filter, begun } = self;
+        if matches!(what, Happening::Rewound | Happening::Gone) {
+            begun.retain(|(whose, _)| *whose != object);
+        }
+        if !filter.takes(object, what) {
+            return false;
+        }
+        let Happening::Contact(contact) = what else { return true };
+        let name = (object, contact.with);
+        let known = begun.iter().position(|begun| *begun == name);
+        let loud = contact.force_n.length() >= filter.above_n;
+        match (known, contact.begins) {
+            (Some(_), true) => false,
+            (None, true) => {
+                if loud {
+                    begun.push(name);
+                }
+                loud
             }
-            loud
+            (Some(at), false) => {
+                begun.swap_remove(at);
+                true
+            }
+            (None, false) => loud,
         }
-        (Some(at), false) => {
-            begun.swap_remove(at);
-            true
-        }
-        (None, false) => loud,
     }
 }
 

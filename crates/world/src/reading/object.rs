@@ -10,18 +10,26 @@ pub struct Object {
     id: AgentId,
 }
 
-/// The tag by which one world of a process differs from all others.
+/// The tag by which one world of a process, wherever it runs, differs from all others.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
-pub(crate) struct WorldTag(u32);
+pub struct WorldTag(u32);
+
+impl Default for WorldTag {
+    fn default() -> Self {
+        Self::new()
+    }
+}
 
 impl WorldTag {
     /// One that no world has had.
+    #[must_use]
     pub fn new() -> Self {
         static NEXT: AtomicU32 = AtomicU32::new(0);
         Self(NEXT.fetch_add(1, Relaxed))
     }
 
     /// The object of this number in the world of the tag.
+    #[must_use]
     pub const fn object(self, id: AgentId) -> Object {
         Object { world: self, id }
     }
@@ -35,7 +43,8 @@ impl Object {
     }
 
     /// Whether the world of this tag named it.
-    pub(crate) fn is_of(self, world: WorldTag) -> bool {
+    #[must_use]
+    pub fn is_of(self, world: WorldTag) -> bool {
         self.world == world
     }
 }

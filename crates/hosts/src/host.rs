@@ -1,0 +1,349 @@
+//! A world that runs here, served to callers elsewhere.
+//!
+//! In: anything that answers a world's calls, an endpoint. Out: its states and events sixty times a second, and answers. Never
+//! here: the effect of a call, which the world knows; sessions ([`crate::endpoint`]).
+
+use crate::endpoint::{Side, is_name, open};
+use crate::error::HostsError;
+use crate::event_wire::WireEvent;
+use crate::gate::{CALLS_MAX, Gate, Refusals};
+use crate::refusal::Refusal;
+use crate::wire::{BadMessage, Call, Moment, ObjectState, PROGRAM, Reply, Request, Welcome, decode, encode};
+use metachron_core::{AgentId, LocalModel, SimSpan, Snapshot};
+use metachron_world::{Checkpoint, EventFilter, EventReader, Touched, WorldCalls, WorldError};
+use std::collections::{BTreeMap, BTreeSet};
+use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::sync::atomic::{AtomicBool, Ordering::Relaxed};
+use std::sync::mpsc::{Receiver, RecvTimeoutError, SyncSender, TrySendError, sync_channel};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::thread::JoinHandle;
+use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
+use zenoh::liveliness::LivelinessToken;
+use zenoh::pubsub::Subscriber;
+use zenoh::query::{Query, Queryable};
+use zenoh::sample::SampleKind;
+use zenoh::{Session, Wait};
+
+/// States leave so often.
+const PERIOD: Duration = Duration::from_nanos(16_666_667);
+/// So many calls wait for the ones before them; more are refused.
+const WAITING: usize = 256;
+/// The longest span that one call lets pass: other callers wait for it.
+const SPAN_MAX: SimSpan = SimSpan::from_secs(1);
+
+/// A world that is served until this is dropped; it runs on then.
+pub struct Host {
+    shared: Arc<Shared>,
+    threads: Vec<JoinHandle<()>>,
+    /// The other sides of these see that they end.
+    served: Option<(Queryable<()>, Subscriber<()>, LivelinessToken)>,
+}
+
+struct Shared {
+    world: Arc<dyn WorldCalls>,
+    name: String,
+    /// A number that no run of a host had before.
+    run: u64,
+    session: Session,
+    gate: Mutex<Gate>,
+    shown: Mutex<Shown>,
+    ends: AtomicBool,
+}
+
+/// What callers were shown.
+struct Shown {
+    /// The number of the next message.
+    sequence: u64,
+    objects: BTreeMap<AgentId, (Arc<str>, Arc<Snapshot>)>,
+    events: EventReader,
+    /// States that were too long for a message.
+    too_long: u64,
+}
+
+impl std::fmt::Debug for Host {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.debug_struct("Host").field("name", &self.shared.name).finish_non_exhaustive()
+    }
+}
+
+/// Serves `world` under `name` at `endpoint`, `tcp/address:port` of this machine.
+///
+/// # Errors
+/// [`HostsError::BadName`], [`HostsError::BadEndpoint`], [`HostsError::NeedsCertificates`] and [`HostsError::Network`].
+pub fn serve(world: Arc<dyn WorldCalls>, name: &str, endpoint: &str) -> Result<Host, HostsError> {
+    if !is_name(name) {
+        return Err(HostsError::BadName { name: name.to_owned() });
+    }
+    let session = open(endpoint, Side::Host)?;
+    let failed = |error: zenoh::Error| HostsError::Network { endpoint: endpoint.to_owned(), reason: error.to_string() };
+    let since_1970 = SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default();
+    let run = (since_1970.as_nanos() as u64 ^ u64::from(std::process::id())).max(1);
+    let events = world.listen(EventFilter::all());
+    let shown = Mutex::new(Shown { sequence: 1, objects: BTreeMap::new(), events, too_long: 0 });
+    let (gate, ends, name) = (Mutex::default(), AtomicBool::new(false), name.to_owned());
+    let shared = Arc::new(Shared { world, name, run, session, gate, shown, ends });
+    let (to_calls, calls) = sync_channel(WAITING);
+    let (publishing, answering) = (Arc::clone(&shared), Arc::clone(&shared));
+    let threads = vec![
+        spawn("hosts-publish", move || publishing.publish_on()).map_err(failed)?,
+        spawn("hosts-answer", move || answering.answer_on(&calls)).map_err(failed)?,
+    ];
+    let mut host = Host { shared: Arc::clone(&shared), threads, served: None };
+    let (session, key) = (&shared.session, |last: &str| format!("metachron/{}/{last}", shared.name));
+    let taking = Arc::clone(&shared);
+    let queryable = session.declare_queryable(key("call/*")).callback(move |query| taking.take(query, &to_calls));
+    let queryable = queryable.wait().map_err(failed)?;
+    let leaving = Arc::clone(&shared);
+    let callers = session.liveliness().declare_subscriber(key("caller/*")).callback(move |sample| {
+        if let (SampleKind::Delete, Some(caller)) = (sample.kind(), sample.key_expr().as_str().rsplit('/').next()) {
+            leaving.gate().leave(caller);
+        }
+    });
+    let callers = callers.wait().map_err(failed)?;
+    let token = session.liveliness().declare_token(key("host")).wait().map_err(failed)?;
+    host.served = Some((queryable, callers, token));
+    Ok(host)
+}
+
+fn spawn(name: &str, act: impl FnOnce() + Send + 'static) -> Result<JoinHandle<()>, zenoh::Error> {
+    std::thread::Builder::new().name(name.to_owned()).spawn(act).map_err(zenoh::Error::from)
+}
+
+impl Host {
+    /// How many callers there are.
+    #[must_use]
+    pub fn callers(&self) -> usize {
+        self.shared.gate().callers()
+    }
+
+    /// How many messages were refused.
+    #[must_use]
+    pub fn refused(&self) -> Refusals {
+        self.shared.gate().refused
+    }
+
+    /// How often the state of an object was too long for a message ([`crate::MESSAGE_MAX`]) and was left out.
+    #[must_use]
+    pub fn too_long(&self) -> u64 {
+        self.shared.shown().too_long
+    }
+}
+
+impl Drop for Host {
+    fn drop(&mut self) {
+        self.shared.ends.store(true, Relaxed);
+        self.threads.drain(..).for_each(|thread| drop(thread.join()));
+        drop(self.served.take());
+        let _ = self.shared.session.close().wait();
+    }
+}
+
+impl Shared {
+    fn gate(&self) -> MutexGuard<'_, Gate> {
+        self.gate.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    fn shown(&self) -> MutexGuard<'_, Shown> {
+        self.shown.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// Shows callers what changes, until the host ends.
+    fn publish_on(&self) {
+        let mut next = Instant::now();
+        while !self.ends.load(Relaxed) {
+            self.publish();
+            next = (next + PERIOD).max(Instant::now());
+            std::thread::sleep(next.saturating_duration_since(Instant::now()).min(PERIOD));
+        }
+    }
+
+    /// Shows callers what has changed; returns the number of the newest message.
+    fn publish(&self) -> u64 {
+        let has_callers = self.gate().callers() > 0;
+        let mut shown = self.shown();
+        let moment = shown.changes(&*self.world, self.run);
+        if has_callers {
+            let mut messages = Vec::new();
+            let Shown { sequence, too_long, .. } = &mut *shown;
+            *too_long += moment.encode_parts(sequence, 1, &mut messages);
+            for bytes in messages {
+                // Ok says nothing: a caller that has missed one finds it by the numbers
+                let _ = self.session.put(format!("metachron/{}/state", self.name), bytes).wait();
+            }
+        }
+        shown.sequence - 1
+    }
+
+    /// Lets a call wait for its turn, or refuses it.
+    fn take(&self, query: Query, calls: &SyncSender<(String, Query)>) {
+        let caller = query.key_expr().as_str().rsplit('/').next().unwrap_or_default().to_owned();
+        if !is_name(&caller) {
+            self.gate().refused.strangers += 1;
+            return;
+        }
+        let is_welcome = self.gate().admits(&caller, Instant::now());
+        let unsent =
+            if is_welcome { calls.try_send((caller, query)).err() } else { Some(TrySendError::Full((caller, query))) };
+        if let Some(TrySendError::Full((caller, query)) | TrySendError::Disconnected((caller, query))) = unsent {
+            self.gate().refused.flooded += u64::from(is_welcome);
+            let reason = format!("a caller makes at most {CALLS_MAX} calls a second, of which {WAITING} wait");
+            self.reply(&caller, &query, refused(Refusal::Other(reason)));
+        }
+    }
+
+    /// Answers calls, one after the other, until the host ends.
+    fn answer_on(&self, calls: &Receiver<(String, Query)>) {
+        while !self.ends.load(Relaxed) {
+            match calls.recv_timeout(PERIOD) {
+                Ok((caller, query)) => self.answer(&caller, &query),
+                Err(RecvTimeoutError::Timeout) => {}
+                Err(RecvTimeoutError::Disconnected) => return,
+            }
+        }
+    }
+
+    fn answer(&self, caller: &str, query: &Query) {
+        let bytes = query.payload().map(|payload| payload.to_bytes()).unwrap_or_default();
+        let answers = match decode::<Request>(&bytes) {
+            Err(bad) => {
+                self.gate().refused.malformed += 1;
+                refused(Refusal::Other(bad.to_string()))
+            }
+            Ok(Request { run, sequence, call }) => match self.admit(caller, run, sequence, &call) {
+                Err(reason) => refused(Refusal::Other(reason)),
+                Ok(()) => {
+                    // what a caller sends is made into objects before all of it is checked: a fault there is its caller's
+                    let done = catch_unwind(AssertUnwindSafe(|| self.act(call)));
+                    let done = done.unwrap_or_else(|_| {
+                        self.gate().refused.malformed += 1;
+                        Err(Refusal::Other("the call could not be made: its values contradict each other".to_owned()))
+                    });
+                    done.unwrap_or_else(refused)
+                }
+            },
+        };
+        self.reply(caller, query, answers);
+    }
+
+    fn reply(&self, caller: &str, query: &Query, answers: Vec<Vec<u8>>) {
+        let key = format!("metachron/{}/call/{caller}", self.name);
+        for answer in answers {
+            // a caller that has gone needs none
+            let _ = query.reply(&key, answer).wait();
+        }
+    }
+
+    fn admit(&self, caller: &str, run: u64, sequence: u64, call: &Call) -> Result<(), String> {
+        let mut gate = self.gate();
+        match call {
+            Call::Hello(program) if program != PROGRAM => {
+                gate.refused.strangers += 1;
+                let program: String = program.chars().take(32).collect();
+                Err(format!("the world's host is metachron {PROGRAM}; the caller is {program}"))
+            }
+            Call::Hello(_) => gate.greet(caller, sequence),
+            _ => gate.pass(caller, sequence, run == self.run),
+        }
+    }
+
+    /// Does what a call says; returns its answers.
+    fn act(&self, call: Call) -> Result<Vec<Vec<u8>>, Refusal> {
+        let world = &*self.world;
+        let reply = match call {
+            Call::Hello(_) => Reply::Hello(self.welcome()),
+            Call::All => {
+                let mut messages = Vec::new();
+                let mut shown = self.shown();
+                let (moment, mut sequence) = (shown.all(world, self.run), shown.sequence - 1);
+                shown.too_long += moment.encode_parts(&mut sequence, 0, &mut messages);
+                return Ok(messages);
+            }
+            Call::Command(id, command) => done(0, world.command(world.object_of(id)?, command))?,
+            Call::SetState(id, state) => done(0, world.set_state(world.object_of(id)?, &state))?,
+            Call::Drive(drive) => done(0, world.drive(drive))?,
+            Call::Advance(span) if span > SPAN_MAX => {
+                let found = span.as_secs_f64();
+                return Err(Refusal::Other(format!("a call lets {found} s pass; expected at most 1 s")));
+            }
+            Call::Advance(span) => {
+                world.advance(span)?;
+                Reply::Done(self.publish())
+            }
+            Call::Add(name, part) => {
+                let added = world.add(&name, *part)?;
+                Reply::Added(added.id(), self.publish())
+            }
+            Call::Remove(id) => done(0, world.remove(world.object_of(id)?))?,
+            Call::Checkpoint => Reply::Checkpoint(world.checkpoint()?.to_bytes()),
+            Call::Restore(bytes) => {
+                let checkpoint = Checkpoint::from_bytes(&bytes).map_err(|bad| Refusal::Other(bad.to_string()))?;
+                world.restore(&checkpoint)?;
+                Reply::Done(self.publish())
+            }
+            Call::Hash => Reply::Hash(world.hash()?),
+        };
+        let too_long = |bad: BadMessage| Refusal::Other(format!("{bad}: the answer is too long"));
+        Ok(vec![encode(&reply).map_err(too_long)?])
+    }
+
+    fn welcome(&self) -> Welcome {
+        let scene = self.world.scene();
+        let fixed = (0..).map_while(|number| self.world.name(Touched::Fixed(number)).ok()).collect();
+        let (world, program) = (self.name.clone(), PROGRAM.to_owned());
+        Welcome { run: self.run, world, program, scene: scene.name, scene_hash: scene.hash, fixed }
+    }
+}
+
+fn done(sequence: u64, outcome: Result<(), WorldError>) -> Result<Reply, Refusal> {
+    outcome.map(|()| Reply::Done(sequence)).map_err(Refusal::from)
+}
+
+/// A refusal as the bytes of an answer.
+fn refused(refusal: Refusal) -> Vec<Vec<u8>> {
+    encode(&Reply::Refused(refusal)).into_iter().collect()
+}
+
+impl Shown {
+    /// Takes up the states that are there now: what has changed since the last time.
+    fn changes(&mut self, world: &dyn WorldCalls, run: u64) -> Moment {
+        let (time, mut present, mut states) = (world.time(), BTreeSet::new(), Vec::new());
+        for object in world.all_objects() {
+            // an object may leave meanwhile
+            let Ok(state) = world.latest(object) else { continue };
+            let id = object.id();
+            present.insert(id);
+            let known = self.objects.get(&id);
+            if known.is_some_and(|(_, shown)| Arc::ptr_eq(shown, &state)) {
+                continue;
+            }
+            let name = known.map(|(name, _)| Ok(Arc::clone(name))).unwrap_or_else(|| world.name(object.into()));
+            let Ok(name) = name else { continue };
+            states.push(ObjectState { id, name: Arc::clone(&name), state: travelling(&state) });
+            self.objects.insert(id, (name, state));
+        }
+        let gone: Vec<_> = self.objects.keys().filter(|id| !present.contains(id)).copied().collect();
+        gone.iter().for_each(|id| drop(self.objects.remove(id)));
+        let events = (self.events)().into_iter().filter_map(WireEvent::of).collect();
+        Moment { run, sequence: 0, time, states, gone, events }
+    }
+
+    /// All states as they were last shown.
+    fn all(&self, world: &dyn WorldCalls, run: u64) -> Moment {
+        let state = |(id, (name, state)): (&AgentId, &(Arc<str>, Arc<Snapshot>))| ObjectState {
+            id: *id,
+            name: Arc::clone(name),
+            state: travelling(state),
+        };
+        let states = self.objects.iter().map(state).collect();
+        Moment { run, time: world.time(), states, ..Moment::default() }
+    }
+}
+
+/// A state without what only partners of asynchronous pairs read: ledgers, and the local model with its factor.
+fn travelling(state: &Arc<Snapshot>) -> Arc<Snapshot> {
+    if state.given.is_empty() && state.taken.is_empty() && state.local_model.blocks.is_empty() {
+        return Arc::clone(state);
+    }
+    let (given, taken, local_model) = (Vec::new(), Vec::new(), LocalModel::default());
+    Arc::new(Snapshot { given, taken, local_model, ..Snapshot::clone(state) })
+}

@@ -1,0 +1,358 @@
+//! A world that runs elsewhere, called as if it ran here.
+//!
+//! In: an endpoint. Out: [`RemoteWorld`]. Never here: what was seen of it ([`crate::mirror`]), the bytes of messages.
+
+use crate::endpoint::{LEASE, Side, is_name, open};
+use crate::error::HostsError;
+use crate::mirror::{Mirror, RemoteFrame};
+use crate::wire::{Call, Moment, PROGRAM, Reply, Request, Welcome, decode, encode};
+use metachron_core::{AgentId, Body, SimSpan, SimTime, Snapshot};
+use metachron_runtime::{Command, TimelineCommand};
+use metachron_world::{
+    Checkpoint, CheckpointError, EventFilter, EventReader, Object, Part, SceneMark, Touched, WorldCalls, WorldError,
+};
+use std::sync::atomic::{AtomicBool, Ordering::Relaxed};
+use std::sync::mpsc::{Receiver, RecvTimeoutError, sync_channel};
+use std::sync::{Arc, Mutex, PoisonError};
+use std::thread::JoinHandle;
+use std::time::{Duration, Instant};
+use zenoh::liveliness::LivelinessToken;
+use zenoh::pubsub::Subscriber;
+use zenoh::query::ConsolidationMode;
+use zenoh::sample::SampleKind;
+use zenoh::{Session, Wait};
+
+/// The most that an answer is waited for: a step of the world may take five seconds.
+const ANSWER_WITHIN: Duration = Duration::from_secs(10);
+/// Whether a host is there at all is asked for so long, so often.
+const GREETING: (u32, Duration) = (20, Duration::from_millis(50));
+/// All states are asked for at most so often.
+const REFRESH: Duration = Duration::from_millis(250);
+/// So many messages wait to be read; of more the newest are lost, and all states are asked for.
+const WAITING: usize = 64;
+/// Time passes elsewhere in calls of this length.
+const PIECE: SimSpan = SimSpan::from_millis(20);
+
+/// A world that runs elsewhere. Clones are the same connection, which ends with the last.
+///
+/// Reading ([`WorldCalls::latest`], [`WorldCalls::all_objects`], [`RemoteWorld::frame`]) shows the newest states that came, and never waits; what
+/// changes the world waits for its host's answer. While the host is silent, states stay as they were last seen, and calls
+/// are [`WorldError::Silent`]; where it lives again, they go on.
+#[derive(Clone)]
+pub struct RemoteWorld {
+    connection: Arc<Connection>,
+}
+
+/// What a connection needs to end.
+struct Connection {
+    link: Arc<Link>,
+    reader: Option<JoinHandle<()>>,
+    _subscribers: [Subscriber<()>; 2],
+    _token: LivelinessToken,
+}
+
+/// Calls of a host and their answers.
+struct Link {
+    session: Session,
+    mirror: Arc<Mirror>,
+    caller: String,
+    /// The number of the newest call.
+    sequence: Mutex<u64>,
+    ends: AtomicBool,
+}
+
+impl std::fmt::Debug for RemoteWorld {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.debug_struct("RemoteWorld").field("world", &self.link().mirror.world).finish_non_exhaustive()
+    }
+}
+
+/// Connects with the world that is served at `endpoint`, `tcp/address:port` of this machine; of the scene `expected`, if that is given.
+///
+/// # Errors
+/// [`HostsError`]: nothing is connected then.
+pub fn connect(endpoint: &str, expected: Option<&SceneMark>) -> Result<RemoteWorld, HostsError> {
+    let session = open(endpoint, Side::Caller)?;
+    let failed = |error: zenoh::Error| HostsError::Network { endpoint: endpoint.to_owned(), reason: error.to_string() };
+    let caller = session.zid().to_string();
+    let welcome = greet(&session, &caller).ok_or_else(|| HostsError::NoWorld { endpoint: endpoint.to_owned() })??;
+    check_welcome(&welcome, expected)?;
+    let mirror = Arc::new(Mirror::new(welcome));
+    let of_world = |last: &str| format!("metachron/{}/{last}", mirror.world);
+    let token = session.liveliness().declare_token(of_world(&format!("caller/{caller}"))).wait().map_err(failed)?;
+    let (to_reader, messages) = sync_channel(WAITING);
+    let states = session.declare_subscriber(of_world("state"));
+    let states = states.callback(move |sample| drop(to_reader.try_send(sample.payload().to_bytes().into_owned())));
+    let states = states.wait().map_err(failed)?;
+    let watched = Arc::clone(&mirror);
+    let host = session.liveliness().declare_subscriber(of_world("host")).history(true);
+    let host =
+        host.callback(move |sample| watched.set_alive(sample.kind() == SampleKind::Put)).wait().map_err(failed)?;
+    // the greeting had the first number
+    let link = Arc::new(Link { session, mirror, caller, sequence: Mutex::new(1), ends: AtomicBool::new(false) });
+    link.refresh()?;
+    let reading = Arc::clone(&link);
+    let reader = std::thread::Builder::new().name("hosts-states".to_owned()).spawn(move || reading.read(&messages));
+    let reader = Some(reader.map_err(|error| failed(error.into()))?);
+    Ok(RemoteWorld { connection: Arc::new(Connection { link, reader, _subscribers: [states, host], _token: token }) })
+}
+
+/// Introduces a caller; `None` where nobody answers.
+fn greet(session: &Session, caller: &str) -> Option<Result<Welcome, HostsError>> {
+    let hello = encode(&Request { run: 0, sequence: 1, call: Call::Hello(PROGRAM.to_owned()) }).ok()?;
+    let (often, pause) = GREETING;
+    for _ in 0..often {
+        let asked = session.get(format!("metachron/*/call/{caller}")).payload(hello.clone()).timeout(LEASE);
+        let answers = asked.wait().ok()?;
+        let answer =
+            answers.recv().ok().and_then(|reply| reply.result().ok().map(|it| it.payload().to_bytes().into_owned()));
+        match answer.map(|bytes| decode(&bytes)) {
+            Some(Ok(Reply::Hello(welcome))) => return Some(Ok(welcome)),
+            Some(Ok(Reply::Refused(refusal))) => return Some(Err(WorldError::from(refusal).into())),
+            Some(Ok(_)) => return Some(Err(unexpected().into())),
+            Some(Err(bad)) => return Some(Err(WorldError::Elsewhere(bad.to_string()).into())),
+            None => std::thread::sleep(pause),
+        }
+    }
+    None
+}
+
+/// Checks that a world is one that this program reads, and of the expected scene.
+fn check_welcome(welcome: &Welcome, expected: Option<&SceneMark>) -> Result<(), HostsError> {
+    if welcome.program != PROGRAM {
+        return Err(HostsError::OtherProgram { found: welcome.program.clone(), expected: PROGRAM.to_owned() });
+    }
+    if !is_name(&welcome.world) {
+        return Err(HostsError::BadName { name: welcome.world.clone() });
+    }
+    match expected.filter(|expected| expected.hash != welcome.scene_hash) {
+        None => Ok(()),
+        Some(SceneMark { name, hash }) => Err(HostsError::OtherScene {
+            found: welcome.scene.clone(),
+            found_hash: welcome.scene_hash,
+            expected: name.clone(),
+            expected_hash: *hash,
+        }),
+    }
+}
+
+fn unexpected() -> WorldError {
+    WorldError::Elsewhere("the host has answered something else than was asked".to_owned())
+}
+
+impl Drop for Connection {
+    fn drop(&mut self) {
+        self.link.ends.store(true, Relaxed);
+        self.reader.take().into_iter().for_each(|reader| drop(reader.join()));
+        let _ = self.link.session.close().wait();
+    }
+}
+
+impl Link {
+    /// Reads states until the connection ends, and asks for all where some are missing.
+    fn read(&self, messages: &Receiver<Vec<u8>>) {
+        let mut refreshed = Instant::now();
+        while !self.ends.load(Relaxed) {
+            match messages.recv_timeout(LEASE / 20) {
+                Ok(bytes) => match decode(&bytes) {
+                    Ok(Reply::Moment(moment)) => self.mirror.take(moment),
+                    _ => self.mirror.refuse(),
+                },
+                Err(RecvTimeoutError::Timeout) => {}
+                Err(RecvTimeoutError::Disconnected) => return,
+            }
+            if self.mirror.is_stale() && self.mirror.silence().is_none() && refreshed.elapsed() >= REFRESH {
+                // where it fails it is asked again
+                let _ = self.refresh();
+                refreshed = Instant::now();
+            }
+        }
+    }
+
+    /// Introduces the caller again, where its host has forgotten it, and takes all states.
+    fn refresh(&self) -> Result<(), WorldError> {
+        self.call(Call::Hello(PROGRAM.to_owned()))?;
+        let all = self.call(Call::All)?.into_iter();
+        let parts = all.map(|part| if let Reply::Moment(part) = part { Ok(part) } else { Err(unexpected()) });
+        self.mirror.take_all(parts.collect::<Result<Vec<Moment>, _>>()?);
+        Ok(())
+    }
+
+    /// Calls the host, and waits for all that it answers.
+    fn call(&self, call: Call) -> Result<Vec<Reply>, WorldError> {
+        if let Some(silent) = self.mirror.silence() {
+            return Err(silent);
+        }
+        let (key, asked) = (format!("metachron/{}/call/{}", self.mirror.world, self.caller), Instant::now());
+        let answers = {
+            let mut sequence = self.sequence.lock().unwrap_or_else(PoisonError::into_inner);
+            *sequence += 1;
+            let request = encode(&Request { run: self.mirror.run, sequence: *sequence, call });
+            let request = request.map_err(|bad| WorldError::Elsewhere(bad.to_string()))?;
+            let get = self.session.get(key).payload(request).timeout(ANSWER_WITHIN);
+            get.consolidation(ConsolidationMode::None)
+                .wait()
+                .map_err(|error| WorldError::Elsewhere(error.to_string()))?
+        };
+        let mut replies = Vec::new();
+        while let Ok(answer) = answers.recv() {
+            let Ok(sample) = answer.result() else { continue };
+            match decode(&sample.payload().to_bytes()) {
+                Ok(Reply::Refused(refusal)) => return Err(refusal.into()),
+                Ok(reply) => replies.push(reply),
+                Err(bad) => {
+                    self.mirror.refuse();
+                    return Err(WorldError::Elsewhere(bad.to_string()));
+                }
+            }
+        }
+        if replies.is_empty() { Err(self.mirror.silent_for(asked.elapsed())) } else { Ok(replies) }
+    }
+
+    /// Calls the host for one answer.
+    fn ask(&self, call: Call) -> Result<Reply, WorldError> {
+        self.call(call)?.pop().ok_or_else(unexpected)
+    }
+
+    /// Calls the host for nothing but that it is done; what it changed is seen then.
+    fn act(&self, call: Call) -> Result<(), WorldError> {
+        let Reply::Done(sequence) = self.ask(call)? else { return Err(unexpected()) };
+        self.mirror.reach(sequence, LEASE);
+        Ok(())
+    }
+
+    fn own(&self, object: Object) -> Result<AgentId, WorldError> {
+        if object.is_of(self.mirror.tag) { Ok(object.id()) } else { Err(WorldError::Foreign) }
+    }
+}
+
+impl RemoteWorld {
+    fn link(&self) -> &Link {
+        &self.connection.link
+    }
+
+    /// All objects as they were last seen, and the time then.
+    #[must_use]
+    pub fn frame(&self) -> RemoteFrame {
+        self.link().mirror.frame()
+    }
+
+    /// The first frame that is later than `since`, once it comes.
+    ///
+    /// # Errors
+    /// [`WorldError::Silent`] if none comes within `patience`, or the host is silent.
+    pub fn next_frame(&self, since: SimTime, patience: Duration) -> Result<RemoteFrame, WorldError> {
+        self.link().mirror.next_frame(since, patience)
+    }
+
+    /// How long ago the newest message came.
+    #[must_use]
+    pub fn age(&self) -> Duration {
+        self.link().mirror.age()
+    }
+
+    /// Whether its host is silent: it has ended, or sent nothing for a second.
+    #[must_use]
+    pub fn is_silent(&self) -> bool {
+        self.link().mirror.silence().is_some()
+    }
+
+    /// How many messages of the host were refused, because their bytes or numbers cannot be.
+    #[must_use]
+    pub fn refused(&self) -> u64 {
+        self.link().mirror.refused()
+    }
+}
+
+impl WorldCalls for RemoteWorld {
+    fn scene(&self) -> SceneMark {
+        self.link().mirror.scene.clone()
+    }
+
+    fn all_objects(&self) -> Vec<Object> {
+        self.link().mirror.all_objects()
+    }
+
+    fn object(&self, name: &str) -> Result<Object, WorldError> {
+        self.link().mirror.object(name)
+    }
+
+    fn object_of(&self, id: AgentId) -> Result<Object, WorldError> {
+        self.link().mirror.object_of(id)
+    }
+
+    fn name(&self, of: Touched) -> Result<Arc<str>, WorldError> {
+        self.link().mirror.name(of)
+    }
+
+    fn latest(&self, object: Object) -> Result<Arc<Snapshot>, WorldError> {
+        self.link().mirror.latest(object)
+    }
+
+    fn time(&self) -> SimTime {
+        self.link().mirror.time()
+    }
+
+    fn hash(&self) -> Result<u64, WorldError> {
+        if let Reply::Hash(hash) = self.link().ask(Call::Hash)? { Ok(hash) } else { Err(unexpected()) }
+    }
+
+    fn drive(&self, drive: TimelineCommand) -> Result<(), WorldError> {
+        self.link().act(Call::Drive(drive))
+    }
+
+    fn advance(&self, span: SimSpan) -> Result<(), WorldError> {
+        let mut left = span;
+        while left > SimSpan::ZERO {
+            let piece = left.min(PIECE);
+            self.link().act(Call::Advance(piece))?;
+            left = SimSpan::from_nanos(left.as_nanos() - piece.as_nanos());
+        }
+        Ok(())
+    }
+
+    fn command(&self, object: Object, command: Command) -> Result<(), WorldError> {
+        self.link().act(Call::Command(self.link().own(object)?, command))
+    }
+
+    fn set_state(&self, object: Object, state: &Body) -> Result<(), WorldError> {
+        self.link().act(Call::SetState(self.link().own(object)?, Box::new(state.clone())))
+    }
+
+    fn add(&self, name: &str, part: Part) -> Result<Object, WorldError> {
+        match self.link().ask(Call::Add(name.to_owned(), Box::new(part)))? {
+            Reply::Added(id, sequence) => {
+                self.link().mirror.reach(sequence, LEASE);
+                Ok(self.link().mirror.tag.object(id))
+            }
+            _ => Err(unexpected()),
+        }
+    }
+
+    fn remove(&self, object: Object) -> Result<(), WorldError> {
+        self.link().act(Call::Remove(self.link().own(object)?))
+    }
+
+    fn checkpoint(&self) -> Result<Checkpoint, CheckpointError> {
+        let Reply::Checkpoint(bytes) = self.link().ask(Call::Checkpoint).map_err(of_checkpoint)? else {
+            return Err(unexpected().into());
+        };
+        Checkpoint::from_bytes(&bytes).map_err(|bad| WorldError::Elsewhere(bad.to_string()).into())
+    }
+
+    fn restore(&self, checkpoint: &Checkpoint) -> Result<(), CheckpointError> {
+        self.link().act(Call::Restore(checkpoint.to_bytes())).map_err(of_checkpoint)
+    }
+
+    fn listen(&self, filter: EventFilter) -> EventReader {
+        self.link().mirror.listen(filter)
+    }
+}
+
+/// The error of a world as one of its checkpoints.
+fn of_checkpoint(error: WorldError) -> CheckpointError {
+    match error {
+        WorldError::Stopped => CheckpointError::Stopped,
+        other => other.into(),
+    }
+}

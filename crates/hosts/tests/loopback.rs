@@ -1,0 +1,227 @@
+//! Two ends over loopback: a world here and the same world as it is called from elsewhere.
+
+use glam::DVec3;
+use metachron::geometry::Solid;
+use metachron_core::{Anchor, Body, SimSpan, SimTime};
+use metachron_hosts::{Host, HostsError, RemoteWorld, connect, serve};
+use metachron_runtime::{Command, TimelineCommand};
+use metachron_world::kinds::ExecutorKind;
+use metachron_world::{EventFilter, Happening, Rigid, Scene, Tube, World, WorldCalls, WorldError};
+use std::io::{Read, Write};
+use std::net::{TcpListener, TcpStream};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering::Relaxed};
+use std::time::{Duration, Instant};
+
+const SOON: Duration = Duration::from_secs(5);
+
+fn scene() -> Scene {
+    let ball = Rigid::ball(0.05).mass_kg(0.2).at([0.0, 0.0, 0.5]);
+    let tube = Tube::along(&[[-0.2, 1.0, 0.3], [0.2, 1.0, 0.3]]).radius_m(0.01).segments(4);
+    Scene::builder().fixed("floor", Solid::Plane).add("ball", ball).add("tube", tube).build().unwrap()
+}
+
+fn free_endpoint() -> String {
+    let port = TcpListener::bind("127.0.0.1:0").unwrap().local_addr().unwrap().port();
+    format!("tcp/127.0.0.1:{port}")
+}
+
+/// A world here, its host, and the same world as it is seen elsewhere.
+fn two_ends(executor: ExecutorKind) -> (World, Host, RemoteWorld) {
+    let (here, endpoint) = (World::start(&scene(), executor).unwrap(), free_endpoint());
+    let host = serve(Arc::new(here.clone()), "bench", &endpoint).unwrap();
+    let elsewhere = connect(&endpoint, Some(&scene().mark())).unwrap();
+    (here, host, elsewhere)
+}
+
+fn until(mut holds: impl FnMut() -> bool, what: &str) {
+    let begun = Instant::now();
+    while !holds() {
+        assert!(begun.elapsed() < SOON, "{what}");
+        std::thread::sleep(Duration::from_millis(2));
+    }
+}
+
+fn bits(body: &Body) -> String {
+    format!("{body:?}")
+}
+
+#[test]
+fn a_state_elsewhere_is_the_state_here_at_the_same_step() {
+    let (here, _host, elsewhere) = two_ends(ExecutorKind::Lockstep);
+    for _ in 0..10 {
+        elsewhere.advance(SimSpan::from_millis(30)).unwrap();
+        assert_eq!(elsewhere.time(), here.time());
+        for name in ["ball", "tube"] {
+            let seen = elsewhere.latest(elsewhere.object(name).unwrap()).unwrap();
+            let is = here.latest(here.object(name).unwrap()).unwrap();
+            assert_eq!((seen.steps, bits(&seen.body)), (is.steps, bits(&is.body)), "{name}");
+        }
+        assert_eq!(elsewhere.hash().unwrap(), here.hash());
+    }
+    assert_eq!(here.time(), SimTime::from_nanos(300_000_000));
+}
+
+#[test]
+fn a_command_from_elsewhere_acts_as_here() {
+    let (here, _host, elsewhere) = two_ends(ExecutorKind::Lockstep);
+    let (alone, span) = (World::start(&scene(), ExecutorKind::Lockstep).unwrap(), SimSpan::from_millis(100));
+    let push = Command::force(Anchor::Local(DVec3::ZERO), DVec3::X * 3.0).key(1).for_ms(50);
+    elsewhere.command(elsewhere.object("ball").unwrap(), push).unwrap();
+    elsewhere.advance(span).unwrap();
+    alone.command(alone.object("ball").unwrap(), push).unwrap();
+    alone.advance_while(span, || true);
+    assert_eq!(here.hash(), alone.hash());
+    let (position, _) = here.latest(here.object("ball").unwrap()).unwrap().body.probe(0.0).unwrap();
+    assert!(position.x > 0.01, "{position}");
+}
+
+#[test]
+fn a_refusal_comes_back_as_the_error_that_it_is_here() {
+    let (here, _host, elsewhere) = two_ends(ExecutorKind::Lockstep);
+    let commands = [
+        ("ball", Command::force(Anchor::Arc(0.1), DVec3::X)),
+        ("ball", Command::force(Anchor::Local(DVec3::ZERO), DVec3::X * f64::NAN)),
+        ("ball", Command::force(Anchor::Local(DVec3::ZERO), DVec3::X).key(99)),
+        ("ball", Command::pressure(1e3)),
+        ("tube", Command::carve(DVec3::ZERO, DVec3::X, 0.1)),
+    ];
+    for (name, command) in commands {
+        let there = elsewhere.command(elsewhere.object(name).unwrap(), command).unwrap_err();
+        let is = here.command(here.object(name).unwrap(), command).unwrap_err();
+        assert_eq!(format!("{there:?}\n{there}"), format!("{is:?}\n{is}"));
+    }
+    let (there, is) = (elsewhere.object("bal").unwrap_err(), here.object("bal").unwrap_err());
+    assert_eq!(format!("{there:?}"), format!("{is:?}"));
+    let foreign = elsewhere.command(here.object("ball").unwrap(), Command::wake());
+    assert!(matches!(foreign, Err(WorldError::Foreign)));
+    let same = elsewhere.add("ball", Rigid::ball(0.1).into());
+    assert!(matches!(same, Err(WorldError::SameName { name }) if name == "ball"));
+    let bad = elsewhere.add("bad", Rigid::ball(-0.1).into()).unwrap_err();
+    assert_eq!(bad.to_string(), here.add("bad", Rigid::ball(-0.1)).unwrap_err().to_string());
+    here.stop();
+    assert!(matches!(elsewhere.command(elsewhere.object("ball").unwrap(), Command::wake()), Err(WorldError::Stopped)));
+}
+
+#[test]
+fn an_object_is_added_and_removed_from_elsewhere() {
+    let (here, _host, elsewhere) = two_ends(ExecutorKind::Lockstep);
+    let second = elsewhere.add("second", Rigid::ball(0.05).mass_kg(0.2).at([1.0, 0.0, 0.5]).into()).unwrap();
+    assert_eq!(here.object("second").unwrap().id(), second.id());
+    assert!(elsewhere.latest(second).is_ok() && elsewhere.object("second").unwrap() == second);
+    elsewhere.advance(SimSpan::from_millis(40)).unwrap();
+    assert!(elsewhere.latest(second).unwrap().steps > 0);
+    elsewhere.remove(second).unwrap();
+    elsewhere.advance(SimSpan::from_millis(40)).unwrap();
+    assert!(matches!(elsewhere.latest(second), Err(WorldError::Gone { name }) if name == "second"));
+    assert!(matches!(elsewhere.command(second, Command::wake()), Err(WorldError::Gone { name }) if name == "second"));
+    assert_eq!(elsewhere.all_objects().len(), 2);
+}
+
+#[test]
+fn a_checkpoint_from_elsewhere_goes_on_to_the_bit() {
+    let (here, _host, elsewhere) = two_ends(ExecutorKind::Lockstep);
+    elsewhere.advance(SimSpan::from_millis(100)).unwrap();
+    let mark = elsewhere.checkpoint().unwrap();
+    assert_eq!(mark, here.checkpoint().unwrap());
+    elsewhere.advance(SimSpan::from_millis(100)).unwrap();
+    let end = here.hash();
+    elsewhere.restore(&mark).unwrap();
+    assert_eq!(elsewhere.time(), mark.time());
+    elsewhere.advance(SimSpan::from_millis(100)).unwrap();
+    assert_eq!(here.hash(), end);
+}
+
+#[test]
+fn events_are_those_of_the_world() {
+    let (here, _host, elsewhere) = two_ends(ExecutorKind::Lockstep);
+    let (mut there, mut is) =
+        (elsewhere.listen(EventFilter::contacts()), WorldCalls::listen(&here, EventFilter::contacts()));
+    elsewhere.advance(SimSpan::from_millis(600)).unwrap();
+    let (mut seen, expected) = (Vec::new(), is());
+    until(
+        || {
+            seen.extend(there());
+            seen.len() >= expected.len()
+        },
+        "events that the world has had",
+    );
+    let said = |event: &metachron_world::Event| event.to_string();
+    assert_eq!(seen.iter().map(said).collect::<Vec<_>>(), expected.iter().map(said).collect::<Vec<_>>());
+    assert!(seen.iter().any(|event| matches!(event.what, Happening::Contact(contact) if contact.begins)));
+}
+
+#[test]
+fn time_that_runs_here_is_seen_and_paused_elsewhere() {
+    let (here, host, elsewhere) = two_ends(ExecutorKind::Threads);
+    elsewhere.drive(TimelineCommand::Run).unwrap();
+    let first = elsewhere.next_frame(SimTime::ZERO, SOON).unwrap();
+    let later = elsewhere.next_frame(first.time, SOON).unwrap();
+    assert!(later.time > first.time && later.body(elsewhere.object("ball").unwrap()).is_some());
+    elsewhere.drive(TimelineCommand::Pause).unwrap();
+    let stands = here.time();
+    until(|| elsewhere.time() == stands, "the time at which it stands");
+    assert_eq!((here.time(), host.callers(), host.refused().total(), elsewhere.refused()), (stands, 1, 0, 0));
+}
+
+#[test]
+fn another_scene_is_refused_in_one_sentence() {
+    let endpoint = free_endpoint();
+    let _host = serve(Arc::new(World::start(&scene(), ExecutorKind::Lockstep).unwrap()), "bench", &endpoint).unwrap();
+    let other = Scene::builder().add("box", Rigid::ball(0.1)).build().unwrap();
+    let refused = connect(&endpoint, Some(&other.mark())).unwrap_err();
+    assert!(matches!(refused, HostsError::OtherScene { .. }), "{refused}");
+    let nobody = connect(&free_endpoint(), None).unwrap_err();
+    assert!(matches!(nobody, HostsError::Network { .. } | HostsError::NoWorld { .. }), "{nobody}");
+    assert!(matches!(connect("tls/bench:7447", None), Err(HostsError::NeedsCertificates { .. })));
+}
+
+/// Carries bytes between a caller and `host` until it is to be silent: its connections stay open then.
+fn relay(host: &str, is_silent: &Arc<AtomicBool>) -> String {
+    let listener = TcpListener::bind("127.0.0.1:0").unwrap();
+    let (host, port) = (host.trim_start_matches("tcp/").to_owned(), listener.local_addr().unwrap().port());
+    let is_silent = Arc::clone(is_silent);
+    std::thread::spawn(move || {
+        for caller in listener.incoming().map_while(Result::ok) {
+            let Ok(served) = TcpStream::connect(&host) else { return };
+            for (mut from, mut to) in [(caller.try_clone().unwrap(), served.try_clone().unwrap()), (served, caller)] {
+                let is_silent = Arc::clone(&is_silent);
+                std::thread::spawn(move || {
+                    let mut bytes = [0; 65536];
+                    while let Ok(count @ 1..) = from.read(&mut bytes) {
+                        if !is_silent.load(Relaxed) && to.write_all(&bytes[..count]).is_err() {
+                            return;
+                        }
+                    }
+                });
+            }
+        }
+    });
+    format!("tcp/127.0.0.1:{port}")
+}
+
+#[test]
+fn a_host_that_goes_silent_is_noticed_and_may_come_back() {
+    let (here, endpoint) = (World::start(&scene(), ExecutorKind::Threads).unwrap(), free_endpoint());
+    let host = serve(Arc::new(here), "bench", &endpoint).unwrap();
+    let is_silent = Arc::new(AtomicBool::new(false));
+    let elsewhere = connect(&relay(&endpoint, &is_silent), None).unwrap();
+    let ball = elsewhere.object("ball").unwrap();
+    until(|| elsewhere.command(ball, Command::wake()).is_ok(), "a host that answers");
+    is_silent.store(true, Relaxed);
+    let begun = Instant::now();
+    until(|| elsewhere.is_silent(), "a silent host that is noticed");
+    // the lease is 1 s
+    assert!(begun.elapsed() < Duration::from_millis(1500), "{:?}", begun.elapsed());
+    let refused = elsewhere.command(ball, Command::wake());
+    assert!(matches!(refused, Err(WorldError::Silent { world, .. }) if world == "bench"));
+    assert!(elsewhere.latest(ball).is_ok(), "it stays as it was last seen");
+    is_silent.store(false, Relaxed);
+    let begun = Instant::now();
+    while elsewhere.command(ball, Command::wake()).is_err() {
+        assert!(begun.elapsed() < Duration::from_secs(15), "a host that lives again");
+        std::thread::sleep(Duration::from_millis(20));
+    }
+    drop(host);
+    until(|| elsewhere.is_silent(), "a host that ended");
+}
