@@ -313,6 +313,7 @@ fn agent(scene: &Scene, agent: &AgentOutcome) -> AgentReport {
         lived_s: stats.lived.as_secs_f64(),
         given_up_s: agent.given_up_s,
         lengthened: stats.lengthened,
+        under_resolved: (stats.under_resolved > 0).then_some(stats.under_resolved),
         dropped_ms: stats.dropped.as_secs_f64() * 1e3,
         rested_ms: stats.rested.as_secs_f64() * 1e3,
         led_by: stats.led_by.map(|id| scene.name_of(id).to_owned()),

@@ -6,6 +6,7 @@
 use crate::Inputs;
 use crate::joint::Motor;
 use crate::member::ClusterMember;
+use crate::motion_bounds::is_within_motion;
 use glam::{DQuat, DVec3};
 use metachron_core::{
     AgentId, Anchor, Archive, ArchiveError, Body, Removed, Resolution, SimSpan, SimTime, Snapshot, StepError,
@@ -231,13 +232,16 @@ pub struct PoseGoal {
 }
 
 impl PoseGoal {
-    /// Whether a body can be led there.
-    ///
-    /// # Errors
-    /// A sentence that names the fault.
-    pub fn check(&self) -> Result<(), &'static str> {
+    /// The motion of a body that is led there at once.
+    #[must_use]
+    pub const fn motion(&self) -> SetMotion {
         let Self { position_m, rotation, velocity_m_s, spin_rad_s } = *self;
-        check_motion([Some(position_m), Some(velocity_m_s), Some(spin_rad_s)], Some(rotation))
+        SetMotion {
+            position_m: Some(position_m),
+            rotation: Some(rotation),
+            velocity_m_s: Some(velocity_m_s),
+            spin_rad_s: Some(spin_rad_s),
+        }
     }
 
     /// Where it is `t_s` seconds later.
@@ -268,32 +272,12 @@ pub struct SetMotion {
 }
 
 impl SetMotion {
-    /// Whether a body can be moved so.
-    ///
-    /// # Errors
-    /// A sentence that names the fault.
-    pub fn check(&self) -> Result<(), &'static str> {
-        check_motion([self.position_m, self.velocity_m_s, self.spin_rad_s], self.rotation)
+    /// Whether a body can be moved so: all numbers are within [`MOTION_MAX`](crate::MOTION_MAX), and the rotation is neither zero nor not finite.
+    #[must_use]
+    pub fn is_sound(&self) -> bool {
+        let vectors = [self.position_m, self.velocity_m_s, self.spin_rad_s];
+        vectors.into_iter().flatten().all(is_within_motion) && self.rotation.is_none_or(|q| unit_rotation(q).is_some())
     }
-}
-
-/// The largest coordinate of a place that a body is moved or led to, metres, and of its velocity and spin, m/s and rad/s.
-pub const MOTION_MAX: f64 = 1e6;
-
-/// Whether these are a place, a velocity and a spin within their range, and a rotation.
-fn check_motion(vectors: [Option<DVec3>; 3], rotation: Option<DQuat>) -> Result<(), &'static str> {
-    let problems = [
-        "a position must be finite and within 1e6 m of the origin along each axis",
-        "a velocity must be finite, at most 1e6 m/s along each axis",
-        "a spin must be finite, at most 1e6 rad/s about each axis",
-    ];
-    // no comparison holds for NaN
-    let is_out = |v: DVec3| !(v.is_finite() && v.abs().max_element() <= MOTION_MAX);
-    if let Some((_, problem)) = vectors.into_iter().zip(problems).find(|(v, _)| v.is_some_and(is_out)) {
-        return Err(problem);
-    }
-    let turns = |q: DQuat| unit_rotation(q).is_some();
-    if rotation.is_none_or(turns) { Ok(()) } else { Err("a rotation must be a quaternion that is finite and not zero") }
 }
 
 /// A region of space, world axes: all that is within a radius of a line. A ball where both its ends are one point.

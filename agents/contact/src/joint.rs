@@ -2,6 +2,7 @@
 //!
 //! In: two bodies, two anchors and a kind. Out: a checked [`Joint`]. Never here: how a joint is solved (`constraint/`).
 
+use crate::motion_bounds::is_within_motion;
 use glam::{DQuat, DVec3};
 use metachron_core::{AgentId, NumberRange, OutOfRange};
 
@@ -254,8 +255,6 @@ impl Joint {
     }
 }
 
-/// The largest coordinate of an anchor, metres.
-const REACH_MAX_M: f64 = 1e6;
 /// Stiffness, damping and lengths at rest; [`ABOVE_ZERO`] is that of lengths of ropes, [`GOAL`] that of goals of motors.
 const NUMBER: NumberRange = NumberRange::new(0.0, 1e9, "");
 const ABOVE_ZERO: NumberRange = NumberRange { least: 1e-9, ..NUMBER };
@@ -268,8 +267,7 @@ fn range(what: &'static str, [low, high]: [f64; 2], within: NumberRange) -> Resu
 }
 
 fn place(what: &'static str, value: DVec3) -> Result<(), JointError> {
-    let good = value.abs().max_element() <= REACH_MAX_M && value.is_finite();
-    if good { Ok(()) } else { Err(JointError::BadVector { what }) }
+    if is_within_motion(value) { Ok(()) } else { Err(JointError::BadVector { what }) }
 }
 
 fn direction(axis: DVec3) -> Result<(), JointError> {

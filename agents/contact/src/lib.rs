@@ -51,15 +51,17 @@ pub mod inputs;
 pub mod joint;
 mod lists;
 pub mod member;
+mod motion_bounds;
 pub mod push_out;
 pub mod remote;
 pub mod solve;
 pub mod step;
 
 pub use agent::{
-    Agent, AnchorForce, AnchorSpring, Carving, Law, Link, MOTION_MAX, Neighbour, OwnSteps, PoseGoal, SetMotion,
-    SetMotor, StepContext, Stepping,
+    Agent, AnchorForce, AnchorSpring, Carving, Law, Link, Neighbour, OwnSteps, PoseGoal, SetMotion, SetMotor,
+    StepContext, Stepping,
 };
 pub use inputs::{Input, Inputs};
+pub use motion_bounds::{MOTION_MAX, is_within_motion};
 pub use push_out::PUSH_OUT_SHARE;
 pub use remote::acknowledged;

@@ -3,7 +3,7 @@
 //! In: where its matter is, where it is to go. Out: a map of points and velocities. Never here: which body may be moved.
 
 use glam::{DQuat, DVec3};
-use metachron_contact::SetMotion;
+use metachron_contact::{MOTION_MAX, SetMotion, is_within_motion};
 
 /// A rigid motion of a deformable.
 #[derive(Debug, Clone, Copy)]
@@ -75,9 +75,8 @@ pub(crate) fn check_nodes(now: &[DVec3], to: [&[DVec3]; 2], held: impl Fn(usize)
             return Err(format!("the state has {found} {what}; the body has {} nodes", now.len()));
         }
     }
-    let reach = |v: &DVec3| v.is_finite() && v.abs().max_element() <= REACH_MAX;
-    if let Some(at) = positions.iter().zip(velocities).position(|(x, v)| !(reach(x) && reach(v))) {
-        return Err(format!("node {at} of the state is not finite or too far"));
+    if let Some(at) = positions.iter().zip(velocities).position(|(x, v)| ![*x, *v].into_iter().all(is_within_motion)) {
+        return Err(format!("node {at} of the state is not finite, or beyond {MOTION_MAX:e} m or m/s"));
     }
     let moved = |at: &usize| held(*at) && positions[*at].distance(now[*at]) > HELD_M;
     match (0..now.len()).find(moved) {
@@ -85,6 +84,3 @@ pub(crate) fn check_nodes(now: &[DVec3], to: [&[DVec3]; 2], held: impl Fn(usize)
         None => Ok(()),
     }
 }
-
-/// The largest coordinate or speed of a node, metres or m/s.
-const REACH_MAX: f64 = 1e6;

@@ -251,7 +251,9 @@ fn joint(JointMoment { name, position, velocity, effort }: &JointMoment) -> Valu
 fn log(event: &Event) -> Value {
     let level = match event.what {
         Happening::Failed => schema::ERROR,
-        Happening::Stalled | Happening::RateMissed | Happening::AttachmentGave => schema::WARNING,
+        Happening::Stalled | Happening::RateMissed | Happening::UnderResolved(_) | Happening::AttachmentGave => {
+            schema::WARNING
+        }
         _ => schema::INFO,
     };
     json!({

@@ -83,6 +83,8 @@ pub(super) struct ClusterSeat {
     drift_m: f64,
     /// How many steps of its own the last step had.
     parts: u32,
+    /// Whether its motion asked for more than the last step could be divided into.
+    under_resolved: bool,
     /// Its part in the last step, and the solves of the steps that it has led.
     state: Option<ClusterState>,
     solves: ClusterSolves,
@@ -194,6 +196,7 @@ impl ClusterSeat {
             doubling: None,
             drift_m: 0.0,
             parts: 1,
+            under_resolved: false,
             state: None,
             solves: ClusterSolves::default(),
             solved: None,
@@ -244,7 +247,7 @@ impl ClusterSeat {
         )?;
         archive_values!(archive, self.bonds, self.sleepers)?;
         archive_values!(archive, self.work, self.work_s, self.schedule, self.drift_m, self.state, self.solves)?;
-        archive_values!(archive, self.solved, self.price)?;
+        archive_values!(archive, self.solved, self.price, self.under_resolved)?;
         archive.option(&mut self.stepper, Box::default, |stepper, archive| stepper.archive(archive))?;
         archive.option(&mut self.doubling, Box::default, |doubling, archive| doubling.archive(archive))?;
         archive.option(&mut self.asynchronous, Box::default, |pairs, archive| pairs.archive(archive))?;

@@ -513,6 +513,7 @@ class Event:
         "left",
         "attachment_gave",
         "rate_missed",
+        "under_resolved",
         "carved",
         "rewound",
         "unknown",

@@ -109,6 +109,8 @@ pub(crate) struct Progress {
     /// How far it is then from where impacts at the start of the step would have brought it, metres and radians (eq.
     /// 27); empty for none.
     pub dx_impacts: Vec<DVec3>,
+    /// The greatest strain of its steps that they were not divided for, as a share of the strain that it can take; 0 where they were.
+    pub strain_left: f64,
     /// Work of its steps within the macro step, in the unit of its model.
     pub work: f64,
     /// Why its last begin or end failed, until that is taken.
@@ -132,13 +134,6 @@ impl Progress {
         self.owed_n_s.clear();
         reset(&mut self.unanswered, member.system().unanswered.len(), DVec3::ZERO);
         (self.touched, self.held) = (false, false);
-    }
-
-    /// Lets it make so many times as many steps, up to the most; whether it makes more.
-    pub fn divide(&mut self, times: u32, most: u32) -> bool {
-        let before = self.parts;
-        self.parts = (before * times).min(most);
-        before < most
     }
 
     /// Notes that a contact or row of the problem acts on it.

@@ -42,7 +42,7 @@ use glam::DVec3;
 pub use lone::LoneStepper;
 use metachron_core::{Archive, ArchiveError, ParallelFor, SimSpan, StepError, Wrench, check_span};
 use metachron_geometry::narrow_phase::TouchKey;
-pub use plan::Plan;
+pub use plan::{FINE_STEPS_MAX, Plan, STEP_FACTORS_MAX};
 pub use report::{ClusterReport, PairTotal};
 pub use rigid_pile::FACTORS_SAFE;
 use rigid_pile::RigidPile;
@@ -147,13 +147,11 @@ impl ClusterStepper {
         self.macro_s = dt.as_secs_f64();
         self.depth_m = scene.depth_m();
         self.solver.settings.depth_m = self.depth_m;
-        let factors_max = self.factors_max.map(|most| most.max(scene.budget().least_steps()));
-        (self.solver.settings.factors_max, self.impacts.factors_max) = (factors_max, factors_max);
         self.joints.missed_m = f64::INFINITY;
         all.iter_mut().for_each(Participant::let_go);
         self.plan(all, self.macro_s, threads)?;
         self.keep(all);
-        // each time at least one member makes twice as many steps, at most 64 times as many as it began with
+        // each time at least one member makes twice as many steps, at most 64 times as many as it began with, and within the bounds of all
         loop {
             match self.advance(on, all, dt, &mut report) {
                 Ok(true) => break,
@@ -183,7 +181,7 @@ impl ClusterStepper {
         let h_s = dt.as_secs_f64() / f64::from(parts);
         for (one, state) in all.iter_mut().zip(&mut self.progress) {
             let own = if bent(one) { state.parts } else { parts };
-            (state.share, state.part) = (parts / own, 0);
+            (state.share, state.part, state.strain_left) = (parts / own, 0, 0.0);
             one.grips.clear();
         }
         self.sums.begin(all.len());
@@ -193,7 +191,9 @@ impl ClusterStepper {
         (report.depth_m, report.pile_contacts) = (0.0, 0);
         self.fine_s = h_s;
         for fine in 0..parts {
+            report.begun_steps += 1;
             self.external.after_s = f64::from(fine) * h_s;
+            self.bound_solves(scene, report);
             self.begin(all, h_s, threads)?;
             self.detect(scene, all, h_s);
             self.assemble(scene, all, h_s, f64::from(fine) * h_s);
@@ -201,7 +201,8 @@ impl ClusterStepper {
             let given = [self.macro_s, h_s, self.depth_m];
             self.impacts.begin(given, &mut self.search, &self.constraints, &self.progress);
             self.solve(on, all, h_s, report)?;
-            if self.divide_joints(all) || self.divide(all, h_s) {
+            let most = plan::parts_left(report);
+            if self.divide_joints(all, most) || self.divide(all, h_s, most) {
                 return Ok(false);
             }
             self.record(all, h_s, dt);
@@ -260,6 +261,13 @@ impl ClusterStepper {
     #[must_use]
     pub fn lets_rest(&self) -> bool {
         self.held_fast() && !self.joints.drives
+    }
+
+    /// How many times as many steps as it made in the last macro step the motion of a participant asked for, > 1, where that were more than a
+    /// step may be divided into; 0 where they were not.
+    #[must_use]
+    pub fn strain_left(&self, member: usize) -> f64 {
+        self.progress.get(member).map_or(0.0, |state| state.strain_left)
     }
 
     /// Work of a participant's own steps in the last macro step, in the unit of its model.

@@ -3,8 +3,11 @@
 //! In: the step that each member wants, its strain by a solve, joints that do not hold. Out: the plan; members and their memories as they were
 //! at the start of the macro step. Never here: steps themselves. Theory: docs/theory/clusters.md, section 9 (eq. 23).
 
+use crate::detect::{ClusterScene, LEAST_STEPS_DEFAULT};
+use crate::member::participant::Progress;
 use crate::member::{ContactMemory, Participant, Role};
 use crate::step::ClusterStepper;
+use crate::step::report::ClusterReport;
 use metachron_core::parallel::for_each;
 use metachron_core::{ParallelFor, StepError};
 use std::f64::consts::SQRT_2;
@@ -14,6 +17,11 @@ use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
 const PARTS_MAX: u32 = 16;
 /// The most times as many steps that a member makes whose motion strains it too far.
 const DIVIDED_MAX: u32 = 64;
+/// The most fine steps of a macro step, those of attempts that were given up among them: one member has time for all its divisions.
+pub const FINE_STEPS_MAX: u32 = 2 * PARTS_MAX * DIVIDED_MAX;
+/// After so many factors in a macro step, attempts that were given up among them, no member is divided further, and every solve makes at most
+/// as many as are safe: 64 fine steps have time for 64 each.
+pub const STEP_FACTORS_MAX: u32 = 4096;
 
 /// How many steps of its own each of some bodies makes within a macro step, and how long that is, seconds.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -80,30 +88,56 @@ impl ClusterStepper {
         self.first_failure()
     }
 
-    /// Gives shorter steps to rigid members where joints ask for them; whether it does.
-    pub(super) fn divide_joints(&mut self, all: &[Participant<'_>]) -> bool {
+    /// Gives shorter steps to rigid members where joints ask for them, at most so many of all; whether it does.
+    pub(super) fn divide_joints(&mut self, all: &[Participant<'_>], most: u32) -> bool {
         if self.joints.ask <= 1 {
             return false;
         }
         let mut any = false;
         for (one, state) in all.iter().zip(&mut self.progress).filter(|(one, _)| one.member.role() == Role::Rigid) {
-            any |= state.divide(self.joints.ask, one.parts * DIVIDED_MAX);
+            any |= divide(state, f64::from(self.joints.ask), most.min(one.parts * DIVIDED_MAX));
         }
         any
     }
 
-    /// Gives shorter steps to members that the solution strains too far; whether there are any.
-    pub(super) fn divide(&mut self, all: &[Participant<'_>], h_s: f64) -> bool {
+    /// Gives shorter steps to members that the solution strains too far, at most so many of all; whether there are any.
+    pub(super) fn divide(&mut self, all: &[Participant<'_>], h_s: f64, most: u32) -> bool {
         let mut any = false;
         for (one, state) in all.iter().zip(&mut self.progress) {
             let so_far = one.member.strain(&state.v_before, h_s * f64::from(state.part));
             // a strain that is too much already grows through the rest of its step
-            let more = if so_far > 1.0 { times(so_far * f64::from(state.share) / f64::from(state.part)) } else { 1 };
+            let strain = so_far * f64::from(state.share) / f64::from(state.part);
             // the division that its free motion asked for counts
-            any |= more > 1 && state.divide(more, one.parts * DIVIDED_MAX);
+            any |= so_far > 1.0 && divide(state, strain, most.min(one.parts * DIVIDED_MAX));
         }
         any
     }
+
+    /// Bounds the solves of a fine step: by the budget, and once the factors of the macro step are spent by as many as are safe.
+    pub(super) fn bound_solves(&mut self, scene: &ClusterScene, report: &ClusterReport) {
+        let mut most = self.factors_max.map(|most| most.max(scene.budget().least_steps()));
+        if report.factors >= STEP_FACTORS_MAX {
+            most = Some(most.unwrap_or(LEAST_STEPS_DEFAULT).min(LEAST_STEPS_DEFAULT));
+        }
+        (self.solver.settings.factors_max, self.impacts.factors_max) = (most, most);
+    }
+}
+
+/// The most steps of a member in a macro step that is begun anew after all in this report: a power of two, as they are, or 0.
+pub(super) fn parts_left(report: &ClusterReport) -> u32 {
+    let left = FINE_STEPS_MAX.saturating_sub(report.begun_steps);
+    if left == 0 || report.factors >= STEP_FACTORS_MAX { 0 } else { 1 << left.ilog2() }
+}
+
+/// Lets a member make as many steps as this strain of one asks for, up to the most; whether it makes more. Where it may not, its strain is noted.
+fn divide(state: &mut Progress, strain: f64, most: u32) -> bool {
+    let divides = state.parts < most;
+    if divides {
+        state.parts = (state.parts * times(strain)).min(most);
+    } else {
+        state.strain_left = state.strain_left.max(strain);
+    }
+    divides
 }
 
 /// How many times as many steps a member needs that this one strains so far, as a share of the strain that it can take.

@@ -15,6 +15,8 @@ use metachron_core::{SolveLevel, Wrench};
 pub struct ClusterReport {
     /// Fine steps that it was made in.
     pub fine_steps: u32,
+    /// Fine steps begun, those given up because a member needed shorter ones among them; at most [`FINE_STEPS_MAX`](super::FINE_STEPS_MAX).
+    pub begun_steps: u32,
     /// Contacts of the last fine step, unloaded ones included.
     pub contacts: u32,
     /// The contacts of a rigid pile among them, which rapier3d has; all others are the problem's.

@@ -141,7 +141,7 @@ impl Agent for RigidBody {
             velocity_m_s: Some(state.velocity),
             spin_rad_s: Some(state.spin),
         };
-        let is_taken = set.check().is_ok() && self.set_motion(&set);
+        let is_taken = set.is_sound() && self.set_motion(&set);
         is_taken.then_some(()).ok_or_else(|| "a number is not finite or too large".to_owned())
     }
 

@@ -7,7 +7,6 @@ use super::Tool;
 use super::agent::{SUPPORTING_MAX_M_S, reach, shape, speed, spin, through};
 use super::drive::Drive;
 use super::gripper::Jaws;
-use super::spec::REACH_MAX_M;
 use crate::trajectory::PointMotion;
 use glam::{DMat3, DQuat, DVec3};
 use metachron_contact::member;
@@ -15,7 +14,7 @@ use metachron_contact::member::{
     Attachments, ClusterMember, MaterialPoint, MemberMotion, Pose, Role, SkinPoint, StepEnd, StepSystem,
 };
 use metachron_contact::solve::{Block, Side};
-use metachron_contact::{AnchorSpring, StepContext};
+use metachron_contact::{AnchorSpring, StepContext, is_within_motion};
 use metachron_core::{AgentId, Anchor, Archive, ArchiveError, SimSpan, SimTime, StepError, ToolState, archive_values};
 use metachron_geometry::{ContactSide, Place, PlacedShape, ShapePose};
 
@@ -133,7 +132,7 @@ impl ClusterMember for Tool {
 
     fn begin(&mut self, h_s: f64) -> Result<(), StepError> {
         let led = self.lead(h_s);
-        let inside = led.tip.is_finite() && led.tip.abs().max_element() <= REACH_MAX_M;
+        let inside = is_within_motion(led.tip);
         if !(inside && led.velocity.is_finite() && led.rotation.is_finite()) {
             let what = format!("what leads it moves the tip to {}", led.tip);
             return Err(StepError::Diverged { model: "tool", dt_s: h_s, what });

@@ -2,6 +2,7 @@
 
 use crate::trajectory::Keyframe;
 use glam::DVec3;
+use metachron_contact::MOTION_MAX;
 use metachron_core::{AgentId, NumberRange, OutOfRange, Ranges, unit_rotation};
 use metachron_geometry::ContactTraits;
 
@@ -88,9 +89,7 @@ pub enum ToolError {
     BadNumber(#[from] OutOfRange),
 }
 
-/// The largest coordinate of a tool, metres.
-pub(super) const REACH_MAX_M: f64 = 1e6;
-const COORDINATE: NumberRange = NumberRange::new(-REACH_MAX_M, REACH_MAX_M, "m");
+const COORDINATE: NumberRange = NumberRange::new(-MOTION_MAX, MOTION_MAX, "m");
 /// The times of a script: up to 11 days.
 const TIME: NumberRange = NumberRange::new(0.0, 1e6, "s");
 /// How far jaws are open.

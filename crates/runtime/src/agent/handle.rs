@@ -143,6 +143,7 @@ impl Shared {
             misses: gauges.misses.load(Relaxed),
             lived: span(&gauges.stepped) + span(&gauges.rested),
             lengthened: gauges.lengthened.load(Relaxed),
+            under_resolved: gauges.under_resolved.load(Relaxed),
             dropped: span(&gauges.dropped),
             rested: span(&gauges.rested),
             state: gauges.state(),

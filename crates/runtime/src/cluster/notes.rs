@@ -7,6 +7,7 @@ use super::attachments::held_by_links;
 use super::solve_budget::Solved;
 use super::{AgentRunner, ClusterSeat};
 use crate::records::events::{AgentEvent, EventKind};
+use crate::records::metrics::add;
 use metachron_contact::constraint::FailedAttachment;
 use metachron_contact::member::Partner;
 use metachron_contact::step::{ClusterReport, ClusterStepper, PairTotal, StepDoubling};
@@ -107,6 +108,14 @@ impl AgentRunner {
             seat.work = stepper.work_of(me);
             let done = &actor.shared.gauges.work;
             done.set(done.get() + seat.work);
+            let times = stepper.strain_left(me);
+            let began = times > 0.0 && !seat.under_resolved;
+            seat.under_resolved = times > 0.0;
+            add(&actor.shared.gauges.under_resolved, u64::from(times > 0.0));
+            if began {
+                let kind = EventKind::UnderResolved(times);
+                actor.shared.streams.event(&AgentEvent { at: actor.pace.time() + dt, kind });
+            }
             place += 1;
         });
     }

@@ -4,7 +4,7 @@
 //! takes; rotations, and motors, which have joints' own bounds ([`metachron_contact::joint::Motor::check`]).
 
 use glam::DVec3;
-use metachron_contact::{AnchorForce, AnchorSpring, Carving, MOTION_MAX};
+use metachron_contact::{AnchorForce, AnchorSpring, Carving, MOTION_MAX, SetMotion};
 use metachron_core::{Anchor, Body};
 
 /// A number of a command or a state that is beyond its bound; the agent stays as it is.
@@ -83,6 +83,12 @@ pub(super) fn check_spring(spring: &AnchorSpring) -> Result<(), OutOfBounds> {
     VELOCITY.check_axes(spring.target_velocity)?;
     STIFFNESS.check(spring.stiffness_n_m)?;
     DAMPING.check(spring.damping_n_s_m)
+}
+
+pub(super) fn check_motion(motion: &SetMotion) -> Result<(), OutOfBounds> {
+    let SetMotion { position_m, velocity_m_s, spin_rad_s, .. } = *motion;
+    let vectors = [(POSITION, position_m), (VELOCITY, velocity_m_s), (SPIN, spin_rad_s)];
+    vectors.into_iter().try_for_each(|(bound, vector)| vector.map_or(Ok(()), |vector| bound.check_axes(vector)))
 }
 
 pub(super) fn check_carving(carving: &Carving) -> Result<(), OutOfBounds> {

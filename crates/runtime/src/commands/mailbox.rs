@@ -183,7 +183,7 @@ impl Mailbox {
     /// # Errors
     /// [`SendError::BadNumber`], [`SendError::OutOfBounds`] and [`SendError::TooMany`]; nothing is delivered then.
     pub fn send(&self, command: Command) -> Result<(), SendError> {
-        check(&command)?;
+        command.check()?;
         if key(&command).is_some_and(|key| key >= KEYS) {
             return Err(SendError::TooMany);
         }
@@ -341,31 +341,35 @@ fn key(command: &Command) -> Option<u32> {
     }
 }
 
-/// Whether the numbers of a command are in their ranges.
-///
-/// # Errors
-/// The range that was missed.
-fn check(command: &Command) -> Result<(), SendError> {
-    let wanted = |is_good: bool, wanted| if is_good { Ok(()) } else { Err(SendError::BadNumber(wanted)) };
-    match command {
-        Command::Pose(Keyed { what, .. }) => {
-            what.as_ref().map_or(Ok(()), PoseGoal::check).map_err(SendError::BadNumber)
-        }
-        Command::SetMotion(motion) => motion.check().map_err(SendError::BadNumber),
-        Command::SetDt(_) | Command::Wake => Ok(()),
-        Command::Retune(resolution) => wanted(resolution.eps_m.is_finite(), "a resolution must be finite"),
-        Command::SetPressure(pressure_pa) => Ok(bounds::check_pressure(*pressure_pa)?),
-        Command::Spring(Keyed { what, .. }) => Ok(what.as_ref().map_or(Ok(()), bounds::check_spring)?),
-        Command::Force(Keyed { what, .. }) => Ok(what.as_ref().map_or(Ok(()), bounds::check_force)?),
-        Command::Impulse(impulse) => Ok(bounds::check_impulse(impulse)?),
-        Command::Motor(Keyed { what, .. }) => {
-            let motor = what.as_ref().and_then(|set| set.motor);
-            let sound = "a motor's goal must be at most 1e9 in magnitude, its stiffness and damping not negative, its effort above zero";
-            wanted(motor.is_none_or(|motor| motor.check().is_ok()), sound)
-        }
-        Command::Carve(carving) => {
-            wanted(carving.radius_m > 0.0, "the radius of a carved region must be above zero")?;
-            Ok(bounds::check_carving(carving)?)
+impl Command {
+    /// Whether the numbers of a command are in their ranges.
+    ///
+    /// # Errors
+    /// [`SendError::BadNumber`] and [`SendError::OutOfBounds`].
+    pub fn check(&self) -> Result<(), SendError> {
+        let wanted = |is_good: bool, wanted| if is_good { Ok(()) } else { Err(SendError::BadNumber(wanted)) };
+        let moves = |motion: &SetMotion| {
+            bounds::check_motion(motion)?;
+            wanted(motion.is_sound(), "a rotation must be a quaternion that is finite and not zero")
+        };
+        match self {
+            Command::Pose(Keyed { what, .. }) => what.as_ref().map_or(Ok(()), |goal| moves(&goal.motion())),
+            Command::SetMotion(motion) => moves(motion),
+            Command::SetDt(_) | Command::Wake => Ok(()),
+            Command::Retune(resolution) => wanted(resolution.eps_m.is_finite(), "a resolution must be finite"),
+            Command::SetPressure(pressure_pa) => Ok(bounds::check_pressure(*pressure_pa)?),
+            Command::Spring(Keyed { what, .. }) => Ok(what.as_ref().map_or(Ok(()), bounds::check_spring)?),
+            Command::Force(Keyed { what, .. }) => Ok(what.as_ref().map_or(Ok(()), bounds::check_force)?),
+            Command::Impulse(impulse) => Ok(bounds::check_impulse(impulse)?),
+            Command::Motor(Keyed { what, .. }) => {
+                let motor = what.as_ref().and_then(|set| set.motor);
+                let sound = "a motor's goal must be at most 1e9 in magnitude, its stiffness and damping not negative, its effort above zero";
+                wanted(motor.is_none_or(|motor| motor.check().is_ok()), sound)
+            }
+            Command::Carve(carving) => {
+                wanted(carving.radius_m > 0.0, "the radius of a carved region must be above zero")?;
+                Ok(bounds::check_carving(carving)?)
+            }
         }
     }
 }

@@ -46,6 +46,8 @@ pub enum EventKind {
     AttachmentGave,
     /// It could not keep its rate, and gave up time.
     RateMissed,
+    /// Its motion asked for so many times as many steps as it made, more than a step may be divided into, and had not in the step before.
+    UnderResolved(f64),
     /// Cells of it were removed.
     Carved(Removed),
     /// The run went back to a state that was saved; later events happen from the time of that on. Its contacts there
@@ -98,6 +100,10 @@ fn words(event: &AgentEvent) -> [u64; WORDS] {
         EventKind::RateMissed => (8, None),
         EventKind::Rewound => (12, None),
         EventKind::Stalled => (13, None),
+        EventKind::UnderResolved(times) => {
+            (words[1], words[2]) = (14, times.to_bits());
+            return words;
+        }
         EventKind::Carved(Removed { cells, triangles, mass_kg, momentum }) => {
             words[1] = 11 | u64::from(cells) << 32;
             words[2] = u64::from(triangles.cast_unsigned());
@@ -137,6 +143,7 @@ fn event(words: &[u64; WORDS]) -> Option<AgentEvent> {
         9 => EventKind::ContactGrew(contact),
         10 => EventKind::Gone,
         13 => EventKind::Stalled,
+        14 => EventKind::UnderResolved(f64::from_bits(words[2])),
         11 => EventKind::Carved(Removed {
             cells: id,
             triangles: (words[2] as u32).cast_signed(),
@@ -170,6 +177,7 @@ mod tests {
             EventKind::Gone,
             EventKind::Rewound,
             EventKind::Stalled,
+            EventKind::UnderResolved(1e5),
             EventKind::Carved(Removed { cells: 10, triangles: -24, mass_kg: 0.25, momentum: DVec3::NEG_Y }),
         ]
     }

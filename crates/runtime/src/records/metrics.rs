@@ -71,6 +71,8 @@ pub struct AgentStats {
     pub lived: SimSpan,
     /// Steps of these that were longer than the step asked of it then.
     pub lengthened: u64,
+    /// Steps of its cluster so far in which its motion asked for more division than a step may have (docs/theory/clusters.md, section 9).
+    pub under_resolved: u64,
     /// Simulated time dropped because it could not be made up.
     pub dropped: SimSpan,
     /// Simulated time at rest.
@@ -111,6 +113,7 @@ impl AgentStats {
             misses: 0,
             lived: none,
             lengthened: 0,
+            under_resolved: 0,
             dropped: none,
             rested: none,
             state: AgentState::Gone,
@@ -151,6 +154,7 @@ pub(crate) struct Metrics {
     pub steps: AtomicU64,
     pub misses: AtomicU64,
     pub lengthened: AtomicU64,
+    pub under_resolved: AtomicU64,
     /// The sum of its steps, nanoseconds.
     pub stepped: AtomicU64,
     pub dt: AtomicU64,
@@ -176,7 +180,7 @@ pub(crate) struct Metrics {
 /// The part of [`Metrics`] that a checkpoint has.
 #[derive(Debug, Clone, Default, serde::Serialize, serde::Deserialize)]
 pub(crate) struct MetricsValues {
-    counts: [u64; 7],
+    counts: [u64; 8],
     gauges: [f64; 4],
     state: u8,
     reason: Option<String>,
@@ -278,9 +282,9 @@ impl Metrics {
         self.state.store(values.state, Relaxed);
     }
 
-    const fn counts(&self) -> [&AtomicU64; 7] {
-        let Self { steps, misses, lengthened, stepped, dt, dropped, rested, .. } = self;
-        [steps, misses, lengthened, stepped, dt, dropped, rested]
+    const fn counts(&self) -> [&AtomicU64; 8] {
+        let Self { steps, misses, lengthened, under_resolved, stepped, dt, dropped, rested, .. } = self;
+        [steps, misses, lengthened, under_resolved, stepped, dt, dropped, rested]
     }
 
     const fn gauges(&self) -> [&Gauge; 4] {
@@ -420,7 +424,7 @@ impl MetricsWriter {
 }
 
 /// Adds to a count that no other thread writes: an atomic addition would cost more.
-fn add(count: &AtomicU64, more: u64) {
+pub(crate) fn add(count: &AtomicU64, more: u64) {
     count.store(count.load(Relaxed) + more, Relaxed);
 }
 

@@ -122,6 +122,9 @@ pub struct AgentReport {
     /// Steps, of `steps`, that were longer than was asked for then, by its rate or by control within the range that the
     /// scene allows: steps of an agent that is late are, by up to 2.5 times near others.
     pub lengthened: u64,
+    /// Steps of its cluster in which its motion asked for more division than a step may have; `None` where there were none.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub under_resolved: Option<u64>,
     /// Simulated milliseconds that could not be made up, ≥ 0.
     pub dropped_ms: f64,
     /// Simulated milliseconds at rest.

@@ -50,6 +50,9 @@ pub enum Happening {
     AttachmentGave,
     /// It could not keep its rate, and gave up time.
     RateMissed,
+    /// It moves too fast for its steps, and did not in the step before: its motion asked for so many times as many, more than a step may be
+    /// divided into (`docs/theory/clusters.md`, section 9).
+    UnderResolved(f64),
     /// Cells of it were removed.
     Carved(Removed),
     /// The world went back to a checkpoint ([`World::restore`]), in which the object is: later events happen from its
@@ -74,6 +77,7 @@ impl Happening {
             Self::Left => "left",
             Self::AttachmentGave => "attachment_gave",
             Self::RateMissed => "rate_missed",
+            Self::UnderResolved(_) => "under_resolved",
             Self::Carved(_) => "carved",
             Self::Rewound => "rewound",
         }
@@ -100,6 +104,7 @@ impl fmt::Display for Event {
             Happening::Left => f.write_str("leaves its cluster"),
             Happening::AttachmentGave => f.write_str("has an attachment that gave"),
             Happening::RateMissed => f.write_str("misses its rate"),
+            Happening::UnderResolved(times) => write!(f, "moves too fast for its steps, by {times:.1} times"),
             Happening::Carved(removed) => write!(f, "has lost {} cells, {:.3} kg", removed.cells, removed.mass_kg),
             Happening::Rewound => f.write_str("is back at a checkpoint"),
         }
@@ -344,6 +349,7 @@ fn happening(tag: WorldTag, event: &AgentEvent) -> Happening {
         EventKind::Left => Happening::Left,
         EventKind::AttachmentGave => Happening::AttachmentGave,
         EventKind::RateMissed => Happening::RateMissed,
+        EventKind::UnderResolved(times) => Happening::UnderResolved(times),
         EventKind::Carved(removed) => Happening::Carved(removed),
         EventKind::Rewound => Happening::Rewound,
         _ => Happening::Rests,

@@ -225,8 +225,7 @@ impl World {
             .map(|(id, reached)| (id, tree.bodies[&id].motion_to(reached.frame)))
             .collect();
         for (id, motion) in &moves {
-            let wrong = |reason: &str| self.refused(*id, reason);
-            motion.check().map_err(wrong)?;
+            Command::SetMotion(*motion).check().map_err(|error| self.refused(*id, &error.to_string()))?;
         }
         moves.into_iter().try_for_each(|(id, motion)| self.command(self.object_of(id)?, Command::SetMotion(motion)))
     }

@@ -101,9 +101,15 @@ fn a_pose_out_of_range_is_refused_with_what_is_wrong() {
     let plate = world.object("plate").unwrap();
     let (place, turn) = (DVec3::Z, DQuat::IDENTITY);
     for (pose, wanted) in [
-        (Command::pose(DVec3::X * 2e6, turn), "a position must be finite and within 1e6 m"),
-        (Command::pose(place, turn).moving(DVec3::X * f64::INFINITY, DVec3::ZERO), "a velocity must be finite"),
-        (Command::pose(place, turn).moving(DVec3::ZERO, DVec3::X * 1e200), "a spin must be finite, at most 1e6 rad/s"),
+        (Command::pose(DVec3::X * 2e6, turn), "the position is 2e6 m; expected a finite number from -1e6 to 1e6 m"),
+        (
+            Command::pose(place, turn).moving(DVec3::X * f64::INFINITY, DVec3::ZERO),
+            "the velocity is inf m/s; expected a finite number",
+        ),
+        (
+            Command::pose(place, turn).moving(DVec3::ZERO, DVec3::X * 1e200),
+            "the spin is 1e200 rad/s; expected a finite number from -1e6 to 1e6 rad/s",
+        ),
         (
             Command::pose(place, DQuat::from_xyzw(0.0, 0.0, 0.0, 0.0)),
             "a rotation must be a quaternion that is finite and not zero",

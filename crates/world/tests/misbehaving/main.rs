@@ -1,10 +1,11 @@
 //! Faults of a user's own model, in each of its calls: it is parked and an event says so, all others step on as they
-//! would have, and the world takes checkpoints, goes back, and lets objects join and leave.
+//! would have, and the world takes checkpoints, goes back, and lets objects join and leave. And loads that no step can follow.
 
 mod coupled;
 mod lockstep_stalls;
 mod rogue;
 mod stalls;
+mod step_cost;
 
 use glam::DVec3;
 use metachron_core::{Body, SimSpan};
