@@ -12,6 +12,7 @@ use crate::constraint::geometric_stiffness::Tie;
 use crate::constraint::{ConstraintRows, End, FineStep, Frame, Pull, RowOwner, Slides};
 use crate::detect::ClusterScene;
 use crate::joint::{Joint, JointKind, Motor, MotorGoal};
+use crate::lists::reset;
 use crate::member::memory::Partner;
 use crate::member::participant::{place_of, relative, velocity};
 use crate::member::{MaterialPoint, Participant, Pose};
@@ -39,6 +40,8 @@ pub(crate) struct Joints {
     pub missed_m: f64,
     held: Vec<Held>,
     parts: Vec<Part>,
+    /// Where members that joints hold will be by the velocities that rows were aimed with last.
+    poses: Vec<Option<Pose>>,
 }
 
 /// The impulse of a joint's motor and stops in a macro step, along the direction that the joint leaves free.
@@ -285,20 +288,25 @@ impl Joints {
     /// Sets the targets of all rows so that joints hold at the end of the step, to the first order about `velocities` of members.
     /// Returns how well they would hold with these velocities themselves.
     pub fn aim<'v>(
-        &self,
+        &mut self,
         all: &[Participant<'_>],
         constraints: &mut ConstraintRows,
         velocities: impl Fn(usize) -> &'v [DVec3],
         h_s: f64,
     ) -> Aimed {
+        let Self { held, parts, poses, .. } = self;
+        reset(poses, all.len(), None);
+        for member in held.iter().flat_map(|held| [Some(held.of.a), held.of.b]).flatten() {
+            poses[member] = poses[member].or_else(|| all[member].member.pose(velocities(member), h_s));
+        }
         let mut aimed = Aimed::default();
         let mut then = None;
-        for part in &self.parts {
-            let held = &self.held[part.held];
+        for part in &*parts {
+            let held = &held[part.held];
             let off = match then {
                 Some((at, off)) if at == part.held => off,
                 _ => {
-                    let (off, turn_rad) = held.after(all, &velocities, h_s);
+                    let (off, turn_rad) = held.after(poses);
                     aimed.turn_rad = aimed.turn_rad.max(turn_rad);
                     off
                 }
@@ -325,9 +333,9 @@ impl Motor {
 }
 
 impl Held {
-    /// How far it is off once its bodies have moved on for `h_s` seconds, and by how much one of them has turned then.
-    fn after<'v>(&self, all: &[Participant<'_>], velocities: &impl Fn(usize) -> &'v [DVec3], h_s: f64) -> (Off, f64) {
-        let at = |member: usize| all[member].member.pose(velocities(member), h_s);
+    /// How far it is off once its bodies have moved on to `poses` of members, and by how much one of them has turned then.
+    fn after(&self, poses: &[Option<Pose>]) -> (Off, f64) {
+        let at = |member: usize| poses[member];
         let Jointed { joint, a, b, .. } = self.of;
         let (Some(a), Some(b)) = (at(a), b.map_or(Some(Pose::WORLD), at)) else { return (self.now, 0.0) };
         let turned = [&a, &b].into_iter().zip(self.rotations).map(|(then, now)| then.rotation.angle_between(now));

@@ -248,9 +248,13 @@ impl Search {
         let mut find = |reach_m: f64, into: &mut Vec<Touch>| match pair.against {
             Against::Own => {
                 body.rest_shape().into_iter().for_each(|rest| self_touches(&skin, rest, reach_m, scratch, into));
+                reach_m
             }
-            Against::Static { solid, .. } => solid.touches(&skin, reach_m, scratch, into),
-            Against::Member(_) => there.iter().for_each(|there| touches(&skin, there, reach_m, scratch, into)),
+            Against::Static { solid, .. } => {
+                solid.touches(&skin, reach_m, scratch, into);
+                reach_m
+            }
+            Against::Member(_) => there.as_ref().map_or(reach_m, |there| touches(&skin, there, reach_m, scratch, into)),
         };
         let radius_m = if let ShapeKind::Solid(solid) = &skin.form.kind { solid.radius_m } else { f64::INFINITY };
         let solids = TwoSolids::of(skin.view, there.map(|there| there.view), radius_m);
@@ -261,7 +265,7 @@ impl Search {
                 let pair = SolidPair { member: pair.member, partner, solids, known, reach_m };
                 recycled.touches(&pair, into, find);
             }
-            None => find(reach_m, into),
+            None => _ = find(reach_m, into),
         }
         now
     }

@@ -53,12 +53,13 @@ impl Recycled {
         self.touches.clear();
     }
 
-    /// Fills `into` with the places of a pair: the known ones, or else all that `find` gives within the reach passed to it.
+    /// Fills `into` with the places of a pair: the known ones, or else all that `find` gives within the reach passed to it; it returns how
+    /// far at least all others are, metres.
     pub(super) fn touches(
         &mut self,
         pair: &SolidPair<'_>,
         into: &mut Vec<Touch>,
-        find: impl FnOnce(f64, &mut Vec<Touch>),
+        find: impl FnOnce(f64, &mut Vec<Touch>) -> f64,
     ) {
         let SolidPair { member, partner, ref solids, known, reach_m } = *pair;
         if let Some(known) = known.filter(|known| known.last(solids, reach_m)) {
@@ -66,7 +67,9 @@ impl Recycled {
             refill(into, known.touches.iter().map(|touch| solids.placed(touch, moved)));
         } else {
             let further_m = FURTHER * reach_m;
-            find(further_m, into);
+            let clear_m = find(further_m, into);
+            // two that nothing of is near are known to be so until they may have come near
+            let further_m = if into.is_empty() { clear_m.max(further_m) } else { further_m };
             self.touches.extend(into.iter().map(|touch| solids.unplaced(touch)));
             let count = into.len();
             self.searched.push(Searched { member, partner, first: solids.first, reach_m: further_m, count });
@@ -123,9 +126,7 @@ mod tests {
         let (mut into, mut scratch, mut recycled) = (Vec::new(), NarrowPhaseScratch::default(), Recycled::default());
         let solids = TwoSolids::of(first.view, Some(second.view), 0.07).unwrap();
         let pair = SolidPair { member: 0, partner: Partner::Agent(AgentId(5)), solids, known: Some(known), reach_m };
-        recycled.touches(&pair, &mut into, |reach_m, into| {
-            touches(&first, &second, reach_m, &mut scratch, into);
-        });
+        recycled.touches(&pair, &mut into, |reach_m, into| touches(&first, &second, reach_m, &mut scratch, into));
         let searched = recycled.searched.first().copied();
         if let Some(Searched { first, reach_m, .. }) = searched {
             *known = FoundPlaces { first, reach_m, touches: recycled.touches };
@@ -155,6 +156,17 @@ mod tests {
         }
         assert!(places(&mut recycled, at(1.7), [-17e-6, 0.0]).1, "it went by more than a micrometre");
         assert!(!places(&mut recycled, at(1.7), [-17e-6, 0.0]).1);
+    }
+
+    #[test]
+    fn a_pair_that_is_far_is_searched_again_once_it_may_be_near() {
+        let mut known = FoundPlaces::default();
+        let mut at_m = |up_m: f64| places(&mut known, Pose::HERE, [up_m, 0.0]);
+        assert!(at_m(0.02).1, "nothing is known");
+        // at a millimetre's reach two that were 2 cm apart may come nearer by 1.9
+        assert_eq!([0.015, 0.01, 0.0011].map(|up_m| at_m(up_m).1), [false; 3]);
+        let (found, searched) = at_m(0.9e-3);
+        assert!(searched && found.len() >= 4, "{}", found.len());
     }
 
     #[test]

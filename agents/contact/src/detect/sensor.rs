@@ -91,7 +91,7 @@ impl Search {
         if let Some(inside) = point.at(&here) {
             match pair.against {
                 Against::Static { solid, .. } => solid.touches(&inside, 0.0, scratch, into),
-                _ => touches(&inside, &there, 0.0, scratch, into),
+                _ => _ = touches(&inside, &there, 0.0, scratch, into),
             }
         }
         if let Some(inside) = point.at(&there).filter(|_| into.is_empty()) {

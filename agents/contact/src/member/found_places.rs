@@ -25,7 +25,8 @@ pub(crate) struct TwoSolids {
     radius_m: f64,
 }
 
-/// All places of a pair that were nearer than a reach when it was searched last; none before.
+/// All places of a pair that were nearer than a reach when it was searched last; none before. Where there are none the reach is as far as
+/// the two are known to be apart.
 #[derive(Debug, PartialEq, Default, serde::Serialize, serde::Deserialize)]
 pub(crate) struct FoundPlaces {
     /// The pose of the first solid then, in the axes of the second.
@@ -111,6 +112,7 @@ impl Clone for FoundPlaces {
 impl FoundPlaces {
     /// Whether they are all within `reach_m` that there are now.
     pub fn last(&self, solids: &TwoSolids, reach_m: f64) -> bool {
-        reach_m + MOVED_M <= self.reach_m && solids.moved_m(self.first) < MOVED_M
+        let moved_m = solids.moved_m(self.first);
+        reach_m + moved_m.max(MOVED_M) <= self.reach_m && (moved_m < MOVED_M || self.touches.is_empty())
     }
 }

@@ -53,6 +53,7 @@ struct Searches {
 }
 
 /// Every contact with a gap of at most `reach_m` (metres, ≥ 0), by rising keys; the previous contents of `into` are dropped.
+/// Returns how far at least all that was left out is, metres: where nothing was found, a bound of the distance of the two.
 ///
 /// Nothing is allocated once the numbers of nodes and contacts settle.
 /// Forms without a shape and places that are not finite touch nothing.
@@ -62,28 +63,31 @@ pub fn touches(
     reach_m: f64,
     scratch: &mut NarrowPhaseScratch,
     into: &mut Vec<Touch>,
-) {
+) -> f64 {
     into.clear();
     let NarrowPhaseScratch { known, searches, .. } = scratch;
     known.prepare(a, b);
     let (first, second) = (Pieces::of(a, known), Pieces::of(b, known));
+    let mut clear_m = f64::INFINITY;
     for (i, piece) in first.iter() {
         for (j, other) in second.iter() {
-            searches.touches([(i, &piece), (j, &other)], reach_m, into);
+            clear_m = clear_m.min(searches.touches([(i, &piece), (j, &other)], reach_m, into));
         }
     }
     finish(into);
+    clear_m
 }
 
 impl Searches {
-    /// Adds every place within `reach_m` of two pieces, given with their numbers.
-    fn touches(&mut self, pieces: [(usize, &Piece<'_>); 2], reach_m: f64, into: &mut Vec<Touch>) {
+    /// Adds every place within `reach_m` of two pieces, given with their numbers. Returns how far at least all others are, metres.
+    fn touches(&mut self, pieces: [(usize, &Piece<'_>); 2], reach_m: f64, into: &mut Vec<Touch>) -> f64 {
         let Self { chains, blocks, surfaces, .. } = self;
         let [(i, piece), (j, other)] = pieces;
-        if !piece.may_touch(other, reach_m) {
-            return;
+        let bounds_m = piece.bounds_apart_m(other);
+        if bounds_m > reach_m || bounds_m.is_nan() {
+            return bounds_m.max(reach_m);
         }
-        let from = into.len();
+        let (from, mut clear_m) = (into.len(), reach_m);
         match (piece, other) {
             (Piece::Strand(a), Piece::Strand(b)) => chains.touches(a, b, reach_m, into),
             (Piece::Strand(a), Piece::Block(b)) => strands::chain_convex::touches(a, b, reach_m, into),
@@ -93,10 +97,10 @@ impl Searches {
             }
             // clipping depends on the order: the larger block is first, whichever agent calls
             (Piece::Block(a), Piece::Block(b)) if a.around.radius_m < b.around.radius_m => {
-                blocks.touches(b, a, reach_m, into);
+                clear_m = blocks.touches(b, a, reach_m, into);
                 into[from..].iter_mut().for_each(|touch| *touch = flipped(*touch));
             }
-            (Piece::Block(a), Piece::Block(b)) => blocks.touches(a, b, reach_m, into),
+            (Piece::Block(a), Piece::Block(b)) => clear_m = blocks.touches(a, b, reach_m, into),
             (Piece::Surface(a), other) => surfaces.touches(a, other, reach_m, into),
             (other, Piece::Surface(b)) => {
                 surfaces.touches(b, other, reach_m, into);
@@ -104,12 +108,14 @@ impl Searches {
             }
         }
         into[from..].iter_mut().for_each(|touch| touch.key.pieces = [i as u8, j as u8]);
+        clear_m
     }
 
     /// The nearest place of two pieces: its normal from the second towards the first, and a gap that is never larger than the true one.
     fn gap(&mut self, piece: &Piece<'_>, other: &Piece<'_>, reach_m: f64) -> Option<(DVec3, f64)> {
         let Self { chains, blocks, .. } = self;
-        if !piece.may_touch(other, reach_m) {
+        let bounds_m = piece.bounds_apart_m(other);
+        if bounds_m > reach_m || bounds_m.is_nan() {
             return None;
         }
         match (piece, other) {

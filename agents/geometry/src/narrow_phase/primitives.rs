@@ -209,26 +209,26 @@ fn strand(nodes: Nodes<'_>) -> Piece<'_> {
 }
 
 impl Piece<'_> {
-    /// Whether the bounds of both come within `reach_m` of each other.
-    pub fn may_touch(&self, other: &Self, reach_m: f64) -> bool {
+    /// How far the bounds of both are apart, metres; below zero where they overlap.
+    pub fn bounds_apart_m(&self, other: &Self) -> f64 {
         match (self, other) {
             (Self::Strand(a), Self::Strand(b)) => {
                 let apart = (b.bounds.low - a.bounds.high).max(a.bounds.low - b.bounds.high).max(DVec3::ZERO).length();
-                apart <= a.widest_m + b.widest_m + reach_m
+                apart - (a.widest_m + b.widest_m)
             }
             (Self::Strand(strand), Self::Block(block)) | (Self::Block(block), Self::Strand(strand)) => {
                 let Aabb { low, high } = strand.bounds;
                 let apart = (low - block.around.centre).max(block.around.centre - high).max(DVec3::ZERO).length();
-                apart <= strand.widest_m + block.around.radius_m + reach_m
+                apart - (strand.widest_m + block.around.radius_m)
             }
             (Self::Block(a), Self::Block(b)) => {
                 let apart = a.around.centre.distance(b.around.centre);
-                apart <= a.around.radius_m + b.around.radius_m + reach_m
+                apart - (a.around.radius_m + b.around.radius_m)
             }
             (Self::Surface(surface), other) | (other, Self::Surface(surface)) => {
                 let (here, there) = (surface.bounds, other.bounds());
                 let apart = (there.low - here.high).max(here.low - there.high).max(DVec3::ZERO).length();
-                apart <= surface.form.radius_m + reach_m
+                apart - surface.form.radius_m
             }
         }
     }

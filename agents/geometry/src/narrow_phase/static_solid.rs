@@ -129,7 +129,7 @@ impl StaticSolid {
                 self.touch_slab(body, reach_m, scratch, into);
                 finish(into);
             }
-            None => touches(body, &self.placed(), reach_m, scratch, into),
+            None => _ = touches(body, &self.placed(), reach_m, scratch, into),
         }
     }
 

@@ -5,7 +5,7 @@
 //! precision and relative to each other.
 
 use super::epa::Hull;
-use super::gjk::{Difference, Part, Separation};
+use super::gjk::{Difference, Part, Parting, Separation};
 use crate::narrow_phase::primitives::Block;
 use crate::narrow_phase::touch_key::{TouchKey, TouchKind};
 use crate::{Place, Touch};
@@ -28,16 +28,22 @@ pub(crate) struct ConvexScratch {
 }
 
 impl ConvexScratch {
-    /// Every place within `reach_m`.
-    pub fn touches(&mut self, a: &Block<'_>, b: &Block<'_>, reach_m: f64, into: &mut Vec<Touch>) {
+    /// Every place within `reach_m`. Returns how far at least all others are, metres.
+    pub fn touches(&mut self, a: &Block<'_>, b: &Block<'_>, reach_m: f64, into: &mut Vec<Touch>) -> f64 {
         let Self { hull, manifold } = self;
         let size_m = a.around.radius_m + b.around.radius_m;
-        each_pair(a, b, reach_m, |first, second| {
-            let Some(apart) = Difference::new(first, second).apart(reach_m, hull) else { return };
-            clip(manifold, first, second, &apart);
-            let facing = Facing { first, second, apart, reach_m, size_m };
-            facing.report(manifold, into);
-        });
+        let mut clear_m = f64::INFINITY;
+        let boxes_m =
+            each_pair(a, b, reach_m, |first, second| match Difference::new(first, second).parting(reach_m, hull) {
+                Parting::Beyond(least_m) => clear_m = clear_m.min(least_m),
+                Parting::Within(apart) => {
+                    clear_m = clear_m.min(reach_m);
+                    clip(manifold, first, second, &apart);
+                    let facing = Facing { first, second, apart, reach_m, size_m };
+                    facing.report(manifold, into);
+                }
+            });
+        clear_m.min(boxes_m)
     }
 
     /// The nearest place: its normal from b towards a, and a gap that is never more than the true one.
@@ -55,17 +61,24 @@ impl ConvexScratch {
     }
 }
 
-/// Visits the pairs of convex parts whose boxes come within `reach_m`.
-fn each_pair(a: &Block<'_>, b: &Block<'_>, reach_m: f64, mut visit: impl FnMut(&Part<'_>, &Part<'_>)) {
+/// Visits the pairs of convex parts whose boxes come within `reach_m`. Returns how far apart at least all others are, metres.
+fn each_pair(a: &Block<'_>, b: &Block<'_>, reach_m: f64, mut visit: impl FnMut(&Part<'_>, &Part<'_>)) -> f64 {
     let loose_m = reach_m.max(0.0) + SINGLE_SHARE * (a.around.radius_m + b.around.radius_m);
+    let mut clear_m = f64::INFINITY;
     for first in parts(a) {
         let own = first.shape.compute_local_aabb().loosened(loose_m as f32);
         for second in parts(b) {
-            if own.intersects(&second.shape.compute_aabb(&relative(&first, &second))) {
+            let other = second.shape.compute_aabb(&relative(&first, &second));
+            if own.intersects(&other) {
                 visit(&first, &second);
+            } else {
+                // the boxes were loosened by as much as rounding may be, too
+                let apart = (other.mins - own.maxs).max(own.mins - other.maxs).max_element();
+                clear_m = clear_m.min(reach_m.max(0.0) + f64::from(apart.max(0.0)));
             }
         }
     }
+    clear_m
 }
 
 /// A pose in single precision.

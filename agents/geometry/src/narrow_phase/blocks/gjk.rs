@@ -49,12 +49,22 @@ const ROUNDING: f64 = 1e-15;
 /// Closer than this share of the sizes, parts count as overlapping: the vector between them has no direction any more.
 const TOUCHING_SHARE: f64 = 1e-12;
 
+/// Beyond the reach a search goes on until its bound of the distance is this share of it: a pair known to be far is not searched for long.
+const FAR_SHARE: f64 = 0.7;
+
 /// The result of a search.
 pub(crate) enum Found {
     Apart(Separation),
-    /// They are farther than the reach, or not finite.
-    Far,
+    /// They are farther than the reach, by at least so much apart, metres; or not finite, and at least 0 m apart.
+    Far(f64),
     Overlap,
+}
+
+/// How two parts lie to each other where the distance beyond a reach counts too.
+pub(crate) enum Parting {
+    Within(Separation),
+    /// At least so far apart, metres.
+    Beyond(f64),
 }
 
 /// The difference of two parts: it holds the origin where they overlap.
@@ -107,8 +117,14 @@ impl Convex for Part<'_> {
             let out = DVec3::new(way.x, 0.0, way.z).normalize_or_zero() * f64::from(round.radius);
             out.with_y(f64::from(round.half_height).copysign(way.y))
         } else if let Some(hull) = self.shape.as_convex_polyhedron() {
-            let far = |best: DVec3, next: DVec3| if next.dot(way) > best.dot(way) { next } else { best };
-            hull.points().iter().map(|p| p.as_dvec3()).reduce(far).unwrap_or_default()
+            let (mut farthest, mut farthest_m) = (DVec3::ZERO, f64::NEG_INFINITY);
+            for corner in hull.points().iter().map(|p| p.as_dvec3()) {
+                let along_m = corner.dot(way);
+                if along_m > farthest_m {
+                    (farthest, farthest_m) = (corner, along_m);
+                }
+            }
+            farthest
         } else {
             self.shape.as_support_map().map_or(DVec3::ZERO, |map| map.local_support_point(way.as_vec3()).as_dvec3())
         };
@@ -133,8 +149,17 @@ impl<'a> Difference<'a> {
     pub fn apart(&self, reach_m: f64, hull: &mut Hull) -> Option<Separation> {
         match self.search(reach_m) {
             Found::Apart(separation) => Some(separation),
-            Found::Far => None,
+            Found::Far(_) => None,
             Found::Overlap => hull.way_out(self),
+        }
+    }
+
+    /// Separation of the parts; farther than `reach_m` apart a bound of how far, to about a third.
+    pub fn parting(&self, reach_m: f64, hull: &mut Hull) -> Parting {
+        match self.seek(reach_m, Some(FAR_SHARE)) {
+            Found::Apart(separation) => Parting::Within(separation),
+            Found::Far(least_m) => Parting::Beyond(least_m),
+            Found::Overlap => hull.way_out(self).map_or(Parting::Beyond(0.0), Parting::Within),
         }
     }
 
@@ -145,6 +170,11 @@ impl<'a> Difference<'a> {
 
     /// The same, also whether the two overlap or are beyond the reach.
     pub fn search(&self, reach_m: f64) -> Found {
+        self.seek(reach_m, None)
+    }
+
+    /// The same; beyond the reach it ends with a bound that is this share of the distance.
+    fn seek(&self, reach_m: f64, far_share: Option<f64>) -> Found {
         let start = self.parts[0].origin() - self.parts[1].origin();
         let mut simplex = Simplex::of(self.support(-start.normalize_or(DVec3::X)));
         let mut best: Option<Separation> = None;
@@ -157,8 +187,8 @@ impl<'a> Difference<'a> {
             let normal = near.way / distance;
             let corner = self.support(-normal);
             let floor_m = corner.way.dot(normal);
-            if floor_m > reach_m {
-                return Found::Far;
+            if floor_m > reach_m && far_share.is_none_or(|share| floor_m >= share * distance) {
+                return Found::Far(floor_m);
             }
             if best.is_none_or(|best| floor_m > best.gap_m) {
                 best = Some(Separation { normal, gap_m: floor_m, on: near.on });
@@ -168,7 +198,10 @@ impl<'a> Difference<'a> {
                 break;
             }
         }
-        best.filter(|best| best.gap_m.is_finite()).map_or(Found::Far, Found::Apart)
+        match best.filter(|best| best.gap_m.is_finite()) {
+            Some(best) if best.gap_m <= reach_m => Found::Apart(best),
+            far => Found::Far(far.map_or(0.0, |far| far.gap_m)),
+        }
     }
 }
 

@@ -88,7 +88,7 @@ impl PartOnTriangle<'_> {
         let difference = Difference::new(part, &rounded);
         let apart = match difference.search(self.reach_m) {
             Found::Apart(apart) => Some(apart),
-            Found::Far => None,
+            Found::Far(_) => None,
             Found::Overlap if self.is_flat() => self.out_of_face(),
             Found::Overlap => hull.way_out(&difference),
         };

@@ -64,6 +64,30 @@ proptest! {
     }
 
     #[test]
+    fn nothing_comes_within_reach_before_a_pair_has_moved_by_the_bound(
+        p in vector(0.3), r in turn(), s in turn(), way in vector(1.0),
+    ) {
+        let (v, reach_m, mut scratch) = (curved((DVec3::ZERO, s)), 1e-3, NarrowPhaseScratch::default());
+        let cast = cast();
+        for first in &cast {
+            for second in &cast {
+                let mut at = |p: DVec3| {
+                    let (u, mut found) = (curved((p, r)), Vec::new());
+                    let (a, b) = (place(first, (p, r), &u), place(second, (DVec3::ZERO, s), &v));
+                    let clear_m = touches(&a, &b, reach_m, &mut scratch, &mut found);
+                    (clear_m, found.is_empty())
+                };
+                let (clear_m, is_far) = at(p);
+                prop_assert!(clear_m >= reach_m, "{}", clear_m);
+                for way in [way, -p].into_iter().filter(|_| is_far) {
+                    let moved = p + way.normalize_or_zero() * (0.999 * (clear_m - reach_m));
+                    prop_assert!(at(moved).1, "{} m towards {}", clear_m, way);
+                }
+            }
+        }
+    }
+
+    #[test]
     fn contact_keys_survive_small_motions(p in vector(0.03), r in turn(), s in turn(), shift in vector(1e-7)) {
         let (u, v, w) = (curved((p, r)), curved((DVec3::ZERO, s)), curved((p + shift, r)));
         let cast = cast();
