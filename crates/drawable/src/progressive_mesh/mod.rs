@@ -7,9 +7,13 @@
 //! Vertices and triangles are then sorted in reverse order of removal: the mesh of a count is a prefix of both lists, whose removed corners
 //! are replaced by following their substitutes. The substitute of each vertex is the only data stored in addition to a plain indexed mesh:
 //! the birth of a triangle follows from them.
+//!
+//! The last part of several that are left alone is a shard of the thing; where the box around all is nearer, that is the coarsest mesh
+//! instead ([`hull_box`]).
 
 mod build;
 mod error;
+mod hull_box;
 mod quadric;
 mod topology;
 mod weld;
@@ -33,7 +37,8 @@ pub struct ProgressiveMesh {
     /// The vertex that replaces each one, of lower index. A vertex that is never removed refers to itself, and so does the last one of a
     /// part that vanishes entirely.
     substitutes: Vec<u32>,
-    /// Triangles of the coarsest cut.
+    coarsest: Cut,
+    /// Fewer triangles than these are drawn as the coarsest cut.
     least: u32,
     /// (triangles, error in metres), from coarse to fine.
     errors: Vec<(u32, f32)>,
@@ -57,10 +62,7 @@ impl ProgressiveMesh {
     /// [`ProgressiveMeshError`] where a triangle refers to a missing vertex, a position is not finite or no triangle is left.
     pub fn new(mesh: &PrimitiveMesh) -> Result<Self, ProgressiveMeshError> {
         let welded = weld::Welded::new(mesh)?;
-        let mut tom = build::ordered(welded);
-        tom.least = tom.triangles.partition_point(|t| tom.birth(*t) == 0) as u32;
-        tom.errors = error::table(&tom);
-        Ok(tom)
+        Ok(hull_box::ordered(&welded).unwrap_or_else(|| build::ordered(&welded, &[])))
     }
 
     /// The same mesh without its finest cuts: its full mesh is the cut of at most `triangles`, and errors are relative to that.
@@ -79,7 +81,8 @@ impl ProgressiveMesh {
     /// The same mesh without the cuts that are coarser than the one of at most `triangles`.
     #[must_use]
     pub fn no_coarser(mut self, triangles: u32) -> Self {
-        self.least = self.cut(triangles).triangles;
+        self.coarsest = self.cut(triangles);
+        self.least = self.least.max(self.coarsest.triangles);
         self
     }
 
@@ -92,15 +95,19 @@ impl ProgressiveMesh {
     /// Triangles of the coarsest and of the full mesh.
     #[must_use]
     pub fn range(&self) -> (u32, u32) {
-        (self.least, self.triangles.len() as u32)
+        (self.coarsest.triangles, self.triangles.len() as u32)
     }
 
     /// The finest mesh of at most `triangles`; the coarsest where that has more.
     ///
-    /// A vertex usually removes two triangles with it, so the cut has at most a few fewer than requested.
+    /// A vertex usually removes two triangles with it, so the cut has at most a few fewer than requested; where the coarsest is a box, also
+    /// the next finer ones that are further from the full mesh are left out.
     #[must_use]
     pub fn cut(&self, triangles: u32) -> Cut {
-        let asked = triangles.max(self.least) as usize;
+        if triangles < self.least {
+            return self.coarsest;
+        }
+        let asked = triangles as usize;
         let Some(next) = self.triangles.get(asked) else {
             return Cut { vertices: self.vertices.len() as u32, triangles: self.triangles.len() as u32 };
         };
@@ -141,7 +148,7 @@ impl ProgressiveMesh {
     /// The error never decreases as the count decreases.
     #[must_use]
     pub fn error_m(&self, triangles: u32) -> f64 {
-        error::at(&self.errors, triangles)
+        error::at(&self.errors, if triangles < self.least { self.coarsest.triangles } else { triangles })
     }
 
     /// Bytes of its storage, and those of a plain indexed mesh of the same vertices and triangles.
