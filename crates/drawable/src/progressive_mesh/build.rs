@@ -5,8 +5,8 @@
 
 use super::quadric::Quadric;
 use super::topology::{HUB, Surface, Verdict, direction};
-use super::weld::Welded;
-use super::{Cut, ProgressiveMesh, SAME_PLACE, error};
+use super::weld::{SAME_PLACE, Welded};
+use super::{Cut, ProgressiveMesh, error};
 use glam::{DVec3, Vec3};
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;

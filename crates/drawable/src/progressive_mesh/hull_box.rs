@@ -1,40 +1,24 @@
 //! The box around a mesh of several parts as its coarsest cut.
 //!
-//! In: a welded mesh. Out: a [`ProgressiveMesh`] that ends in a box, where one part has corners for it and the box is nearer than that part.
+//! In: a welded mesh, then its order. Out: the corners to keep, then the order with a box before it.
 //! Never here: meshes of one part.
 //! The eight outermost corners of the largest part are never removed, so that it is the last and has twelve triangles; the substitutes of
 //! its corners are those of the box.
 
-use super::build;
-use super::error;
-use super::weld::Welded;
-use super::{ProgressiveMesh, SAME_PLACE};
+use super::weld::{SAME_PLACE, Welded};
 use glam::{BVec3, Vec3};
 use metachron_geometry::PrimitiveVertex;
 use std::collections::BTreeMap;
 
 /// Triangles of a box.
-const TRIANGLES: u32 = 12;
+pub(super) const TRIANGLES: u32 = 12;
 /// Most triangles of the first cut beyond the box: further ones are of many things side by side, of which a box says less than those that
 /// are left.
-const NEXT_MOST: u32 = 64;
-
-/// The order of a mesh of several parts; `None` where its coarsest cut would be no box, or one that is further than the part itself.
-pub(super) fn ordered(welded: &Welded) -> Option<ProgressiveMesh> {
-    let mut tom = build::ordered(welded, &corners(welded)?);
-    let of_part = error::distance(&tom, TRIANGLES);
-    prepend_box(&mut tom)?;
-    tom.least = TRIANGLES + 1;
-    let of_box = error::distance(&tom, TRIANGLES);
-    let finer = tom.errors.iter().find(|row| f64::from(row.1) < of_box);
-    tom.least = finer.map_or(tom.triangles.len() as u32, |row| row.0);
-    tom.errors = error::table(&tom);
-    (of_box < of_part && tom.least <= NEXT_MOST).then_some(tom)
-}
+pub(super) const NEXT_MOST: u32 = 64;
 
 /// The outermost positions of the largest part in the eight directions of its diagonals; `None` for a mesh of one part, and for a part that
 /// has fewer.
-fn corners(welded: &Welded) -> Option<[u32; 8]> {
+pub(super) fn corners(welded: &Welded) -> Option<[u32; 8]> {
     let parts = parts(welded);
     let bounds = |part: &Vec<u32>| around(part.iter().map(|&p| welded.places[p as usize]));
     let size = |part: &Vec<u32>| bounds(part).map_or(0.0, |[low, high]| low.distance(high));
@@ -88,10 +72,15 @@ fn around(points: impl Iterator<Item = Vec3>) -> Option<[Vec3; 2]> {
     points.map(|p| [p, p]).reduce(|[low, high], [p, _]| [low.min(p), high.max(p)])
 }
 
-/// Puts the corners of the box around all vertices before those of the last part; `None` where that part is no box in the same way.
-fn prepend_box(tom: &mut ProgressiveMesh) -> Option<()> {
-    let mut faces = Vec::with_capacity(TRIANGLES as usize);
-    tom.resolve(tom.coarsest, &mut faces);
+/// The lists of an ordered mesh.
+pub(super) struct Order<'a> {
+    pub vertices: &'a mut Vec<PrimitiveVertex>,
+    pub triangles: &'a mut [[u32; 3]],
+    pub substitutes: &'a mut Vec<u32>,
+}
+
+/// Puts the corners of the box around all vertices before those of the last part, which has the triangles `faces`; gives their number, `None` where that part is no box in the same way.
+pub(super) fn prepend(tom: Order<'_>, faces: &[[u32; 3]]) -> Option<u32> {
     // the last vertices of parts that vanished follow those of the kept one
     let is_own = |v: &&PrimitiveVertex| faces.iter().flatten().any(|&i| tom.vertices[i as usize].core == v.core);
     let part: Vec<PrimitiveVertex> = tom.vertices.iter().take_while(is_own).copied().collect();
@@ -110,9 +99,8 @@ fn prepend_box(tom: &mut ProgressiveMesh) -> Option<()> {
     let own = |i: u32| i | tom.substitutes[i as usize] & SAME_PLACE;
     let boxed: Vec<u32> = (0..vertices).map(own).collect();
     let later = tom.substitutes[vertices as usize..].iter().map(|s| s + vertices);
-    tom.substitutes = boxed.iter().chain(&boxed).copied().chain(later).collect();
+    *tom.substitutes = boxed.iter().chain(&boxed).copied().chain(later).collect();
     tom.vertices.splice(0..0, corners);
-    tom.coarsest.vertices = vertices;
     tom.triangles.iter_mut().for_each(|t| *t = t.map(|i| i + vertices));
-    Some(())
+    Some(vertices)
 }

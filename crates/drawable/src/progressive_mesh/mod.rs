@@ -23,9 +23,7 @@ mod tests;
 
 use metachron_geometry::{PrimitiveMesh, PrimitiveVertex};
 pub use weld::ProgressiveMeshError;
-
-/// Flag in the substitute of a vertex at the same position as the one before it (a crease).
-const SAME_PLACE: u32 = 1 << 31;
+use weld::SAME_PLACE;
 
 /// A mesh of any number of triangles.
 #[derive(Debug, Clone, PartialEq)]
@@ -62,7 +60,24 @@ impl ProgressiveMesh {
     /// [`ProgressiveMeshError`] where a triangle refers to a missing vertex, a position is not finite or no triangle is left.
     pub fn new(mesh: &PrimitiveMesh) -> Result<Self, ProgressiveMeshError> {
         let welded = weld::Welded::new(mesh)?;
-        Ok(hull_box::ordered(&welded).unwrap_or_else(|| build::ordered(&welded, &[])))
+        Ok(Self::boxed(&welded).unwrap_or_else(|| build::ordered(&welded, &[])))
+    }
+
+    /// The order of a mesh of several parts that ends in a box; `None` where its coarsest cut would be none, or one that is further than the
+    /// last part itself.
+    fn boxed(welded: &weld::Welded) -> Option<Self> {
+        let mut tom = build::ordered(welded, &hull_box::corners(welded)?);
+        let of_part = error::distance(&tom, hull_box::TRIANGLES);
+        let mut faces = Vec::with_capacity(hull_box::TRIANGLES as usize);
+        tom.resolve(tom.coarsest, &mut faces);
+        let Self { vertices, triangles, substitutes, .. } = &mut tom;
+        tom.coarsest.vertices = hull_box::prepend(hull_box::Order { vertices, triangles, substitutes }, &faces)?;
+        tom.least = hull_box::TRIANGLES + 1;
+        let of_box = error::distance(&tom, hull_box::TRIANGLES);
+        let finer = tom.errors.iter().find(|row| f64::from(row.1) < of_box);
+        tom.least = finer.map_or(tom.triangles.len() as u32, |row| row.0);
+        tom.errors = error::table(&tom);
+        (of_box < of_part && tom.least <= hull_box::NEXT_MOST).then_some(tom)
     }
 
     /// The same mesh without its finest cuts: its full mesh is the cut of at most `triangles`, and errors are relative to that.
