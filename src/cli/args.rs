@@ -7,8 +7,8 @@ use clap::{Args, Parser, Subcommand, ValueHint};
 use metachron_console::values::{CommonArgs, LimitArgs, assignment, seconds, size, target_fps};
 #[cfg(feature = "lab")]
 use metachron_lab::args::{
-    BENCH_EXAMPLES, BenchArgs, CHART_EXAMPLES, ChartArgs, DOCS_EXAMPLES, DocsArgs, FIT_EXAMPLES, FitArgs,
-    TUNE_EXAMPLES, TuneArgs,
+    BENCH_EXAMPLES, BenchArgs, CHART_EXAMPLES, COMPARE_EXAMPLES, ChartArgs, CompareArgs, DOCS_EXAMPLES, DocsArgs,
+    FIT_EXAMPLES, FitArgs, TUNE_EXAMPLES, TuneArgs,
 };
 use metachron_scene::papers::Paper;
 use metachron_session::report::Goal;
@@ -117,6 +117,10 @@ pub enum Command {
     #[cfg(feature = "lab")]
     #[command(after_help = BENCH_EXAMPLES)]
     Bench(BenchArgs),
+    /// Write a page on which people say which of two films is better, or evaluate their votes
+    #[cfg(feature = "lab")]
+    #[command(after_help = COMPARE_EXAMPLES)]
+    Compare(CompareArgs),
     /// Compare documents with what their commands print, or print it into them
     #[cfg(feature = "lab")]
     #[command(after_help = DOCS_EXAMPLES)]

@@ -59,6 +59,8 @@ fn dispatch(cli: Cli, matches: &clap::ArgMatches) -> anyhow::Result<Exit> {
         #[cfg(feature = "lab")]
         Command::Bench(args) => metachron_lab::bench(&args),
         #[cfg(feature = "lab")]
+        Command::Compare(args) => metachron_lab::compare(&args),
+        #[cfg(feature = "lab")]
         Command::Docs(args) => metachron_lab::docs(&args),
         #[cfg(feature = "lab")]
         Command::Tune(args) => metachron_lab::tune(&args),

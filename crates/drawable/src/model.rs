@@ -71,7 +71,7 @@ impl Model {
     #[must_use]
     pub fn extent(&self) -> Extent {
         let mesh = self.mesh(u32::MAX);
-        let places = || mesh.vertices.iter().map(|v| v.core.as_dvec3());
+        let places = || mesh.triangles.iter().flatten().map(|&i| mesh.vertices[i as usize].core.as_dvec3());
         let (Some(low), Some(high)) = (places().reduce(DVec3::min), places().reduce(DVec3::max)) else {
             return Extent::default();
         };

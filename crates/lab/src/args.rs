@@ -1,4 +1,4 @@
-//! The arguments of `chart`, `bench`, `docs`, `tune` and `fit`.
+//! The arguments of `chart`, `bench`, `compare`, `docs`, `tune` and `fit`.
 
 use clap::builder::PossibleValuesParser;
 use clap::{Args, ValueHint};
@@ -48,6 +48,14 @@ Examples:
   metachron chart stability --json -q | jq '.experiments[].findings'
 
 Ctrl-C ends a sweep after the rows in progress; run the same command again to continue.";
+
+/// Examples for the help of the command.
+pub const COMPARE_EXAMPLES: &str = "\
+Examples:
+  metachron run domes --headless --policy hierarchical --video with-groups.y4m
+  metachron run domes --headless --policy greedy --video without.y4m
+  metachron compare with-groups.y4m without.y4m        writes comparison.html, and prints how alike they are
+  metachron compare --votes votes.csv more.csv         strengths of the films by the votes that the page saved";
 
 /// Examples for the help of the command.
 pub const DOCS_EXAMPLES: &str = "\
@@ -125,6 +133,20 @@ pub struct FitArgs {
     /// The arguments common to `check`, `tune` and `fit`.
     #[command(flatten)]
     pub common: CommonArgs,
+}
+
+/// `compare`.
+#[derive(Debug, Args)]
+pub struct CompareArgs {
+    /// Films of one size as `run --video` writes them (YUV4MPEG2, 8 bits, 4:2:0), at least two
+    #[arg(required_unless_present = "votes", value_hint = ValueHint::FilePath)]
+    pub films: Vec<PathBuf>,
+    /// The page that shows two of them side by side and asks which is better; it needs no other file
+    #[arg(long, value_name = "FILE", default_value = "comparison.html", value_hint = ValueHint::FilePath)]
+    pub out: PathBuf,
+    /// Evaluate these files of votes, which the page saves, instead
+    #[arg(long, value_name = "FILE", num_args = 1.., conflicts_with_all = ["films", "out"], value_hint = ValueHint::FilePath)]
+    pub votes: Vec<PathBuf>,
 }
 
 /// `docs`.

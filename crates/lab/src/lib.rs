@@ -1,4 +1,4 @@
-//! The laboratory: charts of error, stability and cost, benchmarks, and the commands that tune gains and fit scenes.
+//! The laboratory: charts of error, stability and cost, benchmarks, and the commands that compare films, tune gains and fit scenes.
 //!
 //! In: arguments. Out: CSV, SVG, PNG and JSON files, tables on standard output.
 //! Never here: anything that a running scene needs.
@@ -19,12 +19,14 @@
 pub mod args;
 mod bench;
 mod chart;
+mod compare;
 mod docs;
 mod fit;
 mod tune;
 
 pub use bench::command as bench;
 pub use chart::command as chart;
+pub use compare::command as compare;
 pub use docs::command as docs;
 pub use fit::command as fit;
 pub use tune::command as tune;

@@ -1,12 +1,12 @@
 //! The order in which vertices are removed from a mesh.
 //!
-//! In: a welded mesh. Out: a [`ProgressiveMesh`] without its errors. Never here: cuts.
+//! In: a welded mesh, positions to keep. Out: a [`ProgressiveMesh`]. Never here: cuts.
 //! Each position waits in a heap with its cheapest valid collapse; positions with changed neighbours are evaluated again.
 
 use super::quadric::Quadric;
 use super::topology::{HUB, Surface, Verdict, direction};
-use super::weld::Welded;
-use super::{ProgressiveMesh, SAME_PLACE};
+use super::weld::{SAME_PLACE, Welded};
+use super::{Cut, ProgressiveMesh, error};
 use glam::{DVec3, Vec3};
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
@@ -37,6 +37,8 @@ struct Builder {
     gone: Vec<u32>,
     /// Positions in the order of removal.
     order: Vec<u32>,
+    /// Positions that are never removed.
+    kept: Vec<u32>,
     heap: BinaryHeap<QueuedCollapse>,
     /// Evaluations of each position: a queued collapse of an earlier evaluation is void.
     evaluations: Vec<u32>,
@@ -44,18 +46,23 @@ struct Builder {
     prices: Vec<(f64, u32)>,
 }
 
-/// Computes the order of a mesh.
-pub(super) fn ordered(welded: Welded) -> ProgressiveMesh {
-    let full = welded.triangles.clone();
-    let mut builder = Builder::new(&welded);
+/// Computes the order of a mesh in which the positions `kept` are never removed.
+pub(super) fn ordered(welded: &Welded, kept: &[u32]) -> ProgressiveMesh {
+    let mut builder = Builder::new(welded, kept.to_vec());
     for turn in TURNS {
         builder.collapse_all(turn);
     }
-    builder.sorted(&welded, &full)
+    let mut tom = builder.sorted(welded);
+    tom.least = tom.triangles.partition_point(|t| tom.birth(*t) == 0) as u32;
+    let finer = tom.triangles.get(tom.least as usize);
+    let vertices = finer.map_or(tom.vertices.len() as u32, |t| tom.birth(*t));
+    tom.coarsest = Cut { vertices, triangles: tom.least };
+    tom.errors = error::table(&tom);
+    tom
 }
 
 impl Builder {
-    fn new(welded: &Welded) -> Self {
+    fn new(welded: &Welded, kept: Vec<u32>) -> Self {
         let points: Vec<DVec3> = welded.places.iter().map(|p| p.as_dvec3()).collect();
         let count = points.len();
         let triangles = welded.triangles.iter().map(|t| t.map(|w| welded.place_of[w as usize])).collect();
@@ -70,6 +77,7 @@ impl Builder {
             substitutes: (0..welded.wedges.len() as u32).collect(),
             gone: vec![0; surface.triangles.len()],
             order: Vec::with_capacity(count),
+            kept,
             heap: BinaryHeap::with_capacity(2 * count),
             evaluations: vec![0; count],
             neighbours: Vec::new(),
@@ -101,7 +109,7 @@ impl Builder {
     /// Finds the cheapest valid collapse of `p` and queues it.
     fn queue_cheapest(&mut self, p: u32, turn: f64) {
         self.evaluations[p as usize] += 1;
-        if self.surface.around[p as usize].is_empty() || self.surface.is_hub(p) {
+        if self.surface.around[p as usize].is_empty() || self.surface.is_hub(p) || self.kept.contains(&p) {
             return;
         }
         let mut neighbours = std::mem::take(&mut self.neighbours);
@@ -199,7 +207,7 @@ impl Builder {
     }
 
     /// The finished mesh: vertices and triangles removed last come first.
-    fn sorted(&self, welded: &Welded, full: &[[u32; 3]]) -> ProgressiveMesh {
+    fn sorted(&self, welded: &Welded) -> ProgressiveMesh {
         let mut went = vec![false; self.wedges.len()];
         self.order.iter().for_each(|&p| went[p as usize] = true);
         let stay = (0..self.wedges.len() as u32).filter(|&p| !went[p as usize]);
@@ -211,13 +219,14 @@ impl Builder {
             let later = self.wedges[welded.place_of[old as usize] as usize][0] != old;
             number[self.substitutes[old as usize] as usize] | if later { SAME_PLACE } else { 0 }
         };
-        let mut triangles: Vec<u32> = (0..full.len() as u32).collect();
+        let mut triangles: Vec<u32> = (0..welded.triangles.len() as u32).collect();
         // remaining triangles (0) first, then the last to vanish
         triangles.sort_by_key(|&t| Reverse(self.gone[t as usize].wrapping_sub(1)));
         ProgressiveMesh {
             vertices: wedges.iter().map(|&w| welded.wedges[w as usize]).collect(),
-            triangles: triangles.iter().map(|&t| full[t as usize].map(|w| number[w as usize])).collect(),
+            triangles: triangles.iter().map(|&t| welded.triangles[t as usize].map(|w| number[w as usize])).collect(),
             substitutes: wedges.iter().map(substitute).collect(),
+            coarsest: Cut { vertices: 0, triangles: 0 },
             least: 0,
             errors: Vec::new(),
         }

@@ -48,15 +48,18 @@ pub(super) fn at(table: &[(u32, f32)], triangles: u32) -> f64 {
 }
 
 /// The greatest distance of sampled vertices of the full mesh from a cut, metres.
-fn distance(tom: &ProgressiveMesh, triangles: u32) -> f64 {
+pub(super) fn distance(tom: &ProgressiveMesh, triangles: u32) -> f64 {
     let mut corners = Vec::with_capacity(triangles as usize);
     tom.resolve(tom.cut(triangles), &mut corners);
     let faces: Vec<[DVec3; 3]> =
         corners.iter().map(|t| t.map(|i| tom.vertices()[i as usize].core.as_dvec3())).collect();
     let boxes: Vec<Aabb> = faces.iter().map(|[a, b, c]| around([a.min(*b).min(*c), a.max(*b).max(*c)])).collect();
     let tree = Bvh::from_leaves(BvhBuildStrategy::Binned, &boxes);
-    let stride = tom.vertices().len().div_ceil(SAMPLES);
-    tom.vertices().iter().rev().step_by(stride).map(|v| nearest(&tree, &faces, v.core.as_dvec3())).fold(0.0, f64::max)
+    // corners of a box that is the coarsest cut are not of the full mesh
+    let first = tom.triangles.iter().flatten().min().map_or(0, |&i| i as usize);
+    let own = &tom.vertices()[first..];
+    let stride = own.len().div_ceil(SAMPLES);
+    own.iter().rev().step_by(stride).map(|v| nearest(&tree, &faces, v.core.as_dvec3())).fold(0.0, f64::max)
 }
 
 fn around([low, high]: [DVec3; 2]) -> Aabb {

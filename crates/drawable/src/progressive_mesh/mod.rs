@@ -7,9 +7,13 @@
 //! Vertices and triangles are then sorted in reverse order of removal: the mesh of a count is a prefix of both lists, whose removed corners
 //! are replaced by following their substitutes. The substitute of each vertex is the only data stored in addition to a plain indexed mesh:
 //! the birth of a triangle follows from them.
+//!
+//! The last part of several that are left alone is a shard of the thing; where the box around all is nearer, that is the coarsest mesh
+//! instead ([`hull_box`]).
 
 mod build;
 mod error;
+mod hull_box;
 mod quadric;
 mod topology;
 mod weld;
@@ -19,9 +23,7 @@ mod tests;
 
 use metachron_geometry::{PrimitiveMesh, PrimitiveVertex};
 pub use weld::ProgressiveMeshError;
-
-/// Flag in the substitute of a vertex at the same position as the one before it (a crease).
-const SAME_PLACE: u32 = 1 << 31;
+use weld::SAME_PLACE;
 
 /// A mesh of any number of triangles.
 #[derive(Debug, Clone, PartialEq)]
@@ -33,7 +35,8 @@ pub struct ProgressiveMesh {
     /// The vertex that replaces each one, of lower index. A vertex that is never removed refers to itself, and so does the last one of a
     /// part that vanishes entirely.
     substitutes: Vec<u32>,
-    /// Triangles of the coarsest cut.
+    coarsest: Cut,
+    /// Fewer triangles than these are drawn as the coarsest cut.
     least: u32,
     /// (triangles, error in metres), from coarse to fine.
     errors: Vec<(u32, f32)>,
@@ -57,10 +60,24 @@ impl ProgressiveMesh {
     /// [`ProgressiveMeshError`] where a triangle refers to a missing vertex, a position is not finite or no triangle is left.
     pub fn new(mesh: &PrimitiveMesh) -> Result<Self, ProgressiveMeshError> {
         let welded = weld::Welded::new(mesh)?;
-        let mut tom = build::ordered(welded);
-        tom.least = tom.triangles.partition_point(|t| tom.birth(*t) == 0) as u32;
+        Ok(Self::boxed(&welded).unwrap_or_else(|| build::ordered(&welded, &[])))
+    }
+
+    /// The order of a mesh of several parts that ends in a box; `None` where its coarsest cut would be none, or one that is further than the
+    /// last part itself.
+    fn boxed(welded: &weld::Welded) -> Option<Self> {
+        let mut tom = build::ordered(welded, &hull_box::corners(welded)?);
+        let of_part = error::distance(&tom, hull_box::TRIANGLES);
+        let mut faces = Vec::with_capacity(hull_box::TRIANGLES as usize);
+        tom.resolve(tom.coarsest, &mut faces);
+        let Self { vertices, triangles, substitutes, .. } = &mut tom;
+        tom.coarsest.vertices = hull_box::prepend(hull_box::Order { vertices, triangles, substitutes }, &faces)?;
+        tom.least = hull_box::TRIANGLES + 1;
+        let of_box = error::distance(&tom, hull_box::TRIANGLES);
+        let finer = tom.errors.iter().find(|row| f64::from(row.1) < of_box);
+        tom.least = finer.map_or(tom.triangles.len() as u32, |row| row.0);
         tom.errors = error::table(&tom);
-        Ok(tom)
+        (of_box < of_part && tom.least <= hull_box::NEXT_MOST).then_some(tom)
     }
 
     /// The same mesh without its finest cuts: its full mesh is the cut of at most `triangles`, and errors are relative to that.
@@ -79,7 +96,8 @@ impl ProgressiveMesh {
     /// The same mesh without the cuts that are coarser than the one of at most `triangles`.
     #[must_use]
     pub fn no_coarser(mut self, triangles: u32) -> Self {
-        self.least = self.cut(triangles).triangles;
+        self.coarsest = self.cut(triangles);
+        self.least = self.least.max(self.coarsest.triangles);
         self
     }
 
@@ -92,15 +110,19 @@ impl ProgressiveMesh {
     /// Triangles of the coarsest and of the full mesh.
     #[must_use]
     pub fn range(&self) -> (u32, u32) {
-        (self.least, self.triangles.len() as u32)
+        (self.coarsest.triangles, self.triangles.len() as u32)
     }
 
     /// The finest mesh of at most `triangles`; the coarsest where that has more.
     ///
-    /// A vertex usually removes two triangles with it, so the cut has at most a few fewer than requested.
+    /// A vertex usually removes two triangles with it, so the cut has at most a few fewer than requested; where the coarsest is a box, also
+    /// the next finer ones that are further from the full mesh are left out.
     #[must_use]
     pub fn cut(&self, triangles: u32) -> Cut {
-        let asked = triangles.max(self.least) as usize;
+        if triangles < self.least {
+            return self.coarsest;
+        }
+        let asked = triangles as usize;
         let Some(next) = self.triangles.get(asked) else {
             return Cut { vertices: self.vertices.len() as u32, triangles: self.triangles.len() as u32 };
         };
@@ -141,7 +163,7 @@ impl ProgressiveMesh {
     /// The error never decreases as the count decreases.
     #[must_use]
     pub fn error_m(&self, triangles: u32) -> f64 {
-        error::at(&self.errors, triangles)
+        error::at(&self.errors, if triangles < self.least { self.coarsest.triangles } else { triangles })
     }
 
     /// Bytes of its storage, and those of a plain indexed mesh of the same vertices and triangles.

@@ -242,7 +242,31 @@ fn many_parts_go_one_by_one_down_to_the_last() {
         mesh.triangles.extend(one.triangles.iter().map(|t| t.map(|k| k + first)));
     }
     let tom = ProgressiveMesh::new(&mesh).unwrap();
-    assert!(tom.range().0 <= 4, "{:?}", tom.range());
+    // twelve where the last is the box around all
+    assert!(tom.range().0 <= 12, "{:?}", tom.range());
+}
+
+#[test]
+fn furniture_ends_in_the_box_around_it_and_every_finer_cut_is_nearer() {
+    for kind in [Generator::Seat, Generator::Table, Generator::Shelf, Generator::Door, Generator::Books] {
+        for triangles in [60, 240, 1000] {
+            let mesh = generate(kind, 0, triangles);
+            let tom = ProgressiveMesh::new(&mesh).unwrap();
+            let coarsest = faces(&tom, tom.cut(0));
+            let low = mesh.vertices.iter().map(|v| v.core).reduce(Vec3::min).unwrap();
+            let high = mesh.vertices.iter().map(|v| v.core).reduce(Vec3::max).unwrap();
+            let volume: f32 = coarsest.iter().map(|[a, b, c]| a.dot(b.cross(*c)) / 6.0).sum();
+            let box_m3 = (high - low).element_product();
+            assert_eq!(coarsest.len(), 12, "{kind:?} {triangles}");
+            // twelve triangles on the corners of a box that enclose its volume are its faces; f32: some ulp of the sum
+            assert!((volume / box_m3 - 1.0).abs() < 1e-5, "{kind:?} {triangles}: {volume} of {box_m3}");
+            let on_corner = |p: &Vec3| (0..3).all(|i| p[i] == low[i] || p[i] == high[i]);
+            assert!(coarsest.iter().flatten().all(on_corner), "{kind:?} {triangles}");
+            for n in (13..tom.range().1).filter(|&n| tom.cut(n).triangles > 12) {
+                assert!(tom.error_m(n) < tom.error_m(0), "{kind:?} {triangles}: {n}");
+            }
+        }
+    }
 }
 
 #[test]

@@ -6,6 +6,9 @@ use glam::Vec3;
 use metachron_geometry::{PrimitiveMesh, PrimitiveVertex};
 use std::collections::BTreeMap;
 
+/// Flag in the substitute of a vertex at the same position as the one before it (a crease).
+pub(super) const SAME_PLACE: u32 = 1 << 31;
+
 /// Reasons why a mesh cannot be ordered.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]

@@ -30,7 +30,7 @@ const SPRING_SHARE: f64 = 0.011;
 const SPRING_TURNS: (usize, usize) = (9, 8);
 /// Force that colours a grasp fully red, newtons.
 const FORCE_RED_N: f64 = 2.0;
-/// Objects beyond this multiple of the camera's distance no longer widen the light.
+/// Objects beyond this multiple of the depth of what is seen no longer widen the light.
 const FOCUS_REACH: f64 = 4.0;
 
 /// The user's spring on an object.
@@ -54,6 +54,11 @@ pub(crate) struct Scratch {
     skins: SkinScratch,
 }
 
+/// The next greater of lengths that are a tenth apart, metres; at least a millimetre.
+fn up_a_tenth(length_m: f64) -> f64 {
+    1.1_f64.powf((length_m.max(1e-3).ln() / 1.1_f64.ln()).ceil())
+}
+
 impl SceneView {
     /// The picture of the last composition.
     #[must_use]
@@ -67,9 +72,9 @@ impl SceneView {
         let mut scratch = std::mem::take(&mut self.scratch);
         picture.clear();
         picture.style = style;
-        picture.origin = camera.target_m.round();
         scratch.solids.clear();
         self.find_focus(camera, &mut picture);
+        picture.origin = picture.focus_m.round();
         self.find_shown(&picture, &mut scratch.shown);
         self.add_tubes(levels, &mut picture, &mut scratch);
         let mut allowance = self.allowance(levels, &scratch.shown);
@@ -111,10 +116,13 @@ impl SceneView {
         track.pose.point(anchor).map(|(position, _)| position)
     }
 
-    /// Finds the ball that the light is fitted to and the box that the shadow map is fitted to, around everything near the camera's target.
+    /// Finds the ball that the light is fitted to and the box that the shadow map is fitted to, around everything near what is seen.
+    /// Where the camera's target stands along its view does not matter, except in a scene without objects.
     fn find_focus(&self, camera: &Camera, picture: &mut Picture) {
-        let reach = FOCUS_REACH * camera.distance_m;
-        let near = |c: DVec3, r: f64| r > 0.0 && r.is_finite() && c.distance(camera.target_m) + r < reach;
+        let depth_m = self.seen_depth_m();
+        let middle = camera.eye() + camera.forward() * depth_m.unwrap_or(0.0);
+        let reach = depth_m.map_or(f64::INFINITY, |depth_m| FOCUS_REACH * depth_m);
+        let near = |c: DVec3, r: f64| r > 0.0 && r.is_finite() && c.distance(middle) + r < reach;
         let moving = self.tracks.iter().filter(|t| !matches!(t.actor.form, Form::Unseen | Form::Tool(_)));
         let moving = moving.map(|t| (t.bounds.centre, t.bounds.radius_m, t.bounds.half_m));
         let fixed = self.statics.iter().filter(|p| p.throws_shadow);
@@ -130,8 +138,17 @@ impl SceneView {
         picture.focus_m = if found { 0.5 * (low + high) } else { camera.target_m };
         let radius = if found { 0.5 * low.distance(high) } else { camera.distance_m };
         // in steps of a tenth, so that shadow edges do not crawl with every move
-        picture.focus_radius_m = 1.1_f64.powf((radius.max(1e-3).ln() / 1.1_f64.ln()).ceil());
+        picture.focus_radius_m = up_a_tenth(radius);
         picture.shadowed_m = if found { (tight[0], tight[1]) } else { around(picture.focus_m, picture.focus_radius_m) };
+    }
+
+    /// Depth of what the last survey saw, tools apart, along its view: the mean over pixels; `None` where it saw nothing.
+    fn seen_depth_m(&self) -> Option<f64> {
+        let seen = self.tracks.iter().zip(&self.found).filter(|(track, it)| {
+            it.visible && it.depth_m.is_finite() && !matches!(track.actor.form, Form::Unseen | Form::Tool(_))
+        });
+        let (pixels, sum) = seen.fold((0.0, 0.0), |(n, sum), (_, it)| (n + it.pixels, sum + it.pixels * it.depth_m));
+        (pixels > 0.0).then(|| up_a_tenth(sum / pixels))
     }
 
     /// Finds the actors that are visible or may shade a visible one.
@@ -403,6 +420,25 @@ mod tests {
         let gone = Level { triangles: 0, ..Resolution { eps_m: 0.005, n: 3 }.into() };
         let picture = scene_view.compose(&camera, &[gone], Style::default(), None);
         assert!(picture.tubes.is_empty() && picture.instances.is_empty());
+    }
+
+    #[test]
+    fn ground_and_shadows_are_the_same_wherever_the_target_stands_on_the_view() {
+        let (mut scene_view, camera) = scene_view();
+        scene_view.set_snapshot(AgentId(0), &tube_at(0), true);
+        scene_view.pose(SimTime::ZERO, States::Latest);
+        let [near, far] = [0.05, 40.0].map(|away_m| {
+            let camera = Camera::looking(camera.eye(), camera.eye() + camera.forward() * away_m, camera.fov_y_rad);
+            scene_view.survey(&camera, SIZE);
+            let picture = scene_view.compose(&camera, &[], Style::default(), None);
+            (picture.focus_radius_m, picture.focus_m, picture.shadowed_m, picture.origin)
+        });
+        // the eye is found from target and distance: 40 m cost it some ulp
+        assert_eq!((near.0, near.3), (far.0, far.3));
+        assert!(
+            near.1.distance(far.1) < 1e-9 && near.2.0.distance(far.2.0) < 1e-9 && near.2.1.distance(far.2.1) < 1e-9
+        );
+        assert!(near.0 < 1.0, "the light is about the tube, {} m", near.0);
     }
 
     #[test]

@@ -5,7 +5,7 @@
 
 use crate::chart::policies::numeric::common::number;
 use crate::chart::policies::numeric::metrics::Row;
-use crate::chart::policies::played::{COLUMNS, Case, PLAYS, Times, curves};
+use crate::chart::policies::played::{COLUMNS, Case, PLAYS, Times, curves, primitives};
 use crate::chart::{Experiment, Figure, Finding};
 
 /// The experiment.
@@ -33,7 +33,9 @@ impl Experiment for Every {
             let shown = |row: &&Row| row.setting == scene && SHOWN.contains(&row.policy.as_str());
             curves(scene, rows.iter().filter(shown))
         };
-        let panels = PLAYS.iter().map(|play| panel(play.paper.name())).collect();
+        // the grove alone has boughs and leaves, which may be lines and points
+        let of_kinds = rows.iter().find(|row| row.setting == "grove" && row.policy == "adaptive").map(primitives);
+        let panels = PLAYS.iter().map(|play| panel(play.paper.name())).chain(of_kinds).collect();
         Figure::new("The papers' scenes in lockstep", 2, panels)
     }
 

@@ -74,6 +74,8 @@ pub(crate) struct Row {
     pub(crate) psnr_db: f64,
     /// The time of every frame as a part of T, separated by spaces; empty where the figure plays the frames again.
     pub(crate) times: String,
+    /// Triangles, lines and points of every frame as `triangles/lines/points`, likewise.
+    pub(crate) primitives: String,
 }
 
 impl Row {
@@ -126,6 +128,7 @@ impl Row {
             ssim_least: f64::NAN,
             psnr_db: f64::NAN,
             times: String::new(),
+            primitives: String::new(),
         }
     }
 }

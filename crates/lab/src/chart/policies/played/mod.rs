@@ -64,12 +64,20 @@ impl Play {
 pub(super) fn curves<'a>(title: &str, rows: impl Iterator<Item = &'a Row> + Clone) -> Panel {
     let frames = rows.clone().map(|row| row.frames).max().unwrap_or(1) as f64;
     let greatest = rows.clone().map(|row| row.max).fold(1.5, f64::max);
-    let line = |(row, colour): (&'a Row, Colour)| {
-        Layer::line(&row.policy, colour, row::times(row).into_iter().enumerate().map(|(k, time)| (k as f64, time)))
-    };
+    let line = |(row, colour): (&'a Row, Colour)| Layer::line(&row.policy, colour, row::of_frames(&row.times, 0));
     let drawn = rows.zip(Colour::LINES.into_iter().cycle()).map(line);
     let (x, y) = (Axis::linear("frame", 0.0, frames), Axis::linear("time of a frame / target", 0.0, 1.05 * greatest));
     Panel::new(title, x, y, [Layer::limit("target", [0.0, frames], 1.0)].into_iter().chain(drawn))
+}
+
+/// Triangles, lines and points of every frame of a row (RH05, fig. 6).
+pub(super) fn primitives(row: &Row) -> Panel {
+    let counts = [0, 1, 2].map(|kind| row::of_frames(&row.primitives, kind).collect::<Vec<_>>());
+    let most = counts.iter().flatten().map(|(_, count)| *count).fold(1.0, f64::max);
+    let named = ["triangles", "lines", "points"].into_iter().zip(Colour::LINES).zip(counts);
+    let layers = named.map(|((name, colour), points)| Layer::line(name, colour, points));
+    let (x, y) = (Axis::linear("frame", 0.0, row.frames as f64), Axis::linear("primitives", 0.0, 1.05 * most));
+    Panel::new(format!("{}: primitives, {}", row.setting, row.policy), x, y, layers)
 }
 
 #[cfg(test)]
@@ -89,7 +97,7 @@ mod tests {
         for (row, again) in rows.iter().zip(policies.map(|policy| self::row("library", policy))) {
             // NaN is not equal to itself, so the rows are compared as text
             assert_eq!(format!("{row:?}"), format!("{again:?}"));
-            assert_eq!((row.frames, row::times(row).len(), row.setting.as_str()), (6, 6, "library"));
+            assert_eq!((row.frames, row::of_frames(&row.times, 0).count(), row.setting.as_str()), (6, 6, "library"));
         }
         let drawn = Gpu::headless().is_ok();
         for row in &rows {
@@ -108,6 +116,11 @@ mod tests {
     #[test]
     fn full_detail_takes_the_target_so_many_times_and_is_like_itself() {
         let full = row("library", "full");
+        let [triangles, lines, points] =
+            [0, 1, 2].map(|kind| row::of_frames(&full.primitives, kind).map(|(_, n)| n).collect::<Vec<_>>());
+        // 19,800 triangles are the whole library, walls and what is out of view apart; it has neither boughs nor leaves
+        assert!(triangles.len() == 6 && triangles.iter().all(|n| (5000.0..25_000.0).contains(n)), "{triangles:?}");
+        assert_eq!((lines, points), (vec![0.0; 6], vec![0.0; 6]));
         assert!((full.mean - 2.5).abs() < 1e-9 && full.holes == 0.0 && full.changes == 0.0, "{full:?}");
         assert!(full.adapter.is_empty() || (full.ssim - 1.0).abs() < 1e-12, "{}", full.ssim);
     }

@@ -27,6 +27,8 @@ impl Played<'_> {
         let frames_of_row: Vec<Frame> =
             frames.iter().zip(full_ms).map(|(row, full)| frame(row, full / target_ms, target_ms)).collect();
         let times = frames_of_row.iter().map(|f| format!("{:.3}", f.time)).collect::<Vec<_>>().join(" ");
+        let primitives = frames.iter().map(|row| format!("{}/{}/{}", row.triangles, row.lines, row.points));
+        let primitives = primitives.collect::<Vec<_>>().join(" ");
         let column = |of: fn(&(f64, f64)) -> f64| likeness.iter().map(of).collect::<Vec<_>>();
         Row {
             adapter: adapter.to_owned(),
@@ -36,14 +38,16 @@ impl Played<'_> {
             ssim_least: column(|l| l.0).into_iter().reduce(f64::min).unwrap_or(f64::NAN),
             psnr_db: mean(&column(|l| l.1)),
             times,
+            primitives,
             ..Row::of(scene, policy, &[frames_of_row])
         }
     }
 }
 
-/// The time of every frame of a row, as a part of T.
-pub(super) fn times(row: &Row) -> Vec<f64> {
-    row.times.split(' ').filter_map(|time| time.parse().ok()).collect()
+/// The numbers of every frame in a text of a row, of those separated by `/` the one at `place`, with the frame's own.
+pub(super) fn of_frames(text: &str, place: usize) -> impl Iterator<Item = (f64, f64)> {
+    let numbered = text.split(' ').enumerate();
+    numbered.filter_map(move |(frame, numbers)| Some((frame as f64, numbers.split('/').nth(place)?.parse().ok()?)))
 }
 
 /// Converts a record to a frame of the metrics.
