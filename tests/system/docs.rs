@@ -51,6 +51,7 @@ fn what_measures_this_machine_is_not_compared_but_dated_and_other_mistakes_are_t
         ("<!-- metachron chart stability --quick -->", "named by `--only`"),
         ("<!-- metachron chart stability --only inclin -->", "did you mean `incline`?"),
         ("<!-- metachron lisst -->", "list"),
+        ("<!-- metachron docs slopes.md -->", "begin it again"),
         ("<!-- metachron list -->\n<!-- metachron list -->", "is not closed"),
     ] {
         let (code, said) = told(block);

@@ -121,6 +121,7 @@ fn values_out_of_range_are_underlined_with_their_range() {
     }
     refused("[0.3, 0.0, 0.1]", "[0.3, inf, 0.1]", "[0.3, inf, 0.1]", &["3 numbers from"]);
     refused("0.002", "0.02", "0.02", &["`wall_m`", "at most `radius_m`, 0.015 m"]);
+    refused("[0.3, 0.0, 0.1]", "[0.3, 0.0, 0.1, 2.0]", "[0.3, 0.0, 0.1, 2.0]", &["3 numbers from"]);
     refused("[1, 5]", "[1, 11]", "[1, 11]", &["2 numbers from 0 to 10"]);
     refused("importance = 1.0", "importance = 0", "0", &["`importance`"]);
     refused("importance = 1.0", "poisson = 0.6", "0.6", &["`poisson`", "0.5"]);

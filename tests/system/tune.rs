@@ -519,7 +519,8 @@ fn a_search_that_was_killed_goes_on_from_where_it_was_and_finds_the_same_to_the_
     }
     assert_eq!(std::fs::read(&killed).unwrap(), std::fs::read(&whole).unwrap());
     let (_, said) = told(&other, &["--target-fps", "50"]);
-    assert!(said.contains("other settings") && said.contains("begins anew"), "{said}");
+    assert!(said.contains("with these settings") && said.contains("begins anew"), "{said}");
+    assert!(Path::new(&folder.file("other.trials.old")).exists(), "trials of something else are kept");
 }
 
 #[test]

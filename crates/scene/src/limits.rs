@@ -1,7 +1,7 @@
 //! Checks a table of a scene against its schema: every number is within its range, every list within its length.
 //!
 //! In: the schema of a table ([`whole`]) and the table as it is written. Out: problems to the [`Checker`].
-//! Never here: types, which serde checks before; rules between keys (`build`).
+//! Never here: types, which serde checks before, but for lists of fixed length that are too long; rules between keys (`build`).
 
 use crate::check::{Checker, Place};
 use crate::format::ranges::say_everywhere;
@@ -9,6 +9,7 @@ use schemars::JsonSchema;
 use schemars::generate::SchemaSettings;
 use serde_json::Value;
 use std::fmt::Display;
+use std::ops::RangeInclusive;
 use toml::Spanned;
 use toml::de::{DeTable, DeValue};
 
@@ -52,8 +53,9 @@ fn list(c: &mut Checker<'_, '_>, place: &Place, key: &str, schema: &Value, items
     let (least, most) = (length("minItems").unwrap_or(0), length("maxItems").unwrap_or(usize::MAX));
     let numbers: Option<Vec<f64>> = items.iter().map(|item| number(item.get_ref())).collect();
     if let Some(numbers) = numbers.filter(|_| least == most) {
-        if let Some((_, allowed)) = range(entry).filter(|(range, _)| numbers.iter().any(|n| !range.contains(n))) {
-            let expected = format!("expected {count} numbers {allowed}");
+        let beyond = |range: &RangeInclusive<f64>| count != most || numbers.iter().any(|n| !range.contains(n));
+        if let Some((_, allowed)) = range(entry).filter(|(range, _)| beyond(range)) {
+            let expected = format!("expected {most} numbers {allowed}");
             c.wrong(place, key, format_args!("is [{}]", listed(&numbers)), expected);
         } else if schema["x-rises"] == true && numbers[0] > numbers[1] {
             let expected = format!("expected the lesser number first: [{}, {}]", numbers[1], numbers[0]);
@@ -89,7 +91,7 @@ fn form<'s>(schema: &'s Value, found: &DeValue<'_>) -> &'s Value {
 }
 
 /// The range of a number, and its words: `from 0 to 1 m`.
-fn range(schema: &Value) -> Option<(std::ops::RangeInclusive<f64>, String)> {
+fn range(schema: &Value) -> Option<(RangeInclusive<f64>, String)> {
     let (least, most) = (schema["minimum"].as_f64()?, schema["maximum"].as_f64()?);
     let unit = schema["x-unit"].as_str().unwrap_or_default();
     Some((least..=most, format!("from {least} to {most} {unit}").trim_end().to_owned()))

@@ -15,12 +15,12 @@ use crate::member::participant::Progress;
 use crate::solve::{Hold, JointRow, Side};
 use glam::{DQuat, DVec3};
 
-/// The share of the turn not predicted by which an arm is turned: at ¼ steps begin to throw light bodies.
+/// The share of the turn not predicted by which an arm is turned: below ¼ swings that steps do not resolve grow.
 const TURN_SHARE: f64 = 0.5;
 /// The least share of a body's inertia that is added, where its forces change within a step.
 const LEAST_SHARE: f64 = 1e-9;
-/// How much of the inertia of a body the stiffness of its forces may reach before inertia is added: solves converge as fast.
-const LEFT: f64 = 0.25;
+/// How much of a body's inertia the stiffness of its forces may reach before inertia is added: below it solves converge by a quarter or faster.
+const BORNE_SHARE: f64 = 0.25;
 /// The share of the turn of two bodies against each other by which arms are turned besides, where inertia is added: it damps swings
 /// that steps do not resolve.
 const DAMPING_SHARE: f64 = 0.05;
@@ -53,13 +53,13 @@ impl GeometricStiffness {
             let pose = all[member].member.pose(&[], 0.0)?;
             let arm_m = end.point.position - pose.centre_m;
             let turns = pose.turns.of_member(member);
-            let per_n_m = inverse_inertia_across(all, &turns, arm_m)?;
+            let inverse_kg_m2 = inverse_inertia_across(all, &turns, arm_m)?;
             Some(Arm {
                 point: end.side(),
                 turns,
                 arm_m,
                 turned_m: arm_m,
-                per_n_m,
+                inverse_kg_m2,
                 inertia_kg_m2: 0.0,
                 added: None,
                 is_pulled: false,
@@ -75,7 +75,7 @@ impl GeometricStiffness {
     fn sum_up(&mut self, count: usize) {
         reset(&mut self.asked, count, 0.0);
         for arm in self.pulls.iter().flat_map(|pull| pull.arms.iter().flatten()) {
-            self.asked[arm.turns.member] += arm.inertia_kg_m2 * arm.per_n_m;
+            self.asked[arm.turns.member] += arm.inertia_kg_m2 * arm.inverse_kg_m2;
         }
     }
 }
@@ -188,7 +188,7 @@ impl Arm {
 
     /// The row by which its body resists changes of its spin.
     fn added_inertia(&self, asked: f64) -> JointRow {
-        let inertia_kg_m2 = (self.inertia_kg_m2 * lacking(asked)).max(LEAST_SHARE / self.per_n_m);
+        let inertia_kg_m2 = (self.inertia_kg_m2 * lacking(asked)).max(LEAST_SHARE / self.inverse_kg_m2);
         let across = Hold::across(self.turned_m.normalize_or(DVec3::Z));
         JointRow { compliance_per_kg: Some(inertia_kg_m2.recip()), ..JointRow::new([self.turns, Side::FIXED], across) }
     }
@@ -196,10 +196,10 @@ impl Arm {
 
 /// The share of the inertia asked for that a body lacks.
 fn lacking(asked: f64) -> f64 {
-    (1.0 - LEFT / asked).max(0.0)
+    (1.0 - BORNE_SHARE / asked).max(0.0)
 }
 
-/// The trace of the inverse inertia of a body across an arm, 1/(kg m²): no direction lacks more.
+/// The trace of the inverse inertia of a body across an arm, 1/(kg m²): a bound of it in every direction.
 fn inverse_inertia_across(all: &[Participant<'_>], turns: &Side, arm_m: DVec3) -> Option<f64> {
     let axis = arm_m.try_normalize()?;
     let spin = turns.terms().first()?.block;

@@ -257,7 +257,7 @@ impl Joints {
                 let law = Spring { stiffness_n_m: stiffness, damping_n_s_m: damping, stretch_m: axis * -off };
                 let row = row.with_spring(law, h_s);
                 let compliance = row.compliance_per_kg.unwrap_or(0.0);
-                // a motion that steps resolve need not be damped (eq. 22a)
+                // a motion that steps resolve need not be damped (eq. 22b)
                 let stiff = h_s * h_s * stiffness;
                 let before = |member: usize| &step.progress[member].v_before[..];
                 let [of_a, of_b] = of.sides.map(|side| velocity(&side, before).dot(axis));

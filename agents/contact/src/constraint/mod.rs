@@ -273,7 +273,7 @@ struct Arm {
     arm_m: DVec3,
     turned_m: DVec3,
     /// The inverse inertia of the body across it, 1/(kg m²).
-    per_n_m: f64,
+    inverse_kg_m2: f64,
     /// The inertia that the force asks for, kg m², and whether the force pulls the body along its arm.
     inertia_kg_m2: f64,
     is_pulled: bool,

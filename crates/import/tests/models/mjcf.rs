@@ -84,7 +84,7 @@ fn a_servo_without_damping_swings_on_where_steps_resolve_it_and_is_still_where_t
         last.fold(0.0, f64::max)
     };
     let (resolved, stiff) = (amplitude_in_the_tenth_second(1.0), amplitude_in_the_tenth_second(1000.0));
-    // eq. 22a of clusters.md: exp(−h² ω² · h ω² t/2) = 0.992 at ω = 2π, where an implicit step leaves 0.14
+    // eq. 22b of clusters.md: exp(−h² ω² · h ω² t/2) = 0.992 at ω = 2π, where an implicit step leaves 0.14
     assert!((0.097..0.1005).contains(&resolved), "{resolved}");
     assert!(stiff < 1e-6, "{stiff}");
 }

@@ -113,6 +113,7 @@ impl<'a> Printer<'a> {
 
     /// The output of another command, with the command above it.
     fn spoken(&self, words: &[&str]) -> anyhow::Result<String> {
+        ensure!(words.first() != Some(&"docs"), "a document cannot print `metachron docs`, which would begin it again");
         let folder = self.folder.join("spoken");
         if folder.exists() {
             fs::remove_dir_all(&folder).with_context(|| format!("{} cannot be removed", folder.display()))?;

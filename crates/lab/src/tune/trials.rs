@@ -27,18 +27,20 @@ impl Trials {
     /// Opens the file beside `gains` and reads what a search of the same plant, target and extent left there.
     ///
     /// # Errors
-    /// A file that cannot be written.
+    /// A file that cannot be written, or one of something else that cannot be renamed.
     pub(super) fn open(args: &TuneArgs, on: &Identified, gains: &Path) -> anyhow::Result<Self> {
         let path = gains.with_extension("trials");
         let of = identity(args, on);
-        let text = fs::read_to_string(&path).unwrap_or_default();
+        let text = fs::read(&path).unwrap_or_default();
+        let text = String::from_utf8_lossy(&text);
         let same = text.lines().next() == Some(&of);
         let known: Vec<Verdict> = if same { text.lines().skip(1).filter_map(read).collect() } else { Vec::new() };
         if same {
             message(&format!("going on after the {} trials in {}", known.len(), path.display()));
         } else if !text.is_empty() {
-            let why = "is of another scene, other settings, another build or another measurement";
-            message(&format!("note: {} {why}: the search begins anew", path.display()));
+            let (why, kept) = ("is no search of this scene with these settings", path.with_extension("trials.old"));
+            fs::rename(&path, &kept).with_context(|| format!("{} cannot be renamed", path.display()))?;
+            message(&format!("note: {} {why}: it is now {}, the search begins anew", path.display(), kept.display()));
         }
         let open = || -> anyhow::Result<File> {
             let beside = path.with_extension("trials.new");

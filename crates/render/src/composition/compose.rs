@@ -117,11 +117,10 @@ impl SceneView {
     }
 
     /// Finds the ball that the light is fitted to and the box that the shadow map is fitted to, around everything near what is seen.
-    /// Where the camera's target stands along its view does not matter, except in a scene without objects.
+    /// Where the camera's target stands along its view does not matter, except where no object is seen.
     fn find_focus(&self, camera: &Camera, picture: &mut Picture) {
-        let depth_m = self.seen_depth_m();
-        let middle = camera.eye() + camera.forward() * depth_m.unwrap_or(0.0);
-        let reach = depth_m.map_or(f64::INFINITY, |depth_m| FOCUS_REACH * depth_m);
+        let depth_m = self.seen_depth_m().unwrap_or(camera.distance_m);
+        let (middle, reach) = (camera.eye() + camera.forward() * depth_m, FOCUS_REACH * depth_m);
         let near = |c: DVec3, r: f64| r > 0.0 && r.is_finite() && c.distance(middle) + r < reach;
         let moving = self.tracks.iter().filter(|t| !matches!(t.actor.form, Form::Unseen | Form::Tool(_)));
         let moving = moving.map(|t| (t.bounds.centre, t.bounds.radius_m, t.bounds.half_m));
