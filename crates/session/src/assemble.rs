@@ -55,13 +55,6 @@ impl Governors {
     }
 }
 
-/// Lets every agent that keeps a rate begin at its coarsest, so that it is in time from the first frame on whatever the machine; its
-/// controller refines it as soon as its load is known.
-pub(super) fn begin_coarse(scene: &mut Scene) {
-    let members = scene.agents.iter_mut().filter(|member| member.tolerance_m.is_none());
-    members.for_each(|member| member.begin_at(member.simulation.eps_m.1));
-}
-
 /// Data that the agents' controllers share with the frame loop.
 #[derive(Debug, Default)]
 pub(super) struct ControlledAgents {

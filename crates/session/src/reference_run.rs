@@ -145,9 +145,7 @@ fn common_clock(scene: &Scene) -> Scene {
     for member in &mut scene.agents {
         member.pace.rate_hz = 1.0 / dt.as_secs_f64();
         (member.pace.dt, member.pace.dt_range) = (dt, (dt, dt));
-        let finest_m = member.simulation.eps_m.0;
-        member.begin_at(finest_m);
-        member.simulation.eps_m.1 = finest_m;
+        member.simulation.eps_m = (member.start.eps_m, member.start.eps_m);
         member.faults = Faults::default();
     }
     scene.executor = ExecutorKind::Lockstep;

@@ -156,7 +156,6 @@ impl Session {
         start: impl FnOnce(&Scene, Govern<'_>) -> Result<World, SessionError>,
     ) -> Result<Self, SessionError> {
         let machine = machine(&scene);
-        assemble::begin_coarse(&mut scene);
         let mut governors = assemble::Governors::of(&scene);
         let world = start(&scene, &mut |member| governors.governor(member))?;
         scene.executor = world.executor();

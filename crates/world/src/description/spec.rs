@@ -164,18 +164,6 @@ impl Member {
         }
     }
 
-    /// Lets the agent begin with the spacing `eps_m`, metres, of its range; one without a spacing stays as it is.
-    pub fn begin_at(&mut self, eps_m: f64) {
-        match &mut self.spec {
-            Spec::Tube(tube) => tube.resolution.eps_m = eps_m,
-            Spec::Soft(SoftSpec { shape: SoftShape::Embedded { eps_m: own_m, .. }, .. }) => *own_m = eps_m,
-            Spec::Soft(SoftSpec { nodes: Some(nodes), .. }) => nodes.eps_m = eps_m,
-            Spec::Synthetic(_) => {}
-            Spec::Soft(_) | Spec::Rigid(_) | Spec::Tool(_) | Spec::Custom(_) => return,
-        }
-        self.start.eps_m = eps_m;
-    }
-
     /// Cells of a soft body along each of its axes; empty for other models.
     #[must_use]
     pub fn cells(&self) -> Vec<u32> {

@@ -344,12 +344,9 @@ impl RateControl {
         }
     }
 
-    /// With time to spare: refines, once delays by others have ceased for long enough. The first window, in which nobody delayed it, tells
-    /// an agent that begins coarse how fine it may be.
+    /// With time to spare: refines, once delays by others have ceased for long enough.
     fn refine(&mut self, to: f64) {
-        if self.full.is_first() && self.late == 0 {
-            self.aim = to.max(0.0);
-        } else if self.calm >= self.patience {
+        if self.calm >= self.patience {
             let part = if self.patience == PATIENCE.0 { self.gains.refine * (self.own_target - to) } else { 0.0 };
             self.aim = to.max(self.own_target - part.max(REFINE_MAX)).max(0.0);
         }

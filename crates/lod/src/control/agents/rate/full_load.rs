@@ -34,11 +34,6 @@ impl FullLoad {
         }
     }
 
-    /// Whether the window added last is the first of all.
-    pub fn is_first(&self) -> bool {
-        self.windows.len() == 1
-    }
-
     /// The mean; `None` before the first window.
     pub fn mean(&self) -> Option<f64> {
         let sum: f64 = self.windows.iter().sum();

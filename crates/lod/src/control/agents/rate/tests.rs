@@ -104,20 +104,6 @@ fn an_agent_that_takes_many_cores_is_at_its_coarsest_after_a_window() {
 }
 
 #[test]
-fn an_agent_that_begins_coarse_is_as_fine_as_it_may_be_after_a_window_and_never_late() {
-    // beyond 4 the coarsest takes more than its share of a half, and steps get longer
-    for full in [0.1, 0.5, 1.5, 3.9] {
-        let mut agent = Agent::new(full * PERIOD_S);
-        agent.control = RateControl::new(limits(), RateGains::default(), Some(0.02));
-        agent.now = agent.control.demand();
-        assert_eq!(agent.now, RateDemand { dt_s: PERIOD_S, eps_m: Some(0.02) });
-        agent.run(0.3);
-        assert!(agent.now.eps_m == Some(0.005) || (0.8..=1.06).contains(&agent.load()), "{full}: {:?}", agent.demands);
-        assert!(agent.work_s() <= PERIOD_S, "{full}: {:?}", agent.demands);
-    }
-}
-
-#[test]
 fn demands_stop_once_the_load_is_on_target() {
     for full in [0.7, 1.0, 1.7, 3.0, 6.0] {
         let mut agent = Agent::new(full * PERIOD_S);
