@@ -9,7 +9,7 @@
 //! the birth of a triangle follows from them.
 //!
 //! The last part of several that are left alone is a shard of the thing; where the box around all is nearer, that is the coarsest mesh
-//! instead ([`hull_box`]).
+//! instead (`hull_box.rs`).
 
 mod build;
 mod error;

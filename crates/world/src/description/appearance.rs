@@ -13,7 +13,7 @@ pub struct Appearance {
     pub material: Material,
     /// Weight of its picture relative to that of others, 0.001 … 1000.
     pub importance: f64,
-    /// Whether it may be left out of the picture; `None`: as [`Target::may_vanish`](super::scene::Target::may_vanish) says.
+    /// Whether it may be left out of the picture; `None`: as [`Target::may_vanish`](crate::Target::may_vanish) says.
     pub may_vanish: Option<bool>,
     /// Its shading.
     pub shading: ShadingKind,
