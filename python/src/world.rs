@@ -37,7 +37,7 @@ use std::time::{Duration, Instant};
 #[pyclass(frozen, module = "metachron")]
 pub struct World {
     inner: world::World,
-    /// It was started of this.
+    /// The scene that it was started with.
     scene: world::Scene,
     pictures: Pictures,
     /// The text of its scene; `None` of one that was built of parts.

@@ -50,7 +50,7 @@ struct Shared {
     ends: AtomicBool,
 }
 
-/// What callers were shown.
+/// The states that callers were shown.
 struct Shown {
     /// The number of the next message.
     sequence: u64,

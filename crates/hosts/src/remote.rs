@@ -43,7 +43,7 @@ pub struct RemoteWorld {
     connection: Arc<Connection>,
 }
 
-/// What a connection needs to end.
+/// A link with the thread that reads from it.
 struct Connection {
     link: Arc<Link>,
     reader: Option<JoinHandle<()>>,

@@ -31,7 +31,7 @@ pub(crate) struct Request {
     pub call: Call,
 }
 
-/// What is asked of a world.
+/// A call of a world.
 #[derive(Debug, Clone, serde::Serialize, serde::Deserialize)]
 pub(crate) enum Call {
     /// The first of each caller, with the version of its program.
@@ -54,7 +54,7 @@ pub(crate) enum Call {
 pub(crate) enum Reply {
     Hello(Welcome),
     Moment(Moment),
-    /// What changed is in the messages up to this number.
+    /// The call is done: its changes are in the messages up to this number.
     Done(u64),
     Added(AgentId, u64),
     Checkpoint(Vec<u8>),
@@ -137,7 +137,7 @@ pub(crate) fn decode<T: DeserializeOwned>(bytes: &[u8]) -> Result<T, BadMessage>
 }
 
 impl Moment {
-    /// It as messages that are short enough, the first with the number `sequence`, which rises by `step` after each. An
+    /// The message in parts that are short enough, the first with the number `sequence`, which rises by `step` after each. An
     /// object whose state alone is too long is left out; returned is how many were.
     pub fn encode_parts(mut self, sequence: &mut u64, step: u64, out: &mut Vec<Vec<u8>>) -> u64 {
         self.sequence = *sequence;

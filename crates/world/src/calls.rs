@@ -12,7 +12,7 @@ use metachron_runtime::{Command, TimelineCommand};
 use std::sync::Arc;
 
 impl Scene {
-    /// It in short.
+    /// The scene in short.
     #[must_use]
     pub fn mark(&self) -> SceneMark {
         SceneIdentity::of(self).mark()
@@ -22,7 +22,7 @@ impl Scene {
 /// A reader of events: all since its last call, in the order of their times.
 pub type EventReader = Box<dyn FnMut() -> Vec<Event> + Send>;
 
-/// What answers the calls of a world. Each does as the method of [`World`] of the same name, and has its errors; a world
+/// A world, here or elsewhere, by its calls. Each does as the method of [`World`] of the same name, and has its errors; a world
 /// that runs elsewhere has [`WorldError::Silent`] and [`WorldError::Elsewhere`] besides.
 pub trait WorldCalls: Send + Sync {
     /// The scene that it was started with.

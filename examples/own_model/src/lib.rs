@@ -166,7 +166,7 @@ impl ClusterMember for Pontoon {
 }
 
 impl MemberMotion for Pontoon {
-    /// It moves as a whole: so the engine sums its contacts in its state's `contact_wrench`.
+    /// The pontoon moves as a whole: so the engine sums its contacts in its state's `contact_wrench`.
     fn pose(&self, v: &[DVec3], t_s: f64) -> Option<Pose> {
         // no velocities are given for where it is now
         let way_m = v.first().map_or(0.0, |v| v.z * t_s);

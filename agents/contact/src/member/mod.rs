@@ -95,7 +95,7 @@ pub trait ClusterMember: Send {
         1.0
     }
 
-    /// What there is to say of its motion; `None` where [`Self::skin_point`] says all.
+    /// Its motion as a whole; `None` where [`Self::skin_point`] says all.
     fn motion(&self) -> Option<&dyn MemberMotion> {
         None
     }

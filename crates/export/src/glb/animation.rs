@@ -144,7 +144,7 @@ impl Track {
         Self { name: object.name.clone(), first, hidden: None, surface, motion }
     }
 
-    /// One that begins with the last key of this, where this has as many morph targets as it may.
+    /// A track that begins with the last key of this, where this has as many morph targets as it may.
     fn continued(&self) -> Option<Self> {
         let Motion::Bends { shapes, .. } = &self.motion else { return None };
         let points = shapes.last().filter(|_| shapes.len() > TARGETS_MAX)?.clone();

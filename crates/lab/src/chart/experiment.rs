@@ -52,7 +52,7 @@ pub trait Experiment: Sync {
     fn findings(rows: &[Self::Row]) -> Vec<Finding>;
 }
 
-/// What an experiment measures once.
+/// The case that an experiment measures once.
 pub type CaseOf<E> = <<E as Experiment>::Row as Record>::Case;
 
 /// A line of the CSV file of an experiment.

@@ -131,7 +131,7 @@ pub fn fields(row: &impl Serialize) -> Map<String, Value> {
 }
 
 impl Cell {
-    /// What a column shows of a row's fields.
+    /// The cell of a column, by a row's fields.
     fn of(fields: &Map<String, Value>, column: &str) -> Self {
         let (what, digits) = column.rsplit_once('.').unwrap_or((column, ""));
         let field = |name: &str| {

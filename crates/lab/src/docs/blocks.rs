@@ -27,13 +27,13 @@ pub(super) struct Block<'a> {
     pub(super) words: Vec<&'a str>,
     /// Only rows with one of these values in this column.
     pub(super) only: Vec<(&'a str, Vec<&'a str>)>,
-    /// What is shown; the whole table where nothing is named.
+    /// The parts shown; the whole table where nothing is named.
     pub(super) views: Vec<View<'a>>,
-    /// What stands in the document.
+    /// The lines that stand in the document.
     pub(super) body: &'a str,
 }
 
-/// What is shown of an experiment.
+/// A part of an experiment's result.
 #[derive(Debug, PartialEq)]
 pub(super) enum View<'a> {
     /// These columns of its table.

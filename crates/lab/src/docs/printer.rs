@@ -1,4 +1,4 @@
-//! What the command of a block prints, as Markdown.
+//! The output of a block's command, as Markdown.
 //!
 //! In: blocks. Out: tables of experiments, the words of other commands, figures. An experiment is measured once, however many blocks show it.
 //! Never here: documents.

@@ -123,7 +123,7 @@ fn read(line: &str) -> Option<Verdict> {
     })
 }
 
-/// What the verdicts are of, in one line: the plant with all that it was identified on, the target, the extent of a trial, the program.
+/// The search that verdicts are of, in one line: the plant with all that it was identified on, the target, the extent of a trial, the program.
 fn identity(args: &TuneArgs, on: &Identified) -> String {
     let mut plant = DefaultHasher::new();
     format!("{:?}", on.plant).hash(&mut plant);

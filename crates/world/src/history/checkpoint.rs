@@ -303,7 +303,7 @@ impl SceneIdentity {
         }
     }
 
-    /// It in short.
+    /// The identity in short.
     pub fn mark(&self) -> SceneMark {
         let mut archive = Archive::writer();
         // plain values of this program can all be written

@@ -50,7 +50,7 @@ pub enum Happening {
     AttachmentGave,
     /// It could not keep its rate, and gave up time.
     RateMissed,
-    /// It moves too fast for its steps, and did not in the step before: its motion asked for so many times as many, more than a step may be
+    /// The object moves too fast for its steps, and did not in the step before: its motion asked for so many times as many, more than a step may be
     /// divided into (`docs/theory/clusters.md`, section 9).
     UnderResolved(f64),
     /// Cells of it were removed.
@@ -286,7 +286,7 @@ impl Events {
 }
 
 impl EventSieve {
-    /// One that has seen none.
+    /// A sieve that has seen no event.
     #[must_use]
     pub const fn new(filter: EventFilter) -> Self {
         Self { filter, begun: Vec::new() }
