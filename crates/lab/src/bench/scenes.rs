@@ -118,10 +118,8 @@ impl Subject for Scenes {
                 // Ctrl-C ends the scene that plays, too
                 Err(_) if !progress.continues(done, String::new()) => break,
                 Err(error) if rows.is_empty() => return Err(error),
-                Err(error) => {
-                    message(&format!("{error:#}"));
-                    break;
-                }
+                // an older build does not know every scene
+                Err(error) => message(&format!("{error:#}")),
             }
         }
         Ok(rows)
