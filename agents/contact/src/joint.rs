@@ -29,6 +29,11 @@ pub struct Joint {
     /// The force that it gives at most, N, > 0, below that at which it tears: a greater load moves the place at which it holds, a
     /// rope's length or a spring's length at rest. Its torque is not bounded. Infinite where it never yields.
     pub yields_above_n: f64,
+    /// Dry friction of a hinge, N·m, or a slide, N, ≥ 0, beside its motor; 0 of other kinds.
+    pub friction: f64,
+    /// Inertia about the axis of a hinge, kg·m², or along that of a slide, kg, ≥ 0: of a rotor behind a gear, which resists changes of the
+    /// rate at which b moves against a and is nowhere else. 0 of other kinds.
+    pub armature: f64,
 }
 
 /// The degrees of freedom that a joint locks and leaves free. Axes of a [`Joint`] are in a's shape, of any length above zero.
@@ -181,7 +186,8 @@ impl Joint {
     pub fn new(a: AgentId, b: Option<AgentId>, kind: JointKind) -> Self {
         let (anchor_a_m, anchor_b_m, rest) = (DVec3::ZERO, DVec3::ZERO, DQuat::IDENTITY);
         let (tears_above_n, yields_above_n) = (f64::INFINITY, f64::INFINITY);
-        Self { a, b, kind, anchor_a_m, anchor_b_m, rest, collide: false, tears_above_n, yields_above_n }
+        let (collide, friction, armature) = (false, 0.0, 0.0);
+        Self { a, b, kind, anchor_a_m, anchor_b_m, rest, collide, tears_above_n, yields_above_n, friction, armature }
     }
 
     /// The same joint with its zero at the initial rotations of the two shapes: rotations to the world's axes.
@@ -207,6 +213,9 @@ impl Joint {
         OutOfRange::unless(tears_n > 0.0, "tearing force", tears_n, "above zero")?;
         let yields_first = yields_n > 0.0 && (yields_n < tears_n || yields_n == f64::INFINITY);
         OutOfRange::unless(yields_first, "yield force", yields_n, "above zero and below the tearing force")?;
+        let most = if self.takes_motor() { NUMBER } else { NONE };
+        most.check("friction", self.friction)?;
+        most.check("armature", self.armature)?;
         match self.kind {
             JointKind::Fixed | JointKind::Spherical => Ok(()),
             JointKind::Revolute { axis, range_rad, motor } => {
@@ -257,6 +266,8 @@ impl Joint {
 
 /// Stiffness, damping and lengths at rest; [`ABOVE_ZERO`] is that of lengths of ropes, [`GOAL`] that of goals of motors.
 const NUMBER: NumberRange = NumberRange::new(0.0, 1e9, "");
+/// The friction and armature of a joint that is neither hinge nor slide.
+const NONE: NumberRange = NumberRange::new(0.0, 0.0, "");
 const ABOVE_ZERO: NumberRange = NumberRange { least: 1e-9, ..NUMBER };
 const GOAL: NumberRange = NumberRange { least: -1e9, ..NUMBER };
 const ANGLE: NumberRange = NumberRange::new(-std::f64::consts::PI, std::f64::consts::PI, "rad");
@@ -304,6 +315,12 @@ mod tests {
         assert!(matches!(hinge(DVec3::X, Some([4.0, 5.0])).check(), Err(JointError::BadNumber(_))));
         assert!(matches!(hinge(DVec3::X, Some([1.0, 0.5])).check(), Err(JointError::EmptyRange { .. })));
         assert_eq!(hinge(DVec3::X * 3.0, Some([-1.0, 0.5])).check(), Ok(()));
+        let resisted = |joint: Joint, value| [Joint { friction: value, ..joint }, Joint { armature: value, ..joint }];
+        for joint in [(rope(1.0), 1.0), (hinge(DVec3::X, None), -1.0), (hinge(DVec3::X, None), f64::NAN)] {
+            let refused = |joint: &Joint| matches!(joint.check(), Err(JointError::BadNumber(_)));
+            assert!(resisted(joint.0, joint.1).iter().all(refused), "{joint:?}");
+        }
+        assert!(resisted(hinge(DVec3::X, None), 2.0).iter().all(|joint| joint.check().is_ok()));
     }
 
     #[test]

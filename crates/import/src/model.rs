@@ -182,6 +182,9 @@ pub(crate) struct Joint {
     /// From the position at the start, radians or metres.
     pub(crate) range: Option<[f64; 2]>,
     pub(crate) motor: Option<Motor>,
+    /// Dry friction and the inertia about or along the axis, of a hinge in N·m and kg·m², of a slide in N and kg.
+    pub(crate) friction: f64,
+    pub(crate) armature: f64,
 }
 
 /// A rope or spring between two points.
@@ -224,15 +227,13 @@ pub(crate) enum Kind {
     Prismatic,
 }
 
-/// The motor or brake of a joint, in radians or metres from its position at the start, newtons and newton metres.
+/// The motor of a joint, in radians or metres from its position at the start, newtons and newton metres.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) enum Motor {
     /// A spring to a position, with a damper.
     Spring { position: f64, stiffness: f64, damping: f64, max_effort: Option<f64> },
     /// A damper against a velocity.
     Damper { velocity: f64, damping: f64, max_effort: Option<f64> },
-    /// Dry friction.
-    Brake { max_effort: f64 },
 }
 
 impl Model {
@@ -292,6 +293,8 @@ impl Joint {
             axis: DVec3::Z,
             range: None,
             motor: None,
+            friction: 0.0,
+            armature: 0.0,
         }
     }
 }

@@ -247,6 +247,11 @@ fn write_joint(out: &mut String, model: &Model, joint: &Joint, notes: &mut Vec<L
     if let Some(motor) = joint.motor {
         put(out, "motor", &unit.motor(within(motor, joint, notes)));
     }
+    for (key, value) in [(unit.friction, joint.friction), (unit.armature, joint.armature)] {
+        if value > 0.0 {
+            put(out, key, &exact(value));
+        }
+    }
 }
 
 /// A rope or spring, whose first object is no world.
@@ -293,6 +298,8 @@ struct Unit {
     effort: &'static str,
     stiffness: &'static str,
     damping: &'static str,
+    friction: &'static str,
+    armature: &'static str,
 }
 
 impl Unit {
@@ -306,6 +313,8 @@ impl Unit {
                 effort: "max_torque_n_m",
                 stiffness: "stiffness_n_m_rad",
                 damping: "damping_n_m_s_rad",
+                friction: "friction_n_m",
+                armature: "armature_kg_m2",
             }),
             Kind::Prismatic => Some(Self {
                 is_angle: false,
@@ -315,6 +324,8 @@ impl Unit {
                 effort: "max_force_n",
                 stiffness: "stiffness_n_m",
                 damping: "damping_n_s_m",
+                friction: "friction_n",
+                armature: "armature_kg",
             }),
             Kind::Fixed | Kind::Spherical => None,
         }
@@ -335,7 +346,6 @@ impl Unit {
             Motor::Damper { velocity, damping, max_effort } => {
                 (format!("{} = {}, {} = {damping:?}", self.velocity, number(velocity), self.damping), max_effort)
             }
-            Motor::Brake { max_effort } => (format!("{} = 0", self.velocity), Some(max_effort)),
         };
         let most = max_effort.map_or(String::new(), |most| format!(", {} = {most:?}", self.effort));
         format!("{{ {goal}{most} }}")

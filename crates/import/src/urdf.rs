@@ -31,6 +31,7 @@ struct Draft<'a> {
     axis: DVec3,
     limits: Option<[f64; 2]>,
     motor: Option<Motor>,
+    friction: f64,
     /// Whether the child moves freely.
     is_free: bool,
 }
@@ -149,10 +150,10 @@ fn draft(element: &Element) -> Result<Draft<'_>, ImportError> {
         }
     }
     let limits = if moves && !turns_freely { Some(limits(element)?) } else { None };
-    let motor = if moves { damper(element)? } else { None };
+    let (motor, friction) = if moves { brakes(element)? } else { (None, 0.0) };
     let origin = origin(element)?;
     let (parent, child, is_free) = (end("parent")?, end("child")?, kind_name == "floating");
-    Ok(Draft { element, parent, child, origin, kind, axis, limits, motor, is_free })
+    Ok(Draft { element, parent, child, origin, kind, axis, limits, motor, friction, is_free })
 }
 
 /// The limits of a joint; of one that the file says nothing about both are zero, as in the specification.
@@ -166,20 +167,12 @@ fn limits(element: &Element) -> Result<[f64; 2], ImportError> {
     Ok([lower, upper])
 }
 
-/// The brake of a joint: a damper, or dry friction where it has no damper.
-fn damper(element: &Element) -> Result<Option<Motor>, ImportError> {
-    let Some(given) = element.child("dynamics") else { return Ok(None) };
-    let brakes = |name: &str| {
-        let value = given.number(name)?.unwrap_or(0.0);
-        if value < 0.0 { Err(given.wrong(format!("`{name}` is {value}; expected 0 or more"))) } else { Ok(value) }
-    };
-    given.read_zeros(&["friction", "spring_stiffness", "spring_reference"]);
-    let damping = brakes("damping")?;
-    if damping > 0.0 {
-        return Ok(Some(Motor::Damper { velocity: 0.0, damping, max_effort: None }));
-    }
-    let friction = brakes("friction")?;
-    Ok((friction > 0.0).then_some(Motor::Brake { max_effort: friction }))
+/// The damper of a joint and its dry friction.
+fn brakes(element: &Element) -> Result<(Option<Motor>, f64), ImportError> {
+    let Some(given) = element.child("dynamics") else { return Ok((None, 0.0)) };
+    given.read_zeros(&["spring_stiffness", "spring_reference"]);
+    let (damping, friction) = (given.at_least_0("damping")?, given.at_least_0("friction")?);
+    Ok(((damping > 0.0).then_some(Motor::Damper { velocity: 0.0, damping, max_effort: None }), friction))
 }
 
 /// The position at which a joint starts: as near to zero as it may be.
@@ -196,14 +189,12 @@ fn start(draft: &Draft<'_>, notes: &mut Vec<LeftOut>) -> f64 {
 fn joint(draft: &Draft<'_>, parent: usize, child: usize, start: f64) -> Joint {
     Joint {
         name: draft.element.text("name").unwrap_or_default().to_owned(),
-        place: draft.element.place.clone(),
-        parent: Some(parent),
-        child,
         kind: draft.kind,
-        anchor_m: DVec3::ZERO,
         axis: draft.axis,
         range: draft.limits.map(|limits| limits.map(|end| end - start)),
         motor: draft.motor,
+        friction: draft.friction,
+        ..Joint::weld(draft.element.place.clone(), Some(parent), child)
     }
 }
 

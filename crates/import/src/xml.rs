@@ -143,6 +143,12 @@ impl Element {
         Ok(self.numbers::<1>(name)?.map(|[value]| value))
     }
 
+    /// A number that is not negative; 0 where there is none.
+    pub(crate) fn at_least_0(&self, name: &str) -> Result<f64, ImportError> {
+        let value = self.number(name)?.unwrap_or(0.0);
+        if value < 0.0 { Err(self.wrong(format!("`{name}` is {value}; expected 0 or more"))) } else { Ok(value) }
+    }
+
     /// A number that has to be there.
     pub(crate) fn needed_number(&self, name: &str) -> Result<f64, ImportError> {
         self.needed(name)?;

@@ -26,8 +26,10 @@ use std::f64::consts::{PI, TAU};
 /// A row that gave this share of the most that it may is not asked whether it holds.
 const YIELDS_SHARE: f64 = 0.999;
 
-/// The key of a motor's row: above the keys of the rows that hold its joint.
+/// The keys of the rows of a motor, of friction and of an armature: above those of the rows that hold their joint.
 const MOTOR: u32 = 16;
+const FRICTION: u32 = 17;
+const ARMATURE: u32 = 18;
 
 /// The joints of a fine step.
 #[derive(Debug, Default)]
@@ -128,6 +130,14 @@ struct Together {
     owner: RowOwner,
 }
 
+/// The sides that the motor of a joint drives against each other, along an axis of the world.
+#[derive(Clone, Copy)]
+struct Driven {
+    axis: DVec3,
+    sides: [Side; 2],
+    owner: RowOwner,
+}
+
 impl Joints {
     /// Lays out all joints between participants.
     pub fn gather(&mut self, scene: &ClusterScene, step: &FineStep<'_, '_>, constraints: &mut ConstraintRows) {
@@ -188,6 +198,8 @@ impl Joints {
         let is_point = !matches!(joint.kind, JointKind::Rope { .. });
         let tie = Tie { ends: &ends, force_n: as_before_n, owner, rows, is_point };
         constraints.geometric_stiffness.note(step, &tie);
+        let of = if matches!(joint.kind, JointKind::Revolute { .. }) { turns.sides } else { points.sides };
+        resist(step, constraints, &joint, Driven { axis, sides: of, owner: lasting });
     }
 
     /// Lays out the rows of the joint that was noted last.
@@ -322,6 +334,21 @@ impl Joints {
             }
         }
         aimed
+    }
+}
+
+/// Lays out the friction of a joint and its armature between the sides that its motor would drive.
+fn resist(step: &FineStep<'_, '_>, constraints: &mut ConstraintRows, joint: &Joint, along: Driven) {
+    let Driven { axis, sides, owner } = along;
+    if joint.friction > 0.0 {
+        let row = JointRow::new(sides, Hold::motor(axis, joint.friction * step.h_s));
+        constraints.push(step, row, RowOwner { key: FRICTION, owes: true, ..owner });
+    }
+    if joint.armature > 0.0 {
+        let target_m_s = relative(&sides, |member| &step.progress[member].v_before);
+        let compliance_per_kg = Some(joint.armature.recip());
+        let row = JointRow { target_m_s, compliance_per_kg, ..JointRow::new(sides, Hold::along(axis)) };
+        constraints.push(step, row, RowOwner { key: ARMATURE, ..owner });
     }
 }
 

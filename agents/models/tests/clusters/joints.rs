@@ -43,33 +43,46 @@ pub fn on_world(kind: JointKind) -> Joint {
 
 const HINGE: JointKind = JointKind::Revolute { axis: DVec3::Y, range_rad: None, motor: None };
 
-/// A rod of 1 m on a hinge in the origin, tilted.
-pub fn pendulum(tilt_rad: f64, kind: JointKind, rate_hz: f64) -> Table {
+/// A rod of 1 m whose top is in the origin.
+fn tilted_rod(tilt_rad: f64) -> RigidSpec {
     let rotation = DQuat::from_rotation_y(tilt_rad);
     let start = rod(1.0, DVec3::ZERO);
-    let spec = RigidSpec { rotation, position: rotation * start.position, ..start };
-    party([spec], [Joint { anchor_a_m: DVec3::Z * 0.5, ..on_world(kind) }], rate_hz)
+    RigidSpec { rotation, position: rotation * start.position, ..start }
+}
+
+/// A rod of 1 m on a hinge in the origin, tilted.
+pub fn pendulum(tilt_rad: f64, kind: JointKind, rate_hz: f64) -> Table {
+    party([tilted_rod(tilt_rad)], [Joint { anchor_a_m: DVec3::Z * 0.5, ..on_world(kind) }], rate_hz)
 }
 
 /// Moment of inertia of the rod about its end, kg m².
 pub const ROD_KG_M2: f64 = (1.0 + 0.05 * 0.05) / 3.0;
 
-#[test]
-fn a_pendulum_on_a_hinge_swings_with_its_closed_form_period() {
-    let mut table = pendulum(0.02, HINGE, 120.0);
+/// The period of a small swing of a pendulum in 10 s, seconds, and that of its closed form with an inertia beside its own.
+fn periods(armature: f64, rate_hz: f64) -> [f64; 2] {
+    let hinge = Joint { anchor_a_m: DVec3::Z * 0.5, armature, ..on_world(HINGE) };
+    let mut table = party([tilted_rod(0.02)], [hinge], rate_hz);
     let (mut rises, mut last) = (vec![], state(&table, 0).position.x);
-    for step in 1..=1200 {
+    for step in 1..=(10.0 * rate_hz) as u32 {
         table.step();
         let now = state(&table, 0).position.x;
         if last < 0.0 && now >= 0.0 {
-            rises.push((f64::from(step) - now / (now - last)) / 120.0);
+            rises.push((f64::from(step) - now / (now - last)) / rate_hz);
         }
         last = now;
     }
-    let period = (rises[rises.len() - 1] - rises[0]) / (rises.len() - 1) as f64;
-    let wanted = std::f64::consts::TAU * (ROD_KG_M2 / (G * 0.5)).sqrt() * (1.0 + 0.02 * 0.02 / 16.0);
-    // (ω h)²/24 = 4e-5, and the crossings' interpolation
-    assert!((period / wanted - 1.0).abs() < 1e-4, "{period} is not {wanted}");
+    let found = (rises[rises.len() - 1] - rises[0]) / (rises.len() - 1) as f64;
+    let slow = 1.0 + 0.02 * 0.02 / 16.0;
+    [found, std::f64::consts::TAU * ((ROD_KG_M2 + armature) / (G * 0.5)).sqrt() * slow]
+}
+
+#[test]
+fn a_pendulum_on_a_hinge_swings_with_its_closed_form_period() {
+    for armature in [0.0, 0.5] {
+        let [period, wanted] = periods(armature, 120.0);
+        // (ω h)²/24 = 4e-5, and the crossings' interpolation
+        assert!((period / wanted - 1.0).abs() < 1e-4, "{period} is not {wanted}");
+    }
 }
 
 #[test]
@@ -349,6 +362,30 @@ fn a_body_on_a_slide_falls_along_it_and_stops_at_its_end() {
     assert!(place.distance(wanted) < 5e-5, "{place} is not {wanted}");
     let slid = run(&mut built(Some([-0.3, 0.5]))).dot(axis);
     assert!((slid - 0.5).abs() < 1e-5, "stopped at {slid} m");
+}
+
+#[test]
+fn friction_and_an_armature_act_between_the_two_bodies_of_a_hinge() {
+    let at = |x: f64| RigidSpec { gravity: DVec3::ZERO, ..block(DVec3::splat(0.1), DVec3::X * x, 1.5) };
+    let spun = RigidSpec { spin: DVec3::X * 3.0, ..at(0.0) };
+    let kind = JointKind::Revolute { axis: DVec3::X, range_rad: None, motor: None };
+    let ends = Joint {
+        anchor_a_m: DVec3::X * 0.1,
+        anchor_b_m: DVec3::X * -0.1,
+        ..Joint::new(AgentId(0), Some(AgentId(1)), kind)
+    };
+    let friction = 0.05;
+    let mut table = party([spun, at(0.2)], [Joint { armature: 0.02, friction, ..ends }], 100.0);
+    // friction turns one as much as it slows the other, and the rotor with the difference of the two
+    let inertia = 1.5 * 0.2 * 0.2 / 6.0;
+    let slows_rad_s2 = friction / (0.5 * inertia + 0.02);
+    for step in 1..=200 {
+        table.step();
+        let [a, b] = [0, 1].map(|body| state(&table, body).spin.x);
+        let wanted = (3.0 - slows_rad_s2 * f64::from(step) / 100.0).max(0.0);
+        assert!((a - b - wanted).abs() < 2e-3, "step {step}: {} rad/s for {wanted}", a - b);
+        assert!((inertia * (a + b - 3.0)).abs() < 1e-9, "step {step}");
+    }
 }
 
 #[test]

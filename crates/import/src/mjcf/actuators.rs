@@ -43,7 +43,7 @@ pub(super) fn read(root: &Element, reader: &mut BodyReader<'_>) -> Result<(), Im
             }
             Some(_) => {
                 element.read_all_within();
-                let what = "is left out: a joint of a scene has one motor or its friction, and this one has that";
+                let what = "is left out: a joint of a scene has one motor, and this one has that of another actuator";
                 reader.notes.push(element.note(what));
                 continue;
             }
@@ -65,17 +65,14 @@ struct Law {
 impl Law {
     /// That of an actuator; `None` for one that is no servo.
     fn of(element: &Element) -> Result<Option<Self>, ImportError> {
-        let value = |name: &str, default: f64| {
-            let value = element.number(name)?.unwrap_or(default);
-            if value < 0.0 { Err(element.wrong(format!("`{name}` is {value}; expected 0 or more"))) } else { Ok(value) }
-        };
+        let gain = |name: &str| if element.has(name) { element.at_least_0(name) } else { Ok(1.0) };
         let law = match element.tag.as_str() {
             "position" => {
-                let (gain, damping) = (value("kp", 1.0)?, value("kv", 0.0)?);
+                let (gain, damping) = (gain("kp")?, element.at_least_0("kv")?);
                 Self { gain, bias: 0.0, stiffness: gain, damping }
             }
             "velocity" => {
-                let gain = value("kv", 1.0)?;
+                let gain = gain("kv")?;
                 Self { gain, bias: 0.0, stiffness: 0.0, damping: gain }
             }
             "general" if element.text("biastype") == Some("affine") => {

@@ -4,7 +4,7 @@
 
 use super::bodies::{BodyReader, Host, Placed};
 use super::keyframe::Keyframe;
-use crate::imported::{ImportError, LeftOut};
+use crate::imported::ImportError;
 use crate::model::{Joint, Kind, Motor};
 use crate::pose::Pose;
 use crate::xml::Element;
@@ -58,7 +58,7 @@ impl BodyReader<'_> {
         let anchor_m = frame.point(element.numbers("pos")?.map_or(DVec3::ZERO, DVec3::from_array));
         let place = element.place.clone();
         let name = element.text("name").unwrap_or_default().to_owned();
-        let joint = Joint { name, place, parent, child, kind, anchor_m, axis: DVec3::Z, range: None, motor: None };
+        let joint = Joint { name, kind, anchor_m, ..Joint::weld(place, parent, child) };
         if kind == Kind::Spherical {
             element.read_all(&["axis", "ref", "springref"]);
             return self.ball(joint);
@@ -80,13 +80,15 @@ impl BodyReader<'_> {
         let zero = -at_rest - start;
         let axis = frame.rotation * given;
         let spring = element.number("springref")?.unwrap_or(0.0) * unit - at_rest;
-        let motor = passive(element, spring - start, self.notes)?;
+        let motor = passive(element, spring - start)?;
+        let [friction, armature] = [element.at_least_0("frictionloss")?, element.at_least_0("armature")?];
         if range.is_none() {
             element.read_all(&["limited", "solreflimit", "solimplimit", "margin"]);
         }
         let range = range.map(|range| range.map(|end| end - start));
         let [motion, to_spring] = [start, spring].map(|travel| kind.motion(anchor_m, axis, travel));
-        Ok(StartedJoint { between: Some(Joint { axis, range, motor, ..joint }), motion, to_spring, zero })
+        let between = Some(Joint { axis, range, motor, friction, armature, ..joint });
+        Ok(StartedJoint { between, motion, to_spring, zero })
     }
 
     /// A body that moves freely: where the keyframe has it in the world, or else as the file has it.
@@ -120,26 +122,11 @@ impl BodyReader<'_> {
     }
 }
 
-/// The force that holds or brakes a joint by itself: a spring to a position, with a damper, a damper, or dry friction
-/// where it has neither.
-fn passive(element: &Element, position: f64, notes: &mut Vec<LeftOut>) -> Result<Option<Motor>, ImportError> {
-    let at_least_0 = |name: &str| {
-        let value = element.number(name)?.unwrap_or(0.0);
-        if value < 0.0 { Err(element.wrong(format!("`{name}` is {value}; expected 0 or more"))) } else { Ok(value) }
-    };
-    let (stiffness, damping, friction) =
-        (at_least_0("stiffness")?, at_least_0("damping")?, at_least_0("frictionloss")?);
-    if at_least_0("armature")? > 0.0 {
-        notes.push(element.note("`armature` is left out: scenes have no inertia about the axis of a joint"));
-    }
-    if friction > 0.0 && stiffness + damping > 0.0 {
-        notes.push(element.note("`frictionloss` is left out: a joint of a scene has a spring and damper, or friction"));
-    }
+/// The spring with a damper, or the damper, that holds a joint by itself.
+fn passive(element: &Element, position: f64) -> Result<Option<Motor>, ImportError> {
+    let (stiffness, damping) = (element.at_least_0("stiffness")?, element.at_least_0("damping")?);
     if stiffness > 0.0 {
         return Ok(Some(Motor::Spring { position, stiffness, damping, max_effort: None }));
     }
-    if damping > 0.0 {
-        return Ok(Some(Motor::Damper { velocity: 0.0, damping, max_effort: None }));
-    }
-    Ok((friction > 0.0).then_some(Motor::Brake { max_effort: friction }))
+    Ok((damping > 0.0).then_some(Motor::Damper { velocity: 0.0, damping, max_effort: None }))
 }

@@ -20,7 +20,7 @@ pub(crate) use include::include;
 use crate::imported::{ImportError, LeftOut};
 use crate::masses::rescale;
 use crate::meshes::Meshes;
-use crate::model::{Model, Motor};
+use crate::model::Model;
 use crate::xml::{Element, Harmless};
 use bodies::BodyReader;
 use compiler::Compiler;
@@ -112,8 +112,7 @@ fn read_options(root: &Element, model: &mut Model, notes: &mut Vec<LeftOut>) -> 
         parts.chain(model.fixed.iter_mut().map(|fixed| &mut fixed.part)).for_each(|part| part.touches = false);
     }
     if is_off(root, "frictionloss") {
-        let brakes = model.joints.iter_mut().filter(|joint| matches!(joint.motor, Some(Motor::Brake { .. })));
-        brakes.for_each(|joint| joint.motor = None);
+        model.joints.iter_mut().for_each(|joint| joint.friction = 0.0);
     }
     Ok(())
 }

@@ -38,11 +38,7 @@ struct Ends {
 /// A tendon between two sites.
 fn tie(element: &Element, sites: [&Element; 2], reader: &mut BodyReader<'_>) -> Result<(), ImportError> {
     let Ends { ends, at_springs_m } = ends(sites, reader)?;
-    let number = |name: &str| {
-        let value = element.number(name)?.unwrap_or(0.0);
-        if value < 0.0 { Err(element.wrong(format!("`{name}` is {value}; expected 0 or more"))) } else { Ok(value) }
-    };
-    let (stiffness_n_m, damping_n_s_m) = (number("stiffness")?, number("damping")?);
+    let (stiffness_n_m, damping_n_s_m) = (element.at_least_0("stiffness")?, element.at_least_0("damping")?);
     let limits = limits(element, reader.compiler.auto_limits)?.filter(|_| reader.compiler.has_limits);
     let mut push = |kind: TieKind| reader.model.ties.push(Tie { place: element.place.clone(), ends, kind });
     if let Some([least, greatest]) = limits {

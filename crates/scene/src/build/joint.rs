@@ -83,7 +83,10 @@ fn place_joint(c: &mut Checker<'_, '_>, index: usize, file: &JointFile, objects:
         return None;
     }
     let (ends, anchors, free_motion, collide) = ([a, b], [from, to], free?, collide(file));
-    let placed = PlacedJoint { place, ends, anchors, free_motion, collide, limits };
+    // the keys of other kinds are refused
+    let friction = file.friction_n_m.or(file.friction_n).unwrap_or(0.0);
+    let armature = file.armature_kg_m2.or(file.armature_kg).unwrap_or(0.0);
+    let placed = PlacedJoint { place, ends, anchors, free_motion, collide, limits, friction, armature };
     check_start(c, &placed).then_some(placed)
 }
 
@@ -182,8 +185,10 @@ impl PlacedJoint {
             None => (to, DQuat::IDENTITY),
         };
         let rest = (a.rotation.conjugate() * rotation_b).normalize();
-        let (collide, ForceLimits { tears_above_n, yields_above_n }) = (self.collide, self.limits);
+        let Self { collide, limits: ForceLimits { tears_above_n, yields_above_n }, friction, armature, .. } = *self;
         let anchor_a_m = a.to_local(from);
-        Joint { a: id, b: b.agent, kind, anchor_a_m, anchor_b_m, rest, collide, tears_above_n, yields_above_n }
+        let limited =
+            Joint { collide, tears_above_n, yields_above_n, friction, armature, ..Joint::new(id, b.agent, kind) };
+        Joint { anchor_a_m, anchor_b_m, rest, ..limited }
     }
 }

@@ -10,15 +10,27 @@ use metachron_models::rigid::JointKind;
 /// An axis shorter than this has no direction.
 const AXIS_MIN: f64 = 1e-9;
 /// The keys that not all kinds have.
-const OWN: [&str; 8] =
-    ["axis", "range_m", "range_deg", "motor", "stiffness_n_m", "damping_n_s_m", "rest_m", "length_m"];
+const OWN: [&str; 12] = [
+    "axis",
+    "range_m",
+    "range_deg",
+    "motor",
+    "friction_n_m",
+    "friction_n",
+    "armature_kg_m2",
+    "armature_kg",
+    "stiffness_n_m",
+    "damping_n_s_m",
+    "rest_m",
+    "length_m",
+];
 
 /// The keys of each kind that not all kinds have: required ones, then optional ones.
 const fn keys_of(kind: Kind) -> (&'static [&'static str], &'static [&'static str]) {
     match kind {
         Kind::Fixed | Kind::Spherical => (&[], &[]),
-        Kind::Revolute => (&["axis"], &["range_deg", "motor"]),
-        Kind::Prismatic => (&["axis"], &["range_m", "motor"]),
+        Kind::Revolute => (&["axis"], &["range_deg", "motor", "friction_n_m", "armature_kg_m2"]),
+        Kind::Prismatic => (&["axis"], &["range_m", "motor", "friction_n", "armature_kg"]),
         Kind::Spring => (&["stiffness_n_m"], &["damping_n_s_m", "rest_m"]),
         Kind::Rope => (&[], &["length_m"]),
     }

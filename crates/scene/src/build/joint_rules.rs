@@ -22,6 +22,9 @@ pub(super) struct PlacedJoint {
     pub(super) free_motion: JointKind,
     pub(super) collide: bool,
     pub(super) limits: ForceLimits,
+    /// Of a hinge or slide.
+    pub(super) friction: f64,
+    pub(super) armature: f64,
 }
 
 impl PlacedJoint {

@@ -25,6 +25,7 @@ const SPEED: NumberRange = around(1e4, "");
 const STIFFNESS: NumberRange = NumberRange::new(1e-6, 1e9, "N/m");
 const DAMPING: NumberRange = NumberRange::new(0.0, 1e7, "N·s/m");
 const EFFORT: NumberRange = NumberRange::new(1e-9, 1e9, "N·m or N");
+const RESISTS: NumberRange = NumberRange::new(0.0, 1e9, "");
 const FORCE: NumberRange = NumberRange::new(1e-6, 1e9, "N");
 /// Fractions and shares.
 pub const SHARE: NumberRange = NumberRange::new(0.0, 1.0, "");
@@ -89,6 +90,10 @@ const KEYS: Ranges = Ranges(&[
     ("velocity_rad_s", SPEED),
     ("max_torque_n_m", EFFORT),
     ("max_force_n", EFFORT),
+    ("friction_n_m", RESISTS),
+    ("friction_n", RESISTS),
+    ("armature_kg_m2", RESISTS),
+    ("armature_kg", RESISTS),
     ("stiffness_n_m_rad", STIFFNESS),
     ("damping_n_m_s_rad", DAMPING),
     // springs along a tube, and its peristalsis
