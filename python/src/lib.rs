@@ -60,6 +60,6 @@ mod _metachron {
     fn init(module: &pyo3::Bound<'_, pyo3::types::PyModule>) -> pyo3::PyResult<()> {
         use pyo3::types::PyModuleMethods as _;
         metachron::scenes::provide();
-        module.add("__version__", crate::pickled::VERSION)
+        module.add("__version__", env!("CARGO_PKG_VERSION"))
     }
 }

@@ -38,6 +38,7 @@ Examples:
   metachron run cavity --device simulated=probe        a hand at 1 kHz leads the probe; its force is in the report
   METACHRON_EXECUTOR=lockstep metachron run overload --headless
 
+Files that grow with the run take the place of older ones when it begins, all others when they are whole.
 Flags go before --set, --set before the environment (METACHRON_…), that before the scene, and the scene before defaults.
 Data goes to standard output, messages to standard error.";
 
@@ -48,7 +49,8 @@ Examples:
   metachron replay tube.rec --until 2.5 --png then.png
 
 A recording has the scene, what was changed in it, and all that was done; one that was cut short or
-is damaged is repeated as far as it goes, with a warning.";
+is damaged is repeated as far as it goes, with a warning. Files beside the scene are read again:
+a run with --allow-outside is repeated with --allow-outside.";
 
 const CHECK_EXAMPLES: &str = "\
 Examples:
@@ -291,7 +293,7 @@ pub struct RunArgs {
     /// Policy that chooses the level of detail of every visible object
     #[arg(long, env = "METACHRON_POLICY", value_parser = PossibleValuesParser::new(PolicyKind::ALL.map(PolicyKind::name)))]
     pub policy: Option<String>,
-    /// The feedback law: corrected (its gain does not depend on the machine) or printed (as in the paper)
+    /// The law of the policy feedback: corrected (its gain does not depend on the machine) or printed (as in the paper)
     #[arg(long, env = "METACHRON_LAW", value_parser = PossibleValuesParser::new(["corrected", "printed"]))]
     pub law: Option<String>,
     /// Take the gains of the feedback law from this file (TOML, as `metachron tune` writes it); --set and flags take precedence over it
@@ -322,7 +324,7 @@ pub struct RunArgs {
     /// gamepad=OBJECT in builds with the feature `gamepad`; may be repeated (not in lockstep)
     #[arg(long = "device", value_name = "KIND=OBJECT", value_parser = super::devices::wish, conflicts_with = "oracle")]
     pub device: Vec<DeviceWish>,
-    /// Write down what is done to the run, so that `metachron replay` repeats it to the bit
+    /// Write down what is done to the run, so that `metachron replay` repeats it to the bit; the file grows with the run
     #[arg(long, value_name = "FILE", value_hint = ValueHint::FilePath)]
     pub record: Option<PathBuf>,
     /// How far the scene may go.
@@ -345,10 +347,12 @@ pub struct OutputArgs {
     /// See with this one of the scene's cameras, by name; the first where none is given
     #[arg(long, value_name = "NAME")]
     pub camera: Option<String>,
-    /// Write a film of all frames here (YUV4MPEG2, which ffmpeg and most players read); late frames show as on the screen. Not of a window
+    /// Write a film of all frames here (YUV4MPEG2, which ffmpeg and most players read), which grows with the run; late frames show as on the
+    /// screen. Not of a window
     #[arg(long, value_name = "FILE", value_hint = ValueHint::FilePath)]
     pub video: Option<PathBuf>,
-    /// Write every frame's states, surfaces, contacts, joints and events here as MCAP, which Foxglove, Lichtblick and Rerun open. Not of a window
+    /// Write every frame's states, surfaces, contacts, joints and events here as MCAP, which Foxglove, Lichtblick and Rerun open; the file grows
+    /// with the run. Not of a window
     #[arg(long, value_name = "FILE", value_hint = ValueHint::FilePath)]
     pub mcap: Option<PathBuf>,
     /// Write every frame's surfaces, objects and contacts into this folder as VTK series, which ParaView opens (series.pvd, objects.pvd,
@@ -361,8 +365,8 @@ pub struct OutputArgs {
     /// Write all frames' surfaces here as one animated binary glTF, which Blender, three.js and game engines play; 256 MiB at most. Not of a window
     #[arg(long, value_name = "FILE", value_hint = ValueHint::FilePath)]
     pub animation: Option<PathBuf>,
-    /// Write here when each object stepped and waited, the frames and their parts, and events (JSON, which ui.perfetto.dev opens); 256 MiB at
-    /// most. Not of a window
+    /// Write here when each object stepped and waited, the frames and their parts, and events (JSON, which ui.perfetto.dev opens), in a file that
+    /// grows with the run, 256 MiB at most. Not of a window
     #[arg(long, value_name = "FILE", value_hint = ValueHint::FilePath)]
     pub perfetto: Option<PathBuf>,
     /// Style of headless pictures: wireframe, or contact forces, or colours by resolution, age, detail or depth; several are separated by commas

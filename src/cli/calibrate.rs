@@ -6,7 +6,7 @@
 use super::args::CalibrateArgs;
 use anyhow::Context;
 use metachron_console::exit::Exit;
-use metachron_console::gains::check_output_path;
+use metachron_console::files::{check_output_path, write_file};
 use metachron_console::output::{BadInput, data, message};
 use metachron_lod::control::{AREAS_PX, Prices, Shading, Stages, Stroke};
 use metachron_render::Gpu;
@@ -24,7 +24,7 @@ pub(super) fn command(args: &CalibrateArgs) -> anyhow::Result<Exit> {
     let gpu = Gpu::headless().context("what drawing costs cannot be measured")?;
     let table = table(args, &gpu)?;
     if let Some(path) = &args.export {
-        std::fs::write(path, table.export()).with_context(|| format!("{} cannot be written", path.display()))?;
+        write_file(path, table.export())?;
     }
     data(&if args.json { table.export() } else { text(&table) })?;
     Ok(Exit::Ok)

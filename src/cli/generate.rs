@@ -5,7 +5,7 @@
 use super::args::GenerateArgs;
 use anyhow::Context;
 use metachron_console::exit::Exit;
-use metachron_console::gains::check_output_path;
+use metachron_console::files::{check_output_path, write_file};
 use metachron_console::output::{BadInput, data, message};
 use metachron_scene::papers::{Choices, Paper};
 
@@ -21,8 +21,7 @@ pub(super) fn command(args: &GenerateArgs) -> anyhow::Result<Exit> {
         None => data(&text)?,
         Some(path) => {
             check_output_path(path, "--out", args.force)?;
-            let refused = |why: std::io::Error| BadInput(format!("{} cannot be written: {why}", path.display()));
-            std::fs::write(path, text).map_err(refused)?;
+            write_file(path, text)?;
             message(&format!("scene: {}", path.display()));
         }
     }

@@ -5,8 +5,9 @@
 //! model means.
 
 use super::args::ImportArgs;
+use anyhow::Context;
 use metachron_console::exit::Exit;
-use metachron_console::gains::check_output_path;
+use metachron_console::files::{check_output_path, check_unread, write_file};
 use metachron_console::output::{BadInput, data, message, print_overlaps, rendered};
 use metachron_import::{Folders, Imported, LeftOut, MeshFile, Options, Overlap};
 use metachron_scene::{Limits, SCENE_BYTES_MAX, SceneError, Source, load, read_surface};
@@ -74,9 +75,14 @@ pub(super) fn command(args: &ImportArgs) -> anyhow::Result<Exit> {
         Some(path) => {
             let srdf = args.srdf.clone().unwrap_or_else(|| args.model.with_extension("srdf"));
             let files_read = files_read.into_inner().into_iter().chain([srdf]);
-            let files_read: Vec<_> = files_read.filter_map(|file| file.canonicalize().ok()).collect();
-            check_unread(path, &files_read)?;
-            write_meshes(&imported.files, &scene_folder, |path| check_mesh(path, &files_read, args.force))?;
+            let files_read: Vec<_> = files_read.collect();
+            let check_unread =
+                |path: &Path| check_unread("--out", path, "the model", files_read.iter().map(PathBuf::as_path));
+            check_unread(path)?;
+            write_meshes(&imported.files, &scene_folder, |path| {
+                check_unread(path)?;
+                check_mesh(path, args.force)
+            })?;
             write(path, imported.toml.as_bytes())?;
             message(&format!("scene: {}", path.display()));
         }
@@ -114,22 +120,13 @@ fn scene_of(imported: &Imported, name: &str, folder: &Path) -> Result<Checked, S
     Ok(Checked { scene: load(&source, &[])?, files_outside: source.files_outside().len() })
 }
 
-/// Refuses to write over a file that the model was read from.
-fn check_unread(path: &Path, files_read: &[PathBuf]) -> anyhow::Result<()> {
-    match path.canonicalize().is_ok_and(|path| files_read.contains(&path)) {
-        true => Err(BadInput(format!("{} is read; expected another --out", path.display())).into()),
-        false => Ok(()),
-    }
-}
-
 /// Refuses a mesh where a link leads elsewhere, or where a file is that may not be written over.
-fn check_mesh(path: &Path, files_read: &[PathBuf], force: bool) -> anyhow::Result<()> {
+fn check_mesh(path: &Path, force: bool) -> anyhow::Result<()> {
     let refuse = |path: &Path, what: &str| Err(BadInput(format!("{} {what}", path.display())).into());
     let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty());
     if let Some(link) = folder.into_iter().chain([path]).find(|path| path.is_symlink()) {
         return refuse(link, "is a link; expected a folder or file of its own for meshes");
     }
-    check_unread(path, files_read)?;
     match std::fs::symlink_metadata(path) {
         Ok(_) if !force => refuse(path, "exists already; --force overwrites it, --out FILE names another scene"),
         Ok(about) if !about.is_file() => refuse(path, "is no plain file"),
@@ -140,8 +137,9 @@ fn check_mesh(path: &Path, files_read: &[PathBuf], force: bool) -> anyhow::Resul
 /// Writes a file, and the folder that it is in where there is none.
 fn write(path: &Path, bytes: &[u8]) -> anyhow::Result<()> {
     let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty());
-    let made = folder.map_or(Ok(()), std::fs::create_dir_all).and_then(|()| std::fs::write(path, bytes));
-    made.map_err(|why| BadInput(format!("{} cannot be written: {why}", path.display())).into())
+    let made = folder.map_or(Ok(()), std::fs::create_dir_all);
+    made.with_context(|| format!("{} cannot be made", folder.unwrap_or(path).display()))?;
+    write_file(path, bytes)
 }
 
 fn overlaps(scene: &Scene) -> Vec<Overlap> {

@@ -5,7 +5,7 @@
 
 use super::args::ReplayArgs;
 use super::play::{GoOn, headless};
-use super::run::{Request, RunLength, check_outputs, finish, stem, style};
+use super::run::{Request, RunLength, check_outputs, check_read, finish, stem, style};
 use metachron_console::exit::Exit;
 use metachron_console::output::{BadInput, message};
 use metachron_core::{SimSpan, SimTime};
@@ -16,7 +16,7 @@ use std::path::Path;
 
 /// Repeats a recording.
 pub(super) fn command(args: &ReplayArgs) -> anyhow::Result<Exit> {
-    check_outputs(&args.output, &[("the recording", Some(&args.recording))], None)?;
+    check_outputs(&args.output, Some(("the recording", args.recording.as_path())), None)?;
     let recording = Recording::read(&args.recording).map_err(bad_file)?;
     let path = args.recording.display();
     let scene = recording.scene().ok_or_else(|| {
@@ -34,8 +34,10 @@ pub(super) fn command(args: &ReplayArgs) -> anyhow::Result<Exit> {
         };
         message(&format!("warning: {path} {what}: it is repeated to its last whole chunk{left_out}"));
     }
+    let scene = load(&source, &overrides)?;
+    check_read(&args.output, None, &source)?;
     let request = Request {
-        scene: load(&source, &overrides)?,
+        scene,
         quiet: args.output.quiet,
         overrides,
         // the recording says how time passed

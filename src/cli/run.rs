@@ -11,6 +11,7 @@ use anyhow::Context;
 use clap::ArgMatches;
 use clap::parser::ValueSource;
 use metachron_console::exit::Exit;
+use metachron_console::files::{check_unread, write_file};
 use metachron_console::output::{BadInput, data, message, print_overlaps, warn_priority};
 use metachron_console::progress::Bar;
 use metachron_export::VtkSeries;
@@ -18,9 +19,7 @@ use metachron_render::{Colouring, Style};
 use metachron_scene::{Source, load};
 use metachron_session::FrameRecord;
 use metachron_session::report::{Report, Verdict};
-use metachron_world::{Pace, Scene};
-use std::fs::File;
-use std::io::{BufWriter, Write};
+use metachron_world::{Pace, Scene, is_same_file};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -183,6 +182,7 @@ fn request(args: &RunArgs, matches: Option<&ArgMatches>) -> anyhow::Result<Reque
     let overrides: Vec<_> = given(true).chain(gains).chain(args.set.iter().cloned()).chain(given(false)).collect();
     let source = Source::open(&args.scene)?.within(args.limits.limits());
     let scene = load(&source, &overrides)?;
+    check_read(&args.output, args.record.as_deref(), &source)?;
     let end = args.frames.map(RunLength::Frames).or(args.seconds.map(RunLength::Seconds));
     let png_without_window = format!("metachron-{}.png", stem(&scene.name)).into();
     Ok(Request {
@@ -262,21 +262,13 @@ fn check_inputs(args: &RunArgs) -> anyhow::Result<()> {
         return Err(BadInput(format!("{flag} needs a run without a window; add --headless")).into());
     }
     devices::check(&args.device)?;
-    let scene = Path::new(&args.scene);
-    let inputs = [("the scene", Some(scene).filter(|path| path.is_file())), ("--gains", args.gains.as_deref())];
-    check_outputs(&args.output, &inputs, args.record.as_deref())
+    check_outputs(&args.output, args.gains.as_deref().map(|gains| ("--gains", gains)), args.record.as_deref())
 }
 
-/// Refuses two outputs on standard output, files in missing folders, and an output that would overwrite another one or one of `inputs`.
-pub(super) fn check_outputs(
-    args: &OutputArgs,
-    inputs: &[(&str, Option<&Path>)],
-    record: Option<&Path>,
-) -> anyhow::Result<()> {
-    if args.json && args.report.as_deref() == Some(Path::new("-")) {
-        return Err(BadInput("--json and --report - both print the report; choose one".to_owned()).into());
-    }
-    let files = [
+/// The files that a run writes, by their flags.
+fn files<'a>(args: &'a OutputArgs, record: Option<&'a Path>) -> [(&'static str, Option<&'a Path>); 10] {
+    [
+        ("--report", args.report.as_deref().filter(|path| *path != Path::new("-"))),
         ("--png", args.png.as_deref()),
         ("--depth", args.depth.as_deref()),
         ("--video", args.video.as_deref()),
@@ -286,7 +278,27 @@ pub(super) fn check_outputs(
         ("--perfetto", args.perfetto.as_deref()),
         ("--frames-csv", args.frames_csv.as_deref()),
         ("--record", record),
-    ];
+    ]
+}
+
+/// Refuses an output that would overwrite a file that the scene was read from.
+pub(super) fn check_read(args: &OutputArgs, record: Option<&Path>, source: &Source) -> anyhow::Result<()> {
+    let read = source.files();
+    files(args, record).into_iter().try_for_each(|(flag, path)| {
+        path.map_or(Ok(()), |path| check_unread(flag, path, "the scene", read.iter().map(|file| &*file.path)))
+    })
+}
+
+/// Refuses two outputs on standard output, files in missing folders, and an output that would overwrite another one or `input`.
+pub(super) fn check_outputs(
+    args: &OutputArgs,
+    input: Option<(&str, &Path)>,
+    record: Option<&Path>,
+) -> anyhow::Result<()> {
+    if args.json && args.report.as_deref() == Some(Path::new("-")) {
+        return Err(BadInput("--json and --report - both print the report; choose one".to_owned()).into());
+    }
+    let files = files(args, record);
     for (flag, path) in files {
         if path == Some(Path::new("-")) {
             return Err(BadInput(format!(
@@ -299,9 +311,7 @@ pub(super) fn check_outputs(
         return Err(BadInput("--vtk - would be a folder called -; name another".to_owned()).into());
     }
     args.vtk.as_deref().map_or(Ok(()), check_series)?;
-    let report = ("--report", args.report.as_deref().filter(|path| *path != Path::new("-")));
-    let outputs = [report].into_iter().chain(files);
-    for path in outputs.clone().filter_map(|(_, path)| path) {
+    for path in files.iter().filter_map(|(_, path)| *path) {
         let folder = path.parent().filter(|p| !p.as_os_str().is_empty());
         if folder.is_some_and(|f| !f.is_dir()) {
             return Err(BadInput(format!("the folder of {} does not exist", path.display())).into());
@@ -311,8 +321,9 @@ pub(super) fn check_outputs(
         }
     }
     let series: Vec<_> = args.vtk.iter().flat_map(|folder| VtkSeries::FILES.map(|name| folder.join(name))).collect();
-    let series = series.iter().map(|path| ("--vtk", Some(path.as_path())));
-    check_distinct(inputs.iter().copied().chain(outputs).chain(series), inputs.len())?;
+    let series = series.iter().map(|path| ("--vtk", path.as_path()));
+    let outputs = files.iter().filter_map(|(flag, path)| Some((*flag, (*path)?)));
+    check_distinct(&input.into_iter().chain(outputs).chain(series).collect::<Vec<_>>())?;
     check_extension(args)
 }
 
@@ -345,32 +356,16 @@ fn check_extension(args: &OutputArgs) -> anyhow::Result<()> {
     Ok(())
 }
 
-/// Refuses an output that would overwrite another one, or an input; the first `inputs` of `files` are inputs, which may be the same file.
-fn check_distinct<'a>(files: impl Iterator<Item = (&'a str, Option<&'a Path>)>, inputs: usize) -> anyhow::Result<()> {
-    let places: Vec<_> = files
-        .enumerate()
-        .filter_map(|(number, (what, path))| Some((number, what, path?, resolved_path(path?)?)))
-        .collect();
-    for (k, (number, what, path, at)) in places.iter().enumerate().skip(1) {
-        let before = places[..k].iter().find(|(_, _, _, other)| other == at && *number >= inputs);
-        if let Some((_, other, ..)) = before {
+/// Refuses an output that would overwrite another one, or an input, by a link too.
+fn check_distinct(files: &[(&str, &Path)]) -> anyhow::Result<()> {
+    for (k, (what, path)) in files.iter().enumerate() {
+        if let Some((other, _)) = files[..k].iter().find(|(_, other)| is_same_file(path, other)) {
             let why =
                 format!("{what} {} would overwrite {other}, which is the same file; name another", path.display());
             return Err(BadInput(why).into());
         }
     }
     Ok(())
-}
-
-/// The place of a file, existing or not, independent of how its path is written; `None` for devices, which take any output.
-fn resolved_path(path: &Path) -> Option<PathBuf> {
-    match path.canonicalize() {
-        Ok(there) => there.is_file().then_some(there),
-        Err(_) => {
-            let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
-            Some(folder.canonicalize().ok()?.join(path.file_name()?))
-        }
-    }
 }
 
 fn write_all(args: &OutputArgs, played: &Played) -> anyhow::Result<()> {
@@ -380,8 +375,7 @@ fn write_all(args: &OutputArgs, played: &Played) -> anyhow::Result<()> {
     match args.report.as_ref().or(fallback.as_ref()) {
         Some(path) if path == Path::new("-") => data(&report)?,
         Some(path) => {
-            std::fs::write(path, &report)
-                .with_context(|| format!("the report {} cannot be written", path.display()))?;
+            write_file(path, &report)?;
             if !args.quiet {
                 message(&format!("report: {}", path.display()));
             }
@@ -389,8 +383,7 @@ fn write_all(args: &OutputArgs, played: &Played) -> anyhow::Result<()> {
         None => {}
     }
     if let Some(path) = &args.frames_csv {
-        write_frames(path, &played.frames)
-            .with_context(|| format!("the frames {} cannot be written", path.display()))?;
+        write_frames(path, &played.frames)?;
     }
     if !args.quiet {
         print_notes(played);
@@ -425,12 +418,9 @@ fn print_notes(played: &Played) {
 }
 
 fn write_frames(path: &Path, frames: &[FrameRecord]) -> anyhow::Result<()> {
-    let mut rows = csv::Writer::from_writer(BufWriter::new(File::create(path)?));
-    for frame in frames {
-        rows.serialize(frame)?;
-    }
-    rows.into_inner().map_err(|e| e.into_error())?.flush()?;
-    Ok(())
+    let mut rows = csv::Writer::from_writer(Vec::new());
+    frames.iter().try_for_each(|frame| rows.serialize(frame))?;
+    write_file(path, rows.into_inner()?)
 }
 
 fn judge(args: &OutputArgs, played: &Played) -> anyhow::Result<Exit> {

@@ -55,11 +55,11 @@ const ABSENT: [(&str, &[&str]); 11] = [
     ("crates/session", &["egui", "std::thread::spawn"]),
 ];
 
-/// Where a crate that otherwise knows no file has one: files that the program itself has written, and reads again.
+/// Where a crate that otherwise knows no file has one: files that the program writes, and those of its own that it reads again.
 const OWN_FILES: [&str; 3] = [
     "crates/world/src/history/checkpoint.rs",
+    "crates/world/src/history/output_file.rs",
     "crates/world/src/history/recording.rs",
-    "crates/world/src/history/recording_file.rs",
 ];
 
 /// Modules of the numbers that need neither the standard library nor a type of the engine.
@@ -131,7 +131,7 @@ const RINGS: [(&str, usize); 20] = [
 
 /// Most production lines of Rust in all crates and the Python module: neither blank, comment nor test code. Work that needs
 /// more raises it beforehand, in a commit that names what the lines are for.
-const LINES_MAX: usize = 105_300;
+const LINES_MAX: usize = 105_520;
 
 fn root() -> PathBuf {
     PathBuf::from(env!("CARGO_MANIFEST_DIR"))

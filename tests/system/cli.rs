@@ -134,7 +134,7 @@ fn import_writes_the_meshes_that_scenes_do_not_read_and_its_list_as_json() {
         assert!(code(&done) == 2 && err(&done).contains(why), "{out}: {}", err(&done));
     };
     refused("scene.toml", &[], "t.obj exists already; --force overwrites it");
-    refused("r.urdf", &["--force"], "r.urdf is read; expected another --out");
+    refused("r.urdf", &["--force"], "r.urdf, which the model is read from; name another file");
     #[cfg(unix)]
     {
         std::os::unix::fs::symlink(path("scene-meshes"), path("other-meshes")).unwrap();

@@ -3,7 +3,6 @@
 //! In: text. Out: a candidate with its gains, or overrides of a scene. Never here: which gains are good.
 
 use super::output::BadInput;
-use anyhow::Context;
 use metachron_core::{NumberRange, gains};
 use metachron_lod::adaptive::{DEFAULT_MARGIN, MARGIN_MAX};
 use metachron_lod::control::{Law, RateGains};
@@ -155,22 +154,6 @@ pub fn fragment(law: Law, agents: Option<RateGains>, comment: &str) -> String {
     format!("{comment}[target]\npolicy = \"feedback\"\n{gains}{agents}")
 }
 
-/// Refuses a path that is already taken, or in a folder that does not exist.
-pub fn check_output_path(path: &Path, flag: &str, force: bool) -> anyhow::Result<()> {
-    let folder = path.parent().filter(|p| !p.as_os_str().is_empty());
-    if folder.is_some_and(|f| !f.is_dir()) {
-        return Err(BadInput(format!("the folder of {} does not exist", path.display())).into());
-    }
-    if path.is_dir() {
-        return Err(BadInput(format!("{} is a folder; expected a file", path.display())).into());
-    }
-    if path.exists() && !force {
-        let why = format!("{} exists already; --force overwrites it, {flag} FILE names another file", path.display());
-        return Err(BadInput(why).into());
-    }
-    Ok(())
-}
-
 /// The scene overrides in the fragment at `path`.
 ///
 /// # Errors
@@ -194,11 +177,6 @@ pub fn overrides(path: &Path) -> anyhow::Result<Vec<(String, String)>> {
         );
     }
     Ok(target.iter().map(|(key, value)| (format!("target.{key}"), value.to_string())).collect())
-}
-
-/// Writes the fragment.
-pub fn write(path: &Path, fragment: &str) -> anyhow::Result<()> {
-    std::fs::write(path, fragment).with_context(|| format!("the gains file {} cannot be written", path.display()))
 }
 
 #[cfg(test)]
@@ -245,7 +223,7 @@ mod tests {
         let path = folder.path().join("gains.toml");
         let law = Law::Corrected { kappa: 0.375, lead: 0.125, margin: 0.0625 };
         let agents = RateGains { refine: 0.75, yielding: 0.25 };
-        write(&path, &fragment(law, Some(agents), "one\ntwo")).unwrap();
+        std::fs::write(&path, fragment(law, Some(agents), "one\ntwo")).unwrap();
         let over = overrides(&path).unwrap();
         let value = |key: &str| over.iter().find(|(k, _)| k == key).map(|(_, v)| v.as_str());
         assert_eq!(value("target.kappa"), Some("0.375"));

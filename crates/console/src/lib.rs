@@ -16,6 +16,7 @@
 //! ```
 
 pub mod exit;
+pub mod files;
 pub mod gains;
 pub mod output;
 pub mod progress;

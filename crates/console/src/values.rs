@@ -8,7 +8,8 @@ use metachron_scene::Limits;
 /// How far a scene may go, as arguments of every command that reads one.
 #[derive(Debug, Clone, Copy, Args)]
 pub struct LimitArgs {
-    /// Refuse a scene that is estimated to take more memory, such as 512MiB or 2GiB; half of the machine's where not given
+    /// Refuse a scene that is estimated to take more memory, such as 512MiB or 2GiB; half of the machine's, or of its
+    /// control group's, where not given
     #[arg(long, value_name = "SIZE", value_parser = memory)]
     pub memory_limit: Option<u64>,
     /// Read files that the scene names outside of its folder, by `..` or behind links
@@ -89,12 +90,15 @@ pub fn target_fps(text: &str) -> Result<f64, String> {
 /// # Errors
 /// A sentence that says what was expected.
 pub fn memory(text: &str) -> Result<u64, String> {
-    let expected = || "expected 1MiB to 1048576GiB, such as 512MiB or 1.5GiB".to_owned();
+    let least = Limits::MEMORY_LEAST_BYTES;
+    let expected = || {
+        format!("expected {}MiB, the least that holds an object, to 1048576GiB, such as 512MiB or 1.5GiB", least >> 20)
+    };
     let units = [("MiB", 20_u32), ("GiB", 30)];
     let split = |(unit, shift)| Some((text.strip_suffix(unit)?.trim().parse::<f64>().ok()?, shift));
     let (amount, shift) = units.into_iter().find_map(split).ok_or_else(expected)?;
     let bytes = amount * f64::from(1_u32 << shift);
-    (1_048_576.0..=1.125_899_906_842_624e15).contains(&bytes).then_some(bytes as u64).ok_or_else(expected)
+    (least as f64..=1.125_899_906_842_624e15).contains(&bytes).then_some(bytes as u64).ok_or_else(expected)
 }
 
 /// Parses a number from `least` to `greatest`.
@@ -149,7 +153,9 @@ mod tests {
     fn amounts_of_memory_have_a_unit() {
         assert_eq!(memory("512MiB"), Ok(512 << 20));
         assert_eq!(memory("1.5 GiB"), Ok(3 << 29));
-        for bad in ["512", "0MiB", "-1GiB", "nanGiB", "2GB", "1e9GiB", "MiB"] {
+        assert_eq!(memory("10MiB"), Ok(10 << 20));
+        assert!(memory("9MiB").unwrap_err().starts_with("expected 10MiB, the least"));
+        for bad in ["512", "0MiB", "9.99MiB", "-1GiB", "nanGiB", "2GB", "1e9GiB", "MiB"] {
             assert!(memory(bad).is_err(), "{bad}");
         }
     }

@@ -13,11 +13,10 @@ use glam::{DQuat, DVec3};
 use mcap::records::MessageHeader;
 use mcap::{Compression, McapError, WriteOptions, Writer};
 use metachron_core::{AgentId, Body, SimTime};
-use metachron_world::{Event, Happening};
+use metachron_world::{Event, Happening, OutputFile};
 use serde_json::{Value, json};
 use std::borrow::Cow;
 use std::collections::{BTreeMap, BTreeSet};
-use std::fs::File;
 use std::io::BufWriter;
 use std::path::{Path, PathBuf};
 
@@ -42,10 +41,10 @@ const FIXED: &str = "fixed";
 /// most, the `normal` there towards the object, the `force` on the object (the mean of its last step) and `depth`.
 /// `/joint_states`: position, velocity and effort of all hinges and slides by name, where there are any.
 /// `/events`: each as a sentence under the name of its object at the time of that object, with its kind as `event` and the other object as `with`.
-/// A file that was cut short opens up to about its last second.
+/// It can be read while it grows, and one that was cut short opens up to about its last second.
 pub struct McapFile {
     path: PathBuf,
-    writer: Writer<BufWriter<File>>,
+    writer: Writer<BufWriter<OutputFile>>,
     channels: Channels,
     sequence: u32,
     flushed: SimTime,
@@ -73,12 +72,12 @@ impl std::fmt::Debug for McapFile {
 }
 
 impl McapFile {
-    /// Begins a file, over one that exists; `fixed` are the solids that never move.
+    /// Begins a file, in place of one that exists; `fixed` are the solids that never move.
     ///
     /// # Errors
     /// [`ExportError`] where it cannot be written.
     pub fn create(path: &Path, fixed: &Surface) -> Result<Self, ExportError> {
-        let file = BufWriter::new(File::create(path).map_err(ExportError::at(path))?);
+        let file = BufWriter::new(OutputFile::growing(path).map_err(ExportError::at(path))?);
         let options = WriteOptions::new()
             .compression(Some(Compression::Lz4))
             .library(concat!("metachron ", env!("CARGO_PKG_VERSION")));

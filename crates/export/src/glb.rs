@@ -15,6 +15,7 @@ use corners::Corners;
 use glam::DVec3;
 use metachron_core::Body;
 use metachron_geometry::{Triangles, is_closed, welded};
+use metachron_world::OutputFile;
 use serde_json::{Value, json};
 use std::path::Path;
 
@@ -26,13 +27,13 @@ const UNSIGNED_INT: u32 = 5125;
 const VERTICES: u32 = 34962;
 const INDICES: u32 = 34963;
 
-/// Writes a moment as a file, over one that exists; `fixed` are the solids that never move.
+/// Writes a moment as a file, in place of one that exists once it is whole; `fixed` are the solids that never move.
 ///
 /// # Errors
 /// [`ExportError::File`].
 pub fn write_glb(path: &Path, moment: &Moment, fixed: &Surface) -> Result<(), ExportError> {
     let bytes = glb(moment, fixed).map_err(ExportError::at(path))?;
-    std::fs::write(path, bytes).map_err(ExportError::at(path))
+    OutputFile::write(path, bytes).map_err(ExportError::at(path))
 }
 
 /// A moment as the bytes of a file. A rigid body's points are in its own axes, and its node says where it is; a

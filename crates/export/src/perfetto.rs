@@ -8,9 +8,8 @@
 use super::ExportError;
 use metachron_core::{AgentId, SimSpan, SimTime};
 use metachron_runtime::{AgentHandle, StreamReader, Turn};
-use metachron_world::{Event, EventFilter, Events, Happening, World};
+use metachron_world::{Event, EventFilter, Events, Happening, OutputFile, World};
 use serde_json::{Map, Value, json};
-use std::fs::File;
 use std::io::{BufWriter, Write};
 use std::path::{Path, PathBuf};
 use std::time::Duration;
@@ -36,11 +35,11 @@ pub struct Frame {
 
 /// A trace in a file: slices for steps, with dt, ε, lateness and leader, and for waits; instants for events.
 ///
-/// It takes [`PerfettoFile::BYTES_MAX`] bytes at most: later entries are left out, and [`PerfettoFile::is_full`] says
+/// It can be read while it grows, and one that was cut short opens as far as it goes. It takes [`PerfettoFile::BYTES_MAX`] bytes at most: later entries are left out, and [`PerfettoFile::is_full`] says
 /// so.
 pub struct PerfettoFile {
     path: PathBuf,
-    file: BufWriter<File>,
+    file: BufWriter<OutputFile>,
     world: World,
     events: Events,
     lanes: Vec<Lane>,
@@ -69,12 +68,12 @@ impl PerfettoFile {
     /// The most bytes of a file.
     pub const BYTES_MAX: u64 = BYTES_MAX;
 
-    /// Begins a file, over one that exists, with the turns and events of the world from now on.
+    /// Begins a file, in place of one that exists, with the turns and events of the world from now on.
     ///
     /// # Errors
     /// [`ExportError::File`].
     pub fn create(path: &Path, world: &World) -> Result<Self, ExportError> {
-        let mut file = BufWriter::new(File::create(path).map_err(ExportError::at(path))?);
+        let mut file = BufWriter::new(OutputFile::growing(path).map_err(ExportError::at(path))?);
         file.write_all(b"[").map_err(ExportError::at(path))?;
         let mut it = Self {
             path: path.to_owned(),

@@ -12,9 +12,8 @@ use super::{ExportError, Moment, MomentWriter};
 use glam::DVec3;
 use grid::{Array, Grid};
 use metachron_core::{AgentId, Body, ContactPartner};
-use metachron_world::{Scene, Stresses};
+use metachron_world::{OutputFile, Scene, Stresses};
 use std::collections::{BTreeMap, BTreeSet};
-use std::fs::File;
 use std::io::{BufWriter, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
 
@@ -43,8 +42,8 @@ const INDEX_FOOT: &str = "</Collection>\n</VTKFile>\n";
 #[derive(Debug)]
 pub struct VtkSeries {
     folder: PathBuf,
-    indices: [File; 3],
-    names: BufWriter<File>,
+    indices: [OutputFile; 3],
+    names: BufWriter<OutputFile>,
     named: BTreeSet<AgentId>,
     moments: u64,
     stresses: Stresses,
@@ -86,14 +85,14 @@ impl VtkSeries {
         std::fs::create_dir_all(folder).map_err(ExportError::at(folder))?;
         let index = |name: &str| {
             let path = folder.join(name);
-            let mut index = File::create(&path).map_err(ExportError::at(&path))?;
+            let mut index = OutputFile::growing(&path).map_err(ExportError::at(&path))?;
             index.write_all(format!("{INDEX_HEAD}{INDEX_FOOT}").as_bytes()).map_err(ExportError::at(&path))?;
             Ok(index)
         };
         let [surfaces, objects, contacts] = INDICES.map(index);
         let indices = [surfaces?, objects?, contacts?];
         let names = folder.join(NAMES);
-        let mut names = BufWriter::new(File::create(&names).map_err(ExportError::at(&names))?);
+        let mut names = BufWriter::new(OutputFile::growing(&names).map_err(ExportError::at(&names))?);
         writeln!(names, "object,name").map_err(ExportError::at(folder))?;
         let fixed = Surface::fixed(scene);
         surfaces_of(&[Part { object: -1, eps_m: f64::NAN, residual_m: 0.0, surface: &fixed, stresses_pa: None }])
@@ -143,7 +142,7 @@ impl MomentWriter for VtkSeries {
 }
 
 /// Adds a file to an index, in the place of its end.
-fn enter(index: &mut File, time_s: f64, file: &str) -> std::io::Result<()> {
+fn enter(index: &mut OutputFile, time_s: f64, file: &str) -> std::io::Result<()> {
     let entry = format!("<DataSet timestep=\"{time_s}\" part=\"0\" file=\"{file}\"/>\n{INDEX_FOOT}");
     index.seek(SeekFrom::End(-(INDEX_FOOT.len() as i64)))?;
     index.write_all(entry.as_bytes())

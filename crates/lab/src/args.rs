@@ -69,6 +69,7 @@ A block is what stands between two comments:
   <!-- end -->
 The command comes first, and names one experiment if it is a chart. Then, after each |, rows (column = values), columns,
 `claims`, or `figure`, which is kept in the folder figures. Other commands stand as words under their prompt.
+A comment that is nearly one of these is refused with its line; code between fences is not read.
 Exit codes: 0 all the same, 1 a document says something else, 2 a document that cannot be read.";
 
 /// `tune`.

@@ -36,7 +36,7 @@ fn draw(gpu: Gpu, path: &Path, numbers: &[String]) -> Result<(), Box<dyn std::er
     stage.survey(&camera, size);
     let mut offscreen = Offscreen::new(gpu, size, options)?;
     let times = offscreen.render(stage.compose(&camera, &stage::level(eps_m, n), style, None), &camera)?;
-    offscreen.save(path)?;
+    std::fs::write(path, offscreen.png()?)?;
     println!("{times:?}");
     Ok(())
 }

@@ -112,7 +112,7 @@ impl Cost {
 }
 
 /// The memory of a program with a scene of nothing, bytes.
-const PROGRAM_BYTES: u64 = 9 << 20;
+pub(super) const PROGRAM_BYTES: u64 = 9 << 20;
 
 /// Bytes of the header of a binary STL file, and of each triangle of it.
 const STL_BYTES: (u64, u64) = (84, 50);

@@ -4,7 +4,7 @@
 
 use super::build::triangles;
 use super::builtin;
-use super::demand::FileHead;
+use super::demand::{FileHead, PROGRAM_BYTES};
 use super::diagnostic::{SceneError, did_you_mean};
 use metachron_geometry::Triangles;
 use std::collections::BTreeMap;
@@ -27,7 +27,8 @@ const MEMORY_DEFAULT_BYTES: u64 = 4 << 30;
 /// How far a scene may go on the machine that reads it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Limits {
-    /// Most memory that the scene may ask for, bytes, by the estimate that is made before anything of it is. Default: half of the machine's.
+    /// Most memory that the scene may ask for, bytes, by the estimate that is made before anything of it is. Default: half of the machine's, or of
+    /// what the control groups of this process allow.
     pub memory_bytes: u64,
     /// Whether files that the scene names may lie outside of its folder, by their path or behind links. Default: no.
     pub allow_outside: bool,
@@ -35,15 +36,48 @@ pub struct Limits {
 
 impl Default for Limits {
     fn default() -> Self {
-        Self { memory_bytes: machine_bytes().map_or(MEMORY_DEFAULT_BYTES, |all| all / 2), allow_outside: false }
+        Self {
+            memory_bytes: machine_bytes(&|path| std::fs::read_to_string(path).ok())
+                .map_or(MEMORY_DEFAULT_BYTES, |all| all / 2),
+            allow_outside: false,
+        }
     }
 }
 
-/// The memory of this machine, bytes, where the system says it.
-fn machine_bytes() -> Option<u64> {
-    let text = std::fs::read_to_string("/proc/meminfo").ok()?;
+impl Limits {
+    /// The least memory that an object can be held in, bytes.
+    pub const MEMORY_LEAST_BYTES: u64 = PROGRAM_BYTES + (1 << 20);
+}
+
+/// The memory of this machine that this process may have, bytes, where the system says it.
+fn machine_bytes(read: &dyn Fn(&Path) -> Option<String>) -> Option<u64> {
+    let text = read(Path::new("/proc/meminfo"))?;
     let total = text.lines().find_map(|line| line.strip_prefix("MemTotal:"))?;
-    Some(total.trim().strip_suffix("kB")?.trim().parse::<u64>().ok()? << 10)
+    let total = total.trim().strip_suffix("kB")?.trim().parse::<u64>().ok()? << 10;
+    Some(group_limits(read).into_iter().fold(total, u64::min))
+}
+
+/// The limits of the control groups that this process is in, bytes (Linux, cgroup_namespaces(7)): a container's, a service's, a job's.
+fn group_limits(read: &dyn Fn(&Path) -> Option<String>) -> Vec<u64> {
+    let groups = read(Path::new("/proc/self/cgroup")).unwrap_or_default();
+    let mut limits = Vec::new();
+    for group in groups.lines() {
+        let mut parts = group.splitn(3, ':').skip(1);
+        let (Some(controllers), Some(path)) = (parts.next(), parts.next()) else { continue };
+        let (root, file) = match controllers {
+            "" => ("/sys/fs/cgroup", "memory.max"),
+            _ if controllers.split(',').any(|one| one == "memory") => {
+                ("/sys/fs/cgroup/memory", "memory.limit_in_bytes")
+            }
+            _ => continue,
+        };
+        // the group of a limit may be any around this one; a group without a limit says `max`
+        let around = Path::new(path.trim_start_matches('/')).ancestors();
+        limits.extend(
+            around.filter_map(|group| read(&Path::new(root).join(group).join(file))?.trim().parse::<u64>().ok()),
+        );
+    }
+    limits
 }
 
 /// A scene's text and where it comes from.
@@ -374,6 +408,33 @@ mod tests {
         assert_eq!(read_plain(folder.path(), 9).unwrap_err(), "it is a folder");
         // a scene may come from a pipe, but its length is bounded
         assert!(read_bounded(Path::new("/dev/zero"), 9).unwrap_err().contains("more than 9 bytes"));
+    }
+
+    #[test]
+    fn the_memory_of_a_machine_is_no_more_than_its_groups_allow() {
+        let bytes = |files: &[(&str, &str)]| {
+            let read =
+                |path: &Path| files.iter().find(|(at, _)| Path::new(at) == path).map(|(_, text)| (*text).to_owned());
+            machine_bytes(&read)
+        };
+        let machine = ("/proc/meminfo", "MemFree: 1 kB\nMemTotal:        8388608 kB\n");
+        assert_eq!(bytes(&[machine]), Some(8 << 30));
+        // a service within a slice that has the lesser limit
+        let service = ("/proc/self/cgroup", "0::/user.slice/a.service\n");
+        let own = ("/sys/fs/cgroup/user.slice/a.service/memory.max", "max\n");
+        let slice = ("/sys/fs/cgroup/user.slice/memory.max", "1073741824\n");
+        assert_eq!(bytes(&[machine, service, own]), Some(8 << 30));
+        assert_eq!(bytes(&[machine, service, own, slice]), Some(1 << 30));
+        // a container, which sees itself as the root; the first version, whose limit may exceed the machine
+        assert_eq!(
+            bytes(&[machine, ("/proc/self/cgroup", "0::/\n"), ("/sys/fs/cgroup/memory.max", "4096\n")]),
+            Some(4096)
+        );
+        let first = ("/proc/self/cgroup", "5:cpu,cpuacct:/a\n3:memory:/a\n");
+        let limit = |text| ("/sys/fs/cgroup/memory/a/memory.limit_in_bytes", text);
+        assert_eq!(bytes(&[machine, first, limit("2147483648\n")]), Some(2 << 30));
+        assert_eq!(bytes(&[machine, first, limit("9223372036854771712\n")]), Some(8 << 30));
+        assert_eq!(bytes(&[service, slice]), None);
     }
 
     #[test]

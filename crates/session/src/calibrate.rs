@@ -6,6 +6,7 @@
 use metachron_drawable::PieceKind;
 use metachron_lod::control::{AREAS_PX, Areas, Measured, Misses, Prices, Shading, Stages, Stroke};
 use metachron_render::{Drawn, Gpu, GpuError, RendererOptions};
+use metachron_world::OutputFile;
 use serde::{Deserialize, Serialize};
 use std::hash::{DefaultHasher, Hash, Hasher};
 use std::path::{Path, PathBuf};
@@ -348,12 +349,10 @@ fn store_partial(folder: Option<&Path>, adapter: &str, pictures: &[Measured]) ->
 
 /// Writes a file atomically, so that no reader sees half of it.
 fn write(path: &Path, what: &impl Serialize) -> Result<(), StoreError> {
-    let unfinished = path.with_extension(format!("{}.tmp", std::process::id()));
     let written = || {
         let text = serde_json::to_vec_pretty(what)?;
         path.parent().map_or(Ok(()), std::fs::create_dir_all)?;
-        std::fs::write(&unfinished, text)?;
-        std::fs::rename(&unfinished, path)
+        OutputFile::write(path, text)
     };
     written().map_err(|why| StoreError::NotWritten { path: path.display().to_string(), why })
 }

@@ -38,10 +38,10 @@ pub enum SessionError {
     #[cfg(feature = "picture")]
     #[error(transparent)]
     Picture(GpuError),
-    /// The film could not be written.
+    /// A picture or the film could not be written.
     #[cfg(feature = "picture")]
-    #[error("the film could not be written to {path}: {error}")]
-    Film {
+    #[error("{} cannot be written: {error}", path.display())]
+    File {
         /// The intended path.
         path: PathBuf,
         /// The reason.

@@ -5,14 +5,14 @@
 
 use super::error::SessionError;
 use metachron_render::{PictureFile, Size};
-use std::fs::File;
+use metachron_world::OutputFile;
 use std::io::{BufWriter, Write};
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
 /// A film being written.
 pub(super) struct Film {
-    file: BufWriter<File>,
+    file: BufWriter<OutputFile>,
     path: PathBuf,
     period: Duration,
     /// When the film begins; its first frame is the picture on the screen a tick later.
@@ -28,11 +28,11 @@ impl Film {
         let Size { width, height } = size;
         let head = format!("YUV4MPEG2 W{width} H{height} F{rate_mhz}:1000 Ip A1:1 C420jpeg\n");
         let open = || {
-            let mut file = BufWriter::new(File::create(path)?);
+            let mut file = BufWriter::new(OutputFile::growing(path)?);
             file.write_all(head.as_bytes())?;
             Ok(file)
         };
-        let file = open().map_err(|error| SessionError::Film { path: path.to_owned(), error })?;
+        let file = open().map_err(|error| SessionError::File { path: path.to_owned(), error })?;
         Ok(Self { file, path: path.to_owned(), period, begun, shown: None, written: 0 })
     }
 
@@ -46,7 +46,7 @@ impl Film {
     /// Ends the film at the time `at`.
     pub fn finish(mut self, at: Duration) -> Result<(), SessionError> {
         self.run_until(|tick| tick <= at)?;
-        self.file.flush().map_err(|error| SessionError::Film { path: self.path, error })
+        self.file.flush().map_err(|error| SessionError::File { path: self.path, error })
     }
 
     /// Writes the picture on the screen at the ticks that `are_past`, as soon as there is one.
@@ -55,7 +55,7 @@ impl Film {
         let planes = planes(picture);
         while are_past(self.begun + self.period * (self.written + 1)) {
             let frame = self.file.write_all(b"FRAME\n").and_then(|()| self.file.write_all(&planes));
-            frame.map_err(|error| SessionError::Film { path: self.path.clone(), error })?;
+            frame.map_err(|error| SessionError::File { path: self.path.clone(), error })?;
             self.written += 1;
         }
         Ok(())

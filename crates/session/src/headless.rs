@@ -11,6 +11,10 @@ use super::session::{Finished, Session};
 use metachron_render::{Camera, Size, Style};
 #[cfg(feature = "picture")]
 use metachron_render::{Offscreen, PictureFile, RendererOptions};
+#[cfg(feature = "picture")]
+use metachron_world::OutputFile;
+#[cfg(feature = "picture")]
+use std::path::Path;
 use std::path::PathBuf;
 use std::sync::Arc;
 #[cfg(feature = "picture")]
@@ -81,7 +85,7 @@ pub struct Headless {
 /// ends.
 ///
 /// # Errors
-/// [`SessionError::Draw`] where the adapter fails, [`SessionError::Film`] where a film cannot begin, [`SessionError::Diverged`]. A file that
+/// [`SessionError::Draw`] where the adapter fails, [`SessionError::File`] where a film cannot begin, [`SessionError::Diverged`]. A file that
 /// takes no more ends the run: its outcome says why ([`Outcome::unwritten`]).
 pub fn play_headless(
     mut session: Session,
@@ -134,7 +138,7 @@ fn keep_unwritten(
 ) -> Result<Option<SessionError>, SessionError> {
     match picture {
         Ok(()) => Ok(before),
-        Err(error @ SessionError::Picture(_)) => Ok(before.or(Some(error))),
+        Err(error @ (SessionError::Picture(_) | SessionError::File { .. })) => Ok(before.or(Some(error))),
         Err(error) => Err(error),
     }
 }
@@ -274,11 +278,16 @@ fn write_picture(session: &mut Session, plan: &mut Headless) -> Result<(), Sessi
     session.compose(&camera, plan.size, plan.style, None);
     if let Some(path) = &plan.depth {
         let depths = still.depths(session.picture(), &camera).map_err(SessionError::Draw)?;
-        depths.save(path).map_err(SessionError::Picture)?;
+        write(path, &depths.png().map_err(SessionError::Picture)?)?;
     }
     if let Some(path) = &plan.png {
         still.render(session.picture(), &camera).map_err(SessionError::Draw)?;
-        still.save(path).map_err(SessionError::Picture)?;
+        write(path, &still.png().map_err(SessionError::Picture)?)?;
     }
     Ok(())
+}
+
+#[cfg(feature = "picture")]
+fn write(path: &Path, bytes: &[u8]) -> Result<(), SessionError> {
+    OutputFile::write(path, bytes).map_err(|error| SessionError::File { path: path.to_owned(), error })
 }

@@ -4,8 +4,8 @@
 
 pub mod checkpoint;
 pub mod log;
+pub mod output_file;
 mod recorded;
 pub mod recording;
-pub mod recording_file;
 mod replay;
 mod saved;

@@ -146,10 +146,10 @@ fn the_environment_says_headless_as_environments_do() {
 fn no_output_overwrites_the_scene_and_no_generated_scene_a_file() {
     let scene = Folder::with(BALL);
     let before = std::fs::read_to_string(scene.scene()).unwrap();
-    for flag in ["--report", "--png", "--frames-csv"] {
+    for flag in ["--report", "--mcap", "--frames-csv"] {
         let done = metachron(&["run", scene.scene(), "--headless", flag, scene.scene()]);
         let said = String::from_utf8(done.stderr).unwrap();
-        assert!(done.status.code() == Some(2) && said.contains("would overwrite the scene"), "{said}");
+        assert!(done.status.code() == Some(2) && said.contains("which the scene is read from"), "{said}");
     }
     let generate = |more: &[&str]| metachron(&[&["generate", "domes", "--out", scene.scene()], more].concat());
     let refused = generate(&[]);
@@ -158,6 +158,96 @@ fn no_output_overwrites_the_scene_and_no_generated_scene_a_file() {
     assert_eq!(std::fs::read_to_string(scene.scene()).unwrap(), before);
     assert_eq!(generate(&["--force"]).status.code(), Some(0));
     assert_ne!(std::fs::read_to_string(scene.scene()).unwrap(), before);
+}
+
+/// A scene whose body is the mesh `a.obj`.
+fn meshed() -> Folder {
+    let scene = Folder::with("[[object]]\nname = \"a\"\nmodel = \"rigid\"\nshape = \"mesh\"\nfile = \"a.obj\"\n");
+    let mesh = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 1 4 3\nf 2 3 4\n";
+    std::fs::write(scene.file("a.obj"), mesh).unwrap();
+    scene
+}
+
+#[cfg(unix)]
+#[test]
+fn no_output_overwrites_a_file_of_the_scene_by_whatever_name() {
+    let scene = meshed();
+    let mesh = std::fs::read(scene.file("a.obj")).unwrap();
+    std::fs::hard_link(scene.file("a.obj"), scene.file("hard.glb")).unwrap();
+    std::os::unix::fs::symlink("a.obj", scene.file("soft.csv")).unwrap();
+    std::fs::hard_link(scene.scene(), scene.file("scene.mcap")).unwrap();
+    for (flag, name, read) in [
+        ("--glb", "hard.glb", "a.obj"),
+        ("--animation", "hard.glb", "a.obj"),
+        ("--frames-csv", "soft.csv", "a.obj"),
+        ("--mcap", "scene.mcap", scene.scene()),
+        ("--record", "a.obj", "a.obj"),
+    ] {
+        let file = scene.file(name);
+        let done = metachron(&["run", scene.scene(), "--headless", "--frames", "1", flag, &file]);
+        let said = String::from_utf8(done.stderr).unwrap();
+        assert!(done.status.code() == Some(2) && said.contains(&format!("{flag} {file} would overwrite ")), "{said}");
+        assert!(said.contains(&format!("{read}, which the scene is read from")), "{said}");
+    }
+    assert_eq!(std::fs::read(scene.file("a.obj")).unwrap(), mesh);
+    // a replay reads the meshes again
+    run(&scene, &["-q", "--record", &scene.file("run.rec")]);
+    let replay = metachron(&["replay", &scene.file("run.rec"), "--glb", &scene.file("hard.glb")]);
+    assert!(
+        replay.status.code() == Some(2) && String::from_utf8_lossy(&replay.stderr).contains("a.obj, which the scene")
+    );
+    // an output that shares its bytes with a file of something else leaves those alone
+    std::fs::write(scene.file("other.json"), "other").unwrap();
+    std::fs::hard_link(scene.file("other.json"), scene.file("report.json")).unwrap();
+    run(&scene, &["-q", "--report", &scene.file("report.json")]);
+    assert_eq!(std::fs::read_to_string(scene.file("other.json")).unwrap(), "other");
+    assert!(std::fs::read_to_string(scene.file("report.json")).unwrap().contains("state_hash"));
+}
+
+/// The files in the folder of a scene that are not whole yet.
+fn partial(scene: &Folder) -> usize {
+    let entries = std::fs::read_dir(scene.folder()).unwrap();
+    entries.filter(|entry| entry.as_ref().unwrap().file_name().to_string_lossy().ends_with(".partial")).count()
+}
+
+#[test]
+fn a_run_that_is_killed_leaves_what_an_earlier_one_wrote_but_for_files_that_grow() {
+    let scene = Folder::with(BALL);
+    let (animation, glb, mcap) = (scene.file("run.glb"), scene.file("last.glb"), scene.file("run.mcap"));
+    [&animation, &glb, &mcap].into_iter().for_each(|path| std::fs::write(path, "old").unwrap());
+    let arguments = ["run", scene.scene(), "--headless", "--executor", "lockstep", "--seconds", "1e6", "-q"];
+    let mut child = program();
+    child.args(arguments).args(["--animation", &animation, "--glb", &glb, "--mcap", &mcap]);
+    let mut child = child.spawn().unwrap();
+    while std::fs::read(&mcap).unwrap().len() < 1000 {
+        assert!(child.try_wait().unwrap().is_none(), "the run has ended");
+        std::thread::yield_now();
+    }
+    assert_eq!(partial(&scene), 1, "the animation");
+    child.kill().unwrap();
+    child.wait().unwrap();
+    for path in [animation, glb] {
+        assert_eq!(std::fs::read_to_string(&path).unwrap(), "old", "{path}");
+    }
+    assert!(std::fs::read(mcap).unwrap().starts_with(b"\x89MCAP"));
+}
+
+/// A file may have one block, of half a kB or one: it is as if the disk were full.
+#[cfg(unix)]
+#[test]
+fn what_does_not_fit_on_a_disk_leaves_what_was_there() {
+    let scene = Folder::with(BALL);
+    for (flag, name) in [("--animation", "run.glb"), ("--glb", "last.glb"), ("--report", "report.json")] {
+        let path = scene.file(name);
+        std::fs::write(&path, "old").unwrap();
+        let run = "ulimit -f 1; exec \"$@\"";
+        let mut shell = std::process::Command::new("sh");
+        shell.args(["-c", run, "sh", env!("CARGO_BIN_EXE_metachron"), "run", scene.scene(), "--headless"]);
+        let done = shell.args(["--executor", "lockstep", "--frames", "3", flag, &path]).output().unwrap();
+        let said = String::from_utf8(done.stderr).unwrap();
+        assert!(done.status.code() == Some(1) && said.contains(&format!("{path} cannot be written")), "{said}");
+        assert_eq!((std::fs::read_to_string(&path).unwrap().as_str(), partial(&scene)), ("old", 0), "{name}");
+    }
 }
 
 /// The program where no adapter can be found.

@@ -10,9 +10,10 @@ use super::super::{ExportError, Moment, MomentWriter, colour};
 use super::Glb;
 use glam::{DQuat, DVec3};
 use metachron_core::{AgentId, Body};
+use metachron_world::OutputFile;
 use serde_json::{Value, json};
 use std::collections::BTreeMap;
-use std::fs::File;
+use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
@@ -26,12 +27,14 @@ const TABLE_BYTES: usize = 512;
 
 /// A run in a file, with a key for every moment.
 ///
-/// The file is written by [`MomentWriter::finish`], and is empty before. Times are simulated time since the start of the run; a moment of the
+/// The file is written by [`MomentWriter::finish`], and takes the place of one that is there when it is whole. Times are simulated time since the start of the run; a moment of the
 /// time of the one before is left out, an earlier one is [`ExportError::Earlier`]. All moments together may take [`GlbAnimation::BYTES_MAX`] bytes,
 /// then [`ExportError::TooLong`]: a tube of 100 nodes takes 30 kB each, a rigid body 28 bytes.
 #[derive(Debug)]
 pub struct GlbAnimation {
     path: PathBuf,
+    /// `None` once it is complete.
+    file: Option<OutputFile>,
     fixed: Surface,
     times_s: Vec<f32>,
     bytes: usize,
@@ -62,14 +65,14 @@ impl GlbAnimation {
     /// The most bytes of a file, about.
     pub const BYTES_MAX: usize = BYTES_MAX;
 
-    /// Begins a file, over one that exists; `fixed` are the solids that never move.
+    /// Begins a file; `fixed` are the solids that never move.
     ///
     /// # Errors
     /// [`ExportError::File`].
     pub fn create(path: &Path, fixed: &Surface) -> Result<Self, ExportError> {
-        File::create(path).map_err(ExportError::at(path))?;
-        let (times_s, tracks) = (Vec::new(), BTreeMap::new());
-        Ok(Self { path: path.to_owned(), fixed: fixed.clone(), times_s, bytes: 0, bytes_max: BYTES_MAX, tracks })
+        let file = Some(OutputFile::whole(path).map_err(ExportError::at(path))?);
+        let (path, fixed, times_s, tracks) = (path.to_owned(), fixed.clone(), Vec::new(), BTreeMap::new());
+        Ok(Self { path, file, fixed, times_s, bytes: 0, bytes_max: BYTES_MAX, tracks })
     }
 
     /// Adds a key of an object to its track, or begins another where its triangles are others or the track is full.
@@ -117,6 +120,7 @@ impl MomentWriter for GlbAnimation {
     }
 
     fn finish(&mut self) -> Result<(), ExportError> {
+        let Some(mut out) = self.file.take() else { return Ok(()) };
         let mut file = Glb::default();
         let mut nodes: Vec<_> = file.fixed(&self.fixed).into_iter().collect();
         for (id, tracks) in &self.tracks {
@@ -128,7 +132,7 @@ impl MomentWriter for GlbAnimation {
         }
         let start_s = self.times_s.first().copied().unwrap_or_default();
         let bytes = file.bytes(nodes, f64::from(start_s)).map_err(ExportError::at(&self.path))?;
-        std::fs::write(&self.path, bytes).map_err(ExportError::at(&self.path))
+        out.write_all(&bytes).and_then(|()| out.complete()).map_err(ExportError::at(&self.path))
     }
 }
 

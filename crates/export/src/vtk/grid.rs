@@ -4,7 +4,7 @@
 
 use super::super::ExportError;
 use glam::DVec3;
-use std::fs::File;
+use metachron_world::OutputFile;
 use std::io::{BufWriter, Write};
 use std::path::Path;
 
@@ -64,7 +64,7 @@ impl Grid {
     }
 
     pub fn save(&self, path: &Path) -> Result<(), ExportError> {
-        let mut file = BufWriter::new(File::create(path).map_err(ExportError::at(path))?);
+        let mut file = BufWriter::new(OutputFile::growing(path).map_err(ExportError::at(path))?);
         self.write(&mut file).and_then(|()| file.flush()).map_err(ExportError::at(path))
     }
 

@@ -5,8 +5,8 @@
 use super::super::args::BenchArgs;
 use super::super::chart::figure;
 use crate::chart::{Figure, Table, fields, prepared, stopper};
-use anyhow::Context;
 use metachron_console::exit::Exit;
+use metachron_console::files::write_file;
 use metachron_console::output::{data, message};
 use metachron_console::progress::Bar;
 use serde::Serialize;
@@ -88,7 +88,7 @@ pub(super) fn write<S: Subject>(folder: &Path, rows: &[S::Row]) -> anyhow::Resul
     rows.iter().try_for_each(|row| csv.serialize(row))?;
     for (kind, bytes) in [("csv", csv.into_inner()?), ("json", json::<S>(rows)?.into_bytes())] {
         let path = folder.join(format!("{}.{kind}", S::NAME));
-        std::fs::write(&path, bytes).with_context(|| format!("{} cannot be written", path.display()))?;
+        write_file(&path, bytes)?;
     }
     figure::write(folder, S::NAME, &S::figure(rows)).map(drop)
 }

@@ -27,9 +27,10 @@ use super::args::{ChartArgs, Subject};
 use accuracy::diagram::Diagram;
 use anyhow::Context;
 use metachron_console::exit::Exit;
+use metachron_console::files::write_file;
 use metachron_console::output::{BadInput, data, message};
 use metachron_console::progress::Bar;
-use metachron_render::{Gpu, PictureFile};
+use metachron_render::{Gpu, PictureFile, offscreen};
 use policies::live::Live;
 use policies::plates::Figures;
 use rows::RowFile;
@@ -319,10 +320,10 @@ pub(super) fn build() -> String {
 
 /// Writes the pictures next to the figure.
 fn pictured<E: Experiment>(folder: &Path, stem: &str, rows: &[E::Row]) -> anyhow::Result<Vec<PathBuf>> {
-    let write = |(name, picture): (String, PictureFile)| {
+    let write = |(name, picture): (String, PictureFile)| -> anyhow::Result<PathBuf> {
         let path = folder.join(format!("{stem}-{name}.png"));
-        let written = picture.save(&path).with_context(|| format!("{} cannot be written", path.display()));
-        written.map(|()| path)
+        write_file(&path, offscreen::png(&picture)?)?;
+        Ok(path)
     };
     E::pictures(rows)?.into_iter().map(write).collect()
 }

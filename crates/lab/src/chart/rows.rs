@@ -5,6 +5,7 @@
 
 use super::experiment::{CaseOf, Experiment, Record};
 use anyhow::Context;
+use metachron_console::files::write_file;
 use std::fs::{self, File, OpenOptions};
 use std::path::{Path, PathBuf};
 
@@ -34,7 +35,7 @@ impl RowFile {
         let file = file.with_context(|| format!("{} cannot be written", path.display()))?;
         // the column names are written with the first row
         let out = csv::WriterBuilder::new().has_headers(kept.is_empty()).from_writer(file);
-        fs::write(&mark, settings).with_context(|| format!("{} cannot be written", mark.display()))?;
+        write_file(&mark, settings)?;
         Ok((Self { path, mark, out }, kept))
     }
 
@@ -58,16 +59,11 @@ impl RowFile {
     }
 }
 
-/// Writes rows to a second file and renames it over the first: at no moment are finished rows missing.
+/// Writes rows in place of those that are there: at no moment are finished rows missing.
 fn replace<E: Experiment>(path: &Path, rows: &[E::Row]) -> anyhow::Result<()> {
-    let beside = path.with_extension("csv.new");
-    let write = || -> anyhow::Result<()> {
-        let mut out = csv::Writer::from_path(&beside)?;
-        rows.iter().try_for_each(|row| out.serialize(row))?;
-        out.flush()?;
-        Ok(fs::rename(&beside, path)?)
-    };
-    write().with_context(|| format!("{} cannot be written", path.display()))
+    let mut out = csv::Writer::from_writer(Vec::new());
+    rows.iter().try_for_each(|row| out.serialize(row))?;
+    write_file(path, out.into_inner()?)
 }
 
 /// The rows of a file that belong to these cases, one per case; a last line that was cut off is skipped.

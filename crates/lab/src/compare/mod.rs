@@ -8,13 +8,13 @@ mod votes;
 
 use super::args::CompareArgs;
 use super::chart::Table;
-use anyhow::Context;
 use film::Film;
 use metachron_console::exit::Exit;
+use metachron_console::files::{check_unread, write_file};
 use metachron_console::output::{BadInput, data, message};
 use metachron_render::ssim;
 use serde::Serialize;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 /// The page; its films stand where it says so.
 const PAGE: &str = include_str!("page.html");
@@ -41,6 +41,7 @@ pub fn command(args: &CompareArgs) -> anyhow::Result<Exit> {
         data(&Table::of(&strengths, "film, votes.0, better.3, strength.3, low.3, high.3").text())?;
         return Ok(Exit::Ok);
     }
+    check_unread("--out", &args.out, "the page", args.films.iter().map(PathBuf::as_path))?;
     let films = args.films.iter().map(|path| Film::read(path)).collect::<anyhow::Result<Vec<_>>>()?;
     let (first, rest) = films.split_first().filter(|(_, rest)| !rest.is_empty()).ok_or_else(too_few)?;
     for film in rest {
@@ -56,7 +57,7 @@ pub fn command(args: &CompareArgs) -> anyhow::Result<Exit> {
     }
     let pairs = (0..films.len()).flat_map(|b| (0..b).map(move |a| (a, b)));
     let rows: Vec<Likeness<'_>> = pairs.map(|(a, b)| likeness(&films[a], &films[b])).collect();
-    write_page(&films, &args.out).with_context(|| format!("{} cannot be written", args.out.display()))?;
+    write_page(&films, &args.out)?;
     data(&Table::of(&rows, "left, right, ssim.4").text())?;
     message(&format!(
         "{} asks which is better; `metachron compare --votes FILE` evaluates what it saves",
@@ -80,5 +81,5 @@ fn write_page(films: &[Film], path: &Path) -> anyhow::Result<()> {
     let films = films.iter().map(Film::packed).collect::<anyhow::Result<Vec<_>>>()?;
     // a name may have characters that would end the script
     let listed = serde_json::to_string(&films)?.replace('<', "\\u003c");
-    Ok(std::fs::write(path, PAGE.replacen(FILMS, &listed, 1))?)
+    write_file(path, PAGE.replacen(FILMS, &listed, 1))
 }

@@ -44,13 +44,13 @@ pub(super) enum View<'a> {
     Figure,
 }
 
-/// A document as prose and blocks.
+/// A document as prose and blocks. Code between fences is prose, whatever is in it.
 ///
 /// # Errors
-/// A block that is not closed.
+/// A block that is not closed, a line that nearly opens or closes one.
 pub(super) fn parts(text: &str) -> anyhow::Result<Vec<Part<'_>>> {
     let (mut parts, mut rest, mut line) = (Vec::new(), text, 1);
-    while let Some(from) = rest.match_indices(OPENS).map(|m| m.0).find(|&k| k == 0 || rest[..k].ends_with('\n')) {
+    while let Some(from) = opening(rest, line)? {
         let (prose, block) = rest.split_at(from);
         line += prose.matches('\n').count();
         let place = || format!("line {line}: `{}`", block.lines().next().unwrap_or_default());
@@ -66,6 +66,42 @@ pub(super) fn parts(text: &str) -> anyhow::Result<Vec<Part<'_>>> {
     }
     parts.push(Part::Prose(rest));
     Ok(parts)
+}
+
+/// Where the next block of `text` opens; its first line, of this number, may close the block before.
+fn opening(text: &str, number: usize) -> anyhow::Result<Option<usize>> {
+    let (mut from, mut within) = (0, None);
+    for (k, line) in text.split_inclusive('\n').enumerate() {
+        let inner = line.trim();
+        match within {
+            Some((mark, length)) if inner.chars().all(|c| c == mark) && inner.len() >= length => within = None,
+            Some(_) => {}
+            None if line.starts_with(OPENS) => return Ok(Some(from)),
+            None if (from, line.starts_with(CLOSES)) == (0, true) && number > 1 => {}
+            None if resembles(inner) => bail!(
+                "line {}: `{inner}` is no block; expected `{OPENS}COMMAND -->` or `{CLOSES}` of one, at the beginning of a line",
+                number + k
+            ),
+            None => within = fence(inner),
+        }
+        from += line.len();
+    }
+    Ok(None)
+}
+
+/// The mark of a fence that a line opens, and how many of it; the line that closes it has no fewer.
+fn fence(line: &str) -> Option<(char, usize)> {
+    let mark = line.chars().next().filter(|first| ['`', '~'].contains(first))?;
+    let length = line.len() - line.trim_start_matches(mark).len();
+    (length >= 3 && !line[length..].contains('`')).then_some((mark, length))
+}
+
+/// Whether a line looks as if it were meant to open or close a block: a comment of one of the two words, or nearly.
+fn resembles(line: &str) -> bool {
+    const NEAR_ENOUGH: f64 = 0.85;
+    let Some(comment) = line.strip_prefix("<!").map(|rest| rest.trim_start_matches(['-', ' '])) else { return false };
+    let word = comment.split(|c: char| c.is_whitespace() || c == '-').next().unwrap_or_default().to_lowercase();
+    word == "end" || strsim::jaro_winkler(&word, "metachron") >= NEAR_ENOUGH
 }
 
 /// A block from the line that opens it.
@@ -111,5 +147,39 @@ mod tests {
             assert!(why.starts_with("line 2: `<!-- metachron list -->` is not closed"), "{why}");
         }
         assert_eq!(parts("in `<!-- metachron list -->` prose\n").unwrap().len(), 1);
+    }
+
+    #[test]
+    fn a_line_that_nearly_opens_or_closes_a_block_is_refused_with_its_number() {
+        for line in [
+            "<!--metachron list -->",
+            " <!-- metachron list -->",
+            "<!-- Metachron list -->",
+            "<!-- metacron list -->",
+            "<!-  metachron list -->",
+            "<!-- metachron: list -->",
+            "<!-- metachron-->",
+            "<!-- end -->",
+            "<!--end-->",
+            "<!-- END -->",
+        ] {
+            let why = parts(&format!("A\n\n{line}\nB\n")).unwrap_err().to_string();
+            assert!(why.starts_with(&format!("line 3: `{}` is no block", line.trim())), "{why}");
+        }
+        let closed_twice = "<!-- metachron list -->\n<!-- end -->\n<!-- end -->\n";
+        assert!(parts(closed_twice).unwrap_err().to_string().starts_with("line 3: "));
+        for prose in ["<!-- a remark -->\n", "<!-- ends here -->\n", "metachron\n"] {
+            assert_eq!(parts(prose).unwrap(), [Part::Prose(prose)]);
+        }
+    }
+
+    #[test]
+    fn code_between_fences_is_not_run() {
+        let code = "```md\n<!-- metachron list -->\n<!--metachron list-->\n```\n~~~~\n```\n~~~\n<!-- metachron list -->\n~~~~~\n";
+        assert_eq!(parts(code).unwrap(), [Part::Prose(code)]);
+        let after = format!("{code}<!-- metachron list -->\n<!-- end -->\n");
+        let parts = parts(&after).unwrap();
+        let [Part::Prose(before), Part::Block(block), _] = &parts[..] else { panic!("{parts:?}") };
+        assert_eq!((*before, block.line), (code, 10));
     }
 }

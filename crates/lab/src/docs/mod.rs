@@ -11,6 +11,7 @@ use super::chart::{prepared, stopper};
 use anyhow::Context;
 use blocks::{Block, Part, parts};
 use metachron_console::exit::Exit;
+use metachron_console::files::write_file;
 use metachron_console::output::{BadInput, message};
 use printer::Printer;
 use std::fs;
@@ -40,10 +41,10 @@ pub fn command(args: &DocsArgs) -> anyhow::Result<Exit> {
         let Some(fresh) = fresh else { return Ok(Exit::Interrupted) };
         if args.write {
             for (path, bytes) in fresh.files {
-                fs::write(&path, bytes).with_context(|| format!("{} cannot be written", path.display()))?;
+                write_file(&path, bytes)?;
             }
             if fresh.text != text {
-                fs::write(&path, fresh.text).with_context(|| format!("{} cannot be written", path.display()))?;
+                write_file(&path, fresh.text)?;
             }
         } else {
             wrong += fresh.differences.len();

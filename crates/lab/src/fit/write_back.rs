@@ -6,6 +6,7 @@ use super::objects::{name, tables};
 use super::task::Task;
 use super::{Fitted, to_rope};
 use anyhow::Context;
+use metachron_console::files::write_file;
 use metachron_console::output::BadInput;
 use metachron_models::rod::Integrator;
 use metachron_scene::{Limits, Source, load};
@@ -19,11 +20,11 @@ pub(super) fn write(path: &Path, task: &Task<'_>, fitted: &Fitted, limits: Limit
     let shown = path.display();
     let before = std::fs::read_to_string(path).with_context(|| format!("{shown} cannot be read"))?;
     let (text, changes) = changed(&before, task, fitted).map_err(|what| BadInput(format!("{shown}: {what}")))?;
-    std::fs::write(path, &text).with_context(|| format!("{shown} cannot be written"))?;
+    write_file(path, &text)?;
     let source = Source::open(&path.to_string_lossy());
     let again = source.and_then(|source| load(&source.within(limits), &[]));
     if let Err(error) = again {
-        std::fs::write(path, &before).with_context(|| format!("{shown} cannot be written"))?;
+        write_file(path, &before)?;
         return Err(anyhow::Error::from(error).context(format!("{shown} is unchanged")));
     }
     Ok(changes)

@@ -12,6 +12,7 @@ mod trials;
 use super::args::TuneArgs;
 use anyhow::Context;
 use metachron_console::exit::Exit;
+use metachron_console::files::{check_output_path, check_unread, write_file};
 use metachron_console::gains;
 use metachron_console::output::{BadInput, data, message};
 use metachron_console::progress::Bar;
@@ -47,12 +48,15 @@ struct Identified {
 /// # Errors
 /// Bad input, a file that cannot be written, an adapter that failed.
 pub fn command(args: &TuneArgs) -> anyhow::Result<Exit> {
-    let scene = scene(args)?;
+    let source = Source::open(&args.scene)?.within(args.common.limits.limits());
+    let scene = scene(args, &source)?;
     let given = args.analyse.as_deref().map(|text| gains::parse(text, scene.target.frame_hz)).transpose()?;
     let fragment =
         args.gains.clone().unwrap_or_else(|| PathBuf::from(format!("{}.gains.toml", file_stem(&args.scene))));
     if given.is_none() {
-        gains::check_output_path(&fragment, "--gains", args.force)?;
+        check_output_path(&fragment, "--gains", args.force)?;
+        let read = source.files();
+        check_unread("--gains", &fragment, "the scene", read.iter().map(|file| &*file.path))?;
     }
     let stopped = Arc::new(AtomicBool::new(false));
     let flag = Arc::clone(&stopped);
@@ -93,7 +97,7 @@ fn identify(args: &TuneArgs, scene: Scene, stopped: &AtomicBool) -> anyhow::Resu
 }
 
 /// The scene with the changes by the arguments; in virtual time except with `--live`.
-fn scene(args: &TuneArgs) -> anyhow::Result<Scene> {
+fn scene(args: &TuneArgs, source: &Source) -> anyhow::Result<Scene> {
     let executor = if args.live { ExecutorKind::Threads } else { ExecutorKind::Lockstep };
     let flags = [
         ("executor", Some(format!("\"{}\"", executor.name()))),
@@ -102,7 +106,7 @@ fn scene(args: &TuneArgs) -> anyhow::Result<Scene> {
     ];
     let flags = flags.into_iter().filter_map(|(key, value)| Some((key.to_owned(), value?)));
     let overrides: Vec<_> = args.common.set.iter().cloned().chain(flags).collect();
-    Ok(load(&Source::open(&args.scene)?.within(args.common.limits.limits()), &overrides)?)
+    Ok(load(source, &overrides)?)
 }
 
 fn live(size: Size) -> anyhow::Result<Drawing> {
@@ -136,7 +140,7 @@ fn find(args: &TuneArgs, on: &Identified, fragment: &Path, stopped: &AtomicBool)
     let mut trials = Trials::open(args, on, fragment)?;
     let tuned = look_for_gains(args, on, &mut trials, stopped)?;
     let agents = agents::tune(args, &on.scene, stopped)?;
-    gains::write(fragment, &gains::fragment(tuned.law, agents.gains(), &report::comment(on, &tuned)))?;
+    write_file(fragment, gains::fragment(tuned.law, agents.gains(), &report::comment(on, &tuned)))?;
     trials.close(!tuned.interrupted)?;
     let mut files = vec![fragment.to_owned()];
     let mut checked = Vec::new();

@@ -10,6 +10,7 @@ use anyhow::Context;
 use metachron_console::output::message;
 use metachron_lod::control::Law;
 use metachron_lod::tune::{Candidate, Margins, Verdict};
+use metachron_world::OutputFile;
 use std::fs::{self, File, OpenOptions};
 use std::hash::{DefaultHasher, Hash, Hasher};
 use std::io::{self, Write};
@@ -43,9 +44,7 @@ impl Trials {
             message(&format!("note: {} {why}: it is now {}, the search begins anew", path.display(), kept.display()));
         }
         let open = || -> anyhow::Result<File> {
-            let beside = path.with_extension("trials.new");
-            fs::write(&beside, format!("{of}\n{}", known.iter().map(line).collect::<String>()))?;
-            fs::rename(&beside, &path)?;
+            OutputFile::write(&path, format!("{of}\n{}", known.iter().map(line).collect::<String>()))?;
             Ok(OpenOptions::new().append(true).open(&path)?)
         };
         let file = open().with_context(|| format!("{} cannot be written", path.display()))?;

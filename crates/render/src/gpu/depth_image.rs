@@ -1,11 +1,10 @@
 //! A depth image: 16 bits a pixel, and how many metres one unit is.
 //!
-//! In: depths in metres. Out: a PNG file. Never here: drawing.
+//! In: depths in metres. Out: the bytes of a PNG file. Never here: drawing, files.
 
 use super::offscreen::GpuError;
 use crate::seen::view::Size;
 use image::{ImageBuffer, ImageEncoder, Luma};
-use std::path::Path;
 
 /// Depths along the view, of every pixel.
 #[derive(Debug, Clone, PartialEq)]
@@ -30,18 +29,12 @@ impl DepthImage {
         [1.0, 2.0, 5.0].map(|round| round * power).into_iter().find(|unit| *unit >= least).unwrap_or(10.0 * power)
     }
 
-    /// Writes it as PNG of 16 bits: a pixel is its depth over [`DepthImage::unit_m`], rounded, 0 where there is nothing. The file says so too, in
+    /// A PNG file of 16 bits: a pixel is its depth over [`DepthImage::unit_m`], rounded, 0 where there is nothing. The file says so too, in
     /// a text `Description`.
     ///
     /// # Errors
-    /// [`GpuError::File`] with the path.
-    pub fn save(&self, path: &Path) -> Result<(), GpuError> {
-        let failed = |source| GpuError::File { path: path.to_path_buf(), source };
-        std::fs::write(path, self.png().map_err(failed)?).map_err(|error| failed(error.into()))
-    }
-
-    /// The bytes of the file.
-    fn png(&self) -> Result<Vec<u8>, image::ImageError> {
+    /// [`GpuError::Encode`].
+    pub fn png(&self) -> Result<Vec<u8>, GpuError> {
         let unit_m = self.unit_m();
         let unit = |depth: &f32| if depth.is_finite() { (f64::from(*depth) / unit_m).round() as u16 } else { 0 };
         let units: Vec<u16> = self.depths_m.iter().map(unit).collect();

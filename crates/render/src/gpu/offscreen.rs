@@ -9,7 +9,6 @@ use super::upscale::{Upscaled, Upscaler};
 use crate::composition::picture::{Colouring, Picture, Style};
 use crate::seen::view::{Camera, Size};
 use image::RgbaImage;
-use std::path::{Path, PathBuf};
 use std::sync::{Arc, OnceLock};
 use std::time::Duration;
 
@@ -67,14 +66,9 @@ pub enum GpuError {
         /// The message of wgpu.
         detail: String,
     },
-    /// The file could not be written.
-    #[error("the picture could not be written to {path}")]
-    File {
-        /// The intended path.
-        path: PathBuf,
-        /// The reason.
-        source: image::ImageError,
-    },
+    /// The picture could not be made a file.
+    #[error("the picture could not be made a PNG file")]
+    Encode(#[from] image::ImageError),
 }
 
 /// An adapter and its device.
@@ -327,12 +321,12 @@ impl Offscreen {
         Ok(DepthImage { size: self.size, depths_m })
     }
 
-    /// Writes the last picture to a PNG file.
+    /// The last picture as a PNG file.
     ///
     /// # Errors
-    /// [`GpuError::ReadBack`], or [`GpuError::File`] with the path.
-    pub fn save(&self, path: &Path) -> Result<(), GpuError> {
-        write_png(&self.read_back()?, path)
+    /// [`GpuError::ReadBack`] or [`GpuError::Encode`].
+    pub fn png(&self) -> Result<Vec<u8>, GpuError> {
+        png(&self.read_back()?)
     }
 }
 
@@ -439,8 +433,12 @@ pub fn read_back_shown(
     read_back(gpu, &enlarged, lost)
 }
 
-/// Writes a picture as PNG.
-pub fn write_png(image: &PictureFile, path: &Path) -> Result<(), GpuError> {
-    let saved = image.save_with_format(path, image::ImageFormat::Png);
-    saved.map_err(|source| GpuError::File { path: path.to_path_buf(), source })
+/// A picture as a PNG file.
+///
+/// # Errors
+/// [`GpuError::Encode`].
+pub fn png(image: &PictureFile) -> Result<Vec<u8>, GpuError> {
+    let mut file = std::io::Cursor::new(Vec::new());
+    image.write_to(&mut file, image::ImageFormat::Png)?;
+    Ok(file.into_inner())
 }

@@ -11,6 +11,7 @@ use egui_wgpu::{RenderState, wgpu};
 use metachron_render::Gpu;
 use metachron_render::offscreen;
 use metachron_render::{DeviceLoss, DrawError, Renderer, RendererOptions, Size, Target, Upscaled, Upscaler};
+use metachron_world::OutputFile;
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
 
@@ -111,8 +112,9 @@ impl GpuScreen {
         let now = SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default();
         let path = folder.join(format!("metachron-{}-{}.png", file_name(scene), now.as_millis()));
         let image = offscreen::read_back_shown(&self.gpu, &canvas.texture, canvas.shown, self.lost());
-        let written = image.and_then(|image| offscreen::write_png(&image, &path));
-        written.map(|()| path).map_err(|error| error.to_string())
+        let png = image.and_then(|image| offscreen::png(&image)).map_err(|error| error.to_string())?;
+        let failed = |error| format!("{} cannot be written: {error}", path.display());
+        OutputFile::write(&path, png).map_err(failed).map(|()| path)
     }
 
     fn render(&mut self, simulation: &mut dyn Simulation, view: &ViewRequest) -> Result<DrawnTimes, DrawError> {

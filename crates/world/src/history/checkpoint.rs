@@ -6,6 +6,7 @@
 //! A file: [`MAGIC`], the version of the format, the length and the checksum of the rest, then the program's version,
 //! the scene's identity, the time, the state. All numbers of its head are little-endian.
 
+use super::output_file::OutputFile;
 use crate::start::joined::{JoinedParts, archive_parts};
 use crate::{Scene, WorldError};
 use metachron_core::{Archive, ArchiveError, HASH_START, SimTime};
@@ -184,14 +185,14 @@ impl Checkpoint {
         self.state.len()
     }
 
-    /// Writes it to a file, in place of one that is there. Of an agent of your own that joined ([`crate::Custom`]) the file has the state and
+    /// Writes it to a file, in place of one that is there, which stays as it was until the new one is whole. Of an agent of your own that joined ([`crate::Custom`]) the file has the state and
     /// the name: a world goes on from it where that agent is there.
     ///
     /// # Errors
     /// [`CheckpointError::File`].
     pub fn write(&self, path: impl AsRef<Path>) -> Result<(), CheckpointError> {
         let path = path.as_ref();
-        std::fs::write(path, self.to_bytes()).map_err(|error| CheckpointError::File { path: path.to_owned(), error })
+        OutputFile::write(path, self.to_bytes()).map_err(|error| CheckpointError::File { path: path.to_owned(), error })
     }
 
     /// Reads the one that a file holds.

@@ -5,8 +5,8 @@
 
 use super::checkpoint::{Checkpoint, CheckpointError, SceneIdentity};
 use super::log::{Log, TurnsToLog, logged};
+use super::output_file::RecordingFile;
 use super::recording::{Entry, RecordError, Recorder, Recording, SceneText};
-use super::recording_file::RecordingFile;
 use super::replay::{Followed, Player};
 use crate::description::kinds::ExecutorKind;
 use crate::error::{Waited, WorldError};

@@ -6,9 +6,9 @@ mod draw;
 mod font;
 mod scale;
 
-use anyhow::Context;
 pub use draw::headings;
 use draw::{png, svg};
+use metachron_console::files::write_file;
 use std::path::{Path, PathBuf};
 
 /// Some panels under one title.
@@ -42,7 +42,7 @@ pub fn write(folder: &Path, stem: &str, figure: &Figure) -> anyhow::Result<[Path
     let (svg, png) = (svg(figure)?, png(figure)?);
     let paths = ["svg", "png"].map(|kind| folder.join(format!("{stem}.{kind}")));
     for (path, bytes) in paths.iter().zip([svg.as_bytes(), &png]) {
-        std::fs::write(path, bytes).with_context(|| format!("{} cannot be written", path.display()))?;
+        write_file(path, bytes)?;
     }
     Ok(paths)
 }
