@@ -299,13 +299,9 @@ pub(super) fn check_outputs(
         return Err(BadInput("--json and --report - both print the report; choose one".to_owned()).into());
     }
     let files = files(args, record);
-    for (flag, path) in files {
-        if path == Some(Path::new("-")) {
-            return Err(BadInput(format!(
-                "{flag} - would write to standard output, which only the report may use; name a file"
-            ))
-            .into());
-        }
+    if let Some((flag, _)) = files.iter().find(|(_, path)| *path == Some(Path::new("-"))) {
+        let why = "would write to standard output, which only the report may use; name a file";
+        return Err(BadInput(format!("{flag} - {why}")).into());
     }
     if args.vtk.as_deref() == Some(Path::new("-")) {
         return Err(BadInput("--vtk - would be a folder called -; name another".to_owned()).into());

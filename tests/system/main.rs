@@ -29,3 +29,4 @@ mod sight;
 mod system_calls;
 mod throughput;
 mod tune;
+mod tune_stops;

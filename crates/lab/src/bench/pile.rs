@@ -10,7 +10,7 @@ use super::super::args::BenchArgs;
 use super::rig::machine::{others_cpu, own_cpu};
 use super::rig::plain_world::{Frame, Settings, world_of};
 use super::subject::{Progress, Subject};
-use crate::chart::{Axis, Colour, Figure, Layer};
+use crate::chart::{Axis, Colour, Figure, Layer, Table, table};
 use anyhow::bail;
 use metachron_render::{Size, Style};
 use metachron_runtime::AgentStats;
@@ -59,7 +59,8 @@ type Spent = Vec<f64>;
 impl Subject for Pile {
     type Row = Row;
     const NAME: &'static str = "pile";
-    const COLUMNS: &'static str = "who, here, boxes.0, sim_s.1, dropped_s.2, cpu_s.2, steps_per_cpu_s.1, share.2";
+    const TABLE: fn(&[Row]) -> Table = table!(|r| who: r.who, here: r.here, boxes: r.boxes, sim_s(1): r.sim_s,
+        dropped_s(2): r.dropped_s, cpu_s(2): r.cpu_s, steps_per_cpu_s(1): r.steps_per_cpu_s, share(2): r.share);
 
     fn measure(args: &BenchArgs, progress: &Progress) -> anyhow::Result<Vec<Row>> {
         let sim_s = args.seconds.unwrap_or(SECONDS[usize::from(args.quick)]);

@@ -4,7 +4,7 @@
 
 use super::super::args::BenchArgs;
 use super::subject::{Progress, Subject};
-use crate::chart::{Axis, Colour, Figure, Layer, Panel, span};
+use crate::chart::{Axis, Colour, Figure, Layer, Panel, Table, table};
 use anyhow::Context;
 use metachron_drawable::PieceKind;
 use metachron_lod::control::AREAS_PX;
@@ -32,8 +32,8 @@ pub(super) struct Row {
 impl Subject for Render {
     type Row = Row;
     const NAME: &'static str = "render";
-    const COLUMNS: &'static str =
-        "picture_px.0, objects.0, shading, triangles.0, pixels.0, picture_ms.3, ns_per_triangle.1";
+    const TABLE: fn(&[Row]) -> Table = table!(|r| picture_px: r.picture_px, objects: r.objects, shading: r.shading,
+        triangles: r.triangles, pixels: r.pixels, picture_ms(3): r.picture_ms, ns_per_triangle(1): r.ns_per_triangle);
 
     fn measure(_args: &BenchArgs, progress: &Progress) -> anyhow::Result<Vec<Row>> {
         let gpu = Gpu::headless().context("what drawing costs cannot be measured")?;
@@ -47,14 +47,12 @@ impl Subject for Render {
 
     fn figure(rows: &[Row]) -> Figure {
         let drawn: Vec<&Row> = rows.iter().filter(|row| row.objects > 0).collect();
-        let (low, high) = span(drawn.iter().map(|row| row.triangles), true);
-        let (least, most) = span(drawn.iter().map(|row| row.picture_ms), true);
         let names = SHADINGS.map(name).into_iter().chain([POINTS, LINES]);
         let layers = names.zip(Colour::LINES).map(|(name, colour)| {
             let here = drawn.iter().filter(|row| row.shading == name);
             Layer::dots(name, colour, here.map(|row| (row.triangles, row.picture_ms)))
         });
-        let (x, y) = (Axis::log("triangles", low, high), Axis::log("ms per picture", least, most));
+        let (x, y) = (Axis::log_fit("triangles"), Axis::log_fit("ms per picture"));
         let adapter = rows.first().map_or("", |row| &row.adapter);
         Figure::new("Drawing time of pictures", 1, vec![Panel::new(adapter, x, y, layers)])
     }

@@ -7,7 +7,7 @@ use super::rig::bare::step;
 use super::rig::cast::{ROD_SEGMENTS, rod};
 use super::rig::machine::own_cpu;
 use super::subject::{Progress, Subject};
-use crate::chart::{Axis, Colour, Figure, Layer, exponent, span};
+use crate::chart::{Axis, Colour, Figure, Layer, Table, exponent, table};
 use glam::DVec3;
 use metachron_contact::step::LoneStepper;
 use metachron_core::SimSpan;
@@ -41,7 +41,8 @@ pub(super) struct Row {
 impl Subject for Rod {
     type Row = Row;
     const NAME: &'static str = "rod";
-    const COLUMNS: &'static str = "segments.0, self_contact, us_per_step.2, ns_per_segment.0, steps_per_s.0";
+    const TABLE: fn(&[Row]) -> Table = table!(|r| segments: r.segments, self_contact: r.self_contact,
+        us_per_step(2): r.us_per_step, ns_per_segment: r.ns_per_segment, steps_per_s: r.steps_per_s);
 
     fn measure(args: &BenchArgs, progress: &Progress) -> anyhow::Result<Vec<Row>> {
         let span = Duration::from_secs_f64(args.seconds.unwrap_or(SPANS_S[usize::from(args.quick)]));
@@ -55,8 +56,6 @@ impl Subject for Rod {
             let here = rows.iter().filter(|row| row.self_contact == contact);
             here.map(|row| (row.segments as f64, row.us_per_step)).collect()
         };
-        let (low, high) = span(rows.iter().map(|row| row.segments as f64), true);
-        let (least, most) = span(rows.iter().map(|row| row.us_per_step), true);
         let lines =
             [("without self-contact", false), ("with self-contact search", true)].into_iter().zip(Colour::LINES);
         let layers = lines.map(|((label, contact), colour)| {
@@ -64,8 +63,12 @@ impl Subject for Rod {
             let label = format!("{label}: segments^{:.2}", exponent(&points).unwrap_or(f64::NAN));
             Layer::line(label, colour, points)
         });
-        let (x, y) = (Axis::log("segments", low, high), Axis::log("CPU time per step, µs", least, most));
-        Figure::single("Cost of a tube's step", x, y, layers)
+        Figure::single(
+            "Cost of a tube's step",
+            Axis::log_fit("segments"),
+            Axis::log_fit("CPU time per step, µs"),
+            layers,
+        )
     }
 }
 

@@ -5,7 +5,7 @@
 use super::super::args::BenchArgs;
 use super::rig::machine::processor;
 use super::subject::{Progress, Subject};
-use crate::chart::{Axis, Colour, Figure, Layer, Panel, median, span};
+use crate::chart::{Axis, Colour, Figure, Layer, Panel, Table, median, span, table};
 use anyhow::Context;
 use metachron_console::output::{BadInput, message};
 use serde::{Deserialize, Serialize};
@@ -100,7 +100,8 @@ fn row(scene: &str, reports: &[Vec<Report>]) -> Row {
 impl Subject for Scenes {
     type Row = Row;
     const NAME: &'static str = "scenes";
-    const COLUMNS: &'static str = "scene, cpu_s.2, other_cpu_s.2, over_other.2, same_state";
+    const TABLE: fn(&[Row]) -> Table = table!(|r| scene: r.scene, cpu_s(2): r.cpu_s, other_cpu_s(2): r.other_cpu_s,
+        over_other(2): r.over_other, same_state: r.same_state);
 
     fn measure(args: &BenchArgs, progress: &Progress) -> anyhow::Result<Vec<Row>> {
         let own = std::env::current_exe().context("this program's own file")?;

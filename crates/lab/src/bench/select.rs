@@ -4,7 +4,7 @@
 
 use super::super::args::BenchArgs;
 use super::subject::{Progress, Subject};
-use crate::chart::{Experiment, Figure, Selection};
+use crate::chart::{Experiment, Figure, Selection, Table};
 
 /// The subject.
 pub(super) struct Select;
@@ -12,10 +12,10 @@ pub(super) struct Select;
 impl Subject for Select {
     type Row = <Selection as Experiment>::Row;
     const NAME: &'static str = "select";
-    const COLUMNS: &'static str = Selection::COLUMNS;
+    const TABLE: fn(&[Self::Row]) -> Table = Selection::TABLE;
 
     fn measure(args: &BenchArgs, progress: &Progress) -> anyhow::Result<Vec<Self::Row>> {
-        progress.rows(Selection::cases(args.quick), |_| String::new(), |case| Ok(Selection::measure(&case)))
+        progress.rows(Selection::cases(args.quick), |_| String::new(), |case| Ok(Selection::row(&case)))
     }
 
     fn figure(rows: &[Self::Row]) -> Figure {

@@ -6,7 +6,7 @@ use super::super::args::BenchArgs;
 use super::agents::{Case, Executor, Row, TENTH_HZ, UNPACED_HZ, cases, measure};
 use super::rig::cast::Model;
 use super::subject::{Progress, Subject};
-use crate::chart::{Axis, Colour, Figure, Layer, Panel, exponent, span};
+use crate::chart::{Axis, Colour, Figure, Layer, Panel, Table, exponent, span, table};
 use metachron_console::output::{BadInput, message};
 use metachron_runtime::Priority;
 use std::time::Duration;
@@ -20,7 +20,13 @@ const SPANS: [Duration; 2] = [Duration::from_secs(4), Duration::from_secs(1)];
 impl Subject for Agents {
     type Row = Row;
     const NAME: &'static str = "agents";
-    const COLUMNS: &'static str = COLUMNS;
+    const TABLE: fn(&[Row]) -> Table = table!(|r| executor: r.executor.name(), model: r.model.name(),
+        realtime: r.realtime, agents: r.agents, rate_hz(1): r.rate_hz, cpu_us(2): r.cpu_us_per_step, cores(3): r.cores,
+        bare_us(2): r.bare_us_per_step, sleeping_us(2): r.sleeping_us_per_step, thread_us(2): r.thread_us_per_step,
+        over_thread(2): r.over_thread, steps_per_s: r.steps_per_s, age_p99_ms(2): r.age_ms_p99,
+        late_p50_ms(2): r.late_ms_p50, late_p99_ms(2): r.late_ms_p99, dropped_ms(1): r.dropped_ms,
+        bytes: r.bytes_per_agent, switches(2): r.switches_per_step, frame_p99_ms(2): r.frame_late_ms_p99,
+        read_ns: r.read_ns_per_agent, start_ms(1): r.start_ms, end_ms(1): r.shutdown_ms);
 
     fn measure(args: &BenchArgs, progress: &Progress) -> anyhow::Result<Vec<Row>> {
         let granted = Priority::Realtime.ask();
@@ -54,15 +60,6 @@ fn is_selected(args: &BenchArgs, case: &Case) -> bool {
         && args.agents.is_none_or(|agents| case.agents <= agents)
 }
 
-/// The columns of the table.
-const COLUMNS: &str = "\
-    executor, model, realtime, agents.0, rate_hz.1, cpu_us_per_step.2 as cpu_us, cores.3, \
-    bare_us_per_step.2 as bare_us, sleeping_us_per_step.2 as sleeping_us, \
-    thread_us_per_step.2 as thread_us, over_thread.2, steps_per_s.0, age_ms_p99.2 as age_p99_ms, \
-    late_ms_p50.2 as late_p50_ms, late_ms_p99.2 as late_p99_ms, dropped_ms.1, bytes_per_agent.0 as bytes, \
-    switches_per_step.2 as switches, frame_late_ms_p99.2 as frame_p99_ms, read_ns_per_agent.0 as read_ns, \
-    start_ms.1, shutdown_ms.1 as end_ms";
-
 /// CPU per step and lateness over the number of agents, and the cost of a round where agents are unpaced.
 fn figure_of(all: &[Row]) -> Figure {
     let of_a_kind = |row: &&Row| row.model == Model::Synthetic && ![1000.0, TENTH_HZ].contains(&row.rate_hz);
@@ -91,11 +88,9 @@ fn figure_of(all: &[Row]) -> Figure {
 fn growth(rows: &[&Row]) -> Panel {
     let line = |y: fn(&Row) -> f64| rows.iter().map(|row| (row.agents as f64, y(row) * row.agents as f64)).collect();
     let (ours, bare): (Vec<_>, Vec<_>) = (line(|row| row.cpu_us_per_step), line(|row| row.bare_us_per_step));
-    let (low, high) = span(ours.iter().map(|(x, _)| *x), true);
-    let (least, most) = span(ours.iter().chain(&bare).map(|(_, y)| *y), true);
     let title = format!("unpaced: a round costs agents^{:.2}", exponent(&ours).unwrap_or(f64::NAN));
     let layers = [Layer::line("pool", Colour::LINES[1], ours), Layer::dashed("bare loop", Colour::Grey, bare)];
-    Panel::new(title, Axis::log("agents", low, high), Axis::log("µs per round", least, most), layers)
+    Panel::new(title, Axis::log_fit("agents"), Axis::log_fit("µs per round"), layers)
 }
 
 #[cfg(test)]

@@ -22,8 +22,8 @@ pub(super) trait Subject {
     /// Its name on the command line; the files are called after it.
     const NAME: &'static str;
 
-    /// The columns of the table that is printed.
-    const COLUMNS: &'static str;
+    /// The table that is printed of the rows.
+    const TABLE: fn(&[Self::Row]) -> Table;
 
     /// Measures the requested cases one by one while `progress` says to go on; returns the finished rows.
     fn measure(args: &BenchArgs, progress: &Progress) -> anyhow::Result<Vec<Self::Row>>;
@@ -74,7 +74,7 @@ pub(super) fn run<S: Subject>(args: &BenchArgs) -> anyhow::Result<Exit> {
     if args.json {
         data(&format!("{}\n", json::<S>(&rows)?))?;
     } else if !args.quiet {
-        data(&Table::of(&rows, S::COLUMNS).text())?;
+        data(&(S::TABLE)(&rows).text())?;
     }
     if interrupted {
         message("interrupted: the finished rows are written");

@@ -2,9 +2,9 @@
 //!
 //! In: whether to be quick. Out: cases, rows, a figure, a table, findings. Never here: files, threads, drawing.
 
+use super::blank::blank;
 use super::figure::Figure;
 use super::table::Table;
-use csv::StringRecord;
 use metachron_render::PictureFile;
 use serde::de::DeserializeOwned;
 use serde::{Serialize, Serializer};
@@ -13,15 +13,15 @@ use std::ops::Deref;
 /// One measurement, made for many cases.
 pub trait Experiment: Sync {
     /// A case with its measurements: [`Measured`], where the fields of a case are the first columns.
-    type Row: Record + 'static;
+    type Row: Record;
 
     /// The name that `--only` takes; the files are called after it.
     const NAME: &'static str;
     /// One sentence that says what the experiment shows.
     const TITLE: &'static str;
 
-    /// The columns of the table that is printed, as [`Table::of`] takes them; none where a line is no row.
-    const COLUMNS: &'static str = "";
+    /// The table that is printed of the rows.
+    const TABLE: fn(&[Self::Row]) -> Table;
 
     /// Whether cases are measured one at a time, because they measure the time of this machine.
     const ALONE: bool = false;
@@ -29,8 +29,14 @@ pub trait Experiment: Sync {
     /// The cases in the order of the rows; `quick`: a small part of them, or shorter runs.
     fn cases(quick: bool) -> Vec<CaseOf<Self>>;
 
-    /// Measures one case. The same case gives the same row, whenever and on whichever thread, except for times of this machine.
-    fn measure(case: &CaseOf<Self>) -> Self::Row;
+    /// Measures one case; `None` where that fails, and the row is [`blank`]. The same case gives the same row, whenever and on
+    /// whichever thread, except for times of this machine.
+    fn measure(case: &CaseOf<Self>) -> Option<<Self::Row as Record>::Found>;
+
+    /// The row of one case, measured now.
+    fn row(case: &CaseOf<Self>) -> Self::Row {
+        Self::Row::of(case, Self::measure(case).unwrap_or_else(blank))
+    }
 
     /// The picture of the rows so far.
     fn figure(rows: &[Self::Row]) -> Figure;
@@ -43,11 +49,6 @@ pub trait Experiment: Sync {
         Ok(Vec::new())
     }
 
-    /// The table that is printed.
-    fn table(rows: &[Self::Row]) -> Table {
-        Table::of(rows, Self::COLUMNS)
-    }
-
     /// The claims and their measured values.
     fn findings(rows: &[Self::Row]) -> Vec<Finding>;
 }
@@ -55,19 +56,15 @@ pub trait Experiment: Sync {
 /// The case that an experiment measures once.
 pub type CaseOf<E> = <<E as Experiment>::Row as Record>::Case;
 
-/// A line of the CSV file of an experiment.
-pub trait Record: Serialize + Clone + Send + Sync {
-    /// Identifies a row: rows of the same case are the same measurement.
-    type Case: PartialEq + Sync;
+/// A line of the CSV file of an experiment: a column for each column of its case, and more.
+pub trait Record: Serialize + Send + Sync + 'static {
+    /// What is measured; rows of cases that are written alike are the same measurement.
+    type Case: Serialize + Sync;
+    /// What is read from a line.
+    type Found: DeserializeOwned;
 
-    /// The case that was measured.
-    fn case(&self) -> Self::Case;
-
-    /// The same from a line of the file.
-    ///
-    /// # Errors
-    /// A line without a column, or with a value of another kind.
-    fn read(names: &StringRecord, line: &StringRecord) -> csv::Result<Self>;
+    /// The line of a case.
+    fn of(case: &Self::Case, found: Self::Found) -> Self;
 }
 
 /// A case and its measurements; the fields of both are the columns of the CSV file.
@@ -95,19 +92,51 @@ impl<C: Serialize, M: Serialize> Serialize for Measured<C, M> {
 
 impl<C, M> Record for Measured<C, M>
 where
-    C: Serialize + DeserializeOwned + Clone + PartialEq + Send + Sync,
-    M: Serialize + DeserializeOwned + Clone + Send + Sync,
+    C: Serialize + Clone + Send + Sync + 'static,
+    M: Serialize + DeserializeOwned + Send + Sync + 'static,
 {
     type Case = C;
+    type Found = M;
 
-    fn case(&self) -> C {
-        self.case.clone()
-    }
-
-    fn read(names: &StringRecord, line: &StringRecord) -> csv::Result<Self> {
-        Ok(Self { case: line.deserialize(Some(names))?, found: line.deserialize(Some(names))? })
+    fn of(case: &C, found: M) -> Self {
+        Self { case: case.clone(), found }
     }
 }
+
+/// A choice of some, which is written as its name.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Named<T>(pub &'static str, pub T);
+
+impl<T> Serialize for Named<T> {
+    fn serialize<S: Serializer>(&self, out: S) -> Result<S::Ok, S::Error> {
+        out.serialize_str(self.0)
+    }
+}
+
+/// A list with an entry for every combination of some lists: `each!(scene in SCENES, &ratio in RATIOS => Case { scene, ratio })` has all ratios
+/// of the first scene before those of the second. A list may depend on entries of those before it.
+macro_rules! each {
+    (@ $all:ident, $entry:expr) => { $all.push($entry) };
+    (@ $all:ident, $entry:expr, $one:pat in $list:expr $(, $more:pat in $lists:expr)*) => {
+        for $one in $list {
+            $crate::chart::each!(@ $all, $entry $(, $more in $lists)*);
+        }
+    };
+    ($($one:pat in $list:expr),+ => $entry:expr) => {{
+        let mut all = Vec::new();
+        $crate::chart::each!(@ all, $entry, $($one in $list),+);
+        all
+    }};
+}
+
+/// Claims, each with its measured value and its limit: `claims!["energy made, J" => made_j, at_most 0.1; …]`; names in braces are filled in.
+macro_rules! claims {
+    [$($claim:literal => $measured:expr, $relation:ident $limit:expr);* $(;)?] => {
+        vec![$($crate::chart::Finding::$relation(format!($claim), $measured, $limit)),*]
+    };
+}
+
+pub(crate) use {claims, each};
 
 /// A claim compared with the rows.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -128,11 +157,6 @@ impl Finding {
         Self { claim: claim.into(), measured, limit, holds: Some(measured <= limit) }
     }
 
-    /// Claims with what was measured and what it is at most.
-    pub fn all_at_most<const N: usize>(claims: [(&str, f64, f64); N]) -> Vec<Self> {
-        claims.into_iter().map(|(claim, measured, limit)| Self::at_most(claim, measured, limit)).collect()
-    }
-
     /// Holds where `measured` is at least `limit`; does not hold for NaN.
     pub fn at_least(claim: impl Into<String>, measured: f64, limit: f64) -> Self {
         Self { claim: claim.into(), measured, limit, holds: Some(measured >= limit) }
@@ -143,6 +167,32 @@ impl Finding {
         let measured = rows > 0 && !self.measured.is_nan();
         Self { holds: self.holds.filter(|_| measured), ..self }
     }
+}
+
+/// The number of the first row of some; NaN where there is none.
+pub fn number_of<R>(rows: &[R], which: impl Fn(&R) -> bool, number: impl Fn(&R) -> f64) -> f64 {
+    rows.iter().find(|row| which(row)).map_or(f64::NAN, number)
+}
+
+/// The greatest number of some rows; NaN where one of them is, or where there are none.
+pub fn worst_of<R>(rows: &[R], which: impl Fn(&R) -> bool, number: impl Fn(&R) -> f64) -> f64 {
+    worst(rows.iter().filter(|row| which(row)).map(number))
+}
+
+/// The distinct names of some, in their order.
+pub fn distinct<'a>(names: impl IntoIterator<Item = &'a str>) -> Vec<&'a str> {
+    let mut list: Vec<&str> = Vec::new();
+    for name in names {
+        if !list.contains(&name) {
+            list.push(name);
+        }
+    }
+    list
+}
+
+/// How many rows are such.
+pub fn count_of<R>(rows: &[R], which: impl Fn(&R) -> bool) -> f64 {
+    rows.iter().filter(|row| which(row)).count() as f64
 }
 
 /// The greatest of some numbers; NaN where one of them is, or where there are none.

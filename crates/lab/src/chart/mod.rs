@@ -5,6 +5,7 @@
 mod accuracy;
 mod asynchronous;
 mod bench;
+mod blank;
 mod coupling;
 mod energy_bench;
 mod experiment;
@@ -40,11 +41,14 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicU32, Ordering};
 
-pub(super) use experiment::{Experiment, Finding, Measured, Record, worst};
+pub(super) use blank::blank;
+pub(super) use experiment::{
+    Experiment, Finding, Measured, Named, Record, claims, count_of, distinct, each, number_of, worst, worst_of,
+};
 pub(super) use figure::{Axis, Colour, Figure, Layer, Mark, Panel, lines, span};
 pub(super) use policies::compared::selection::Selection;
 pub(super) use power::exponent;
-pub(super) use table::{Cell, Table, fields};
+pub(super) use table::{Cell, Shown, Table, fields, table};
 pub(super) use timing::{calibration_us, floor_us, least_us, median, pace_for_goals};
 
 /// Settings that the experiments of a command share.
@@ -302,7 +306,7 @@ fn run<E: Experiment>(setting: &Setting<'_>) -> anyhow::Result<Done> {
         complete: swept.complete,
         rows: swept.rows.len(),
         files,
-        table: E::table(&swept.rows),
+        table: (E::TABLE)(&swept.rows),
         findings: findings.into_iter().map(judged).collect(),
     })
 }
@@ -330,17 +334,13 @@ fn pictured<E: Experiment>(folder: &Path, stem: &str, rows: &[E::Row]) -> anyhow
 
 /// An experiment's claims, with what was measured and whether they hold.
 pub(crate) fn claims(done: &Done) -> Table {
-    let mut claims = Table::new(&["", "claim", "measured", "limit"]);
     let so_far = if done.complete { "" } else { " so far" };
-    for Finding { claim, measured, limit, holds } in &done.findings {
-        let word = match holds {
-            Some(true) => format!("holds{so_far}"),
-            Some(false) => format!("FAILS{so_far}"),
-            None => "not measured".to_owned(),
-        };
-        claims.rows.push(vec![word.into(), claim.into(), Cell::Number(*measured, 4), Cell::Number(*limit, 4)]);
-    }
-    claims
+    let word = |holds: Option<bool>| match holds {
+        Some(true) => format!("holds{so_far}"),
+        Some(false) => format!("FAILS{so_far}"),
+        None => "not measured".to_owned(),
+    };
+    table!(&done.findings, |one| "": word(one.holds), claim: one.claim, measured(4): one.measured, limit(4): one.limit)
 }
 
 /// An experiment's table, claims and files as text.

@@ -35,6 +35,11 @@ pub(super) fn scene(name: &str, rates_hz: [f64; 2]) -> Option<Scene> {
     }
 }
 
+/// Whether the first agent is the fast one: both, unless the rates are the same.
+pub(super) const fn ways(same_rates: bool) -> &'static [bool] {
+    if same_rates { &[true] } else { &[true, false] }
+}
+
 fn gravity() -> DVec3 {
     DVec3::NEG_Z * GRAVITY
 }

@@ -3,7 +3,7 @@
 //! In: cases, rows that exist already, a flag that stops it. Out: rows in the order of the cases, each in the file as soon
 //! as it is measured. The core that measures a case is left to chance; the rows do not depend on it. Never here: measurements.
 
-use super::experiment::{CaseOf, Experiment, Record};
+use super::experiment::{CaseOf, Experiment};
 use super::rows::RowFile;
 use anyhow::Context;
 use std::panic::{AssertUnwindSafe, catch_unwind};
@@ -19,7 +19,7 @@ pub(super) struct Swept<R> {
     pub(super) complete: bool,
 }
 
-/// Measures every case of `E` without a row in `kept`; `stopped` ends it after the rows in progress; `progress` is called for every
+/// Measures every case of `E` without a row in `rows`; `stopped` ends it after the rows in progress; `progress` is called for every
 /// row with the number of rows done and of all rows.
 ///
 /// # Errors
@@ -27,17 +27,10 @@ pub(super) struct Swept<R> {
 pub(super) fn sweep<E: Experiment>(
     cases: &[CaseOf<E>],
     mut file: RowFile,
-    kept: Vec<E::Row>,
+    mut rows: Vec<Option<E::Row>>,
     stopped: &AtomicBool,
     progress: &mut dyn FnMut(usize, usize),
 ) -> anyhow::Result<Swept<E::Row>> {
-    let mut rows: Vec<Option<E::Row>> = cases.iter().map(|_| None).collect();
-    for row in kept {
-        let case = row.case();
-        if let Some(k) = cases.iter().position(|c| *c == case) {
-            rows[k] = Some(row);
-        }
-    }
     let open: Vec<usize> = (0..cases.len()).filter(|&k| rows[k].is_none()).collect();
     let mut done = cases.len() - open.len();
     progress(done, cases.len());
@@ -45,7 +38,7 @@ pub(super) fn sweep<E: Experiment>(
     let work = |out: mpsc::Sender<(usize, Option<E::Row>)>| {
         while !stopped.load(Ordering::Relaxed) {
             let Some(&k) = open.get(next.fetch_add(1, Ordering::Relaxed)) else { break };
-            let row = catch_unwind(AssertUnwindSafe(|| E::measure(&cases[k]))).ok();
+            let row = catch_unwind(AssertUnwindSafe(|| E::row(&cases[k]))).ok();
             if out.send((k, row)).is_err() {
                 break;
             }

@@ -2,6 +2,7 @@
 //!
 //! In: cells. Out: aligned text, or JSON. Never here: where it is printed.
 
+use super::experiment::Named;
 use anyhow::Context;
 use serde::ser::{Serialize, SerializeMap, SerializeSeq, Serializer};
 use serde_json::{Map, Value};
@@ -24,41 +25,34 @@ pub struct Table {
     pub rows: Vec<Vec<Cell>>,
 }
 
+/// A table with a line for each of some rows: `table!(rows, |row| law: row.case.law, "depth, mm"(2): 1e3 * row.depth_m)` shows a text,
+/// and a number with two digits after the point; without rows it is a function of them.
+macro_rules! table {
+    (|$row:pat_param| $($columns:tt)+) => {
+        |rows| $crate::chart::table!(rows, |$row| $($columns)+)
+    };
+    ($rows:expr, |$row:pat_param| $($name:tt $(($digits:literal))?: $value:expr),+ $(,)?) => {{
+        let mut table = $crate::chart::Table::new(&[$(stringify!($name).trim_matches('"')),+]);
+        for $row in $rows {
+            table.rows.push(vec![$($crate::chart::Shown::cell(&$value, 0 $(+ $digits)?)),+]);
+        }
+        table
+    }};
+}
+
+pub(crate) use table;
+
 impl Table {
     /// An empty table.
     pub fn new(columns: &[&str]) -> Self {
         Self { columns: columns.iter().map(|&c| c.to_owned()).collect(), rows: Vec::new() }
     }
 
-    /// A line for each row, with the fields that `columns` names, each with its digits after the point if it is a number: `mean.3, limit`.
-    /// `depth_m*1e3.2 as depth_mm` shows a multiple under another name, `measured/theory.2` a ratio of two fields.
-    pub fn of<'a, R: Serialize + 'a>(rows: impl IntoIterator<Item = &'a R>, columns: &str) -> Self {
-        let own = |column| str::split(column, ['.', '*', '/']).next().unwrap_or(column);
-        let named = |column| str::split_once(column, " as ").unwrap_or((column, own(column)));
-        let (shown, names): (Vec<&str>, Vec<&str>) = columns.split(", ").map(named).unzip();
-        let line = |row: &R| {
-            let fields = fields(row);
-            shown.iter().map(|column| Cell::of(&fields, column)).collect()
-        };
-        Self { rows: rows.into_iter().map(line).collect(), ..Self::new(&names) }
-    }
-
-    /// The same with a column more of numbers, one for each row.
-    pub fn with(mut self, name: &str, digits: usize, numbers: impl IntoIterator<Item = f64>) -> Self {
+    /// The same with a column more.
+    pub fn with(mut self, name: &str, cells: impl Iterator<Item = Cell>) -> Self {
         self.columns.push(name.to_owned());
-        self.rows.iter_mut().zip(numbers).for_each(|(row, number)| row.push(Cell::Number(number, digits)));
+        self.rows.iter_mut().zip(cells).for_each(|(row, cell)| row.push(cell));
         self
-    }
-
-    /// Lines of cells with the names of their columns, the same in every line.
-    pub fn named(lines: impl IntoIterator<Item = Vec<(&'static str, Cell)>>) -> Self {
-        let mut table = Self::new(&[]);
-        for line in lines {
-            let (names, cells): (Vec<_>, _) = line.into_iter().unzip();
-            table.columns = names.into_iter().map(str::to_owned).collect();
-            table.rows.push(cells);
-        }
-        table
     }
 
     /// The table as lines, columns two spaces apart.
@@ -131,31 +125,6 @@ pub fn fields(row: &impl Serialize) -> Map<String, Value> {
 }
 
 impl Cell {
-    /// The cell of a column, by a row's fields.
-    fn of(fields: &Map<String, Value>, column: &str) -> Self {
-        let (what, digits) = column.rsplit_once('.').unwrap_or((column, ""));
-        let field = |name: &str| {
-            debug_assert!(fields.contains_key(name), "a row has no field {name}");
-            fields.get(name)
-        };
-        let number = |name: &str| field(name).and_then(Value::as_f64).unwrap_or(f64::NAN);
-        if let Ok(digits) = digits.parse() {
-            return Self::Number(
-                match (what.split_once('*'), what.split_once('/')) {
-                    (Some((name, factor)), _) => number(name) * factor.parse().unwrap_or(f64::NAN),
-                    (None, Some((over, under))) => number(over) / number(under),
-                    (None, None) => number(what),
-                },
-                digits,
-            );
-        }
-        match field(column) {
-            Some(Value::String(text)) if !text.is_empty() => Self::Text(text.clone()),
-            Some(Value::Bool(whether)) => if *whether { "yes" } else { "no" }.into(),
-            _ => "–".into(),
-        }
-    }
-
     fn text(&self) -> String {
         match self {
             Self::Text(text) => text.clone(),
@@ -178,29 +147,71 @@ fn readable(value: f64, digits: usize) -> String {
     }
 }
 
-impl From<&str> for Cell {
-    fn from(text: &str) -> Self {
-        Self::Text(text.to_owned())
+/// A value that a cell shows, of a number so many digits after the point.
+pub trait Shown {
+    fn cell(&self, digits: usize) -> Cell;
+}
+
+impl<T: Shown + ?Sized> Shown for &T {
+    fn cell(&self, digits: usize) -> Cell {
+        (**self).cell(digits)
     }
 }
 
-impl From<&String> for Cell {
-    fn from(text: &String) -> Self {
-        Self::Text(text.clone())
+impl Shown for Cell {
+    fn cell(&self, _: usize) -> Cell {
+        self.clone()
     }
 }
 
-impl From<String> for Cell {
-    fn from(text: String) -> Self {
-        Self::Text(text)
+impl Shown for str {
+    fn cell(&self, _: usize) -> Cell {
+        Cell::Text(if self.is_empty() { "–" } else { self }.to_owned())
     }
 }
 
-impl From<(f64, usize)> for Cell {
-    fn from(rounded: (f64, usize)) -> Self {
-        Self::Number(rounded.0, rounded.1)
+impl Shown for String {
+    fn cell(&self, digits: usize) -> Cell {
+        self.as_str().cell(digits)
     }
 }
+
+impl<T> Shown for Named<T> {
+    fn cell(&self, digits: usize) -> Cell {
+        self.0.cell(digits)
+    }
+}
+
+impl Shown for bool {
+    fn cell(&self, digits: usize) -> Cell {
+        if *self { "yes" } else { "no" }.cell(digits)
+    }
+}
+
+impl Shown for Option<bool> {
+    fn cell(&self, digits: usize) -> Cell {
+        self.map_or_else(|| "–".cell(digits), |whether| whether.cell(digits))
+    }
+}
+
+impl Shown for Option<f64> {
+    fn cell(&self, digits: usize) -> Cell {
+        self.unwrap_or(f64::NAN).cell(digits)
+    }
+}
+
+/// Numbers of some types are shown as they are.
+macro_rules! shown_numbers {
+    ($($number:ty),+) => {
+        $(impl Shown for $number {
+            fn cell(&self, digits: usize) -> Cell {
+                Cell::Number(*self as f64, digits)
+            }
+        })+
+    };
+}
+
+shown_numbers!(f64, i64, u32, u64, usize);
 
 impl Serialize for Cell {
     fn serialize<S: Serializer>(&self, out: S) -> Result<S::Ok, S::Error> {
@@ -238,37 +249,36 @@ impl Serialize for Table {
 mod tests {
     use super::*;
 
-    fn table() -> Table {
-        let mut table = Table::new(&["law", "peak"]);
-        table.rows.push(vec!["ledger".into(), (1.5, 2).into()]);
-        table.rows.push(vec!["penalty".into(), (2e9, 2).into()]);
-        table
+    fn laws() -> Table {
+        table!([("ledger", 1.5), ("penalty", 2e9)], |(law, peak)| law: law, peak(2): peak)
     }
 
     #[test]
     fn text_is_left_aligned_and_numbers_right() {
-        assert_eq!(table().text(), "law       peak\nledger    1.50\npenalty  2.0e9\n");
+        assert_eq!(laws().text(), "law       peak\nledger    1.50\npenalty  2.0e9\n");
     }
 
     #[test]
-    fn columns_show_fields_multiples_and_ratios() {
-        let row = |limit_m: Option<f64>| serde_json::json!([{ "law": "ledger", "fast": true }, { "depth_m": 0.0025, "limit_m": limit_m }]);
-        let columns = "law, fast, depth_m*1e3.1 as depth_mm, depth_m/limit_m.2 as share, limit_m.3";
-        let table = Table::of(&[row(Some(0.005)), row(None)], columns);
-        let text = "law     fast  depth_mm  share  limit_m\nledger  yes        2.5   0.50    0.005\nledger  yes        2.5      –        –\n";
-        assert_eq!(table.text(), text);
+    fn columns_show_texts_numbers_and_what_is_not_known() {
+        let rows = [("ledger", true, Some(0.005)), ("", false, None)];
+        let mm = |limit_m: Option<f64>| limit_m.map(|limit_m| 1e3 * limit_m);
+        let table = table!(rows, |row| law: row.0, fast: row.1, "limit, mm"(1): mm(row.2), of: 7_usize);
+        assert_eq!(
+            table.text(),
+            "law     fast  limit, mm  of\nledger  yes         5.0   7\n–       no            –   7\n"
+        );
     }
 
     #[test]
     fn markdown_has_the_rows_and_columns_that_are_asked_for() {
-        let some = table().only("law", &["penalty"]).unwrap().columns(&["peak", "law"]).unwrap();
+        let some = laws().only("law", &["penalty"]).unwrap().columns(&["peak", "law"]).unwrap();
         assert_eq!(some.markdown(), "| peak | law |\n| --: | --- |\n| 2.0e9 | penalty |\n");
-        assert!(table().columns(&["depth"]).unwrap_err().to_string().contains("there are: law, peak"));
+        assert!(laws().columns(&["depth"]).unwrap_err().to_string().contains("there are: law, peak"));
     }
 
     #[test]
     fn json_has_numbers_under_the_column_names() {
-        let json = serde_json::to_value(table()).unwrap();
+        let json = serde_json::to_value(laws()).unwrap();
         assert_eq!(json[0]["law"], "ledger");
         assert_eq!(json[1]["peak"], 2e9);
     }

@@ -7,13 +7,12 @@ mod film;
 mod votes;
 
 use super::args::CompareArgs;
-use super::chart::Table;
+use super::chart::table;
 use film::Film;
 use metachron_console::exit::Exit;
 use metachron_console::files::{check_unread, write_file};
 use metachron_console::output::{BadInput, data, message};
 use metachron_render::ssim;
-use serde::Serialize;
 use std::path::{Path, PathBuf};
 
 /// The page; its films stand where it says so.
@@ -21,14 +20,6 @@ const PAGE: &str = include_str!("page.html");
 const FILMS: &str = "/* films */";
 /// Most pictures of two films whose likeness is measured, spread evenly.
 const COMPARED: usize = 50;
-
-/// Likeness of two films.
-#[derive(Serialize)]
-struct Likeness<'a> {
-    left: &'a str,
-    right: &'a str,
-    ssim: f64,
-}
 
 /// Writes the page of films, or evaluates votes.
 ///
@@ -38,7 +29,9 @@ pub fn command(args: &CompareArgs) -> anyhow::Result<Exit> {
     if !args.votes.is_empty() {
         let votes = args.votes.iter().map(|path| votes::read(path)).collect::<anyhow::Result<Vec<_>>>()?.concat();
         let strengths = votes::strengths(&votes).map_err(BadInput)?;
-        data(&Table::of(&strengths, "film, votes.0, better.3, strength.3, low.3, high.3").text())?;
+        let table = table!(&strengths, |one| film: one.film, votes: one.votes, better(3): one.better,
+            strength(3): one.strength, low(3): one.low, high(3): one.high);
+        data(&table.text())?;
         return Ok(Exit::Ok);
     }
     check_unread("--out", &args.out, "the page", args.films.iter().map(PathBuf::as_path))?;
@@ -56,9 +49,10 @@ pub fn command(args: &CompareArgs) -> anyhow::Result<Exit> {
         }
     }
     let pairs = (0..films.len()).flat_map(|b| (0..b).map(move |a| (a, b)));
-    let rows: Vec<Likeness<'_>> = pairs.map(|(a, b)| likeness(&films[a], &films[b])).collect();
+    let pairs = pairs.map(|(a, b)| (&films[a], &films[b]));
+    let likeness = table!(pairs, |(a, b)| left: a.name, right: b.name, ssim(4): ssim_of(a, b));
     write_page(&films, &args.out)?;
-    data(&Table::of(&rows, "left, right, ssim.4").text())?;
+    data(&likeness.text())?;
     message(&format!(
         "{} asks which is better; `metachron compare --votes FILE` evaluates what it saves",
         args.out.display()
@@ -70,11 +64,12 @@ fn too_few() -> BadInput {
     BadInput("there are fewer than two films; expected at least two, or --votes".to_owned())
 }
 
-fn likeness<'a>(a: &'a Film, b: &'a Film) -> Likeness<'a> {
+/// Likeness of two films, the mean over some of their frames.
+fn ssim_of(a: &Film, b: &Film) -> f64 {
     let count = a.frames.len().min(b.frames.len());
     let at = (0..count).step_by(count.div_ceil(COMPARED).max(1));
     let values: Vec<f64> = at.filter_map(|k| ssim(&a.picture(k), &b.picture(k))).collect();
-    Likeness { left: &a.name, right: &b.name, ssim: values.iter().sum::<f64>() / values.len() as f64 }
+    values.iter().sum::<f64>() / values.len() as f64
 }
 
 fn write_page(films: &[Film], path: &Path) -> anyhow::Result<()> {

@@ -3,7 +3,7 @@
 //! In: settings and costs, present and needed. Out: text. Never here: where it is printed.
 
 use super::super::args::FitArgs;
-use super::super::chart::{Cell, Table};
+use super::super::chart::{Cell, Shown, table};
 use super::task::Task;
 use super::{Fitted, Simpler, length};
 use metachron_models::rod::Integrator;
@@ -12,14 +12,16 @@ use serde_json::{Value, json};
 
 /// The table, and the basis of its results.
 pub(super) fn text(args: &FitArgs, task: &Task<'_>, fitted: &Fitted) -> String {
-    let columns = ["object", "model", "", "integrator", "dt_ms", "segments", "ms_per_s", "cpu_ms_per_s", "simpler"];
-    let mut table = Table::new(&columns);
-    for object in 0..task.objects.len() {
-        let name = task.objects[object].name.as_str();
-        let [pays, needs] = models(task, object);
-        table.rows.push(row(task, fitted, object, 0, [name, pays, "pays"]));
-        table.rows.push(row(task, fitted, object, 1, ["", if needs == pays { "" } else { needs }, "needs"]));
-    }
+    let text = |text: &str| Cell::Text(text.to_owned());
+    let lines = (0..task.objects.len()).flat_map(|object| [(object, 0), (object, 1)]);
+    let lines = lines.map(|(object, which)| (object, which, setting_and_cost(fitted, object, which)));
+    let table = table!(lines, |(object, which, (setting, cost_s))|
+        object: text(if which == 0 { &task.objects[object].name } else { "" }),
+        model: text(shown_model(task, object, which)), "": ["pays", "needs"][which],
+        integrator: method(models(task, object)[which], setting).unwrap_or("-"), dt_ms(3): setting.dt_s * 1e3,
+        segments: if setting.pieces > 0 { setting.pieces.cell(0) } else { text("-") }, ms_per_s(4): cost_s * 1e3,
+        cpu_ms_per_s(3): fitted.cpu_s[which][object] * 1e3,
+        simpler: text(simpler(fitted, object).filter(|_| which == 1).map_or("", |note| note.word)));
     let Fitted { now, need, known_m, .. } = fitted;
     let held = if now.1.error_m + known_m <= args.tolerance { "met" } else { "not met" };
     let mut out = format!(
@@ -45,19 +47,16 @@ pub(super) fn text(args: &FitArgs, task: &Task<'_>, fitted: &Fitted) -> String {
     out
 }
 
-fn row(task: &Task<'_>, fitted: &Fitted, object: usize, which: usize, head: [&str; 3]) -> Vec<Cell> {
-    let (setting, cost_s) = setting_and_cost(fitted, object, which);
-    let pieces: Cell = if setting.pieces > 0 { Cell::Number(f64::from(setting.pieces), 0) } else { "-".into() };
-    let mut cells: Vec<Cell> = head.iter().map(|text| (*text).into()).collect();
-    cells.extend([
-        method(models(task, object)[which], setting).unwrap_or("-").into(),
-        Cell::Number(setting.dt_s * 1e3, 3),
-        pieces,
-        Cell::Number(cost_s * 1e3, 4),
-        Cell::Number(fitted.cpu_s[which][object] * 1e3, 3),
-        simpler(fitted, object).filter(|_| which == 1).map_or("", |note| note.word).into(),
-    ]);
-    cells
+/// The model of an object; of the needed one nothing where it is the present one.
+fn shown_model(task: &Task<'_>, object: usize, which: usize) -> &'static str {
+    let [pays, needs] = models(task, object);
+    if which == 0 {
+        pays
+    } else if needs == pays {
+        ""
+    } else {
+        needs
+    }
 }
 
 /// The present model of an object, and the needed one.

@@ -4,7 +4,7 @@
 //! ([`metachron_lod::tune`] does), the experiment's turns ([`metachron_session`] makes them).
 
 use super::super::args::TuneArgs;
-use super::super::chart::{Cell, Table};
+use super::super::chart::{Shown, Table, table};
 use metachron_console::progress::Bar;
 use metachron_lod::control::RateGains;
 use metachron_lod::tune::{AgentPlant, AgentTuning, AgentVerdict, tune_agents};
@@ -109,21 +109,11 @@ impl AgentLoops {
 }
 
 fn rows(tuning: &AgentTuning) -> Table {
-    let seconds = |settle: Option<f64>| settle.map_or_else(|| "never".into(), |s| Cell::Number(s, 2));
-    let line = |(name, row): (&&str, &AgentVerdict)| {
-        vec![
-            ("gains of", (*name).into()),
-            ("agent_refine", (row.gains.refine, 3).into()),
-            ("agent_yield", (row.gains.yielding, 3).into()),
-            ("coarsened_s", seconds(row.coarsened_s)),
-            ("refined_s", seconds(row.refined_s)),
-            ("late_share", (row.late_share, 4).into()),
-            ("reversals_per_s", (row.reversals_per_s, 3).into()),
-            ("quality", (row.quality, 3).into()),
-            ("objective", (row.objective, 4).into()),
-        ]
-    };
-    Table::named(ROWS.iter().zip(&tuning.rows).map(line))
+    let seconds = |settle: Option<f64>| settle.map_or_else(|| "never".cell(0), |s| s.cell(2));
+    table!(ROWS.iter().zip(&tuning.rows), |(name, row)| "gains of": name, agent_refine(3): row.gains.refine,
+        agent_yield(3): row.gains.yielding, coarsened_s: seconds(row.coarsened_s), refined_s: seconds(row.refined_s),
+        late_share(4): row.late_share, reversals_per_s(3): row.reversals_per_s, quality(3): row.quality,
+        objective(4): row.objective)
 }
 
 fn gains_text(gains: RateGains) -> String {

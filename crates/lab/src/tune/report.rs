@@ -2,7 +2,7 @@
 //!
 //! In: a plant, verdicts, an explanation. Out: text. Never here: where it is printed.
 
-use super::super::chart::{Cell, Table};
+use super::super::chart::{Cell, Shown, table};
 use super::agents::AgentLoops;
 use super::checked::Checked;
 use super::{Identified, origin_name};
@@ -23,24 +23,12 @@ pub(super) struct Found<'a> {
 /// The table of a tuning, the plant, the files.
 pub(super) fn text(on: &Identified, found: &Found<'_>) -> String {
     let Found { tuned, agents, checked, files } = found;
-    let table = Table::named(tuned.rows.iter().map(|row| {
-        let v = &row.verdict;
-        let number = |value: f64, digits| Cell::Number(value, digits);
-        vec![
-            ("law", origin_name(row.origin).into()),
-            ("gains", gains::gains_text(v.candidate).into()),
-            ("settle_s", v.settle_s.map_or_else(|| "never".into(), |s| number(s, 2))),
-            ("overshoot", number(v.overshoot, 3)),
-            ("miss_share", number(v.miss_share, 4)),
-            ("gain_margin", v.margins.map_or_else(|| "–".into(), |m| number(m.gain, 1))),
-            ("delay_margin", v.margins.map_or_else(|| "–".into(), |m| number(m.delay as f64, 0))),
-            ("reversals", number(v.reversals, 4)),
-            ("quality", number(v.quality, 3)),
-            ("robust_to", robust(v).into()),
-            ("lacks", number(v.shortfall, 2)),
-            ("objective", number(v.objective, 4)),
-        ]
-    }));
+    let or = |word: &str, value: Option<Cell>| value.unwrap_or_else(|| word.cell(0));
+    let table = table!(tuned.rows.iter().map(|row| (row.origin, &row.verdict)), |(origin, v)| law: origin_name(origin),
+        gains: gains::gains_text(v.candidate), settle_s: or("never", v.settle_s.map(|s| s.cell(2))),
+        overshoot(3): v.overshoot, miss_share(4): v.miss_share, gain_margin: or("–", v.margins.map(|m| m.gain.cell(1))),
+        delay_margin: or("–", v.margins.map(|m| (m.delay as f64).cell(0))), reversals(4): v.reversals,
+        quality(3): v.quality, robust_to: robust(v), lacks(2): v.shortfall, objective(4): v.objective);
     let files: Vec<_> = files.iter().map(|f| f.display().to_string()).collect();
     format!(
         "{}{}{}\n{}\nbest: {}\n{}{}files: {}\n",

@@ -3,20 +3,19 @@
 //! In: the displayed vertices, their connectivity, a level. Out: corners with normals for one mesh of the frame, smooth except at the sharp
 //! edges of solids; a framed curve. Never here: the choice of levels, the GPU. Nothing is allocated once sizes settle.
 
+mod normals;
+
 use super::mesh_corner::MeshCorner;
 use super::tessellation::{CoarseSkin, FineSkin, RestPoint, SkinEdges, SkinPoint, skin_divisions};
 use crate::seen::level::Shading;
 use glam::{DQuat, DVec3};
 use metachron_core::{CurveState, SoftState};
 use metachron_geometry::SurfaceShape;
+use normals::{Faces, vertex_normals};
 use std::sync::Arc;
 
 /// Least drawn thickness of a sheet, as a fraction of its edges: below, the depths of its two faces cannot be told apart.
 const THIN_SHARE: f64 = 0.01;
-
-/// Triangles of a solid that share a vertex are shaded as one surface where the cosine between them is at least this, 60°: the bends of a
-/// soft body stay smooth, the edges of its shape stay sharp.
-const SMOOTH_COS: f64 = 0.5;
 
 /// The skin of a sheet or soft solid.
 #[derive(Debug, Clone)]
@@ -124,26 +123,6 @@ pub(super) struct ShownSkin<'a> {
     pub soft: &'a SoftState,
 }
 
-/// The surfaces that meet at each vertex of a solid: the first has the vertex's number, others are stored after all vertices.
-#[derive(Debug, Default)]
-struct Faces {
-    all: Vec<Face>,
-    /// Corners of each triangle, by face.
-    triangles: Vec<[u32; 3]>,
-}
-
-/// One surface at a vertex.
-#[derive(Debug, Clone, Copy)]
-struct Face {
-    vertex: u32,
-    /// The normal of its first triangle; zero until that is known.
-    first: DVec3,
-    /// The area-weighted sum of its triangles' normals.
-    sum: DVec3,
-    /// The next surface at this vertex.
-    next: Option<u32>,
-}
-
 /// Reused scratch storage.
 #[derive(Debug, Default)]
 pub(super) struct SkinScratch {
@@ -196,56 +175,7 @@ impl Skins {
     }
 }
 
-impl Faces {
-    fn find(&mut self, form: &SurfaceShape, soft: &SoftState) {
-        let empty = |vertex| Face { vertex, first: DVec3::ZERO, sum: DVec3::ZERO, next: None };
-        self.all.clear();
-        self.all.extend((0..soft.positions.len() as u32).map(empty));
-        self.triangles.clear();
-        for triangle in form.triangles.iter() {
-            let [a, b, c] = triangle.map(|vertex| soft.positions[vertex as usize]);
-            let normal = (b - a).cross(c - a);
-            let faces = triangle.map(|vertex| self.face(vertex, normal.normalize_or_zero()));
-            faces.iter().for_each(|face| self.all[*face as usize].sum += normal);
-            self.triangles.push(faces);
-        }
-    }
-
-    /// The surface at `vertex` that a triangle with this normal belongs to; a degenerate triangle belongs to the first.
-    fn face(&mut self, vertex: u32, normal: DVec3) -> u32 {
-        let mut at = vertex;
-        loop {
-            let face = &mut self.all[at as usize];
-            if face.first == DVec3::ZERO {
-                face.first = normal;
-            }
-            if normal == DVec3::ZERO || face.first.dot(normal) >= SMOOTH_COS {
-                return at;
-            }
-            match face.next {
-                Some(next) => at = next,
-                None => break,
-            }
-        }
-        let new = self.all.len() as u32;
-        self.all[at as usize].next = Some(new);
-        self.all.push(Face { vertex, first: normal, sum: DVec3::ZERO, next: None });
-        new
-    }
-}
-
 impl SkinScratch {
-    fn find_normals(&mut self, form: &SurfaceShape, soft: &SoftState) {
-        self.normals.clear();
-        self.normals.resize(soft.positions.len(), DVec3::ZERO);
-        for triangle in form.triangles.iter() {
-            let [a, b, c] = triangle.map(|vertex| soft.positions[vertex as usize]);
-            let normal = (b - a).cross(c - a);
-            triangle.iter().for_each(|vertex| self.normals[*vertex as usize] += normal);
-        }
-        self.normals.iter_mut().for_each(|normal| *normal = normal.normalize_or(DVec3::Z));
-    }
-
     /// Divides every side of a skin into `parts`, its front where it is open.
     fn divide(&mut self, skin: ShownSkin<'_>, parts: u32) {
         let ShownSkin { form: SkinForm { surface: form, rest, edges, .. }, soft } = skin;
@@ -261,7 +191,7 @@ impl SkinScratch {
             }));
             self.fine.divide(CoarseSkin { edges, vertices, corners: &self.faces.triangles, parts });
         } else {
-            self.find_normals(form, soft);
+            vertex_normals(form, soft, &mut self.normals);
             let both = soft.positions.iter().zip(&self.normals).enumerate();
             self.fine.points.extend(both.map(|(vertex, (position, normal))| SkinPoint {
                 position: *position,

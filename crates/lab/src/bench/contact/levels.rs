@@ -8,7 +8,9 @@ use super::peer::PeerRun;
 use super::stage::Stage;
 use super::{Case as BenchCase, Row as BenchRow, cases, peer_row, row};
 use crate::bench::rig::peers::Peers;
-use crate::chart::{Axis, Experiment, Figure, Finding, Mark, Measured, Panel, lines, span, worst};
+use crate::chart::{
+    Axis, Experiment, Figure, Finding, Mark, Measured, Panel, Table, claims, distinct, lines, span, table, worst_of,
+};
 use anyhow::Context;
 use metachron_console::output::message;
 use serde::{Deserialize, Serialize};
@@ -66,9 +68,9 @@ const SHOWN: [Shown; 6] = [
 ];
 
 /// A scene stepped by an engine at one of its levels.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Serialize)]
 pub(crate) struct Case {
-    test: String,
+    test: &'static str,
     engine: String,
     /// Our factors or rapier3d's iterations, "exact", or "default settings".
     level: String,
@@ -97,18 +99,6 @@ pub(crate) struct Found {
 type Row = Measured<Case, Found>;
 
 impl Found {
-    const UNKNOWN: Self = Self {
-        cpu_ms_per_s: f64::NAN,
-        ms_p50: f64::NAN,
-        ms_p99: f64::NAN,
-        landing_mm: f64::NAN,
-        rest_mm: f64::NAN,
-        drift_mm: f64::NAN,
-        sank_mm: f64::NAN,
-        made_j: f64::NAN,
-        lost_j: f64::NAN,
-    };
-
     fn of(run: &BenchRow, seconds: f64) -> Self {
         Self {
             cpu_ms_per_s: run.cpu_s * 1e3 / seconds,
@@ -143,9 +133,9 @@ fn peers() -> impl Iterator<Item = Peers<PeerRun>> {
 }
 
 fn measured(case: &Case) -> anyhow::Result<Found> {
-    let BenchCase { seconds, stage, .. } = scene(&case.test).context("no such scene")?;
+    let BenchCase { seconds, stage, .. } = scene(case.test).context("no such scene")?;
     if let Some(peer) = peers().find(|peer| name(peer) == case.engine) {
-        return Ok(Found::of(&peer_row(&peer, peer.of(&case.test).context("no such run of it")?), seconds));
+        return Ok(Found::of(&peer_row(&peer, peer.of(case.test).context("no such run of it")?), seconds));
     }
     let stage: Stage = stage()?;
     let course = if case.engine == RAPIER {
@@ -155,7 +145,7 @@ fn measured(case: &Case) -> anyhow::Result<Found> {
     } else {
         Course::of_cluster(&mut stage.play()?.within(case.level.parse().ok()), seconds)?
     };
-    Ok(Found::of(&row(case.test.clone(), &case.engine, &course), seconds))
+    Ok(Found::of(&row(case.test.to_owned(), &case.engine, &course), seconds))
 }
 
 /// An engine and the processor that it ran on.
@@ -168,15 +158,15 @@ impl Experiment for SolveLevels {
     const NAME: &'static str = "levels";
     const TITLE: &'static str = "Error of contacts over their cost, by levels of the solve";
     const ALONE: bool = true;
-    const COLUMNS: &'static str = "\
-        test, engine, level, cpu_ms_per_s.1 as ms_per_s, ms_p50.3 as p50_ms, ms_p99.3 as p99_ms, \
-        landing_mm.3, rest_mm.3, drift_mm.4, sank_mm.2, made_j.5";
+    const TABLE: fn(&[Row]) -> Table = table!(|r| test: r.case.test, engine: r.case.engine, level: r.case.level,
+        ms_per_s(1): r.cpu_ms_per_s, p50_ms(3): r.ms_p50, p99_ms(3): r.ms_p99, landing_mm(3): r.landing_mm,
+        rest_mm(3): r.rest_mm, drift_mm(4): r.drift_mm, sank_mm(2): r.sank_mm, made_j(5): r.made_j);
 
     fn cases(quick: bool) -> Vec<Case> {
         let mut all = Vec::new();
         for Shown { test, .. } in &SHOWN[..if quick { 2 } else { SHOWN.len() }] {
             let mut add = |engine: &str, level: String| {
-                all.push(Case { test: (*test).to_owned(), engine: engine.to_owned(), level });
+                all.push(Case { test, engine: engine.to_owned(), level });
             };
             for most in FACTORS {
                 add(OURS, most.map_or_else(|| EXACT.to_owned(), |most| most.to_string()));
@@ -191,21 +181,13 @@ impl Experiment for SolveLevels {
         all
     }
 
-    fn measure(case: &Case) -> Row {
-        let found = measured(case).unwrap_or_else(|error| {
-            message(&format!("{}, {} at {}: {error:#}", case.test, case.engine, case.level));
-            Found::UNKNOWN
-        });
-        Row { case: case.clone(), found }
+    fn measure(case: &Case) -> Option<Found> {
+        let reported = |error| message(&format!("{}, {} at {}: {error:#}", case.test, case.engine, case.level));
+        measured(case).map_err(reported).ok()
     }
 
     fn figure(rows: &[Row]) -> Figure {
-        let mut engines: Vec<&str> = Vec::new();
-        for row in rows {
-            if !engines.contains(&row.case.engine.as_str()) {
-                engines.push(&row.case.engine);
-            }
-        }
+        let engines = distinct(rows.iter().map(|row| row.case.engine.as_str()));
         let panel = |Shown { test, title, measure }: &Shown| {
             let here: Vec<_> = rows.iter().filter(|row| row.case.test == *test).collect();
             let error = |row: &Row| if row.error(*measure) < LEAST { LEAST } else { row.error(*measure) };
@@ -227,15 +209,14 @@ impl Experiment for SolveLevels {
     }
 
     fn findings(rows: &[Row]) -> Vec<Finding> {
-        let towers = rows.iter().filter(|row| row.case.test == SHOWN[0].test && row.case.engine == OURS);
-        let from_five = |row: &&Row| row.case.level == EXACT || row.case.level.parse().is_ok_and(|most: u32| most >= 5);
-        let from_five: Vec<_> = towers.filter(from_five).collect();
-        let most = |of: fn(&Row) -> f64| worst(from_five.iter().map(|row| of(row)));
-        Finding::all_at_most([
-            ("from five factors a solve on: by how much the tower sinks, mm", most(|row| row.sank_mm.abs()), 1.0),
-            ("how far a box of it creeps in half a second at rest, mm", most(|row| row.drift_mm), 0.01),
-            ("energy that it makes, J (a box falls by its height with 0.08 J)", most(|row| row.made_j), 2e-3),
-        ])
+        let from_five = |level: &str| level == EXACT || level.parse().is_ok_and(|most: u32| most >= 5);
+        let tower = |row: &Row| row.case.test == SHOWN[0].test && row.case.engine == OURS && from_five(&row.case.level);
+        let most = |of: fn(&Row) -> f64| worst_of(rows, tower, of);
+        claims![
+            "from five factors a solve on: by how much the tower sinks, mm" => most(|row| row.sank_mm.abs()), at_most 1.0;
+            "how far a box of it creeps in half a second at rest, mm" => most(|row| row.drift_mm), at_most 0.01;
+            "energy that it makes, J (a box falls by its height with 0.08 J)" => most(|row| row.made_j), at_most 2e-3;
+        ]
     }
 }
 

@@ -14,20 +14,20 @@ use super::super::args::BenchArgs;
 use super::rig::machine::processor;
 use super::rig::peers::Peers;
 use super::subject::{Progress, Subject};
-use crate::chart::{Axis, Colour, Figure, Layer, span};
+use crate::chart::{Axis, Colour, Figure, Layer, Table, blank, span, table};
 use anyhow::Context;
 use course::Course;
 pub(crate) use levels::SolveLevels;
 use metachron_console::output::{BadInput, message};
 use peer::PeerRun;
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 use stage::Stage;
 
 /// The subject.
 pub(super) struct Contact;
 
 /// A run of one engine.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub(super) struct Row {
     pub test: String,
     pub engine: String,
@@ -235,7 +235,8 @@ fn beside(rows: Vec<Row>, peers: Option<&Peers<PeerRun>>) -> Vec<Row> {
 /// Another engine's run as a row.
 fn peer_row(peers: &Peers<PeerRun>, run: &PeerRun) -> Row {
     Row {
-        contacts: f64::NAN,
+        test: run.test.clone(),
+        engine: peers.engine.clone(),
         bodies: run.bodies,
         steps: run.steps,
         ms_per_step_p50: run.ms_p50,
@@ -243,30 +244,26 @@ fn peer_row(peers: &Peers<PeerRun>, run: &PeerRun) -> Row {
         ms_most: run.ms_most,
         cpu_s: run.cpu_s,
         over_peer: 1.0,
-        fine_steps: f64::NAN,
-        solves: f64::NAN,
-        factors: f64::NAN,
-        products: f64::NAN,
         landing_m: run.landing_m,
         rest_m: run.rest_m,
         drift_mean_m: run.drift_mean_m,
         drift_most_m: run.drift_most_m,
         sank_m: run.sank_m,
         made_j: run.made_j,
-        lost_j: f64::NAN,
         machine: peers.machine.clone(),
-        ..row(run.test.clone(), &peers.engine, &Course::default())
+        ..blank()
     }
 }
 
 impl Subject for Contact {
     type Row = Row;
     const NAME: &'static str = "contact";
-    const COLUMNS: &'static str = "\
-        test, engine, ms_per_step_p50.3 as p50_ms, ms_per_step_p99.3 as p99_ms, ms_most.2 as most_ms, \
-        cpu_s.3, over_peer.2, fine_steps.2 as fine, solves.2, factors.2, products.1, unfinished.0, \
-        landing_m*1e3.3 as landing_mm, rest_m*1e3.3 as rest_mm, drift_mean_m*1e3.3 as drift_mm, \
-        drift_most_m*1e3.3 as most_mm, sank_m*1e3.2 as sank_mm, made_j.5";
+    const TABLE: fn(&[Row]) -> Table = table!(|r| test: r.test, engine: r.engine, p50_ms(3): r.ms_per_step_p50,
+        p99_ms(3): r.ms_per_step_p99, most_ms(2): r.ms_most, cpu_s(3): r.cpu_s, over_peer(2): r.over_peer,
+        fine(2): r.fine_steps, solves(2): r.solves, factors(2): r.factors, products(1): r.products,
+        unfinished: r.unfinished, landing_mm(3): 1e3 * r.landing_m, rest_mm(3): 1e3 * r.rest_m,
+        drift_mm(3): 1e3 * r.drift_mean_m, most_mm(3): 1e3 * r.drift_most_m, sank_mm(2): 1e3 * r.sank_m,
+        made_j(5): r.made_j);
 
     fn measure(args: &BenchArgs, progress: &Progress) -> anyhow::Result<Vec<Row>> {
         let names: Vec<_> = cases(false).iter().map(Case::name).collect();

@@ -12,7 +12,7 @@ use super::rig::peers::Peers;
 use super::rig::play::{Bound, Play, Series};
 use super::rig::shaken_floor::ShakenFloor;
 use super::subject::{Progress, Subject};
-use crate::chart::{Axis, Colour, Figure, Layer, exponent, span};
+use crate::chart::{Axis, Colour, Figure, Layer, Table, blank, exponent, table};
 use anyhow::Context;
 use bodies::{CUBE_M, DemoTube};
 use glam::DVec3;
@@ -21,7 +21,7 @@ use metachron_contact::Agent;
 use metachron_models::rod::WallModel;
 use metachron_models::soft::{SoftBody, SoftMatter, SoftSpec};
 use peer::Cube;
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 use std::time::Duration;
 
 /// The subject.
@@ -79,7 +79,7 @@ struct Limits {
 }
 
 /// The cost of a test's steps.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub(super) struct Row {
     pub test: String,
     pub nodes: usize,
@@ -107,9 +107,10 @@ pub(super) struct Row {
 impl Subject for Soft {
     type Row = Row;
     const NAME: &'static str = "soft";
-    const COLUMNS: &'static str = "\
-        test, nodes.0, contacts.0, ms_per_step_p50.3, ms_per_step_p99.3, over_plain.2, exponent.2, \
-        sag_m*1e3.3 as sag_mm, shape_error.5, peer_ms_per_step.2 as peer_ms, peer_sag_m*1e3.3 as peer_sag_mm";
+    const TABLE: fn(&[Row]) -> Table = table!(|r| test: r.test, nodes: r.nodes, contacts: r.contacts,
+        ms_per_step_p50(3): r.ms_per_step_p50, ms_per_step_p99(3): r.ms_per_step_p99, over_plain(2): r.over_plain,
+        exponent(2): r.exponent, sag_mm(3): 1e3 * r.sag_m, shape_error(5): r.shape_error,
+        peer_ms(2): r.peer_ms_per_step, peer_sag_mm(3): 1e3 * r.peer_sag_m);
 
     fn measure(args: &BenchArgs, progress: &Progress) -> anyhow::Result<Vec<Row>> {
         let peers = args.peers.as_deref().map(|path| Peers::<Cube>::read(path, &TESTS)).transpose()?;
@@ -139,16 +140,17 @@ impl Subject for Soft {
             ("on the floor", of(LYING, |row| row.ms_per_step_p50)),
             ("peer, held", of(HELD, |row| row.peer_ms_per_step)),
         ];
-        let all = || curves.iter().flat_map(|(_, points)| points);
-        let (low, high) = span(all().map(|(nodes, _)| *nodes), true);
-        let (least, most) = span(all().map(|(_, ms)| *ms), true);
         let drawn = curves.into_iter().zip(Colour::LINES).filter(|((_, points), _)| !points.is_empty());
         let layers = drawn.map(|((name, points), colour)| {
             let power = exponent(&points).map(|power| format!(": nodes^{power:.2}"));
             Layer::line(name.to_owned() + &power.unwrap_or_default(), colour, points)
         });
-        let (x, y) = (Axis::log("nodes", low, high), Axis::log("CPU time per step, ms", least, most));
-        Figure::single("Cost of a soft cube's step", x, y, layers)
+        Figure::single(
+            "Cost of a soft cube's step",
+            Axis::log_fit("nodes"),
+            Axis::log_fit("CPU time per step, ms"),
+            layers,
+        )
     }
 }
 
@@ -293,14 +295,8 @@ fn row(test: &str, nodes: usize, series: &Series) -> Row {
         steps: series.steps(),
         ms_per_step_p50: series.ms_at(0.5),
         ms_per_step_p99: series.ms_at(0.99),
-        over_plain: f64::NAN,
-        exponent: f64::NAN,
-        sag_m: f64::NAN,
-        shape_error: f64::NAN,
-        peer_ms_per_step: f64::NAN,
-        peer_sag_m: f64::NAN,
         machine: processor(),
-        peer: String::new(),
+        ..blank()
     }
 }
 

@@ -6,8 +6,8 @@ use super::front::front;
 use super::peers;
 use super::play::Play;
 use crate::chart::{
-    Axis, Cell, Colour, Experiment, Figure, Finding, Layer, Measured, Panel, Table, calibration_us, exponent, lines,
-    pace_for_goals, span,
+    Axis, Cell, Colour, Experiment, Figure, Finding, Layer, Measured, Named, Panel, Shown, Table, calibration_us,
+    distinct, each, exponent, lines, pace_for_goals, span, table,
 };
 use metachron_models::rod::Integrator;
 use serde::{Deserialize, Serialize};
@@ -35,12 +35,12 @@ pub(in super::super) trait Benchmark: Send + Sync + 'static {
 }
 
 /// One run of a benchmark.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Serialize)]
 pub(in super::super) struct Case {
     /// Which problem of the benchmark.
     pub(super) case: String,
     /// Which integrator.
-    pub(super) method: String,
+    pub(super) method: Named<Integrator>,
     pub(super) segments: u32,
     pub(super) dt_ms: f64,
     /// The least number of substeps.
@@ -50,13 +50,8 @@ pub(in super::super) struct Case {
 impl Case {
     /// Every problem by every method with every number of segments, in steps of `dt_ms`.
     pub(super) fn ladder(cases: &[&str], methods: &[Integrator], sizes: &[u32], dt_ms: f64) -> Vec<Self> {
-        let mut list = Vec::new();
-        for (case, method) in cases.iter().flat_map(|case| methods.iter().map(move |method| (case, method))) {
-            let (case, method) = ((*case).to_owned(), method.name().to_owned());
-            let of = |&segments| Self { case: case.clone(), method: method.clone(), segments, dt_ms, substeps: 1 };
-            list.extend(sizes.iter().map(of));
-        }
-        list
+        each!(case in cases, &method in methods, &segments in sizes =>
+            Self { case: (*case).to_owned(), method: Named(method.name(), method), segments, dt_ms, substeps: 1 })
     }
 
     /// The same for problems with user pulls: under these every implicit method falls back to implicit Euler.
@@ -111,51 +106,38 @@ impl<B: Benchmark> Experiment for Diagram<B> {
     const NAME: &'static str = B::NAME;
     const TITLE: &'static str = B::TITLE;
     const ALONE: bool = true;
+    const TABLE: fn(&[Row]) -> Table = |rows| {
+        let of = |case, method| -> Vec<&Row> {
+            rows.iter().filter(|r| r.case.case == case && r.case.method.0 == method).collect()
+        };
+        let all = each!(case in distinct(rows.iter().map(|r| &*r.case.case)), method in distinct(rows.iter().map(|r| r.case.method.0)) =>
+            (case, method, of(case, method)));
+        table!(all.iter().filter(|(.., here)| !here.is_empty()), |(case, method, here)| case: case, method: method,
+            "order in dt": optional(dt_order(here), 2), "order in segments": optional(segment_order(here), 2),
+            "best error"(6): here.iter().filter_map(|r| r.error).fold(f64::INFINITY, f64::min),
+            "ms/s to 1e-3": optional(cheapest(here.iter().copied(), 1e-3), 3),
+            "ms/s to 1e-4": optional(cheapest(here.iter().copied(), 1e-4), 3))
+    };
 
     fn cases(quick: bool) -> Vec<Case> {
         B::cases(quick)
     }
 
-    fn measure(case: &Case) -> Row {
+    fn measure(case: &Case) -> Option<Found> {
         let played = B::play(case);
         let cpu_ms_per_s = played.as_ref().map_or(0.0, |(play, _)| cost::<B>(case, play));
         let substeps_per_step = played.as_ref().map_or(0.0, |(play, _)| play.substeps_per_step());
         let error = played.map(|(_, error)| error).filter(|error| error.is_finite());
-        let found = Found { substeps_per_step, error, cpu_ms_per_s, calibration_us: calibration_us() };
-        Row { case: case.clone(), found }
+        Some(Found { substeps_per_step, error, cpu_ms_per_s, calibration_us: calibration_us() })
     }
 
     fn figure(rows: &[Row]) -> Figure {
-        let panels: Vec<Panel> = names(rows, |r| &r.case.case).into_iter().map(|case| panel::<B>(case, rows)).collect();
+        let panels: Vec<Panel> =
+            distinct(rows.iter().map(|r| &*r.case.case)).into_iter().map(|case| panel::<B>(case, rows)).collect();
         let columns = panels.len().clamp(1, 3);
         let others =
             if peers::of(B::NAME).is_empty() { String::new() } else { format!(" (others: {})", peers::MACHINE) };
         Figure::new(format!("{}{others}", B::TITLE), columns, panels)
-    }
-
-    fn table(rows: &[Row]) -> Table {
-        let columns =
-            ["case", "method", "order in dt", "order in segments", "best error", "ms/s to 1e-3", "ms/s to 1e-4"];
-        let mut table = Table::new(&columns);
-        for case in names(rows, |r| &r.case.case) {
-            for method in names(rows, |r| &r.case.method) {
-                let here: Vec<&Row> = rows.iter().filter(|r| r.case.case == case && r.case.method == method).collect();
-                if here.is_empty() {
-                    continue;
-                }
-                let best = here.iter().filter_map(|r| r.error).fold(f64::INFINITY, f64::min);
-                table.rows.push(vec![
-                    case.into(),
-                    method.into(),
-                    optional(dt_order(&here), 2),
-                    optional(segment_order(&here), 2),
-                    (best, 6).into(),
-                    optional(cheapest(here.iter().copied(), 1e-3), 3),
-                    optional(cheapest(here.iter().copied(), 1e-4), 3),
-                ]);
-            }
-        }
-        table
     }
 
     fn findings(rows: &[Row]) -> Vec<Finding> {
@@ -175,18 +157,7 @@ fn cost<B: Benchmark>(case: &Case, first: &Play) -> f64 {
 
 /// A number in a cell, or a dash where there is none.
 fn optional(value: Option<f64>, digits: usize) -> Cell {
-    value.map_or_else(|| "–".into(), |value| (value, digits).into())
-}
-
-/// The distinct values of a column, in the order of the rows.
-fn names(rows: &[Row], of: fn(&Row) -> &String) -> Vec<&str> {
-    let mut list: Vec<&str> = Vec::new();
-    for row in rows {
-        if !list.contains(&of(row).as_str()) {
-            list.push(of(row));
-        }
-    }
-    list
+    value.map_or_else(|| "–".cell(0), |value| value.cell(digits))
 }
 
 /// The least cost of a run whose error is at most `error`.
@@ -213,19 +184,18 @@ fn segment_order(rows: &[&Row]) -> Option<f64> {
 fn panel<B: Benchmark>(case: &str, rows: &[Row]) -> Panel {
     let here = || rows.iter().filter(|r| r.case.case == case);
     let ours = |method: &str| {
-        let of = here().filter(|r| r.case.method == method);
+        let of = here().filter(|r| r.case.method.0 == method);
         front(of.filter_map(|r| Some((r.cpu_ms_per_s, r.error?))))
     };
     let others: Vec<_> = peers::of(B::NAME).into_iter().filter(|peer| peer.case == case).collect();
     let theirs = || others.iter().map(|peer| (peer.cpu_ms_per_s, peer.error));
     let all = || here().filter_map(|r| Some((r.cpu_ms_per_s, r.error?))).chain(theirs());
-    let mut engines: Vec<&str> = others.iter().map(|peer| peer.peer.as_str()).collect();
-    engines.dedup();
-    let dots = engines.iter().enumerate().map(|(k, engine)| {
-        let here = others.iter().filter(|peer| peer.peer == *engine);
-        Layer::dots(*engine, Colour::behind(k), here.map(|peer| (peer.cpu_ms_per_s, peer.error)))
+    let engines = distinct(others.iter().map(|peer| peer.peer.as_str())).into_iter().enumerate();
+    let dots = engines.map(|(k, engine)| {
+        let here = others.iter().filter(|peer| peer.peer == engine);
+        Layer::dots(engine, Colour::behind(k), here.map(|peer| (peer.cpu_ms_per_s, peer.error)))
     });
-    let methods = lines(names(rows, |r| &r.case.method), ours);
+    let methods = lines(distinct(rows.iter().map(|r| r.case.method.0)), ours);
     let layers = dots.chain(methods).chain([Layer::dashed("front", Colour::Grey, front(all()))]);
     let ((left, right), (low, high)) = (span(all().map(|p| p.0), true), span(all().map(|p| p.1), true));
     let (x, y) = (Axis::log("CPU ms per simulated second", left, right), Axis::log(B::ERROR, low, high));

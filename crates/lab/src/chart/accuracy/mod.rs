@@ -7,3 +7,6 @@ pub(super) mod peers;
 mod play;
 pub(super) mod sheet;
 pub(super) mod tubes;
+
+use diagram::{Benchmark, Case, Goal};
+use play::{Play, metre, reference_tube, slender_tube};

@@ -4,8 +4,11 @@
 //! of 1 there is little else.
 
 use super::super::energy_bench::Play;
-use super::super::scenes::{Scene, scene};
-use crate::chart::{Axis, Colour, Experiment, Figure, Finding, Layer, Measured, Panel, span, worst};
+use super::super::scenes::{Scene, scene, ways};
+use crate::chart::{
+    Axis, Colour, Experiment, Figure, Finding, Layer, Measured, Panel, Table, claims, count_of, each, span, table,
+    worst, worst_of,
+};
 use glam::DVec3;
 use metachron_core::{AgentId, Anchor};
 use serde::{Deserialize, Serialize};
@@ -28,9 +31,9 @@ const MOMENTUM_MAX: f64 = 0.005;
 const REST_MAX_M: f64 = 2e-3;
 
 /// A scene, the ratio of the steps, and which agent has the short one.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Serialize)]
 pub(in super::super) struct Case {
-    scene: String,
+    scene: &'static str,
     ratio: u32,
     first_is_fast: bool,
     seconds: f64,
@@ -50,38 +53,37 @@ pub(in super::super) struct Found {
     impulse: f64,
 }
 
-impl Default for Found {
-    fn default() -> Self {
-        let none = f64::NAN;
-        Self { looks: 0, position_rms_m: none, position_max_m: none, momentum: none, impulse: none }
-    }
-}
-
 type Row = Measured<Case, Found>;
 
 impl Experiment for CouplingError {
     type Row = Row;
     const NAME: &'static str = "error";
     const TITLE: &'static str = "coupling error: the same scene with unequal steps and with very fine ones for all";
-    const COLUMNS: &'static str = "\
-        scene, ratio.0, first_is_fast, looks.0, position_rms_m*1e3.4 as rms_mm, \
-        position_max_m*1e3.4 as max_mm, momentum.6 as momentum_error, impulse.6 as impulse_error";
+    const TABLE: fn(&[Row]) -> Table = table!(|r| scene: r.case.scene, ratio: r.case.ratio,
+        first_is_fast: r.case.first_is_fast, looks: r.looks, rms_mm(4): 1e3 * r.position_rms_m,
+        max_mm(4): 1e3 * r.position_max_m, momentum_error(6): r.momentum, impulse_error(6): r.impulse);
 
     fn cases(quick: bool) -> Vec<Case> {
         let (ratios, seconds) = if quick { (&QUICK_RATIOS[..], QUICK_SECONDS) } else { (&RATIOS[..], SECONDS) };
-        let mut cases = Vec::new();
-        for name in SCENES {
-            for &ratio in ratios {
-                let ways = if ratio == 1 { &[true][..] } else { &[true, false][..] };
-                let of = |&first_is_fast: &bool| Case { scene: name.to_owned(), ratio, first_is_fast, seconds };
-                cases.extend(ways.iter().map(of));
-            }
-        }
-        cases
+        each!(scene in SCENES, &ratio in ratios, &first_is_fast in ways(ratio == 1) =>
+            Case { scene, ratio, first_is_fast, seconds })
     }
 
-    fn measure(case: &Case) -> Row {
-        Row { case: case.clone(), found: apart(case).unwrap_or_default() }
+    fn measure(case: &Case) -> Option<Found> {
+        let slow_ns = FAST_NS * u64::from(case.ratio);
+        let steps_ns = if case.first_is_fast { [FAST_NS, slow_ns] } else { [slow_ns, FAST_NS] };
+        let coupled = trail(case, slow_ns, steps_ns)?;
+        let oracle = trail(case, slow_ns, [ORACLE_NS; 2])?;
+        let pairs = coupled.samples.iter().flatten().zip(oracle.samples.iter().flatten());
+        let squares: Vec<f64> = pairs.map(|(a, b)| a.distance_squared(*b)).collect();
+        let mean = squares.iter().sum::<f64>() / squares.len() as f64;
+        Some(Found {
+            looks: coupled.samples.len(),
+            position_rms_m: mean.sqrt(),
+            position_max_m: worst(squares).sqrt(),
+            momentum: coupled.momentum.distance(oracle.momentum) / oracle.impulse_n_s,
+            impulse: (coupled.impulse_n_s - oracle.impulse_n_s).abs() / oracle.impulse_n_s,
+        })
     }
 
     fn figure(rows: &[Row]) -> Figure {
@@ -93,14 +95,13 @@ impl Experiment for CouplingError {
     }
 
     fn findings(rows: &[Row]) -> Vec<Finding> {
-        let lost = rows.iter().filter(|r| !r.position_rms_m.is_finite()).count() as f64;
-        let of = |scene: &str, get: fn(&Row) -> f64| worst(rows.iter().filter(|r| r.case.scene == scene).map(get));
-        Finding::all_at_most([
-            ("runs that stopped early", lost, 0.0),
-            ("two balls: impulse error over the impulse with fine steps", of(SCENES[0], |r| r.impulse), BLOW_MAX),
-            ("two balls: momentum error over the impulse", of(SCENES[0], |r| r.momentum), MOMENTUM_MAX),
-            ("ball on box: position error, m", of(SCENES[1], |r| r.position_max_m), REST_MAX_M),
-        ])
+        let of = |scene: &str, number: fn(&Row) -> f64| worst_of(rows, |r| r.case.scene == scene, number);
+        claims![
+            "runs that stopped early" => count_of(rows, |r| !r.position_rms_m.is_finite()), at_most 0.0;
+            "two balls: impulse error over the impulse with fine steps" => of(SCENES[0], |r| r.impulse), at_most BLOW_MAX;
+            "two balls: momentum error over the impulse" => of(SCENES[0], |r| r.momentum), at_most MOMENTUM_MAX;
+            "ball on box: position error, m" => of(SCENES[1], |r| r.position_max_m), at_most REST_MAX_M;
+        ]
     }
 }
 
@@ -129,26 +130,9 @@ struct Trail {
     impulse_n_s: f64,
 }
 
-fn apart(case: &Case) -> Option<Found> {
-    let slow_ns = FAST_NS * u64::from(case.ratio);
-    let steps_ns = if case.first_is_fast { [FAST_NS, slow_ns] } else { [slow_ns, FAST_NS] };
-    let coupled = trail(case, slow_ns, steps_ns)?;
-    let oracle = trail(case, slow_ns, [ORACLE_NS; 2])?;
-    let pairs = coupled.samples.iter().flatten().zip(oracle.samples.iter().flatten());
-    let squares: Vec<f64> = pairs.map(|(a, b)| a.distance_squared(*b)).collect();
-    let mean = squares.iter().sum::<f64>() / squares.len() as f64;
-    Some(Found {
-        looks: coupled.samples.len(),
-        position_rms_m: mean.sqrt(),
-        position_max_m: worst(squares).sqrt(),
-        momentum: coupled.momentum.distance(oracle.momentum) / oracle.impulse_n_s,
-        impulse: (coupled.impulse_n_s - oracle.impulse_n_s).abs() / oracle.impulse_n_s,
-    })
-}
-
 /// Plays the scene and records it at every whole multiple of `every_ns`, up to the case's length; `None` where it broke off.
 fn trail(case: &Case, every_ns: u64, steps_ns: [u64; 2]) -> Option<Trail> {
-    let Scene { mut play, points, .. } = scene(&case.scene, steps_ns.map(|ns| 1e9 / ns as f64))?;
+    let Scene { mut play, points, .. } = scene(case.scene, steps_ns.map(|ns| 1e9 / ns as f64))?;
     let mut trail = Trail::default();
     for sample in 1..=libm::round(case.seconds * 1e9) as u64 / every_ns {
         play.stage.run_to((sample * every_ns) as f64 * 1e-9).ok()?;

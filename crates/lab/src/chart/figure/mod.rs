@@ -63,7 +63,9 @@ pub struct Panel {
 impl Panel {
     /// Layers in a pair of axes.
     pub fn new(title: impl Into<String>, x: Axis, y: Axis, layers: impl IntoIterator<Item = Layer>) -> Self {
-        Self { title: title.into(), x, y, layers: layers.into_iter().collect() }
+        let layers: Vec<Layer> = layers.into_iter().collect();
+        let (xs, ys): (Vec<f64>, Vec<f64>) = layers.iter().flat_map(Layer::points).unzip();
+        Self { title: title.into(), x: x.fitted(xs), y: y.fitted(ys), layers }
     }
 }
 
@@ -89,6 +91,17 @@ impl Axis {
     /// Equal ratios are equal distances.
     pub fn log(label: &'static str, low: f64, high: f64) -> Self {
         Self { label, low, high, log: true }
+    }
+
+    /// Equal ratios are equal distances; the range is that of what is drawn.
+    pub const fn log_fit(label: &'static str) -> Self {
+        Self { label, low: f64::NAN, high: f64::NAN, log: true }
+    }
+
+    /// The same with the range of these numbers, unless it has one.
+    fn fitted(self, numbers: Vec<f64>) -> Self {
+        let (low, high) = if self.low.is_nan() { span(numbers, self.log) } else { (self.low, self.high) };
+        Self { low, high, ..self }
     }
 
     /// Whether a value is below the low end (−1) or above the high end (1) of the axis by more than rounding, or on the axis (0).
@@ -128,6 +141,16 @@ impl Layer {
     /// Rectangles [x from, x to, y from, y to].
     pub fn cells(label: impl Into<String>, colour: Colour, cells: impl IntoIterator<Item = [f64; 4]>) -> Self {
         Self { label: label.into(), colour, mark: Mark::Cells(cells.into_iter().collect()) }
+    }
+
+    /// Its points; of rectangles two corners.
+    fn points(&self) -> Vec<(f64, f64)> {
+        match &self.mark {
+            Mark::Line(points) | Mark::Dashed(points) | Mark::Dots(points) => points.clone(),
+            Mark::Cells(cells) => {
+                cells.iter().flat_map(|&[left, right, low, high]| [(left, low), (right, high)]).collect()
+            }
+        }
     }
 
     /// A limit: a dashed grey line at a height.

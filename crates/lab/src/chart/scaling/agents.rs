@@ -28,11 +28,9 @@ impl Growth for Agents {
 
     fn cases(quick: bool) -> Vec<Case> {
         let sizes: &[u32] = if quick { &[1, 100] } else { &[1, 10, 100, 1000, 10_000] };
-        let of = |executor: Executor| {
-            let fits = move |size: &u32| executor != Executor::Threads || *size <= THREADS_MAX;
-            sizes.iter().copied().filter(fits).map(move |size| Case { case: executor.name().to_owned(), size })
-        };
-        EXECUTORS.into_iter().flat_map(of).collect()
+        let mut cases = Case::of(EXECUTORS.map(Executor::name), sizes);
+        cases.retain(|case| case.case != Executor::Threads.name() || case.size <= THREADS_MAX);
+        cases
     }
 
     fn measure(case: &Case) -> Option<Cost> {

@@ -2,7 +2,7 @@
 
 use super::growth::{Case, Cost, Growth, Row, pace};
 use super::tubes::{TUBE, folded, grasp, on_ground};
-use crate::chart::{Finding, floor_us, least_us};
+use crate::chart::{Finding, claims, floor_us, least_us, number_of};
 use std::time::Duration;
 
 /// The experiment.
@@ -28,8 +28,7 @@ impl Growth for Contacts {
     /// Sizes are segments, 14 per strand.
     fn cases(quick: bool) -> Vec<Case> {
         let sizes: &[u32] = if quick { &[28, 100] } else { &[28, 56, 100, 200, 400, 800] };
-        let kinds = [FREE, HELD].into_iter();
-        kinds.flat_map(|case| sizes.iter().map(|&size| Case { case: case.to_owned(), size })).collect()
+        Case::of([FREE, HELD], sizes)
     }
 
     fn measure(case: &Case) -> Option<Cost> {
@@ -53,17 +52,14 @@ impl Growth for Contacts {
 
     fn findings(rows: &[Row]) -> Vec<Finding> {
         let us = |case: &str, size: u32| {
-            let row = rows.iter().find(|row| row.case.case == case && row.case.size == size);
-            pace(rows) * row.map_or(f64::NAN, |row| row.point().1)
+            pace(rows) * number_of(rows, |row| row.case.case == case && row.case.size == size, |row| row.point().1)
         };
-        let mut list = vec![Finding::at_most(
-            "100 segments in self-contact: µs per step of 4 ms by calibration",
-            us(FREE, 100),
-            300.0,
-        )];
+        let mut list =
+            claims!["100 segments in self-contact: µs per step of 4 ms by calibration" => us(FREE, 100), at_most 300.0];
         if rows.iter().any(|row| row.case.size == 400) {
-            let claim = "400 segments in self-contact and in a grasp: µs per step of 1 ms by calibration";
-            list.push(Finding::at_most(claim, us(HELD, 400), 5000.0));
+            list.extend(claims![
+                "400 segments in self-contact and in a grasp: µs per step of 1 ms by calibration" => us(HELD, 400), at_most 5000.0;
+            ]);
         }
         list
     }

@@ -3,8 +3,8 @@
 //! In: a [`Growth`]. Out: an experiment whose cases are measured one at a time. Never here: what is counted.
 
 use crate::chart::{
-    Axis, Colour, Experiment, Figure, Finding, Layer, Measured, Panel, Table, calibration_us, exponent, lines,
-    pace_for_goals, span,
+    Axis, Colour, Experiment, Figure, Finding, Layer, Measured, Panel, Table, calibration_us, distinct, each, exponent,
+    lines, pace_for_goals, table,
 };
 use serde::{Deserialize, Serialize};
 use std::marker::PhantomData;
@@ -42,12 +42,19 @@ pub(in super::super) trait Growth: Send + Sync + 'static {
 }
 
 /// One size of one kind.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Serialize)]
 pub(in super::super) struct Case {
     /// The kind.
-    pub(super) case: String,
+    pub(super) case: &'static str,
     /// The requested size.
     pub(super) size: u32,
+}
+
+impl Case {
+    /// Every kind in every size.
+    pub(super) fn of(kinds: impl IntoIterator<Item = &'static str>, sizes: &[u32]) -> Vec<Self> {
+        each!(case in kinds, &size in sizes => Self { case, size })
+    }
 }
 
 /// The cost of a size.
@@ -107,41 +114,27 @@ impl<G: Growth> Experiment for Scaling<G> {
     const NAME: &'static str = G::NAME;
     const TITLE: &'static str = G::TITLE;
     const ALONE: bool = true;
+    const TABLE: fn(&[Row]) -> Table = |rows| {
+        let mut table = table!(rows, |row| case: row.case.case, size: row.case.size, count: row.count, us(2): row.us,
+            "ns each"(1): row.ns_each(), "floor ns each"(1): row.floor().1 * 1e3 / row.floor().0,
+            "times the floor"(2): row.times_floor(), exponent(3): power(rows, row.case.case, ANY_COUNT));
+        G::COUNTED.clone_into(&mut table.columns[2]);
+        table
+    };
 
     fn cases(quick: bool) -> Vec<Case> {
         G::cases(quick)
     }
 
-    fn measure(case: &Case) -> Row {
+    fn measure(case: &Case) -> Option<Found> {
         let cost = G::measure(case);
         let number = |of: fn(&Cost) -> f64| cost.as_ref().map(of).filter(|number| number.is_finite());
         let (count, us, floor_us) = (number(|c| c.count), number(|c| c.us), number(|c| c.floor_us));
-        let found = Found { count, us, floor_us, calibration_us: calibration_us() };
-        Row { case: case.clone(), found }
+        Some(Found { count, us, floor_us, calibration_us: calibration_us() })
     }
 
     fn figure(rows: &[Row]) -> Figure {
         Figure::new(G::TITLE, 2, vec![whole::<G>(rows), each::<G>(rows)])
-    }
-
-    fn table(rows: &[Row]) -> Table {
-        let columns = ["case", "size", G::COUNTED, "us", "ns each", "floor ns each", "times the floor", "exponent"];
-        let mut table = Table::new(&columns);
-        for row in rows {
-            let (count, us) = row.point();
-            let floor_us = row.floor().1;
-            table.rows.push(vec![
-                (&row.case.case).into(),
-                (f64::from(row.case.size), 0).into(),
-                (count, 0).into(),
-                (us, 2).into(),
-                (row.ns_each(), 1).into(),
-                (floor_us * 1e3 / count, 1).into(),
-                (row.times_floor(), 2).into(),
-                (power(rows, &row.case.case, ANY_COUNT), 3).into(),
-            ]);
-        }
-        table
     }
 
     fn findings(rows: &[Row]) -> Vec<Finding> {
@@ -156,13 +149,6 @@ pub(super) fn power(rows: &[Row], case: &str, counts: RangeInclusive<f64>) -> f6
     exponent(&points).unwrap_or(f64::NAN)
 }
 
-/// The distinct cases, in the order of the rows.
-fn names(rows: &[Row]) -> Vec<&str> {
-    let mut list: Vec<&str> = rows.iter().map(|row| row.case.case.as_str()).collect();
-    list.dedup();
-    list
-}
-
 /// Cost against count, the floor as a dashed line, other engines as dots.
 fn whole<G: Growth>(rows: &[Row]) -> Panel {
     let of = |case: &'_ str, y: fn(&Found) -> (f64, f64)| -> Vec<_> {
@@ -170,32 +156,25 @@ fn whole<G: Growth>(rows: &[Row]) -> Panel {
     };
     let mut layers = Vec::new();
     let peers = G::peers();
-    let mut engines: Vec<&str> = peers.iter().map(|peer| peer.0.as_str()).collect();
-    engines.dedup();
-    for (k, engine) in engines.iter().enumerate() {
-        let points = peers.iter().filter(|peer| peer.0 == *engine).map(|peer| (peer.1, peer.2));
-        layers.push(Layer::dots(*engine, Colour::behind(k), points));
+    for (k, engine) in distinct(peers.iter().map(|peer| peer.0.as_str())).into_iter().enumerate() {
+        let points = peers.iter().filter(|peer| peer.0 == engine).map(|peer| (peer.1, peer.2));
+        layers.push(Layer::dots(engine, Colour::behind(k), points));
     }
-    for (case, colour) in names(rows).into_iter().zip(Colour::LINES) {
+    for (case, colour) in distinct(rows.iter().map(|row| row.case.case)).into_iter().zip(Colour::LINES) {
         let label = format!("{case}: ^{:.2}", power(rows, case, ANY_COUNT));
         layers.push(Layer::line(label, colour, of(case, Found::point)));
         layers.push(Layer::dashed("", colour, of(case, Found::floor)));
     }
     layers.push(Layer::dashed(G::FLOOR, Colour::Grey, []));
-    let all = || rows.iter().flat_map(|row| [row.point(), row.floor()]).chain(peers.iter().map(|p| (p.1, p.2)));
-    let ((left, right), (low, high)) = (span(all().map(|p| p.0), true), span(all().map(|p| p.1), true));
-    let (x, y) = (Axis::log(G::COUNTED, left, right), Axis::log(G::COST, low, high));
-    Panel::new("total", x, y, layers)
+    Panel::new("total", Axis::log_fit(G::COUNTED), Axis::log_fit(G::COST), layers)
 }
 
 /// Cost of each item against count.
 fn each<G: Growth>(rows: &[Row]) -> Panel {
     let of = |case| rows.iter().filter(move |r| r.case.case == case).map(|r| (r.point().0, r.ns_each()));
-    let layers = lines(names(rows), of).map(|line| Layer { label: String::new(), ..line });
-    let ((left, right), (low, high)) =
-        (span(rows.iter().map(|r| r.point().0), true), span(rows.iter().map(|r| r.ns_each()), true));
-    let (x, y) = (Axis::log(G::COUNTED, left, right), Axis::log("ns each", low, high));
-    Panel::new("per item", x, y, layers)
+    let layers =
+        lines(distinct(rows.iter().map(|row| row.case.case)), of).map(|line| Layer { label: String::new(), ..line });
+    Panel::new("per item", Axis::log_fit(G::COUNTED), Axis::log_fit("ns each"), layers)
 }
 
 #[cfg(test)]
@@ -205,7 +184,7 @@ mod tests {
     #[test]
     fn the_power_is_fitted_between_two_counts() {
         let row = |size: u32, us: f64| Row {
-            case: Case { case: "a".to_owned(), size },
+            case: Case { case: "a", size },
             found: Found { count: Some(f64::from(size)), us: Some(us), floor_us: Some(1.0), calibration_us: None },
         };
         // a fixed cost below 100, proportional from there on

@@ -3,7 +3,7 @@
 use super::super::accuracy::peers;
 use super::growth::{Case, Cost, Growth, Row, pace, power};
 use super::tubes::{grasp, hanging, straight};
-use crate::chart::{Finding, floor_us, least_us, worst};
+use crate::chart::{Finding, claims, floor_us, least_us, worst_of};
 use std::ops::RangeInclusive;
 use std::time::Duration;
 
@@ -36,8 +36,7 @@ impl Growth for Segments {
         } else {
             &[8, 16, 32, 64, 100, 128, 256, 400, 512, 1000, 1024, 2048, 4000, 4096]
         };
-        let kinds = [ALONE, WARY, HELD].into_iter();
-        kinds.flat_map(|case| sizes.iter().map(|&size| Case { case: case.to_owned(), size })).collect()
+        Case::of([ALONE, WARY, HELD], sizes)
     }
 
     fn measure(case: &Case) -> Option<Cost> {
@@ -56,12 +55,12 @@ impl Growth for Segments {
     }
 
     fn findings(rows: &[Row]) -> Vec<Finding> {
-        let inside = |row: &&Row| row.case.case == ALONE && CLAIMED.contains(&f64::from(row.case.size));
-        let slowest = pace(rows) * worst(rows.iter().filter(inside).map(|row| row.ns_each()));
-        let range = format!("{} … {} segments", CLAIMED.start(), CLAIMED.end());
-        vec![
-            Finding::at_most(format!("ns per segment and step by calibration, {range}, alone"), slowest, CLAIMED_NS),
-            Finding::at_most(format!("exponent, {range}, alone"), power(rows, ALONE, CLAIMED), CLAIMED_POWER),
+        let inside = |row: &Row| row.case.case == ALONE && CLAIMED.contains(&f64::from(row.case.size));
+        let slowest = pace(rows) * worst_of(rows, inside, |row| row.ns_each());
+        let (from, to) = (CLAIMED.start(), CLAIMED.end());
+        claims![
+            "ns per segment and step by calibration, {from} … {to} segments, alone" => slowest, at_most CLAIMED_NS;
+            "exponent, {from} … {to} segments, alone" => power(rows, ALONE, CLAIMED), at_most CLAIMED_POWER;
         ]
     }
 

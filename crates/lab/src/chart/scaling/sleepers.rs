@@ -44,8 +44,7 @@ impl Growth for Sleepers {
 
     fn cases(quick: bool) -> Vec<Case> {
         let sizes: &[u32] = if quick { &[1000] } else { &[10, 100, 1000] };
-        let of = |name: &str| sizes.iter().map(|&size| Case { case: name.to_owned(), size }).collect::<Vec<_>>();
-        CASES.iter().flat_map(|(name, ..)| of(name)).collect()
+        Case::of(CASES.map(|(name, ..)| name), sizes)
     }
 
     fn measure(case: &Case) -> Option<Cost> {

@@ -6,7 +6,7 @@
 
 use super::super::bench::StepHarness;
 use super::common::{dead_load, plain_tube};
-use crate::chart::{Axis, Colour, Experiment, Figure, Finding, Layer, Measured, worst};
+use crate::chart::{Axis, Colour, Experiment, Figure, Finding, Layer, Measured, Table, claims, each, table, worst_of};
 use glam::{DQuat, DVec3};
 use metachron_geometry::{Obstacle, Solid};
 use metachron_models::rod::{Tube, TubeSpec};
@@ -44,7 +44,7 @@ const SETTLE_S: f64 = 0.4;
 const SLIP_M: f64 = 5e-4;
 
 /// An angle and a coefficient.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Serialize)]
 pub(in super::super) struct Case {
     friction: f64,
     wrap_rad: f64,
@@ -71,19 +71,17 @@ impl Experiment for Capstan {
     type Row = Row;
     const NAME: &'static str = "capstan";
     const TITLE: &'static str = "capstan: tension ratio at which a tube around a fixed cylinder slips";
-    const COLUMNS: &'static str =
-        "friction.1, wrap_rad.4, theory.4 as exp(μφ), ratio.4, ratio/theory.4 as ratio / exp(μφ)";
+    const TABLE: fn(&[Row]) -> Table = table!(|r| friction(1): r.case.friction, wrap_rad(4): r.case.wrap_rad,
+        "exp(μφ)"(4): r.theory, ratio(4): r.ratio, "ratio / exp(μφ)"(4): r.ratio.map(|ratio| ratio / r.theory));
 
     fn cases(quick: bool) -> Vec<Case> {
         let frictions = if quick { &[CLAIMED_FRICTION][..] } else { &FRICTIONS[..] };
         let wraps = if quick { &CLAIMED_WRAPS[..] } else { &WRAPS[..] };
-        let of = |&friction: &f64| wraps.iter().map(move |&wrap_rad| Case { wrap_rad, friction });
-        frictions.iter().flat_map(of).collect()
+        each!(&friction in frictions, &wrap_rad in wraps => Case { friction, wrap_rad })
     }
 
-    fn measure(case: &Case) -> Row {
-        let theory = libm::exp(case.friction * case.wrap_rad);
-        Row { case: case.clone(), found: Found { theory, ratio: slip_ratio(case) } }
+    fn measure(case: &Case) -> Option<Found> {
+        Some(Found { theory: libm::exp(case.friction * case.wrap_rad), ratio: slip_ratio(case) })
     }
 
     fn figure(rows: &[Row]) -> Figure {
@@ -102,13 +100,11 @@ impl Experiment for Capstan {
     }
 
     fn findings(rows: &[Row]) -> Vec<Finding> {
-        let claimed = |r: &&Row| r.case.friction == CLAIMED_FRICTION && CLAIMED_WRAPS.contains(&r.case.wrap_rad);
-        let greatest = worst(rows.iter().filter(claimed).map(|r| r.error()));
-        vec![Finding::at_most(
-            "T₂/T₁ at slip against exp(μφ), μ = 0.3, φ = π/2, π: relative error",
-            greatest,
-            TOLERANCE,
-        )]
+        let claimed = |r: &Row| r.case.friction == CLAIMED_FRICTION && CLAIMED_WRAPS.contains(&r.case.wrap_rad);
+        claims![
+            "T₂/T₁ at slip against exp(μφ), μ = 0.3, φ = π/2, π: relative error" =>
+                worst_of(rows, claimed, |r| r.error()), at_most TOLERANCE;
+        ]
     }
 }
 

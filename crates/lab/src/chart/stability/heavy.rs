@@ -6,7 +6,9 @@
 use super::super::lockstep_run::LockstepRun;
 use super::common::{GRAVITY, plain_body};
 use crate::chart::accuracy::peers::stored;
-use crate::chart::{Axis, Colour, Experiment, Figure, Finding, Layer, Measured, Panel, worst};
+use crate::chart::{
+    Axis, Colour, Experiment, Figure, Finding, Layer, Measured, Panel, Table, claims, count_of, each, table, worst,
+};
 use glam::{DQuat, DVec3};
 use metachron_contact::detect::ClusterScene;
 use metachron_core::{AgentId, Body, RigidState, Snapshot};
@@ -38,9 +40,9 @@ const HALF_LINK_M: f64 = 0.1;
 const LINKS: u32 = 20;
 
 /// A test.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Serialize)]
 pub(in super::super) struct Case {
-    test: String,
+    test: &'static str,
     ratio: f64,
     rate_hz: f64,
 }
@@ -93,23 +95,16 @@ impl Experiment for Heavy {
     type Row = Row;
     const NAME: &'static str = "heavy-on-light";
     const TITLE: &'static str = "stacks and chains with a heavy end: sink and stretch, compared with other engines";
-    const COLUMNS: &'static str = "\
-        test, ratio.0, rate_hz.0, value.6, aside_m.6, gain.6, holds, best_peer_value.6 as best peer, \
-        best_peer as peer";
+    const TABLE: fn(&[Row]) -> Table = table!(|r| test: r.case.test, ratio: r.case.ratio, rate_hz: r.case.rate_hz,
+        value(6): r.value, aside_m(6): r.aside_m, gain(6): r.gain, holds: r.holds, "best peer"(6): r.best_peer_value,
+        peer: r.best_peer);
 
     fn cases(quick: bool) -> Vec<Case> {
-        let (tests, ratios) = if quick { (&TESTS[..], &RATIOS[2..]) } else { (&TESTS[..], &RATIOS[..]) };
-        let rates = if quick { &RATES_HZ[..1] } else { &RATES_HZ[..] };
-        let mut cases = Vec::new();
-        for test in tests {
-            for &ratio in ratios {
-                cases.extend(rates.iter().map(|&rate_hz| Case { test: (*test).to_owned(), ratio, rate_hz }));
-            }
-        }
-        cases
+        let (ratios, rates_hz) = if quick { (&RATIOS[2..], &RATES_HZ[..1]) } else { (&RATIOS[..], &RATES_HZ[..]) };
+        each!(test in TESTS, &ratio in ratios, &rate_hz in rates_hz => Case { test, ratio, rate_hz })
     }
 
-    fn measure(case: &Case) -> Row {
+    fn measure(case: &Case) -> Option<Found> {
         let is_stack = case.test.starts_with("stack");
         let result = if is_stack { cube_stack(case) } else { hanging_chain(case) };
         let peer = best_peer(case);
@@ -123,7 +118,7 @@ impl Experiment for Heavy {
         } else {
             found.value <= STRETCH_MAX && found.gain <= GAIN_MAX
         };
-        Row { case: case.clone(), found }
+        Some(found)
     }
 
     fn figure(rows: &[Row]) -> Figure {
@@ -132,17 +127,12 @@ impl Experiment for Heavy {
     }
 
     fn findings(rows: &[Row]) -> Vec<Finding> {
-        let fails = |r: &&Row| !r.holds && !r.best_peer.is_empty();
-        let worse = |r: &&Row| r.best_peer_value.is_some_and(|best| r.value.abs() > best.max(STRETCH_MAX));
-        Finding::all_at_most([
-            ("cases that fail where another engine holds", rows.iter().filter(fails).count() as f64, 0.0),
-            ("cases that fail", rows.iter().filter(|r| !r.holds).count() as f64, 0.0),
-            (
-                "cases that sink or stretch by more than 0.001 and more than the best engine",
-                rows.iter().filter(worse).count() as f64,
-                0.0,
-            ),
-        ])
+        let worse = |r: &Row| r.best_peer_value.is_some_and(|best| r.value.abs() > best.max(STRETCH_MAX));
+        claims![
+            "cases that fail where another engine holds" => count_of(rows, |r| !r.holds && !r.best_peer.is_empty()), at_most 0.0;
+            "cases that fail" => count_of(rows, |r| !r.holds), at_most 0.0;
+            "cases that sink or stretch by more than 0.001 and more than the best engine" => count_of(rows, worse), at_most 0.0;
+        ]
     }
 }
 

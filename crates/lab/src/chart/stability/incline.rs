@@ -2,7 +2,7 @@
 
 use super::super::bench::StepHarness;
 use super::common::{GRAVITY, plain_body, plain_tube};
-use crate::chart::{Axis, Colour, Experiment, Figure, Finding, Layer, Measured, span, worst};
+use crate::chart::{Axis, Colour, Experiment, Figure, Finding, Layer, Measured, Table, each, span, table, worst};
 use glam::{DQuat, DVec3};
 use metachron_contact::Agent;
 use metachron_core::{Body, Snapshot};
@@ -27,9 +27,9 @@ const SECONDS: f64 = 1.0;
 const DT_S: f64 = 0.004;
 
 /// A body on a slope.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Serialize)]
 pub(in super::super) struct Case {
-    body: String,
+    body: &'static str,
     /// tan(angle)/μ.
     slope: f64,
 }
@@ -49,19 +49,19 @@ impl Experiment for Incline {
     type Row = Row;
     const NAME: &'static str = "incline";
     const TITLE: &'static str = "box and tube on a slope: angle at which sliding begins, μ = 0.3";
-    const COLUMNS: &'static str = "body, slope.2 as tan/μ, slid_m*1e3.3 as slid_mm, theory_m*1e3.3 as Coulomb_mm";
+    const TABLE: fn(&[Row]) -> Table = table!(|r| body: r.case.body, "tan/μ"(2): r.case.slope,
+        slid_mm(3): r.slid_m.map(|slid_m| 1e3 * slid_m), Coulomb_mm(3): 1e3 * r.theory_m);
 
     fn cases(quick: bool) -> Vec<Case> {
         let slopes = if quick { &QUICK_SLOPES[..] } else { &SLOPES[..] };
-        let of = |body: &'static str| slopes.iter().map(move |&slope| Case { body: body.to_owned(), slope });
-        BODIES.into_iter().flat_map(of).collect()
+        each!(body in BODIES, &slope in slopes => Case { body, slope })
     }
 
-    fn measure(case: &Case) -> Row {
+    fn measure(case: &Case) -> Option<Found> {
         let angle = libm::atan(case.slope * FRICTION);
         let pull = GRAVITY * (libm::sin(angle) - FRICTION * libm::cos(angle));
         let theory_m = 0.5 * pull.max(0.0) * SECONDS * SECONDS;
-        Row { case: case.clone(), found: Found { slid_m: slid(case, angle), theory_m } }
+        Some(Found { slid_m: slid(case, angle), theory_m })
     }
 
     fn figure(rows: &[Row]) -> Figure {
@@ -85,11 +85,8 @@ impl Experiment for Incline {
             let slid_below = here().filter(slides).map(|r| 1.0 - r.case.slope);
             let stuck_above = here().filter(|r| !slides(r)).map(|r| r.case.slope - 1.0);
             let off = worst(slid_below.chain(stuck_above).chain([0.0]));
-            Finding::at_most(
-                format!("{body}: transition from stick to slip at tan(angle) = μ, relative error"),
-                off,
-                TOLERANCE * 0.999,
-            )
+            let claim = format!("{body}: transition from stick to slip at tan(angle) = μ, relative error");
+            Finding::at_most(claim, off, TOLERANCE * 0.999)
         };
         BODIES.into_iter().map(of).collect()
     }

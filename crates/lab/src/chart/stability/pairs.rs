@@ -1,9 +1,12 @@
 //! Tubes in contact at two rates: on a bar, between two fingers, across another tube, rates 1:1 to 1:100 in both directions.
 
 use super::super::energy_bench::Play;
-use super::super::scenes::{Scene, WITH_TUBES, scene};
+use super::super::scenes::{Scene, WITH_TUBES, scene, ways};
 use super::common::COMMON_ENERGY_MAX;
-use crate::chart::{Axis, Colour, Experiment, Figure, Finding, Layer, Measured, Panel, worst};
+use crate::chart::{
+    Axis, Colour, Experiment, Figure, Finding, Layer, Measured, Panel, Table, blank, claims, count_of, each, table,
+    worst, worst_of,
+};
 use glam::DVec3;
 use metachron_core::{AgentId, Anchor};
 use serde::{Deserialize, Serialize};
@@ -19,9 +22,9 @@ const REST_S: f64 = 2.0;
 const DEPTH_MAX_M: f64 = 0.005;
 
 /// A scene, the ratio of its rates, and which agent has the fast one.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Serialize)]
 pub(in super::super) struct Case {
-    scene: String,
+    scene: &'static str,
     ratio: f64,
     /// Whether the tube (of two tubes the one clamped at both ends) has the fast rate.
     first_is_fast: bool,
@@ -46,27 +49,19 @@ impl Experiment for Pairs {
     type Row = Row;
     const NAME: &'static str = "tubes";
     const TITLE: &'static str = "tubes on a bar, in a gripper and across each other, step rates 1:1 to 1:100";
-    const COLUMNS: &'static str = "\
-        scene, ratio.0, first_is_fast, peak.4, depth_m*1e3.4 as depth_mm, creep_m_s*1e3.4 as creep_mm_s, \
-        contacts.0";
+    const TABLE: fn(&[Row]) -> Table = table!(|r| scene: r.case.scene, ratio: r.case.ratio,
+        first_is_fast: r.case.first_is_fast, peak(4): r.peak, depth_mm(4): 1e3 * r.depth_m,
+        creep_mm_s(4): 1e3 * r.creep_m_s, contacts: r.contacts);
 
     fn cases(quick: bool) -> Vec<Case> {
         let ratios = if quick { &RATIOS[3..4] } else { &RATIOS[..] };
-        let mut cases = Vec::new();
-        for name in WITH_TUBES {
-            for &ratio in ratios {
-                let ways = if ratio == 1.0 { &[true][..] } else { &[true, false][..] };
-                let of = |&first_is_fast: &bool| Case { scene: name.to_owned(), ratio, first_is_fast };
-                cases.extend(ways.iter().map(of));
-            }
-        }
-        cases
+        each!(scene in WITH_TUBES, &ratio in ratios, &first_is_fast in ways(ratio == 1.0) => Case { scene, ratio, first_is_fast })
     }
 
-    fn measure(case: &Case) -> Row {
+    fn measure(case: &Case) -> Option<Found> {
         let slow_hz = FAST_HZ / case.ratio;
-        let lost = Found { slow_hz, peak: f64::NAN, depth_m: f64::NAN, creep_m_s: f64::NAN, contacts: 0 };
-        Row { case: case.clone(), found: settle_pair(case, slow_hz).unwrap_or(lost) }
+        let unsettled = Found { slow_hz, ..blank() };
+        Some(settle_pair(case, slow_hz).unwrap_or(unsettled))
     }
 
     fn figure(rows: &[Row]) -> Figure {
@@ -90,19 +85,17 @@ impl Experiment for Pairs {
     }
 
     fn findings(rows: &[Row]) -> Vec<Finding> {
-        let at_60 = rows.iter().filter(|r| r.slow_hz >= 50.0).map(|r| r.depth_m);
-        let apart = rows.iter().filter(|r| r.contacts == 0).count() as f64;
-        Finding::all_at_most([
-            ("peak energy over the start's", worst(rows.iter().map(|r| r.peak)), COMMON_ENERGY_MAX),
-            ("overlap at rest at 50 Hz and more, m", worst(at_60), DEPTH_MAX_M),
-            ("pairs without contact at the end", apart, 0.0),
-        ])
+        claims![
+            "peak energy over the start's" => worst_of(rows, |_| true, |r| r.peak), at_most COMMON_ENERGY_MAX;
+            "overlap at rest at 50 Hz and more, m" => worst_of(rows, |r| r.slow_hz >= 50.0, |r| r.depth_m), at_most DEPTH_MAX_M;
+            "pairs without contact at the end" => count_of(rows, |r| r.contacts == 0), at_most 0.0;
+        ]
     }
 }
 
 fn settle_pair(case: &Case, slow_hz: f64) -> Option<Found> {
     let rates_hz = if case.first_is_fast { [FAST_HZ, slow_hz] } else { [slow_hz, FAST_HZ] };
-    let Scene { mut play, points, zero_j } = scene(&case.scene, rates_hz)?;
+    let Scene { mut play, points, zero_j } = scene(case.scene, rates_hz)?;
     let start_j = play.energy_j() - zero_j;
     let (mut peak, mut depth_m, mut contacts) = (1.0, 0.0_f64, 0_u32);
     let mut since: Option<(f64, Vec<DVec3>)> = None;

@@ -6,7 +6,9 @@
 
 use super::common::{GRAVITY, plain_tube};
 use super::hanging::Hanging;
-use crate::chart::{Axis, Colour, Experiment, Figure, Finding, Layer, Measured, Panel, Table};
+use crate::chart::{
+    Axis, Colour, Experiment, Figure, Finding, Layer, Measured, Named, Panel, Table, claims, count_of, each, table,
+};
 use glam::DVec3;
 use metachron_contact::step::LoneStepper;
 use metachron_contact::{Agent, StepContext};
@@ -35,9 +37,9 @@ const BLOWN_UP: f64 = 10.0;
 const TILT: f64 = 1.5;
 
 /// A square of the map.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Serialize)]
 pub(in super::super) struct Case {
-    integrator: String,
+    integrator: Named<Integrator>,
     young_pa: f64,
     dt_ms: f64,
 }
@@ -73,18 +75,26 @@ impl Experiment for TubeMap {
     type Row = Row;
     const NAME: &'static str = "tube-map";
     const TITLE: &'static str = "dt × stiffness of the tube: stable, bounded but wrong, or blown up";
+    const TABLE: fn(&[Row]) -> Table = |rows| {
+        let tubes = rows.chunk_by(|a, b| (a.case.integrator, a.case.young_pa) == (b.case.integrator, b.case.young_pa));
+        let count = |here: &[Row], verdict| count_of(here, |r| r.verdict == verdict);
+        let greatest = |here: &[Row], of: fn(&Row) -> f64| {
+            here.iter().filter(|r| r.verdict != Verdict::Refused).map(of).fold(0.0, f64::max)
+        };
+        table!(tubes, |here| integrator: here[0].case.integrator, young_pa: here[0].case.young_pa,
+            "stable to dt_ms"(1): stable_to_ms(here), refused: count(here, Verdict::Refused),
+            wrong: count(here, Verdict::Wrong), "blown up": count(here, Verdict::BlownUp),
+            "worst tip error"(4): greatest(here, |r| r.tip_error.unwrap_or(f64::INFINITY)),
+            "most substeps"(1): greatest(here, |r| r.substeps_per_step), stretch(2): greatest(here, |r| r.stretch))
+    };
 
     fn cases(quick: bool) -> Vec<Case> {
         let (young, dt) = if quick { (&QUICK_YOUNG_PA[..], &QUICK_DT_MS[..]) } else { (&YOUNG_PA[..], &DT_MS[..]) };
-        let of = |integrator: Integrator| {
-            young.iter().flat_map(move |&young_pa| {
-                dt.iter().map(move |&dt_ms| Case { integrator: integrator.name().to_owned(), young_pa, dt_ms })
-            })
-        };
-        Integrator::ALL.into_iter().flat_map(of).collect()
+        let named = |integrator: Integrator| Named(integrator.name(), integrator);
+        each!(integrator in Integrator::ALL.map(named), &young_pa in young, &dt_ms in dt => Case { integrator, young_pa, dt_ms })
     }
 
-    fn measure(case: &Case) -> Row {
+    fn measure(case: &Case) -> Option<Found> {
         let fall = fall(case);
         let tip_error = fall.tip.map(|tip| tip.distance(rest_of(case.young_pa)) / LENGTH_M);
         let verdict = match tip_error {
@@ -94,7 +104,7 @@ impl Experiment for TubeMap {
             Some(_) => Verdict::Wrong,
         };
         let Fall { energy_rise, stretch, substeps_per_step, .. } = fall;
-        Row { case: case.clone(), found: Found { verdict, tip_error, energy_rise, stretch, substeps_per_step } }
+        Some(Found { verdict, tip_error, energy_rise, stretch, substeps_per_step })
     }
 
     fn figure(rows: &[Row]) -> Figure {
@@ -102,50 +112,21 @@ impl Experiment for TubeMap {
         Figure::new("Clamped tube released from the horizontal, 6 s", 3, panels)
     }
 
-    fn table(rows: &[Row]) -> Table {
-        let line = |(integrator, young_pa): (&'static str, f64)| {
-            let here = || {
-                let same = move |r: &&Row| r.case.integrator == integrator && r.case.young_pa == young_pa;
-                rows.iter().filter(same)
-            };
-            let count = |verdict| (here().filter(|r| r.verdict == verdict).count() as f64, 0).into();
-            let bad =
-                here().filter(|r| r.verdict != Verdict::Stable).map(|r| r.case.dt_ms).fold(f64::INFINITY, f64::min);
-            let stable_ms = here().map(|r| r.case.dt_ms).filter(|dt| *dt < bad).fold(0.0, f64::max);
-            let ran = || here().filter(|r| r.verdict != Verdict::Refused);
-            let greatest = |of: fn(&Row) -> f64| ran().map(of).fold(0.0, f64::max);
-            vec![
-                ("integrator", integrator.into()),
-                ("young_pa", (young_pa, 0).into()),
-                ("stable to dt_ms", (stable_ms, 1).into()),
-                ("refused", count(Verdict::Refused)),
-                ("wrong", count(Verdict::Wrong)),
-                ("blown up", count(Verdict::BlownUp)),
-                ("worst tip error", (greatest(|r| r.tip_error.unwrap_or(f64::INFINITY)), 4).into()),
-                ("most substeps", (greatest(|r| r.substeps_per_step), 1).into()),
-                ("stretch", (greatest(|r| r.stretch), 2).into()),
-            ]
-        };
-        let moduli = moduli(rows);
-        let of = |integrator: Integrator| moduli.iter().map(move |young_pa| (integrator.name(), *young_pa));
-        Table::named(Integrator::ALL.into_iter().flat_map(of).map(line))
-    }
-
     fn findings(rows: &[Row]) -> Vec<Finding> {
-        let implicit = [Integrator::ImplicitEuler, Integrator::Bdf2, Integrator::EnergyMomentum].map(Integrator::name);
-        let bad =
-            rows.iter().filter(|r| implicit.contains(&r.case.integrator.as_str()) && r.verdict != Verdict::Stable);
-        let unsaid = rows.iter().filter(|r| matches!(r.verdict, Verdict::Wrong | Verdict::BlownUp));
-        Finding::all_at_most([
-            ("implicit methods: cells of the map that are not stable", bad.count() as f64, 0.0),
-            ("all methods: cells that fail without being refused beforehand", unsaid.count() as f64, 0.0),
-        ])
+        let implicit = [Integrator::ImplicitEuler, Integrator::Bdf2, Integrator::EnergyMomentum];
+        let bad = |r: &Row| implicit.contains(&r.case.integrator.1) && r.verdict != Verdict::Stable;
+        let unsaid = |r: &Row| matches!(r.verdict, Verdict::Wrong | Verdict::BlownUp);
+        claims![
+            "implicit methods: cells of the map that are not stable" => count_of(rows, bad), at_most 0.0;
+            "all methods: cells that fail without being refused beforehand" => count_of(rows, unsaid), at_most 0.0;
+        ]
     }
 }
 
-/// The moduli in the rows, rising.
-fn moduli(rows: &[Row]) -> Vec<f64> {
-    YOUNG_PA.into_iter().filter(|young| rows.iter().any(|r| r.case.young_pa == *young)).collect()
+/// The longest step below all that are not stable.
+fn stable_to_ms(here: &[Row]) -> f64 {
+    let bad = here.iter().filter(|r| r.verdict != Verdict::Stable).map(|r| r.case.dt_ms).fold(f64::INFINITY, f64::min);
+    here.iter().map(|r| r.case.dt_ms).filter(|dt| *dt < bad).fold(0.0, f64::max)
 }
 
 /// The reference tube along +x.
@@ -181,8 +162,7 @@ struct Fall {
 
 /// Releases the tube; the tip is `None` where the motion blew up.
 fn fall(case: &Case) -> Fall {
-    let integrator = Integrator::ALL.into_iter().find(|i| i.name() == case.integrator).unwrap_or_default();
-    let spec = TubeSpec { integrator, ..spec(case.young_pa) };
+    let spec = TubeSpec { integrator: case.integrator.1, ..spec(case.young_pa) };
     let given_j = spec.section.mass_per_length_kg_m * GRAVITY * LENGTH_M * LENGTH_M;
     let mut out = Fall { tip: None, energy_rise: 0.0, stretch: 1.0, substeps_per_step: 0.0, refused: false };
     let (Ok(mut tube), Some(dt)) = (Tube::new(spec), SimSpan::from_secs_f64(case.dt_ms * 1e-3)) else { return out };
@@ -211,7 +191,7 @@ fn fall(case: &Case) -> Fall {
 
 /// The map of one integrator.
 fn panel(integrator: &str, rows: &[Row]) -> Panel {
-    let here: Vec<&Row> = rows.iter().filter(|r| r.case.integrator == integrator).collect();
+    let here: Vec<&Row> = rows.iter().filter(|r| r.case.integrator.0 == integrator).collect();
     let edges = |of: fn(&Row) -> f64| {
         let mut values: Vec<f64> = here.iter().map(|r| of(r)).collect();
         values.sort_by(f64::total_cmp);

@@ -4,8 +4,7 @@
 //! its stiffness, which passes through zero where the tube buckles. Runs on one side approach that twist step by step; a run that
 //! turns out to be on the other side is a failure. Theory: docs/theory/rod.md, eq. 50–53.
 
-use crate::chart::accuracy::diagram::{Benchmark, Case, Goal};
-use crate::chart::accuracy::play::{Play, metre, reference_tube, slender_tube};
+use crate::chart::accuracy::{Benchmark, Case, Goal, Play, metre, reference_tube, slender_tube};
 use crate::chart::stability::common::dead_load;
 use glam::DVec3;
 use metachron_core::CurveState;

@@ -1,7 +1,6 @@
 //! A clamped tube at rest under its own weight, against shooting ([`crate::chart::stability::hanging`]).
 
-use crate::chart::accuracy::diagram::{Benchmark, Case, Goal};
-use crate::chart::accuracy::play::{Play, metre, reference_tube};
+use crate::chart::accuracy::{Benchmark, Case, Goal, Play, metre, reference_tube};
 use crate::chart::stability::common::GRAVITY;
 use crate::chart::stability::hanging::Hanging;
 use glam::DVec3;
@@ -44,10 +43,10 @@ impl Benchmark for Cantilever {
                     continue;
                 }
                 let steps: &[f64] = if explicit { &[10.0] } else { &[10.0, 40.0] };
-                for (&segments, &dt_ms) in sizes.iter().flat_map(|n| steps.iter().map(move |dt| (n, dt))) {
-                    let (case, method) = (case.to_owned(), integrator.name().to_owned());
-                    list.push(Case { case, method, segments, dt_ms, substeps: 1 });
-                }
+                let of_size = |&segments: &u32| {
+                    steps.iter().flat_map(move |&dt_ms| Case::ladder(&[case], &[integrator], &[segments], dt_ms))
+                };
+                list.extend(sizes.iter().flat_map(of_size));
             }
         }
         list

@@ -1,7 +1,6 @@
 //! A cable without bending stiffness between two points, against the catenary in closed form.
 
-use crate::chart::accuracy::diagram::{Benchmark, Case};
-use crate::chart::accuracy::play::{Play, reference_tube};
+use crate::chart::accuracy::{Benchmark, Case, Play, reference_tube};
 use crate::chart::stability::common::GRAVITY;
 use glam::DVec3;
 use metachron_models::rod::{Integrator, TubeSpec};

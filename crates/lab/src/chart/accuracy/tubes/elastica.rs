@@ -1,7 +1,6 @@
 //! A cantilever with a load at its tip: the elastica, computed by shooting with another code (tests/reference/elastica.json).
 
-use crate::chart::accuracy::diagram::{Benchmark, Case};
-use crate::chart::accuracy::play::{Play, metre, slender_tube};
+use crate::chart::accuracy::{Benchmark, Case, Play, metre, slender_tube};
 use crate::chart::stability::common::dead_load;
 use glam::DVec3;
 use metachron_models::rod::TubeSpec;

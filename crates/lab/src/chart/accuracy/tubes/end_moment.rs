@@ -3,8 +3,7 @@
 //! A tube takes pulls but no moments from outside, so the moment is a pair of pulls on a piece beyond the measured length; the
 //! pair stays perpendicular to the piece however that turns, so the measured length feels the moment and no force.
 
-use crate::chart::accuracy::diagram::{Benchmark, Case};
-use crate::chart::accuracy::play::{Play, slender_tube};
+use crate::chart::accuracy::{Benchmark, Case, Play, slender_tube};
 use crate::chart::stability::common::dead_load;
 use glam::DVec3;
 use metachron_contact::AnchorSpring;

@@ -1,7 +1,6 @@
 //! Four-point bending: a beam on two supports with two loads between them, against beam theory with shear.
 
-use crate::chart::accuracy::diagram::{Benchmark, Case};
-use crate::chart::accuracy::play::{Play, metre, reference_tube};
+use crate::chart::accuracy::{Benchmark, Case, Play, metre, reference_tube};
 use crate::chart::stability::common::dead_load;
 use glam::DVec3;
 use metachron_models::rod::TubeSpec;

@@ -3,8 +3,7 @@
 //! A mode is excited by pulls in its own shape, or released from an even twist, and is measured by projection onto the same shape:
 //! other motion does not count.
 
-use crate::chart::accuracy::diagram::{Benchmark, Case};
-use crate::chart::accuracy::play::{Play, metre, reference_tube, slender_tube};
+use crate::chart::accuracy::{Benchmark, Case, Play, metre, reference_tube, slender_tube};
 use crate::chart::stability::common::dead_load;
 use glam::{DQuat, DVec3};
 use metachron_contact::AnchorSpring;

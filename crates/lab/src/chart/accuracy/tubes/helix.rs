@@ -3,8 +3,7 @@
 //! The force must act on the axis, where there is no tube: it is shared evenly by points around the last turn, whose centre is on
 //! the axis. The turns before it then feel only the force on the axis and stay an even helix; these are measured.
 
-use crate::chart::accuracy::diagram::{Benchmark, Case};
-use crate::chart::accuracy::play::{Play, slender_tube};
+use crate::chart::accuracy::{Benchmark, Case, Play, slender_tube};
 use crate::chart::stability::common::dead_load;
 use glam::DVec3;
 use metachron_contact::AnchorSpring;

@@ -2,8 +2,7 @@
 //!
 //! The tube follows the law of thin walls, dr = p r² (1 − ν/2)/(E t): its error is that of the law, and grows with the wall.
 
-use crate::chart::accuracy::diagram::{Benchmark, Case};
-use crate::chart::accuracy::play::{Play, metre};
+use crate::chart::accuracy::{Benchmark, Case, Play, metre};
 use metachron_models::rod::{Integrator, Material, Section, TubeSpec};
 
 /// The benchmark.

@@ -1,8 +1,8 @@
 //! A cable pinned at one end and released from the horizontal, undamped, against the trajectory extrapolated from rigid links
 //! (tests/reference/swing_cable.json).
 
-use crate::chart::accuracy::diagram::{Benchmark, Case, Goal};
-use crate::chart::accuracy::play::{Play, metre, slender_tube};
+use crate::chart::accuracy::{Benchmark, Case, Goal, Play, metre, slender_tube};
+use crate::chart::each;
 use crate::chart::stability::common::GRAVITY;
 use glam::DVec3;
 use metachron_models::rod::{Integrator, TubeSpec};
@@ -27,16 +27,10 @@ impl Benchmark for Swing {
     const ERROR: &'static str = "RMS of the tip in the first second, m";
 
     fn cases(quick: bool) -> Vec<Case> {
-        let mut list = Vec::new();
-        for integrator in [Integrator::ImplicitEuler, Integrator::Bdf2, Integrator::EnergyMomentum] {
-            for &segments in if quick { &[16][..] } else { &[16, 32, 64] } {
-                for &substeps in if quick { &[1, 4][..] } else { &[1, 2, 4, 5, 8, 16, 32] } {
-                    let (case, method) = ("cable".to_owned(), integrator.name().to_owned());
-                    list.push(Case { case, method, segments, dt_ms: 10.0, substeps });
-                }
-            }
-        }
-        list
+        let methods = [Integrator::ImplicitEuler, Integrator::Bdf2, Integrator::EnergyMomentum];
+        let sizes = if quick { &[16][..] } else { &[16, 32, 64] };
+        let substeps: &[u32] = if quick { &[1, 4] } else { &[1, 2, 4, 5, 8, 16, 32] };
+        each!(case in Case::ladder(&["cable"], &methods, sizes, 10.0), &substeps in substeps => Case { substeps, ..case.clone() })
     }
 
     fn play(case: &Case) -> Option<(Play, f64)> {

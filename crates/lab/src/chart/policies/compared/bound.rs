@@ -1,9 +1,9 @@
 //! Benefit of each policy over the bound of the linear relaxation.
 
-use crate::chart::policies::numeric::common::LEVEL_PARTS;
-use crate::chart::policies::numeric::machine::RandomSource;
-use crate::chart::policies::numeric::metrics::mean;
-use crate::chart::{Axis, Colour, Experiment, Figure, Finding, Layer, Measured};
+use crate::chart::policies::numeric::{LEVEL_PARTS, RandomSource, mean};
+use crate::chart::{
+    Axis, Colour, Experiment, Figure, Finding, Layer, Measured, Named, Table, claims, each, number_of, table,
+};
 use metachron_lod::adaptive::{Adaptive, Offer, Settings, Time};
 use metachron_lod::select::{Entry, Mode, Problem, funkhouser, incremental, linear, marginal};
 use serde::{Deserialize, Serialize};
@@ -19,23 +19,23 @@ const COUNTER_EXAMPLE: &str = "counter-example";
 
 type Choose = fn(&Problem) -> u64;
 
-const POLICIES: [(&str, Choose); 7] = [
-    ("greedy", |p| funkhouser::greedy(p, funkhouser::Scan::Skip).value),
-    ("greedy-repaired", |p| funkhouser::repaired(p).value),
-    ("greedy-incremental", |p| incremental::incremental(p, &[], incremental::Keep::Last).selection.value),
-    ("marginal-stop", |p| marginal::marginal(p, marginal::Fit::Stop).value),
-    ("marginal-fill", |p| marginal::marginal(p, marginal::Fit::Fill).value),
-    ("marginal-repaired", |p| marginal::repaired(p).value),
-    ("adaptive", ours),
+const POLICIES: [Named<Choose>; 7] = [
+    Named("greedy", |p| funkhouser::greedy(p, funkhouser::Scan::Skip).value),
+    Named("greedy-repaired", |p| funkhouser::repaired(p).value),
+    Named("greedy-incremental", |p| incremental::incremental(p, &[], incremental::Keep::Last).selection.value),
+    Named("marginal-stop", |p| marginal::marginal(p, marginal::Fit::Stop).value),
+    Named("marginal-fill", |p| marginal::marginal(p, marginal::Fit::Fill).value),
+    Named("marginal-repaired", |p| marginal::repaired(p).value),
+    Named("adaptive", ours),
 ];
 
 /// Some problems and a policy.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Serialize)]
 pub(crate) struct Case {
-    set: String,
+    set: &'static str,
     objects: usize,
     instances: usize,
-    policy: String,
+    policy: Named<Choose>,
 }
 
 /// Benefits of a policy over some problems.
@@ -52,66 +52,44 @@ impl Experiment for Bound {
     type Row = Row;
     const NAME: &'static str = "bound";
     const TITLE: &'static str = "benefit over the bound of the linear relaxation, which no selection can exceed";
-    const COLUMNS: &'static str = "set, objects.0, policy, mean.5, least.5";
+    const TABLE: fn(&[Row]) -> Table = table!(|r| set: r.case.set, objects: r.case.objects, policy: r.case.policy,
+        mean(5): r.mean, least(5): r.least);
 
     fn cases(quick: bool) -> Vec<Case> {
         let instances = if quick { QUICK_INSTANCES } else { INSTANCES };
         let counts = if quick { &OBJECTS[..3] } else { &OBJECTS[..] };
-        let case = |set: &str, objects, instances, policy: &str| Case {
-            set: set.to_owned(),
-            objects,
-            instances,
-            policy: policy.to_owned(),
-        };
-        let random = counts.iter().flat_map(|&n| POLICIES.map(|(policy, _)| case("random", n, instances, policy)));
-        random.chain(POLICIES.map(|(policy, _)| case(COUNTER_EXAMPLE, 3, 1, policy))).collect()
+        let sets = counts.iter().map(|&objects| ("random", objects, instances)).chain([(COUNTER_EXAMPLE, 3, 1)]);
+        each!((set, objects, instances) in sets, policy in POLICIES => Case { set, objects, instances, policy })
     }
 
-    fn measure(case: &Case) -> Row {
-        let choose = POLICIES.iter().find(|p| p.0 == case.policy).map_or(POLICIES[0].1, |p| p.1);
-        let problem = |k| if case.set == COUNTER_EXAMPLE { counter_example() } else { random(case.objects, k) };
+    fn measure(case: &Case) -> Option<Found> {
         let part = |k: usize| {
-            let problem = problem(k);
-            linear(&problem).map_or(f64::NAN, |bound| choose(&problem) as f64 / bound.value)
+            let problem = if case.set == COUNTER_EXAMPLE { counter_example() } else { random(case.objects, k) };
+            linear(&problem).map_or(f64::NAN, |bound| case.policy.1(&problem) as f64 / bound.value)
         };
         let parts: Vec<f64> = (0..case.instances).map(part).collect();
-        let least = parts.iter().copied().fold(f64::INFINITY, f64::min);
-        Row { case: case.clone(), found: Found { mean: mean(&parts), least } }
+        Some(Found { mean: mean(&parts), least: parts.iter().copied().fold(f64::INFINITY, f64::min) })
     }
 
     fn figure(rows: &[Row]) -> Figure {
-        let line = |((name, _), colour): (&(&str, Choose), Colour)| {
-            let here = rows.iter().filter(|r| r.case.set == "random" && r.case.policy == *name);
-            Layer::line(*name, colour, here.map(|r| (r.case.objects as f64, (1.0 - r.mean).max(1e-7))))
+        let line = |(Named(name, _), colour): (Named<Choose>, Colour)| {
+            let here = rows.iter().filter(|r| r.case.set == "random" && r.case.policy.0 == name);
+            Layer::line(name, colour, here.map(|r| (r.case.objects as f64, (1.0 - r.mean).max(1e-7))))
         };
-        let layers = POLICIES.iter().zip(Colour::LINES.into_iter().chain([Colour::Grey])).map(line);
+        let layers = POLICIES.into_iter().zip(Colour::LINES.into_iter().chain([Colour::Grey])).map(line);
         let (x, y) = (Axis::log("objects", 8.0, 12_000.0), Axis::log("1 − benefit / bound, mean", 1e-7, 1.0));
         Figure::single("Greatest possible loss of a selection", x, y, layers)
     }
 
     fn findings(rows: &[Row]) -> Vec<Finding> {
         let of = |set: &str, objects: usize, policy: &str, what: fn(&Row) -> f64| {
-            let row = rows
-                .iter()
-                .find(|r| (r.case.set.as_str(), r.case.objects, r.case.policy.as_str()) == (set, objects, policy));
-            row.map_or(f64::NAN, what)
+            number_of(rows, |r| (r.case.set, r.case.objects, r.case.policy.0) == (set, objects, policy), what)
         };
-        vec![
-            Finding::at_least(
-                "adaptive, 100 objects: least benefit over the bound",
-                of("random", 100, "adaptive", |r| r.least),
-                0.99,
-            ),
-            Finding::at_least(
-                "adaptive, 1000 objects: least benefit over the bound",
-                of("random", 1000, "adaptive", |r| r.least),
-                0.99,
-            ),
-            Finding::at_most(
-                "greedy on the counter-example: benefit falls below half of the optimum",
-                of(COUNTER_EXAMPLE, 3, "greedy", |r| r.mean),
-                0.5,
-            ),
+        claims![
+            "adaptive, 100 objects: least benefit over the bound" => of("random", 100, "adaptive", |r| r.least), at_least 0.99;
+            "adaptive, 1000 objects: least benefit over the bound" => of("random", 1000, "adaptive", |r| r.least), at_least 0.99;
+            "greedy on the counter-example: benefit falls below half of the optimum" =>
+                of(COUNTER_EXAMPLE, 3, "greedy", |r| r.mean), at_most 0.5;
         ]
     }
 }

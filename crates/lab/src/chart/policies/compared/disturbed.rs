@@ -1,12 +1,10 @@
 //! The same walk on a machine that is a quarter slower than its table, has 40 % more load for a while, and stalls.
 
 use crate::chart::policies::numeric::auditorium_model::{LAP, show};
-use crate::chart::policies::numeric::chooser::Policy;
-use crate::chart::policies::numeric::closed_loop::{Frame, Show};
-use crate::chart::policies::numeric::common::{COLUMNS, Case, curves, number};
-use crate::chart::policies::numeric::machine::Fault;
-use crate::chart::policies::numeric::metrics::{Row, overshoot, settled};
-use crate::chart::{Experiment, Figure, Finding, Table, worst};
+use crate::chart::policies::numeric::{
+    Case, Fault, Frame, Policy, Row, Show, common, curves, number, overshoot, settled,
+};
+use crate::chart::{Experiment, Figure, Finding, Shown, Table, claims, worst};
 
 /// The experiment.
 pub(crate) struct Disturbed;
@@ -35,25 +33,27 @@ impl Experiment for Disturbed {
     const NAME: &'static str = "disturbed";
     const TITLE: &'static str =
         "cost table 25 % too low, 40 % more load in frames 300 to 700, stalls of 50 % in 1 % of frames";
+    const TABLE: fn(&[Row]) -> Table =
+        |rows| common::table(rows).with("settled", rows.iter().map(|row| row.settled.cell(0)));
 
     fn cases(quick: bool) -> Vec<Case> {
         let seeds = if quick { 1 } else { SEEDS };
-        POLICIES.map(|policy| Case::new(SETTING, policy, seeds, FRAMES)).to_vec()
+        POLICIES.map(|policy| Case::new(SETTING, policy.name(), seeds * FRAMES)).to_vec()
     }
 
-    fn measure(case: &Case) -> Row {
-        let (seeds, policy) = (1..=(case.frames / FRAMES) as u64, case.policy_of(&POLICIES));
+    fn measure(case: &Case) -> Option<Row> {
+        let (seeds, policy) = (1..=(case.frames / FRAMES) as u64, case.policy_of(&POLICIES)?);
         let played = |spikes| seeds.clone().map(|seed| disturbed(spikes).play(policy, seed)).collect::<Vec<_>>();
         let runs = played(SPIKES);
         let settles = |run: &Vec<Frame>| {
             let times: Vec<f64> = run.iter().map(|f| f.time).collect();
             worst([LOADED.start, LOADED.end].into_iter().zip(LATER).map(|(step, later)| settled(&times, step, later)))
         };
-        Row {
+        Some(Row {
             settled: worst(played(0.0).iter().map(settles)),
             overshoot: worst(runs.iter().map(|run| overshoot(run, LOADED.start))),
-            ..Row::of(&case.setting, &case.policy, &runs)
-        }
+            ..Row::of(&case.setting, case.policy, &runs)
+        })
     }
 
     fn figure(_: &[Row]) -> Figure {
@@ -61,20 +61,12 @@ impl Experiment for Disturbed {
         Figure::new("Cost table too low, load step, stalls", 3, panels.to_vec())
     }
 
-    fn table(rows: &[Row]) -> Table {
-        Table::of(rows, COLUMNS).with("settled", 0, rows.iter().map(|row| row.settled))
-    }
-
     fn findings(rows: &[Row]) -> Vec<Finding> {
         let of = |policy: &str, what: fn(&Row) -> f64| number(rows, SETTING, policy, what);
-        vec![
-            Finding::at_most("adaptive: frames past 1.05 T", of("adaptive", |r| r.misses), 0.05),
-            Finding::at_most(
-                "adaptive, without stalls: frames until settled after a step",
-                of("adaptive", |r| r.settled),
-                15.0,
-            ),
-            Finding::at_least("greedy (no learning): frames past 1.05 T", of("greedy", |r| r.misses), 0.9),
+        claims![
+            "adaptive: frames past 1.05 T" => of("adaptive", |r| r.misses), at_most 0.05;
+            "adaptive, without stalls: frames until settled after a step" => of("adaptive", |r| r.settled), at_most 15.0;
+            "greedy (no learning): frames past 1.05 T" => of("greedy", |r| r.misses), at_least 0.9;
         ]
     }
 }

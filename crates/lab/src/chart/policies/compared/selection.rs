@@ -1,7 +1,7 @@
 //! Wall time of a choice, from 100 objects to 100,000: the only experiment here that reads a clock.
 
-use crate::chart::policies::numeric::common::LEVEL_PARTS;
-use crate::chart::{Axis, Experiment, Figure, Finding, Layer, Measured, lines, median};
+use crate::chart::policies::numeric::LEVEL_PARTS;
+use crate::chart::{Axis, Experiment, Figure, Finding, Layer, Measured, Named, Table, each, lines, median, table};
 use metachron_lod::adaptive::{Adaptive, Offer, Settings, Time};
 use metachron_lod::select::tree::{Node, Tree};
 use metachron_lod::select::{Entry, Level, Mode, Problem, funkhouser, incremental, marginal, mason, mason_flat};
@@ -22,22 +22,24 @@ const GOAL_OBJECTS: usize = 10_000;
 
 type Time1 = fn(usize) -> Vec<f64>;
 
-const POLICIES: [(&str, Time1); 6] = [
-    ("greedy", |n| papers(n, |p, _| funkhouser::greedy(p, funkhouser::Scan::Skip).levels)),
-    ("greedy-incremental", |n| {
+const POLICIES: [Named<Time1>; 6] = [
+    Named("greedy", |n| papers(n, |p, _| funkhouser::greedy(p, funkhouser::Scan::Skip).levels)),
+    Named("greedy-incremental", |n| {
         papers(n, |p, last| incremental::incremental(p, last, incremental::Keep::Last).selection.levels)
     }),
-    ("hierarchical", |n| trees(n, |tree, last| mason::incremental(tree, last, incremental::Keep::Last).cut.levels)),
-    ("hierarchical-flat", |n| trees(n, |tree, _| mason_flat::flat(tree).levels)),
-    ("marginal-stop", |n| papers(n, |p, _| marginal::marginal(p, marginal::Fit::Stop).levels)),
-    ("adaptive", ours),
+    Named("hierarchical", |n| {
+        trees(n, |tree, last| mason::incremental(tree, last, incremental::Keep::Last).cut.levels)
+    }),
+    Named("hierarchical-flat", |n| trees(n, |tree, _| mason_flat::flat(tree).levels)),
+    Named("marginal-stop", |n| papers(n, |p, _| marginal::marginal(p, marginal::Fit::Stop).levels)),
+    Named("adaptive", ours),
 ];
 
 /// A number of objects, and a policy.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Serialize)]
 pub struct Case {
     objects: usize,
-    policy: String,
+    policy: Named<Time1>,
 }
 
 /// Wall time of a choice.
@@ -54,34 +56,33 @@ impl Experiment for Selection {
     const NAME: &'static str = "selection";
     const TITLE: &'static str = "wall time of one selection, five levels per object, new weights in every frame";
     const ALONE: bool = true;
-    const COLUMNS: &'static str = "objects.0, policy, median_ms.4, least_ms.4, least_ms*0.06.4 as share_of_60_hz";
+    const TABLE: fn(&[Row]) -> Table = table!(|r| objects: r.case.objects, policy: r.case.policy,
+        median_ms(4): r.median_ms, least_ms(4): r.least_ms, share_of_60_hz(4): 0.06 * r.least_ms);
 
     fn cases(quick: bool) -> Vec<Case> {
         let counts = if quick { &QUICK_OBJECTS[..] } else { &OBJECTS[..] };
-        let of = |&objects: &usize| POLICIES.map(|(policy, _)| Case { objects, policy: policy.to_owned() });
-        counts.iter().flat_map(of).collect()
+        each!(&objects in counts, policy in POLICIES => Case { objects, policy })
     }
 
-    fn measure(case: &Case) -> Row {
-        let time = POLICIES.iter().find(|p| p.0 == case.policy).map_or(POLICIES[0].1, |p| p.1);
-        let times = time(case.objects);
+    fn measure(case: &Case) -> Option<Found> {
+        let times = case.policy.1(case.objects);
         let least_ms = times.iter().copied().fold(f64::INFINITY, f64::min);
-        Row { case: case.clone(), found: Found { median_ms: median(times), least_ms } }
+        Some(Found { median_ms: median(times), least_ms })
     }
 
     fn figure(rows: &[Row]) -> Figure {
         let points = |name| {
-            let here = rows.iter().filter(move |r| r.case.policy == name);
+            let here = rows.iter().filter(move |r| r.case.policy.0 == name);
             here.map(|r| (r.case.objects as f64, r.least_ms))
         };
-        let layers = lines(POLICIES.map(|(name, _)| name), points);
+        let layers = lines(POLICIES.map(|policy| policy.0), points);
         let layers = layers.chain([Layer::limit("1 % of 1/60 s", [100.0, 1e5], SHARE * FRAME_MS)]);
         let (x, y) = (Axis::log("objects", 100.0, 1e5), Axis::log("least selection time, ms", 1e-3, 1e3));
         Figure::single("Selection time", x, y, layers)
     }
 
     fn findings(rows: &[Row]) -> Vec<Finding> {
-        let goal = rows.iter().find(|r| r.case.objects == GOAL_OBJECTS && r.case.policy == "adaptive");
+        let goal = rows.iter().find(|r| r.case.objects == GOAL_OBJECTS && r.case.policy.0 == "adaptive");
         let claim = "adaptive, 10,000 objects: least time over 1/60 s";
         goal.map(|r| Finding::at_most(claim, r.least_ms / FRAME_MS, SHARE)).into_iter().collect()
     }
@@ -176,7 +177,7 @@ mod tests {
 
     #[test]
     fn every_policy_has_a_time_for_every_number_of_objects() {
-        let rows: Vec<Row> = Selection::cases(true).iter().map(Selection::measure).collect();
+        let rows: Vec<Row> = Selection::cases(true).iter().map(Selection::row).collect();
         assert_eq!(rows.len(), QUICK_OBJECTS.len() * POLICIES.len());
         let timed = |row: &Row| row.found.least_ms > 0.0 && row.found.least_ms <= row.found.median_ms;
         assert!(rows.iter().all(timed), "{rows:?}");

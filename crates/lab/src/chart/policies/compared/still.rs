@@ -1,13 +1,9 @@
 //! A fixed camera in front of a scene in which nothing moves: no level may change.
 
-use crate::chart::policies::numeric::auditorium_model;
-use crate::chart::policies::numeric::camera::{Path, key};
-use crate::chart::policies::numeric::chooser::Policy;
-use crate::chart::policies::numeric::closed_loop::Show;
-use crate::chart::policies::numeric::common::{COLUMNS, Case, curves, number};
-use crate::chart::policies::numeric::machine::Fault;
-use crate::chart::policies::numeric::metrics::Row;
-use crate::chart::{Experiment, Figure, Finding};
+use crate::chart::policies::numeric::{
+    Case, Fault, Path, Policy, Row, Show, auditorium_model, common, curves, key, number,
+};
+use crate::chart::{Experiment, Figure, Finding, Table, each};
 
 /// The experiment.
 pub(crate) struct Still;
@@ -36,20 +32,18 @@ impl Experiment for Still {
     type Row = Row;
     const NAME: &'static str = "still";
     const TITLE: &'static str = "static scene: changes of level by policy";
-    const COLUMNS: &'static str = COLUMNS;
+    const TABLE: fn(&[Row]) -> Table = common::table;
 
     fn cases(quick: bool) -> Vec<Case> {
         let seeds = if quick { 1 } else { SEEDS };
-        let judged = FRAMES - LEARNT;
-        let of = |setting: &str| POLICIES.map(|policy| Case::new(setting, policy, seeds, judged));
-        SETTINGS.iter().flat_map(|s| of(s.0)).collect()
+        each!((setting, ..) in SETTINGS, policy in POLICIES => Case::new(setting, policy.name(), seeds * (FRAMES - LEARNT)))
     }
 
-    fn measure(case: &Case) -> Row {
-        let (show, policy) = (still(&case.setting), case.policy_of(&POLICIES));
+    fn measure(case: &Case) -> Option<Row> {
+        let (show, policy) = (still(&case.setting), case.policy_of(&POLICIES)?);
         let seeds = (case.frames / (FRAMES - LEARNT)) as u64;
         let runs: Vec<_> = (1..=seeds).map(|seed| show.play(policy, seed).split_off(LEARNT)).collect();
-        Row::of(&case.setting, &case.policy, &runs)
+        Some(Row::of(&case.setting, case.policy, &runs))
     }
 
     fn figure(_: &[Row]) -> Figure {

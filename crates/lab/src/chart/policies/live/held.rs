@@ -4,8 +4,10 @@
 //! beside the same threads, how much the time of one and the same picture varies. Never here: a declared machine, a
 //! window. Policies and loads take turns, round by round, so that other work of the machine meets all of them.
 
-use crate::chart::policies::numeric::metrics::{deviation95, error_over_allowed, mean, predicts, within};
-use crate::chart::{Axis, Colour, Experiment, Figure, Finding, Layer, Measured, Panel, Table, worst};
+use crate::chart::policies::numeric::{deviation95, error_over_allowed, mean, predicts, within};
+use crate::chart::{
+    Axis, Colour, Experiment, Figure, Finding, Layer, Measured, Named, Panel, Table, blank, claims, each, table, worst,
+};
 use anyhow::Context;
 use metachron_lod::control::Policy;
 use metachron_render::{Camera, Gpu, Offscreen, RendererOptions, SceneView, Size, Style};
@@ -40,10 +42,10 @@ const LATE: f64 = 0.02;
 const OVER: f64 = 1.1;
 
 /// A play.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Serialize)]
 pub(in super::super::super) struct Case {
-    scene: String,
-    policy: String,
+    scene: &'static str,
+    policy: Named<Policy>,
     /// Threads that compete.
     busy: usize,
     round: usize,
@@ -119,10 +121,10 @@ impl Play {
         let overrides = [
             ("executor", "\"threads\"".to_owned()),
             ("target.frame_hz", format!("{TARGET_HZ:?}")),
-            ("target.policy", format!("\"{}\"", case.policy)),
+            ("target.policy", format!("\"{}\"", case.policy.0)),
         ];
         let overrides: Vec<_> = overrides.into_iter().map(|(key, value)| (key.to_owned(), value)).collect();
-        let built_in = builtin::find(&case.scene).context("no such scene")?;
+        let built_in = builtin::find(case.scene).context("no such scene")?;
         let mut session = Session::open(load(&built_in.source()?, &overrides)?)?;
         session.hold();
         session.calibrate(&gpu.describe(), gpu.is_processor(), || Some(gpu.clone()));
@@ -186,24 +188,6 @@ fn empty(gpu: &Gpu) -> anyhow::Result<Vec<f64>> {
 }
 
 impl Found {
-    /// Nothing measured, for a reason.
-    fn blank(said: String) -> Self {
-        Self {
-            adapter: String::new(),
-            frames: 0,
-            late: f64::NAN,
-            work_ms: f64::NAN,
-            work95_ms: f64::NAN,
-            empty_ms: f64::NAN,
-            spread95: f64::NAN,
-            error95: f64::NAN,
-            triangles: f64::NAN,
-            scale: f64::NAN,
-            value: f64::NAN,
-            said,
-        }
-    }
-
     fn measured(case: &Case) -> anyhow::Result<Self> {
         let gpu = Gpu::headless()?;
         let at = usize::from(case.quick);
@@ -241,32 +225,20 @@ impl Experiment for Held {
     const NAME: &'static str = "held";
     const TITLE: &'static str = "late frames at 30 Hz and 1280 x 720 on this adapter, alone and beside busy threads";
     const ALONE: bool = true;
-    const COLUMNS: &'static str = "\
-        scene, policy, busy.0, round.0, late*100.1 as late_%, work_ms.1, work95_ms.1, empty_ms.1, \
-        spread95.2, error95.2, triangles.0, scale.2, value.3";
+    const TABLE: fn(&[Row]) -> Table = table!(|r| scene: r.case.scene, policy: r.case.policy, busy: r.case.busy,
+        round: r.case.round, "late_%"(1): 100.0 * r.late, work_ms(1): r.work_ms, work95_ms(1): r.work95_ms,
+        empty_ms(1): r.empty_ms, spread95(2): r.spread95, error95(2): r.error95, triangles: r.triangles,
+        scale(2): r.scale, value(3): r.value, error(2): r.error());
 
     fn cases(quick: bool) -> Vec<Case> {
         let scenes = if quick { &SCENES[..1] } else { &SCENES[..] };
-        let mut cases = Vec::new();
-        for round in 0..ROUNDS[usize::from(quick)] {
-            for scene in scenes {
-                for busy in BUSY {
-                    cases.extend(POLICIES.map(|policy| Case {
-                        scene: (*scene).to_owned(),
-                        policy: policy.name().to_owned(),
-                        busy,
-                        round,
-                        quick,
-                    }));
-                }
-            }
-        }
-        cases
+        let policies = POLICIES.map(|policy| Named(policy.name(), policy));
+        each!(round in 0..ROUNDS[usize::from(quick)], &scene in scenes, busy in BUSY, policy in policies =>
+            Case { scene, policy, busy, round, quick })
     }
 
-    fn measure(case: &Case) -> Row {
-        let found = Found::measured(case).unwrap_or_else(|why| Found::blank(why.to_string()));
-        Row { case: case.clone(), found }
+    fn measure(case: &Case) -> Option<Found> {
+        Some(Found::measured(case).unwrap_or_else(|why| Found { said: why.to_string(), ..blank() }))
     }
 
     fn figure(rows: &[Row]) -> Figure {
@@ -288,10 +260,6 @@ impl Experiment for Held {
         Figure::new(format!("{} ({adapter})", Self::TITLE), 2, BUSY.map(panel).to_vec())
     }
 
-    fn table(rows: &[Row]) -> Table {
-        Table::of(rows, Self::COLUMNS).with("error", 2, rows.iter().map(|row| row.error()))
-    }
-
     fn findings(rows: &[Row]) -> Vec<Finding> {
         let period_ms = 1e3 / TARGET_HZ;
         let of = |policy: Policy, busy: usize, value: &dyn Fn(&Row) -> f64| {
@@ -303,22 +271,11 @@ impl Experiment for Held {
         let more = late(Policy::Adaptive).into_iter().zip(late(Policy::Feedback)).map(|(a, b)| a - b);
         let over = of(Policy::Adaptive, BUSY[1], &|row| row.work_ms / row.empty_ms.max(period_ms));
         let errors = of(Policy::Adaptive, 0, &|row| row.error());
-        let mut findings = vec![
-            Finding::at_most(
-                "adaptive, once settled: share of late frames in any scene",
-                known(late(Policy::Adaptive)),
-                LATE,
-            ),
-            Finding::at_most(
-                "adaptive: more late frames than feedback in any scene",
-                worst(more.filter(|x| !x.is_nan())),
-                LATE,
-            ),
-            Finding::at_most(
-                "beside two busy threads: work of a frame over its target, or over an empty picture if that takes longer",
-                known(over),
-                OVER,
-            ),
+        let mut findings = claims![
+            "adaptive, once settled: share of late frames in any scene" => known(late(Policy::Adaptive)), at_most LATE;
+            "adaptive: more late frames than feedback in any scene" => worst(more.filter(|x| !x.is_nan())), at_most LATE;
+            "beside two busy threads: work of a frame over its target, or over an empty picture if that takes longer" =>
+                known(over), at_most OVER;
         ];
         findings.extend(SCENES.iter().zip(errors).map(|(scene, error)| predicts(scene, error)));
         findings.into_iter().map(|finding| finding.unfinished(rows.len())).collect()
@@ -334,7 +291,7 @@ impl Found {
 
 impl Case {
     fn matches(&self, scene: &str, policy: Policy, busy: usize) -> bool {
-        (self.scene.as_str(), self.policy.as_str(), self.busy) == (scene, policy.name(), busy)
+        (self.scene, self.policy.1, self.busy) == (scene, policy, busy)
     }
 }
 
@@ -350,15 +307,8 @@ mod tests {
     #[test]
     fn rounds_are_medians_and_a_scene_that_was_not_played_neither_holds_nor_fails() {
         let row = |policy: Policy, busy, round, late| Row {
-            case: Case { scene: "tube".to_owned(), policy: policy.name().to_owned(), busy, round, quick: false },
-            found: Found {
-                late,
-                work_ms: 40.0,
-                empty_ms: 20.0,
-                spread95: 0.2,
-                error95: 0.18,
-                ..Found::blank(String::new())
-            },
+            case: Case { scene: "tube", policy: Named(policy.name(), policy), busy, round, quick: false },
+            found: Found { late, work_ms: 40.0, empty_ms: 20.0, spread95: 0.2, error95: 0.18, ..blank() },
         };
         let rows: Vec<_> = [0.0, 0.5, 0.01]
             .into_iter()

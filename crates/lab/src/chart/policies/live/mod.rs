@@ -10,7 +10,7 @@ pub(in super::super) mod traversal;
 
 use super::numeric::metrics::Row;
 use super::played::{Case, PLAYS, Times, curves};
-use crate::chart::{Experiment, Figure, Finding, Table, worst};
+use crate::chart::{Experiment, Figure, Finding, Table, claims, worst_of};
 use rounds::{median_of, summary, verdict};
 
 /// The experiment on play number `P`.
@@ -35,13 +35,14 @@ impl<const P: usize> Experiment for Live<P> {
     const NAME: &'static str = PLAYS[P].paper.name();
     const TITLE: &'static str = "the papers' scene on this adapter: frame-time control and similarity to full detail";
     const ALONE: bool = true;
+    const TABLE: fn(&[Row]) -> Table = summary;
 
     fn cases(quick: bool) -> Vec<Case> {
         let rounds = 0..ROUNDS[usize::from(quick)];
         rounds.flat_map(|round| PLAYS[P].cases(quick, round)).filter(|c| c.round == 0 || c.policy != "full").collect()
     }
 
-    fn measure(case: &Case) -> Row {
+    fn measure(case: &Case) -> Option<Row> {
         case.play(Times::Measured)
     }
 
@@ -54,18 +55,14 @@ impl<const P: usize> Experiment for Live<P> {
         Figure::new(title, 2, KINDS.map(panel).to_vec())
     }
 
-    fn table(rows: &[Row]) -> Table {
-        summary(rows)
-    }
-
     fn findings(rows: &[Row]) -> Vec<Finding> {
         let of = |what: fn(&Row) -> f64| median_of(rows, "adaptive", what);
-        let holes = worst(rows.iter().filter(|row| row.policy == "adaptive").map(|row| row.holes));
+        let holes = worst_of(rows, |row| row.policy == "adaptive", |row| row.holes);
         let mut findings = verdict(Self::NAME, rows);
-        findings.extend([
-            Finding::at_most("adaptive: longest frame / T", of(|row| row.max), 1.3),
-            Finding::at_most("adaptive: stddev / T of binding frames", of(|row| row.binding_stddev), 0.08),
-            Finding::at_most("adaptive: objects left out per object and frame", holes, 0.0),
+        findings.extend(claims![
+            "adaptive: longest frame / T" => of(|row| row.max), at_most 1.3;
+            "adaptive: stddev / T of binding frames" => of(|row| row.binding_stddev), at_most 0.08;
+            "adaptive: objects left out per object and frame" => holes, at_most 0.0;
         ]);
         findings
     }

@@ -6,10 +6,11 @@
 
 use super::super::played::walk;
 use super::super::played::walk::{PathPoint, Predicted};
-use crate::chart::policies::numeric::machine::RandomSource;
-use crate::chart::policies::numeric::metrics::within;
-use crate::chart::{Axis, Colour, Experiment, Figure, Finding, Layer, Panel, Record, span, worst};
-use csv::StringRecord;
+use crate::chart::policies::numeric::{RandomSource, within};
+use crate::chart::{
+    Axis, Colour, Experiment, Figure, Finding, Layer, Measured, Named, Panel, Table, claims, each, span, table,
+    worst_of,
+};
 use metachron_lod::control::Policy;
 use metachron_scene::papers::Paper;
 use serde::{Deserialize, Serialize};
@@ -24,24 +25,23 @@ const TARGETS_S: (f64, f64) = (4e-3, 0.3);
 /// How often each picture is drawn.
 const TIMES: usize = 5;
 /// Prices by two stages and by areas, each with a policy that predicts by them and learns nothing.
-const PRICES: [(&str, Policy); 2] = [("lines", Policy::MarginalFill), ("areas", Policy::RobinHood)];
+const PRICES: [Named<Policy>; 2] = [Named("lines", Policy::MarginalFill), Named("areas", Policy::RobinHood)];
 /// Bound of the prediction error for 19 of 20 pictures (FS93, §4).
 const WANTED: f64 = 0.1;
 const SEED: u64 = 3;
 
 /// A scene, the prices that predict it, and the number of pictures.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, Serialize)]
 pub(in super::super::super) struct Case {
-    scene: String,
-    prices: String,
+    scene: Named<Paper>,
+    prices: Named<Policy>,
+    #[serde(skip)]
     pictures: usize,
 }
 
 /// Measured and predicted times of a scene's pictures.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub(in super::super::super) struct Row {
-    scene: String,
-    prices: String,
+pub(in super::super::super) struct Found {
     adapter: String,
     pictures: usize,
     /// |predicted − measured| over measured, for the first drawing of each picture: the mean, and the bound that 19 of 20 keep.
@@ -56,20 +56,10 @@ pub(in super::super::super) struct Row {
     pairs: String,
 }
 
-impl Record for Row {
-    type Case = Case;
+type Row = Measured<Case, Found>;
 
-    fn case(&self) -> Case {
-        Case { scene: self.scene.clone(), prices: self.prices.clone(), pictures: self.pictures }
-    }
-
-    fn read(names: &StringRecord, line: &StringRecord) -> csv::Result<Self> {
-        line.deserialize(Some(names))
-    }
-}
-
-impl Row {
-    fn of(case: &Case, adapter: String, pictures: &[Predicted]) -> Self {
+impl Found {
+    fn of(adapter: String, pictures: &[Predicted]) -> Self {
         let pairs: Vec<_> = pictures.iter().filter_map(|p| Some((p.predicted_ms, *p.measured_ms.first()?))).collect();
         let factor = within(&pairs.iter().map(|(predicted, measured)| measured / predicted).collect::<Vec<_>>(), 0.5);
         let errors = |by: f64| {
@@ -77,10 +67,8 @@ impl Row {
         };
         let plain = errors(1.0);
         Self {
-            scene: case.scene.clone(),
-            prices: case.prices.clone(),
             adapter,
-            pictures: case.pictures,
+            pictures: pictures.len(),
             error: plain.iter().sum::<f64>() / plain.len() as f64,
             error95: within(&plain, 0.95),
             scaled_error95: within(&errors(factor), 0.95),
@@ -114,54 +102,47 @@ impl Experiment for Prediction {
     const NAME: &'static str = "prediction";
     const TITLE: &'static str = "predicted and measured drawing times, by the adapter's cost model";
     const ALONE: bool = true;
-    const COLUMNS: &'static str =
-        "scene, prices, pictures.0, error.3, error95.3, factor.3, scaled_error95.3 as scaled95, scatter95.3";
+    const TABLE: fn(&[Row]) -> Table = table!(|r| scene: r.case.scene, prices: r.case.prices, pictures: r.pictures,
+        error(3): r.error, error95(3): r.error95, factor(3): r.factor, scaled95(3): r.scaled_error95,
+        scatter95(3): r.scatter95);
 
     fn cases(quick: bool) -> Vec<Case> {
-        let pictures = PICTURES[usize::from(quick)];
-        let case = |paper: Paper| {
-            let scene = paper.name().to_owned();
-            PRICES.map(|(prices, _)| Case { scene: scene.clone(), prices: prices.to_owned(), pictures })
-        };
-        Paper::ALL.into_iter().flat_map(case).collect()
+        let named = |paper: Paper| Named(paper.name(), paper);
+        each!(scene in Paper::ALL.map(named), prices in PRICES => Case { scene, prices, pictures: PICTURES[usize::from(quick)] })
     }
 
-    fn measure(case: &Case) -> Row {
+    fn measure(case: &Case) -> Option<Found> {
         let mut noise = RandomSource::new(SEED);
         let (low, high) = TARGETS_S;
         let mut point = || PathPoint { part: noise.uniform(), target_s: low * libm::pow(high / low, noise.uniform()) };
         let asked: Vec<_> = (0..case.pictures).map(|_| point()).collect();
-        let paper = Paper::ALL.into_iter().find(|paper| paper.name() == case.scene);
-        let policy = PRICES.into_iter().find(|(name, _)| *name == case.prices).map(|(_, policy)| policy);
-        let predicted = paper.zip(policy).and_then(|(paper, by)| walk::predicted(paper, by, &asked, TIMES).ok());
-        let (adapter, pictures) = predicted.unwrap_or_default();
-        Row::of(case, adapter, &pictures)
+        let (adapter, pictures) = walk::predicted(case.scene.1, case.prices.1, &asked, TIMES).ok()?;
+        Some(Found::of(adapter, &pictures))
     }
 
     fn figure(rows: &[Row]) -> Figure {
         let adapter = rows.first().map_or("", |row| &row.adapter);
         let (low, high) =
-            span(rows.iter().flat_map(Row::pairs).flat_map(|(predicted, measured)| [predicted, measured]), true);
+            span(rows.iter().flat_map(|row| row.pairs()).flat_map(|(predicted, measured)| [predicted, measured]), true);
         let grey = |label: &str, by: f64| Layer::dashed(label, Colour::Grey, [low, high].map(|ms| (ms, by * ms)));
-        let panel = |prices: &str| {
+        let panel = |prices: Named<Policy>| {
             let mut layers = vec![grey("exact, and 10 % off", 1.0), grey("", 1.0 - WANTED), grey("", 1.0 + WANTED)];
-            let here = rows.iter().filter(|row| row.prices == prices).zip(Colour::LINES.into_iter().cycle());
-            layers.extend(here.map(|(row, colour)| Layer::dots(&row.scene, colour, row.pairs())));
+            let here = rows.iter().filter(|row| row.case.prices == prices).zip(Colour::LINES.into_iter().cycle());
+            layers.extend(here.map(|(row, colour)| Layer::dots(row.case.scene.0, colour, row.pairs())));
             let (x, y) = (Axis::log("predicted, ms", low, high), Axis::log("measured, ms", low, high));
-            Panel::new(format!("cost model: {prices}"), x, y, layers)
+            Panel::new(format!("cost model: {}", prices.0), x, y, layers)
         };
         let title = format!("Predicted and measured on {adapter} (FS93, fig. 3)");
-        Figure::new(title, 2, PRICES.map(|(prices, _)| panel(prices)).to_vec())
+        Figure::new(title, 2, PRICES.map(panel).to_vec())
     }
 
     fn findings(rows: &[Row]) -> Vec<Finding> {
-        let by_areas = || rows.iter().filter(|row| row.prices == "areas");
-        let all = |of: fn(&Row) -> f64| worst(by_areas().map(of));
-        Finding::all_at_most([
-            ("19 of 20 pictures of every scene: error of the prediction", all(|r| r.error95), WANTED),
-            ("the same with one factor per scene", all(|r| r.scaled_error95), WANTED),
-            ("19 of 20 drawings of the same picture: scatter", all(|r| r.scatter95), WANTED),
-        ])
+        let all = |what: fn(&Row) -> f64| worst_of(rows, |row| row.case.prices.0 == "areas", what);
+        claims![
+            "19 of 20 pictures of every scene: error of the prediction" => all(|r| r.error95), at_most WANTED;
+            "the same with one factor per scene" => all(|r| r.scaled_error95), at_most WANTED;
+            "19 of 20 drawings of the same picture: scatter" => all(|r| r.scatter95), at_most WANTED;
+        ]
     }
 }
 
@@ -171,13 +152,12 @@ mod tests {
 
     #[test]
     fn a_uniformly_slower_machine_is_distinguished_from_prediction_errors() {
-        let case = Case { scene: String::new(), prices: String::new(), pictures: 40 };
         let measured = |k: u32| f64::from(k) * if k == 7 { 2.0 } else { 1.5 };
         let picture = |k: u32| Predicted {
             predicted_ms: f64::from(k),
             measured_ms: vec![measured(k), 0.98 * measured(k), 1.01 * measured(k)],
         };
-        let row = Row::of(&case, String::new(), &(1..=40).map(picture).collect::<Vec<_>>());
+        let row = Found::of(String::new(), &(1..=40).map(picture).collect::<Vec<_>>());
         assert!((row.error95 - 1.0 / 3.0).abs() < 1e-12 && (row.factor - 1.5).abs() < 1e-12);
         assert!(row.scaled_error95 < 1e-12, "one of forty is past the 95th of a hundred");
         assert!((row.scatter95 - 0.02).abs() < 1e-12 && row.pairs().len() == 40);

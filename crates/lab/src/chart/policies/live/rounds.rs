@@ -2,8 +2,8 @@
 //!
 //! In: the rows of one scene, round by round. Out: a table of policies, findings. Never here: how a row is measured.
 
-use crate::chart::policies::numeric::metrics::{Row, error_over_allowed, predicts, within};
-use crate::chart::{Cell, Finding, Table};
+use crate::chart::policies::numeric::{Row, error_over_allowed, predicts, within};
+use crate::chart::{Finding, Table, table};
 use metachron_lod::control::Policy;
 
 /// A number of a policy over the rounds.
@@ -100,33 +100,20 @@ fn worst_of(claim: String, differences: impl Iterator<Item = Difference>, none: 
 
 /// One line for each policy: medians over the rounds, and half of the range of its late frames.
 pub(super) fn summary(rows: &[Row]) -> Table {
-    let played = |policy: &str| rows.iter().filter(|row| row.policy == policy).count();
-    let line = |policy: &str| {
-        let of = |what: fn(&Row) -> f64, digits| Cell::Number(median_of(rows, policy, what), digits);
-        let late = OverRounds::of(rows, policy, |row| row.misses);
-        vec![
-            ("scene", (&rows[0].setting).into()),
-            ("policy", policy.into()),
-            ("rounds", (played(policy) as f64, 0).into()),
-            ("T_ms", of(|row| row.target_ms, 2)),
-            ("frames", of(|row| row.frames as f64, 0)),
-            ("mean", of(|row| row.mean, 3)),
-            ("p95", of(|row| row.p95, 3)),
-            ("max", of(|row| row.max, 2)),
-            ("late_%", (100.0 * late.median, 1).into()),
-            ("spread_%", (100.0 * late.spread, 1).into()),
-            ("value", of(|row| row.value_over_bound, 4)),
-            ("error95", of(|row| row.model_error95, 3)),
-            ("spread95", of(|row| row.spread95, 3)),
-            ("error", of(error, 2)),
-            ("reversals", of(|row| row.reversals, 5)),
-            ("triangles", of(|row| row.polygons, 0)),
-            ("ssim", of(|row| row.ssim, 4)),
-            ("ssim_least", of(|row| row.ssim_least, 4)),
-            ("holes", of(|row| row.holes, 4)),
-        ]
-    };
-    Table::named(Policy::ALL.iter().map(|policy| policy.name()).filter(|policy| played(policy) > 0).map(line))
+    let policies = Policy::ALL.into_iter().map(Policy::name);
+    let played = policies.map(|policy| (policy, rows.iter().filter(|row| row.policy == policy).collect::<Vec<_>>()));
+    let played = played.filter(|(_, rounds)| !rounds.is_empty());
+    let median = |policy: &str, what: fn(&Row) -> f64| median_of(rows, policy, what);
+    let late = |policy: &str| OverRounds::of(rows, policy, |row| row.misses);
+    table!(played, |(policy, rounds)| scene: rounds[0].setting, policy: policy, rounds: rounds.len(),
+        T_ms(2): median(policy, |row| row.target_ms), frames: median(policy, |row| row.frames as f64),
+        mean(3): median(policy, |row| row.mean), p95(3): median(policy, |row| row.p95),
+        max(2): median(policy, |row| row.max), "late_%"(1): 100.0 * late(policy).median,
+        "spread_%"(1): 100.0 * late(policy).spread, value(4): median(policy, |row| row.value_over_bound),
+        error95(3): median(policy, |row| row.model_error95), spread95(3): median(policy, |row| row.spread95),
+        error(2): median(policy, error), reversals(5): median(policy, |row| row.reversals),
+        triangles: median(policy, |row| row.polygons), ssim(4): median(policy, |row| row.ssim),
+        ssim_least(4): median(policy, |row| row.ssim_least), holes(4): median(policy, |row| row.holes))
 }
 
 #[cfg(test)]

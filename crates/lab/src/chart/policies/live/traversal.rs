@@ -3,7 +3,7 @@
 //!
 //! In: a mesh of 100,000 triangles. Out: triangles per second at each resolution. Never here: drawing.
 
-use crate::chart::{Axis, Colour, Experiment, Figure, Finding, Layer, Measured, Panel, span, worst};
+use crate::chart::{Axis, Colour, Experiment, Figure, Finding, Layer, Measured, Panel, Table, claims, table, worst};
 use metachron_drawable::{Generator, ProgressiveMesh, generate};
 use serde::{Deserialize, Serialize};
 use std::sync::OnceLock;
@@ -19,7 +19,7 @@ const HALVINGS: u32 = 10;
 const ROUNDS: usize = 15;
 
 /// Triangles of a cut.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Serialize)]
 pub(in super::super::super) struct Case {
     asked: u32,
 }
@@ -46,35 +46,30 @@ impl Experiment for Traversal {
     const NAME: &'static str = "traversal";
     const TITLE: &'static str = "traversal speed of a cut's triangles, by resolution";
     const ALONE: bool = true;
-    const COLUMNS: &'static str = "triangles.0, micros.2, rate.1 as million_a_second";
+    const TABLE: fn(&[Row]) -> Table = table!(|r| triangles: r.triangles, micros(2): r.micros,
+        million_a_second(1): r.rate);
 
     fn cases(_: bool) -> Vec<Case> {
         (0..=HALVINGS).rev().map(|k| Case { asked: TRIANGLES >> k }).collect()
     }
 
-    fn measure(case: &Case) -> Row {
+    fn measure(case: &Case) -> Option<Found> {
+        let mesh = mesh()?;
         let (mut corners, mut least, mut triangles) = (Vec::new(), f64::INFINITY, 0);
         for _ in 0..ROUNDS {
-            let Some(tom) = mesh() else { break };
             corners.clear();
             let started = Instant::now();
-            let cut = tom.cut(case.asked);
-            tom.resolve(cut, &mut corners);
+            let cut = mesh.cut(case.asked);
+            mesh.resolve(cut, &mut corners);
             least = least.min(started.elapsed().as_secs_f64());
             triangles = cut.triangles;
         }
-        let found = Found { triangles, micros: 1e6 * least, rate: 1e-6 * f64::from(triangles) / least };
-        Row { case: case.clone(), found }
+        Some(Found { triangles, micros: 1e6 * least, rate: 1e-6 * f64::from(triangles) / least })
     }
 
     fn figure(rows: &[Row]) -> Figure {
-        let line: Vec<_> = rows.iter().map(|r| (f64::from(r.triangles) / f64::from(TRIANGLES), r.rate)).collect();
-        let (low, high) = span(line.iter().map(|p| p.0), true);
-        let (least, most) = span(line.iter().map(|p| p.1), true);
-        let (x, y) = (
-            Axis::log("triangles of the cut / all", low, high),
-            Axis::log("millions of triangles per second", least, most),
-        );
+        let line = rows.iter().map(|r| (f64::from(r.triangles) / f64::from(TRIANGLES), r.rate));
+        let (x, y) = (Axis::log_fit("triangles of the cut / all"), Axis::log_fit("millions of triangles per second"));
         let panel = Panel::new("the whole mesh, at 1, is a plain list", x, y, [Layer::line("", Colour::Blue, line)]);
         Figure::new("Traversal of a mesh of 100,000 triangles (GB99)", 1, vec![panel])
     }
@@ -83,6 +78,6 @@ impl Experiment for Traversal {
         // in the full mesh no vertex is replaced by a substitute
         let cuts = || rows.iter().filter(|row| row.case.asked < TRIANGLES).map(|row| row.rate);
         let spread = worst(cuts()) / cuts().reduce(f64::min).unwrap_or(f64::NAN);
-        vec![Finding::at_most("triangles per second, fastest over slowest cut, without the full mesh", spread, 4.0)]
+        claims!["triangles per second, fastest over slowest cut, without the full mesh" => spread, at_most 4.0]
     }
 }

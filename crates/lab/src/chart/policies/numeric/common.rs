@@ -3,63 +3,62 @@
 use super::chooser::Policy;
 use super::closed_loop::Show;
 use super::metrics::Row;
-use crate::chart::{Axis, Colour, Layer, Panel, Record};
-use csv::StringRecord;
+use crate::chart::{Axis, Colour, Layer, Panel, Record, Table, number_of, table};
+use serde::Serialize;
 
 /// Polygons of each of an object's five levels, as fractions of the polygons at full detail.
 pub(crate) const LEVEL_PARTS: [f64; 5] = [0.02, 0.06, 0.18, 0.45, 1.0];
 
 /// A setting or scene, and a policy, in one of some equal rounds.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, Serialize)]
 pub(crate) struct Case {
     pub(crate) setting: String,
-    pub(crate) policy: String,
+    pub(crate) policy: &'static str,
     /// Frames of all runs together, each run with a machine of another seed.
+    #[serde(rename = "asked")]
     pub(crate) frames: usize,
     pub(crate) round: usize,
 }
 
 impl Case {
-    /// A case of some runs.
-    pub(crate) fn new(setting: &str, policy: Policy, seeds: usize, frames: usize) -> Self {
-        Self { setting: setting.to_owned(), policy: policy.name().to_owned(), frames: seeds * frames, round: 0 }
+    /// A case of the first round.
+    pub(crate) fn new(setting: &str, policy: &'static str, frames: usize) -> Self {
+        Self { setting: setting.to_owned(), policy, frames, round: 0 }
     }
 
-    /// The policy of `policies` that the case names; the last one where it names none of them.
-    pub(crate) fn policy_of(&self, policies: &[Policy]) -> Policy {
-        let named = policies.iter().find(|p| p.name() == self.policy);
-        *named.or(policies.last()).unwrap_or(&Policy::Full)
+    /// The policy of `policies` that the case names.
+    pub(crate) fn policy_of(&self, policies: &[Policy]) -> Option<Policy> {
+        policies.iter().copied().find(|policy| policy.name() == self.policy)
     }
 
     /// Plays the show once per seed; returns the row of all frames.
-    pub(crate) fn measure(&self, show: &Show, policies: &[Policy]) -> Row {
-        let (policy, seeds) = (self.policy_of(policies), self.frames / show.frames.max(1));
+    pub(crate) fn measure(&self, show: &Show, policies: &[Policy]) -> Option<Row> {
+        let (policy, seeds) = (self.policy_of(policies)?, self.frames / show.frames.max(1));
         let runs: Vec<_> = (1..=seeds as u64).map(|seed| show.play(policy, seed)).collect();
-        Row::of(&self.setting, &self.policy, &runs)
+        Some(Row::of(&self.setting, self.policy, &runs))
     }
 }
 
 impl Record for Row {
     type Case = Case;
+    type Found = Self;
 
-    fn case(&self) -> Case {
-        Case { setting: self.setting.clone(), policy: self.policy.clone(), frames: self.asked, round: self.round }
-    }
-
-    fn read(names: &StringRecord, line: &StringRecord) -> csv::Result<Self> {
-        line.deserialize(Some(names))
+    fn of(_: &Case, found: Self) -> Self {
+        found
     }
 }
 
 /// The columns in which policies differ.
-pub(crate) const COLUMNS: &str = "\
-    setting, policy, mean.3, max.3, stddev.4, binding.2, binding_stddev.4 as b_stddev, avg_err.4, \
-    misses.4 as miss, model_error.4 as model, value_over_bound.4 as value, certified.3 as proven, \
-    changes.4, reversals.5, holes.4";
+pub(crate) fn table(rows: &[Row]) -> Table {
+    table!(rows, |r| setting: r.setting, policy: r.policy, mean(3): r.mean, max(3): r.max, stddev(4): r.stddev,
+        binding(2): r.binding, b_stddev(4): r.binding_stddev, avg_err(4): r.avg_err, miss(4): r.misses,
+        model(4): r.model_error, value(4): r.value_over_bound, proven(3): r.certified, changes(4): r.changes,
+        reversals(5): r.reversals, holes(4): r.holes)
+}
 
 /// A number of the row of a setting and a policy; NaN where there is no such row.
 pub(crate) fn number(rows: &[Row], setting: &str, policy: &str, of: fn(&Row) -> f64) -> f64 {
-    rows.iter().find(|r| r.setting == setting && r.policy == policy).map_or(f64::NAN, of)
+    number_of(rows, |r| r.setting == setting && r.policy == policy, of)
 }
 
 /// The time of every frame under some policies, next to the target.

@@ -3,7 +3,7 @@
 //! In: frames. Out: a row of numbers. Never here: policies. The definitions are those of a run's report.
 
 use super::closed_loop::Frame;
-use crate::chart::experiment::{Finding, worst};
+use crate::chart::{Finding, blank, worst};
 use metachron_session::report::{BINDING, MISS, SETTLE_BAND, SETTLE_HOLD, SETTLE_MEDIAN};
 use serde::{Deserialize, Serialize};
 
@@ -93,11 +93,8 @@ impl Row {
         Self {
             setting: setting.to_owned(),
             policy: policy.to_owned(),
-            adapter: String::new(),
             frames: frames.len(),
             asked: frames.len(),
-            round: 0,
-            target_ms: f64::NAN,
             mean: mean(&all),
             min: within(&all, 0.0),
             max: within(&all, 1.0),
@@ -115,20 +112,14 @@ impl Row {
             overshoot: worst(runs.iter().map(|run| overshoot(run, steepest(run)))),
             model_error: mean(&errors),
             model_error95: within(&errors, 0.95),
-            spread95: f64::NAN,
             changes: each(|f| f.changes),
             reversals: each(|f| f.reversals),
             holes: each(|f| f.holes),
             value_over_bound: mean(&known(|f| f.quality)),
             certified: part(gaps.iter().filter(|g| **g <= CERTIFIED).count(), gaps.len()),
-            settled: f64::NAN,
             polygons: mean(&known(|f| f.polygons)),
             choosing: mean(&known(|f| f.choosing)),
-            ssim: f64::NAN,
-            ssim_least: f64::NAN,
-            psnr_db: f64::NAN,
-            times: String::new(),
-            primitives: String::new(),
+            ..blank()
         }
     }
 }

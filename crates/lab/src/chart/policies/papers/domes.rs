@@ -1,9 +1,9 @@
 //! Domes of struts that turn, approach and recede, with or without a coarse ball for a group (MB97, §8).
 
-use crate::chart::policies::numeric::geodesic;
-use crate::chart::policies::numeric::geodesic::{DOMES, STRUTS};
-use crate::chart::policies::numeric::metrics::mean;
-use crate::chart::{Axis, Experiment, Figure, Finding, Measured, Panel, lines};
+use crate::chart::policies::numeric::{DOMES, STRUTS, geodesic, mean};
+use crate::chart::{
+    Axis, Experiment, Figure, Finding, Measured, Named, Panel, Table, claims, each, lines, number_of, table,
+};
 use metachron_lod::select::incremental::Keep;
 use metachron_lod::select::tree::{Node, Tree};
 use metachron_lod::select::{Entry, Level, Mode, Problem, funkhouser, mason, mason_flat, tree_exact};
@@ -38,18 +38,18 @@ enum Algorithm {
     Hull,
 }
 
-const POLICIES: [(&str, Algorithm); 4] = [
-    ("greedy with null", Algorithm::Flat),
-    ("hierarchical", Algorithm::Hierarchical),
-    ("hierarchical-flat", Algorithm::HierarchicalFlat),
-    ("hull of cuts", Algorithm::Hull),
+const POLICIES: [Named<Algorithm>; 4] = [
+    Named("greedy with null", Algorithm::Flat),
+    Named("hierarchical", Algorithm::Hierarchical),
+    Named("hierarchical-flat", Algorithm::HierarchicalFlat),
+    Named("hull of cuts", Algorithm::Hull),
 ];
 
 /// A limit and a policy.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Serialize)]
 pub(crate) struct Case {
     limit: i64,
-    policy: String,
+    policy: Named<Algorithm>,
     frames: usize,
 }
 
@@ -74,21 +74,20 @@ impl Experiment for Domes {
     const NAME: &'static str = "domes";
     const TITLE: &'static str =
         "eight domes of 120 struts at half, one and two times the nominal cost: groups or holes";
-    const COLUMNS: &'static str = "limit.0, policy, holes.4, error.4, balls.4, changes.4, spent.4";
+    const TABLE: fn(&[Row]) -> Table = table!(|r| limit: r.case.limit, policy: r.case.policy, holes(4): r.holes,
+        error(4): r.error, balls(4): r.balls, changes(4): r.changes, spent(4): r.spent);
 
     fn cases(quick: bool) -> Vec<Case> {
         let frames = if quick { QUICK_FRAMES } else { FRAMES };
-        let of = |limit| POLICIES.map(|(policy, _)| Case { limit, policy: policy.to_owned(), frames });
-        LIMITS.into_iter().flat_map(of).collect()
+        each!(limit in LIMITS, policy in POLICIES => Case { limit, policy, frames })
     }
 
-    fn measure(case: &Case) -> Row {
-        let algorithm = POLICIES.iter().find(|p| p.0 == case.policy).map_or(Algorithm::Flat, |p| p.1);
+    fn measure(case: &Case) -> Option<Found> {
         let (mut last, mut shown): (Vec<Level>, Vec<StrutForm>) = (Vec::new(), Vec::new());
         let mut sums: [Vec<f64>; 5] = Default::default();
         for frame in 0..case.frames {
             let pixels = geodesic::pixels(frame);
-            let (now, spent) = choose(algorithm, case.limit, &pixels, &mut last);
+            let (now, spent) = choose(case.policy.1, case.limit, &pixels, &mut last);
             let changed = now.iter().zip(&shown).filter(|(a, b)| a != b).count() as f64 / now.len() as f64;
             let count = |what: StrutForm| now.iter().filter(|s| **s == what).count() as f64 / now.len() as f64;
             let of_frame = [
@@ -102,17 +101,17 @@ impl Experiment for Domes {
             shown = now;
         }
         let [holes, error, changes, spent, balls] = sums.map(|s| mean(&s));
-        Row { case: case.clone(), found: Found { holes, error, changes, spent, balls } }
+        Some(Found { holes, error, changes, spent, balls })
     }
 
     fn figure(rows: &[Row]) -> Figure {
         let panel = |title: &str, label, of: fn(&Row) -> f64| {
             let points = |name| {
-                let here = rows.iter().filter(move |r| r.case.policy == name);
+                let here = rows.iter().filter(move |r| r.case.policy.0 == name);
                 here.map(move |r| (r.case.limit as f64, of(r)))
             };
             let x = Axis::log("limit of cost", 1500.0, 10_000.0);
-            Panel::new(title, x, Axis::linear(label, 0.0, 1.0), lines(POLICIES.map(|(name, _)| name), points))
+            Panel::new(title, x, Axis::linear(label, 0.0, 1.0), lines(POLICIES.map(|policy| policy.0), points))
         };
         let panels = vec![
             panel("holes", "fraction of struts not drawn", |r| r.holes),
@@ -123,18 +122,15 @@ impl Experiment for Domes {
 
     fn findings(rows: &[Row]) -> Vec<Finding> {
         let of = |limit: i64, policy: &str, what: fn(&Row) -> f64| {
-            rows.iter().find(|r| r.case.limit == limit && r.case.policy == policy).map_or(f64::NAN, what)
+            number_of(rows, |r| r.case.limit == limit && r.case.policy.0 == policy, what)
         };
-        let mut findings = Vec::new();
-        for limit in LIMITS {
-            let holes = of(limit, "hierarchical", |r| r.holes);
-            findings.push(Finding::at_most(format!("hierarchical at {limit}: holes"), holes, 0.0));
-        }
-        for limit in &LIMITS[..2] {
-            let ratio = of(*limit, "hierarchical", |r| r.error) / of(*limit, "greedy with null", |r| r.error);
-            findings.push(Finding::at_most(format!("image error at {limit}, hierarchical over flat: < 1"), ratio, 1.0));
-        }
-        findings
+        let holes =
+            |limit| claims!["hierarchical at {limit}: holes" => of(limit, "hierarchical", |r| r.holes), at_most 0.0];
+        let error = |limit| {
+            let ratio = of(limit, "hierarchical", |r| r.error) / of(limit, "greedy with null", |r| r.error);
+            claims!["image error at {limit}, hierarchical over flat: < 1" => ratio, at_most 1.0]
+        };
+        LIMITS.into_iter().flat_map(holes).chain(LIMITS[..2].iter().flat_map(|&limit| error(limit))).collect()
     }
 }
 

@@ -1,12 +1,7 @@
 //! Walks through the grove: how close to its target time every policy stays (RH05, tables 2 and 3).
 
-use crate::chart::policies::numeric::chooser::Policy;
-use crate::chart::policies::numeric::closed_loop::Show;
-use crate::chart::policies::numeric::common::{COLUMNS, Case, curves, number};
-use crate::chart::policies::numeric::forest;
-use crate::chart::policies::numeric::forest::{CameraPath, Forms};
-use crate::chart::policies::numeric::metrics::Row;
-use crate::chart::{Axis, Colour, Experiment, Figure, Finding, Layer, Panel, Table, span};
+use crate::chart::policies::numeric::{CameraPath, Case, Forms, Policy, Row, Show, common, curves, forest, number};
+use crate::chart::{Axis, Colour, Experiment, Figure, Finding, Layer, Panel, Shown, Table, claims, number_of, span};
 use metachron_lod::cost::value::Value;
 
 /// The experiment.
@@ -83,17 +78,21 @@ impl Experiment for Grove {
     type Row = Row;
     const NAME: &'static str = "grove";
     const TITLE: &'static str = "600 to 2000 trees, five targets, two paths, with levels and without";
+    const TABLE: fn(&[Row]) -> Table = |rows| {
+        let paper = |row: &Row| number_of(&SETTINGS, |s| s.name == row.setting, |s| s.paper);
+        common::table(rows).with("paper_avg_err", rows.iter().map(|row| paper(row).cell(4)))
+    };
 
     fn cases(quick: bool) -> Vec<Case> {
         let asked = |s: &&Setting| !quick || QUICK.contains(&s.name);
-        let of = |s: &Setting| s.policies().map(|policy| Case::new(s.name, policy, 1, s.frames(quick)));
+        let of = |s: &Setting| s.policies().map(|policy| Case::new(s.name, policy.name(), s.frames(quick)));
         SETTINGS.iter().filter(asked).flat_map(of).collect()
     }
 
-    fn measure(case: &Case) -> Row {
-        let setting = SETTINGS.iter().find(|s| s.name == case.setting).unwrap_or(&SETTINGS[0]);
+    fn measure(case: &Case) -> Option<Row> {
+        let setting = SETTINGS.iter().find(|s| s.name == case.setting)?;
         let policies = setting.policies();
-        case.measure(&setting.show(case.policy_of(&policies), case.frames), &policies)
+        case.measure(&setting.show(case.policy_of(&policies)?, case.frames), &policies)
     }
 
     fn figure(_: &[Row]) -> Figure {
@@ -116,30 +115,17 @@ impl Experiment for Grove {
         Figure::new("Fly-throughs of the grove (RH05, fig. 3, 6 and 7)", 2, panels)
     }
 
-    fn table(rows: &[Row]) -> Table {
-        Table::of(rows, COLUMNS).with("paper_avg_err", 4, rows.iter().map(paper_error))
-    }
-
     fn findings(rows: &[Row]) -> Vec<Finding> {
         let there = SETTINGS.iter().filter(|s| rows.iter().any(|r| r.setting == s.name));
-        let of = |s: &Setting, what: fn(&Row) -> f64| number(rows, s.name, "adaptive", what);
-        let claims = |s: &Setting| {
-            [
-                Finding::at_most(format!("adaptive, {}: AvgErr", s.name), of(s, |r| r.avg_err), s.limit),
-                Finding::at_least(
-                    format!("adaptive, {}: benefit over the bound", s.name),
-                    of(s, |r| r.value_over_bound),
-                    VALUE_WANTED,
-                ),
+        let claims = |Setting { name, limit, .. }: &Setting| {
+            let of = |what: fn(&Row) -> f64| number(rows, name, "adaptive", what);
+            claims![
+                "adaptive, {name}: AvgErr" => of(|r| r.avg_err), at_most *limit;
+                "adaptive, {name}: benefit over the bound" => of(|r| r.value_over_bound), at_least VALUE_WANTED;
             ]
         };
         there.flat_map(claims).collect()
     }
-}
-
-/// The paper's mean |t − T|/T of a row's walk.
-fn paper_error(row: &Row) -> f64 {
-    SETTINGS.iter().find(|s| s.name == row.setting).map_or(f64::NAN, |s| s.paper)
 }
 
 /// Triangles, lines and points of every frame (RH05, fig. 6).

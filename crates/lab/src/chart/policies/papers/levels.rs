@@ -3,10 +3,10 @@
 //! In: nothing. Out: a row for each setting and policy, all against full detail of the same trees, in lockstep on the declared machine.
 //! Never here: how frames are played ([`crate::chart::policies::played`]). Without an adapter everything but the likeness of pictures is measured.
 
-use crate::chart::policies::numeric::common::number;
-use crate::chart::policies::numeric::metrics::Row;
-use crate::chart::policies::played::{COLUMNS, Case, Shown, Times, curves, walk};
-use crate::chart::{Experiment, Figure, Finding};
+use crate::chart::policies::numeric::{Row, number};
+use crate::chart::policies::played;
+use crate::chart::policies::played::{Case, Shown, Times, curves, walk};
+use crate::chart::{Experiment, Figure, Finding, Table, claims, each};
 use metachron_lod::control::Policy;
 use std::fmt::Write;
 
@@ -71,24 +71,16 @@ impl Experiment for Levels {
     type Row = Row;
     const NAME: &'static str = "levels";
     const TITLE: &'static str = "impostors for whole woods: benefit of levels of groups";
-    const COLUMNS: &'static str = COLUMNS;
+    const TABLE: fn(&[Row]) -> Table = played::table;
 
     fn cases(quick: bool) -> Vec<Case> {
         let frames = FRAMES[usize::from(quick)];
-        let case = |setting: &str, policy: Policy| Case {
-            setting: setting.to_owned(),
-            policy: policy.name().to_owned(),
-            frames,
-            round: 0,
-        };
-        settings().flat_map(|(scene, ..)| POLICIES.map(|policy| case(&scene, policy))).collect()
+        each!((setting, ..) in settings(), policy in POLICIES => Case::new(&setting, policy.name(), frames))
     }
 
-    fn measure(case: &Case) -> Row {
-        let Some((_, levels, times_over)) = settings().find(|setting| setting.0 == case.setting) else {
-            return Row::of(&case.setting, &case.policy, &[]);
-        };
-        walk::measure(&Shown { name: "woods", text: &text(levels), times_over }, case, Times::Declared)
+    fn measure(case: &Case) -> Option<Row> {
+        let (_, levels, times_over) = settings().find(|setting| setting.0 == case.setting)?;
+        Some(walk::measure(&Shown { name: "woods", text: &text(levels), times_over }, case, Times::Declared))
     }
 
     fn figure(rows: &[Row]) -> Figure {
@@ -103,23 +95,18 @@ impl Experiment for Levels {
     }
 
     fn findings(rows: &[Row]) -> Vec<Finding> {
-        let of = |levels: usize, over: f64, what: fn(&Row) -> f64| {
-            number(rows, &setting(LEVELS[levels].0, over), "adaptive", what)
-        };
-        let claims = TIMES_OVER.into_iter().flat_map(|over| {
-            let claim = |words: &str| format!("adaptive, four levels, full detail / {over:.0}: {words}");
-            let single = f64::max(of(1, over, |row| row.ssim), of(2, over, |row| row.ssim));
-            [
-                Finding::at_most(claim("frames past 1.05 T"), of(3, over, |row| row.misses), 0.01),
-                Finding::at_most(claim("objects left out"), of(3, over, |row| row.holes), 0.0),
-                Finding::at_least(
-                    claim("SSIM minus the better single level's"),
-                    of(3, over, |row| row.ssim) - single,
-                    -0.01,
-                ),
+        let claims = |over: f64| {
+            let of =
+                |levels: usize, what: fn(&Row) -> f64| number(rows, &setting(LEVELS[levels].0, over), "adaptive", what);
+            let single = f64::max(of(1, |row| row.ssim), of(2, |row| row.ssim));
+            claims![
+                "adaptive, four levels, full detail / {over:.0}: frames past 1.05 T" => of(3, |row| row.misses), at_most 0.01;
+                "adaptive, four levels, full detail / {over:.0}: objects left out" => of(3, |row| row.holes), at_most 0.0;
+                "adaptive, four levels, full detail / {over:.0}: SSIM minus the better single level's" =>
+                    of(3, |row| row.ssim) - single, at_least -0.01;
             ]
-        });
-        claims.collect()
+        };
+        TIMES_OVER.into_iter().flat_map(claims).collect()
     }
 }
 

@@ -1,14 +1,10 @@
 //! A textured room in which the shading is chosen as well (FS93, fig. 11): levels with flat, Gouraud and textured shading.
 
-use crate::chart::policies::numeric::camera::{Path, key};
-use crate::chart::policies::numeric::chooser::Policy;
-use crate::chart::policies::numeric::closed_loop::Show;
-use crate::chart::policies::numeric::common;
-use crate::chart::policies::numeric::common::{Case, curves};
-use crate::chart::policies::numeric::machine::{Fault, RandomSource};
-use crate::chart::policies::numeric::metrics::Row;
-use crate::chart::policies::numeric::scene::{BenefitModel, ObjectLevel, Scene, SceneObject};
-use crate::chart::{Axis, Colour, Experiment, Figure, Finding, Layer, Panel, Table};
+use crate::chart::policies::numeric::{
+    BenefitModel, Case, Fault, ObjectLevel, Path, Policy, RandomSource, Row, Scene, SceneObject, Show, curves, key,
+    number,
+};
+use crate::chart::{Axis, Colour, Experiment, Figure, Finding, Layer, Panel, Table, claims, each, number_of, table};
 use glam::DVec3;
 use metachron_lod::cost::stages::Stages;
 
@@ -79,17 +75,16 @@ impl Experiment for Library {
     type Row = Row;
     const NAME: &'static str = "library";
     const TITLE: &'static str = "textured room of about 20,000 polygons: levels and shading chosen together";
-    const COLUMNS: &'static str = "\
-        setting as target, policy, mean.3, max.3, misses.4 as miss, polygons.0, \
-        value_over_bound.4 as value, certified.3 as proven";
+    const TABLE: fn(&[Row]) -> Table = table!(|r| target: r.setting, policy: r.policy, mean(3): r.mean, max(3): r.max,
+        miss(4): r.misses, polygons: r.polygons, value(4): r.value_over_bound, proven(3): r.certified,
+        paper: paper_polygons(r));
 
     fn cases(_: bool) -> Vec<Case> {
-        TARGETS.iter().flat_map(|t| POLICIES.map(|policy| Case::new(t.0, policy, 1, FRAMES))).collect()
+        each!((target, ..) in TARGETS, policy in POLICIES => Case::new(target, policy.name(), FRAMES))
     }
 
-    fn measure(case: &Case) -> Row {
-        let target = TARGETS.iter().find(|t| t.0 == case.setting).map_or(TARGETS[0].1, |t| t.1);
-        case.measure(&show(target), &POLICIES)
+    fn measure(case: &Case) -> Option<Row> {
+        case.measure(&show(TARGETS.iter().find(|t| t.0 == case.setting)?.1), &POLICIES)
     }
 
     fn figure(_: &[Row]) -> Figure {
@@ -98,29 +93,20 @@ impl Experiment for Library {
         Figure::new("The library: shading of the drawn objects (FS93, fig. 11)", 2, panels)
     }
 
-    fn table(rows: &[Row]) -> Table {
-        Table::of(rows, Self::COLUMNS).with("paper", 0, rows.iter().map(paper_polygons))
-    }
-
     fn findings(rows: &[Row]) -> Vec<Finding> {
-        let of = |t: &str, what: fn(&Row) -> f64| common::number(rows, t, "adaptive", what);
-        let mut findings = Vec::new();
-        for (name, ..) in TARGETS {
-            findings.push(Finding::at_most(format!("adaptive, {name}: longest frame / T"), of(name, |r| r.max), 1.15));
-            findings.push(Finding::at_least(
-                format!("adaptive, {name}: benefit over the bound"),
-                of(name, |r| r.value_over_bound),
-                0.99,
-            ));
-        }
-        findings
+        let claims = |name: &str| {
+            claims![
+                "adaptive, {name}: longest frame / T" => number(rows, name, "adaptive", |r| r.max), at_most 1.15;
+                "adaptive, {name}: benefit over the bound" => number(rows, name, "adaptive", |r| r.value_over_bound), at_least 0.99;
+            ]
+        };
+        TARGETS.into_iter().flat_map(|target| claims(target.0)).collect()
     }
 }
 
 /// The paper's number of polygons for a row.
 fn paper_polygons(row: &Row) -> f64 {
-    let of_target = || TARGETS.iter().find(|t| t.0 == row.setting).map_or(f64::NAN, |t| t.2);
-    if row.policy == "full" { 19_821.0 } else { of_target() }
+    if row.policy == "full" { 19_821.0 } else { number_of(&TARGETS, |t| t.0 == row.setting, |t| t.2) }
 }
 
 /// Number of things drawn with each shading, along the path.

@@ -2,7 +2,9 @@
 //!
 //! In: the built-in scene `auditorium` at three places of its walk. Out: counts, and a plan for each place. Never here: a policy.
 
-use crate::chart::{Axis, Colour, Experiment, Figure, Finding, Layer, Mark, Measured, Panel};
+use crate::chart::{
+    Axis, Colour, Experiment, Figure, Finding, Layer, Mark, Measured, Named, Panel, Table, claims, number_of, table,
+};
 use glam::DVec3;
 use metachron_geometry::Cell;
 use metachron_render::{Size, VisibleCounts};
@@ -15,18 +17,18 @@ use serde::{Deserialize, Serialize};
 pub(crate) struct Rooms;
 
 /// Places of the walk and their times, seconds: the viewpoints of (FS93, §8).
-const PLACES: [(&str, f64); 3] =
-    [("A, seats across the view", 4.0), ("B, from the foyer", 13.0), ("C, after the turn", 18.4)];
+const PLACES: [Named<f64>; 3] =
+    [Named("A, seats across the view", 4.0), Named("B, from the foyer", 13.0), Named("C, after the turn", 18.4)];
 const SIZE: Size = Size { width: 1280, height: 720 };
 
 /// A place.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Serialize)]
 pub(crate) struct Case {
-    place: String,
+    place: Named<f64>,
 }
 
 /// The counts at a place.
-#[derive(Debug, Clone, Default, Serialize, Deserialize)]
+#[derive(Debug, Clone, Serialize, Deserialize)]
 pub(crate) struct Found {
     /// All objects of the scene.
     objects: u64,
@@ -118,45 +120,35 @@ impl Experiment for Rooms {
     type Row = Row;
     const NAME: &'static str = "rooms";
     const TITLE: &'static str = "the auditorium from above: rooms that the eye reaches and objects that are in view";
-    const COLUMNS: &'static str = "\
-        place, objects.0, in_frustum.0 as in the frustum, potentially_visible.0 as potentially visible, \
-        visible.0";
+    const TABLE: fn(&[Row]) -> Table = table!(|r| place: r.case.place, objects: r.objects,
+        "in the frustum": r.in_frustum, "potentially visible": r.potentially_visible, visible: r.visible);
 
     fn cases(_: bool) -> Vec<Case> {
-        PLACES.map(|(name, _)| Case { place: name.to_owned() }).to_vec()
+        PLACES.map(|place| Case { place }).to_vec()
     }
 
-    fn measure(case: &Case) -> Row {
-        let at_s = PLACES.iter().find(|(name, _)| *name == case.place).map_or(0.0, |(_, at_s)| *at_s);
-        let plan = auditorium().map(|mut session| plan(&mut session, at_s));
-        let found = plan.map(|plan| Found {
+    fn measure(case: &Case) -> Option<Found> {
+        let plan = plan(&mut auditorium()?, case.place.1);
+        Some(Found {
             objects: plan.spots.len() as u64,
             in_frustum: plan.spots.iter().filter(|spot| spot.in_frustum).count() as u64,
             potentially_visible: plan.counts.potentially_visible,
             visible: plan.counts.visible,
-        });
-        Row { case: case.clone(), found: found.unwrap_or_default() }
+        })
     }
 
     fn figure(_: &[Row]) -> Figure {
-        let panels = auditorium().map(|mut session| {
-            PLACES.iter().map(|(name, at_s)| plan(&mut session, *at_s).panel(name)).collect::<Vec<_>>()
-        });
+        let panels = auditorium()
+            .map(|mut session| PLACES.map(|Named(name, at_s)| plan(&mut session, at_s).panel(name)).to_vec());
         Figure::new("The auditorium from above", 3, panels.unwrap_or_default())
     }
 
     fn findings(rows: &[Row]) -> Vec<Finding> {
-        let of = |k: usize, what: fn(&Row) -> u64| {
-            rows.iter().find(|r| r.case.place == PLACES[k].0).map_or(f64::NAN, |r| what(r) as f64)
-        };
-        vec![
-            Finding::at_least("A: objects in view", of(0, |r| r.visible), 100.0),
-            Finding::at_most(
-                "B: objects in view, of those in the frustum",
-                of(1, |r| r.visible) / of(1, |r| r.in_frustum),
-                0.5,
-            ),
-            Finding::at_least("C: objects in view", of(2, |r| r.visible), 100.0),
+        let of = |k: usize, what: fn(&Row) -> u64| number_of(rows, |r| r.case.place == PLACES[k], |r| what(r) as f64);
+        claims![
+            "A: objects in view" => of(0, |r| r.visible), at_least 100.0;
+            "B: objects in view, of those in the frustum" => of(1, |r| r.visible) / of(1, |r| r.in_frustum), at_most 0.5;
+            "C: objects in view" => of(2, |r| r.visible), at_least 100.0;
         ]
     }
 }

@@ -2,7 +2,9 @@
 //!
 //! A diffuse cylinder under one directional light, in an orthographic projection: the meaning of the printed accuracy of a level.
 
-use crate::chart::{Axis, Colour, Experiment, Figure, Finding, Layer, Measured, Panel};
+use crate::chart::{
+    Axis, Colour, Experiment, Figure, Finding, Layer, Measured, Named, Panel, Table, claims, number_of, table,
+};
 use serde::{Deserialize, Serialize};
 use std::f64::consts::PI;
 
@@ -25,17 +27,17 @@ enum Shading {
     Gouraud(u32),
 }
 
-const PICTURES: [(&str, Shading); 4] = [
-    ("ideal", Shading::Ideal),
-    ("flat, 8 faces", Shading::Flat(8)),
-    ("flat, 16 faces", Shading::Flat(16)),
-    ("Gouraud, 16 faces", Shading::Gouraud(16)),
+const PICTURES: [Named<Shading>; 4] = [
+    Named("ideal", Shading::Ideal),
+    Named("flat, 8 faces", Shading::Flat(8)),
+    Named("flat, 16 faces", Shading::Flat(16)),
+    Named("Gouraud, 16 faces", Shading::Gouraud(16)),
 ];
 
 /// A picture.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Serialize)]
 pub(crate) struct Case {
-    picture: String,
+    picture: Named<Shading>,
 }
 
 /// Error of a picture.
@@ -92,16 +94,15 @@ impl Experiment for Scanline {
     type Row = Row;
     const NAME: &'static str = "scanline";
     const TITLE: &'static str = "intensity along a scan line of a cylinder: flat and Gouraud shaded prisms";
-    const COLUMNS: &'static str = "picture, colours.0, rms.4 as rms error, greatest.4 as greatest error";
+    const TABLE: fn(&[Row]) -> Table = table!(|r| picture: r.case.picture, colours: r.colours, "rms error"(4): r.rms,
+        "greatest error"(4): r.greatest);
 
     fn cases(_: bool) -> Vec<Case> {
-        PICTURES.map(|(name, _)| Case { picture: name.to_owned() }).to_vec()
+        PICTURES.map(|picture| Case { picture }).to_vec()
     }
 
-    fn measure(case: &Case) -> Row {
-        let named = PICTURES.iter().find(|(name, _)| *name == case.picture);
-        let shading = named.map_or(Shading::Ideal, |(_, shading)| *shading);
-        let line = shading.line();
+    fn measure(case: &Case) -> Option<Found> {
+        let line = case.picture.1.line();
         let off: Vec<f64> =
             line.iter().map(|(x, intensity)| (intensity - Shading::Ideal.intensity(*x)).abs()).collect();
         let mut colours: Vec<u64> = line.iter().map(|(_, intensity)| (intensity * 1e9).round() as u64).collect();
@@ -109,31 +110,30 @@ impl Experiment for Scanline {
         colours.dedup();
         let rms = (off.iter().map(|d| d * d).sum::<f64>() / f64::from(PIXELS)).sqrt();
         let greatest = off.iter().copied().fold(0.0, f64::max);
-        Row { case: case.clone(), found: Found { colours: colours.len(), rms, greatest } }
+        Some(Found { colours: colours.len(), rms, greatest })
     }
 
     fn figure(_: &[Row]) -> Figure {
-        let panel = |(name, shading): &(&str, Shading)| {
+        let panel = |Named(name, shading): Named<Shading>| {
             let ideal = Layer::dashed("ideal", Colour::Grey, Shading::Ideal.line());
-            let beside = (*shading != Shading::Ideal).then_some(ideal);
+            let beside = (shading != Shading::Ideal).then_some(ideal);
             let layers = beside.into_iter().chain([Layer::line("", Colour::Blue, shading.line())]);
             let (x, y) =
                 (Axis::linear("position across the cylinder", -1.0, 1.0), Axis::linear("intensity", 0.0, 1.05));
-            Panel::new(*name, x, y, layers)
+            Panel::new(name, x, y, layers)
         };
-        Figure::new("A scan line of a cylinder (FS93, fig. 5)", 2, PICTURES.iter().map(panel).collect())
+        Figure::new("A scan line of a cylinder (FS93, fig. 5)", 2, PICTURES.map(panel).to_vec())
     }
 
     fn findings(rows: &[Row]) -> Vec<Finding> {
-        let row = |k: usize| rows.iter().find(|r| r.case.picture == PICTURES[k].0);
-        let rms = |k: usize| row(k).map_or(f64::NAN, |r| r.rms);
-        let colours = |k: usize| row(k).map_or(f64::NAN, |r| r.colours as f64);
-        Finding::all_at_most([
-            ("colours of the flat prism of 8 faces", colours(1), 4.0),
-            ("colours of the flat prism of 16 faces", colours(2), 8.0),
-            ("error of 16 flat faces over that of 8, accuracy 1 − ½/samples", rms(2) / rms(1), 0.6),
-            ("error of 16 Gouraud faces over that of 8 flat ones", rms(3) / rms(1), 0.2),
-        ])
+        let of = |k: usize, what: fn(&Row) -> f64| number_of(rows, |r| r.case.picture == PICTURES[k], what);
+        let rms = |k: usize| of(k, |r| r.rms);
+        claims![
+            "colours of the flat prism of 8 faces" => of(1, |r| r.colours as f64), at_most 4.0;
+            "colours of the flat prism of 16 faces" => of(2, |r| r.colours as f64), at_most 8.0;
+            "error of 16 flat faces over that of 8, accuracy 1 − ½/samples" => rms(2) / rms(1), at_most 0.6;
+            "error of 16 Gouraud faces over that of 8 flat ones" => rms(3) / rms(1), at_most 0.2;
+        ]
     }
 }
 

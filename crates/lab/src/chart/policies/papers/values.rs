@@ -1,24 +1,21 @@
 //! Shares that the value functions of (RH05) give to near and far trees, side by side (fig. 1).
 
-use crate::chart::policies::numeric::chooser;
-use crate::chart::policies::numeric::chooser::Policy;
-use crate::chart::policies::numeric::forest;
-use crate::chart::policies::numeric::forest::{CameraPath, Forms};
-use crate::chart::policies::numeric::machine::Fault;
-use crate::chart::policies::numeric::metrics::mean;
-use crate::chart::{Axis, Colour, Experiment, Figure, Finding, Layer, Measured, Panel};
+use crate::chart::policies::numeric::{CameraPath, Fault, Forms, Policy, chooser, forest, mean};
+use crate::chart::{
+    Axis, Colour, Experiment, Figure, Finding, Layer, Measured, Named, Panel, Table, claims, number_of, table,
+};
 use metachron_lod::cost::value::Value;
 use serde::{Deserialize, Serialize};
 
 /// The experiment.
 pub(crate) struct Values;
 
-const VALUES: [(&str, Value); 5] = [
-    ("a/√z (eq. 8)", Value::Gentle),
-    ("a/z (eq. 9)", Value::Plain),
-    ("a/z² (eq. 10)", Value::Steep),
-    ("√(a/d²) (eq. 11)", Value::Focus),
-    ("√a/d² (eq. 11)", Value::FocusSteep),
+const VALUES: [Named<Value>; 5] = [
+    Named("a/√z (eq. 8)", Value::Gentle),
+    Named("a/z (eq. 9)", Value::Plain),
+    Named("a/z² (eq. 10)", Value::Steep),
+    Named("√(a/d²) (eq. 11)", Value::Focus),
+    Named("√a/d² (eq. 11)", Value::FocusSteep),
 ];
 const TARGET: f64 = 50e3;
 /// The frame that is measured: the middle of the path.
@@ -28,9 +25,9 @@ const FRAMES: usize = 2;
 const NEAR_FAR_M: [f64; 2] = [60.0, 180.0];
 
 /// A value function.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Serialize)]
 pub(crate) struct Case {
-    value: String,
+    value: Named<Value>,
 }
 
 /// The result of a value function.
@@ -64,46 +61,37 @@ impl Experiment for Values {
     type Row = Row;
     const NAME: &'static str = "values";
     const TITLE: &'static str = "Robin Hood's value functions: detail of near and far trees";
-    const COLUMNS: &'static str = "value, near.3, between.3, far.3, spent.3";
+    const TABLE: fn(&[Row]) -> Table = table!(|r| value: r.case.value, near(3): r.near, between(3): r.between,
+        far(3): r.far, spent(3): r.spent);
 
     fn cases(_: bool) -> Vec<Case> {
-        VALUES.map(|v| Case { value: v.0.to_owned() }).to_vec()
+        VALUES.map(|value| Case { value }).to_vec()
     }
 
-    fn measure(case: &Case) -> Row {
-        let value = VALUES.iter().find(|v| v.0 == case.value).map_or(Value::Gentle, |v| v.1);
-        let (parts, spent) = drawn(value);
+    fn measure(case: &Case) -> Option<Found> {
+        let (parts, spent) = drawn(case.value.1);
         let between = |from: f64, to: f64| {
             let here = parts.iter().filter(|(depth, _)| (from..to).contains(depth)).map(|(_, part)| *part);
             mean(&here.collect::<Vec<_>>())
         };
         let [near, far] = NEAR_FAR_M;
         let (near, between, far) = (between(0.0, near), between(near, far), between(far, f64::INFINITY));
-        Row { case: case.clone(), found: Found { near, between, far, spent } }
+        Some(Found { near, between, far, spent })
     }
 
     fn figure(_: &[Row]) -> Figure {
-        let panel = |(name, value): &(&str, Value)| {
+        let panel = |Named(name, value): Named<Value>| {
             let (x, y) = (Axis::linear("depth, m", 0.0, 320.0), Axis::linear("fraction of its triangles", 0.0, 1.05));
-            Panel::new(*name, x, y, [Layer::dots("", Colour::Blue, drawn(*value).0)])
+            Panel::new(name, x, y, [Layer::dots("", Colour::Blue, drawn(value).0)])
         };
-        Figure::new("One frame of 50 ms by each value function (RH05, fig. 1)", 3, VALUES.iter().map(panel).collect())
+        Figure::new("One frame of 50 ms by each value function (RH05, fig. 1)", 3, VALUES.map(panel).to_vec())
     }
 
     fn findings(rows: &[Row]) -> Vec<Finding> {
-        let of =
-            |k: usize, what: fn(&Row) -> f64| rows.iter().find(|r| r.case.value == VALUES[k].0).map_or(f64::NAN, what);
-        vec![
-            Finding::at_least(
-                "near trees get more triangles by a/z² than by a/√z",
-                of(2, |r| r.near) - of(0, |r| r.near),
-                0.0,
-            ),
-            Finding::at_least(
-                "far trees get fewer triangles by a/z² than by a/√z",
-                of(0, |r| r.far) - of(2, |r| r.far),
-                0.0,
-            ),
+        let of = |k: usize, what: fn(&Row) -> f64| number_of(rows, |r| r.case.value == VALUES[k], what);
+        claims![
+            "near trees get more triangles by a/z² than by a/√z" => of(2, |r| r.near) - of(0, |r| r.near), at_least 0.0;
+            "far trees get fewer triangles by a/z² than by a/√z" => of(0, |r| r.far) - of(2, |r| r.far), at_least 0.0;
         ]
     }
 }

@@ -1,13 +1,10 @@
 //! A walk among 200 meshes of any resolution with a sudden turn (GB99): accuracy of the prediction, and proof of the choice.
 
-use crate::chart::policies::numeric::camera::{Path, key};
-use crate::chart::policies::numeric::chooser::Policy;
-use crate::chart::policies::numeric::closed_loop::Show;
-use crate::chart::policies::numeric::common::{COLUMNS, Case, curves, number};
-use crate::chart::policies::numeric::machine::{Fault, RandomSource};
-use crate::chart::policies::numeric::metrics::Row;
-use crate::chart::policies::numeric::scene::{BenefitModel, ObjectLevel, Scene, SceneObject};
-use crate::chart::{Experiment, Figure, Finding};
+use crate::chart::policies::numeric::{
+    BenefitModel, Case, Fault, ObjectLevel, Path, Policy, RandomSource, Row, Scene, SceneObject, Show, common, curves,
+    key, number,
+};
+use crate::chart::{Experiment, Figure, Finding, Table, claims};
 use glam::DVec3;
 use metachron_lod::cost::stages::Stages;
 
@@ -70,14 +67,14 @@ impl Experiment for Walkthrough {
     const NAME: &'static str = "walkthrough";
     const TITLE: &'static str =
         "200 meshes of 1.5 million triangles and a sudden turn: prediction, measurement and certificate";
-    const COLUMNS: &'static str = COLUMNS;
+    const TABLE: fn(&[Row]) -> Table = common::table;
 
     fn cases(quick: bool) -> Vec<Case> {
         let frames = FRAMES / if quick { QUICK_PART } else { 1 };
-        POLICIES.map(|policy| Case::new(SETTING, policy, 1, frames)).to_vec()
+        POLICIES.map(|policy| Case::new(SETTING, policy.name(), frames)).to_vec()
     }
 
-    fn measure(case: &Case) -> Row {
+    fn measure(case: &Case) -> Option<Row> {
         case.measure(&show(case.frames), &POLICIES)
     }
 
@@ -92,10 +89,10 @@ impl Experiment for Walkthrough {
 
     fn findings(rows: &[Row]) -> Vec<Finding> {
         let of = |what: fn(&Row) -> f64| number(rows, SETTING, "adaptive", what);
-        vec![
-            Finding::at_most("adaptive: mean error of the prediction", of(|r| r.model_error), 0.05),
-            Finding::at_least("adaptive: frames whose certificate is within 1 %", of(|r| r.certified), 0.95),
-            Finding::at_least("adaptive: benefit over the bound", of(|r| r.value_over_bound), 0.99),
+        claims![
+            "adaptive: mean error of the prediction" => of(|r| r.model_error), at_most 0.05;
+            "adaptive: frames whose certificate is within 1 %" => of(|r| r.certified), at_least 0.95;
+            "adaptive: benefit over the bound" => of(|r| r.value_over_bound), at_least 0.99;
         ]
     }
 }

@@ -1,6 +1,8 @@
 //! The papers' figures of pictures, as data: scene, place, policies and limits of each.
 
 use super::super::played::still::{Above, Approach, Sight};
+use metachron_lod::control::Policy;
+use metachron_lod::control::Policy::{Adaptive, Full, Greedy, Hierarchical, RobinHood, Static, Threshold};
 use metachron_scene::papers::{Choices, Paper};
 
 /// A figure of a paper: pictures side by side.
@@ -29,7 +31,7 @@ pub(super) type Changes = &'static [(&'static str, &'static str)];
 #[derive(Debug)]
 pub(super) struct Panel {
     pub(super) label: &'static str,
-    pub(super) policy: &'static str,
+    pub(super) policy: Policy,
     pub(super) limit: Limit,
     pub(super) changes: Changes,
     /// Polygons that the paper says of it.
@@ -69,7 +71,7 @@ const TRIANGLES_COST: Changes = &[
 /// Objects may be left out: the null impostor of (MB97, §8).
 const NULL: Changes = &[("target.may_vanish", "true")];
 
-const fn panel(label: &'static str, policy: &'static str, times_over: f64) -> Panel {
+const fn panel(label: &'static str, policy: Policy, times_over: f64) -> Panel {
     Panel { label, policy, limit: Limit::TimesOver([times_over; 2]), changes: &[], polygons: None }
 }
 
@@ -95,134 +97,121 @@ impl Panel {
     }
 }
 
+/// What most plates have in common: the middle of the path through the grove.
+const MIDDLE: Plate = Plate {
+    name: "",
+    title: "",
+    paper: Paper::Grove,
+    choices: PLAIN,
+    changes: &[],
+    from: 0.5,
+    to: 0.5,
+    frames: [20, 4],
+    panels: &[],
+    sights: &[Sight::Eye],
+};
+/// View A of the auditorium.
+const AT_VIEW_A: Plate = Plate { paper: Paper::Auditorium, from: VIEW_A, to: VIEW_A, frames: [40, 12], ..MIDDLE };
+
 /// All plates; first the ones that are drawn on the present adapter too.
 pub(super) const PLATES: [Plate; 8] = [
     Plate {
         name: "fs93-10",
         title: "view A in full detail and within a tenth of its time (FS93, fig. 10)",
-        paper: Paper::Auditorium,
-        choices: PLAIN,
-        changes: &[],
-        from: VIEW_A,
-        to: VIEW_A,
-        frames: [40, 12],
         panels: &[
-            panel("a", "full", 1.0).polygons(72_570),
-            panel("b", "greedy", 9.8).live(5.0).polygons(5_300),
-            panel("b, default", "adaptive", 9.8).live(5.0).polygons(5_300),
+            panel("a", Full, 1.0).polygons(72_570),
+            panel("b", Greedy, 9.8).live(5.0).polygons(5_300),
+            panel("b, default", Adaptive, 9.8).live(5.0).polygons(5_300),
         ],
         sights: &[Sight::Eye, Sight::Difference],
+        ..AT_VIEW_A
     },
     Plate {
         name: "fs93-11",
         title: "the library in full detail and under two targets (FS93, fig. 11)",
         paper: Paper::Library,
-        choices: PLAIN,
-        changes: &[],
-        from: 0.5,
-        to: 0.5,
         frames: [40, 12],
         panels: &[
-            panel("a", "full", 1.0).polygons(19_821),
-            panel("b", "greedy", 4.0).live(1.5).polygons(4_217),
-            panel("c", "greedy", 6.0).live(2.0).polygons(1_389),
-            panel("b, default", "adaptive", 4.0).live(1.5).polygons(4_217),
-            panel("c, default", "adaptive", 6.0).live(2.0).polygons(1_389),
+            panel("a", Full, 1.0).polygons(19_821),
+            panel("b", Greedy, 4.0).live(1.5).polygons(4_217),
+            panel("c", Greedy, 6.0).live(2.0).polygons(1_389),
+            panel("b, default", Adaptive, 4.0).live(1.5).polygons(4_217),
+            panel("c, default", Adaptive, 6.0).live(2.0).polygons(1_389),
         ],
         sights: &[Sight::Eye, Sight::Levels, Sight::Difference],
+        ..MIDDLE
     },
     Plate {
         name: "fs93-8",
         title: "levels at view A by size and by benefit (FS93, fig. 8)",
-        paper: Paper::Auditorium,
-        choices: PLAIN,
-        changes: &[],
-        from: VIEW_A,
-        to: VIEW_A,
-        frames: [40, 12],
-        panels: &[panel("a", "static", 9.8), panel("b", "greedy", 9.8), panel("b, default", "adaptive", 9.8)],
+        panels: &[panel("a", Static, 9.8), panel("b", Greedy, 9.8), panel("b, default", Adaptive, 9.8)],
         sights: &[Sight::Eye, Sight::Levels, Sight::Above(Above { height_m: 6.6, ahead_m: 9.0 })],
+        ..AT_VIEW_A
     },
     Plate {
         name: "fs93-9",
         title: "levels at view C, just after the turn, by the last frame's time and by benefit (FS93, fig. 9)",
         paper: Paper::Auditorium,
-        choices: PLAIN,
-        changes: &[],
         // from the stage in view to the seats that the turn brings into view
         from: 0.64,
         to: 0.728,
         frames: [22, 22],
         // the target of view A, where full detail takes three times as long
-        panels: &[panel("a", "threshold", 3.2), panel("b", "greedy", 3.2), panel("b, default", "adaptive", 3.2)],
+        panels: &[panel("a", Threshold, 3.2), panel("b", Greedy, 3.2), panel("b, default", Adaptive, 3.2)],
         sights: &[Sight::Eye, Sight::Levels],
+        ..MIDDLE
     },
     Plate {
         name: "rh05-1",
         title: "three value functions from above and from the path (RH05, fig. 1)",
-        paper: Paper::Grove,
         choices: WHOLE_TREES,
-        changes: &[],
-        from: 0.5,
-        to: 0.5,
-        frames: [20, 4],
         panels: &[
-            panel("a/√z", "robin-hood", 8.0).with(&[("target.value", "\"gentle\"")]),
-            panel("a/z", "robin-hood", 8.0).with(&[("target.value", "\"plain\"")]),
-            panel("a/z²", "robin-hood", 8.0).with(&[("target.value", "\"steep\"")]),
+            panel("a/√z", RobinHood, 8.0).with(&[("target.value", "\"gentle\"")]),
+            panel("a/z", RobinHood, 8.0).with(&[("target.value", "\"plain\"")]),
+            panel("a/z²", RobinHood, 8.0).with(&[("target.value", "\"steep\"")]),
         ],
         sights: &[Sight::Above(Above { height_m: 110.0, ahead_m: 120.0 }), Sight::Eye],
+        ..MIDDLE
     },
     Plate {
         name: "rh05-5",
         title: "the middle of the path under five targets, trees without levels (RH05, fig. 5)",
-        paper: Paper::Grove,
         choices: WHOLE_TREES,
-        changes: &[],
-        from: 0.5,
-        to: 0.5,
-        frames: [20, 4],
         // at a sixth of full detail every tree has a triangle a pixel, past which no policy goes
         panels: &[
-            panel("T", "robin-hood", 96.0),
-            panel("2 T", "robin-hood", 48.0),
-            panel("4 T", "robin-hood", 24.0),
-            panel("8 T", "robin-hood", 12.0),
-            panel("16 T", "robin-hood", 6.0),
+            panel("T", RobinHood, 96.0),
+            panel("2 T", RobinHood, 48.0),
+            panel("4 T", RobinHood, 24.0),
+            panel("8 T", RobinHood, 12.0),
+            panel("16 T", RobinHood, 6.0),
         ],
-        sights: &[Sight::Eye],
+        ..MIDDLE
     },
     Plate {
         name: "rh05-8",
         title: "the middle of the path with lines and points, and without restriction (RH05, fig. 8)",
-        paper: Paper::Grove,
-        choices: PLAIN,
-        changes: &[],
-        from: 0.5,
-        to: 0.5,
-        frames: [20, 4],
         panels: &[
-            panel("with levels", "robin-hood", 10.0).with(&[("target.value", "\"focus\"")]),
-            panel("without restriction", "full", 1.0),
+            panel("with levels", RobinHood, 10.0).with(&[("target.value", "\"focus\"")]),
+            panel("without restriction", Full, 1.0),
         ],
         sights: &[Sight::Eye, Sight::Difference],
+        ..MIDDLE
     },
     Plate {
         name: "mb97-7",
         title: "domes at half and at twice their nominal cost, with groups and without (MB97, fig. 7)",
         paper: Paper::Domes,
-        choices: PLAIN,
         changes: TRIANGLES_COST,
         from: 0.0,
         to: 0.0,
         frames: [40, 12],
         panels: &[
-            panel("a: hierarchical, 1920", "hierarchical", 1.0).triangles(1920.0),
-            panel("b: flat, 1920", "greedy", 1.0).triangles(1920.0).with(NULL),
-            panel("c: hierarchical, 7680", "hierarchical", 1.0).triangles(7680.0),
-            panel("d: flat, 7680", "greedy", 1.0).triangles(7680.0).with(NULL),
+            panel("a: hierarchical, 1920", Hierarchical, 1.0).triangles(1920.0),
+            panel("b: flat, 1920", Greedy, 1.0).triangles(1920.0).with(NULL),
+            panel("c: hierarchical, 7680", Hierarchical, 1.0).triangles(7680.0),
+            panel("d: flat, 7680", Greedy, 1.0).triangles(7680.0).with(NULL),
         ],
-        sights: &[Sight::Eye],
+        ..MIDDLE
     },
 ];
 

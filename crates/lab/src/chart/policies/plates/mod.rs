@@ -8,8 +8,9 @@ mod sheet;
 
 use super::played::still::{Approach, Sight, Still, StillRequest, still};
 use super::played::walk::{ALIKE_DB, Opening, Times};
-use crate::chart::{Axis, Colour, Experiment, Figure, Finding, Layer, Record, worst};
-use csv::StringRecord;
+use crate::chart::{
+    Axis, Colour, Experiment, Figure, Finding, Layer, Measured, Named, Table, blank, claims, table, worst_of,
+};
 use figures::{Changes, Limit, PLATES, Panel, Plate};
 use metachron_lod::control::Policy;
 use metachron_render::{PictureFile, psnr_db, ssim};
@@ -24,18 +25,16 @@ pub(in super::super) struct Figures<const F: usize, const LIVE: bool>;
 const LONGEST: f64 = 1.3;
 
 /// A picture of a figure.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, Serialize)]
 pub(in super::super) struct Case {
-    panel: String,
+    panel: Named<&'static Panel>,
+    policy: Named<Policy>,
     frames: usize,
 }
 
 /// Numbers of a picture.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub(in super::super) struct Row {
-    panel: String,
-    policy: String,
-    frames: usize,
+#[derive(Debug, Clone, Serialize, Deserialize)]
+pub(in super::super) struct Found {
     adapter: String,
     target_ms: f64,
     frame_ms: f64,
@@ -50,17 +49,7 @@ pub(in super::super) struct Row {
     psnr_db: f64,
 }
 
-impl Record for Row {
-    type Case = Case;
-
-    fn case(&self) -> Case {
-        Case { panel: self.panel.clone(), frames: self.frames }
-    }
-
-    fn read(names: &StringRecord, line: &StringRecord) -> csv::Result<Self> {
-        line.deserialize(Some(names))
-    }
-}
+type Row = Measured<Case, Found>;
 
 /// The play behind a picture: figure, panel (none: full detail), frames, whether live.
 type Played = (&'static str, Option<&'static str>, usize, bool);
@@ -69,10 +58,6 @@ type Played = (&'static str, Option<&'static str>, usize, bool);
 static PLAYED: Mutex<Vec<(Played, Arc<Still>)>> = Mutex::new(Vec::new());
 
 impl Plate {
-    fn panel(&self, case: &Case) -> Option<&'static Panel> {
-        self.panels.iter().find(|panel| panel.label == case.panel)
-    }
-
     /// The still of a panel, or of full detail at the same place; played now if it was not yet.
     fn still(&self, panel: Option<&'static Panel>, frames: usize, target_s: f64, live: bool) -> Option<Arc<Still>> {
         let key = (self.name, panel.map(|panel| panel.label), frames, live);
@@ -84,7 +69,7 @@ impl Plate {
         let changes: Vec<Changes> = vec![self.changes, panel.map_or(&[], |panel| panel.changes)];
         let request = StillRequest {
             scene: Opening { name: self.paper.name(), text: &text, changes: &changes.concat() },
-            policy: panel.map_or("full", |panel| panel.policy),
+            policy: panel.map_or(Policy::Full, |panel| panel.policy),
             target_s,
             approach: Approach { frames, ..self.approach(false) },
             times: if live { Times::Measured } else { Times::Declared },
@@ -97,7 +82,7 @@ impl Plate {
 
     /// Full detail at the place, the still of a panel, and the panel's target, seconds.
     fn pair(&self, case: &Case, live: bool) -> Option<(Arc<Still>, Arc<Still>, f64)> {
-        let panel = self.panel(case)?;
+        let Named(_, panel) = case.panel;
         // the target has no effect on full detail
         let full = self.still(None, case.frames, 1.0, live)?;
         let target_s = match panel.limit {
@@ -116,47 +101,45 @@ impl<const F: usize, const LIVE: bool> Experiment for Figures<F, LIVE> {
     const TITLE: &'static str = PLATES[F].title;
     // full detail is played once for all of them
     const ALONE: bool = true;
-    const COLUMNS: &'static str = "\
-        panel, policy, target_ms.3 as T_ms, frame_ms.3, triangles.0, paper_triangles.0 as paper, \
-        holes.0 as left_out, impostors.0, ssim.4, psnr_db.1";
+    const TABLE: fn(&[Row]) -> Table = table!(|r| panel: r.case.panel, policy: r.case.policy, T_ms(3): r.target_ms,
+        frame_ms(3): r.frame_ms, triangles: r.triangles, paper: r.paper_triangles, left_out: r.holes,
+        impostors: r.impostors, ssim(4): r.ssim, psnr_db(1): r.psnr_db);
 
     fn cases(quick: bool) -> Vec<Case> {
         let frames = PLATES[F].approach(quick).frames;
-        PLATES[F].panels.iter().map(|panel| Case { panel: panel.label.to_owned(), frames }).collect()
+        let case = |panel: &'static Panel| Case {
+            panel: Named(panel.label, panel),
+            policy: Named(panel.policy.name(), panel.policy),
+            frames,
+        };
+        PLATES[F].panels.iter().map(case).collect()
     }
 
-    fn measure(case: &Case) -> Row {
-        let panel = PLATES[F].panel(case);
-        let mut row = Row {
-            panel: case.panel.clone(),
-            policy: panel.map_or("", |panel| panel.policy).to_owned(),
-            frames: case.frames,
-            adapter: String::new(),
-            target_ms: f64::NAN,
-            frame_ms: f64::NAN,
-            triangles: 0,
-            paper_triangles: panel.and_then(|panel| panel.polygons).map_or(f64::NAN, f64::from),
-            holes: 0,
-            impostors: 0,
-            ssim: f64::NAN,
-            psnr_db: f64::NAN,
+    fn measure(case: &Case) -> Option<Found> {
+        let paper_triangles = case.panel.1.polygons.map_or(f64::NAN, f64::from);
+        let Some((full, own, target_s)) = PLATES[F].pair(case, LIVE) else {
+            return Some(Found { paper_triangles, ..blank() });
         };
-        let Some((full, own, target_s)) = PLATES[F].pair(case, LIVE) else { return row };
-        (row.target_ms, row.frame_ms, row.triangles) = (1e3 * target_s, own.frame_ms, own.triangles);
-        (row.holes, row.impostors) = (own.holes, own.impostors);
-        row.adapter.clone_from(&own.adapter);
-        if let Some((picture, full)) = own.picture(Sight::Eye).zip(full.picture(Sight::Eye)) {
-            row.ssim = ssim(picture, full).unwrap_or(f64::NAN);
-            row.psnr_db = psnr_db(picture, full).unwrap_or(f64::NAN).min(ALIKE_DB);
-        }
-        row
+        let pictures = own.picture(Sight::Eye).zip(full.picture(Sight::Eye));
+        let psnr_db = |(picture, full)| psnr_db(picture, full).unwrap_or(f64::NAN).min(ALIKE_DB);
+        Some(Found {
+            adapter: own.adapter.clone(),
+            target_ms: 1e3 * target_s,
+            frame_ms: own.frame_ms,
+            triangles: own.triangles,
+            paper_triangles,
+            holes: own.holes,
+            impostors: own.impostors,
+            ssim: pictures.and_then(|(picture, full)| ssim(picture, full)).unwrap_or(f64::NAN),
+            psnr_db: pictures.map_or(f64::NAN, psnr_db),
+        })
     }
 
     fn figure(rows: &[Row]) -> Figure {
         let most = rows.iter().map(|row| row.triangles as f64).fold(1.0, f64::max);
         let slowest = rows.iter().map(|row| row.frame_ms / row.target_ms).fold(1.2, f64::max);
         let dots = rows.iter().zip(Colour::LINES.into_iter().cycle()).map(|(row, colour)| {
-            Layer::dots(&row.panel, colour, [(row.triangles as f64, row.frame_ms / row.target_ms)])
+            Layer::dots(row.case.panel.0, colour, [(row.triangles as f64, row.frame_ms / row.target_ms)])
         });
         let (x, y) = (
             Axis::log("triangles", 100.0, 1.2 * most.max(100.0)),
@@ -168,7 +151,7 @@ impl<const F: usize, const LIVE: bool> Experiment for Figures<F, LIVE> {
     fn pictures(rows: &[Row]) -> anyhow::Result<Vec<(String, PictureFile)>> {
         let plate = &PLATES[F];
         let column = |row: &Row| {
-            let (full, own, _) = plate.pair(&row.case(), LIVE)?;
+            let (full, own, _) = plate.pair(&row.case, LIVE)?;
             let (eye, full) = (own.picture(Sight::Eye)?, full.picture(Sight::Eye)?);
             let shown = |sight: &Sight| match sight {
                 Sight::Difference => Some(difference(eye, full)),
@@ -176,7 +159,7 @@ impl<const F: usize, const LIVE: bool> Experiment for Figures<F, LIVE> {
             };
             let pictures = plate.sights.iter().filter_map(shown).collect();
             Some(sheet::Column {
-                name: format!("{}: {} triangles, {:.2} ms", row.panel, row.triangles, row.frame_ms),
+                name: format!("{}: {} triangles, {:.2} ms", row.case.panel.0, row.triangles, row.frame_ms),
                 pictures,
             })
         };
@@ -185,15 +168,14 @@ impl<const F: usize, const LIVE: bool> Experiment for Figures<F, LIVE> {
     }
 
     fn findings(rows: &[Row]) -> Vec<Finding> {
-        let predicts = |row: &&Row| Policy::named(&row.policy).is_some_and(Policy::predicts);
-        let late = worst(rows.iter().filter(predicts).map(|row| row.frame_ms / row.target_ms));
-        let mut findings = vec![Finding::at_most("frame / T of policies that predict", late, LONGEST)];
-        let with_groups = |row: &&Row| row.policy == "hierarchical";
-        if rows.iter().any(|row| with_groups(&row)) {
-            let out = worst(rows.iter().filter(with_groups).map(|row| f64::from(row.holes)));
-            findings.push(Finding::at_most("objects left out where groups may be drawn as one", out, 0.0));
-            let flat = worst(rows.iter().filter(|row| row.policy == "greedy").map(|row| f64::from(row.holes)));
-            findings.push(Finding::at_least("objects left out where they may not", flat, 1.0));
+        let late = worst_of(rows, |row| row.case.policy.1.predicts(), |row| row.frame_ms / row.target_ms);
+        let mut findings = claims!["frame / T of policies that predict" => late, at_most LONGEST];
+        let holes = |policy| worst_of(rows, |row| row.case.policy.1 == policy, |row| f64::from(row.holes));
+        if rows.iter().any(|row| row.case.policy.1 == Policy::Hierarchical) {
+            findings.extend(claims![
+                "objects left out where groups may be drawn as one" => holes(Policy::Hierarchical), at_most 0.0;
+                "objects left out where they may not" => holes(Policy::Greedy), at_least 1.0;
+            ]);
         }
         findings
     }
@@ -211,7 +193,6 @@ mod tests {
             assert!(PLATES[..at].iter().all(|other| other.name != plate.name));
             for (k, panel) in plate.panels.iter().enumerate() {
                 assert!(plate.panels[..k].iter().all(|other| other.label != panel.label), "{}", plate.name);
-                assert!(Policy::named(panel.policy).is_some(), "{}: {}", plate.name, panel.policy);
                 let changes = [plate.changes, panel.changes].concat();
                 let changes: Vec<_> = changes.iter().map(|(key, to)| ((*key).to_owned(), (*to).to_owned())).collect();
                 assert!(load(&tiny, &changes).is_ok(), "{}: {changes:?}", plate.name);

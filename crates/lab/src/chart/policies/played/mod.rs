@@ -11,7 +11,7 @@ use super::numeric::metrics::Row;
 use crate::chart::{Axis, Colour, Layer, Panel};
 use metachron_lod::control::Policy;
 use metachron_scene::papers::{Choices, Paper};
-pub(super) use row::COLUMNS;
+pub(super) use row::table;
 pub(super) use walk::{Shown, Times};
 
 /// A scene, its frames, and the ratio of full detail's time to the target.
@@ -35,14 +35,10 @@ pub(super) const PLAYS: [Play; 5] = [
 
 impl Case {
     /// Measures the row; one without frames where the case could not be played.
-    pub(super) fn play(&self, times: Times) -> Row {
-        let play = PLAYS.iter().find(|play| play.paper.name() == self.setting);
-        let measure = |play: &Play| {
-            let text = play.paper.text(&Choices::default());
-            walk::measure(&play.shown(&text), self, times)
-        };
-        let row = play.map_or_else(|| Row::of(&self.setting, &self.policy, &[]), measure);
-        Row { asked: self.frames, round: self.round, ..row }
+    pub(super) fn play(&self, times: Times) -> Option<Row> {
+        let play = PLAYS.iter().find(|play| play.paper.name() == self.setting)?;
+        let row = walk::measure(&play.shown(&play.paper.text(&Choices::default())), self, times);
+        Some(Row { asked: self.frames, round: self.round, ..row })
     }
 }
 
@@ -54,9 +50,7 @@ impl Play {
     /// One case for every policy of the program in one round.
     pub(super) fn cases(&self, quick: bool, round: usize) -> impl Iterator<Item = Case> {
         let (setting, frames) = (self.paper.name(), self.frames[usize::from(quick)]);
-        let case =
-            move |policy: Policy| Case { setting: setting.to_owned(), policy: policy.name().to_owned(), frames, round };
-        Policy::ALL.into_iter().map(case)
+        Policy::ALL.into_iter().map(move |policy| Case { round, ..Case::new(setting, policy.name(), frames) })
     }
 }
 
@@ -86,13 +80,13 @@ mod tests {
     use crate::chart::{Cell, Table};
     use metachron_render::Gpu;
 
-    fn row(scene: &str, policy: &str) -> Row {
-        Case { setting: scene.to_owned(), policy: policy.to_owned(), frames: 6, round: 0 }.play(Times::Declared)
+    fn row(scene: &str, policy: Policy) -> Row {
+        Case::new(scene, policy.name(), 6).play(Times::Declared).unwrap()
     }
 
     #[test]
     fn a_policy_plays_a_scene_to_the_bit_and_every_number_is_there() {
-        let policies = ["robin-hood", "adaptive"];
+        let policies = [Policy::RobinHood, Policy::Adaptive];
         let rows = policies.map(|policy| row("library", policy));
         for (row, again) in rows.iter().zip(policies.map(|policy| self::row("library", policy))) {
             // NaN is not equal to itself, so the rows are compared as text
@@ -101,7 +95,7 @@ mod tests {
         }
         let drawn = Gpu::headless().is_ok();
         for row in &rows {
-            let Table { columns, rows } = Table::of([row], COLUMNS);
+            let Table { columns, rows } = table(std::slice::from_ref(row));
             let is_nan = |cell: &Cell| matches!(cell, Cell::Number(value, _) if value.is_nan());
             let unknown: Vec<_> =
                 columns.iter().zip(&rows[0]).filter(|(_, cell)| is_nan(cell)).map(|(name, _)| name.as_str()).collect();
@@ -115,7 +109,7 @@ mod tests {
 
     #[test]
     fn full_detail_takes_the_target_so_many_times_and_is_like_itself() {
-        let full = row("library", "full");
+        let full = row("library", Policy::Full);
         let [triangles, lines, points] =
             [0, 1, 2].map(|kind| row::of_frames(&full.primitives, kind).map(|(_, n)| n).collect::<Vec<_>>());
         // 19,800 triangles are the whole library, walls and what is out of view apart; it has neither boughs nor leaves

@@ -41,7 +41,7 @@ pub(in super::super) struct Approach {
 #[derive(Debug, Clone, Copy)]
 pub(in super::super) struct StillRequest<'a> {
     pub(in super::super) scene: Opening<'a>,
-    pub(in super::super) policy: &'a str,
+    pub(in super::super) policy: Policy,
     pub(in super::super) target_s: f64,
     pub(in super::super) approach: Approach,
     pub(in super::super) times: Times,
@@ -72,7 +72,7 @@ pub(in super::super) fn still(request: &StillRequest<'_>) -> anyhow::Result<Stil
     let (adapter, mut fly_through) = opened(&request.scene, request.times)?;
     let control = fly_through.session().control();
     control.set_target_hz(1.0 / request.target_s);
-    control.set_policy(Policy::named(request.policy).context("no such policy")?);
+    control.set_policy(request.policy);
     if from != to {
         for _ in 0..LEAD_IN {
             fly_through.step(from)?;

@@ -5,8 +5,8 @@
 //! Full detail is played once for all policies of a scene: its times set the target, and its pictures are the reference for the others.
 
 use super::Case;
-use super::row::Played;
-use crate::chart::policies::numeric::metrics::Row;
+use super::row::frame;
+use crate::chart::policies::numeric::{Row, deviation95, mean, within};
 use anyhow::Context;
 use metachron_lod::control::Policy;
 use metachron_render::{Gpu, Offscreen, PictureFile, RendererOptions, Size, psnr_db, ssim};
@@ -64,6 +64,7 @@ const AGAIN: usize = 20;
 pub(in super::super) const ALIKE_DB: f64 = 99.0;
 
 /// A walk that has been played.
+#[derive(Default)]
 struct PlayedPath {
     adapter: String,
     frames: Vec<FrameRecord>,
@@ -97,30 +98,30 @@ impl<'a> Shown<'a> {
 pub(in super::super) fn measure(shown: &Shown<'_>, case: &Case, times: Times) -> Row {
     let measured = reference(shown, case.frames, times).and_then(|full| {
         let target_s = 1e-3 * mean_ms(&full) / shown.times_over;
-        let full_itself = case.policy == "full";
+        let full_itself = case.policy == Policy::Full.name();
         let case = Case { frames: full.frames.len(), ..case.clone() };
         let own = if full_itself { Arc::clone(&full) } else { Arc::new(played(shown, &case, target_s, times)?) };
         Ok((full, own, target_s))
     });
-    let (full, own, target_s) = measured.unwrap_or_else(|_| (empty_path(), empty_path(), f64::NAN));
+    let (full, own, target_s) = measured.unwrap_or_else(|_| (Arc::default(), Arc::default(), f64::NAN));
+    let target_ms = 1e3 * target_s;
     let pairs = own.pictures.iter().zip(&full.pictures);
     let likeness: Vec<_> = pairs.filter_map(|(a, b)| Some((ssim(a, b)?, psnr_db(a, b)?.min(ALIKE_DB)))).collect();
-    let full_ms: Vec<f64> = full.frames.iter().map(|row| row.frame_ms).collect();
-    let played = Played {
-        scene: &case.setting,
-        policy: &case.policy,
-        adapter: &own.adapter,
-        target_ms: 1e3 * target_s,
-        frames: &own.frames,
-        full_ms: &full_ms,
-        again_ms: &own.again_ms,
-        likeness: &likeness,
-    };
-    played.row()
-}
-
-fn empty_path() -> Arc<PlayedPath> {
-    Arc::new(PlayedPath { adapter: String::new(), frames: Vec::new(), pictures: Vec::new(), again_ms: Vec::new() })
+    let column = |of: fn(&(f64, f64)) -> f64| likeness.iter().map(of).collect::<Vec<_>>();
+    let pairs = own.frames.iter().zip(&full.frames);
+    let frames: Vec<_> = pairs.map(|(row, full)| frame(row, full.frame_ms / target_ms, target_ms)).collect();
+    let text = |of: &mut dyn Iterator<Item = String>| of.collect::<Vec<_>>().join(" ");
+    Row {
+        adapter: own.adapter.clone(),
+        target_ms,
+        spread95: deviation95(&own.again_ms),
+        ssim: mean(&column(|l| l.0)),
+        ssim_least: within(&column(|l| l.0), 0.0),
+        psnr_db: mean(&column(|l| l.1)),
+        times: text(&mut frames.iter().map(|frame| format!("{:.3}", frame.time))),
+        primitives: text(&mut own.frames.iter().map(|row| format!("{}/{}/{}", row.triangles, row.lines, row.points))),
+        ..Row::of(&case.setting, case.policy, &[frames])
+    }
 }
 
 fn mean_ms(played: &PlayedPath) -> f64 {
@@ -135,7 +136,7 @@ fn reference(shown: &Shown<'_>, frames: usize, times: Times) -> anyhow::Result<A
         return Ok(Arc::clone(played));
     }
     let in_time = if times == Times::Measured { frames_in_time(shown, frames)? } else { frames };
-    let case = Case { setting: shown.name.to_owned(), policy: "full".to_owned(), frames: in_time, round: 0 };
+    let case = Case::new(shown.name, Policy::Full.name(), in_time);
     // the target has no effect on full detail
     let full = Arc::new(played(shown, &case, 1.0, times)?);
     known.push((shown.name, frames, times, Arc::clone(&full)));
@@ -162,7 +163,7 @@ fn played(shown: &Shown<'_>, case: &Case, target_s: f64, times: Times) -> anyhow
     let (adapter, mut fly_through) = opened(&shown.opening(), times)?;
     let control = fly_through.session().control();
     control.set_target_hz(1.0 / target_s);
-    control.set_policy(Policy::named(&case.policy).context("no such policy")?);
+    control.set_policy(Policy::named(case.policy).context("no such policy")?);
     let lead_in = if times == Times::Measured { MEASURED_LEAD_IN.min(case.frames).max(LEAD_IN) } else { LEAD_IN };
     for _ in 0..lead_in {
         fly_through.step(0.0)?;

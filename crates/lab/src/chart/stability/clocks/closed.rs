@@ -9,7 +9,10 @@
 use super::closed_system::{ROOM_M, SYSTEMS, system};
 use crate::chart::asynchronous::play::Play;
 use crate::chart::stability::common::COMMON_ENERGY_MAX;
-use crate::chart::{Axis, Colour, Experiment, Figure, Finding, Layer, Measured, Panel, span, worst};
+use crate::chart::{
+    Axis, Colour, Experiment, Figure, Finding, Layer, Measured, Panel, Table, blank, claims, count_of, each, span,
+    table, worst, worst_of,
+};
 use glam::DVec3;
 use metachron_contact::audit::{Audit, audit};
 use metachron_core::{AgentId, SimTime};
@@ -33,9 +36,9 @@ const ROUNDING: f64 = 1e-9;
 const BLOWS_MIN: u32 = 5;
 
 /// A system, the shift of its rates, its seed and its length.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Serialize)]
 pub(crate) struct Case {
-    system: String,
+    system: &'static str,
     /// The rates are shifted cyclically by so many places.
     turn: usize,
     seed: u64,
@@ -77,45 +80,30 @@ impl Experiment for Closed {
     const NAME: &'static str = "closed";
     const TITLE: &'static str =
         "closed system of three rigid bodies and two tubes on five clocks: momentum and energy at a common time";
-    const COLUMNS: &'static str = "\
-        system, turn.0, seed.0, seconds.0, energy_peak.4 as energy peak, energy_end.4 as energy end, \
-        raw_peak.4 as raw peak, drift.4, angular_drift.4 as angular, raw_drift.4 as raw drift, \
-        in_flight.4 as in flight, impacts.0, pause_s.1";
+    const TABLE: fn(&[Row]) -> Table = table!(|r| system: r.case.system, turn: r.case.turn, seed: r.case.seed,
+        seconds: r.case.seconds, "energy peak"(4): r.energy_peak, "energy end"(4): r.energy_end,
+        "raw peak"(4): r.raw_peak, drift(4): r.drift, angular(4): r.angular_drift, "raw drift"(4): r.raw_drift,
+        "in flight"(4): r.in_flight, impacts: r.impacts, pause_s(1): r.pause_s);
 
     fn cases(quick: bool) -> Vec<Case> {
         let (turns, seeds, seconds) =
             if quick { (&TURNS[..1], &SEEDS[..1], QUICK_SECONDS) } else { (&TURNS[..], &SEEDS[..], SECONDS) };
-        let mut cases = Vec::new();
-        for system in SYSTEMS {
-            for &turn in turns {
-                cases.extend(seeds.iter().map(|&seed| Case { system: system.to_owned(), turn, seed, seconds }));
-            }
-        }
-        cases
+        each!(system in SYSTEMS, &turn in turns, &seed in seeds => Case { system, turn, seed, seconds })
     }
 
-    fn measure(case: &Case) -> Row {
+    fn measure(case: &Case) -> Option<Found> {
         let (extremes, whole) = play(case).unwrap_or_default();
-        let [energy_peak, energy_end, raw_peak, drift, angular_drift, raw_drift, in_flight, beyond] =
-            if whole { extremes.numbers() } else { [f64::NAN; 8] };
         let [energy_of_second, published_of_second, in_flight_of_second] = [0, 1, 2].map(|k| extremes.of_second(k));
-        let found = Found {
-            energy_peak,
-            energy_end,
-            raw_peak,
-            drift,
-            angular_drift,
-            raw_drift,
-            in_flight,
-            beyond,
+        let pause_s = extremes.pause_s.max(case.seconds - extremes.last_impact_s);
+        Some(Found {
             looks: extremes.looks,
             impacts: extremes.impacts,
-            pause_s: extremes.pause_s.max(case.seconds - extremes.last_impact_s),
+            pause_s,
             energy_of_second,
             published_of_second,
             in_flight_of_second,
-        };
-        Row { case: case.clone(), found }
+            ..if whole { extremes.found() } else { blank() }
+        })
     }
 
     fn figure(rows: &[Row]) -> Figure {
@@ -125,7 +113,7 @@ impl Experiment for Closed {
         let (low, high) = span(energies, false);
         let lines = rows.iter().map(|r| {
             let Case { system, turn, seed, .. } = &r.case;
-            let first = *seed == SEEDS[0] && system == SYSTEMS[0];
+            let first = *seed == SEEDS[0] && *system == SYSTEMS[0];
             let label = if first { format!("rates shifted by {turn}") } else { String::new() };
             Layer::line(label, Colour::LINES[turn % Colour::LINES.len()], read(&r.energy_of_second))
         });
@@ -146,17 +134,13 @@ impl Experiment for Closed {
     }
 
     fn findings(rows: &[Row]) -> Vec<Finding> {
-        let most = |get: fn(&Row) -> f64| worst(rows.iter().map(get));
-        let idle = rows.iter().filter(|r| r.impacts < BLOWS_MIN).count();
-        vec![
-            Finding::at_most("energy at a common time over the start's", most(|r| r.energy_peak), COMMON_ENERGY_MAX),
-            Finding::at_most(
-                "momentum with every impulse delivered: change over the momenta",
-                most(|r| r.drift),
-                ROUNDING,
-            ),
-            Finding::at_most("published momentum: change beyond the impulses in flight", most(|r| r.beyond), ROUNDING),
-            Finding::at_most(format!("runs with fewer than {BLOWS_MIN} impacts"), idle as f64, 0.0),
+        let most = |number: fn(&Row) -> f64| worst_of(rows, |_| true, number);
+        let idle = count_of(rows, |r| r.impacts < BLOWS_MIN);
+        claims![
+            "energy at a common time over the start's" => most(|r| r.energy_peak), at_most COMMON_ENERGY_MAX;
+            "momentum with every impulse delivered: change over the momenta" => most(|r| r.drift), at_most ROUNDING;
+            "published momentum: change beyond the impulses in flight" => most(|r| r.beyond), at_most ROUNDING;
+            "runs with fewer than {BLOWS_MIN} impacts" => idle, at_most 0.0;
         ]
     }
 }
@@ -186,10 +170,10 @@ struct Extremes {
 }
 
 impl Extremes {
-    fn numbers(&self) -> [f64; 8] {
-        let ([peak, end, raw], [drift, angular], [published, flying, beyond]) =
-            (self.energy, self.drift, self.published);
-        [peak, end, raw, drift, angular, published, flying, beyond]
+    fn found(&self) -> Found {
+        let ([energy_peak, energy_end, raw_peak], [drift, angular_drift]) = (self.energy, self.drift);
+        let [raw_drift, in_flight, beyond] = self.published;
+        Found { energy_peak, energy_end, raw_peak, drift, angular_drift, raw_drift, in_flight, beyond, ..blank() }
     }
 
     fn of_second(&self, which: usize) -> String {
@@ -229,7 +213,7 @@ impl Extremes {
 
 /// Plays the case; returns its results and whether it reached its end.
 fn play(case: &Case) -> Option<(Extremes, bool)> {
-    let (play, ids) = system(&case.system, case.turn, case.seed)?;
+    let (play, ids) = system(case.system, case.turn, case.seed)?;
     let start = play.common(SimTime::ZERO);
     let size: f64 = momenta(&play, ids);
     let (raw_start, published_start) = (play.raw_j(), published_momentum(&play));

@@ -6,7 +6,10 @@
 use crate::chart::asynchronous::bench::{Faults, PairLaw};
 use crate::chart::asynchronous::play::{ContactImpulse, Play};
 use crate::chart::stability::common::{COMMON_ENERGY_MAX, GRAVITY, plain_body};
-use crate::chart::{Axis, Colour, Experiment, Figure, Finding, Layer, Measured, Panel, Table, worst};
+use crate::chart::{
+    Axis, Colour, Experiment, Figure, Finding, Layer, Measured, Panel, Table, blank, claims, each, table, worst,
+    worst_of,
+};
 use glam::{DQuat, DVec3};
 use metachron_contact::{AnchorSpring, Law};
 use metachron_core::{AgentId, Anchor};
@@ -58,11 +61,11 @@ const MOMENTUM_MAX: f64 = 0.005;
 const DEPTH_MAX_M: f64 = 0.002;
 
 /// A law, the number of dimensions, the slow rate, the share of lost states.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Serialize)]
 pub(crate) struct Case {
-    law: String,
+    law: &'static str,
     stiffness_n_m: f64,
-    space: String,
+    space: &'static str,
     rate_hz: f64,
     jitter: f64,
     loss: f64,
@@ -88,40 +91,30 @@ impl Experiment for Drop {
     type Row = Row;
     const NAME: &'static str = "drop";
     const TITLE: &'static str = "50 g fall on 100 g on springs, separate clocks: peak energy of every contact law";
+    const TABLE: fn(&[Row]) -> Table = |rows| {
+        let of = |here: &[Row], number: fn(&Row) -> f64| worst_of(here, |_| true, number);
+        table!(rows.chunk_by(|a, b| a.case.key() == b.case.key()), |here| law: here[0].case.law,
+            k_n_m: here[0].case.stiffness_n_m, space: here[0].case.space, rate_hz: here[0].case.rate_hz,
+            "raw peak"(3): of(here, |r| r.raw_peak), peak(4): of(here, |r| r.common_peak),
+            "momentum error"(5): of(here, |r| r.momentum_error), depth_mm(4): 1e3 * of(here, |r| r.depth_m))
+    };
 
     fn cases(quick: bool) -> Vec<Case> {
-        let (rates, losses) = if quick { (&RATES_HZ[2..3], &LOSSES[1..2]) } else { (&RATES_HZ[..], &LOSSES[..]) };
+        let (rates_hz, losses) = if quick { (&RATES_HZ[2..3], &LOSSES[1..2]) } else { (&RATES_HZ[..], &LOSSES[..]) };
         let seeds = if quick { QUICK_SEEDS } else { SEEDS };
-        let mut cases = Vec::new();
-        for (law, stiffness_n_m) in LAWS {
-            for space in SPACES {
-                for &rate_hz in rates {
-                    let of = |&loss: &f64| Case {
-                        law: law.to_owned(),
-                        stiffness_n_m,
-                        space: space.to_owned(),
-                        rate_hz,
-                        jitter: JITTER,
-                        loss,
-                        seeds,
-                    };
-                    cases.extend(losses.iter().map(of));
-                }
-            }
-        }
-        cases
+        each!((law, stiffness_n_m) in LAWS, space in SPACES, &rate_hz in rates_hz, &loss in losses =>
+            Case { law, stiffness_n_m, space, rate_hz, jitter: JITTER, loss, seeds })
     }
 
-    fn measure(case: &Case) -> Row {
-        let falls: Vec<Found> = (1..=case.seeds).map(|seed| fall(case, seed).unwrap_or(Found::BROKEN)).collect();
-        let greatest = |of: fn(&Found) -> f64| worst(falls.iter().map(of));
-        let found = Found {
+    fn measure(case: &Case) -> Option<Found> {
+        let falls: Vec<Found> = (1..=case.seeds).map(|seed| fall(case, seed).unwrap_or_else(blank)).collect();
+        let greatest = |number: fn(&Found) -> f64| worst(falls.iter().map(number));
+        Some(Found {
             raw_peak: greatest(|f| f.raw_peak),
             common_peak: greatest(|f| f.common_peak),
             momentum_error: greatest(|f| f.momentum_error),
             depth_m: greatest(|f| f.depth_m),
-        };
-        Row { case: case.clone(), found }
+        })
     }
 
     fn figure(rows: &[Row]) -> Figure {
@@ -134,54 +127,21 @@ impl Experiment for Drop {
         Figure::new(format!("50 g fall on 100 g on springs; the worst of {SEEDS} seeds and all loss rates"), 2, panels)
     }
 
-    fn table(rows: &[Row]) -> Table {
-        let mut table =
-            Table::new(&["law", "k_n_m", "space", "rate_hz", "raw peak", "peak", "momentum error", "depth_mm"]);
-        for (law, k) in LAWS {
-            for space in SPACES {
-                for rate_hz in RATES_HZ {
-                    let here: Vec<&Row> = rows.iter().filter(|r| r.case.matches(law, k, space, rate_hz)).collect();
-                    if here.is_empty() {
-                        continue;
-                    }
-                    let of = |get: fn(&Row) -> f64| worst(here.iter().map(|r| get(r)));
-                    table.rows.push(vec![
-                        law.into(),
-                        (k, 0).into(),
-                        space.into(),
-                        (rate_hz, 0).into(),
-                        (of(|r| r.raw_peak), 3).into(),
-                        (of(|r| r.common_peak), 4).into(),
-                        (of(|r| r.momentum_error), 5).into(),
-                        (1e3 * of(|r| r.depth_m), 4).into(),
-                    ]);
-                }
-            }
-        }
-        table
-    }
-
     fn findings(rows: &[Row]) -> Vec<Finding> {
-        let ours = || rows.iter().filter(|r| r.case.law == "ledger");
-        let at_60 = ours().filter(|r| r.case.rate_hz == 60.0).map(|r| r.depth_m);
-        Finding::all_at_most([
-            ("ledger: peak of the sum over two clocks", worst(ours().map(|r| r.raw_peak)), RAW_MAX),
-            ("ledger: peak at a common time", worst(ours().map(|r| r.common_peak)), COMMON_ENERGY_MAX),
-            ("ledger: momentum error", worst(ours().map(|r| r.momentum_error)), MOMENTUM_MAX),
-            ("ledger: overlap at rest at 60 Hz, m", worst(at_60), DEPTH_MAX_M),
-        ])
+        let ours = |number: fn(&Row) -> f64| worst_of(rows, |r| r.case.law == "ledger", number);
+        let at_60 = worst_of(rows, |r| r.case.law == "ledger" && r.case.rate_hz == 60.0, |r| r.depth_m);
+        claims![
+            "ledger: peak of the sum over two clocks" => ours(|r| r.raw_peak), at_most RAW_MAX;
+            "ledger: peak at a common time" => ours(|r| r.common_peak), at_most COMMON_ENERGY_MAX;
+            "ledger: momentum error" => ours(|r| r.momentum_error), at_most MOMENTUM_MAX;
+            "ledger: overlap at rest at 60 Hz, m" => at_60, at_most DEPTH_MAX_M;
+        ]
     }
-}
-
-impl Found {
-    const BROKEN: Self =
-        Self { raw_peak: f64::NAN, common_peak: f64::NAN, momentum_error: f64::NAN, depth_m: f64::NAN };
 }
 
 impl Case {
-    fn matches(&self, law: &str, stiffness_n_m: f64, space: &str, rate_hz: f64) -> bool {
-        (self.law.as_str(), self.stiffness_n_m, self.space.as_str(), self.rate_hz)
-            == (law, stiffness_n_m, space, rate_hz)
+    fn key(&self) -> (&'static str, f64, &'static str, f64) {
+        (self.law, self.stiffness_n_m, self.space, self.rate_hz)
     }
 }
 
@@ -256,8 +216,8 @@ pub(crate) fn pair(space: &str, law: PairLaw, rate_hz: f64, faults: Faults, fall
 
 fn fall(case: &Case, seed: u64) -> Option<Found> {
     let faults = Faults { jitter: case.jitter, loss: case.loss, seed, due: false };
-    let law = law(&case.law, case.stiffness_n_m, DAMPING_RATIO);
-    let Pair { play, mounted, falling, zero_j } = pair(&case.space, law, case.rate_hz, faults, FALL_M)?;
+    let law = law(case.law, case.stiffness_n_m, DAMPING_RATIO);
+    let Pair { play, mounted, falling, zero_j } = pair(case.space, law, case.rate_hz, faults, FALL_M)?;
     let start_j = play.raw_j() - zero_j;
     let mut out = Found { raw_peak: 1.0, common_peak: 1.0, momentum_error: 0.0, depth_m: 0.0 };
     let mut contact = [ContactImpulse::default(); 2];
@@ -283,10 +243,10 @@ fn fall(case: &Case, seed: u64) -> Option<Found> {
 }
 
 /// A quantity over the slow body's rate, one line per law.
-fn panel(space: &str, rows: &[Row], y: Axis, get: fn(&Row) -> f64) -> Panel {
-    let line = |((law, k), colour): ((&str, f64), Colour)| {
+fn panel(space: &'static str, rows: &[Row], y: Axis, get: fn(&Row) -> f64) -> Panel {
+    let line = |((law, k), colour): ((&'static str, f64), Colour)| {
         let at = |rate_hz: f64| {
-            let worst = worst(rows.iter().filter(|r| r.case.matches(law, k, space, rate_hz)).map(get));
+            let worst = worst_of(rows, |r| r.case.key() == (law, k, space, rate_hz), get);
             (rate_hz, worst.max(y.low) + 0.0 * worst)
         };
         let label = if k > 0.0 { format!("{law}, {k} N/m") } else { law.to_owned() };

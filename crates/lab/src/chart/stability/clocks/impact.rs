@@ -2,7 +2,10 @@
 
 use crate::chart::lockstep_run::{LockstepRun, members};
 use crate::chart::stability::common::plain_body;
-use crate::chart::{Axis, Colour, Experiment, Figure, Finding, Layer, Measured, Panel, Table, span, worst};
+use crate::chart::{
+    Axis, Colour, Experiment, Figure, Finding, Layer, Measured, Panel, Table, claims, count_of, each, span, table,
+    worst, worst_of,
+};
 use glam::DVec3;
 use metachron_contact::Law;
 use metachron_contact::audit::settled;
@@ -11,6 +14,7 @@ use metachron_geometry::Solid;
 use metachron_models::rigid::{RigidBody, RigidSpec};
 use metachron_runtime::AgentSpawn;
 use serde::{Deserialize, Serialize};
+use std::collections::BTreeSet;
 
 /// The experiment.
 pub(crate) struct Impact;
@@ -27,7 +31,7 @@ const SECONDS: f64 = 0.6;
 const TOLERANCE: f64 = 0.01;
 
 /// A pair.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Serialize)]
 pub(crate) struct Case {
     restitution: f64,
     /// Mass of the ball that is hit over that of the ball that flies.
@@ -51,40 +55,60 @@ pub(crate) struct Found {
     led: bool,
 }
 
-impl Default for Found {
-    fn default() -> Self {
-        let (error, momentum_error) = (f64::NAN, f64::NAN);
-        Self { error, momentum_error, kind: String::new(), steps_hitting: 0, steps_hit: 0, led: false }
-    }
-}
-
 type Row = Measured<Case, Found>;
 
 impl Experiment for Impact {
     type Row = Row;
     const NAME: &'static str = "impact";
     const TITLE: &'static str = "impact of two balls on different clocks: velocities against the closed form";
+    const TABLE: fn(&[Row]) -> Table = |rows| {
+        let pairs =
+            rows.chunk_by(|a, b| (a.case.restitution, a.case.mass_ratio) == (b.case.restitution, b.case.mass_ratio));
+        table!(pairs, |here| e(1): here[0].case.restitution, mass_ratio(3): here[0].case.mass_ratio,
+            "worst error"(9): worst_of(here, |_| true, |r| r.error),
+            "worst momentum error"(9): worst_of(here, |_| true, |r| r.momentum_error),
+            kinds: here.iter().map(|r| r.kind.as_str()).collect::<BTreeSet<_>>().into_iter().collect::<Vec<_>>().join(" "))
+    };
 
     fn cases(quick: bool) -> Vec<Case> {
         let ratios = if quick { &[1.0, 10.0, 1000.0][..] } else { &MASS_RATIOS[..] };
         let rates = if quick { &RATES_HZ[2..4] } else { &RATES_HZ[..] };
-        let mut cases = Vec::new();
-        for restitution in RESTITUTIONS {
-            for &mass_ratio in ratios {
-                let case = |&[rate_hitting_hz, rate_hit_hz]: &[f64; 2]| Case {
-                    restitution,
-                    mass_ratio,
-                    rate_hitting_hz,
-                    rate_hit_hz,
-                };
-                cases.extend(rates.iter().map(case));
-            }
-        }
-        cases
+        each!(restitution in RESTITUTIONS, &mass_ratio in ratios, &[rate_hitting_hz, rate_hit_hz] in rates =>
+            Case { restitution, mass_ratio, rate_hitting_hz, rate_hit_hz })
     }
 
-    fn measure(case: &Case) -> Row {
-        Row { case: case.clone(), found: collide(case).unwrap_or_default() }
+    fn measure(case: &Case) -> Option<Found> {
+        let masses = [0.1, 0.1 * case.mass_ratio];
+        let ball = |x: f64, speed: f64, mass: f64| {
+            let plain = plain_body(Solid::Ball { radius_m: RADIUS_M }, DVec3::X * x, mass);
+            RigidBody::new(RigidSpec { velocity: DVec3::X * speed, restitution: case.restitution, ..plain }).ok()
+        };
+        let far = GAP_M + 2.0 * RADIUS_M;
+        let (hitting, hit) = (ball(0.0, CLOSING_M_S, masses[0])?, ball(far, 0.0, masses[1])?);
+        let alone = |name: &str, ball: RigidBody, rate_hz: f64| AgentSpawn::alone(name, Box::new(ball), rate_hz);
+        let mut hitting = alone("hitting", hitting, case.rate_hitting_hz);
+        hitting.laws = vec![(AgentId(1), Law::Ledger)];
+        let spawns = vec![hitting, alone("hit", hit, case.rate_hit_hz)];
+        let mut run = LockstepRun::start(spawns).ok()?;
+        run.run_to(SECONDS);
+        let snapshots = run.snapshots();
+        let members = members(&snapshots);
+        let at = SimTime::ZERO + SimSpan::from_secs_f64(SECONDS)?;
+        let speeds = [settled(&members[0], &members, at)?.velocity, settled(&members[1], &members, at)?.velocity];
+        let share = masses[1] / (masses[0] + masses[1]);
+        let closed = [1.0 - (1.0 + case.restitution) * share, (1.0 + case.restitution) * (1.0 - share)];
+        let error = speeds.iter().zip(closed).map(|(v, c)| v.distance(DVec3::X * (c * CLOSING_M_S)) / CLOSING_M_S);
+        let momentum = speeds[0] * masses[0] + speeds[1] * masses[1];
+        let pair = snapshots.iter().flat_map(|s| &s.pairs).next();
+        let steps = run.steps();
+        Some(Found {
+            error: worst(error),
+            momentum_error: momentum.distance(DVec3::X * (masses[0] * CLOSING_M_S)) / (masses[0] * CLOSING_M_S),
+            kind: pair.map_or_else(String::new, |pair| pair.kind.name().to_owned()),
+            steps_hitting: steps.first()?.0,
+            steps_hit: steps.get(1)?.0,
+            led: steps.iter().any(|(_, leader)| leader.is_some()),
+        })
     }
 
     fn figure(rows: &[Row]) -> Figure {
@@ -106,73 +130,11 @@ impl Experiment for Impact {
         Figure::new("Impact of two balls on two clocks", 3, panels.collect())
     }
 
-    fn table(rows: &[Row]) -> Table {
-        let mut table = Table::new(&["e", "mass_ratio", "worst error", "worst momentum error", "kinds"]);
-        for e in RESTITUTIONS {
-            for ratio in MASS_RATIOS {
-                let same = |r: &&Row| r.case.restitution == e && r.case.mass_ratio == ratio;
-                let here: Vec<&Row> = rows.iter().filter(same).collect();
-                if here.is_empty() {
-                    continue;
-                }
-                let mut kinds: Vec<&str> = here.iter().map(|r| r.kind.as_str()).collect();
-                kinds.sort_unstable();
-                kinds.dedup();
-                table.rows.push(vec![
-                    (e, 1).into(),
-                    (ratio, 3).into(),
-                    (worst(here.iter().map(|r| r.error)), 9).into(),
-                    (worst(here.iter().map(|r| r.momentum_error)), 9).into(),
-                    kinds.join(" ").into(),
-                ]);
-            }
-        }
-        table
-    }
-
     fn findings(rows: &[Row]) -> Vec<Finding> {
-        let other = rows.iter().filter(|r| r.kind != PairKind::Ledger.name() || r.led).count();
-        Finding::all_at_most([
-            (
-                "velocities after the impact: error over the closing speed",
-                worst(rows.iter().map(|r| r.error)),
-                TOLERANCE,
-            ),
-            ("pairs not coupled by the ledger, or stepped in one cluster", other as f64, 0.0),
-        ])
+        let other = count_of(rows, |r| r.kind != PairKind::Ledger.name() || r.led);
+        claims![
+            "velocities after the impact: error over the closing speed" => worst_of(rows, |_| true, |r| r.error), at_most TOLERANCE;
+            "pairs not coupled by the ledger, or stepped in one cluster" => other, at_most 0.0;
+        ]
     }
-}
-
-fn collide(case: &Case) -> Option<Found> {
-    let masses = [0.1, 0.1 * case.mass_ratio];
-    let ball = |x: f64, speed: f64, mass: f64| {
-        let plain = plain_body(Solid::Ball { radius_m: RADIUS_M }, DVec3::X * x, mass);
-        RigidBody::new(RigidSpec { velocity: DVec3::X * speed, restitution: case.restitution, ..plain }).ok()
-    };
-    let far = GAP_M + 2.0 * RADIUS_M;
-    let (hitting, hit) = (ball(0.0, CLOSING_M_S, masses[0])?, ball(far, 0.0, masses[1])?);
-    let alone = |name: &str, ball: RigidBody, rate_hz: f64| AgentSpawn::alone(name, Box::new(ball), rate_hz);
-    let mut hitting = alone("hitting", hitting, case.rate_hitting_hz);
-    hitting.laws = vec![(AgentId(1), Law::Ledger)];
-    let spawns = vec![hitting, alone("hit", hit, case.rate_hit_hz)];
-    let mut run = LockstepRun::start(spawns).ok()?;
-    run.run_to(SECONDS);
-    let snapshots = run.snapshots();
-    let members = members(&snapshots);
-    let at = SimTime::ZERO + SimSpan::from_secs_f64(SECONDS)?;
-    let speeds = [settled(&members[0], &members, at)?.velocity, settled(&members[1], &members, at)?.velocity];
-    let share = masses[1] / (masses[0] + masses[1]);
-    let closed = [1.0 - (1.0 + case.restitution) * share, (1.0 + case.restitution) * (1.0 - share)];
-    let error = speeds.iter().zip(closed).map(|(v, c)| v.distance(DVec3::X * (c * CLOSING_M_S)) / CLOSING_M_S);
-    let momentum = speeds[0] * masses[0] + speeds[1] * masses[1];
-    let pair = snapshots.iter().flat_map(|s| &s.pairs).next();
-    let steps = run.steps();
-    Some(Found {
-        error: worst(error),
-        momentum_error: momentum.distance(DVec3::X * (masses[0] * CLOSING_M_S)) / (masses[0] * CLOSING_M_S),
-        kind: pair.map_or_else(String::new, |pair| pair.kind.name().to_owned()),
-        steps_hitting: steps.first()?.0,
-        steps_hit: steps.get(1)?.0,
-        led: steps.iter().any(|(_, leader)| leader.is_some()),
-    })
 }

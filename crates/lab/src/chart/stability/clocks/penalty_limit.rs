@@ -9,7 +9,7 @@
 
 use super::drop::{FALLING_KG, MOUNTED_KG, Pair, law, pair};
 use crate::chart::asynchronous::bench::Faults;
-use crate::chart::{Axis, Colour, Experiment, Figure, Finding, Layer, Measured, worst};
+use crate::chart::{Axis, Colour, Experiment, Figure, Finding, Layer, Measured, Table, claims, each, table, worst_of};
 use serde::{Deserialize, Serialize};
 
 /// The experiment.
@@ -32,9 +32,9 @@ const HALVINGS: u32 = 18;
 const APART_MAX: f64 = 2.0;
 
 /// A law and a rate.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Serialize)]
 pub(crate) struct Case {
-    law: String,
+    law: &'static str,
     rate_hz: f64,
     halvings: u32,
 }
@@ -54,16 +54,16 @@ impl Experiment for PenaltyLimit {
     type Row = Row;
     const NAME: &'static str = "penalty-limit";
     const TITLE: &'static str = "stability limit of penalty contact from stale states, compared with 0.55 μ/τ²";
-    const COLUMNS: &'static str =
-        "law, rate_hz.0, measured_n_m.2, theory_n_m.2 as 0.55 μ/τ², measured_n_m/theory_n_m.2 as measured / formula";
+    const TABLE: fn(&[Row]) -> Table = table!(|r| law: r.case.law, rate_hz: r.case.rate_hz,
+        measured_n_m(2): r.measured_n_m, "0.55 μ/τ²"(2): r.theory_n_m,
+        "measured / formula"(2): r.measured_n_m / r.theory_n_m);
 
     fn cases(quick: bool) -> Vec<Case> {
-        let (rates, halvings) = if quick { (&RATES_HZ[2..3], 8) } else { (&RATES_HZ[..], HALVINGS) };
-        let of = |law: &'static str| rates.iter().map(move |&rate_hz| Case { law: law.to_owned(), rate_hz, halvings });
-        LAWS.into_iter().flat_map(of).collect()
+        let (rates_hz, halvings) = if quick { (&RATES_HZ[2..3], 8) } else { (&RATES_HZ[..], HALVINGS) };
+        each!(law in LAWS, &rate_hz in rates_hz => Case { law, rate_hz, halvings })
     }
 
-    fn measure(case: &Case) -> Row {
+    fn measure(case: &Case) -> Option<Found> {
         let [mut low, mut high] = STIFFNESS_N_M.map(libm::log);
         for _ in 0..case.halvings {
             let middle = 0.5 * (low + high);
@@ -71,9 +71,7 @@ impl Experiment for PenaltyLimit {
         }
         let reduced_kg = MOUNTED_KG * FALLING_KG / (MOUNTED_KG + FALLING_KG);
         let tau_s = 0.5 / case.rate_hz;
-        let measured_n_m = libm::exp(0.5 * (low + high));
-        let theory_n_m = LIMIT * reduced_kg / (tau_s * tau_s);
-        Row { case: case.clone(), found: Found { measured_n_m, theory_n_m } }
+        Some(Found { measured_n_m: libm::exp(0.5 * (low + high)), theory_n_m: LIMIT * reduced_kg / (tau_s * tau_s) })
     }
 
     fn figure(rows: &[Row]) -> Figure {
@@ -89,14 +87,13 @@ impl Experiment for PenaltyLimit {
 
     fn findings(rows: &[Row]) -> Vec<Finding> {
         let factor = |r: &Row| (r.measured_n_m / r.theory_n_m).max(r.theory_n_m / r.measured_n_m);
-        let apart = worst(rows.iter().map(factor));
-        vec![Finding::at_most("measured limit over 0.55 μ/τ², τ = H/2, or its inverse", apart, APART_MAX)]
+        claims!["measured limit over 0.55 μ/τ², τ = H/2, or its inverse" => worst_of(rows, |_| true, factor), at_most APART_MAX]
     }
 }
 
 /// Whether the motion decays at this stiffness.
 fn decays(case: &Case, stiffness_n_m: f64) -> bool {
-    let law = law(&case.law, stiffness_n_m, DAMPING_RATIO);
+    let law = law(case.law, stiffness_n_m, DAMPING_RATIO);
     let faults = Faults { seed: 1, due: true, ..Faults::default() };
     let set = pair("1d", law, case.rate_hz, faults, FALL_M);
     let Some(Pair { play, zero_j, .. }) = set else { return false };
