@@ -17,6 +17,8 @@ const LENT: f64 = 1e-3;
 const MASS_MIN_KG: f64 = 1e-9;
 /// Least moment of inertia, of the sum of all three.
 const LEAST: f64 = 1e-9;
+/// A moment of inertia below this share of the stand-in's is none: files have products of rounding where they mean nothing.
+const NOTHING: f64 = 1e-6;
 /// How much of the sum the triangle inequality may be missed by: files write few digits.
 const SLACK: f64 = 2e-4;
 /// How often the addition to moments is doubled: from 1e-4 of the largest to far beyond it.
@@ -150,11 +152,13 @@ pub(crate) fn ball(link: &Link, at_m: DVec3, radius_m: f64) -> Part {
 /// For moments that no addition makes possible: they or their sum are not finite.
 pub(crate) fn repair(link: &mut Link, notes: &mut Vec<LeftOut>) -> Result<(), ImportError> {
     let Mass::Given { mass_kg, inertia_kg_m2: Some(tensor), .. } = &mut link.mass else { return Ok(()) };
-    if is_of_a_body(*tensor) {
+    let stand_in = 0.4 * *mass_kg * STAND_IN_M * STAND_IN_M;
+    let scale = tensor.to_cols_array().iter().fold(0.0_f64, |most, value| most.max(value.abs()));
+    let is_none = scale < NOTHING * stand_in;
+    if is_of_a_body(*tensor) && !is_none {
         return Ok(());
     }
-    let scale = tensor.to_cols_array().iter().fold(0.0_f64, |most, value| most.max(value.abs()));
-    let least = if scale > 0.0 { 1e-4 * scale } else { 0.4 * *mass_kg * STAND_IN_M * STAND_IN_M };
+    let least = if is_none { stand_in } else { 1e-4 * scale };
     let raised = |by: f64| *tensor + DMat3::from_diagonal(DVec3::splat(by));
     let Some(added) = (0..DOUBLINGS).map(|i| least * 2.0_f64.powi(i)).find(|by| is_of_a_body(raised(*by))) else {
         return Err(link.place.wrong("has moments of inertia that no body can have; expected some with a finite sum"));
@@ -210,6 +214,8 @@ mod tests {
     #[test]
     fn moments_that_no_body_has_are_raised_and_others_stay() {
         assert_eq!(repaired([1.0, 2.0, 3.0]), (DVec3::new(1.0, 2.0, 3.0), 0)); // a flat plate
+        // a body of 2 kg that turns as easily as one of a nanometre has none that are meant
+        assert_eq!(repaired([2e-18; 3]), (DVec3::splat(2e-18 + 0.4 * 2.0 * 1e-4), 1));
         for moments in [[1.0, 1.0, 3.0], [1.0, 1.0, 0.0], [0.0; 3], [-1.0, 1.0, 1.0]] {
             let (raised, notes) = repaired(moments);
             let (most, sum) = (raised.max_element(), raised.element_sum());

@@ -1,5 +1,5 @@
-//! Brings a model to a form that a scene can have: links without mass become part of the links that they are on, and
-//! nothing is without a shape.
+//! Brings a model to a form that a scene can have: links that a fixed joint holds, and links without mass, become part of the bodies that they
+//! are on, and nothing is without a shape.
 //!
 //! In: a [`Model`] as the file has it. Out: the same where every link has a mass and a part. Never here: XML, TOML.
 
@@ -7,8 +7,10 @@ use crate::imported::{ImportError, LeftOut};
 use crate::masses::{STAND_IN_M, ball, lend, repair};
 use crate::model::{End, Fixed, Joint, Kind, Link, Mass, Model, Part, TieKind, Why};
 use crate::pose::Pose;
+use crate::weight::Weight;
 use glam::{DMat3, DVec3};
 use metachron_geometry::COMPOUND_PARTS_MAX;
+use std::collections::BTreeSet;
 
 /// The outcome for a link.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -36,17 +38,23 @@ pub(crate) fn settle(mut model: Model, fixed_base: bool, notes: &mut Vec<LeftOut
     for (at, link) in model.links.iter().enumerate() {
         let joint = above[at].map(|joint| &model.joints[joint]);
         let own = fate(link, joint, &fates, &model)?;
-        if let Some(joint) = joint.filter(|joint| own != Fate::Itself && joint.kind != Kind::Fixed) {
-            notes.push(link.place.note(format!("has no mass, and carries none: {} is fixed", joint.place.label)));
+        if let Some(joint) = joint.filter(|_| own != Fate::Itself) {
+            note_fate(link, joint, own, &model, notes);
         }
         fates.push(own);
     }
+    let touched: Vec<bool> = model.links.iter().map(|link| link.parts.iter().any(|part| part.touches)).collect();
     for (at, fate) in fates.iter().enumerate() {
         let parts = if *fate == Fate::Itself { continue } else { std::mem::take(&mut model.links[at].parts) };
         match *fate {
             Fate::PartOf(host, pose) => {
                 let moved = parts.into_iter().map(|part| Part { pose: pose.then(part.pose), ..part });
-                model.links[host].parts.extend(moved);
+                let weights = [host, at].map(|link| Weight::given(&model.links[link].mass));
+                let host = &mut model.links[host];
+                host.parts.extend(moved);
+                if let [Some(own), Some(more)] = weights {
+                    host.mass = Weight::together(&[own, more.at(pose)]);
+                }
             }
             _ => {
                 let link = &model.links[at];
@@ -57,7 +65,7 @@ pub(crate) fn settle(mut model: Model, fixed_base: bool, notes: &mut Vec<LeftOut
     }
     move_ties(&mut model, &fates, notes);
     move_joints(&mut model, &fates, notes);
-    pass_excluded(&mut model, &fates);
+    pass_excluded(&mut model, &fates, &touched);
     keep(&mut model, &fates);
     model.pass_neighbours();
     for link in &mut model.links {
@@ -66,6 +74,16 @@ pub(crate) fn settle(mut model: Model, fixed_base: bool, notes: &mut Vec<LeftOut
     }
     model.drop_unnamed_files();
     Ok(model)
+}
+
+/// Lists a link that is no body of its own.
+fn note_fate(link: &Link, joint: &Joint, fate: Fate, model: &Model, notes: &mut Vec<LeftOut>) {
+    if joint.kind != Kind::Fixed {
+        notes.push(link.place.note(format!("has no mass, and carries none: {} is fixed", joint.place.label)));
+    } else if let (Fate::PartOf(host, _), Mass::Given { .. }) = (fate, link.mass) {
+        let what = format!("is part of `{}`, to which it is fixed", model.links[host].name);
+        notes.push(link.place.note(what).harmless());
+    }
 }
 
 /// A part of a link that is part of the world.
@@ -95,20 +113,23 @@ fn fix_bases(model: &mut Model) {
     model.joints = welds.into_iter().chain(joints).collect();
 }
 
-/// Brings the pairs that the file excludes to the bodies that links become.
-fn pass_excluded(model: &mut Model, fates: &[Fate]) {
+/// Brings the pairs that the file excludes to the bodies that links become: two of several links each pass through each other where all of
+/// their links do that something touches.
+fn pass_excluded(model: &mut Model, fates: &[Fate], touched: &[bool]) {
+    let body = |link: usize| if let Fate::PartOf(host, _) = fates[link] { host } else { link };
+    let excluded: BTreeSet<[usize; 2]> = model.excluded.iter().flat_map(|&[a, b]| [[a, b], [b, a]]).collect();
+    let links = |of: usize| (0..fates.len()).filter(move |link| body(*link) == of && touched[*link]);
+    let pass = |&[a, b]: &[usize; 2]| links(a).all(|one| links(b).all(|other| excluded.contains(&[one, other])));
     let names = |link: usize| -> Vec<String> {
-        match fates[link] {
-            Fate::Itself => vec![model.links[link].name.clone()],
-            Fate::PartOf(host, _) => vec![model.links[host].name.clone()],
-            Fate::World => {
-                let own = model.fixed.iter().filter(|fixed| fixed.link == Some(link) && fixed.can_pass());
-                own.map(|fixed| fixed.name.clone()).collect()
-            }
+        if fates[link] == Fate::Itself {
+            return vec![model.links[link].name.clone()];
         }
+        let own = model.fixed.iter().filter(|fixed| fixed.link == Some(link) && fixed.can_pass());
+        own.map(|fixed| fixed.name.clone()).collect()
     };
     let moving = model.excluded.iter().filter(|pair| pair.iter().any(|link| fates[*link] != Fate::World));
-    let pairs: Vec<[Vec<String>; 2]> = moving.map(|pair| pair.map(names)).collect();
+    let pairs: Vec<[Vec<String>; 2]> =
+        moving.map(|pair| pair.map(body)).filter(pass).map(|pair| pair.map(names)).collect();
     for [first, second] in pairs {
         for (a, b) in first.iter().flat_map(|a| second.iter().map(move |b| (a, b))) {
             model.let_pass(a, b, Why::Excluded);
@@ -118,7 +139,8 @@ fn pass_excluded(model: &mut Model, fates: &[Fate]) {
 
 /// The fate of a link, where the links before it have theirs.
 fn fate(link: &Link, joint: Option<&Joint>, before: &[Fate], model: &Model) -> Result<Fate, ImportError> {
-    if !matches!(link.mass, Mass::None) {
+    let weighs = !matches!(link.mass, Mass::None);
+    if weighs && (link.is_free || joint.is_none_or(|joint| joint.kind != Kind::Fixed)) {
         return Ok(Fate::Itself);
     }
     if link.is_free {
@@ -129,11 +151,26 @@ fn fate(link: &Link, joint: Option<&Joint>, before: &[Fate], model: &Model) -> R
         let reason = format!("has no mass, and {} lets it move; expected a mass above zero", joint.place.label);
         return Err(link.place.wrong(reason));
     }
-    Ok(match joint.parent.map(|parent| (parent, before[parent])) {
-        None | Some((_, Fate::World)) => Fate::World,
-        Some((parent, Fate::Itself)) => Fate::PartOf(parent, model.links[parent].pose.inverse().then(link.pose)),
-        Some((_, Fate::PartOf(host, _))) => Fate::PartOf(host, model.links[host].pose.inverse().then(link.pose)),
-    })
+    let host = match joint.parent.map(|parent| (parent, before[parent])) {
+        None | Some((_, Fate::World)) => return Ok(Fate::World),
+        Some((parent, Fate::Itself)) => parent,
+        Some((_, Fate::PartOf(host, _))) => host,
+    };
+    if weighs && !can_join(link, host, before, &model.links) {
+        return Ok(Fate::Itself);
+    }
+    Ok(Fate::PartOf(host, model.links[host].pose.inverse().then(link.pose)))
+}
+
+/// Whether a link that weighs something can be part of the body of another: it has a mass and a surface for all of its solids, and room for so
+/// many.
+fn can_join(link: &Link, host: usize, before: &[Fate], links: &[Link]) -> bool {
+    let of_host = before.iter().zip(links).filter(|(fate, _)| matches!(fate, Fate::PartOf(body, _) if *body == host));
+    let parts: usize = of_host.map(|(_, link)| link.parts.len()).sum();
+    let host = &links[host];
+    [link, host].iter().all(|one| Weight::given(&one.mass).is_some())
+        && link.look.surface == host.look.surface
+        && parts + host.parts.len() + link.parts.len() <= COMPOUND_PARTS_MAX
 }
 
 /// How much longer than its rope a distance may be by rounding alone, metres.

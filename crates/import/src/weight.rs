@@ -19,6 +19,12 @@ pub(crate) struct Weight {
 }
 
 impl Weight {
+    /// That of a body whose moments are given, in its axes.
+    pub(crate) fn given(mass: &Mass) -> Option<Self> {
+        let Mass::Given { mass_kg, com_m, inertia_kg_m2: Some(inertia_kg_m2) } = *mass else { return None };
+        Some(Self { mass_kg, com_m, inertia_kg_m2 })
+    }
+
     /// A solid of a density; `None` for one that has no closed form.
     pub(crate) fn of_solid(solid: &Solid, density_kg_m3: f64) -> Option<Self> {
         let mass_kg = solid.volume_m3().ok()? * density_kg_m3;

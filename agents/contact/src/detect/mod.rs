@@ -149,9 +149,9 @@ impl Search {
             }
             while let Some(&[_, other]) = pairs.next_if(|pair| pair[0] == member) {
                 if !(self.is_pile(member) && self.is_pile(other))
+                    && !scene.lets_through([all[member].id, all[other].id])
                     && all[member].may_touch(&all[other])
                     && [member, other].iter().any(|at| all[*at].member.role() != Role::Kinematic)
-                    && !scene.lets_through([all[member].id, all[other].id])
                 {
                     self.find_of(round, Pair { member, against: Against::Member(other) });
                 }

@@ -58,13 +58,16 @@ impl ClusterStepper {
             all[a].memory.meet(other, now);
         }
         let mut sensed = search.sensed.as_slice();
+        let holds = constraints.owners.iter().any(|owner| owner.hold.is_some());
         for (member, one) in all.iter_mut().enumerate() {
             let (mine, others) = sensed.split_at(sensed.partition_point(|pair| pair.member <= member));
             sensed = others;
             let begins = SimSpan::from_secs_f64(external.after_s).unwrap_or(SimSpan::ZERO);
             one.memory.sense(mine.iter().map(|pair| pair.partner), one.context.time + begins);
             one.memory.turn(one.context.time + dt);
-            constraints.grips(member, &solver.solution().rows_n_s, *macro_s, one.grips);
+            if holds {
+                constraints.grips(member, &solver.solution().rows_n_s, *macro_s, one.grips);
+            }
         }
     }
 

@@ -99,7 +99,7 @@ impl RigidBody {
         motion.angular += given;
         motion.velocity = restraint.translation(v[0]);
         motion.position += motion.velocity * h_s;
-        motion.turn_within(&self.spread, &restraint, h_s);
+        motion.turn_held(&self.spread, &restraint, h_s);
         motion
     }
 
@@ -138,7 +138,7 @@ impl ClusterMember for RigidBody {
 
     fn begin(&mut self, h_s: f64) -> Result<(), StepError> {
         let mut flight = self.motion;
-        flight.fly(&self.spread, &self.flight, h_s);
+        flight.fly_predicted(&self.spread, &self.flight, h_s);
         let masses = self.masses();
         let Unknowns { blocks, free, now, .. } = &mut self.unknowns;
         *now = [self.motion.velocity, self.motion.spin(&self.spread)];

@@ -4,7 +4,8 @@
 //!
 //! Translation is a parabola, evaluated in closed form; so is the rotation of a body of which two principal moments are equal.
 //! Any other one conserves the angular momentum L in world axes to the bit and turns the body about its three principal axes one
-//! after the other (DLM97), symmetrically, composed to fourth order (SUZ90): energy does not drift, for flights of any length.
+//! after the other (DLM97), symmetrically: of a flight composed to fourth order (SUZ90), so that energy does not drift over flights of any
+//! length; within a step in which impulses change L anyway, once, to the second order of such a step.
 
 use super::Restraint;
 use super::mass_properties::MassDistribution;
@@ -31,7 +32,7 @@ pub(super) struct Flight {
     pub restraint: Restraint,
 }
 
-/// A part of a flight turns the body by at most this, radians: fourth order then leaves about 1e-6 rad a turn.
+/// A part of a turn turns the body by at most this, radians: fourth order then leaves about 1e-6 rad a turn.
 const TURN_MAX: f64 = 0.1;
 /// The most parts of one flight (reached by a body that spins at 10⁴ rad/s for a second).
 const PARTS_MAX: f64 = 1e5;
@@ -43,6 +44,9 @@ const SUZUKI: [f64; 5] = [
     0.414_490_771_794_375_7,
     0.414_490_771_794_375_7,
 ];
+
+/// The symmetric parts of which a turn is composed, as shares of it: once the whole is of second order.
+const ONCE: [f64; 1] = [1.0];
 
 impl Motion {
     /// Angular velocity in world axes, rad/s.
@@ -81,6 +85,15 @@ impl Motion {
 
     /// Flies freely for `t` seconds: by a parabola, or, where it is damped, towards its last velocity g / c, both in closed form.
     pub(super) fn fly(&mut self, body: &MassDistribution, flight: &Flight, t: f64) {
+        self.fly_by(body, flight, t, &SUZUKI);
+    }
+
+    /// The same as others predict it, who act on it: its turn is of second order.
+    pub(super) fn fly_predicted(&mut self, body: &MassDistribution, flight: &Flight, t: f64) {
+        self.fly_by(body, flight, t, &ONCE);
+    }
+
+    fn fly_by(&mut self, body: &MassDistribution, flight: &Flight, t: f64, parts: &[f64]) {
         let Flight { gravity, restraint } = *flight;
         let damping = restraint.linear_damping_per_s;
         if damping > 0.0 {
@@ -91,33 +104,35 @@ impl Motion {
             self.position += self.velocity * t + gravity * (0.5 * t * t);
             self.velocity += gravity * t;
         }
-        self.spin_freely(body, &restraint, t);
-    }
-
-    /// Turns freely for `t` seconds. An angular momentum that decays as e^(−ct) turns the body along the same path as one that stays, in
-    /// (1 − e^(−ct)) / c: Euler's equations are homogeneous.
-    fn spin_freely(&mut self, body: &MassDistribution, restraint: &Restraint, t: f64) {
+        // an angular momentum that decays as e^(−ct) turns the body along the same path as one that stays, in (1 − e^(−ct)) / c: Euler's
+        // equations are homogeneous
         let damping = restraint.angular_damping_per_s;
-        let decay = -libm::expm1(-damping * t);
-        let turns_s = if damping > 0.0 { decay / damping } else { t };
-        self.turn_within(body, restraint, turns_s);
         if damping > 0.0 {
+            let decay = -libm::expm1(-damping * t);
+            self.turn_within(body, &restraint, decay / damping, parts);
             self.angular *= 1.0 - decay;
+        } else {
+            self.turn_within(body, &restraint, t, parts);
         }
     }
 
+    /// Turns for `t` seconds with the angular momentum that the impulses of a step have left to it.
+    pub(super) fn turn_held(&mut self, body: &MassDistribution, restraint: &Restraint, t: f64) {
+        self.turn_within(body, restraint, t, &ONCE);
+    }
+
     /// Turns for `t` seconds about the axes that are left to it: with its spin, where one is locked, as a hinge lets it.
-    pub(super) fn turn_within(&mut self, body: &MassDistribution, restraint: &Restraint, t: f64) {
+    fn turn_within(&mut self, body: &MassDistribution, restraint: &Restraint, t: f64, parts: &[f64]) {
         if !restraint.locks_rotation() {
-            return self.turn(body, t);
+            return self.turn(body, t, parts);
         }
         let spin = restraint.rotation(self.spin(body));
         self.rotation = (DQuat::from_scaled_axis(spin * t) * self.rotation).normalize();
         self.set_spin(body, spin);
     }
 
-    /// Turns freely for `t` seconds; the angular momentum in world axes stays.
-    pub(super) fn turn(&mut self, body: &MassDistribution, t: f64) {
+    /// Turns freely for `t` seconds, each small turn composed of `parts`; the angular momentum in world axes stays.
+    fn turn(&mut self, body: &MassDistribution, t: f64, parts: &[f64]) {
         if self.angular == DVec3::ZERO {
             return;
         }
@@ -130,11 +145,11 @@ impl Motion {
             self.rotation = (turned * spun * self.rotation).normalize();
             return;
         }
-        let parts = (self.spin_max(body) * t / TURN_MAX).ceil().clamp(1.0, PARTS_MAX);
-        let h = t / parts;
+        let turns = (self.spin_max(body) * t / TURN_MAX).ceil().clamp(1.0, PARTS_MAX);
+        let h = t / turns;
         let mut principal = self.rotation * body.axes;
-        for _ in 0..parts as u32 {
-            for share in SUZUKI {
+        for _ in 0..turns as u32 {
+            for share in parts {
                 principal = turn_about_axes(principal, self.angular, body.moments, share * h);
             }
             principal = principal.normalize();
@@ -203,7 +218,7 @@ mod tests {
             let body = MassDistribution { moments, ..brick() };
             let mut motion = tumbling();
             let mut principal = motion.rotation * body.axes;
-            motion.turn(&body, 1.0);
+            motion.turn(&body, 1.0, &SUZUKI);
             for _ in 0..20_000 {
                 principal = turn_about_axes(principal, motion.angular, moments, 5e-5).normalize();
             }

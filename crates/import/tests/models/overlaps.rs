@@ -97,6 +97,31 @@ fn pairs_of_an_srdf_do_not_collide_and_links_that_the_robot_has_not_are_none() {
 }
 
 #[test]
+fn bodies_of_several_links_pass_through_each_other_where_all_of_their_links_do() {
+    // `0` and `tool` hang on `1` by joints, and `plate` is fixed to `0`
+    let link = |name: &str, at: f64| {
+        format!(
+            r#"<link name="{name}"><inertial><mass value="1"/><inertia ixx="1" iyy="1" izz="1"/></inertial>
+            <collision><origin xyz="{at} 0 0"/><geometry><sphere radius="0.1"/></geometry></collision></link>"#
+        )
+    };
+    let joint = |kind: &str, parent: &str, child: &str| {
+        format!(
+            r#"<joint name="{child} on {parent}" type="{kind}"><parent link="{parent}"/><child link="{child}"/></joint>"#
+        )
+    };
+    let links: String =
+        [("1", 0.0), ("0", 1.0), ("plate", 2.0), ("tool", 3.0)].map(|(name, at)| link(name, at)).concat();
+    let joints =
+        [joint("continuous", "1", "0"), joint("fixed", "0", "plate"), joint("continuous", "1", "tool")].concat();
+    let robot = format!("<robot name=\"r\">{links}{joints}</robot>");
+    let pair = |other: &str| format!(r#"<disable_collisions link1="tool" link2="{other}" reason="Never"/>"#);
+    let of = |pairs: &str| apart(&import(&robot, Some(&format!("<robot>{pairs}</robot>"))));
+    assert!(of(&pair("0")).is_empty(), "the plate and the tool collide");
+    assert_eq!(of(&(pair("0") + &pair("plate"))), [["tool", "0"]]);
+}
+
+#[test]
 fn an_exclude_with_a_body_that_never_moves_is_in_the_scene() {
     let text = r#"<mujoco><worldbody><body name="post"><geom size="0.1"/>
         <body name="arm"><joint/><geom size="0.1" pos="0 0 1"/></body></body></worldbody>

@@ -126,18 +126,23 @@ fn dampers_brakes_and_slides_are_in_the_scene() {
 }
 
 #[test]
-fn links_without_mass_are_part_of_what_they_are_on() {
+fn links_that_are_fixed_and_links_without_mass_are_part_of_what_they_are_on() {
     let robot = r#"<robot name="cart">
         <link name="base"><inertial><mass value="1"/><inertia ixx="1" iyy="1" izz="1"/></inertial></link>
         <link name="plate"><collision><geometry><box size="2 2 0.2"/></geometry></collision></link>
+        <link name="rim"><inertial><mass value="1"/><inertia ixx="1" iyy="1" izz="1"/></inertial>
+            <collision><geometry><sphere radius="0.25"/></geometry></collision></link>
         <link name="cup"><inertial><mass value="1"/><inertia ixx="1" iyy="1" izz="1"/></inertial>
             <visual><geometry><sphere radius="0.5"/></geometry><material name="red"/></visual></link>
         <joint name="a" type="fixed"><origin xyz="0 0 1"/><parent link="base"/><child link="plate"/></joint>
-        <joint name="b" type="fixed"><origin xyz="0 3 0"/><parent link="plate"/><child link="cup"/></joint>
+        <joint name="b" type="fixed"><origin xyz="0 -3 0"/><parent link="plate"/><child link="rim"/></joint>
+        <joint name="c" type="continuous"><origin xyz="0 6 0"/><parent link="rim"/><child link="cup"/></joint>
         <material name="red"><color rgba="1 0 0 1"/></material>
         <gazebo/></robot>"#;
     let imported = import(robot).unwrap();
-    assert_eq!(left_out(&imported), ["line 9: gazebo: is left out"]);
+    let listed = ["line 4: link `rim`: is part of `base`, to which it is fixed", "line 12: gazebo: is left out"];
+    assert_eq!(left_out(&imported), listed);
+    // two masses of 1 kg, 3 m apart along y and 1 m along z: by parallel axes about the middle, 1.5 m and 0.5 m away from each
     let expected = r##"format = 1
 description = "cart, imported"
 
@@ -145,14 +150,19 @@ description = "cart, imported"
 name = "base"
 model = "rigid"
 shape = "compound"
-mass_kg = 1.0
-centre_of_mass_m = [0.0, 0.0, 0.0]
-inertia_kg_m2 = [1.0, 1.0, 1.0, 0.0, 0.0, 0.0]
+mass_kg = 2.0
+centre_of_mass_m = [0.0, -1.5, 0.5]
+inertia_kg_m2 = [7.0, 2.5, 6.5, 0.0, 0.0, 1.5]
 
 [[object.part]]
 shape = "box"
 half_extents_m = [1.0, 1.0, 0.1]
 position_m = [0.0, 0.0, 1.0]
+
+[[object.part]]
+shape = "ball"
+radius_m = 0.25
+position_m = [0.0, -3.0, 1.0]
 
 [[object]]
 name = "cup"
@@ -167,11 +177,12 @@ colour = "#ff0000"
 contact = { collides_with = [] }
 
 [[joint]]
-name = "b"
-kind = "fixed"
+name = "c"
+kind = "revolute"
 a = "base"
 b = "cup"
 at_a_m = [0.0, 3.0, 1.0]
+axis = [1.0, 0.0, 0.0]
 "##;
     assert_eq!(imported.toml, expected);
 }

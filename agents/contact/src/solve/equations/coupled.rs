@@ -84,19 +84,20 @@ impl Coupled {
         refill(own, near);
         refill(pairs, own.iter().map(Pair::of));
         reset(x, met.len(), DVec3::ZERO);
-        self.take(rows);
-        self.meet(rows);
+        if !self.take(rows) {
+            self.meet(rows);
+        }
     }
 
-    /// Makes room for the matrix with these rows.
-    fn take(&mut self, rows: &Rows) {
+    /// Makes room for the matrix with these rows; whether their meetings are known.
+    fn take(&mut self, rows: &Rows) -> bool {
         for row in (0..self.active.len()).filter(|&row| self.active[row]) {
             self.fronts[self.starts[row]..self.starts[row + 1]].iter().for_each(|&front| self.factor.spoil(front));
         }
         self.gains.fill(DMat3::ZERO);
         self.active.fill(false);
-        let size = self.met.len();
-        if !(self.knows(rows) && self.factor.fits(size, &self.pairs)) {
+        let (size, mut is_known) = (self.met.len(), self.knows(rows));
+        if !(is_known && self.factor.fits(size, &self.pairs)) {
             let Self { factor, places, pairs, changes, .. } = self;
             for terms in (0..rows.len()).map(|row| rows.terms(row)) {
                 for (left, term) in terms.iter().enumerate() {
@@ -107,17 +108,15 @@ impl Coupled {
             reset(changes, size, false);
             rows.all_terms().iter().for_each(|term| changes[places[term.block]] = true);
             if factor.shape(size, pairs, changes) {
-                self.forget();
+                is_known = false;
             }
         }
         self.factor.set(&self.own);
+        is_known
     }
 
     /// Finds where the rows add to the matrix.
     fn meet(&mut self, rows: &Rows) {
-        if self.knows(rows) {
-            return;
-        }
         self.forget();
         let Self { factor, places, gains, active, pushed, starts, fronts, blocks, unsorted, .. } = self;
         let terms = rows.all_terms();

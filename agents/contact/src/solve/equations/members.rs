@@ -19,6 +19,8 @@ pub(crate) struct Members {
     pub owners: Vec<usize>,
     /// The inverse of each diagonal block.
     pub mobilities: Vec<DMat3>,
+    /// Whether each block is coupled with others of its member: of one that is not its mobility is the response.
+    pub coupled: Vec<bool>,
     /// Whether each member has no more blocks than a rigid body.
     pub rigid: Vec<bool>,
     /// Whether each member lends its own factor.
@@ -43,7 +45,10 @@ impl Size {
 
 impl Members {
     /// Takes up the members of a problem, the first block of each being at its offset.
-    pub fn take(&mut self, problem: &Problem<'_>, offsets: &[usize]) {
+    ///
+    /// # Errors
+    /// A block of a member without a factor of its own, coupled with no other, that is not positive definite.
+    pub fn take(&mut self, problem: &Problem<'_>, offsets: &[usize]) -> Result<(), usize> {
         self.blocks.clear();
         self.owners.clear();
         self.rigid.clear();
@@ -60,10 +65,28 @@ impl Members {
             }));
         }
         reset(&mut self.mobilities, self.owners.len(), DMat3::ZERO);
-        for block in self.blocks.iter().filter(|block| block.row == block.column) {
-            self.mobilities[block.row] += block.value;
+        reset(&mut self.coupled, self.owners.len(), false);
+        for block in &self.blocks {
+            if block.row == block.column {
+                self.mobilities[block.row] += block.value;
+            } else {
+                (self.coupled[block.row], self.coupled[block.column]) = (true, true);
+            }
         }
-        self.mobilities.iter_mut().for_each(|m| *m = m.inverse());
+        let Self { mobilities, coupled, lends, owners, .. } = self;
+        let answers_alone = |block: usize| !(coupled[block] || lends[owners[block]]);
+        let wrong = (0..mobilities.len()).find(|&block| answers_alone(block) && !is_positive(&mobilities[block]));
+        mobilities.iter_mut().for_each(|m| *m = m.inverse());
+        wrong.map_or(Ok(()), Err)
+    }
+
+    /// Sets the response of blocks that are coupled with no others.
+    pub fn respond_alone(&self, impulses: &[DVec3], into: &mut [DVec3]) {
+        for (block, coupled) in self.coupled.iter().enumerate() {
+            if !coupled {
+                into[block] = self.mobilities[block] * impulses[block];
+            }
+        }
     }
 
     /// How many blocks of velocity there are.
@@ -86,6 +109,11 @@ impl Members {
         }
         size
     }
+}
+
+/// Whether a symmetric matrix is positive definite (Sylvester's criterion); not where a number is none.
+fn is_positive(m: &DMat3) -> bool {
+    m.x_axis.x > 0.0 && m.x_axis.x * m.y_axis.y - m.x_axis.y * m.y_axis.x > 0.0 && m.determinant() > 0.0
 }
 
 /// The larger of two sizes; one that is not a number stays.

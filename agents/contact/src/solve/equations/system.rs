@@ -37,7 +37,7 @@ pub(crate) struct System {
     /// The velocity by which unanswered momentum may change a block by itself, m/s (eq. 17).
     pub still_m_s: f64,
     pub members: Members,
-    /// The matrix of members that lend no factor, and that of all members with contacts, in the direct form.
+    /// The matrix of coupled blocks of members that lend no factor, and that of all members with contacts, in the direct form.
     own: Coupled,
     coupled: Coupled,
     /// Factors of the latter for the members taken up last.
@@ -63,17 +63,17 @@ impl System {
     /// # Errors
     /// [`ProblemError::NotPositiveDefinite`].
     pub fn take_members(&mut self, problem: &Problem<'_>, offsets: &[usize]) -> Result<(), ProblemError> {
-        self.members.take(problem, offsets);
+        let alone = self.members.take(problem, offsets);
         (self.is_coupled, self.factors, self.gradients.products) = (false, 0, 0);
         let Self { members, own, gradients, .. } = self;
-        let taken = match self.form {
+        let taken = alone.and_then(|()| match self.form {
             StepForm::Direct => {
                 let none = Rows::default();
-                own.couple(members, &none, |block| !members.lends[members.owners[block]]);
+                own.couple(members, &none, |block| members.coupled[block] && !members.lends[members.owners[block]]);
                 own.factor(Stiffness { rows: &none, gains: &[], skews: &[], threads: problem.threads })
             }
             StepForm::Iterative => gradients.take_members(members),
-        };
+        });
         taken.map_err(|block| {
             let member = self.members.owners[block];
             ProblemError::NotPositiveDefinite { member, block: block - offsets[member] }
@@ -85,6 +85,7 @@ impl System {
         match self.form {
             StepForm::Direct => {
                 self.own.solve(task.right, task.x);
+                self.members.respond_alone(task.right, task.x);
                 task.left.fill(DVec3::ZERO);
             }
             StepForm::Iterative => self.descend(members, task),
