@@ -8,7 +8,7 @@ use super::rig::cast::Model;
 use super::subject::{Progress, Subject};
 use crate::chart::{Axis, Colour, Figure, Layer, Panel, exponent, span};
 use metachron_console::output::{BadInput, message};
-use metachron_runtime::Priority;
+use metachron_runtime::{Priority, ask_priority};
 use std::time::Duration;
 
 /// The subject.
@@ -23,7 +23,7 @@ impl Subject for Agents {
     const COLUMNS: &'static str = COLUMNS;
 
     fn measure(args: &BenchArgs, progress: &Progress) -> anyhow::Result<Vec<Row>> {
-        let granted = Priority::Realtime.ask();
+        let granted = ask_priority(Priority::Realtime);
         let possible = |case: &Case| case.priority == Priority::Normal || granted.is_ok();
         let all = cases(args.quick).into_iter();
         let chosen: Vec<_> = all.filter(|case| is_selected(args, case) && possible(case)).collect();
