@@ -10,7 +10,7 @@ use glam::DVec3;
 use metachron_contact::step::LoneStepper;
 use metachron_contact::{Agent, AnchorSpring, StepContext};
 use metachron_core::{AgentId, Body, CurveState, SimSpan, SimTime, Snapshot};
-use metachron_models::rod::{Integrator, Material, Section, Tube, TubeSpec};
+use metachron_models::rod::{Material, Section, Tube, TubeSpec};
 use metachron_models::soft::{SoftBody, SoftSpec};
 
 /// Factor by which a [`slender_tube`] is stiffer in stretch and shear than the tube of the references.
@@ -51,7 +51,7 @@ pub(in super::super) struct Play {
 impl Play {
     /// The tube of a case, with enough substeps for a method whose limit is below the step. `None` where it cannot be built.
     pub(super) fn new(spec: TubeSpec, case: &Case) -> Option<Self> {
-        let integrator = Integrator::ALL.into_iter().find(|i| i.name() == case.method)?;
+        let integrator = case.method.parse().ok()?;
         let segments = Some(case.segments as usize);
         let mut spec = TubeSpec { integrator, segments, substeps: case.substeps, ..spec };
         let dt_s = case.dt_ms * 1e-3;

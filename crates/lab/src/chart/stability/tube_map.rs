@@ -181,7 +181,7 @@ struct Fall {
 
 /// Releases the tube; the tip is `None` where the motion blew up.
 fn fall(case: &Case) -> Fall {
-    let integrator = Integrator::ALL.into_iter().find(|i| i.name() == case.integrator).unwrap_or_default();
+    let integrator = case.integrator.parse().unwrap_or_default();
     let spec = TubeSpec { integrator, ..spec(case.young_pa) };
     let given_j = spec.section.mass_per_length_kg_m * GRAVITY * LENGTH_M * LENGTH_M;
     let mut out = Fall { tip: None, energy_rise: 0.0, stretch: 1.0, substeps_per_step: 0.0, refused: false };

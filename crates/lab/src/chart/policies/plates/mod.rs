@@ -185,7 +185,7 @@ impl<const F: usize, const LIVE: bool> Experiment for Figures<F, LIVE> {
     }
 
     fn findings(rows: &[Row]) -> Vec<Finding> {
-        let predicts = |row: &&Row| Policy::named(&row.policy).is_some_and(Policy::predicts);
+        let predicts = |row: &&Row| row.policy.parse().is_ok_and(Policy::predicts);
         let late = worst(rows.iter().filter(predicts).map(|row| row.frame_ms / row.target_ms));
         let mut findings = vec![Finding::at_most("frame / T of policies that predict", late, LONGEST)];
         let with_groups = |row: &&Row| row.policy == "hierarchical";
@@ -211,7 +211,7 @@ mod tests {
             assert!(PLATES[..at].iter().all(|other| other.name != plate.name));
             for (k, panel) in plate.panels.iter().enumerate() {
                 assert!(plate.panels[..k].iter().all(|other| other.label != panel.label), "{}", plate.name);
-                assert!(Policy::named(panel.policy).is_some(), "{}: {}", plate.name, panel.policy);
+                assert!(panel.policy.parse::<Policy>().is_ok(), "{}: {}", plate.name, panel.policy);
                 let changes = [plate.changes, panel.changes].concat();
                 let changes: Vec<_> = changes.iter().map(|(key, to)| ((*key).to_owned(), (*to).to_owned())).collect();
                 assert!(load(&tiny, &changes).is_ok(), "{}: {changes:?}", plate.name);

@@ -5,7 +5,6 @@
 
 use super::walk::{LEAD_IN, Opening, Times, opened};
 use anyhow::Context;
-use metachron_lod::control::Policy;
 use metachron_render::{Camera, Colouring, PictureFile, Style};
 use metachron_session::FlyThrough;
 
@@ -72,7 +71,7 @@ pub(in super::super) fn still(request: &StillRequest<'_>) -> anyhow::Result<Stil
     let (adapter, mut fly_through) = opened(&request.scene, request.times)?;
     let control = fly_through.session().control();
     control.set_target_hz(1.0 / request.target_s);
-    control.set_policy(Policy::named(request.policy).context("no such policy")?);
+    control.set_policy(request.policy.parse().context("no such policy")?);
     if from != to {
         for _ in 0..LEAD_IN {
             fly_through.step(from)?;
