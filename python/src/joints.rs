@@ -81,7 +81,7 @@ impl Joints {
             self.world.name(object).map(str::to_owned).map_err(raised::world)
         };
         let (kind, range) = match listed.joint.kind {
-            JointKind::Fixed => ("weld", None),
+            JointKind::Fixed => ("fixed", None),
             JointKind::Spherical => ("spherical", None),
             JointKind::Revolute { range_rad, .. } => ("revolute", range_rad),
             JointKind::Prismatic { range_m, .. } => ("prismatic", range_m),

@@ -12,7 +12,9 @@ use crate::soft::soft;
 use crate::start::started;
 use crate::world::World;
 use metachron::contact::joint::JointKind;
+use metachron::core::NoSuchChoice;
 use metachron::geometry::Solid;
+use metachron::scene::format::End;
 use metachron::scene::{Limits, Source, load};
 use metachron::world::{self, Part, Rigid, SceneBuilder, SceneText, SolveBudget, Tube};
 use pyo3::conversion::FromPyObjectOwned;
@@ -21,15 +23,13 @@ use pyo3::prelude::*;
 use pyo3::types::PyBytes;
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
+use std::str::FromStr;
 
 /// A scene, complete or in the making.
 #[pyclass(module = "metachron")]
 pub struct Scene {
     inner: Inner,
 }
-
-/// The ends of a tube, as its part names them.
-const ENDS: [&str; 2] = ["start", "end"];
 
 enum Inner {
     Built(SceneBuilder),
@@ -44,46 +44,8 @@ enum Saved {
     Read(SceneText),
 }
 
-/// The keywords of every solid; `None` where the engine's default stands.
-struct Placed {
-    at: Option<Vector>,
-    rotation: Option<Rotation>,
-    friction: Option<f64>,
-    restitution: Option<f64>,
-}
-
-/// The keywords of a moving body.
-struct Moving {
-    mass: Option<f64>,
-    velocity: Option<Vector>,
-    rate: Option<f64>,
-    kinematic: bool,
-    gravity_scale: Option<f64>,
-    damping: Option<(f64, f64)>,
-}
-
-impl Placed {
-    fn of(part: &Bound<'_, PyAny>) -> PyResult<Self> {
-        Ok(Self {
-            at: field(part, "at")?,
-            rotation: field(part, "rotation")?,
-            friction: field(part, "friction")?,
-            restitution: field(part, "restitution")?,
-        })
-    }
-}
-
-impl Moving {
-    /// `None` of a solid that never moves.
-    fn of(part: &Bound<'_, PyAny>) -> PyResult<Option<Self>> {
-        if class(part)? == "Plane" {
-            return Ok(None);
-        }
-        let (mass, velocity, rate) = (field(part, "mass")?, field(part, "velocity")?, field(part, "rate")?);
-        let (kinematic, gravity_scale) = (field(part, "kinematic")?, field(part, "gravity_scale")?);
-        Ok(Some(Self { mass, velocity, rate, kinematic, gravity_scale, damping: field(part, "damping")? }))
-    }
-}
+/// The fields by which a solid moves.
+const MOVING: [&str; 6] = ["mass", "velocity", "rate", "kinematic", "gravity_scale", "damping"];
 
 #[pymethods]
 impl Scene {
@@ -166,21 +128,19 @@ impl Scene {
         name: String,
         solid: &Bound<'py, PyAny>,
     ) -> PyResult<PyRefMut<'py, Self>> {
-        let (shape, placed) = (shape(solid)?, Placed::of(solid)?);
-        let is_still = |m: Moving| {
-            let moves = m.mass.is_some() || m.velocity.is_some() || m.rate.is_some() || m.kinematic;
-            !(moves || m.gravity_scale.is_some() || m.damping.is_some())
-        };
-        if !Moving::of(solid)?.is_none_or(is_still) {
+        let mut obstacle = world::static_solid(name, shape(solid)?);
+        let given = MOVING.iter().filter_map(|name| solid.getattr_opt(*name).transpose());
+        let given = given.collect::<PyResult<Vec<_>>>()?;
+        if !given.iter().all(|value| value.is_none() || matches!(value.extract::<bool>(), Ok(false))) {
+            let name = obstacle.name;
             let message =
                 format!("\"{name}\" is fixed: it has no mass, no velocity, no rate, no gravity_scale and no damping");
             return Err(PyValueError::new_err(message));
         }
-        let mut obstacle = world::static_solid(name, shape);
-        obstacle.position = placed.at.map_or(obstacle.position, |Vector(at)| at);
-        obstacle.rotation = placed.rotation.map_or(obstacle.rotation, |Rotation(rotation)| rotation);
-        obstacle.friction = placed.friction.unwrap_or(obstacle.friction);
-        obstacle.restitution = placed.restitution.unwrap_or(obstacle.restitution);
+        obstacle.position = field::<Option<Vector>>(solid, "at")?.map_or(obstacle.position, |Vector(at)| at);
+        obstacle.rotation = field::<Option<Rotation>>(solid, "rotation")?.map_or(obstacle.rotation, |Rotation(by)| by);
+        obstacle.friction = field::<Option<f64>>(solid, "friction")?.unwrap_or(obstacle.friction);
+        obstacle.restitution = field::<Option<f64>>(solid, "restitution")?.unwrap_or(obstacle.restitution);
         slf.build(|builder| builder.obstacle(obstacle))?;
         Ok(slf)
     }
@@ -270,6 +230,26 @@ pub fn field<'py, T: FromPyObjectOwned<'py>>(part: &Bound<'py, PyAny>, name: &st
     part.getattr(name)?.extract().map_err(wrong)
 }
 
+/// A part with a field set, unless that is `None`.
+pub fn set<'py, P, T: FromPyObjectOwned<'py>>(
+    built: P,
+    part: &Bound<'py, PyAny>,
+    name: &str,
+    set: impl FnOnce(P, T) -> P,
+) -> PyResult<P> {
+    if part.getattr(name)?.is_none() { Ok(built) } else { Ok(set(built, field(part, name)?)) }
+}
+
+/// Points, m.
+pub fn points(part: &Bound<'_, PyAny>) -> PyResult<Vec<[f64; 3]>> {
+    Ok(field::<Vec<Vector>>(part, "points")?.iter().map(|Vector(point)| point.to_array()).collect())
+}
+
+/// A choice by its name.
+pub fn chosen<T: FromStr<Err = NoSuchChoice>>(what: &str, name: &str) -> PyResult<T> {
+    name.parse::<T>().map_err(|error| PyValueError::new_err(format!("there is no {what} {error}")))
+}
+
 /// The class of a part.
 pub fn class(part: &Bound<'_, PyAny>) -> PyResult<String> {
     Ok(part.get_type().name()?.to_string())
@@ -283,29 +263,20 @@ pub fn part(part: &Bound<'_, PyAny>) -> PyResult<Part> {
     if let Some(soft) = soft(part)? {
         return Ok(soft.into());
     }
-    let (solid, placed) = (shape(part)?, Placed::of(part)?);
-    let Some(moving) = Moving::of(part)? else {
+    let solid = shape(part)?;
+    if matches!(solid, Solid::Plane) {
         return Err(PyValueError::new_err("a Plane does not move: it is fixed in a scene"));
-    };
-    let mut rigid = Rigid::new(solid);
-    if let Some(Vector(at)) = placed.at {
-        rigid = rigid.at(at.to_array());
     }
-    if let Some(Rotation(rotation)) = placed.rotation {
-        rigid = rigid.turned(rotation);
-    }
-    if let Some(Vector(velocity)) = moving.velocity {
-        rigid = rigid.velocity_m_s(velocity.to_array());
-    }
-    rigid = placed.friction.into_iter().fold(rigid, Rigid::friction);
-    rigid = placed.restitution.into_iter().fold(rigid, Rigid::restitution);
-    rigid = moving.mass.into_iter().fold(rigid, Rigid::mass_kg);
-    rigid = moving.gravity_scale.into_iter().fold(rigid, Rigid::gravity_scale);
-    rigid = moving.damping.into_iter().fold(rigid, |rigid, (linear, angular)| rigid.damping_per_s(linear, angular));
-    if moving.kinematic {
-        rigid = rigid.kinematic();
-    }
-    Ok(moving.rate.into_iter().fold(rigid, Rigid::rate_hz).into())
+    let rigid = set(Rigid::new(solid), part, "at", |rigid, Vector(at)| rigid.at(at.to_array()))?;
+    let rigid = set(rigid, part, "rotation", |rigid, Rotation(by)| rigid.turned(by))?;
+    let rigid = set(rigid, part, "velocity", |rigid, Vector(velocity)| rigid.velocity_m_s(velocity.to_array()))?;
+    let rigid = set(rigid, part, "friction", Rigid::friction)?;
+    let rigid = set(rigid, part, "restitution", Rigid::restitution)?;
+    let rigid = set(rigid, part, "mass", Rigid::mass_kg)?;
+    let rigid = set(rigid, part, "gravity_scale", Rigid::gravity_scale)?;
+    let rigid = set(rigid, part, "damping", |rigid, (linear, angular)| rigid.damping_per_s(linear, angular))?;
+    let rigid = set(rigid, part, "rate", Rigid::rate_hz)?;
+    Ok(if field(part, "kinematic")? { rigid.kinematic() } else { rigid }.into())
 }
 
 fn shape(part: &Bound<'_, PyAny>) -> PyResult<Solid> {
@@ -327,32 +298,28 @@ fn shape(part: &Bound<'_, PyAny>) -> PyResult<Solid> {
 }
 
 fn tube(part: &Bound<'_, PyAny>) -> PyResult<Tube> {
-    let points: Vec<_> = field::<Vec<Vector>>(part, "points")?.iter().map(|Vector(point)| point.to_array()).collect();
     let Names(clamp) = field(part, "clamp")?;
-    if let Some(wrong) = clamp.iter().find(|end| !ENDS.contains(&&***end)) {
-        return Err(PyValueError::new_err(format!("a tube is clamped at \"start\" and \"end\", not at {wrong:?}")));
-    }
-    let tube = Tube::along(&points).clamp(ENDS.map(|end| clamp.iter().any(|clamped| clamped == end)));
-    let number = |name| field::<Option<f64>>(part, name).map(Option::into_iter);
-    let tube = number("radius")?.fold(tube, Tube::radius_m);
-    let tube = number("wall")?.fold(tube, Tube::wall_m);
-    let tube = number("young")?.fold(tube, Tube::young_pa);
-    let tube = number("density")?.fold(tube, Tube::density_kg_m3);
-    let tube = number("damping")?.fold(tube, Tube::damping_per_s);
-    let tube = number("rate")?.fold(tube, Tube::rate_hz);
-    Ok(field::<Option<usize>>(part, "segments")?.into_iter().fold(tube, Tube::segments))
+    let clamp = clamp.iter().map(|end| chosen::<End>("end of a tube", end)).collect::<PyResult<Vec<_>>>()?;
+    let tube = Tube::along(&points(part)?).clamp(End::ALL.map(|end| clamp.contains(&end)));
+    let tube = set(tube, part, "radius", Tube::radius_m)?;
+    let tube = set(tube, part, "wall", Tube::wall_m)?;
+    let tube = set(tube, part, "young", Tube::young_pa)?;
+    let tube = set(tube, part, "density", Tube::density_kg_m3)?;
+    let tube = set(tube, part, "damping", Tube::damping_per_s)?;
+    let tube = set(tube, part, "rate", Tube::rate_hz)?;
+    set(tube, part, "segments", Tube::segments)
 }
 
 fn joint_kind(kind: &Bound<'_, PyAny>) -> PyResult<JointKind> {
     let axis = || field(kind, "axis").map(|Vector(axis)| axis);
     let range = || field(kind, "range");
     Ok(match class(kind)?.as_str() {
-        "Weld" => JointKind::Fixed,
+        "Fixed" => JointKind::Fixed,
         "Spherical" => JointKind::Spherical,
         "Revolute" => JointKind::Revolute { axis: axis()?, range_rad: range()?, motor: None },
         "Prismatic" => JointKind::Prismatic { axis: axis()?, range_m: range()?, motor: None },
         other => {
-            let message = format!("a joint is a Revolute, Prismatic, Spherical or Weld, not a {other}");
+            let message = format!("a joint is a Revolute, Prismatic, Spherical or Fixed, not a {other}");
             return Err(PyTypeError::new_err(message));
         }
     })

@@ -3,14 +3,11 @@
 //! In: a scene, names. Out: a world whose time stands. Never here: calls to the world.
 
 use crate::raised;
+use crate::scene::chosen;
 use metachron::world::kinds::ExecutorKind;
 use metachron::world::{Pace, Scene, World, WorldError};
 use pyo3::exceptions::{PyTypeError, PyValueError};
 use pyo3::prelude::*;
-
-/// The executors, as Python names them.
-const EXECUTORS: [ExecutorKind; 4] =
-    [ExecutorKind::Lockstep, ExecutorKind::Threads, ExecutorKind::Pool, ExecutorKind::Auto];
 
 /// The paces, as Python names them: beside a clock, and as fast as objects can step.
 const PACES: [&str; 2] = ["real-time", "free"];
@@ -50,10 +47,7 @@ impl<'py> FromPyObject<'_, 'py> for WantedPace {
 
 /// Starts a scene; at the free pace in lockstep where none is given.
 pub fn started(py: Python<'_>, scene: &Scene, executor: &str, pace: Option<&str>) -> PyResult<World> {
-    let Some(kind) = EXECUTORS.into_iter().find(|kind| kind.name() == executor) else {
-        let known = EXECUTORS.map(ExecutorKind::name).join(", ");
-        return Err(PyValueError::new_err(format!("there is no executor {executor:?}; expected one of {known}")));
-    };
+    let kind: ExecutorKind = chosen("executor", executor)?;
     let pace = match pace {
         None if kind == ExecutorKind::Lockstep => Pace::Free,
         None => Pace::RealTime,

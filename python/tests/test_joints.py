@@ -21,6 +21,11 @@ def arm() -> mc.Scene:
     return scene.joint("rail", mc.Prismatic([1.0, 0.0, 0.0], at=[0.0, 2.0, 0.0], range=(-0.5, 0.5)), "cart")
 
 
+def test_a_joint_that_leaves_no_motion_is_named_as_in_scene_files() -> None:
+    scene = mc.Scene().add("ball", mc.Ball(0.1)).joint("hold", mc.Fixed(at=[0.0, 0.0, 0.0]), "ball")
+    assert scene.start().joints["hold"].kind == "fixed"
+
+
 def test_a_world_lists_its_objects_joints_and_sensors() -> None:
     scene = arm().sensor("angle", mc.JointPosition("elbow")).sensor("imu", mc.Imu("lower"))
     world = scene.start()

@@ -46,11 +46,15 @@ def test_parts_that_cannot_be_are_named() -> None:
     wrong(lambda: scene().fixed("a", mc.Ball(0.1, gravity_scale=2.0)), "no gravity_scale")
     wrong(lambda: scene().fixed("a", mc.Plane(friction=-3.0)), '"a": friction is -3; expected a number from 0 to 1000')
     wrong(lambda: scene().add("a", mc.Tube([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0]], segments=-3)), "field 'segments'")
-    wrong(lambda: scene().joint("j", mc.Weld(at=[0.0, 0.0, 0.0]), "a"), '"a"')
+    wrong(lambda: scene().joint("j", mc.Fixed(at=[0.0, 0.0, 0.0]), "a"), '"a"')
     wrong(lambda: scene().add("a", mc.Ball(0.1, rotation=[0.0, 0.0, 0.0, 0.0])), "is no rotation")
     wrong(lambda: mc.Scene.from_toml(TOML).add("b", mc.Ball(0.1)), "complete")
-    with pytest.raises(ValueError, match="expected one of lockstep, threads, pool, auto"):
+    with pytest.raises(ValueError, match="expected one of auto, threads, pool, lockstep"):
         scenes.floating().start("gpu")  # type: ignore[arg-type]
+    with pytest.raises(ValueError, match='there is no end of a tube "middle"; expected one of start, end'):
+        scene().add("a", mc.Tube([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0]], clamp=["middle"]))  # type: ignore[list-item]
+    with pytest.raises(AttributeError, match="metachron.Weld is named metachron.Fixed"):
+        getattr(mc, "Weld")
     with pytest.raises(ValueError, match="there is no pace \"slow\"; expected one of real-time, free"):
         scenes.floating().start("lockstep", "slow")  # type: ignore[arg-type]
     with pytest.raises(TypeError, match="field 'at': expected three numbers"):

@@ -12,7 +12,7 @@ use metachron_lab::args::{
 };
 use metachron_scene::papers::Paper;
 use metachron_session::report::Goal;
-use metachron_world::kinds::PolicyKind;
+use metachron_world::kinds::{ExecutorKind, LawKind, PolicyKind};
 use std::path::PathBuf;
 
 const EXAMPLES: &str = "\
@@ -294,14 +294,14 @@ pub struct RunArgs {
     #[arg(long, env = "METACHRON_POLICY", value_parser = PossibleValuesParser::new(PolicyKind::ALL.map(PolicyKind::name)))]
     pub policy: Option<String>,
     /// The law of the policy feedback: corrected (its gain does not depend on the machine) or printed (as in the paper)
-    #[arg(long, env = "METACHRON_LAW", value_parser = PossibleValuesParser::new(["corrected", "printed"]))]
+    #[arg(long, env = "METACHRON_LAW", value_parser = PossibleValuesParser::new(LawKind::ALL.map(LawKind::name)))]
     pub law: Option<String>,
     /// Take the gains of the feedback law from this file (TOML, as `metachron tune` writes it); --set and flags take precedence over it
     #[arg(long, value_name = "FILE", value_hint = ValueHint::FilePath)]
     pub gains: Option<PathBuf>,
     /// How agents run: a thread each, a pool of workers, the cheaper of the two by their number (auto), or one thread in
     /// virtual time with declared costs (lockstep: the same bits on every run)
-    #[arg(long, env = "METACHRON_EXECUTOR", value_parser = PossibleValuesParser::new(["auto", "threads", "pool", "lockstep"]))]
+    #[arg(long, env = "METACHRON_EXECUTOR", value_parser = PossibleValuesParser::new(ExecutorKind::ALL.map(ExecutorKind::name)))]
     pub executor: Option<String>,
     /// How time passes: beside the clock (real-time, the default: who is too slow for it makes longer steps and gives up time; in lockstep the
     /// declared machine may be), or free, as fast as agents can step: none gives up time or makes longer steps than it was asked for, and

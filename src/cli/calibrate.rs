@@ -46,11 +46,6 @@ fn table(args: &CalibrateArgs, gpu: &Gpu) -> anyhow::Result<PriceTable> {
     PriceTable::known(&adapter).filter(|_| !args.renew).map_or_else(measured, Ok)
 }
 
-/// Names of the shadings that are priced.
-const SHADINGS: [&str; Shading::ALL.len()] = ["flat", "gouraud", "per-pixel", "textured"];
-/// Names of the strokes that are priced.
-const STROKES: [&str; Stroke::ALL.len()] = ["points", "lines"];
-
 fn text(table: &PriceTable) -> String {
     let PriceTable { adapter, prices, misses } = table;
     let mut text = format!(
@@ -67,8 +62,9 @@ fn text(table: &PriceTable) -> String {
         "pixel ns",
         "beside %"
     );
-    let shadings = SHADINGS.into_iter().zip(Shading::ALL.map(|shading| prices.of(shading)));
-    for (name, stages) in shadings.chain(STROKES.into_iter().zip(prices.strokes)) {
+    let shadings = Shading::PRICED.map(|shading| (shading.name(), prices.of(shading)));
+    let strokes = Stroke::ALL.map(Stroke::name).into_iter().zip(prices.strokes);
+    for (name, stages) in shadings.into_iter().chain(strokes) {
         let Stages { setup, polygon, vertex, pixel, serial } = stages;
         let (setup_us, beside) = (1e6 * setup, 100.0 * (1.0 - serial));
         let [polygon, vertex, pixel] = [polygon, vertex, pixel].map(|seconds| 1e9 * seconds);
@@ -95,7 +91,7 @@ fn areas(prices: &Prices) -> String {
         let _ = write!(text, " {area:>8.0}");
     });
     text.push('\n');
-    for (name, of) in SHADINGS.into_iter().zip(areas) {
+    for (name, of) in Shading::PRICED.map(Shading::name).into_iter().zip(areas) {
         let _ = write!(text, "{name:<10} {:>10.2}", 1e6 * of.setup);
         of.polygon.iter().for_each(|price| {
             let _ = write!(text, " {:>8.1}", 1e9 * price);

@@ -11,8 +11,7 @@ use metachron_scene::papers::{Choices, Paper};
 
 /// Writes the scene.
 pub(super) fn command(args: &GenerateArgs) -> anyhow::Result<Exit> {
-    let named = |paper: &Paper| paper.name() == args.scene;
-    let paper = Paper::ALL.into_iter().find(named).with_context(|| format!("there is no scene {}", args.scene))?;
+    let paper: Paper = args.scene.parse().context("there is no such scene")?;
     refuse_strays(args, paper)?;
     let usual = Choices::default();
     let trees = args.trees.unwrap_or(usual.trees);

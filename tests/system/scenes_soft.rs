@@ -46,6 +46,11 @@ fn what_a_soft_body_cannot_be_is_told_with_its_line_and_limit() {
         ),
         (format!("{SOLID}shape = \"box\""), 1, "`size_m` of `s` is missing; a box needs it"),
         (format!("{SOLID}shape = \"ball\"\nradius_m = 0.1\nhold = [\"top\"]"), 7, "a ball does not have"),
+        (
+            format!("{SHEET}young_pa = 1e5\nhold = [\"left\", \"top\"]"),
+            7,
+            "`hold` of `s` names `top`, which a flat sheet does not have; expected `left`, `right`, `near` or `far`",
+        ),
         (format!("{ROPE}path_m = [[0, 0, 0]]"), 6, "`path_m` of `s` has 1 points; expected at least 2"),
         (
             format!("{ROPE}path_m = [[0, 0, 0], [0, 0, 0]]"),

@@ -42,22 +42,13 @@ pub struct AttachmentEvent {
     pub force_n: f64,
 }
 
-/// The kinds of events of an attachment.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, serde::Serialize, serde::Deserialize)]
-pub enum AttachmentEventKind {
-    /// It slipped for the first time.
-    Yielded,
-    /// It tore, for good.
-    Tore,
-}
-
-impl AttachmentEventKind {
-    /// The name as reports write it.
-    #[must_use]
-    pub const fn name(self) -> &'static str {
-        match self {
-            Self::Yielded => "yielded",
-            Self::Tore => "tore",
-        }
+crate::choices! {
+    /// The kinds of events of an attachment.
+    #[derive(PartialOrd, Ord)]
+    pub enum AttachmentEventKind {
+        /// It slipped for the first time.
+        Yielded = "yielded",
+        /// It tore, for good.
+        Tore = "tore",
     }
 }

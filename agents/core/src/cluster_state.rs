@@ -15,34 +15,22 @@ pub struct ClusterState {
     pub solves: Option<ClusterSolves>,
 }
 
-/// How far a solve of contacts went, the dearest last. All laws hold to the tolerance but at the last two.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Default, serde::Serialize, serde::Deserialize)]
-pub enum SolveLevel {
-    /// The impulses of the last step still hold.
-    #[default]
-    Kept,
-    /// Newton's method found the rest from them.
-    Near,
-    /// Interior points led to where all laws hold.
-    Polished,
-    /// Interior points, ended before all laws held, by the budget or after as many steps as any solve makes: inside all bounds, with momentum and
-    /// passivity as everywhere; the miss says how far off.
-    Interior,
-    /// Rigid bodies for whose solve there was no time were stepped by rapier3d, as deep in each other as that leaves them; others as far as above.
-    RigidPile,
-}
-
-impl SolveLevel {
-    /// Its name in reports.
-    #[must_use]
-    pub const fn name(self) -> &'static str {
-        match self {
-            Self::Kept => "kept",
-            Self::Near => "near",
-            Self::Polished => "polished",
-            Self::Interior => "interior",
-            Self::RigidPile => "rigid-pile",
-        }
+crate::choices! {
+    /// How far a solve of contacts went, the dearest last. All laws hold to the tolerance but at the last two.
+    #[derive(PartialOrd, Ord, Default)]
+    pub enum SolveLevel {
+        /// The impulses of the last step still hold.
+        #[default]
+        Kept = "kept",
+        /// Newton's method found the rest from them.
+        Near = "near",
+        /// Interior points led to where all laws hold.
+        Polished = "polished",
+        /// Interior points, ended before all laws held, by the budget or after as many steps as any solve makes: inside all bounds, with momentum and
+        /// passivity as everywhere; the miss says how far off.
+        Interior = "interior",
+        /// Rigid bodies for whose solve there was no time were stepped by rapier3d, as deep in each other as that leaves them; others as far as above.
+        RigidPile = "rigid-pile",
     }
 }
 

@@ -22,6 +22,7 @@
 pub mod archive;
 mod attachment;
 pub mod body;
+mod choice;
 mod cluster_state;
 mod contact;
 mod disjoint_sets;
@@ -52,6 +53,7 @@ pub use body::{
     Anchor, Body, Bounds, CurveState, GRASP_BELOW, Grasp, GraspOrientation, Grip, RigidState, SoftNodes, SoftState,
     ToolState,
 };
+pub use choice::NoSuchChoice;
 pub use cluster_state::{ClusterSolves, ClusterState, SolveLevel};
 pub use contact::{ContactPartner, ContactState, JointEffort, Wrench};
 pub use disjoint_sets::DisjointSets;

@@ -3,33 +3,21 @@
 use super::wave::Wave;
 use crate::AgentId;
 
-/// How an agent's couplings act.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, serde::Serialize, serde::Deserialize)]
-pub enum PairKind {
-    /// Contact by impulse ledger.
-    #[default]
-    Ledger,
-    /// Contact within one cluster.
-    Cluster,
-    /// Contact or link by wave variables.
-    Tlm,
-    /// A tool's hold.
-    Grasp,
-    /// A bilateral link of the scene.
-    Attachment,
-}
-
-impl PairKind {
-    /// The word of reports.
-    #[must_use]
-    pub const fn name(self) -> &'static str {
-        match self {
-            Self::Ledger => "ledger",
-            Self::Cluster => "cluster",
-            Self::Tlm => "tlm",
-            Self::Grasp => "grasp",
-            Self::Attachment => "attach",
-        }
+crate::choices! {
+    /// How an agent's couplings act.
+    #[derive(Default)]
+    pub enum PairKind {
+        /// Contact by impulse ledger.
+        #[default]
+        Ledger = "ledger",
+        /// Contact within one cluster.
+        Cluster = "cluster",
+        /// Contact or link by wave variables.
+        Tlm = "tlm",
+        /// A tool's hold.
+        Grasp = "grasp",
+        /// A bilateral link of the scene.
+        Attachment = "attach",
     }
 }
 

@@ -12,15 +12,30 @@ use metachron_core::{
 /// A synthetic agent: cost per step = `cost_us · (eps_ref / ε)^cost_order`, error = `error_m · (ε / eps_ref)^error_order`,
 /// with `eps_ref` the coarsest spacing of its range.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "schema", derive(serde::Deserialize, schemars::JsonSchema))]
 pub struct SyntheticSpec {
-    /// Cost of one step at the reference spacing, microseconds, ≥ 0.
+    /// Cost of one step at the coarsest `eps_m`, microseconds.
     pub cost_us: f64,
-    /// Order at which the cost rises with refinement, ≥ 0.
+    /// How the cost rises with refinement: cost · (coarsest / ε)^order. Default 1.
+    #[cfg_attr(feature = "schema", serde(default = "linear"))]
     pub cost_order: f64,
-    /// Error at the reference spacing, metres, ≥ 0.
+    /// Error at the coarsest `eps_m`, metres. Default 0.
+    #[cfg_attr(feature = "schema", serde(default))]
     pub error_m: f64,
-    /// Order at which the error falls with refinement, ≥ 0.
+    /// How the error falls with refinement: error · (ε / coarsest)^order. Default 2.
+    #[cfg_attr(feature = "schema", serde(default = "quadratic"))]
     pub error_order: f64,
+}
+
+/// Default orders, of cost and of error.
+#[cfg(feature = "schema")]
+const fn linear() -> f64 {
+    1.0
+}
+
+#[cfg(feature = "schema")]
+const fn quadratic() -> f64 {
+    2.0
 }
 
 /// Why a synthetic agent cannot be built.

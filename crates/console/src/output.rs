@@ -2,7 +2,7 @@
 
 use super::exit::Exit;
 use anyhow::Context;
-use metachron_runtime::Priority;
+use metachron_runtime::ask_priority;
 use metachron_scene::SceneError;
 use metachron_world::kinds::{ExecutorKind, PriorityKind};
 use metachron_world::{Moved, Overlap, Scene};
@@ -53,7 +53,7 @@ pub fn print_overlaps(scene: &Scene) {
 /// Reports that the system refuses the priority that a scene requests; the run goes on without it.
 pub fn warn_priority(scene: &Scene) {
     let asked = scene.priority == PriorityKind::Realtime && scene.executor != ExecutorKind::Lockstep;
-    if asked && let Err(refused) = Priority::Realtime.ask() {
+    if asked && let Err(refused) = ask_priority(PriorityKind::Realtime) {
         message(&format!("note: {refused}"));
     }
 }

@@ -4,7 +4,7 @@
 
 use super::device_loop::DeviceLoop;
 use super::report::DeviceReport;
-use metachron_runtime::Priority;
+use metachron_runtime::{Priority, take_priority};
 use std::sync::atomic::{AtomicBool, Ordering::Relaxed};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::thread::JoinHandle;
@@ -65,7 +65,7 @@ impl Drop for Served {
 
 fn serve(mut device_loop: DeviceLoop, stop: &AtomicBool, report: &Mutex<DeviceReport>) {
     let period = device_loop.period();
-    let realtime = Priority::Realtime.take().is_ok();
+    let realtime = take_priority(Priority::Realtime).is_ok();
     let hand_out = |device_loop: &DeviceLoop| {
         *report.lock().unwrap_or_else(PoisonError::into_inner) = DeviceReport { realtime, ..device_loop.report() };
     };

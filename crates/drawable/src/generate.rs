@@ -8,75 +8,38 @@ use glam::{DVec2, DVec3};
 use metachron_geometry::creased_mesh;
 use metachron_geometry::{PrimitiveMesh, Triangles};
 
-/// Shape of a generated mesh.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
-#[cfg_attr(feature = "schema", derive(serde::Deserialize, schemars::JsonSchema), serde(rename_all = "kebab-case"))]
-pub enum Generator {
-    /// A ball of radius 1.
-    Sphere,
-    /// A ring about z of radius 1; the tube's radius is a third of it.
-    Torus,
-    /// A ball whose radius varies by a fifth: smooth bumps.
-    Blob,
-    /// Hills on a square of side 2 about the origin, a quarter high; open at its border.
-    Terrain,
-    /// A theatre seat that faces +y: seat, back, two arms and a foot, 0.55 wide and 1 high, standing on z = 0.
-    Seat,
-    /// A rod along z from −1 to 1, of radius a twentieth.
-    Strut,
-    /// A rod along z from −1 to 1, of radius a sixth.
-    Bar,
-    /// A table on four legs, 1.6 long along x, 0.8 wide and 0.75 high, standing on z = 0.
-    Table,
-    /// A shelf that faces −y: two sides and three boards, 1 wide and 2 high, standing on z = 0.
-    Shelf,
-    /// A door in its frame that faces −y, 1 wide and 2.1 high, standing on z = 0.
-    Door,
-    /// Five books side by side along x, their backs to −y, 0.3 wide and high, standing on z = 0.
-    Books,
-    /// A liver, about 2 long along x: a thick right lobe at −x, a thin left one at +x, a flat underside with the hollow of the gallbladder.
-    Liver,
-    /// The wall of a cavity, seen from within: a bowl 2 wide and 0.62 deep about the origin that bends inward above it, with a ridge along y in
-    /// its bottom; open at the top.
-    Cavity,
-}
-
-impl Generator {
-    /// All of them, in the order of the list of names.
-    pub const ALL: [Self; 13] = [
-        Self::Sphere,
-        Self::Torus,
-        Self::Blob,
-        Self::Terrain,
-        Self::Seat,
-        Self::Strut,
-        Self::Bar,
-        Self::Table,
-        Self::Shelf,
-        Self::Door,
-        Self::Books,
-        Self::Liver,
-        Self::Cavity,
-    ];
-
-    /// The name in scene files.
-    #[must_use]
-    pub const fn name(self) -> &'static str {
-        match self {
-            Self::Sphere => "sphere",
-            Self::Torus => "torus",
-            Self::Blob => "blob",
-            Self::Terrain => "terrain",
-            Self::Seat => "seat",
-            Self::Strut => "strut",
-            Self::Bar => "bar",
-            Self::Table => "table",
-            Self::Shelf => "shelf",
-            Self::Door => "door",
-            Self::Books => "books",
-            Self::Liver => "liver",
-            Self::Cavity => "cavity",
-        }
+metachron_core::choices! {
+    /// Shape of a generated mesh.
+    #[derive(Hash, PartialOrd, Ord)]
+    #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
+    pub enum Generator {
+        /// A ball of radius 1.
+        Sphere = "sphere",
+        /// A ring about z of radius 1; the tube's radius is a third of it.
+        Torus = "torus",
+        /// A ball whose radius varies by a fifth: smooth bumps.
+        Blob = "blob",
+        /// Hills on a square of side 2 about the origin, a quarter high; open at its border.
+        Terrain = "terrain",
+        /// A theatre seat that faces +y: seat, back, two arms and a foot, 0.55 wide and 1 high, standing on z = 0.
+        Seat = "seat",
+        /// A rod along z from −1 to 1, of radius a twentieth.
+        Strut = "strut",
+        /// A rod along z from −1 to 1, of radius a sixth.
+        Bar = "bar",
+        /// A table on four legs, 1.6 long along x, 0.8 wide and 0.75 high, standing on z = 0.
+        Table = "table",
+        /// A shelf that faces −y: two sides and three boards, 1 wide and 2 high, standing on z = 0.
+        Shelf = "shelf",
+        /// A door in its frame that faces −y, 1 wide and 2.1 high, standing on z = 0.
+        Door = "door",
+        /// Five books side by side along x, their backs to −y, 0.3 wide and high, standing on z = 0.
+        Books = "books",
+        /// A liver, about 2 long along x: a thick right lobe at −x, a thin left one at +x, a flat underside with the hollow of the gallbladder.
+        Liver = "liver",
+        /// The wall of a cavity, seen from within: a bowl 2 wide and 0.62 deep about the origin that bends inward above it, with a ridge along y in
+        /// its bottom; open at the top.
+        Cavity = "cavity",
     }
 }
 

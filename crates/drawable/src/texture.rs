@@ -26,31 +26,20 @@ pub struct Texture {
 /// Width and height of a pattern, pixels.
 const PATTERN: u32 = 256;
 
-/// A procedural pattern that repeats without a seam.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
-pub enum Pattern {
-    /// Four by four squares, light and dark.
-    Checker,
-    /// Boards next to each other, each in its own shade, with a grain.
-    Planks,
-    /// Four shelves of books.
-    Books,
+metachron_core::choices! {
+    /// A procedural pattern that repeats without a seam.
+    #[derive(Hash, PartialOrd, Ord)]
+    pub enum Pattern {
+        /// Four by four squares, light and dark.
+        Checker = "checker",
+        /// Boards next to each other, each in its own shade, with a grain.
+        Planks = "planks",
+        /// Four shelves of books.
+        Books = "books",
+    }
 }
 
 impl Pattern {
-    /// All of them.
-    pub const ALL: [Self; 3] = [Self::Checker, Self::Planks, Self::Books];
-
-    /// The name in scene files.
-    #[must_use]
-    pub const fn name(self) -> &'static str {
-        match self {
-            Self::Checker => "checker",
-            Self::Planks => "planks",
-            Self::Books => "books",
-        }
-    }
-
     /// The pattern, one repeat every `metres` (finite, > 0).
     #[must_use]
     pub fn texture(self, metres: f32) -> Texture {

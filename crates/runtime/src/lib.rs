@@ -46,7 +46,7 @@ pub use executors::archive::Absent;
 pub use executors::follower::Follower;
 pub use executors::lockstep::Lockstep;
 pub use executors::pool::Pool;
-pub use executors::priority::{Priority, PriorityRefused};
+pub use executors::priority::{Priority, PriorityRefused, ask_priority, take_priority};
 pub use executors::threads::{AUTO_THREADS_MAX, THREADS_MAX, Threads};
 pub use lock_free::slot::{LatestSlot, SlotWriter};
 pub use records::events::{AgentEvent, ContactEvent, EVENTS_KEPT, EventKind};

@@ -37,7 +37,7 @@ pub use diagnostic::{SceneError, SceneProblem};
 pub use schema::json_schema;
 pub use source::{FileVersion, Limits, SCENE_BYTES_MAX, Source, SourceFile};
 
-use build::{Objects, SceneContext};
+use build::{Entry, Objects, SceneContext};
 use check::{Checker, Place};
 use diagnostic::Problem;
 use document::Document;
@@ -66,18 +66,19 @@ pub fn load(source: &Source, overrides: &[(String, String)]) -> Result<Scene, Sc
     read(source, &text).map_err(|problems| SceneError::new(source.name(), &text, problems))
 }
 
-/// Reads a scene twice: keys that are wrong, or take too much memory, are found in a draft, before anything is made.
+/// Reads a scene, and resolves what was read first in a draft: keys that are wrong, or take too much memory, are found before anything is made.
 fn read(source: &Source, text: &str) -> Result<Scene, Vec<Problem>> {
     let document = Document::parse(text).map_err(|problem| vec![problem])?;
     let mut draft = Checker::draft(&document);
-    resolve(&mut draft, source);
+    let (file, entries) = (read_stage(&mut draft), build::read_objects(&mut draft));
+    resolve(&mut draft, source, file.as_ref(), &entries);
     draft.check_memory(source.limits().memory_bytes);
     let problems = draft.finish();
     if !problems.is_empty() {
         return Err(problems);
     }
     let mut c = Checker::new(&document);
-    match (resolve(&mut c, source), c.finish()) {
+    match (resolve(&mut c, source, file.as_ref(), &entries), c.finish()) {
         (Some(mut scene), problems) if problems.is_empty() => {
             scene.resolve_initial_overlaps();
             Ok(scene)
@@ -86,14 +87,11 @@ fn read(source: &Source, text: &str) -> Result<Scene, Vec<Problem>> {
     }
 }
 
-fn resolve(c: &mut Checker<'_, '_>, source: &Source) -> Option<Scene> {
-    let file = read_stage(c);
-    let world = file.as_ref().map(|f| &f.world);
+fn resolve(c: &mut Checker<'_, '_>, source: &Source, file: Option<&SceneFile>, entries: &[Entry]) -> Option<Scene> {
+    let world = file.map(|f| &f.world);
     let gravity = world.and_then(|w| w.gravity_m_s2).map_or(GRAVITY_DEFAULT, DVec3::from);
     let faults = world.and_then(|w| w.faults.as_ref());
-    let context = SceneContext { source, gravity, faults };
-    let objects = c.document().root().get("object");
-    let objects = build::read_objects(c, objects, &context);
+    let objects = build::make_objects(c, entries, &SceneContext { source, gravity, faults });
     file.map(|file| assemble(c, source, file, gravity, objects))
 }
 
@@ -114,7 +112,7 @@ fn check_executor(c: &mut Checker<'_, '_>, executor: ExecutorKind, agents: usize
     }
 }
 
-fn assemble(c: &mut Checker<'_, '_>, source: &Source, file: SceneFile, gravity: DVec3, mut objects: Objects) -> Scene {
+fn assemble(c: &mut Checker<'_, '_>, source: &Source, file: &SceneFile, gravity: DVec3, mut objects: Objects) -> Scene {
     if file.format != FORMAT {
         let what = format!("is {}, which this version does not support", file.format);
         c.wrong(&Place::SCENE, "format", what, format!("expected {FORMAT}"));
@@ -141,7 +139,7 @@ fn assemble(c: &mut Checker<'_, '_>, source: &Source, file: SceneFile, gravity: 
     }
     Scene {
         name: source.name().to_owned(),
-        description: file.description.unwrap_or_default(),
+        description: file.description.clone().unwrap_or_default(),
         executor: file.executor,
         priority: file.priority,
         stall_limit: file.stall_s.map(Duration::from_secs_f64),
@@ -150,7 +148,7 @@ fn assemble(c: &mut Checker<'_, '_>, source: &Source, file: SceneFile, gravity: 
         gravity,
         target: file.target,
         cameras: build::cameras(c, &file.camera),
-        machine: build::machine(c, file.machine),
+        machine: build::machine(c, file.machine.clone()),
         agents: objects.agents,
         obstacles: objects.obstacles,
         obstacle_appearances: objects.obstacle_appearances,

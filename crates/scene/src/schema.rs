@@ -8,6 +8,7 @@ use super::format::{
     CommonFile, MODELS, MeshFile, OLD_NAMES, RigidFile, RopeFile, SceneFile, SheetFile, SoftFile, SolidFile,
     SolidShapeFile, SyntheticFile, ToolFile, TreeFile, TubeFile,
 };
+use metachron_models::synthetic::SyntheticSpec;
 use schemars::{JsonSchema, SchemaGenerator};
 use serde_json::{Map, Value, json};
 
@@ -22,7 +23,7 @@ pub fn json_schema() -> Value {
         object::<SoftFile, SolidFile>(&mut generator),
         object::<SoftFile, RopeFile>(&mut generator),
         object::<(), ToolFile>(&mut generator),
-        object::<(), SyntheticFile>(&mut generator),
+        object::<SyntheticSpec, SyntheticFile>(&mut generator),
         object::<(), MeshFile>(&mut generator),
         object::<(), TreeFile>(&mut generator),
     ];

@@ -325,7 +325,7 @@ fn read_partial(folder: &Path, adapter: &str) -> Vec<Measured> {
     let picture = |[picture_px, enlarged_px, objects, polygons, pixels, shading, stroke, seconds]: [f64; 8]| {
         let sound =
             [picture_px, enlarged_px, objects, polygons, pixels, seconds].iter().all(|x| x.is_finite() && *x >= 0.0);
-        let shading = Shading::ALL.into_iter().find(|known| f64::from(*known as u8) == shading).filter(|_| sound)?;
+        let shading = Shading::PRICED.into_iter().find(|known| f64::from(*known as u8) == shading).filter(|_| sound)?;
         let stroke = match Stroke::ALL.into_iter().find(|known| f64::from(*known as u8 + 1) == stroke) {
             None if stroke != 0.0 => return None,
             stroke => stroke,

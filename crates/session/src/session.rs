@@ -28,7 +28,7 @@ use super::visible_resolution::VisibleResolution;
 use cpu_time::ThreadTime;
 use metachron_contact::AnchorSpring;
 use metachron_core::{AgentId, SimTime};
-use metachron_lod::control::{FrameWork, Law, ObjectView, PictureControl, Policy, Prices};
+use metachron_lod::control::{FrameWork, Law, ObjectView, PictureControl, Prices};
 #[cfg(feature = "picture")]
 use metachron_render::Gpu;
 use metachron_render::{Camera, Level, Picture, SceneView};
@@ -294,7 +294,7 @@ impl Session {
 
     /// Selects the policy by name; an unknown name changes nothing.
     pub fn set_policy(&mut self, name: &str) {
-        if let Some(policy) = Policy::named(name) {
+        if let Ok(policy) = name.parse() {
             self.control.set_policy(policy);
         }
     }

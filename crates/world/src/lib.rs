@@ -55,7 +55,7 @@ pub use history::checkpoint::{BadCheckpoint, Checkpoint, CheckpointError, SceneM
 pub use history::output_file::{OutputFile, RecordingFile, is_same_file};
 pub use history::recording::{BadRecording, RecordError, Recording, SceneText};
 pub use metachron_contact::detect::SolveBudget;
-pub use metachron_runtime::{Command, FACTOR};
+pub use metachron_runtime::{Command, FACTOR, PRESETS};
 pub use reading::events::{Contact, Event, EventFilter, EventSieve, Events, Happening};
 pub use reading::frames::{Frame, Frames};
 pub use reading::joint_states::JointState;

@@ -136,7 +136,7 @@ impl World {
         let surroundings = assemble::surroundings(scene)?;
         let spawns = assemble::spawns(scene, &surroundings, executor, &mut logged(govern, &log))?;
         let clock = Arc::new(SystemClock::new());
-        let priority = assemble::priority(scene);
+        let priority = scene.priority;
         let mut run: Box<dyn Run> = match executor {
             ExecutorKind::Threads => Box::new(Threads::start(spawns, clock.clone(), priority)?),
             ExecutorKind::Auto | ExecutorKind::Pool => Box::new(Pool::start(spawns, clock.clone(), priority)?),

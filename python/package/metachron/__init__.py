@@ -4,6 +4,8 @@ A scene is built of parts, or read from TOML; started, it is a world whose objec
 Units are SI: metres, seconds, kilograms, newtons, radians. Rotations are quaternions (x, y, z, w) of any length above zero.
 """
 
+from typing import TYPE_CHECKING
+
 from ._metachron import (
     Checkpoint,
     Contact,
@@ -30,6 +32,7 @@ from .parts import (
     Capsule,
     ContactForce,
     Cylinder,
+    Fixed,
     Imu,
     JointEffort,
     JointPosition,
@@ -45,7 +48,6 @@ from .parts import (
     SoftMesh,
     Spherical,
     Tube,
-    Weld,
 )
 
 __all__ = [
@@ -60,6 +62,7 @@ __all__ = [
     "Event",
     "Events",
     "Export",
+    "Fixed",
     "Hit",
     "Imu",
     "Joint",
@@ -83,9 +86,15 @@ __all__ = [
     "State",
     "States",
     "Tube",
-    "Weld",
     "World",
     "__version__",
     "replay",
     "rollout",
 ]
+
+if not TYPE_CHECKING:
+
+    def __getattr__(name: str) -> object:
+        if name == "Weld":
+            raise AttributeError("metachron.Weld is named metachron.Fixed, as in scene files")
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

@@ -255,7 +255,7 @@ class Spherical(_Joint):
 
 @final
 @dataclass(frozen=True)
-class Weld(_Joint):
+class Fixed(_Joint):
     """Nothing moves; its place is one of the world at the start."""
 
 
@@ -336,5 +336,5 @@ class Camera:
 
 Solid = Plane | Ball | Box | Capsule | Cylinder
 Part = Ball | Box | Capsule | Cylinder | Tube | Sheet | SoftBox | SoftBall | SoftMesh | Rope
-JointKind = Revolute | Prismatic | Spherical | Weld
+JointKind = Revolute | Prismatic | Spherical | Fixed
 Sensor = Imu | Pose | ContactForce | JointPosition | JointVelocity | JointEffort

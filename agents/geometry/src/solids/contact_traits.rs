@@ -36,21 +36,22 @@ pub struct CollisionGroups {
     pub collides_with: u32,
 }
 
-/// How two coefficients become that of a pair. Of two sides with different rules the later one of this list counts, as in Rapier.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, serde::Serialize, serde::Deserialize)]
-#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
-#[serde(rename_all = "kebab-case")]
-pub enum CombineRule {
-    /// Half of their sum.
-    Average,
-    /// The smaller one.
-    Min,
-    /// Their product.
-    Multiply,
-    /// The larger one.
-    Max,
-    /// The square root of their product.
-    GeometricMean,
+metachron_core::choices! {
+    /// How two coefficients become that of a pair. Of two sides with different rules the later one of this list counts, as in Rapier.
+    #[derive(PartialOrd, Ord)]
+    #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
+    pub enum CombineRule {
+        /// Half of their sum.
+        Average = "average",
+        /// The smaller one.
+        Min = "min",
+        /// Their product.
+        Multiply = "multiply",
+        /// The larger one.
+        Max = "max",
+        /// The square root of their product.
+        GeometricMean = "geometric-mean",
+    }
 }
 
 impl Default for CollisionGroups {

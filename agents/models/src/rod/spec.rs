@@ -80,15 +80,17 @@ pub struct TubeSpec {
     pub sleep: bool,
 }
 
-/// How a tube's sections behave.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
-#[cfg_attr(feature = "schema", derive(serde::Deserialize, schemars::JsonSchema), serde(rename_all = "kebab-case"))]
-pub enum WallModel {
-    /// They stay round, and their radius is given: pressure and peristalsis widen and narrow them, and nothing else does.
-    #[default]
-    Prescribed,
-    /// They widen and flatten under pressure, bending, contact and the tension of their muscles (docs/theory/rod.md, section 15).
-    Gives,
+metachron_core::choices! {
+    /// How a tube's sections behave.
+    #[derive(Hash, Default)]
+    #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
+    pub enum WallModel {
+        /// They stay round, and their radius is given: pressure and peristalsis widen and narrow them, and nothing else does.
+        #[default]
+        Prescribed = "prescribed",
+        /// They widen and flatten under pressure, bending, contact and the tension of their muscles (docs/theory/rod.md, section 15).
+        Gives = "gives",
+    }
 }
 
 /// A tube's section: dimensions, stiffnesses of stretch, shear, bend and twist, and inertia.
@@ -232,40 +234,24 @@ impl Section {
     }
 }
 
-/// Time integration of a tube.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
-#[cfg_attr(feature = "schema", derive(serde::Deserialize, schemars::JsonSchema), serde(rename_all = "kebab-case"))]
-pub enum Integrator {
-    /// Explicit, first order: for soft, coarse tubes with substeps below `Tube::longest_substep_s`; scene
-    /// files with longer ones are refused.
-    SymplecticEuler,
-    /// Compliant constraints, projected forth and back once per substep (MMC16): for comparison, as it bends too softly where substeps are
-    /// longer than `Tube::longest_substep_s`.
-    Xpbd,
-    /// Linearly implicit Euler, usually one Newton step: stable at any step, exact at rest, damps fast motion.
-    #[default]
-    ImplicitEuler,
-    /// Backward differences of second order, with little damping; implicit Euler while the tube is in contact or held.
-    Bdf2,
-    /// Conserves energy and momentum of a tube without contact; implicit Euler while it is in contact or held.
-    EnergyMomentum,
-}
-
-impl Integrator {
-    /// All integrators, the cheapest step first.
-    pub const ALL: [Self; 5] =
-        [Self::SymplecticEuler, Self::Xpbd, Self::ImplicitEuler, Self::Bdf2, Self::EnergyMomentum];
-
-    /// Its name in scenes.
-    #[must_use]
-    pub const fn name(self) -> &'static str {
-        match self {
-            Self::SymplecticEuler => "symplectic-euler",
-            Self::Xpbd => "xpbd",
-            Self::ImplicitEuler => "implicit-euler",
-            Self::Bdf2 => "bdf2",
-            Self::EnergyMomentum => "energy-momentum",
-        }
+metachron_core::choices! {
+    /// Time integration of a tube, the cheapest step first.
+    #[derive(Hash, Default)]
+    #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
+    pub enum Integrator {
+        /// Explicit, first order: for soft, coarse tubes with substeps below `Tube::longest_substep_s`; scene
+        /// files with longer ones are refused.
+        SymplecticEuler = "symplectic-euler",
+        /// Compliant constraints, projected forth and back once per substep (MMC16): for comparison, as it bends too softly where substeps are
+        /// longer than `Tube::longest_substep_s`.
+        Xpbd = "xpbd",
+        /// Linearly implicit Euler, usually one Newton step: stable at any step, exact at rest, damps fast motion.
+        #[default]
+        ImplicitEuler = "implicit-euler",
+        /// Backward differences of second order, with little damping; implicit Euler while the tube is in contact or held.
+        Bdf2 = "bdf2",
+        /// Conserves energy and momentum of a tube without contact; implicit Euler while it is in contact or held.
+        EnergyMomentum = "energy-momentum",
     }
 }
 

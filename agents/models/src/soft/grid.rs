@@ -5,39 +5,26 @@
 
 use super::spec::SoftShape;
 
-/// A side of a soft body, in its own axes: a rope has two ends, a sheet four edges, a box six faces.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
-#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
-#[serde(rename_all = "kebab-case")]
-pub enum Side {
-    /// Where x is least; the start of a rope.
-    Left,
-    /// Where x is largest; the end of a rope.
-    Right,
-    /// Where y is least.
-    Near,
-    /// Where y is largest.
-    Far,
-    /// Where z is least.
-    Bottom,
-    /// Where z is largest.
-    Top,
+metachron_core::choices! {
+    /// A side of a soft body, in its own axes: a rope has two ends, a sheet four edges, a box six faces.
+    #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
+    pub enum Side {
+        /// Where x is least; the start of a rope.
+        Left = "left",
+        /// Where x is largest; the end of a rope.
+        Right = "right",
+        /// Where y is least.
+        Near = "near",
+        /// Where y is largest.
+        Far = "far",
+        /// Where z is least.
+        Bottom = "bottom",
+        /// Where z is largest.
+        Top = "top",
+    }
 }
 
 impl Side {
-    /// Its name in a scene.
-    #[must_use]
-    pub const fn name(self) -> &'static str {
-        match self {
-            Self::Left => "left",
-            Self::Right => "right",
-            Self::Near => "near",
-            Self::Far => "far",
-            Self::Bottom => "bottom",
-            Self::Top => "top",
-        }
-    }
-
     /// Its axis, and whether it is where that coordinate is largest.
     pub(super) const fn place(self) -> (usize, bool) {
         match self {

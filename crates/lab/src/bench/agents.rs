@@ -13,13 +13,13 @@ use serde::{Deserialize, Serialize};
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
-/// The executor of the agents.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "lowercase")]
-pub enum Executor {
-    Threads,
-    Pool,
-    Lockstep,
+metachron_core::choices! {
+    /// The executor of the agents.
+    pub enum Executor {
+        Threads = "threads",
+        Pool = "pool",
+        Lockstep = "lockstep",
+    }
 }
 
 /// One case to measure.
@@ -252,14 +252,4 @@ fn share(mut numbers: Vec<f64>, part: f64) -> f64 {
 
 fn millis(span: Duration) -> f64 {
     span.as_secs_f64() * 1e3
-}
-
-impl Executor {
-    pub const fn name(self) -> &'static str {
-        match self {
-            Self::Threads => "threads",
-            Self::Pool => "pool",
-            Self::Lockstep => "lockstep",
-        }
-    }
 }

@@ -47,7 +47,7 @@ impl Subject for Render {
 
     fn figure(rows: &[Row]) -> Figure {
         let drawn: Vec<&Row> = rows.iter().filter(|row| row.objects > 0).collect();
-        let names = SHADINGS.map(name).into_iter().chain([POINTS, LINES]);
+        let names = Shading::PRICED.map(Shading::name).into_iter().chain([POINTS, LINES]);
         let layers = names.zip(Colour::LINES).map(|(name, colour)| {
             let here = drawn.iter().filter(|row| row.shading == name);
             Layer::dots(name, colour, here.map(|row| (row.triangles, row.picture_ms)))
@@ -58,27 +58,16 @@ impl Subject for Render {
     }
 }
 
-const SHADINGS: [Shading; 4] = [Shading::Flat, Shading::Gouraud, Shading::PerPixel, Shading::Textured];
 /// Names of the strokes.
 const POINTS: &str = "points";
 const LINES: &str = "lines";
-
-const fn name(shading: Shading) -> &'static str {
-    match shading {
-        Shading::Flat => "flat",
-        Shading::Gouraud => "gouraud",
-        Shading::PerPixel => "per-pixel",
-        Shading::Textured => "textured",
-        Shading::Shadowed => "shadowed",
-    }
-}
 
 /// The name of the primitive that the objects of a picture are drawn as.
 const fn drawn_as(drawn: &Drawn) -> &'static str {
     match drawn.strokes {
         Some(PieceKind::Leaf) => POINTS,
         Some(PieceKind::Bough) => LINES,
-        None => name(drawn.shading),
+        None => drawn.shading.name(),
     }
 }
 

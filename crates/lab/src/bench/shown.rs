@@ -8,7 +8,7 @@ use super::rig::cast::Model;
 use super::subject::{Progress, Subject};
 use crate::chart::{Axis, Colour, Figure, Layer, Panel, Table, exponent, span, table};
 use metachron_console::output::{BadInput, message};
-use metachron_runtime::Priority;
+use metachron_runtime::{Priority, ask_priority};
 use std::time::Duration;
 
 /// The subject.
@@ -29,7 +29,7 @@ impl Subject for Agents {
         read_ns: r.read_ns_per_agent, start_ms(1): r.start_ms, end_ms(1): r.shutdown_ms);
 
     fn measure(args: &BenchArgs, progress: &Progress) -> anyhow::Result<Vec<Row>> {
-        let granted = Priority::Realtime.ask();
+        let granted = ask_priority(Priority::Realtime);
         let possible = |case: &Case| case.priority == Priority::Normal || granted.is_ok();
         let all = cases(args.quick).into_iter();
         let chosen: Vec<_> = all.filter(|case| is_selected(args, case) && possible(case)).collect();

@@ -93,11 +93,9 @@ mod tests {
     use super::*;
     use std::f64::consts::{PI, TAU};
 
-    const ALL: [Environment; 3] = [Environment::Room, Environment::Sky, Environment::Endoscope];
-
     #[test]
     fn a_surface_receives_the_integral_of_the_background_over_what_it_faces() {
-        for light in ALL.map(EnvironmentLight::of) {
+        for light in Environment::ALL.map(EnvironmentLight::of) {
             for n in [DVec3::Z, DVec3::NEG_Z, DVec3::X, DVec3::new(0.6, -0.48, 0.64)] {
                 // midpoints in height and azimuth: areas of equal size on the sphere
                 let (rows, columns) = (200_i32, 200_i32);
@@ -117,7 +115,7 @@ mod tests {
 
     #[test]
     fn no_background_is_darker_than_black() {
-        for light in ALL.map(EnvironmentLight::of) {
+        for light in Environment::ALL.map(EnvironmentLight::of) {
             assert!(light.radiance(DVec3::NEG_Z).min_element() >= 0.0 && light.radiance(DVec3::Z).min_element() >= 0.0);
         }
     }

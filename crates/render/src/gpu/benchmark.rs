@@ -64,7 +64,6 @@ const LONGEST: Duration = Duration::from_secs(3);
 const DRAWINGS: usize = 2;
 /// … and most rounds.
 const ROUNDS: usize = 4;
-const SHADINGS: [Shading; 4] = [Shading::Flat, Shading::Gouraud, Shading::PerPixel, Shading::Textured];
 
 /// Equal trees of which the leaves are drawn as points, or the boughs as lines: triangles of each tree's strokes, and pixels that it covers.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -100,7 +99,7 @@ enum TestPicture {
 fn test_pictures(areas_px: &[f64]) -> Vec<TestPicture> {
     let of = |area_px| {
         numbers(area_px).flat_map(|(triangles, pixels)| {
-            SHADINGS.map(|shading| TestPicture::Balls(Balls { shading, triangles, pixels }))
+            Shading::PRICED.map(|shading| TestPicture::Balls(Balls { shading, triangles, pixels }))
         })
     };
     let empty = EMPTY.map(|size| (size, 1.0)).into_iter().chain([ENLARGED]);
@@ -142,7 +141,7 @@ pub fn benchmark(gpu: &Gpu, options: RendererOptions, areas_px: &[f64], known: u
     let trees = tree(&TREE).map(|foliage| Model::Foliage(Arc::new(foliage)));
     let mut screen = Offscreen::new(gpu.clone(), SIZE, options)?;
     // shaders are compiled at their first use, which must not count as drawing time
-    for shading in SHADINGS {
+    for shading in Shading::PRICED {
         measure(&mut screen, &ball, Balls { shading, triangles: TRIANGLES[0], pixels: SQUARES[0].1 })?;
     }
     for kind in [PieceKind::Leaf, PieceKind::Bough] {

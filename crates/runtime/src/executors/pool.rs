@@ -52,7 +52,7 @@ pub struct Pool {
 
 impl Pool {
     /// Starts a worker per core that the system gives; simulated time is paused until [`TimelineCommand::Run`]. If the system refuses `priority`
-    /// ([`Priority::ask`]) workers have the ordinary one.
+    /// ([`crate::ask_priority`]) workers have the ordinary one.
     ///
     /// # Errors
     /// [`RunError`] for agents that cannot run as requested, and if the system gives no thread.

@@ -2,21 +2,13 @@
 //!
 //! In: the scene's request. Out: threads with this priority, or the reason for a refusal. Never here: which agent is next.
 
+/// How the system's scheduler ranks the threads of agents: real-time is first in, first out (POSIX `SCHED_FIFO`), at the lowest priority of
+/// that kind.
+pub use metachron_core::kinds::PriorityKind as Priority;
 use thread_priority::{
     RealtimeThreadSchedulePolicy, ThreadPriority, ThreadSchedulePolicy, set_thread_priority_and_policy,
     thread_native_id,
 };
-
-/// How the system's scheduler ranks the threads of agents.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub enum Priority {
-    /// The default of the system.
-    #[default]
-    Normal,
-    /// Before all threads of ordinary priority, the frame loop included: first in, first out (POSIX `SCHED_FIFO`), at the lowest real-time
-    /// priority. If agents use all cores, nothing is left for pictures.
-    Realtime,
-}
 
 /// The system does not grant real-time priority.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
@@ -28,31 +20,29 @@ pub struct PriorityRefused {
     why: String,
 }
 
-impl Priority {
-    /// Sets the priority of this thread: for threads of a caller that have to be as steady as agents' threads. After a
-    /// refusal it has its previous one.
-    ///
-    /// # Errors
-    /// [`PriorityRefused`].
-    pub fn take(self) -> Result<(), PriorityRefused> {
-        if self == Self::Normal {
-            return Ok(());
-        }
-        let policy = ThreadSchedulePolicy::Realtime(RealtimeThreadSchedulePolicy::Fifo);
-        set_thread_priority_and_policy(thread_native_id(), ThreadPriority::Min, policy)
-            .map_err(|error| PriorityRefused { why: error.to_string() })
+/// Sets the priority of this thread: for threads of a caller that have to be as steady as agents' threads. After a
+/// refusal it has its previous one.
+///
+/// # Errors
+/// [`PriorityRefused`].
+pub fn take_priority(priority: Priority) -> Result<(), PriorityRefused> {
+    if priority == Priority::Normal {
+        return Ok(());
     }
+    let policy = ThreadSchedulePolicy::Realtime(RealtimeThreadSchedulePolicy::Fifo);
+    set_thread_priority_and_policy(thread_native_id(), ThreadPriority::Min, policy)
+        .map_err(|error| PriorityRefused { why: error.to_string() })
+}
 
-    /// Whether the system grants it; tested on a separate thread, without effect on others.
-    ///
-    /// # Errors
-    /// [`PriorityRefused`].
-    pub fn ask(self) -> Result<(), PriorityRefused> {
-        let asked = std::thread::Builder::new().name("priority".to_owned()).spawn(move || self.take());
-        let refused = |why: String| PriorityRefused { why };
-        let answer = asked.map_err(|error| refused(error.to_string()))?.join();
-        answer.unwrap_or_else(|_| Err(refused("the test thread ended without a result".to_owned())))
-    }
+/// Whether the system grants a priority; tested on a separate thread, without effect on others.
+///
+/// # Errors
+/// [`PriorityRefused`].
+pub fn ask_priority(priority: Priority) -> Result<(), PriorityRefused> {
+    let asked = std::thread::Builder::new().name("priority".to_owned()).spawn(move || take_priority(priority));
+    let refused = |why: String| PriorityRefused { why };
+    let answer = asked.map_err(|error| refused(error.to_string()))?.join();
+    answer.unwrap_or_else(|_| Err(refused("the test thread ended without a result".to_owned())))
 }
 
 #[cfg(test)]
@@ -77,7 +67,7 @@ mod tests {
     #[test]
     #[cfg(target_os = "linux")]
     fn realtime_is_what_threads_have_where_it_is_granted_and_agents_run_either_way() {
-        let granted = Priority::Realtime.ask();
+        let granted = ask_priority(Priority::Realtime);
         if let Err(refused) = &granted {
             assert!(refused.to_string().contains("CAP_SYS_NICE"), "{refused}");
         }
@@ -95,6 +85,6 @@ mod tests {
             assert!(found.contains(&class), "{prefix} {found:?}");
             run.shutdown();
         }
-        assert_eq!(Priority::Normal.ask(), Ok(()));
+        assert_eq!(ask_priority(Priority::Normal), Ok(()));
     }
 }

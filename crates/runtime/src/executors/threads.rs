@@ -8,7 +8,7 @@ mod agent_thread;
 mod watch;
 
 use super::archive::{Absent, Cut, CutBetweenTurns};
-use super::priority::Priority;
+use super::priority::{Priority, take_priority};
 use crate::Run;
 use crate::agent::agent_spawn::AgentSpawn;
 use crate::agent::agents::Agents;
@@ -71,7 +71,7 @@ type Spawner = fn(thread::Builder, Body) -> io::Result<JoinHandle<Option<Box<Age
 type Body = Box<dyn FnOnce() -> Option<Box<AgentRunner>> + Send>;
 
 impl Threads {
-    /// Gives every agent its thread; simulated time is paused until [`TimelineCommand::Run`]. If the system refuses `priority` ([`Priority::ask`])
+    /// Gives every agent its thread; simulated time is paused until [`TimelineCommand::Run`]. If the system refuses `priority` ([`crate::ask_priority`])
     /// the threads have the ordinary one.
     ///
     /// # Errors
@@ -174,8 +174,8 @@ impl Threads {
         let priority = self.priority;
         let body = move || {
             let _farewell = farewell;
-            // a refusal was already reported to the caller of `Priority::ask`
-            drop(priority.take());
+            // a refusal was already reported to the caller of `ask_priority`
+            drop(take_priority(priority));
             // by itself: where the agent is given back before another thread registers this one, no thread is woken
             shared.sleep.set_thread(shared.id, Some(thread::current()));
             stage.run(&shared)

@@ -4,7 +4,7 @@
 //! depend on who makes what ([`metachron_core::parallel`]). Never here: which turns are worth it, what is done side by
 //! side.
 
-use crate::executors::priority::Priority;
+use crate::executors::priority::{Priority, take_priority};
 use crate::time::cpu::thread_time;
 use metachron_core::parallel::is_worth_dividing;
 use metachron_core::{ParallelFor, PlainLoop};
@@ -95,8 +95,8 @@ impl Helpers {
         let pool = ThreadPoolBuilder::new()
             .num_threads(self.threads)
             .thread_name(|at| format!("helper:{at}"))
-            // a refusal was already reported to the caller of `Priority::ask`
-            .start_handler(move |_| drop(priority.take()));
+            // a refusal was already reported to the caller of `ask_priority`
+            .start_handler(move |_| drop(take_priority(priority)));
         pool.build().ok()
     }
 }

@@ -5,7 +5,7 @@
 use super::common::parse_colour;
 use super::objects::{OBSTACLES_MAX, Objects, too_many};
 use crate::check::{Checker, Place};
-use crate::format::{CellFile, PortalFile, SideKind};
+use crate::format::{CellFile, PortalFile};
 use glam::{DQuat, DVec3};
 use metachron_geometry::{Cell, Cells, CellsError, ContactTraits, Obstacle, Portal, Region, Side, Solid};
 use metachron_world::Appearance;
@@ -167,7 +167,7 @@ fn build_walls(c: &mut Checker<'_, '_>, files: &[CellFile], cells: &Cells, objec
     let mut obstacles: Vec<Obstacle> = objects.obstacles.to_vec();
     for (number, file) in files.iter().enumerate() {
         let Some(thickness_m) = file.walls_m else { continue };
-        let is_open = |side: &Side| file.without.iter().any(|kind| side_of(*kind) == *side);
+        let is_open = |side: &Side| file.without.iter().any(|kind| Side::ALL[*kind as usize] == *side);
         let sides: Vec<_> = Side::ALL.into_iter().filter(|side| !is_open(side)).collect();
         check_openings(c, number, cells, &sides);
         let appearance = Appearance {
@@ -212,16 +212,4 @@ fn check_openings(c: &mut Checker<'_, '_>, cell: usize, cells: &Cells, walls: &[
             );
         }
     }
-}
-
-const fn side_of(kind: SideKind) -> Side {
-    let (axis, upper) = match kind {
-        SideKind::West => (0, false),
-        SideKind::East => (0, true),
-        SideKind::South => (1, false),
-        SideKind::North => (1, true),
-        SideKind::Floor => (2, false),
-        SideKind::Ceiling => (2, true),
-    };
-    Side { axis, upper }
 }

@@ -8,11 +8,11 @@ use super::objects::{
     AGENTS_MAX, Entry, ModelContext, ModelFile, NamedObject, Names, OBSTACLES_MAX, Objects, RigidFiles, SceneContext,
     too_many,
 };
-use super::{rigid, scenery, soft, synthetic, tool, tube};
+use super::{rigid, scenery, soft, tool, tube};
 use crate::check::{Checker, Place};
 use crate::demand::Cost;
 use crate::diagnostic::{Problem, did_you_mean};
-use crate::format::{CommonFile, MODELS, model_named};
+use crate::format::{CommonFile, MODELS, OneOrRange, model_named};
 use crate::source::Source;
 use metachron_core::{AgentId, Resolution, ResolutionRange};
 use metachron_geometry::Obstacle;
@@ -32,6 +32,8 @@ use std::sync::Arc;
 use toml::Spanned;
 use toml::de::{DeTable, DeValue};
 
+/// Default spacing of a synthetic agent, metres.
+const SYNTHETIC_EPS_M: f64 = 0.01;
 /// Longest name, in characters.
 const NAME_MAX: usize = 64;
 
@@ -42,16 +44,12 @@ struct Known<'a> {
 }
 
 /// Reads every `[[object]]`.
-pub(crate) fn read_objects(
-    c: &mut Checker<'_, '_>,
-    list: Option<&Spanned<DeValue<'_>>>,
-    context: &SceneContext<'_>,
-) -> Objects {
-    let Some(list) = list else { return Objects::default() };
+pub(crate) fn read_objects(c: &mut Checker<'_, '_>) -> Vec<Entry> {
+    let Some(list) = c.document().root().get("object") else { return Vec::new() };
     let DeValue::Array(items) = list.get_ref() else {
         let found = format!("`object` is of type {}", list.get_ref().type_str());
         c.push(Problem::new(list.span(), found).expecting("expected tables under `[[object]]`"));
-        return Objects::default();
+        return Vec::new();
     };
     let mut read = |(i, item)| {
         let entry = read_entry(c, i, item);
@@ -84,12 +82,17 @@ pub(crate) fn read_objects(
             break;
         }
     }
-    let names = assign_names(c, &entries);
+    entries
+}
+
+/// Makes the objects of the `entries`, as far as a draft does.
+pub(crate) fn make_objects(c: &mut Checker<'_, '_>, entries: &[Entry], context: &SceneContext<'_>) -> Objects {
+    let names = assign_names(c, entries);
     let groups = GroupNames::of(c, entries.iter().filter_map(|e| Some((&e.place, e.common.contact.as_ref()?))));
-    let (obstacles, obstacle_appearances) = fixed_objects(c, &entries, context.source, &groups);
+    let (obstacles, obstacle_appearances) = fixed_objects(c, entries, context.source, &groups);
     let obstacles: Arc<[Obstacle]> = obstacles.into();
-    let agents = agents(c, &entries, &Known { names: &names, groups: &groups }, context);
-    let scenery = scenery::read(c, &entries, context.source);
+    let agents = agents(c, entries, &Known { names: &names, groups: &groups }, context);
+    let scenery = scenery::read(c, entries, context.source);
     Objects { agents, obstacles, obstacle_appearances, scenery, names }
 }
 
@@ -123,7 +126,7 @@ fn read_entry(c: &mut Checker<'_, '_>, index: usize, item: &Spanned<DeValue<'_>>
         "tool" => parts.rest(c).map(ModelFile::Tool),
         "mesh" => parts.rest(c).map(ModelFile::Mesh),
         "tree" => parts.rest(c).map(ModelFile::Tree),
-        _ => parts.rest(c).map(ModelFile::Synthetic),
+        _ => parts.both(c).map(|(spec, file)| ModelFile::Synthetic(spec, file)),
     };
     let (common, model) = (common?, own?);
     Some(Entry { place, common, model, fixed: false, copies: Copies::single() })
@@ -198,7 +201,7 @@ fn assign_names(c: &mut Checker<'_, '_>, entries: &[Entry]) -> Names {
             (ModelFile::Rigid(_), _) => NamedObject::Rigid(id),
             (ModelFile::Sheet(..) | ModelFile::Solid(..) | ModelFile::Rope(..), _) => NamedObject::Soft(id),
             (ModelFile::Tool(_), _) => NamedObject::Tool(id),
-            (ModelFile::Synthetic(_), _) => NamedObject::Synthetic(id),
+            (ModelFile::Synthetic(..), _) => NamedObject::Synthetic(id),
         };
         let first = next;
         next += if entry.fixed { 0 } else { entry.copies.len() as u32 };
@@ -353,11 +356,11 @@ fn member(
             (Spec::Soft(built.spec), Resolution { eps_m: range.eps_m.0, n: levels.1 }, range, flat)
         }
         ModelFile::Tool(file) => (Spec::Tool(tool::build(c, file, &model_context, known.names)), unit, flat, flat),
-        ModelFile::Synthetic(file) => {
+        ModelFile::Synthetic(spec, file) => {
             contact::refuse(c, place, common.contact.as_ref());
-            let (spec, eps_m) = synthetic::build(file);
+            let eps_m = file.eps_m.map_or((SYNTHETIC_EPS_M, SYNTHETIC_EPS_M), OneOrRange::ends);
             let range = ResolutionRange { eps_m, n: levels };
-            (Spec::Synthetic(spec), Resolution { eps_m: range.eps_m.1, n: levels.1 }, range, flat)
+            (Spec::Synthetic(*spec), Resolution { eps_m: range.eps_m.1, n: levels.1 }, range, flat)
         }
         ModelFile::Mesh(_) | ModelFile::Tree(_) => return None,
     };

@@ -14,6 +14,7 @@ use glam::DVec3;
 use metachron_core::AgentId;
 use metachron_drawable::geodesic_edges;
 use metachron_geometry::{ContactTraits, Obstacle};
+use metachron_models::synthetic::SyntheticSpec;
 use metachron_world::{Appearance, Member, Scenery};
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -114,7 +115,7 @@ impl Names {
 }
 
 /// An object as the file has it.
-pub(super) struct Entry {
+pub(crate) struct Entry {
     pub(super) place: Place,
     pub(super) common: CommonFile,
     pub(super) model: ModelFile,
@@ -135,7 +136,7 @@ pub(super) enum ModelFile {
     Solid(SoftFile, SolidFile),
     Rope(SoftFile, RopeFile),
     Tool(ToolFile),
-    Synthetic(SyntheticFile),
+    Synthetic(SyntheticSpec, SyntheticFile),
     Mesh(MeshFile),
     Tree(TreeFile),
 }
@@ -158,7 +159,7 @@ impl ModelFile {
     /// The way in which a grid can repeat it.
     pub(super) const fn repeats(&self) -> Repeats {
         match self {
-            Self::Tool(_) | Self::Synthetic(_) => Repeats::Nothing,
+            Self::Tool(_) | Self::Synthetic(..) => Repeats::Nothing,
             Self::Rigid(_) => Repeats::MovedAndTurned,
             _ => Repeats::Moved,
         }

@@ -7,7 +7,7 @@ use super::scenery::{SurfaceSource, surface_source};
 use super::soft_mesh;
 use crate::check::{Checker, Place};
 use crate::demand::Cost;
-use crate::format::{OneOrRange, RopeEnd, RopeFile, SheetFile, SheetSide, SoftFile, SoftShapeKind, SolidFile};
+use crate::format::{End, OneOrRange, RopeFile, SheetFile, SoftFile, SoftShapeKind, SolidFile};
 use glam::{DQuat, DVec3};
 use metachron_core::{Anchor, Body};
 use metachron_drawable::generate_surface;
@@ -36,13 +36,11 @@ pub(super) fn sheet(
     let is_mesh = file.file.is_some();
     let eps_m = if is_mesh { None } else { one_division(c, place, file.segments.is_some(), file.eps_m) };
     let shape = if is_mesh { soft_mesh::shell(c, file, context) } else { flat_sheet(c, place, file) }?;
-    let side = |side: &SheetSide| match side {
-        SheetSide::Left => Side::Left,
-        SheetSide::Right => Side::Right,
-        SheetSide::Near => Side::Near,
-        SheetSide::Far => Side::Far,
-    };
-    let held = file.hold.iter().flatten().map(side).collect();
+    let held = file.hold.clone().unwrap_or_default();
+    if let Some(none) = held.iter().find(|side| !side.of(&shape)) {
+        let what = format_args!("names `{}`, which a flat sheet does not have", none.name());
+        c.wrong(place, "hold", what, "expected `left`, `right`, `near` or `far`");
+    }
     let half = if let SoftShape::Sheet { size_m: [x, y], .. } = shape {
         DVec3::new(0.5 * x, 0.5 * y, 0.0)
     } else {
@@ -258,7 +256,7 @@ pub(super) fn too_large(size_m: f64, scale_is_missing: bool) -> Result<(), Strin
 /// Reads a rope.
 pub(super) fn rope(c: &mut Checker<'_, '_>, soft: &SoftFile, file: &RopeFile, context: &ModelContext<'_>) -> BuiltSoft {
     let path_m = file.path_m.iter().map(|at| DVec3::from(*at)).collect();
-    let end = |end: &RopeEnd| if *end == RopeEnd::Start { Side::Left } else { Side::Right };
+    let end = |end: &End| if *end == End::Start { Side::Left } else { Side::Right };
     let held = file.hold.iter().flatten().map(end).collect();
     let eps_m = one_division(c, context.place, file.segments.is_some(), file.eps_m);
     let shape = SoftShape::Rope { path_m, radius_m: file.radius_m, segments: file.segments.unwrap_or(1) };

@@ -8,12 +8,10 @@ use crate::format::{CameraFile, CameraFiles, CameraKeyFile, MODELS, Point, Probe
 use glam::DVec3;
 use metachron_core::SimSpan;
 use metachron_core::kinds::PolicyKind;
-use metachron_world::{Camera, FACTOR, Load, Machine, NamedCamera, Probe, Target, View};
+use metachron_world::{Camera, FACTOR, Load, Machine, NamedCamera, PRESETS, Probe, Target, View};
 
 /// Default vertical angle of view, degrees.
 const FOV_DEFAULT_DEG: f64 = 40.0;
-/// The machines that a scene can name.
-const PRESETS: [&str; 2] = ["two-cores-software", "workstation"];
 /// An eye nearer than this to the point it looks at has no direction, metres.
 const EYE_NEAREST_M: f64 = 1e-6;
 

@@ -97,7 +97,7 @@ fn texture_of(
         return known.clone();
     }
     let source = textures.source;
-    let is_pattern = key == "texture" && Pattern::ALL.iter().any(|pattern| pattern.name() == name);
+    let is_pattern = key == "texture" && name.parse::<Pattern>().is_ok();
     if !is_pattern && !c.may_read(place, key, source.head(name), image_cost) {
         textures.made.insert(made_from, None);
         return None;
@@ -118,7 +118,7 @@ fn texture_of(
 
 /// A pattern, or an image file next to the scene.
 fn pattern_or_file(name: &str, metres: f64, wrap: Wrap, source: &Source) -> Result<Texture, String> {
-    if let Some(pattern) = Pattern::ALL.into_iter().find(|pattern| pattern.name() == name) {
+    if let Ok(pattern) = name.parse::<Pattern>() {
         return Ok(pattern.texture(metres as f32));
     }
     decode(&source.sibling(name)?, wrap)

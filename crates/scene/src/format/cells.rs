@@ -44,6 +44,7 @@ pub struct PortalFile {
     pub corners_m: Option<Vec<Point>>,
 }
 
+// in the order of `metachron_geometry::Side::ALL`
 /// A side of a cell.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]

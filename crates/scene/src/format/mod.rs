@@ -30,7 +30,7 @@ pub use scene::{
 };
 pub use scenery::{GroupFile, MeshFile, MotionFile, TreeFile, TreeLod};
 pub use sensor::{SensorFile, SensorFileKind};
-pub use soft::{LawKind, RegionFile, RopeEnd, RopeFile, SheetFile, SheetSide, SoftFile, SoftShapeKind, SolidFile};
+pub use soft::{LawKind, RegionFile, RopeFile, SheetFile, SoftFile, SoftShapeKind, SolidFile};
 pub use synthetic::SyntheticFile;
 pub use tool::{KeyframeFile, ToolFile};
 pub use tube::{End, PressureFile, TubeFile};

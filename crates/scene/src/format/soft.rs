@@ -2,6 +2,7 @@
 
 use super::Point;
 use super::ranges::within;
+use super::tube::End;
 use super::value::OneOrRange;
 use metachron_drawable::Generator;
 use metachron_models::soft::{MATTER, Side};
@@ -55,8 +56,8 @@ pub struct SheetFile {
     pub position_m: Option<Point>,
     /// Rotation about its middle by angles about the world's x, then y, then z axis, degrees. Default none.
     pub rotation_deg: Option<Point>,
-    /// Sides whose vertices never move. Default none.
-    pub hold: Option<Vec<SheetSide>>,
+    /// Sides whose vertices never move; `bottom` and `top` of a mesh alone. Default none.
+    pub hold: Option<Vec<Side>>,
 }
 
 /// A soft solid: a box, a ball, or the volume within a closed surface.
@@ -121,19 +122,20 @@ pub struct RopeFile {
     /// finest.
     pub eps_m: Option<OneOrRange<f64>>,
     /// Ends that never move. Default none.
-    pub hold: Option<Vec<RopeEnd>>,
+    pub hold: Option<Vec<End>>,
 }
 
-/// How the stress of a solid follows from its strain; near rest all are the law of Hooke.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize, JsonSchema)]
-#[serde(rename_all = "kebab-case")]
-pub enum LawKind {
-    /// Linear in strains that turn with the body.
-    Corotational,
-    /// Stable Neo-Hookean: rubber-like under large strains.
-    NeoHookean,
-    /// The law of Ogden of one term, with `exponent`.
-    Ogden,
+metachron_core::choices! {
+    /// How the stress of a solid follows from its strain; near rest all are the law of Hooke.
+    #[derive(JsonSchema)]
+    pub enum LawKind {
+        /// Linear in strains that turn with the body.
+        Corotational = "corotational",
+        /// Stable Neo-Hookean: rubber-like under large strains.
+        NeoHookean = "neo-hookean",
+        /// The law of Ogden of one term, with `exponent`.
+        Ogden = "ogden",
+    }
 }
 
 /// A region of a mesh of tetrahedra.
@@ -166,28 +168,4 @@ pub enum SoftShapeKind {
     Ball,
     /// The volume within a closed surface, or tetrahedra.
     Mesh,
-}
-
-/// An edge of a sheet, in its own axes.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize, JsonSchema)]
-#[serde(rename_all = "kebab-case")]
-pub enum SheetSide {
-    /// Where x is least.
-    Left,
-    /// Where x is largest.
-    Right,
-    /// Where y is least.
-    Near,
-    /// Where y is largest.
-    Far,
-}
-
-/// An end of a rope.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize, JsonSchema)]
-#[serde(rename_all = "kebab-case")]
-pub enum RopeEnd {
-    /// The first point.
-    Start,
-    /// The last point.
-    End,
 }

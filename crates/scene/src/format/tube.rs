@@ -91,12 +91,13 @@ pub enum PressureFile {
     Keys(#[schemars(length(min = 1, max = 10_000))] Vec<(f64, f64)>),
 }
 
-/// An end of a tube.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize, JsonSchema)]
-#[serde(rename_all = "kebab-case")]
-pub enum End {
-    /// Where the path begins.
-    Start,
-    /// Where the path ends.
-    End,
+metachron_core::choices! {
+    /// An end of a tube or rope.
+    #[derive(JsonSchema)]
+    pub enum End {
+        /// Where the path begins.
+        Start = "start",
+        /// Where the path ends.
+        End = "end",
+    }
 }

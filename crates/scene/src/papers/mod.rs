@@ -10,19 +10,20 @@ mod grove;
 mod library;
 mod walkthrough;
 
-/// One of the scenes.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Paper {
-    /// 384 seats and a stage, 87,565 triangles (FS93, §8).
-    Auditorium,
-    /// Trees of three kinds (RH05, §6).
-    Grove,
-    /// Eight domes of 120 struts (MB97, §8).
-    Domes,
-    /// 200 meshes of 1.5 million triangles and a sudden turn (GB99).
-    Walkthrough,
-    /// A room of 19,800 triangles whose shading is chosen too (FS93, fig. 11).
-    Library,
+metachron_core::choices! {
+    /// One of the scenes.
+    pub enum Paper {
+        /// 384 seats and a stage, 87,565 triangles (FS93, §8).
+        Auditorium = "auditorium",
+        /// Trees of three kinds (RH05, §6).
+        Grove = "grove",
+        /// Eight domes of 120 struts (MB97, §8).
+        Domes = "domes",
+        /// 200 meshes of 1.5 million triangles and a sudden turn (GB99).
+        Walkthrough = "walkthrough",
+        /// A room of 19,800 triangles whose shading is chosen too (FS93, fig. 11).
+        Library = "library",
+    }
 }
 
 /// Options of a scene.
@@ -46,21 +47,6 @@ impl Default for Choices {
 }
 
 impl Paper {
-    /// All of them.
-    pub const ALL: [Self; 5] = [Self::Auditorium, Self::Grove, Self::Domes, Self::Walkthrough, Self::Library];
-
-    /// The name of its built-in scene.
-    #[must_use]
-    pub const fn name(self) -> &'static str {
-        match self {
-            Self::Auditorium => "auditorium",
-            Self::Grove => "grove",
-            Self::Domes => "domes",
-            Self::Walkthrough => "walkthrough",
-            Self::Library => "library",
-        }
-    }
-
     /// The scene as TOML.
     #[must_use]
     pub fn text(self, choices: &Choices) -> String {

@@ -3,7 +3,7 @@
 //! In: a [`Scene`]. Out: spawns for the runtime. Never here: time passing, a law of control.
 
 use super::ties::{Ties, faults};
-use crate::description::kinds::{ExecutorKind, PriorityKind};
+use crate::description::kinds::ExecutorKind;
 use crate::description::scene::{Load, ShadingCosts};
 use crate::error::WorldError;
 use crate::{Member, Scene, Spec};
@@ -16,7 +16,7 @@ use metachron_models::rod::Tube;
 use metachron_models::soft::SoftBody;
 use metachron_models::synthetic::Synthetic;
 use metachron_models::tool::Tool;
-use metachron_runtime::{AUTO_THREADS_MAX, AgentSpawn, Governor, Machine, Priority, StepPrice, WatchedPoint};
+use metachron_runtime::{AUTO_THREADS_MAX, AgentSpawn, Governor, Machine, StepPrice, WatchedPoint};
 use std::borrow::Cow;
 use std::sync::Arc;
 
@@ -83,14 +83,6 @@ pub(crate) fn executor(asked: ExecutorKind, agents: usize) -> ExecutorKind {
         ExecutorKind::Auto if agents <= AUTO_THREADS_MAX => ExecutorKind::Threads,
         ExecutorKind::Auto => ExecutorKind::Pool,
         asked => asked,
-    }
-}
-
-/// The scheduling priority of the agents' threads.
-pub(crate) const fn priority(scene: &Scene) -> Priority {
-    match scene.priority {
-        PriorityKind::Normal => Priority::Normal,
-        PriorityKind::Realtime => Priority::Realtime,
     }
 }
 

@@ -13,30 +13,18 @@ use metachron_models::rigid::{RigidBody, RigidSpec};
 use metachron_models::rod::{Material, Section, Tube, TubeSpec};
 use metachron_models::synthetic::{Synthetic, SyntheticSpec};
 use metachron_runtime::AgentSpawn;
-use serde::{Deserialize, Serialize};
 
-/// The kind of an agent.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "lowercase")]
-pub enum Model {
-    /// Half a microsecond of arithmetic per step: as cheap as agents get.
-    Synthetic,
-    /// As synthetic, but at rest after its first step.
-    Asleep,
-    /// A tube of 64 segments, clamped at one end.
-    Rod,
-    /// A ball in free flight.
-    Rigid,
-}
-
-impl Model {
-    pub const fn name(self) -> &'static str {
-        match self {
-            Self::Synthetic => "synthetic",
-            Self::Asleep => "asleep",
-            Self::Rod => "rod",
-            Self::Rigid => "rigid",
-        }
+metachron_core::choices! {
+    /// The kind of an agent.
+    pub enum Model {
+        /// Half a microsecond of arithmetic per step: as cheap as agents get.
+        Synthetic = "synthetic",
+        /// As synthetic, but at rest after its first step.
+        Asleep = "asleep",
+        /// A tube of 64 segments, clamped at one end.
+        Rod = "rod",
+        /// A ball in free flight.
+        Rigid = "rigid",
     }
 }
 

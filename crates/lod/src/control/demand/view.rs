@@ -6,18 +6,14 @@ use super::level::{IMPOSTORS_MAX, PRIMITIVE_LEVELS};
 pub use metachron_core::kinds::Shading;
 use metachron_core::{AgentId, ResolutionRange};
 
-/// The cheap form of the pieces of an object (RH05, §6).
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Stroke {
-    /// A point: the leaves of a tree.
-    Point,
-    /// A line: its boughs.
-    Line,
-}
-
-impl Stroke {
-    /// Both, in the order of their prices.
-    pub const ALL: [Self; 2] = [Self::Point, Self::Line];
+metachron_core::choices! {
+    /// The cheap form of the pieces of an object (RH05, §6), in the order of their prices.
+    pub enum Stroke {
+        /// A point: the leaves of a tree.
+        Point = "points",
+        /// A line: its boughs.
+        Line = "lines",
+    }
 }
 
 /// The pieces of an object that are drawn as strokes where its triangles do not suffice for all of them in full: of n pieces p strokes up to

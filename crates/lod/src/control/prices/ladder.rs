@@ -214,7 +214,7 @@ impl Ladder {
         let allowed = move |s: &Shading| (key.shading.0..=key.shading.1).contains(s) || *s == key.shading.1;
         let mut rungs: Vec<Rung> = Vec::new();
         for cut in key.cuts(view, *span) {
-            rungs.extend(Shading::ALL.into_iter().filter(allowed).map(|shading| rung(cut, shading)));
+            rungs.extend(Shading::PRICED.into_iter().filter(allowed).map(|shading| rung(cut, shading)));
         }
         rungs.sort_by(|a, b| a.cost_s.total_cmp(&b.cost_s).then(a.accuracy.total_cmp(&b.accuracy)));
         let asked = rungs.len();

@@ -145,7 +145,7 @@ impl Prices {
         };
         let sample = |(polygons, pixels, time): (f64, f64, f64)| Sample { work: work(polygons, pixels), time };
         let draws = |shading: Shading| drawn_as(None, Some(shading));
-        let samples = Shading::ALL.map(|shading| draws(shading).map(sample).collect::<Vec<_>>());
+        let samples = Shading::PRICED.map(|shading| draws(shading).map(sample).collect::<Vec<_>>());
         let strokes = Stroke::ALL.map(|stroke| drawn_as(Some(stroke), None).map(sample).collect::<Vec<_>>());
         // whether stages work beside each other is the machine's, whatever the shading
         let fits = |serial: f64| {
@@ -158,7 +158,7 @@ impl Prices {
         let [points, lines] = strokes.each_ref().map(|of| fit(of, shading[0].serial));
         let strokes = [points?.stages, lines?.stages];
         let [flat, gouraud, per_pixel, textured] =
-            Shading::ALL.map(|shading| Areas::fitted(&draws(shading).collect::<Vec<_>>()));
+            Shading::PRICED.map(|shading| Areas::fitted(&draws(shading).collect::<Vec<_>>()));
         let areas = || Some([flat?, gouraud?, per_pixel?, textured?]);
         Some(Self { frame_s, pixel_s, enlarge_s, shading, strokes, areas: areas() })
     }
@@ -283,7 +283,7 @@ mod tests {
             state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
             (state >> 11) as f64 / (1_u64 << 53) as f64
         };
-        for shading in Shading::ALL {
+        for shading in Shading::PRICED {
             for k in 0..40 {
                 let objects = if k % 10 == 0 { 0.0 } else { 36.0 };
                 let (polygons, pixels) = (10.0 * 400.0_f64.powf(random()), 10.0 * 500.0_f64.powf(random()));

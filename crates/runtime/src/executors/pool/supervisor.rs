@@ -3,7 +3,7 @@
 //! In: the pool's shared state. Out: a thread for each worker's place, until the end. A step that lasts too long costs one thread: its agent is
 //! stalled, and another worker takes the place; the first one ends with that step. Never here: turns.
 
-use super::super::priority::Priority;
+use super::super::priority::{Priority, take_priority};
 use super::shared::PoolState;
 use super::worker::Worker;
 use crate::agent::handle::AgentHandle;
@@ -112,8 +112,8 @@ impl Supervisor {
             let (word, watchdog, priority) = (Arc::clone(&watchdog), self.team.watchdog.clone(), self.team.priority);
             move || {
                 let _notice = notice;
-                // a refusal was already reported to the caller of `Priority::ask`
-                drop(priority.take());
+                // a refusal was already reported to the caller of `ask_priority`
+                drop(take_priority(priority));
                 Worker::new(state, at, word, watchdog).work();
             }
         };

@@ -163,7 +163,7 @@ fn played(shown: &Shown<'_>, case: &Case, target_s: f64, times: Times) -> anyhow
     let (adapter, mut fly_through) = opened(&shown.opening(), times)?;
     let control = fly_through.session().control();
     control.set_target_hz(1.0 / target_s);
-    control.set_policy(Policy::named(case.policy).context("no such policy")?);
+    control.set_policy(case.policy.parse().context("no such policy")?);
     let lead_in = if times == Times::Measured { MEASURED_LEAD_IN.min(case.frames).max(LEAD_IN) } else { LEAD_IN };
     for _ in 0..lead_in {
         fly_through.step(0.0)?;
