@@ -5,6 +5,7 @@
 use metachron::render::{Gpu, Offscreen, RendererOptions, Size, Style};
 use metachron::scene::{Source, load};
 use metachron::session::{Drawing, End, Headless, Session, play_headless};
+use metachron::world::Pace;
 use metachron::world::kinds::ExecutorKind;
 use std::error::Error;
 use std::path::PathBuf;
@@ -29,7 +30,7 @@ fn main() -> Result<(), Box<dyn Error>> {
         depth: None,
         film: None,
     };
-    let outcome = play_headless(Session::open(scene)?, plan, &mut |_, _| true)?;
+    let outcome = play_headless(Session::open(scene, Pace::RealTime)?, plan, &mut |_, _| true)?;
     println!(
         "{} agents, {:.2} s, drawn on {}: {}",
         outcome.agents.len(),

@@ -15,6 +15,7 @@ use metachron_viewer::ui::{
     run_window,
 };
 use metachron_viewer::{WindowFailure, WindowPlan, play_in_window};
+use metachron_world::Pace;
 use std::io::{BufRead, BufReader, Write};
 use std::path::Path;
 use std::process::{Child, Command, ExitCode, Stdio};
@@ -123,7 +124,7 @@ const FRAMES: u64 = 8;
 fn the_tube_plays_in_a_window() {
     metachron::scenes::provide();
     let source = Source::open("tube").unwrap();
-    let session = Session::open(metachron_scene::load(&source, &[]).unwrap()).unwrap();
+    let session = Session::open(metachron_scene::load(&source, &[]).unwrap(), Pace::RealTime).unwrap();
     let screenshots = std::env::temp_dir();
     let size = Some([800.0, 500.0]);
     let plan = WindowPlan {
@@ -150,7 +151,7 @@ fn the_tube_plays_in_a_window() {
 fn a_display_that_goes_away_ends_the_run_with_its_outcome() {
     metachron::scenes::provide();
     let source = Source::open("pendulum").unwrap();
-    let session = Session::open(metachron_scene::load(&source, &[]).unwrap()).unwrap();
+    let session = Session::open(metachron_scene::load(&source, &[]).unwrap(), Pace::RealTime).unwrap();
     let screenshots = std::env::temp_dir();
     let plan = WindowPlan {
         source,

@@ -27,7 +27,7 @@ use metachron_viewer::ui::WindowError;
 #[cfg(feature = "viewer")]
 use metachron_viewer::{WindowFailure, WindowPlan, play_in_window};
 use metachron_world::kinds::ExecutorKind;
-use metachron_world::{Pace, Reading, RecordingFile, Scene, SceneText, Sensor};
+use metachron_world::{Reading, RecordingFile, Scene, SceneText, Sensor};
 use std::path::{Path, PathBuf};
 
 /// Begins to write down the commands to the run.
@@ -53,10 +53,7 @@ const PICTURE_SIZE: [u32; 2] = [1280, 720];
 /// # Errors
 /// Errors of the models, the executor or the adapter.
 pub(super) fn play(request: &Request, go_on: GoOn<'_>) -> anyhow::Result<Played> {
-    let mut session = Session::open(request.scene.clone())?;
-    if request.pace != Pace::RealTime {
-        session.set_pace(request.pace)?;
-    }
+    let mut session = Session::open(request.scene.clone(), request.pace)?;
     if !request.quiet {
         session.report_start_up(metachron_console::output::message);
     }

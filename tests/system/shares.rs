@@ -5,6 +5,7 @@ use metachron_lod::control;
 use metachron_render::{Camera, Shading, Size, Style};
 use metachron_scene::Source;
 use metachron_session::{Drawing, End, Finished, Headless, Outcome, Session, play_headless};
+use metachron_world::Pace;
 use std::fmt::Write;
 
 const SIZE: Size = Size { width: 640, height: 360 };
@@ -13,7 +14,7 @@ fn session(text: &str) -> Session {
     let folder = Folder::with(&format!("executor = \"lockstep\"\n{text}"));
     let source = Source::open(folder.scene()).expect("the file just written");
     let scene = metachron_scene::load(&source, &[]).unwrap_or_else(|why| panic!("{:?}", why.problems));
-    Session::open(scene).expect("agents that can run")
+    Session::open(scene, Pace::RealTime).expect("agents that can run")
 }
 
 fn play(text: &str, frames: u64) -> Outcome {
@@ -308,7 +309,8 @@ fn library(policy: &str, frame_hz: f64) -> (f64, [u32; 2], f64) {
     ];
     let source = Source::open(concat!(env!("CARGO_MANIFEST_DIR"), "/scenes/library.toml")).expect("a built-in scene");
     let scene = metachron_scene::load(&source, &set.map(|(key, value)| (key.to_owned(), value)));
-    let mut session = Session::open(scene.unwrap_or_else(|why| panic!("{:?}", why.problems))).expect("a scene");
+    let scene = scene.unwrap_or_else(|why| panic!("{:?}", why.problems));
+    let mut session = Session::open(scene, Pace::RealTime).expect("a scene");
     let (camera, mut frame_ms) = (session.camera_at(3.0), 0.0);
     for _ in 0..30 {
         let started = session.now();

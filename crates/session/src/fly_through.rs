@@ -11,7 +11,7 @@ use super::outcome::FrameRecord;
 use super::session::Session;
 use metachron_render::{Camera, PictureFile, Size, Style};
 use metachron_runtime::TimelineCommand;
-use metachron_world::Scene;
+use metachron_world::{Pace, Scene};
 
 /// A walk through a scene.
 pub struct FlyThrough {
@@ -30,7 +30,7 @@ impl FlyThrough {
     /// As [`Session::open`].
     pub fn open(scene: Scene, drawing: Drawing, size: Size) -> Result<Self, SessionError> {
         let length_s = scene.cameras.first().and_then(|first| first.camera.length_s()).unwrap_or(0.0);
-        let mut session = Session::open(scene)?;
+        let mut session = Session::open(scene, Pace::RealTime)?;
         session.drive(TimelineCommand::Pause);
         if let Drawing::Every(screen) = &drawing {
             let gpu = screen.gpu();

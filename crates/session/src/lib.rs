@@ -7,12 +7,13 @@
 //! use metachron_render::{Size, Style};
 //! use metachron_scene::{Source, load};
 //! use metachron_session::{Drawing, End, Headless, Session, play_headless};
+//! use metachron_world::Pace;
 //!
 //! let text = b"format = 1\nexecutor = 'lockstep'\n[[object]]\nname = 'ball'\nmodel = 'rigid'\nshape = 'ball'\nradius_m = 0.1";
 //! let scene = load(&Source::memory("falling", text).unwrap(), &[]).unwrap();
 //! let (size, style) = (Size { width: 320, height: 180 }, Style::default());
 //! let plan = Headless { end: End::Frames(30), size, style, drawing: Drawing::Nothing, png: None, depth: None, film: None };
-//! let outcome = play_headless(Session::open(scene).unwrap(), plan, &mut |_, _| true).unwrap();
+//! let outcome = play_headless(Session::open(scene, Pace::RealTime).unwrap(), plan, &mut |_, _| true).unwrap();
 //! assert_eq!((outcome.frames.len(), outcome.agents.len()), (30, 1));
 //! assert!((outcome.sim_s - 0.5).abs() < 0.02); // 30 frames at 60 Hz, to a frame
 //! assert!(outcome.adapter.is_none());

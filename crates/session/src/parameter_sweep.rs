@@ -82,8 +82,7 @@ pub fn play_points(
     go_on: &mut dyn FnMut() -> bool,
 ) -> Result<Option<Played>, SessionError> {
     let machine = metachron_world::machine(scene);
-    let mut session = Session::open(watched(scene, points, seconds))?;
-    session.set_pace(Pace::Free)?;
+    let mut session = Session::open(watched(scene, points, seconds), Pace::Free)?;
     let looks = (seconds / LOOK_S).ceil().max(1.0);
     for look in 1..=looks as u32 {
         session.wait_until(Duration::from_secs_f64(seconds * f64::from(look) / looks));

@@ -99,10 +99,8 @@ fn compare_runs(
 ) -> Result<ReferenceComparison, SessionError> {
     let common = common_clock(scene);
     let dt_s = common.agents.first().map_or(STEP_MAX_S, |member| member.pace.dt.as_secs_f64());
-    let mut moved = Session::open(moved(&common))?;
-    let mut session = Session::open(common)?;
-    moved.set_pace(Pace::Free)?;
-    session.set_pace(Pace::Free)?;
+    let mut moved = Session::open(moved(&common), Pace::Free)?;
+    let mut session = Session::open(common, Pace::Free)?;
     let mut sensitivity_m = 0.0_f64;
     let empty = Trace::default();
     let trace = outcome.trace.as_ref().unwrap_or(&empty);
@@ -302,7 +300,7 @@ mod tests {
 
     /// `frames` frames of `scene`, with a trace.
     fn played(scene: &Scene, frames: u32) -> Outcome {
-        let mut session = Session::open(scene.clone()).unwrap();
+        let mut session = Session::open(scene.clone(), Pace::RealTime).unwrap();
         session.keep_trace();
         session.begin();
         for frame in 0..frames {

@@ -34,7 +34,7 @@ use metachron_render::Gpu;
 use metachron_render::{Camera, Level, Picture, SceneView};
 use metachron_runtime::{AgentHandle, Agents, Command, Keyed, Machine, Reader};
 use metachron_world::kinds::{ExecutorKind, LawKind};
-use metachron_world::{Govern, Scene, World, WorldError, machine};
+use metachron_world::{Govern, Pace, Scene, World, WorldError, machine};
 use rewind::Rewind;
 pub use rewind::{REWIND_BYTES, RewindStatus};
 use std::sync::Arc;
@@ -143,12 +143,22 @@ const CPU_NEWS: f64 = 0.05;
 const GEOMORPH_FRAMES: u8 = 6;
 
 impl Session {
-    /// Creates the agents of `scene`; real time is held until [`Session::begin`].
+    /// Creates the agents of `scene`, whose time passes at `pace`; real time is held until [`Session::begin`].
+    ///
+    /// At [`Pace::Free`] no agent gives up time or makes longer steps than it was asked for; where time is real, each frame then waits for all
+    /// agents, and is due a period of simulated time after the one before.
     ///
     /// # Errors
-    /// [`SessionError::World`]; nothing runs then.
-    pub fn open(scene: Scene) -> Result<Self, SessionError> {
-        Self::open_as(scene, |scene, govern| Ok(World::start_governed(scene, scene.executor, govern)?))
+    /// [`SessionError::World`], also for a factor outside its range; nothing runs then.
+    pub fn open(scene: Scene, pace: Pace) -> Result<Self, SessionError> {
+        Self::open_as(scene, |scene, govern| {
+            let world = World::start_governed(scene, scene.executor, govern)?;
+            // a world to which nothing was done is recorded without its state
+            if pace != Pace::RealTime {
+                world.set_pace(pace)?;
+            }
+            Ok(world)
+        })
     }
 
     fn open_as(

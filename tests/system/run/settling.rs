@@ -5,6 +5,7 @@ use metachron_lod::control::Status;
 use metachron_render::{Size, Style};
 use metachron_scene::{builtin, load};
 use metachron_session::{Finished, Session};
+use metachron_world::Pace;
 use std::time::Duration;
 
 /// Of this size all three targets are within reach: one triangle a pixel, the most there is, takes longer than 1/20 s.
@@ -32,7 +33,7 @@ impl Play {
         overrides.push(("target.frame_hz".to_owned(), target_hz.to_string()));
         metachron::scenes::provide();
         let source = builtin::find(scene).unwrap().source().unwrap();
-        let session = Session::open(load(&source, &overrides).unwrap()).unwrap();
+        let session = Session::open(load(&source, &overrides).unwrap(), Pace::RealTime).unwrap();
         Self { session, due: Duration::ZERO }
     }
 

@@ -17,7 +17,7 @@ use metachron_runtime::AgentStats;
 use metachron_scene::{Source, load};
 use metachron_session::{Drawing, End, Headless, Session, play_headless};
 use metachron_world::kinds::ExecutorKind;
-use metachron_world::{Scene, Spec};
+use metachron_world::{Pace, Scene, Spec};
 use serde::{Deserialize, Serialize};
 
 /// The subject.
@@ -112,7 +112,7 @@ fn first_steps_per_s(spent: &[f64], steps: f64) -> f64 {
 
 /// Measures the scene's boxes as agents.
 fn agents(scene: &Scene, executor: ExecutorKind, seconds: f64) -> anyhow::Result<Row> {
-    let session = Session::open(Scene { executor, ..scene.clone() })?;
+    let session = Session::open(Scene { executor, ..scene.clone() }, Pace::RealTime)?;
     let plan = Headless {
         end: End::Seconds(seconds),
         size: Size { width: 640, height: 360 },

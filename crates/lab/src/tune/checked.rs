@@ -8,6 +8,7 @@ use metachron_console::progress::Bar;
 use metachron_lod::control::Law;
 use metachron_lod::tune::{Start, Trial, Tuning, play, settled_after};
 use metachron_session::{After, Drawing, Pushes, Session, median, push};
+use metachron_world::Pace;
 use serde_json::{Value, json};
 use std::sync::atomic::{AtomicBool, Ordering};
 
@@ -68,7 +69,7 @@ pub(super) fn check(
         drawing: if on.live { live(on.size)? } else { Drawing::Nothing },
     };
     let bar = Bar::new("measured frames", args.common.quiet || args.common.json);
-    let runs = push(Session::open(on.scene.clone())?, pushes, &mut |share| {
+    let runs = push(Session::open(on.scene.clone(), Pace::RealTime)?, pushes, &mut |share| {
         bar.set(share, "step response".to_owned());
         !stopped.load(Ordering::Relaxed)
     })?;

@@ -22,8 +22,8 @@ use metachron_lod::tune::{
 use metachron_render::{Gpu, Offscreen, RendererOptions, Size};
 use metachron_scene::{Source, load};
 use metachron_session::{Drawing, Experiment, Session, experiment};
-use metachron_world::Scene;
 use metachron_world::kinds::ExecutorKind;
+use metachron_world::{Pace, Scene};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -78,7 +78,7 @@ fn identify(args: &TuneArgs, scene: Scene, stopped: &AtomicBool) -> anyhow::Resu
     let target_hz = scene.target.frame_hz;
     let [width, height] = args.size.unwrap_or([1280, 720]);
     let size = Size { width, height };
-    let session = Session::open(scene.clone())?;
+    let session = Session::open(scene.clone(), Pace::RealTime)?;
     let drawing = if args.live { live(size)? } else { Drawing::Nothing };
     let plan = Experiment { frames: FRAMES[usize::from(args.quick)], size, drawing };
     let bar = Bar::new("experiment", args.common.quiet || args.common.json);

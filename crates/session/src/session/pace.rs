@@ -2,23 +2,12 @@
 //!
 //! In: a pace, when frames are due. Out: simulated time that has passed by then. Never here: frames, when agents make their turns.
 
-use super::super::error::SessionError;
 use super::Session;
 use metachron_core::{SimSpan, SimTime};
 use metachron_runtime::TimelineCommand;
-use metachron_world::Pace;
 use std::time::Duration;
 
 impl Session {
-    /// Sets how fast time passes: before the first frame. At [`Pace::Free`] no agent gives up time or makes longer steps than it was asked for;
-    /// where time is real, each frame then waits for all agents, and is due a period of simulated time after the one before.
-    ///
-    /// # Errors
-    /// [`SessionError::World`] for a factor outside its range.
-    pub fn set_pace(&mut self, pace: Pace) -> Result<(), SessionError> {
-        Ok(self.world.set_pace(pace)?)
-    }
-
     /// Pauses real time until [`Session::begin`]. Virtual time passes only while the caller waits.
     pub fn hold(&mut self) {
         if !self.is_virtual() {
@@ -72,6 +61,7 @@ mod tests {
     use crate::Outcome;
     use metachron_render::{Size, Style};
     use metachron_scene::{Source, load};
+    use metachron_world::Pace;
 
     /// A tube whose step and ε control may choose, and a load of 3 ms a step, each of them asked for a step of 2 ms; on the declared machine a step
     /// of the tube takes ten of them.
@@ -83,8 +73,7 @@ mod tests {
     fn played(executor: &str, pace: Pace) -> Outcome {
         let source = Source::memory("load", TOO_MUCH.as_bytes()).unwrap();
         let scene = load(&source, &[("executor".to_owned(), format!("\"{executor}\""))]).unwrap();
-        let mut session = Session::open(scene).unwrap();
-        session.set_pace(pace).unwrap();
+        let session = Session::open(scene, pace).unwrap();
         let plan = Headless {
             end: End::Frames(41),
             size: Size { width: 64, height: 64 },

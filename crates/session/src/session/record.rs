@@ -91,13 +91,14 @@ mod tests {
     use metachron_render::{Size, Style};
     use metachron_runtime::Command;
     use metachron_scene::Source;
+    use metachron_world::Pace;
 
     #[test]
     fn time_before_the_first_step_counts_as_start_up() {
         let text = b"format = 1\nexecutor = \"threads\"\n[[object]]\nname = \"idle\"\nmodel = \"synthetic\"\nrate_hz = 10.0\ncost_us = 10.0\n";
         let scene = metachron_scene::load(&Source::memory("idle", text).unwrap(), &[]).unwrap();
         let opened = std::time::Instant::now();
-        let mut session = Session::open(scene).unwrap();
+        let mut session = Session::open(scene, Pace::RealTime).unwrap();
         let held = session.now() + Duration::from_millis(30);
         session.wait_until(held);
         assert_eq!((session.sim_now(), session.agents()[0].steps()), (SimTime::ZERO, 0));
@@ -113,7 +114,7 @@ mod tests {
             shape = \"mesh\"\ngenerate = \"liver\"\nscale = 0.1\ntriangles = 600\nposition_m = [0.0, 0.0, 0.1]\neps_m = 0.03\nyoung_pa = 5e3\n\
             hold = [\"bottom\"]\n";
         let scene = metachron_scene::load(&Source::memory("liver", text).unwrap(), &[]).unwrap();
-        let mut session = Session::open(scene).unwrap();
+        let mut session = Session::open(scene, Pace::RealTime).unwrap();
         let (camera, size) = (session.scene_camera(), Size { width: 200, height: 200 });
         session.begin();
         let drawn = |session: &mut Session, milliseconds: u64| {

@@ -7,7 +7,7 @@ use super::WindowSimulation;
 use crate::ui::{Message, Severity};
 use metachron_scene::{FileVersion, SceneError, Source, SourceFile};
 use metachron_session::Session;
-use metachron_world::Scene;
+use metachron_world::{Pace, Scene};
 use std::path::Path;
 use std::time::{Duration, Instant};
 
@@ -101,7 +101,7 @@ impl WindowSimulation<'_> {
 
     /// Restarts with `scene`; speed and pause are kept.
     pub(super) fn restart(&mut self, scene: Scene) {
-        match Session::open(scene) {
+        match Session::open(scene, Pace::RealTime) {
             Ok(session) => self.replace(session),
             Err(error) => self.show_message(Severity::Failure, error.to_string()),
         }

@@ -6,6 +6,7 @@ mod past_tests;
 
 use super::*;
 use metachron_render::{Size, Style};
+use metachron_world::Pace;
 use std::path::Path;
 
 fn plan(scene: &str) -> WindowPlan {
@@ -37,7 +38,7 @@ fn with_scene(scene: &str, check: impl FnOnce(&mut WindowSimulation<'_>)) {
 }
 
 fn with_plan(plan: WindowPlan, check: impl FnOnce(&mut WindowSimulation<'_>)) {
-    let session = Session::open(metachron_scene::load(&plan.source, &plan.overrides).unwrap()).unwrap();
+    let session = Session::open(metachron_scene::load(&plan.source, &plan.overrides).unwrap(), Pace::RealTime).unwrap();
     let mut go_on = |_: &FrameRecord, _: Option<f64>| true;
     check(&mut WindowSimulation::new(session, plan, &mut go_on));
 }
@@ -197,7 +198,7 @@ fn a_run_without_an_end_forgets_its_oldest_frames() {
     with_simulation(|simulation| {
         simulation.session.keep_frames(10);
         (0..45).for_each(|_| frame(simulation, None));
-        let other = Session::open(simulation.session.scene().clone()).unwrap();
+        let other = Session::open(simulation.session.scene().clone(), Pace::RealTime).unwrap();
         let session = std::mem::replace(&mut simulation.session, other);
         let outcome = session.end(None, false);
         assert_eq!((outcome.finished, outcome.frames.last().unwrap().frame), (45, 44));
@@ -219,7 +220,7 @@ fn dropped_time_lowers_the_real_time_factor() {
     let mut plan = plan("pendulum");
     // a step that becomes 1/60 s long at most, as the tube swings past the ball, takes twice that
     plan.overrides.push(("machine.step.tube.base_us".to_owned(), "33000".to_owned()));
-    let session = Session::open(metachron_scene::load(&plan.source, &plan.overrides).unwrap()).unwrap();
+    let session = Session::open(metachron_scene::load(&plan.source, &plan.overrides).unwrap(), Pace::RealTime).unwrap();
     let mut go_on = |_: &FrameRecord, _: Option<f64>| true;
     let simulation = &mut WindowSimulation::new(session, plan, &mut go_on);
     let mut sum = 0.0;

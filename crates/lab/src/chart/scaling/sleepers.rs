@@ -8,6 +8,7 @@ use metachron_render::{Size, Style};
 use metachron_runtime::AgentState;
 use metachron_scene::{Source, load};
 use metachron_session::{Finished, Session};
+use metachron_world::Pace;
 use std::time::Duration;
 
 /// The experiment.
@@ -83,7 +84,7 @@ struct Play {
 impl Play {
     fn open(sleeper: Sleeper, count: u32, pictures: bool) -> Option<Self> {
         let source = Source::memory("sleepers", scene(sleeper, count).as_bytes()).ok()?;
-        let session = Session::open(load(&source, &[]).ok()?).ok()?;
+        let session = Session::open(load(&source, &[]).ok()?, Pace::RealTime).ok()?;
         Some(Self { session, pictures, due: Duration::ZERO })
     }
 

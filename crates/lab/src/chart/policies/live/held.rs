@@ -14,6 +14,7 @@ use metachron_render::{Camera, Gpu, Offscreen, RendererOptions, SceneView, Size,
 use metachron_scene::{builtin, load};
 use metachron_session::report::MISS;
 use metachron_session::{FrameRecord, PictureFormat, Session, draw_frame};
+use metachron_world::Pace;
 use serde::{Deserialize, Serialize};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -125,7 +126,7 @@ impl Play {
         ];
         let overrides: Vec<_> = overrides.into_iter().map(|(key, value)| (key.to_owned(), value)).collect();
         let built_in = builtin::find(case.scene).context("no such scene")?;
-        let mut session = Session::open(load(&built_in.source()?, &overrides)?)?;
+        let mut session = Session::open(load(&built_in.source()?, &overrides)?, Pace::RealTime)?;
         session.hold();
         session.calibrate(&gpu.describe(), gpu.is_processor(), || Some(gpu.clone()));
         let screen = Offscreen::new(gpu.clone(), SIZE, RendererOptions::for_adapter(&gpu.info))?;

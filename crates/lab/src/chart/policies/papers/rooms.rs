@@ -11,6 +11,7 @@ use metachron_render::{Size, VisibleCounts};
 use metachron_scene::papers::{Choices, Paper};
 use metachron_scene::{Source, load};
 use metachron_session::Session;
+use metachron_world::Pace;
 use serde::{Deserialize, Serialize};
 
 /// The experiment.
@@ -60,7 +61,7 @@ fn auditorium() -> Option<Session> {
     let text = Paper::Auditorium.text(&Choices::default());
     let source = Source::memory("auditorium", text.as_bytes()).ok()?;
     let lockstep = ("executor".to_owned(), "lockstep".to_owned());
-    Session::open(load(&source, &[lockstep]).ok()?).ok()
+    Session::open(load(&source, &[lockstep]).ok()?, Pace::RealTime).ok()
 }
 
 /// Looks from the scene's camera at a time.
