@@ -5,6 +5,7 @@
 
 use super::walk::{LEAD_IN, Opening, Times, opened};
 use anyhow::Context;
+use metachron_lod::control::Policy;
 use metachron_render::{Camera, Colouring, PictureFile, Style};
 use metachron_session::FlyThrough;
 
