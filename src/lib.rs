@@ -30,6 +30,8 @@ pub use metachron_drawable as drawable;
 #[cfg(feature = "export")]
 pub use metachron_export as export;
 pub use metachron_geometry as geometry;
+#[cfg(feature = "hosts")]
+pub use metachron_hosts as hosts;
 #[cfg(feature = "import")]
 pub use metachron_import as import;
 #[cfg(feature = "lab")]

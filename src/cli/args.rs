@@ -2,6 +2,8 @@
 
 use super::devices::DeviceWish;
 use super::exports::ExportPaths;
+#[cfg(feature = "hosts")]
+use super::hosts::args::{HOST_EXAMPLES, HostArgs, VIEW_EXAMPLES, ViewArgs};
 use clap::builder::PossibleValuesParser;
 use clap::{Args, Parser, Subcommand, ValueHint};
 use metachron_console::values::{CommonArgs, LimitArgs, assignment, seconds, size, target_fps};
@@ -100,6 +102,14 @@ pub enum Command {
     /// Repeat a recorded run, to the bit: to see what happened, or to stop on the way
     #[command(after_help = REPLAY_EXAMPLES)]
     Replay(Box<ReplayArgs>),
+    /// Run a scene and serve it to other processes, until Ctrl-C
+    #[cfg(feature = "hosts")]
+    #[command(after_help = HOST_EXAMPLES)]
+    Host(HostArgs),
+    /// Show a world that another process serves, in a window with its own frame budget
+    #[cfg(feature = "hosts")]
+    #[command(after_help = VIEW_EXAMPLES)]
+    View(Box<ViewArgs>),
     /// Validate scenes; all problems of the first stage that fails, each at its place in the file
     #[command(after_help = CHECK_EXAMPLES)]
     Check(CheckArgs),

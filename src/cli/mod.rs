@@ -10,6 +10,8 @@ mod describe;
 mod devices;
 mod exports;
 mod generate;
+#[cfg(feature = "hosts")]
+mod hosts;
 mod import;
 mod play;
 mod replay;
@@ -53,6 +55,10 @@ fn dispatch(cli: Cli, matches: &clap::ArgMatches) -> anyhow::Result<Exit> {
     match cli.command {
         Command::Run(args) => run::command(&args, matches.subcommand_matches("run")),
         Command::Replay(args) => replay::command(&args),
+        #[cfg(feature = "hosts")]
+        Command::Host(args) => hosts::host(&args),
+        #[cfg(feature = "hosts")]
+        Command::View(args) => hosts::view(&args),
         Command::Check(args) => check::command(&args),
         #[cfg(feature = "lab")]
         Command::Chart(args) => metachron_lab::chart(&args),

@@ -74,7 +74,7 @@ pub(super) fn play(request: &Request, go_on: GoOn<'_>) -> anyhow::Result<Played>
 }
 
 #[cfg(not(feature = "viewer"))]
-fn in_window(session: Session, request: &Request, go_on: GoOn<'_>) -> anyhow::Result<Played> {
+pub(super) fn in_window(session: Session, request: &Request, go_on: GoOn<'_>) -> anyhow::Result<Played> {
     let png = cfg!(feature = "render").then(|| request.png_without_window.clone());
     let mut played = headless(session, request, png, go_on)?;
     played.no_window = Some("this build cannot open a window: it lacks the feature `viewer`".to_owned());
@@ -82,7 +82,7 @@ fn in_window(session: Session, request: &Request, go_on: GoOn<'_>) -> anyhow::Re
 }
 
 #[cfg(feature = "viewer")]
-fn in_window(mut session: Session, request: &Request, go_on: GoOn<'_>) -> anyhow::Result<Played> {
+pub(super) fn in_window(mut session: Session, request: &Request, go_on: GoOn<'_>) -> anyhow::Result<Played> {
     choose_camera(&mut session, request)?;
     match play_in_window(session, window_plan(request), &mut |record, done| go_on(step(record, done))) {
         Ok(outcome) => Ok(played(&request.scene, outcome, None)),

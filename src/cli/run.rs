@@ -247,7 +247,13 @@ fn check_inputs(args: &RunArgs) -> anyhow::Result<()> {
         let why = "--pace free lets time wait for agents, and a hand at a device does not; leave one of the two out";
         return Err(BadInput(why.to_owned()).into());
     }
-    let output = &args.output;
+    check_windowless(&args.output, args.headless)?;
+    devices::check(&args.device)?;
+    check_outputs(&args.output, args.gains.as_deref().map(|gains| ("--gains", gains)), args.record.as_deref())
+}
+
+/// Refuses files that only a run without a window writes.
+pub(super) fn check_windowless(output: &OutputArgs, headless: bool) -> anyhow::Result<()> {
     let files = [
         ("--png", &output.png),
         ("--depth", &output.depth),
@@ -258,11 +264,10 @@ fn check_inputs(args: &RunArgs) -> anyhow::Result<()> {
         ("--animation", &output.animation),
         ("--perfetto", &output.perfetto),
     ];
-    if let Some((flag, _)) = files.iter().find(|(_, path)| path.is_some() && !args.headless) {
+    if let Some((flag, _)) = files.iter().find(|(_, path)| path.is_some() && !headless) {
         return Err(BadInput(format!("{flag} needs a run without a window; add --headless")).into());
     }
-    devices::check(&args.device)?;
-    check_outputs(&args.output, args.gains.as_deref().map(|gains| ("--gains", gains)), args.record.as_deref())
+    Ok(())
 }
 
 /// The files that a run writes, by their flags.

@@ -92,7 +92,7 @@ const RINGS: [(&str, usize); 20] = [
 
 /// Most production lines of Rust in all crates and the Python module: neither blank, comment nor test code. Work that needs
 /// more raises it beforehand, in a commit that names what the lines are for.
-const LINES_MAX: usize = 105_520;
+const LINES_MAX: usize = 106_100;
 
 fn root() -> PathBuf {
     PathBuf::from(env!("CARGO_MANIFEST_DIR"))
@@ -166,6 +166,18 @@ fn every_crate_depends_on_those_below_it_alone_and_says_what_it_is() {
         }
     }
     assert!(wrong.is_empty(), "{wrong:#?}");
+}
+
+/// `.ci/run` looks for zenoh in the tree of dependencies; here is why it finds none.
+#[test]
+fn the_network_comes_by_its_own_feature_alone() {
+    let text = fs::read_to_string(root().join("Cargo.toml")).unwrap();
+    let (_, features) = text.split_once("\n[features]\n").unwrap();
+    let (features, rest) = features.split_once("\n[").unwrap();
+    let with_hosts: Vec<_> = features.lines().filter(|line| !line.starts_with('#') && line.contains("hosts")).collect();
+    assert_eq!(with_hosts, ["hosts = [\"dep:metachron-hosts\"]"]);
+    assert!(rest.contains("\nmetachron-hosts = { workspace = true, optional = true }\n"), "an optional dependency");
+    assert!(text.contains("exclude = [\"crates/bevy\", \"crates/hosts\"]"), "a member is built by every command");
 }
 
 #[test]

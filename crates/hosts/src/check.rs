@@ -47,7 +47,19 @@ fn snapshot(state: &Snapshot) -> Result<(), String> {
     if state.time.as_nanos().checked_add(state.clock_offset.as_nanos()).is_none() {
         return Err("its time is beyond all times".to_owned());
     }
+    others(state).try_for_each(number)?;
     body(&state.body)
+}
+
+/// The objects that a state names besides its own.
+fn others(state: &Snapshot) -> impl Iterator<Item = AgentId> {
+    let tool = state.body.tool();
+    let held = tool.and_then(|tool| tool.grasp.as_ref()).map(|grasp| grasp.target);
+    let held = held.into_iter().chain(tool.and_then(|tool| tool.admits));
+    let pairs = state.pairs.iter().map(|pair| pair.with).chain(state.grips.iter().filter_map(|grip| grip.by));
+    let listed = state.touches.iter().chain(&state.bonds).copied();
+    let events = state.events.iter().filter_map(|event| event.with);
+    held.chain(pairs).chain(listed).chain(events).chain(state.cluster.map(|cluster| cluster.leader))
 }
 
 /// Checks where its matter is.

@@ -8,9 +8,10 @@ use crate::error::HostsError;
 use crate::event_wire::WireEvent;
 use crate::gate::{CALLS_MAX, Gate, Refusals};
 use crate::refusal::Refusal;
+use crate::serving::{SceneFiles, Serving};
 use crate::wire::{BadMessage, Call, Moment, ObjectState, PROGRAM, Reply, Request, Welcome, decode, encode};
 use metachron_core::{AgentId, LocalModel, SimSpan, Snapshot};
-use metachron_world::{Checkpoint, EventFilter, EventReader, Touched, WorldCalls, WorldError};
+use metachron_world::{Checkpoint, EventFilter, EventReader, Part, Touched, WorldCalls, WorldError};
 use std::collections::{BTreeMap, BTreeSet};
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::atomic::{AtomicBool, Ordering::Relaxed};
@@ -42,6 +43,7 @@ pub struct Host {
 struct Shared {
     world: Arc<dyn WorldCalls>,
     name: String,
+    scene: Option<Box<SceneFiles>>,
     /// A number that no run of a host had before.
     run: u64,
     session: Session,
@@ -66,22 +68,23 @@ impl std::fmt::Debug for Host {
     }
 }
 
-/// Serves `world` under `name` at `endpoint`, `tcp/address:port` of this machine.
+/// Serves `world`, until the host is dropped.
 ///
 /// # Errors
 /// [`HostsError::BadName`], [`HostsError::BadEndpoint`], [`HostsError::NeedsCertificates`] and [`HostsError::Network`].
-pub fn serve(world: Arc<dyn WorldCalls>, name: &str, endpoint: &str) -> Result<Host, HostsError> {
-    if !is_name(name) {
-        return Err(HostsError::BadName { name: name.to_owned() });
+pub fn serve(world: Arc<dyn WorldCalls>, serving: Serving) -> Result<Host, HostsError> {
+    let Serving { name, endpoint, scene } = serving;
+    if !is_name(&name) {
+        return Err(HostsError::BadName { name });
     }
-    let session = open(endpoint, Side::Host)?;
-    let failed = |error: zenoh::Error| HostsError::Network { endpoint: endpoint.to_owned(), reason: error.to_string() };
+    let session = open(&endpoint, Side::Host)?;
+    let failed = |error: zenoh::Error| HostsError::Network { endpoint: endpoint.clone(), reason: error.to_string() };
     let since_1970 = SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default();
     let run = (since_1970.as_nanos() as u64 ^ u64::from(std::process::id())).max(1);
     let events = world.listen(EventFilter::all());
     let shown = Mutex::new(Shown { sequence: 1, objects: BTreeMap::new(), events, too_long: 0 });
-    let (gate, ends, name) = (Mutex::default(), AtomicBool::new(false), name.to_owned());
-    let shared = Arc::new(Shared { world, name, run, session, gate, shown, ends });
+    let (gate, ends, scene) = (Mutex::default(), AtomicBool::new(false), scene.map(Box::new));
+    let shared = Arc::new(Shared { world, name, scene, run, session, gate, shown, ends });
     let (to_calls, calls) = sync_channel(WAITING);
     let (publishing, answering) = (Arc::clone(&shared), Arc::clone(&shared));
     let threads = vec![
@@ -281,6 +284,12 @@ impl Shared {
                 Reply::Done(self.publish())
             }
             Call::Hash => Reply::Hash(world.hash()?),
+            Call::Part(id) => {
+                let part = world.part(world.object_of(id)?)?;
+                // a model of somebody's own stays in its process
+                Reply::Part(part.filter(|part| !matches!(part, Part::Custom(_))).map(Box::new))
+            }
+            Call::Scene => Reply::Scene(self.scene.clone()),
         };
         let too_long = |bad: BadMessage| Refusal::Other(format!("{bad}: the answer is too long"));
         Ok(vec![encode(&reply).map_err(too_long)?])

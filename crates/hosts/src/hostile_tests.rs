@@ -4,7 +4,7 @@ use crate::endpoint::{Side, open};
 use crate::gate::CALLS_MAX;
 use crate::mirror::Mirror;
 use crate::wire::{Call, MESSAGE_MAX, Moment, ObjectState, PROGRAM, Reply, Request, VERSION, Welcome, decode, encode};
-use crate::{Host, connect, serve};
+use crate::{Host, Serving, connect, serve};
 use glam::{DQuat, DVec3};
 use metachron_core::{AgentId, Anchor, Body, CurveState, RigidState, SimSpan, SimTime, Snapshot};
 use metachron_runtime::{Command, TimelineCommand};
@@ -22,7 +22,7 @@ fn scene() -> Scene {
 fn serve_one() -> (World, Host, String) {
     let port = TcpListener::bind("127.0.0.1:0").unwrap().local_addr().unwrap().port();
     let (world, endpoint) = (World::start(&scene(), ExecutorKind::Lockstep).unwrap(), format!("tcp/127.0.0.1:{port}"));
-    let host = serve(Arc::new(world.clone()), "bench", &endpoint).unwrap();
+    let host = serve(Arc::new(world.clone()), Serving::new("bench", &endpoint)).unwrap();
     (world, host, endpoint)
 }
 

@@ -4,13 +4,13 @@
 //! [`RemoteWorld`] that answers the same calls. Never here: physics, a picture, a file.
 //!
 //! ```no_run
-//! use metachron_hosts::{connect, serve};
+//! use metachron_hosts::{Serving, connect, serve};
 //! use metachron_world::{Rigid, Scene, World, WorldCalls, kinds::ExecutorKind};
 //! use std::sync::Arc;
 //!
 //! let scene = Scene::builder().add("ball", Rigid::ball(0.05).mass_kg(0.2)).build()?;
 //! let here = World::start(&scene, ExecutorKind::Auto)?;
-//! let host = serve(Arc::new(here), "bench", "tcp/127.0.0.1:7447")?;
+//! let host = serve(Arc::new(here), Serving::new("bench", "tcp/127.0.0.1:7447"))?;
 //! let elsewhere = connect("tcp/127.0.0.1:7447", Some(&scene.mark()))?;
 //! let ball = elsewhere.object("ball")?;
 //! println!("{:?}, refused {}", elsewhere.latest(ball)?.body.probe(0.0), host.refused().total());
@@ -28,6 +28,7 @@ mod hostile_tests;
 mod mirror;
 mod refusal;
 mod remote;
+mod serving;
 mod wire;
 
 pub use error::HostsError;
@@ -35,4 +36,5 @@ pub use gate::{CALLS_MAX, Refusals, SESSIONS_MAX};
 pub use host::{Host, serve};
 pub use mirror::RemoteFrame;
 pub use remote::{RemoteWorld, connect};
+pub use serving::{SceneFiles, Serving};
 pub use wire::MESSAGE_MAX;

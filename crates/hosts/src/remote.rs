@@ -5,6 +5,7 @@
 use crate::endpoint::{LEASE, Side, is_name, open};
 use crate::error::HostsError;
 use crate::mirror::{Mirror, RemoteFrame};
+use crate::serving::SceneFiles;
 use crate::wire::{Call, Moment, PROGRAM, Reply, Request, Welcome, decode, encode};
 use metachron_core::{AgentId, Body, SimSpan, SimTime, Snapshot};
 use metachron_runtime::{Command, TimelineCommand};
@@ -245,6 +246,18 @@ impl RemoteWorld {
         self.link().mirror.next_frame(since, patience)
     }
 
+    /// The scene of the world, for one who draws it; `None` where its host does not say it.
+    ///
+    /// # Errors
+    /// [`WorldError::Silent`] and [`WorldError::Elsewhere`].
+    pub fn scene_files(&self) -> Result<Option<SceneFiles>, WorldError> {
+        if let Reply::Scene(scene) = self.link().ask(Call::Scene)? {
+            Ok(scene.map(|scene| *scene))
+        } else {
+            Err(unexpected())
+        }
+    }
+
     /// How long ago the newest message came.
     #[must_use]
     pub fn age(&self) -> Duration {
@@ -287,6 +300,11 @@ impl WorldCalls for RemoteWorld {
 
     fn latest(&self, object: Object) -> Result<Arc<Snapshot>, WorldError> {
         self.link().mirror.latest(object)
+    }
+
+    fn part(&self, object: Object) -> Result<Option<Part>, WorldError> {
+        let asked = Call::Part(self.link().own(object)?);
+        if let Reply::Part(part) = self.link().ask(asked)? { Ok(part.map(|part| *part)) } else { Err(unexpected()) }
     }
 
     fn time(&self) -> SimTime {
@@ -342,6 +360,10 @@ impl WorldCalls for RemoteWorld {
 
     fn restore(&self, checkpoint: &Checkpoint) -> Result<(), CheckpointError> {
         self.link().act(Call::Restore(checkpoint.to_bytes())).map_err(of_checkpoint)
+    }
+
+    fn answers(&self) -> Result<(), WorldError> {
+        self.link().mirror.silence().map_or(Ok(()), Err)
     }
 
     fn listen(&self, filter: EventFilter) -> EventReader {

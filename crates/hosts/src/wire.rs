@@ -7,6 +7,7 @@
 
 use crate::event_wire::WireEvent;
 use crate::refusal::Refusal;
+use crate::serving::SceneFiles;
 use metachron_core::{AgentId, Body, SimSpan, SimTime, Snapshot};
 use metachron_runtime::{Command, TimelineCommand};
 use metachron_world::Part;
@@ -15,7 +16,7 @@ use serde::de::DeserializeOwned;
 use std::sync::Arc;
 
 /// The version of all messages: it changes with the meaning of their bytes.
-pub(crate) const VERSION: u8 = 1;
+pub(crate) const VERSION: u8 = 2;
 /// The version of the program, whose parts and states each version has its own of.
 pub(crate) const PROGRAM: &str = env!("CARGO_PKG_VERSION");
 /// The most bytes of one message.
@@ -47,6 +48,9 @@ pub(crate) enum Call {
     Checkpoint,
     Restore(Vec<u8>),
     Hash,
+    /// The part as which an object joined.
+    Part(AgentId),
+    Scene,
 }
 
 /// An answer to a call.
@@ -59,6 +63,8 @@ pub(crate) enum Reply {
     Added(AgentId, u64),
     Checkpoint(Vec<u8>),
     Hash(u64),
+    Part(Option<Box<Part>>),
+    Scene(Option<Box<SceneFiles>>),
     Refused(Refusal),
 }
 

@@ -44,6 +44,7 @@ pub use commands::bounds::{Bound, OutOfBounds, check_state};
 pub use commands::mailbox::{AwaitedMotion, Command, KEYS, Keyed, SendError};
 pub use executors::archive::Absent;
 pub use executors::follower::Follower;
+pub use executors::ghosts::Ghosts;
 pub use executors::lockstep::Lockstep;
 pub use executors::pool::Pool;
 pub use executors::priority::{Priority, PriorityRefused, ask_priority, take_priority};

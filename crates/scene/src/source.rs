@@ -233,6 +233,21 @@ impl Source {
         files.iter().map(|(path, version)| SourceFile { path: path.clone(), version: *version }).collect()
     }
 
+    /// The bytes of the files beside it on the disk that a [`crate::load`] of it has read, by their names in the scene: with these
+    /// ([`Source::with_files`]) its text is the same scene elsewhere.
+    ///
+    /// # Errors
+    /// The file that cannot be read, and why.
+    pub fn files_beside(&self) -> Result<BTreeMap<String, Vec<u8>>, String> {
+        let SiblingFiles::Folder(folder) = &self.siblings else { return Ok(BTreeMap::new()) };
+        let beside = self.files().into_iter().filter(|file| file.path != Path::new(&self.name));
+        let read = |SourceFile { path, .. }: SourceFile| {
+            let bytes = read_plain(&path, SIBLING_BYTES_MAX).map_err(|why| format!("{}: {why}", path.display()))?;
+            Ok((plain_name(path.strip_prefix(folder).unwrap_or(&path)), bytes))
+        };
+        beside.map(read).collect()
+    }
+
     /// Of these files the ones outside of its folder: only a source whose limits allow it is read from them.
     #[must_use]
     pub fn files_outside(&self) -> Vec<PathBuf> {
@@ -293,7 +308,7 @@ impl Source {
         if name.is_empty() || path.components().any(|c| matches!(c, Component::Prefix(_) | Component::RootDir)) {
             return Err("expected a path relative to the scene".to_owned());
         }
-        if let Some(bytes) = self.made.get(name) {
+        if let Some(bytes) = self.made.get(name).or_else(|| self.made.get(&plain_name(path))) {
             return Ok(SiblingFile::InMemory(bytes));
         }
         match &self.siblings {
@@ -311,6 +326,12 @@ impl Source {
             SiblingFiles::Unavailable => Err("a scene from memory has no files beside it".to_owned()),
         }
     }
+}
+
+/// A relative path without `.`, its parts divided by `/`.
+fn plain_name(path: &Path) -> String {
+    let parts = path.components().filter(|part| *part != Component::CurDir);
+    parts.map(|part| part.as_os_str().to_string_lossy()).collect::<Vec<_>>().join("/")
 }
 
 /// Whether the file called `name` in a folder lies outside of it: by its path, which is not looked up, or behind links.
@@ -452,6 +473,9 @@ mod tests {
         assert!(changed().is_empty() && source.files().len() == 2);
         std::fs::write(at("mesh.obj"), "v 0 0 0\n").unwrap();
         assert_eq!(changed(), [at("mesh.obj")]);
+        let elsewhere =
+            Source::memory("scene.toml", b"format = 1\n").unwrap().with_files(source.files_beside().unwrap());
+        assert_eq!(elsewhere.sibling("./mesh.obj").unwrap(), b"v 0 0 0\n");
         std::fs::write(at("scene.toml"), "format = 1\nname = 'other'\n").unwrap();
         assert_eq!(changed(), [at("mesh.obj"), at("scene.toml")]);
     }

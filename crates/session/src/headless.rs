@@ -161,7 +161,7 @@ fn warm_up(session: &mut Session, plan: &mut Headless) -> Result<(), SessionErro
 fn share_done(session: &Session, end: End) -> Result<f64, SessionError> {
     Ok(match end {
         End::Frames(frames) => session.frames() as f64 / frames as f64,
-        End::Seconds(seconds) => session.sim_now().as_secs_f64() / seconds,
+        End::Seconds(seconds) => session.played_s() / seconds,
         End::Recording => session.replayed().unwrap_or(Ok(1.0)).map_err(SessionError::Diverged)?,
     })
 }

@@ -27,6 +27,7 @@ mod checkpoint_tests;
 mod coupling_record;
 mod cpu_budget;
 mod drawn_form;
+mod elsewhere;
 mod error;
 mod error_control;
 mod event_record;

@@ -6,6 +6,7 @@
 mod ahead;
 mod cameras;
 mod choose;
+mod elsewhere;
 mod gather;
 mod limit;
 mod pace;
@@ -18,6 +19,7 @@ use super::assemble;
 use super::calibrate;
 use super::coupling_record::{Coupling, Couplings};
 use super::cpu_budget::CpuBudget;
+use super::elsewhere::Elsewhere;
 use super::error::SessionError;
 use super::error_control;
 use super::error_control::ErrorStatus;
@@ -47,6 +49,8 @@ pub struct Session {
     /// Drawing costs on the declared machine.
     declared: Prices,
     world: World,
+    /// The world that this one shows, where it runs elsewhere.
+    elsewhere: Option<Elsewhere>,
     scene_view: SceneView,
     control: PictureControl,
     /// Whether pictures are drawn on the processor that agents step on.
@@ -185,6 +189,7 @@ impl Session {
             declared: assemble::prices(&machine.draw),
             machine,
             world,
+            elsewhere: None,
             views: Vec::new(),
             lasting: assemble::lasting(&scene),
             levels: Vec::new(),
@@ -355,13 +360,15 @@ impl Session {
 
     /// Attaches the user spring to an agent, or releases it (`None`). An agent that does not exist gives an error.
     pub fn hand(&self, to: AgentId, pull: Option<AnchorSpring>) -> Result<(), WorldError> {
-        self.world.command(self.world.object_of(to)?, Command::Spring(Keyed::first(pull)))
+        let world = self.acted_on();
+        world.command(world.object_of(to)?, Command::Spring(Keyed::first(pull)))
     }
 
     /// Sets the pressure of an agent's filling, inside minus outside, Pa. An agent that nothing fills or that does not
     /// exist and a number that is not finite give an error.
     pub fn set_pressure(&self, of: AgentId, pressure_pa: f64) -> Result<(), WorldError> {
-        self.world.command(self.world.object_of(of)?, Command::pressure(pressure_pa))
+        let world = self.acted_on();
+        world.command(world.object_of(of)?, Command::pressure(pressure_pa))
     }
 
     /// Ends the frame that began at `started`.

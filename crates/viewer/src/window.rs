@@ -121,8 +121,10 @@ impl<'a> WindowSimulation<'a> {
     fn new(mut session: Session, plan: WindowPlan, go_on: GoOn<'a>) -> Self {
         session.keep_frames(frames_kept(&plan));
         session.keep_moments(REWIND_BYTES);
-        // time is paused until the window shows the scene
-        session.drive(TimelineCommand::Pause);
+        // time is paused until the window shows the scene, but not that of others
+        if !session.is_elsewhere() {
+            session.drive(TimelineCommand::Pause);
+        }
         let mut simulation = Self {
             go_on,
             adapter: None,
@@ -211,6 +213,16 @@ impl<'a> WindowSimulation<'a> {
         }
     }
 
+    /// Shows whether time passes in a world elsewhere, and why something of it is not shown or did not act.
+    fn follow_elsewhere(&mut self) {
+        if self.session.is_elsewhere() {
+            self.running = self.session.passes();
+        }
+        if let Some(error) = self.session.take_error_elsewhere() {
+            self.show_message(Severity::Failure, error.to_string());
+        }
+    }
+
     fn show_message(&mut self, severity: Severity, text: String) {
         let message = Message { severity, text };
         self.notices.retain(|(_, old)| *old != message);
@@ -281,7 +293,7 @@ impl<'a> WindowSimulation<'a> {
     /// The share that is done of a run that ends by itself, 0 … 1.
     fn share_done(&self) -> Option<f64> {
         let frames = self.plan.frames.map(|all| self.session.frames() as f64 / all as f64);
-        let seconds = self.plan.seconds.map(|all| self.session.sim_now().as_secs_f64() / all);
+        let seconds = self.plan.seconds.map(|all| self.session.played_s() / all);
         frames.or(seconds)
     }
 
@@ -336,6 +348,10 @@ impl Simulation for WindowSimulation<'_> {
                 self.status.camera = self.session.camera_number();
             }
             Action::Look(look) => self.look(look),
+            Action::Reset | Action::Reload | Action::OpenScene(_) if self.session.is_elsewhere() => {
+                let text = "the world runs elsewhere: its scene is started anew and exchanged by its host".to_owned();
+                self.show_message(Severity::Warning, text);
+            }
             Action::Reset => self.reset(),
             Action::Reload => self.reload(),
             Action::Speed(speed) => self.drive(TimelineCommand::Speed(speed)),
@@ -366,6 +382,7 @@ impl Simulation for WindowSimulation<'_> {
             self.begin();
         }
         self.follow_files();
+        self.follow_elsewhere();
         self.pass_time();
         self.take_gains();
         self.refresh();
@@ -374,6 +391,8 @@ impl Simulation for WindowSimulation<'_> {
         self.status.messages.clear();
         self.status.messages.extend(self.notices.iter().map(|(_, message)| message.clone()));
         self.status.messages.extend(self.file_error.clone());
+        let unanswered = self.session.unanswered().map(|error| error.to_string());
+        self.status.messages.extend(unanswered.map(|text| Message { severity: Severity::Failure, text }));
         self.status.rewind = self.session.rewind();
         let shown = self.session.rewind().and_then(|rewind| rewind.shown);
         self.status.sim_time = shown.unwrap_or_else(|| self.session.sim_now());

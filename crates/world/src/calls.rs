@@ -49,6 +49,11 @@ pub trait WorldCalls: Send + Sync {
     /// # Errors
     /// [`WorldError::Foreign`] and [`WorldError::Gone`].
     fn latest(&self, object: Object) -> Result<Arc<Snapshot>, WorldError>;
+    /// The part as which an object joined since the start; `None` of an object of the scene.
+    ///
+    /// # Errors
+    /// [`WorldError::Foreign`] and [`WorldError::Gone`].
+    fn part(&self, object: Object) -> Result<Option<Part>, WorldError>;
     /// Simulated time now; of a world elsewhere that of the newest states that came.
     fn time(&self) -> SimTime;
     /// Hash of the newest states of all objects.
@@ -96,6 +101,11 @@ pub trait WorldCalls: Send + Sync {
     /// # Errors
     /// The errors of [`World::restore`].
     fn restore(&self, checkpoint: &Checkpoint) -> Result<(), CheckpointError>;
+    /// Whether it answers calls.
+    ///
+    /// # Errors
+    /// [`WorldError::Silent`] of a world elsewhere.
+    fn answers(&self) -> Result<(), WorldError>;
     /// Events from now on.
     fn listen(&self, filter: EventFilter) -> EventReader;
 }
@@ -123,6 +133,12 @@ impl WorldCalls for World {
 
     fn latest(&self, object: Object) -> Result<Arc<Snapshot>, WorldError> {
         Self::latest(self, object)
+    }
+
+    fn part(&self, object: Object) -> Result<Option<Part>, WorldError> {
+        Self::latest(self, object)?;
+        let joined = self.shared.joined.get(object.id());
+        Ok(joined.and_then(|joined| joined.part).map(|part| Part::clone(&part)))
     }
 
     fn time(&self) -> SimTime {
@@ -165,6 +181,10 @@ impl WorldCalls for World {
 
     fn restore(&self, checkpoint: &Checkpoint) -> Result<(), CheckpointError> {
         Self::restore(self, checkpoint)
+    }
+
+    fn answers(&self) -> Result<(), WorldError> {
+        Ok(())
     }
 
     fn listen(&self, filter: EventFilter) -> EventReader {

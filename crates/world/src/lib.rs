@@ -64,4 +64,5 @@ pub use reading::queries::{Cast, ContactNow, Hit};
 pub use reading::sensors::{JointRef, ListedJoint, Reading};
 pub use reading::stress::Stresses;
 pub use start::assemble::{Govern, machine};
+pub use start::ghost_world::GhostWorld;
 pub use world::World;

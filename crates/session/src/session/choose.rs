@@ -109,8 +109,7 @@ impl Session {
     /// Whether most of the time of the frame that began at `started` is gone; while time is paused no frame is late.
     fn is_late(&self, started: Duration) -> bool {
         let gone = self.now().saturating_sub(started) + self.declared_cull() + self.chosen.select;
-        let passes = self.world.timeline().runs_at(self.now());
-        passes && is_late(gone.as_secs_f64(), 1.0 / self.control.target_hz())
+        self.passes() && is_late(gone.as_secs_f64(), 1.0 / self.control.target_hz())
     }
 
     /// Sets the controller's inputs for the next choice.

@@ -22,6 +22,7 @@ impl Session {
 
     /// Reads the newest states and poses the states of the frame: these, or the moment that is looked at.
     pub(super) fn gather(&mut self) {
+        self.elsewhere.iter_mut().for_each(super::super::elsewhere::Elsewhere::follow);
         let now = self.world.time();
         let shown = self.rewind.as_ref().and_then(super::Rewind::shown_beside);
         let Self { scene, scene_view, couplings, world, reader, .. } = self;

@@ -10,26 +10,21 @@ use std::time::Duration;
 impl Session {
     /// Pauses real time until [`Session::begin`]. Virtual time passes only while the caller waits.
     pub fn hold(&mut self) {
-        if !self.is_virtual() {
+        if !self.is_virtual() && !self.is_elsewhere() {
             self.world.drive(TimelineCommand::Pause);
         }
     }
 
-    /// Starts real time, and virtual time that was paused for a window; returns the wall time of that.
+    /// Starts real time, and virtual time that was paused for a window; returns the wall time of that. Time elsewhere is left as it is.
     pub fn begin(&mut self) -> Duration {
         let now = self.now();
         if !self.is_virtual() {
             self.begun = now;
         }
-        if !self.waits_for_agents() && !self.world.timeline().runs_at(now) {
+        if !self.waits_for_agents() && !self.is_elsewhere() && !self.passes() {
             self.world.drive(TimelineCommand::Run);
         }
         now
-    }
-
-    /// Changes the flow of time: pause, run, speed, single step.
-    pub fn drive(&mut self, drive: TimelineCommand) {
-        self.world.drive(drive);
     }
 
     /// Waits until the wall time `until`, while the agents run; where each frame waits for all agents, until they have lived as long as from

@@ -253,3 +253,29 @@ fn the_pressure_of_a_tube_follows_its_slider() {
         assert!(widest_m(simulation) > 1.1 * before_m, "{} m of {before_m} m", widest_m(simulation));
     });
 }
+
+#[test]
+fn a_window_on_a_world_elsewhere_shows_its_time_drives_it_and_leaves_its_scene_alone() {
+    let plan = plan("pendulum");
+    let scene = metachron_scene::load(&plan.source, &plan.overrides).unwrap();
+    let world = metachron_world::World::start(&scene, scene.executor).unwrap();
+    let session = Session::open_elsewhere(scene, std::sync::Arc::new(world.clone())).unwrap();
+    let mut go_on = |_: &FrameRecord, _: Option<f64>| true;
+    let simulation = &mut WindowSimulation::new(session, plan, &mut go_on);
+    assert!(world.timeline().runs_at(world.now()), "a window leaves time elsewhere as it is");
+    for _ in 0..3 {
+        world.advance(SimSpan::from_millis(20));
+        frame(simulation, None);
+    }
+    // a frame says the time at its begin
+    frame(simulation, None);
+    assert_eq!(simulation.status().sim_time, world.time());
+    assert_eq!(steps(simulation), world.agents().iter().map(|agent| agent.stats().steps).sum::<u64>());
+    for action in [Action::Reset, Action::Reload, Action::OpenScene(PathBuf::from("other.toml"))] {
+        simulation.apply(action);
+    }
+    frame(simulation, None);
+    assert_eq!((simulation.status().messages.len(), simulation.session.is_elsewhere()), (1, true));
+    simulation.apply(Action::Pause);
+    assert!(!world.timeline().runs_at(world.now()));
+}

@@ -1,9 +1,9 @@
-//! Watches a world that runs elsewhere for three seconds, and drops a ball into it: `cargo run --example elsewhere -- tcp/127.0.0.1:7447`.
+//! Watches a world that runs elsewhere for three seconds, and drops a ball into it: `cargo run --features hosts --example elsewhere -- tcp/127.0.0.1:7447`.
 
+use metachron::hosts::connect;
 use metachron::prelude::*;
+use metachron::runtime::TimelineCommand;
 use metachron::world::WorldCalls;
-use metachron_hosts::connect;
-use metachron_runtime::TimelineCommand;
 use std::error::Error;
 use std::time::{Duration, Instant};
 

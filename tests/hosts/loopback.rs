@@ -1,12 +1,14 @@
 //! Two ends over loopback: a world here and the same world as it is called from elsewhere.
 
 use glam::DVec3;
+use metachron::core::{Anchor, Body, SimSpan, SimTime};
 use metachron::geometry::Solid;
-use metachron_core::{Anchor, Body, SimSpan, SimTime};
-use metachron_hosts::{Host, HostsError, RemoteWorld, connect, serve};
-use metachron_runtime::{Command, TimelineCommand};
-use metachron_world::kinds::ExecutorKind;
-use metachron_world::{EventFilter, Happening, Rigid, Scene, Tube, World, WorldCalls, WorldError};
+use metachron::hosts::{Host, HostsError, RemoteWorld, SceneFiles, Serving, connect, serve};
+use metachron::runtime::{Command, TimelineCommand};
+use metachron::world::kinds::ExecutorKind;
+use metachron::world::{
+    EventFilter, GhostWorld, Happening, Rigid, Scene, SceneText, Tube, World, WorldCalls, WorldError,
+};
 use std::io::{Read, Write};
 use std::net::{TcpListener, TcpStream};
 use std::sync::Arc;
@@ -29,7 +31,7 @@ fn free_endpoint() -> String {
 /// A world here, its host, and the same world as it is seen elsewhere.
 fn two_ends(executor: ExecutorKind) -> (World, Host, RemoteWorld) {
     let (here, endpoint) = (World::start(&scene(), executor).unwrap(), free_endpoint());
-    let host = serve(Arc::new(here.clone()), "bench", &endpoint).unwrap();
+    let host = serve(Arc::new(here.clone()), Serving::new("bench", &endpoint)).unwrap();
     let elsewhere = connect(&endpoint, Some(&scene().mark())).unwrap();
     (here, host, elsewhere)
 }
@@ -111,6 +113,8 @@ fn an_object_is_added_and_removed_from_elsewhere() {
     assert!(elsewhere.latest(second).is_ok() && elsewhere.object("second").unwrap() == second);
     elsewhere.advance(SimSpan::from_millis(40)).unwrap();
     assert!(elsewhere.latest(second).unwrap().steps > 0);
+    assert!(elsewhere.part(second).unwrap().is_some());
+    assert!(elsewhere.part(elsewhere.object("ball").unwrap()).unwrap().is_none(), "it is of the scene");
     elsewhere.remove(second).unwrap();
     elsewhere.advance(SimSpan::from_millis(40)).unwrap();
     assert!(matches!(elsewhere.latest(second), Err(WorldError::Gone { name }) if name == "second"));
@@ -133,6 +137,31 @@ fn a_checkpoint_from_elsewhere_goes_on_to_the_bit() {
 }
 
 #[test]
+fn ghosts_have_the_states_of_the_world_and_what_joined_it() {
+    let (here, _host, elsewhere) = two_ends(ExecutorKind::Lockstep);
+    let mut ghosts = GhostWorld::of(&scene()).unwrap();
+    elsewhere.advance(SimSpan::from_millis(60)).unwrap();
+    elsewhere.add("second", Rigid::ball(0.05).mass_kg(0.2).at([1.0, 0.0, 0.5]).into()).unwrap();
+    ghosts.follow(&elsewhere).unwrap();
+    let shown = ghosts.world();
+    assert_eq!((shown.hash(), shown.time(), shown.all_objects().count()), (here.hash(), here.time(), 3));
+    assert!(elsewhere.answers().is_ok() && shown.object("second").is_ok());
+}
+
+#[test]
+fn the_scene_of_a_world_is_read_elsewhere_without_its_folder() {
+    let (world, endpoint) = (World::start(&scene(), ExecutorKind::Lockstep).unwrap(), free_endpoint());
+    let scene = SceneText { text: "format = 1".to_owned(), folder: Some("/secret".to_owned()), ..SceneText::default() };
+    let files = SceneFiles { scene, files: [("a.obj".to_owned(), vec![1, 2, 3])].into() };
+    let serving = Serving::new("bench", &endpoint).scene(files.clone());
+    let _host = serve(Arc::new(world), serving).unwrap();
+    let read = connect(&endpoint, None).unwrap().scene_files().unwrap().unwrap();
+    assert_eq!((read.files, read.scene.text, read.scene.folder), (files.files, files.scene.text, None));
+    let (_here, _host, elsewhere) = two_ends(ExecutorKind::Lockstep);
+    assert!(elsewhere.scene_files().unwrap().is_none());
+}
+
+#[test]
 fn events_are_those_of_the_world() {
     let (here, _host, elsewhere) = two_ends(ExecutorKind::Lockstep);
     let (mut there, mut is) =
@@ -146,7 +175,7 @@ fn events_are_those_of_the_world() {
         },
         "events that the world has had",
     );
-    let said = |event: &metachron_world::Event| event.to_string();
+    let said = |event: &metachron::world::Event| event.to_string();
     assert_eq!(seen.iter().map(said).collect::<Vec<_>>(), expected.iter().map(said).collect::<Vec<_>>());
     assert!(seen.iter().any(|event| matches!(event.what, Happening::Contact(contact) if contact.begins)));
 }
@@ -167,7 +196,9 @@ fn time_that_runs_here_is_seen_and_paused_elsewhere() {
 #[test]
 fn another_scene_is_refused_in_one_sentence() {
     let endpoint = free_endpoint();
-    let _host = serve(Arc::new(World::start(&scene(), ExecutorKind::Lockstep).unwrap()), "bench", &endpoint).unwrap();
+    let _host =
+        serve(Arc::new(World::start(&scene(), ExecutorKind::Lockstep).unwrap()), Serving::new("bench", &endpoint))
+            .unwrap();
     let other = Scene::builder().add("box", Rigid::ball(0.1)).build().unwrap();
     let refused = connect(&endpoint, Some(&other.mark())).unwrap_err();
     assert!(matches!(refused, HostsError::OtherScene { .. }), "{refused}");
@@ -203,7 +234,7 @@ fn relay(host: &str, is_silent: &Arc<AtomicBool>) -> String {
 #[test]
 fn a_host_that_goes_silent_is_noticed_and_may_come_back() {
     let (here, endpoint) = (World::start(&scene(), ExecutorKind::Threads).unwrap(), free_endpoint());
-    let host = serve(Arc::new(here), "bench", &endpoint).unwrap();
+    let host = serve(Arc::new(here), Serving::new("bench", &endpoint)).unwrap();
     let is_silent = Arc::new(AtomicBool::new(false));
     let elsewhere = connect(&relay(&endpoint, &is_silent), None).unwrap();
     let ball = elsewhere.object("ball").unwrap();
