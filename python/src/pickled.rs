@@ -27,7 +27,8 @@ pub fn read<T: Serialize + DeserializeOwned>(bytes: &[u8], value: &mut T) -> PyR
     let wrong = |error| PyValueError::new_err(format!("the pickle is not read: {error}"));
     archive.value(&mut begins).map_err(wrong)?;
     if begins != (MAGIC, FORMAT) {
-        let found = if begins.0 == MAGIC { format!("format {}", begins.1) } else { "no format of metachron".to_owned() };
+        let found =
+            if begins.0 == MAGIC { format!("format {}", begins.1) } else { "no format of metachron".to_owned() };
         return Err(PyValueError::new_err(format!("the pickle has {found}; this version reads format {FORMAT}")));
     }
     archive.value(value).and_then(|()| archive.finish()).map_err(wrong)

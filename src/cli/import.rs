@@ -73,18 +73,9 @@ pub(super) fn command(args: &ImportArgs) -> anyhow::Result<Exit> {
         }
         None => data(&imported.toml)?,
         Some(path) => {
-            let srdf = args.srdf.clone().unwrap_or_else(|| args.model.with_extension("srdf"));
-            let files_read = files_read.into_inner().into_iter().chain([srdf]);
-            let files_read: Vec<_> = files_read.collect();
-            let check_unread =
-                |path: &Path| check_unread("--out", path, "the model", files_read.iter().map(PathBuf::as_path));
-            check_unread(path)?;
-            write_meshes(&imported.files, &scene_folder, |path| {
-                check_unread(path)?;
-                check_mesh(path, args.force)
-            })?;
-            write(path, imported.toml.as_bytes())?;
-            message(&format!("scene: {}", path.display()));
+            let beside = srdf.map(|_| args.srdf.clone().unwrap_or_else(|| args.model.with_extension("srdf")));
+            let read: Vec<_> = files_read.into_inner().into_iter().chain(beside).collect();
+            write_scene(path, &imported, &read, args.force)?;
         }
     }
     Ok(Exit::Ok)
@@ -97,6 +88,20 @@ fn print_outside(args: &ImportArgs, files: usize) {
             (args.model.display(), "run the scene with --allow-outside, or import it with --copy-meshes");
         message(&format!("note: {model}: meshes outside of the scene's folder: {files}; {hint}"));
     }
+}
+
+/// Writes a scene with its meshes, over none of the files that were `read`.
+fn write_scene(path: &Path, imported: &Imported, read: &[PathBuf], force: bool) -> anyhow::Result<()> {
+    let is_new = |path: &Path| check_unread("--out", path, "the model", read.iter().map(PathBuf::as_path));
+    is_new(path)?;
+    let folder = path.parent().unwrap_or(Path::new(""));
+    write_meshes(&imported.files, folder, |path| {
+        is_new(path)?;
+        check_mesh(path, force)
+    })?;
+    write(path, imported.toml.as_bytes())?;
+    message(&format!("scene: {}", path.display()));
+    Ok(())
 }
 
 /// Writes the meshes of a scene into its folder, if each of them may be.

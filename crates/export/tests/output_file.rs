@@ -123,3 +123,22 @@ fn one_file_is_the_same_by_all_of_its_names() {
     assert!(is_same_file(&new, &spelled) && !is_same_file(&new, &path));
     assert!(!is_same_file(&folder.0, &folder.0) && !is_same_file(Path::new("/dev/null"), Path::new("/dev/null")));
 }
+
+#[cfg(target_os = "linux")]
+#[test]
+fn a_file_or_pipe_that_the_process_has_open_takes_bytes_at_its_end() {
+    use std::io::Read;
+    use std::os::fd::AsRawFd;
+    let folder = Folder::new("open");
+    let path = folder.file("log");
+    fs::write(&path, "before ").unwrap();
+    let open = fs::File::open(&path).unwrap();
+    OutputFile::write(format!("/proc/self/fd/{}", open.as_raw_fd()), "more").unwrap();
+    assert_eq!(text(&path), "before more");
+    let (mut reader, writer) = std::io::pipe().unwrap();
+    OutputFile::write(format!("/dev/fd/{}", writer.as_raw_fd()), "through").unwrap();
+    drop(writer);
+    let mut read = String::new();
+    reader.read_to_string(&mut read).unwrap();
+    assert_eq!(read, "through");
+}

@@ -57,6 +57,7 @@ impl Elsewhere {
 
     /// Changes the flow of its time.
     pub fn drive(&mut self, drive: TimelineCommand) {
-        self.error = self.calls.drive(drive).err();
+        let error = self.calls.drive(drive).err();
+        self.error = error.or(self.error.take());
     }
 }

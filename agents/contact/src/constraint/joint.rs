@@ -273,7 +273,8 @@ impl Joints {
                 let stiff = h_s * h_s * stiffness;
                 let before = |member: usize| &step.progress[member].v_before[..];
                 let [of_a, of_b] = of.sides.map(|side| velocity(&side, before).dot(axis));
-                let inverse_mass: f64 = of.sides.iter().map(|side| own_inverse_mass(step.all, side, axis)).sum();
+                let of_bodies: f64 = of.sides.iter().map(|side| own_inverse_mass(step.all, side, axis)).sum();
+                let inverse_mass = of_bodies / (1.0 + joint.armature * of_bodies);
                 let kept = (of_b - of_a) * stiff / (1.0 + stiff * inverse_mass);
                 let target_m_s = row.target_m_s - axis * ((wanted * h_s * damping + kept) * compliance);
                 JointRow { target_m_s, ..row }

@@ -148,8 +148,9 @@ impl Search {
                 self.find_around(round, member);
             }
             while let Some(&[_, other]) = pairs.next_if(|pair| pair[0] == member) {
-                if !(self.is_pile(member) && self.is_pile(other))
-                    && !scene.lets_through([all[member].id, all[other].id])
+                let is_left_out =
+                    self.is_pile(member) && self.is_pile(other) || scene.lets_through([all[member].id, all[other].id]);
+                if !is_left_out
                     && all[member].may_touch(&all[other])
                     && [member, other].iter().any(|at| all[*at].member.role() != Role::Kinematic)
                 {

@@ -3,7 +3,8 @@
 use crate::joints::{G, ROD_KG_M2, block, on_world, party, pendulum, state};
 use crate::table::Table;
 use glam::DVec3;
-use metachron_contact::joint::{JointKind, Motor, MotorGoal};
+use metachron_contact::joint::{Joint, JointKind, Motor, MotorGoal};
+use metachron_models::rigid::RigidSpec;
 use std::f64::consts::FRAC_PI_2;
 
 /// The torque by which a rod of 1 kg and 1 m hangs on its hinge where it is level, N m.
@@ -139,5 +140,21 @@ fn a_limit_stops_a_rod_with_no_energy_gained() {
         // all of the fall is lost
         let lies_j = -0.5 * G * libm::cos(0.3);
         assert!((table.energy_j() - lies_j).abs() < 1e-4, "{} J", table.energy_j());
+    }
+}
+
+#[test]
+fn an_undamped_servo_swings_a_rotor_as_it_swings_that_mass_on_the_body() {
+    let goal = MotorGoal::Spring { position: 0.05, velocity: 0.0, stiffness: 400.0, damping: 0.0 };
+    let built = |mass_kg: f64, armature: f64| {
+        let body = RigidSpec { gravity: DVec3::ZERO, ..block(DVec3::splat(0.1), DVec3::ZERO, mass_kg) };
+        party([body], [Joint { armature, ..on_world(slide(goal, f64::INFINITY)) }], 200.0)
+    };
+    let [mut heavy, mut geared] = [built(1.01, 0.0), built(0.01, 1.0)];
+    for step in 0..1200 {
+        heavy.step();
+        geared.step();
+        let [heavy, geared] = [&heavy, &geared].map(|table| state(table, 0).position.z);
+        assert!((heavy - geared).abs() < 1e-6, "step {step}: {heavy} {geared} m");
     }
 }

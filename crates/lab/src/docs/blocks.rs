@@ -100,8 +100,9 @@ fn fence(line: &str) -> Option<(char, usize)> {
 fn resembles(line: &str) -> bool {
     const NEAR_ENOUGH: f64 = 0.85;
     let Some(comment) = line.strip_prefix("<!").map(|rest| rest.trim_start_matches(['-', ' '])) else { return false };
-    let word = comment.split(|c: char| c.is_whitespace() || c == '-').next().unwrap_or_default().to_lowercase();
-    word == "end" || strsim::jaro_winkler(&word, "metachron") >= NEAR_ENOUGH
+    let mut words = comment.split(|c: char| c.is_whitespace() || c == '-' || c == '>').filter(|word| !word.is_empty());
+    let word = words.next().unwrap_or_default().to_lowercase();
+    word == "end" && words.next().is_none() || strsim::jaro_winkler(&word, "metachron") >= NEAR_ENOUGH
 }
 
 /// A block from the line that opens it.

@@ -16,7 +16,8 @@ const LINKS_MAX: usize = 40;
 ///
 /// It is made beside the place that its path leads to, as `metachron-PROCESS-NUMBER.partial` in the same folder, and takes that place by a
 /// rename: one that is there keeps its permissions, and stays as it was where the new one is dropped or its process ends before that. A link is
-/// followed, and leads to the new file. Pipes and devices take bytes as they come. Nothing is buffered.
+/// followed, and leads to the new file. Pipes and devices take bytes as they come, and so does a file that this process has open already and that is
+/// named by that (`/dev/stdout`), at its end. Nothing is buffered.
 #[derive(Debug)]
 pub struct OutputFile {
     file: File,
@@ -36,12 +37,12 @@ impl OutputFile {
     /// # Errors
     /// A folder in which no file can be made, a file that may not be written, a folder at the path.
     pub fn whole(path: impl AsRef<Path>) -> Result<Self> {
-        let target = destination(path.as_ref());
-        let there = match fs::metadata(&target) {
+        let (path, target) = (path.as_ref(), destination(path.as_ref()));
+        let there = match fs::metadata(path) {
             Ok(about) => {
                 // a file that may not be written is not replaced either
-                let file = OpenOptions::new().write(true).open(&target)?;
-                if !about.is_file() {
+                let file = OpenOptions::new().append(true).open(path)?;
+                if !about.is_file() || is_of_process(&target) {
                     return Ok(Self { file, beside: None });
                 }
                 Some(about.permissions())
@@ -127,8 +128,16 @@ impl Seek for OutputFile {
 
 /// Where the links of a path lead, also to a file that is not there.
 fn destination(path: &Path) -> PathBuf {
-    let next = |at: &PathBuf| Some(at.parent().unwrap_or(Path::new("")).join(fs::read_link(at).ok()?));
-    std::iter::successors(Some(path.to_owned()), next).take(LINKS_MAX).last().unwrap_or_default()
+    let next = |at: &PathBuf| {
+        let link = fs::read_link(at).ok().filter(|_| !is_of_process(at))?;
+        Some(at.parent().unwrap_or(Path::new("")).join(link))
+    };
+    std::iter::successors(Some(path.to_owned()), next).take(LINKS_MAX + 1).last().unwrap_or_default()
+}
+
+/// Whether a path names what a process has open, by its number: a link that leads nowhere else.
+fn is_of_process(path: &Path) -> bool {
+    ["/proc", "/dev/fd"].iter().any(|folder| path.starts_with(folder))
 }
 
 /// Whether two paths lead to one file, existing or not, however they are written and by links of both kinds. Folders, pipes and devices are none.
@@ -146,9 +155,9 @@ enum Place {
 }
 
 fn place(path: &Path) -> Option<Place> {
-    let path = destination(path);
+    let (given, path) = (path, destination(path));
     let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
-    match fs::metadata(&path) {
+    match fs::metadata(given) {
         Ok(about) if !about.is_file() => None,
         #[cfg(unix)]
         Ok(about) => {

@@ -89,19 +89,25 @@ impl GhostWorld {
 
     /// Takes an object up under its number, once: one that cannot be made is not shown.
     fn join(&mut self, id: AgentId, object: Object, calls: &dyn WorldCalls) -> Result<(), WorldError> {
+        self.ghosts.reach(id);
+        let made = self.make(object, calls);
+        // also one that could not be made has its number
+        self.ghosts.reach(AgentId(id.0 + 1));
+        self.shown.resize(self.world.agents().len(), None);
+        made
+    }
+
+    /// Makes an object under the next number; none of a model of somebody's own.
+    fn make(&self, object: Object, calls: &dyn WorldCalls) -> Result<(), WorldError> {
         let part = match calls.part(object) {
             // it has left meanwhile
             Err(WorldError::Gone { .. }) => None,
             part => part?.filter(|part| !matches!(part, Part::Custom(_))),
         };
-        self.ghosts.reach(id);
+        let Some(part) = part else { return Ok(()) };
         let name = calls.name(object.into())?;
-        // an object is made of what came before all of it is checked
-        let made =
-            catch_unwind(AssertUnwindSafe(|| part.map_or(Ok(()), |part| self.world.add(&*name, part).map(drop))));
-        self.ghosts.reach(AgentId(id.0 + 1));
-        self.shown.resize(self.world.agents().len(), None);
-        made.unwrap_or_else(|_| {
+        // making it may panic: not all that came of it has been checked
+        catch_unwind(AssertUnwindSafe(|| self.world.add(&*name, part).map(drop))).unwrap_or_else(|_| {
             Err(WorldError::Elsewhere(format!("\"{name}\" cannot be made: its values contradict each other")))
         })
     }
