@@ -55,7 +55,7 @@ pub(super) fn host(args: &HostArgs) -> anyhow::Result<Exit> {
     let serving = Serving::new(&args.name, &args.listen).scene(SceneFiles { scene: text, files });
     let host = serve(Arc::new(world.clone()), serving).map_err(refused)?;
     let (stop, stopped) = channel();
-    // a second one finds nobody who waits for it
+    // no reader waits for a second Ctrl-C
     ctrlc::set_handler(move || stop.send(()).unwrap_or(())).context("Ctrl-C cannot be caught")?;
     message(&format!("`{}` serves {} at {}, until Ctrl-C", args.name, scene.name, args.listen));
     if !args.paused {

@@ -1,4 +1,4 @@
-//! What `tune` refuses, what it overwrites, how it is stopped and goes on.
+//! Settings that `tune` refuses, files that it overwrites, how it is stopped and goes on.
 
 use crate::play::{Folder, metachron, number, program};
 use crate::tune::dear_ball;

@@ -206,6 +206,6 @@ impl PolicyKind {
 }
 
 impl Shading {
-    /// Those that objects request and that have prices, cheapest first.
+    /// Shadings that objects request and that have prices, cheapest first.
     pub const PRICED: [Self; 4] = [Self::Flat, Self::Gouraud, Self::PerPixel, Self::Textured];
 }

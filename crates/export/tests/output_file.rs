@@ -100,7 +100,7 @@ fn a_place_that_takes_no_file_says_why_and_a_device_takes_the_bytes() {
     let kind = |path: &Path| OutputFile::whole(path).map(drop).unwrap_err().kind();
     assert_eq!(kind(&folder.0), ErrorKind::IsADirectory);
     assert_eq!(kind(&folder.file("none/a")), ErrorKind::NotFound);
-    // no file can be made there, by whoever it is
+    // no user can make a file there
     assert!(OutputFile::whole("/proc/a").is_err());
     OutputFile::write("/dev/null", "new").unwrap();
     assert!(OutputFile::write("/dev/full", "new").is_err());

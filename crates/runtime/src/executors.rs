@@ -1,4 +1,4 @@
-//! Who makes turns, and when: threads, a pool of workers, one thread in virtual time, one that follows a recorded order; and ghosts, whose turns are made elsewhere.
+//! Executors, which make turns: threads, a pool of workers, one thread in virtual time, one that follows a recorded order; and ghosts, whose turns are made elsewhere.
 //!
 //! In: agents that were introduced to each other. Out: runs, saved and read back. Never here: what a turn does.
 

@@ -58,9 +58,9 @@ pub type CaseOf<E> = <<E as Experiment>::Row as Record>::Case;
 
 /// A line of the CSV file of an experiment: a column for each column of its case, and more.
 pub trait Record: Serialize + Send + Sync + 'static {
-    /// What is measured; rows of cases that are written alike are the same measurement.
+    /// The quantity measured; rows of cases that are written alike are the same measurement.
     type Case: Serialize + Sync;
-    /// What is read from a line.
+    /// The values of a line.
     type Found: DeserializeOwned;
 
     /// The line of a case.

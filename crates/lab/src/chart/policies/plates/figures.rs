@@ -97,7 +97,7 @@ impl Panel {
     }
 }
 
-/// What most plates have in common: the middle of the path through the grove.
+/// Settings that most plates share: the middle of the path through the grove.
 const MIDDLE: Plate = Plate {
     name: "",
     title: "",
