@@ -11,7 +11,7 @@ use anyhow::Context;
 use clap::ArgMatches;
 use clap::parser::ValueSource;
 use metachron_console::exit::Exit;
-use metachron_console::files::{check_unread, write_file};
+use metachron_console::files::{check_place, check_unread, write_file};
 use metachron_console::output::{BadInput, data, message, print_overlaps, warn_priority};
 use metachron_console::progress::Bar;
 use metachron_export::VtkSeries;
@@ -271,8 +271,8 @@ pub(super) fn check_windowless(output: &OutputArgs, headless: bool) -> anyhow::R
 }
 
 /// The files that a run writes, by their flags.
-fn files<'a>(args: &'a OutputArgs, record: Option<&'a Path>) -> [(&'static str, Option<&'a Path>); 10] {
-    [
+fn files(args: &OutputArgs, record: Option<&Path>) -> Vec<(&'static str, PathBuf)> {
+    let single = [
         ("--report", args.report.as_deref().filter(|path| *path != Path::new("-"))),
         ("--png", args.png.as_deref()),
         ("--depth", args.depth.as_deref()),
@@ -283,15 +283,18 @@ fn files<'a>(args: &'a OutputArgs, record: Option<&'a Path>) -> [(&'static str, 
         ("--perfetto", args.perfetto.as_deref()),
         ("--frames-csv", args.frames_csv.as_deref()),
         ("--record", record),
-    ]
+    ];
+    let series = args.vtk.iter().flat_map(|folder| VtkSeries::FILES.map(|name| ("--vtk", folder.join(name))));
+    single.into_iter().filter_map(|(flag, path)| Some((flag, path?.to_owned()))).chain(series).collect()
 }
 
 /// Refuses an output that would overwrite a file that the scene was read from.
 pub(super) fn check_read(args: &OutputArgs, record: Option<&Path>, source: &Source) -> anyhow::Result<()> {
     let read = source.files();
-    files(args, record).into_iter().try_for_each(|(flag, path)| {
-        path.map_or(Ok(()), |path| check_unread(flag, path, "the scene", read.iter().map(|file| &*file.path)))
-    })
+    let unread = |(flag, path): &(&str, PathBuf)| {
+        check_unread(flag, path, "the scene", read.iter().map(|file| &*file.path))
+    };
+    files(args, record).iter().try_for_each(unread)
 }
 
 /// Refuses two outputs on standard output, files in missing folders, and an output that would overwrite another one or `input`.
@@ -303,38 +306,19 @@ pub(super) fn check_outputs(
     if args.json && args.report.as_deref() == Some(Path::new("-")) {
         return Err(BadInput("--json and --report - both print the report; choose one".to_owned()).into());
     }
-    let files = files(args, record);
-    if let Some((flag, _)) = files.iter().find(|(_, path)| *path == Some(Path::new("-"))) {
-        let why = "would write to standard output, which only the report may use; name a file";
-        return Err(BadInput(format!("{flag} - {why}")).into());
-    }
     if args.vtk.as_deref() == Some(Path::new("-")) {
         return Err(BadInput("--vtk - would be a folder called -; name another".to_owned()).into());
     }
     args.vtk.as_deref().map_or(Ok(()), check_series)?;
-    for path in files.iter().filter_map(|(_, path)| *path) {
-        let folder = path.parent().filter(|p| !p.as_os_str().is_empty());
-        if folder.is_some_and(|f| !f.is_dir()) {
-            return Err(BadInput(format!("the folder of {} does not exist", path.display())).into());
-        }
-        if path.is_dir() {
-            return Err(BadInput(format!("{} is a folder; expected a file", path.display())).into());
-        }
+    let files = files(args, record);
+    if let Some((flag, _)) = files.iter().find(|(_, path)| path == Path::new("-")) {
+        let why = "would write to standard output, which only the report may use; name a file";
+        return Err(BadInput(format!("{flag} - {why}")).into());
     }
-    let series: Vec<_> = args.vtk.iter().flat_map(|folder| VtkSeries::FILES.map(|name| folder.join(name))).collect();
-    let series = series.iter().map(|path| ("--vtk", path.as_path()));
-    let outputs = files.iter().filter_map(|(flag, path)| Some((*flag, (*path)?)));
-    check_distinct(&input.into_iter().chain(outputs).chain(series).collect::<Vec<_>>())?;
+    files.iter().filter(|(flag, _)| *flag != "--vtk").try_for_each(|(_, path)| check_place(path))?;
+    let outputs = files.iter().map(|(flag, path)| (*flag, path.as_path()));
+    check_distinct(&input.into_iter().chain(outputs).collect::<Vec<_>>())?;
     check_extension(args)
-}
-
-/// Refuses a folder for a series that holds files of its names, or cannot be one.
-fn check_series(folder: &Path) -> anyhow::Result<()> {
-    let there = folder.ancestors().find(|path| path.exists());
-    if let Some(file) = there.filter(|path| !path.is_dir()) {
-        return Err(BadInput(format!("{} is a file; --vtk expects a folder", file.display())).into());
-    }
-    VtkSeries::check(folder).map_err(|error| BadInput(error.to_string()).into())
 }
 
 /// Refuses a picture, film or mesh whose file has the ending of something else.

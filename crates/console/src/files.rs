@@ -13,8 +13,8 @@ pub fn write_file(path: impl AsRef<Path>, bytes: impl AsRef<[u8]>) -> anyhow::Re
     OutputFile::write(path, bytes).with_context(|| format!("{} cannot be written", path.display()))
 }
 
-/// Refuses a path that is already taken, or in a folder that does not exist.
-pub fn check_output_path(path: &Path, flag: &str, force: bool) -> anyhow::Result<()> {
+/// Refuses a path in a folder that does not exist, or of a folder.
+pub fn check_place(path: &Path) -> anyhow::Result<()> {
     let folder = path.parent().filter(|p| !p.as_os_str().is_empty());
     if folder.is_some_and(|f| !f.is_dir()) {
         return Err(BadInput(format!("the folder of {} does not exist", path.display())).into());
@@ -22,6 +22,12 @@ pub fn check_output_path(path: &Path, flag: &str, force: bool) -> anyhow::Result
     if path.is_dir() {
         return Err(BadInput(format!("{} is a folder; expected a file", path.display())).into());
     }
+    Ok(())
+}
+
+/// Refuses a path that is already taken, and those that [`check_place`] refuses.
+pub fn check_output_path(path: &Path, flag: &str, force: bool) -> anyhow::Result<()> {
+    check_place(path)?;
     if path.exists() && !force {
         let why = format!("{} exists already; --force overwrites it, {flag} FILE names another file", path.display());
         return Err(BadInput(why).into());

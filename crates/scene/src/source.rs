@@ -174,7 +174,11 @@ impl Source {
     /// [`SceneError`] when the text is too long.
     pub fn recorded(name: &str, text: &str, folder: Option<&Path>) -> Result<Self, SceneError> {
         let siblings = folder.map_or(SiblingFiles::BuiltIn, |folder| SiblingFiles::Folder(folder.to_owned()));
-        Ok(Self { siblings, ..Self::memory(name, text.as_bytes())? })
+        let source = Self { siblings, ..Self::memory(name, text.as_bytes())? };
+        if let Some(path) = folder.zip(Path::new(name).file_name()).map(|(folder, name)| folder.join(name)) {
+            source.note_file(&path, FileVersion::of(&path));
+        }
+        Ok(source)
     }
 
     /// The same with files beside it that are not written yet, by their names in the scene.

@@ -16,7 +16,6 @@ mod mouse;
 mod native_window;
 mod overlays;
 mod plots;
-mod present_time;
 mod protocol;
 mod screen;
 mod side;

@@ -192,10 +192,11 @@ fn no_output_overwrites_a_file_of_the_scene_by_whatever_name() {
     assert_eq!(std::fs::read(scene.file("a.obj")).unwrap(), mesh);
     // a replay reads the meshes again
     run(&scene, &["-q", "--record", &scene.file("run.rec")]);
-    let replay = metachron(&["replay", &scene.file("run.rec"), "--glb", &scene.file("hard.glb")]);
-    assert!(
-        replay.status.code() == Some(2) && String::from_utf8_lossy(&replay.stderr).contains("a.obj, which the scene")
-    );
+    for (flag, file, read) in [("--glb", &*scene.file("hard.glb"), "a.obj"), ("--report", scene.scene(), scene.scene())] {
+        let replay = metachron(&["replay", &scene.file("run.rec"), flag, file]);
+        let said = String::from_utf8_lossy(&replay.stderr);
+        assert!(replay.status.code() == Some(2) && said.contains(&format!("{read}, which the scene")), "{said}");
+    }
     // an output that shares its bytes with a file of something else leaves those alone
     std::fs::write(scene.file("other.json"), "other").unwrap();
     std::fs::hard_link(scene.file("other.json"), scene.file("report.json")).unwrap();

@@ -47,7 +47,7 @@ pub(super) enum View<'a> {
 /// A document as prose and blocks. Code between fences is prose, whatever is in it.
 ///
 /// # Errors
-/// A block that is not closed, a line that nearly opens or closes one.
+/// A block or a fence that is not closed, a line that nearly opens or closes a block.
 pub(super) fn parts(text: &str) -> anyhow::Result<Vec<Part<'_>>> {
     let (mut parts, mut rest, mut line) = (Vec::new(), text, 1);
     while let Some(from) = opening(rest, line)? {
@@ -70,7 +70,7 @@ pub(super) fn parts(text: &str) -> anyhow::Result<Vec<Part<'_>>> {
 
 /// Where the next block of `text` opens; its first line, of this number, may close the block before.
 fn opening(text: &str, number: usize) -> anyhow::Result<Option<usize>> {
-    let (mut from, mut within) = (0, None);
+    let (mut from, mut within, mut opened) = (0, None, 0);
     for (k, line) in text.split_inclusive('\n').enumerate() {
         let inner = line.trim();
         match within {
@@ -82,11 +82,12 @@ fn opening(text: &str, number: usize) -> anyhow::Result<Option<usize>> {
                 "line {}: `{inner}` is no block; expected `{OPENS}COMMAND -->` or `{CLOSES}` of one, at the beginning of a line",
                 number + k
             ),
-            None => within = fence(inner),
+            None => (within, opened) = (fence(inner), number + k),
         }
         from += line.len();
     }
-    Ok(None)
+    // what is behind an open fence would be prose, its blocks too
+    within.map_or(Ok(None), |_| bail!("line {opened}: this fence is not closed"))
 }
 
 /// The mark of a fence that a line opens, and how many of it; the line that closes it has no fewer.
@@ -182,5 +183,7 @@ mod tests {
         let parts = parts(&after).unwrap();
         let [Part::Prose(before), Part::Block(block), _] = &parts[..] else { panic!("{parts:?}") };
         assert_eq!((*before, block.line), (code, 10));
+        let open = "A\n\n```sh\n<!-- metachron list -->\n<!-- end -->\n";
+        assert!(super::parts(open).unwrap_err().to_string().starts_with("line 3: this fence is not closed"));
     }
 }

@@ -20,13 +20,11 @@ pub(super) fn write(path: &Path, task: &Task<'_>, fitted: &Fitted, limits: Limit
     let shown = path.display();
     let before = std::fs::read_to_string(path).with_context(|| format!("{shown} cannot be read"))?;
     let (text, changes) = changed(&before, task, fitted).map_err(|what| BadInput(format!("{shown}: {what}")))?;
+    let source = Source::recorded(&path.to_string_lossy(), &text, path.parent());
+    source
+        .and_then(|source| load(&source.within(limits), &[]))
+        .map_err(|error| anyhow::Error::from(error).context(format!("{shown} is unchanged")))?;
     write_file(path, &text)?;
-    let source = Source::open(&path.to_string_lossy());
-    let again = source.and_then(|source| load(&source.within(limits), &[]));
-    if let Err(error) = again {
-        write_file(path, &before)?;
-        return Err(anyhow::Error::from(error).context(format!("{shown} is unchanged")));
-    }
     Ok(changes)
 }
 

@@ -4,7 +4,6 @@
 //! eframe reconfigures an outdated surface and remakes a lost one, but does not notice a lost device; so [`run_window`] receives the loss
 //! from wgpu, closes the window and opens it again on a new device. The simulation keeps running.
 
-use super::present_time::Presenting;
 use super::protocol::{FrameTimes, Message, Severity, Simulation, Skip};
 use super::screen::GpuScreen;
 use super::{Layout, Screen, Viewer, WindowRequests};
@@ -65,6 +64,8 @@ pub enum WindowError {
 const YOUNG: Duration = Duration::from_secs(1);
 /// Early losses in a row after which the window gives up.
 const LOSSES_MAX: u32 = 5;
+/// The layout is saved at this interval.
+const SAVE_PERIOD: Duration = Duration::from_secs(30);
 /// While the window is hidden, [`Simulation::wants_close`] is polled at this interval.
 const HIDDEN_POLL: Duration = Duration::from_millis(200);
 /// Interval between pictures while the simulation is paused and there is no input.
@@ -75,8 +76,6 @@ const CALM: f64 = 0.5;
 const WARM_UP: u64 = 3;
 /// A picture due within this time is drawn now instead of waiting.
 const EARLY: Duration = Duration::from_micros(500);
-/// A picture later than this was delayed by the one before.
-const LATE: Duration = Duration::from_millis(1);
 
 /// Opens the window and shows `simulation` in it until the user or the simulation closes it.
 ///
@@ -251,7 +250,7 @@ struct Shell<'a> {
     window_state: Rc<Cell<WindowState>>,
     screenshots: PathBuf,
     pace: Pace,
-    presenting: Presenting,
+    frame_clock: FrameClock,
     /// Time that [`Viewer::ui`] spent on the picture in the previous frame.
     drawing: Duration,
     hidden: bool,
@@ -273,8 +272,8 @@ impl Pace {
 
     /// Due time of the next picture; `still` allows a long interval.
     fn next(&self, still: bool) -> Instant {
-        let calm = self.started.filter(|_| still).map(|started| started + STILL_PERIOD);
-        calm.map_or(self.due, |calm| calm.max(self.due))
+        let next = self.started.filter(|_| still).map(|started| started + STILL_PERIOD);
+        next.map_or(self.due, |next| next.max(self.due))
     }
 
     /// Counts a picture that starts now; returns the time since the one before.
@@ -285,6 +284,19 @@ impl Pace {
         let before = self.started.replace(now);
         before.map_or(period, |before| now - before)
     }
+}
+
+/// The times of a frame besides its picture.
+#[derive(Debug, Clone, Copy, Default)]
+struct ScreenTimes {
+    panels: Duration,
+    present: Duration,
+}
+
+/// The time of a whole frame of eframe, from its first call to the application to its last one, after it has presented.
+struct FrameClock {
+    begun: Instant,
+    took: Cell<Duration>,
 }
 
 impl<'a> Shell<'a> {
@@ -303,7 +315,7 @@ impl<'a> Shell<'a> {
             window_state,
             screenshots,
             pace,
-            presenting: Presenting::default(),
+            frame_clock: FrameClock { begun: Instant::now(), took: Cell::new(Duration::ZERO) },
             drawing: Duration::ZERO,
             hidden: false,
             touched_s: 0.0,
@@ -327,11 +339,18 @@ impl<'a> Shell<'a> {
         ctx.send_viewport_cmd(egui::ViewportCommand::Close);
     }
 
-    /// Collects the times of the picture just drawn, and passes them to the simulation and the plots.
-    fn account(&mut self, interval: Duration, panels: Duration) {
-        let Some(drawn) = self.screen.take_times() else { return };
+    /// The times of the frame before, of which eframe reports `cpu_s`: all that is not waiting for the surface, the picture's drawing in it.
+    fn times_before(&self, cpu_s: Option<f32>) -> ScreenTimes {
+        let Some(cpu) = cpu_s.map(|s| Duration::from_secs_f32(s.max(0.0))) else { return ScreenTimes::default() };
         // a GPU presents on its own: waiting for it is not work
-        let present = if self.screen.is_software() { self.presenting.time() } else { Duration::ZERO };
+        let waited = self.frame_clock.took.get().saturating_sub(cpu);
+        let present = if self.screen.is_software() { waited } else { Duration::ZERO };
+        ScreenTimes { panels: cpu.saturating_sub(self.drawing), present }
+    }
+
+    /// Collects the times of the picture just drawn, and passes them to the simulation and the plots.
+    fn account(&mut self, interval: Duration, ScreenTimes { panels, present }: ScreenTimes) {
+        let Some(drawn) = self.screen.take_times() else { return };
         let skip = if self.pace.pictures <= WARM_UP {
             Some(Skip::WarmUp)
         } else if std::mem::take(&mut self.hidden) {
@@ -353,7 +372,6 @@ impl<'a> Shell<'a> {
             interval,
             skip,
         };
-        self.presenting.worked(drawn.compose + drawn.draw + panels, skip.is_none());
         self.simulation.measured(&times);
         self.viewer.measured(&times);
     }
@@ -377,6 +395,7 @@ impl<'a> Shell<'a> {
 
 impl eframe::App for Shell<'_> {
     fn logic(&mut self, ctx: &egui::Context, _frame: &mut eframe::Frame) {
+        self.frame_clock.begun = Instant::now();
         if self.window_state.get() != WindowState::Open {
             return;
         }
@@ -396,20 +415,15 @@ impl eframe::App for Shell<'_> {
             return;
         }
         let (now, first_pass) = (Instant::now(), ui.ctx().current_pass_index() == 0);
-        let panels = frame.info().cpu_usage.map_or(Duration::ZERO, |s| Duration::from_secs_f32(s.max(0.0)));
-        let panels = panels.saturating_sub(self.drawing);
+        let before = self.times_before(frame.info().cpu_usage);
         let period = Duration::from_secs_f64(1.0 / self.simulation.status().target_hz.clamp(0.1, 1000.0));
         let still = self.is_still(ui.ctx());
         let due = first_pass && self.pace.is_due(now, still);
-        let late = now.saturating_duration_since(self.pace.next(still)) > LATE;
         let interval = if due { self.pace.start(now, period) } else { Duration::ZERO };
-        if due {
-            self.presenting.started(interval, late);
-        }
         self.screen.set_due(due);
         let (requests, drawing) = self.viewer.ui(ui, self.simulation, &mut self.screen);
         self.drawing = if first_pass { drawing } else { self.drawing + drawing };
-        self.account(interval, panels);
+        self.account(interval, before);
         if let Some(error) = self.screen.take_failure() {
             let text = format!("The picture could not be drawn: {error}");
             self.viewer.note(ui.ctx().time(), Message { severity: Severity::Failure, text });
@@ -420,6 +434,12 @@ impl eframe::App for Shell<'_> {
             ui.ctx().graphics_mut(|layers| *layers = egui::layers::GraphicLayers::default());
         }
         ui.ctx().request_repaint_after(self.pace.next(still).saturating_duration_since(Instant::now()));
+    }
+
+    /// eframe asks for this at the end of each frame, when the picture is presented and no event has been waited for yet.
+    fn auto_save_interval(&self) -> Duration {
+        self.frame_clock.took.set(self.frame_clock.begun.elapsed());
+        SAVE_PERIOD
     }
 
     fn save(&mut self, storage: &mut dyn eframe::Storage) {
