@@ -321,6 +321,15 @@ pub(super) fn check_outputs(
     check_extension(args)
 }
 
+/// Refuses a folder for a series that holds files of its names, or cannot be one.
+fn check_series(folder: &Path) -> anyhow::Result<()> {
+    let there = folder.ancestors().find(|path| path.exists());
+    if let Some(file) = there.filter(|path| !path.is_dir()) {
+        return Err(BadInput(format!("{} is a file; --vtk expects a folder", file.display())).into());
+    }
+    VtkSeries::check(folder).map_err(|error| BadInput(error.to_string()).into())
+}
+
 /// Refuses a picture, film or mesh whose file has the ending of something else.
 fn check_extension(args: &OutputArgs) -> anyhow::Result<()> {
     let outputs = [

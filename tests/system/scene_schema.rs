@@ -120,10 +120,10 @@ fn the_documentation_of_pythons_parts_has_the_ranges_of_the_models() {
     let fields: [(&str, &str, &[NumberRange]); 6] = [
         ("_Placed", "restitution", &[RESTITUTION]),
         ("_Moving", "mass", &[rigid::MASS]),
-        ("_Soft", "young", &[matter("young_pa")]),
-        ("_Soft", "poisson", &[matter("poisson")]),
-        ("_Soft", "density", &[matter("density_kg_m3")]),
-        ("_Soft", "damping", &[matter("damping_per_s"), matter("damping_s")]),
+        ("_Soft", "young", &[material("young_pa")]),
+        ("_Soft", "poisson", &[material("poisson")]),
+        ("_Soft", "density", &[material("density_kg_m3")]),
+        ("_Soft", "damping", &[material("damping_per_s"), material("damping_s")]),
     ];
     for (class, field, ranges) in fields {
         let (_, body) = text.split_once(&format!("class {class}")).expect(class);

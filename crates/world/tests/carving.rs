@@ -55,7 +55,7 @@ fn scene() -> Scene {
         .fixed("floor", Solid::Plane)
         .add("slab", soft(lies))
         .add("ball", ball)
-        .add("flier", soft(SoftSpec { velocity: FLIES_M_S, matter: undamped, ..slab(AWAY) }))
+        .add("flier", soft(SoftSpec { velocity: FLIES_M_S, material: undamped, ..slab(AWAY) }))
         .add("rope", soft(SoftSpec { shape, ..slab(DVec3::Y * 9.0) }))
         .build()
         .unwrap()

@@ -26,7 +26,7 @@ pub struct RigidBody {
     /// How its spin changed in the mean of that step, rad/s².
     pub(super) angular_acceleration: DVec3,
     pub(super) at_rest: bool,
-    pub(super) still_s: f64,
+    pub(super) quiet_s: f64,
     pub(super) steps: u64,
     /// Its unknowns in a contact cluster.
     pub(super) unknowns: Unknowns,
@@ -69,7 +69,7 @@ impl RigidBody {
             acceleration: flight.gravity,
             angular_acceleration: DVec3::ZERO,
             at_rest: false,
-            still_s: 0.0,
+            quiet_s: 0.0,
             steps: 0,
             unknowns: Unknowns::default(),
         };
@@ -126,7 +126,7 @@ impl Agent for RigidBody {
             return false;
         }
         *motion = to;
-        (self.at_rest, self.still_s) = (false, 0.0);
+        (self.at_rest, self.quiet_s) = (false, 0.0);
         (self.acceleration, self.angular_acceleration) = (DVec3::ZERO, DVec3::ZERO);
         self.unknowns.start([velocity, spin_rad_s]);
         true
@@ -170,7 +170,7 @@ impl Agent for RigidBody {
 
     fn archive(&mut self, archive: &mut Archive<'_>) -> Result<(), ArchiveError> {
         archive_values!(archive, self.motion, self.acceleration, self.angular_acceleration)?;
-        archive_values!(archive, self.at_rest, self.still_s, self.steps)?;
+        archive_values!(archive, self.at_rest, self.quiet_s, self.steps)?;
         self.unknowns.archive(archive)
     }
 

@@ -50,7 +50,7 @@ struct SavedState {
     motion: Motion,
     acceleration: DVec3,
     angular_acceleration: DVec3,
-    still_s: f64,
+    quiet_s: f64,
     at_rest: bool,
     steps: u64,
 }
@@ -178,15 +178,15 @@ impl ClusterMember for RigidBody {
     }
 
     fn keep(&mut self) {
-        let Self { motion, acceleration, angular_acceleration, still_s, at_rest, steps, .. } = *self;
-        self.unknowns.saved = Some(SavedState { motion, acceleration, angular_acceleration, still_s, at_rest, steps });
+        let Self { motion, acceleration, angular_acceleration, quiet_s, at_rest, steps, .. } = *self;
+        self.unknowns.saved = Some(SavedState { motion, acceleration, angular_acceleration, quiet_s, at_rest, steps });
     }
 
     fn go_back(&mut self) {
         let Some(saved) = self.unknowns.saved else { return };
-        let SavedState { motion, acceleration, angular_acceleration, still_s, at_rest, steps } = saved;
+        let SavedState { motion, acceleration, angular_acceleration, quiet_s, at_rest, steps } = saved;
         (self.motion, self.acceleration, self.angular_acceleration) = (motion, acceleration, angular_acceleration);
-        (self.still_s, self.at_rest, self.steps) = (still_s, at_rest, steps);
+        (self.quiet_s, self.at_rest, self.steps) = (quiet_s, at_rest, steps);
     }
 
     fn end(&mut self, &StepEnd { v, h_s, touched, .. }: &StepEnd<'_>) -> Result<(), StepError> {
@@ -207,7 +207,7 @@ impl ClusterMember for RigidBody {
     }
 
     fn can_sleep(&self) -> bool {
-        self.may_sleep && self.still_s >= REST_S
+        self.may_sleep && self.quiet_s >= REST_S
     }
 
     fn sleep(&mut self) {
@@ -271,6 +271,6 @@ impl RigidBody {
         let still = self.motion.velocity.length() + self.swing_m_s() < STILL_M_S;
         // one that hovers at the top of its flight is not at rest
         let held = touched || (self.flight.gravity == DVec3::ZERO && *before == self.motion);
-        self.still_s = if still && held { self.still_s + h_s } else { 0.0 };
+        self.quiet_s = if still && held { self.quiet_s + h_s } else { 0.0 };
     }
 }

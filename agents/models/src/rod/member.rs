@@ -40,7 +40,7 @@ pub(super) struct Unknowns {
     is_whole: bool,
     /// Substeps that its own integrator made in the step before: the cluster counts their work with this one's.
     own_substeps: u32,
-    quiet_before: bool,
+    was_at_rest: bool,
     /// The forces of its attachments that may tear in the last step.
     attached: Vec<OwnAttachment>,
     saved: SavedState,
@@ -56,7 +56,7 @@ struct SavedState {
     slid: Vec<Slid>,
     rest: RestDetector,
     time: SimTime,
-    quiet_before: bool,
+    was_at_rest: bool,
     acceleration: DVec3,
     at_rest: bool,
     steps: u64,
@@ -197,7 +197,7 @@ impl ClusterMember for Tube {
         wall.iter().for_each(|wall| saved.wall.copy_from(&wall.now));
         saved.past.copy_from(&stepper.past);
         saved.rest.copy_from(rest);
-        (saved.time, saved.at_rest, saved.steps, saved.quiet_before) = (*time, *at_rest, *steps, unknowns.quiet_before);
+        (saved.time, saved.at_rest, saved.steps, saved.was_at_rest) = (*time, *at_rest, *steps, unknowns.was_at_rest);
         saved.acceleration = *acceleration;
         saved.own_substeps = unknowns.own_substeps;
     }
@@ -213,7 +213,7 @@ impl ClusterMember for Tube {
         // a copy has no forces
         now.strain(material, division);
         rest.copy_from(&saved.rest);
-        (*time, *at_rest, *steps, unknowns.quiet_before) = (saved.time, saved.at_rest, saved.steps, saved.quiet_before);
+        (*time, *at_rest, *steps, unknowns.was_at_rest) = (saved.time, saved.at_rest, saved.steps, saved.was_at_rest);
         *acceleration = saved.acceleration;
         unknowns.own_substeps = saved.own_substeps;
         self.follow_pressure(self.time);
@@ -251,7 +251,7 @@ impl ClusterMember for Tube {
         self.note_attachments();
         self.acceleration = (self.momentum().0 - before) / (self.mass_kg() * h_s);
         self.time += SimSpan::from_secs_f64(h_s).unwrap_or(SimSpan::ZERO);
-        self.unknowns.quiet_before = self.observe_rest(h_s);
+        self.unknowns.was_at_rest = self.observe_rest(h_s);
         self.at_rest = false;
         self.steps += 1;
         self.present_velocities();
@@ -259,7 +259,7 @@ impl ClusterMember for Tube {
     }
 
     fn can_sleep(&self) -> bool {
-        self.unknowns.quiet_before
+        self.unknowns.was_at_rest
     }
 
     fn sleep(&mut self) {
@@ -407,7 +407,7 @@ impl Unknowns {
 
     /// Writes or reads the state that is known between steps.
     pub(super) fn archive(&mut self, archive: &mut Archive<'_>) -> Result<(), ArchiveError> {
-        archive_values!(archive, self.places, self.radii_m, self.present, self.quiet_before, self.own_substeps)
+        archive_values!(archive, self.places, self.radii_m, self.present, self.was_at_rest, self.own_substeps)
     }
 
     /// Adds the system of a wall that gives, with its solution.
