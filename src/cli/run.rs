@@ -291,9 +291,8 @@ fn files(args: &OutputArgs, record: Option<&Path>) -> Vec<(&'static str, PathBuf
 /// Refuses an output that would overwrite a file that the scene was read from.
 pub(super) fn check_read(args: &OutputArgs, record: Option<&Path>, source: &Source) -> anyhow::Result<()> {
     let read = source.files();
-    let unread = |(flag, path): &(&str, PathBuf)| {
-        check_unread(flag, path, "the scene", read.iter().map(|file| &*file.path))
-    };
+    let unread =
+        |(flag, path): &(&str, PathBuf)| check_unread(flag, path, "the scene", read.iter().map(|file| &*file.path));
     files(args, record).iter().try_for_each(unread)
 }
 

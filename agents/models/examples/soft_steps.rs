@@ -22,7 +22,7 @@ fn main() {
             damping_s: 0.0,
             law: MaterialLaw::Corotational,
         };
-        step(&format!("cube of {:5} nodes", (cells + 1).pow(3)), shape, matter, Side::Bottom);
+        step(&format!("cube of {:5} nodes", (cells + 1).pow(3)), shape, material, Side::Bottom);
     }
     for cells in [10, 20, 30, 60] {
         let shape = SoftShape::Sheet { size_m: [0.3; 2], thickness_m: 0.004, segments: [cells; 2] };
@@ -34,7 +34,7 @@ fn main() {
             damping_s: 0.0,
             law: MaterialLaw::Corotational,
         };
-        step(&format!("sheet of {:4} nodes", (cells + 1).pow(2)), shape, matter, Side::Left);
+        step(&format!("sheet of {:4} nodes", (cells + 1).pow(2)), shape, material, Side::Left);
     }
 }
 

@@ -192,7 +192,8 @@ fn no_output_overwrites_a_file_of_the_scene_by_whatever_name() {
     assert_eq!(std::fs::read(scene.file("a.obj")).unwrap(), mesh);
     // a replay reads the meshes again
     run(&scene, &["-q", "--record", &scene.file("run.rec")]);
-    for (flag, file, read) in [("--glb", &*scene.file("hard.glb"), "a.obj"), ("--report", scene.scene(), scene.scene())] {
+    for (flag, file, read) in [("--glb", &*scene.file("hard.glb"), "a.obj"), ("--report", scene.scene(), scene.scene())]
+    {
         let replay = metachron(&["replay", &scene.file("run.rec"), flag, file]);
         let said = String::from_utf8_lossy(&replay.stderr);
         assert!(replay.status.code() == Some(2) && said.contains(&format!("{read}, which the scene")), "{said}");

@@ -59,7 +59,10 @@ impl OutputFile {
         });
         let of_folder = |error: Error| {
             let folder = target.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
-            let why = format!("a file is made anew before it takes its place, and its folder {} takes none", folder.display());
+            let why = format!(
+                "a file is made anew before it takes its place, and its folder {} takes none",
+                folder.display()
+            );
             Error::new(error.kind(), format!("{why}: {error}"))
         };
         let (file, partial) = made.ok_or(ErrorKind::AlreadyExists)?.map_err(of_folder)?;
