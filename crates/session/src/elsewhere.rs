@@ -11,6 +11,9 @@ use std::time::{Duration, Instant};
 /// The time there is taken to stand when no later one has come for so long.
 const STANDS_AFTER: Duration = Duration::from_millis(250);
 
+/// So many notes are kept: a hundred objects that cannot be shown say no more than a few of them.
+const NOTES_MAX: usize = 8;
+
 /// The world that is shown.
 pub(super) struct Elsewhere {
     pub calls: Arc<dyn WorldCalls>,
@@ -22,6 +25,8 @@ pub(super) struct Elsewhere {
     came: Instant,
     /// Why it was not shown whole, or did not take what a user did.
     pub error: Option<WorldError>,
+    /// What all that is shown of it is not without.
+    pub notes: Vec<String>,
 }
 
 impl Elsewhere {
@@ -31,7 +36,7 @@ impl Elsewhere {
     /// [`WorldError::Build`] and [`WorldError::Run`].
     pub fn new(scene: &Scene, calls: Arc<dyn WorldCalls>) -> Result<Self, WorldError> {
         let (ghosts, first) = (GhostWorld::of(scene)?, calls.time());
-        let mut elsewhere = Self { calls, ghosts, first, newest: first, came: Instant::now(), error: None };
+        let mut elsewhere = Self { calls, ghosts, first, newest: first, came: Instant::now(), error: None, notes: Vec::new() };
         elsewhere.follow();
         Ok(elsewhere)
     }
@@ -52,7 +57,19 @@ impl Elsewhere {
 
     /// Whether its time passes.
     pub fn passes(&self) -> bool {
-        self.came.elapsed() < STANDS_AFTER
+        self.stood() < STANDS_AFTER
+    }
+
+    /// For how long its time has stood.
+    pub fn stood(&self) -> Duration {
+        self.came.elapsed()
+    }
+
+    /// Keeps a note, once.
+    pub fn note(&mut self, text: String) {
+        if self.notes.len() < NOTES_MAX && !self.notes.contains(&text) {
+            self.notes.push(text);
+        }
     }
 
     /// Changes the flow of its time.
