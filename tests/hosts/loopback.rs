@@ -5,6 +5,7 @@ use metachron::core::{Anchor, Body, SimSpan, SimTime};
 use metachron::geometry::Solid;
 use metachron::hosts::{Calling, Host, HostsError, RemoteWorld, SceneFiles, Serving, connect, serve};
 use metachron::runtime::{Command, TimelineCommand};
+use metachron::scene::{Source, load};
 use metachron::world::kinds::ExecutorKind;
 use metachron::world::{
     EventFilter, GhostWorld, Happening, Rigid, Scene, SceneText, Tube, World, WorldCalls, WorldError,
@@ -88,6 +89,26 @@ fn a_caller_that_looks_sees_rounded_states_which_follow_what_joins_and_is_put_ba
         ghosts.follow(&elsewhere).unwrap();
     }
     assert_eq!((elsewhere.refused(), elsewhere.is_silent()), (0, false));
+}
+
+#[test]
+fn sixty_frames_a_second_of_the_cavity_are_less_than_a_megabyte_to_look_at() {
+    metachron::scenes::provide();
+    let scene = load(&Source::open("cavity").unwrap(), &[]).unwrap();
+    let (here, endpoint) = (World::start(&scene, ExecutorKind::Lockstep).unwrap(), free_endpoint());
+    let host = serve(Arc::new(here), Serving::new("bench", &endpoint)).unwrap();
+    let frame = SimSpan::from_nanos(16_666_667);
+    // a caller that drives would be sent whole states: both are counted by themselves
+    let bytes = |calling: Calling| {
+        let elsewhere = connect(calling).unwrap();
+        elsewhere.advance(frame).unwrap();
+        let before = host.sent();
+        (0..30).for_each(|_| elsewhere.advance(frame).unwrap());
+        2 * (host.sent() - before)
+    };
+    let (looked_at, whole) = (bytes(Calling::at(&endpoint).looking()), bytes(Calling::at(&endpoint)));
+    println!("cavity at 60 Hz: {looked_at} bytes a second to look at, {whole} whole");
+    assert!(looked_at <= 1_000_000 && looked_at < whole / 4, "{looked_at} of {whole}");
 }
 
 #[test]

@@ -72,6 +72,8 @@ struct Shown {
     sequence: u64,
     objects: BTreeMap<AgentId, (Arc<str>, Arc<Snapshot>)>,
     events: Box<dyn EventReader>,
+    /// Whether there was a caller at the last message: without one nothing is looked at.
+    is_followed: bool,
     /// States that were too long for a message.
     too_long: u64,
     /// Bytes of all messages of states.
@@ -98,7 +100,7 @@ pub fn serve(world: Arc<dyn WorldCalls>, serving: Serving) -> Result<Host, Hosts
     let since_1970 = SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default();
     let run = (since_1970.as_nanos() as u64 ^ u64::from(std::process::id())).max(1);
     let events = world.listen(EventFilter::all());
-    let shown = Mutex::new(Shown { sequence: 1, objects: BTreeMap::new(), events, too_long: 0, sent: 0 });
+    let shown = Mutex::new(Shown { sequence: 1, objects: BTreeMap::new(), events, is_followed: false, too_long: 0, sent: 0 });
     let gate = Mutex::new(Gate::new(identity.is_some()));
     let (ends, scene, waiting) = (AtomicBool::new(false), scene.map(Box::new), AtomicUsize::new(0));
     let is_open = is_open_to_all(&endpoint);
@@ -233,10 +235,15 @@ impl Shared {
     fn publish(&self) -> u64 {
         let Callers { whole, looking } = self.gate().callers();
         let mut shown = self.shown();
-        let Changes { moment, before } = shown.changes(&*self.world, self.run);
-        if whole + looking == 0 {
+        let was_followed = std::mem::replace(&mut shown.is_followed, whole + looking > 0);
+        if !shown.is_followed {
             return shown.sequence - 1;
         }
+        if !was_followed {
+            // nobody has listened
+            shown.events.take();
+        }
+        let Changes { moment, before } = shown.changes(&*self.world, self.run);
         let (mut messages, mut sent) = (Vec::new(), 0);
         let Shown { sequence, too_long, .. } = &mut *shown;
         *too_long += moment.encode_parts(sequence, 1, &mut messages);
@@ -352,8 +359,8 @@ impl Shared {
         let reply = match call {
             Call::Hello { .. } => Reply::Hello(self.welcome()),
             Call::All => {
-                let mut messages = Vec::new();
-                let mut shown = self.shown();
+                self.publish();
+                let (mut messages, mut shown) = (Vec::new(), self.shown());
                 let (moment, mut sequence) = (shown.all(world, self.run), shown.sequence - 1);
                 shown.too_long += moment.encode_parts(&mut sequence, 0, &mut messages);
                 return Ok(messages.into_iter().map(|encoded| encoded.bytes).collect());

@@ -18,7 +18,7 @@ const NOTES_MAX: usize = 8;
 pub(super) struct Elsewhere {
     pub calls: Arc<dyn WorldCalls>,
     ghosts: GhostWorld,
-    /// Its time when it was first seen.
+    /// Its time when it began to be shown.
     pub first: SimTime,
     /// Its newest time, and when that came.
     newest: SimTime,
@@ -39,6 +39,11 @@ impl Elsewhere {
         let mut elsewhere = Self { calls, ghosts, first, newest: first, came: Instant::now(), error: None, notes: Vec::new() };
         elsewhere.follow();
         Ok(elsewhere)
+    }
+
+    /// Counts from now on: opening an adapter takes seconds, in which its time may pass or stand.
+    pub fn begin(&mut self) {
+        (self.first, self.newest, self.came) = (self.calls.time(), self.calls.time(), Instant::now());
     }
 
     /// The world that shows it.

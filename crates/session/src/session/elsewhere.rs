@@ -66,7 +66,7 @@ impl Session {
         (stood > patience).then_some(SessionError::Stands { at_s, stood_s })
     }
 
-    /// Simulated seconds that have passed in this session.
+    /// Simulated seconds that have passed in this session, of a world elsewhere since it began.
     #[must_use]
     pub fn played_s(&self) -> f64 {
         let first = self.elsewhere.as_ref().map_or(SimTime::ZERO, |elsewhere| elsewhere.first);
