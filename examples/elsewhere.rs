@@ -9,7 +9,7 @@ use std::time::{Duration, Instant};
 
 fn main() -> Result<(), Box<dyn Error>> {
     let endpoint = std::env::args().nth(1).ok_or("expected an endpoint, such as tcp/127.0.0.1:7447")?;
-    let world = connect(&endpoint, None)?;
+    let world = connect(&endpoint)?;
     let ball = world.add("a ball from elsewhere", Rigid::ball(0.03).mass_kg(0.1).at([0.0, 0.0, 1.0]).into())?;
     world.drive(TimelineCommand::Run)?;
     let (begun, mut shown, mut frames) = (Instant::now(), 0, 0);

@@ -5,16 +5,17 @@
 use crate::numbers::row;
 use crate::object::Object;
 use glam::DVec3;
-use metachron::world::{self, Happening, World};
+use metachron::world::{self, EventFilter, EventReader, Happening, WorldCalls};
 use numpy::PyArray1;
+use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
-use std::sync::{Mutex, PoisonError};
+use std::sync::{Arc, Mutex, PoisonError};
 
-/// Listens to a world. An object keeps its newest 128 events until they are drained.
+/// Listens to a world. An object keeps its newest 128 events until they are drained; of a world elsewhere all objects together 4096.
 #[pyclass(frozen, module = "metachron")]
 pub struct Events {
-    world: World,
-    events: Mutex<world::Events>,
+    world: Arc<dyn WorldCalls>,
+    events: Mutex<Box<dyn EventReader>>,
 }
 
 /// Something that happened.
@@ -44,15 +45,30 @@ pub struct Event {
     force: Option<Py<PyArray1<f64>>>,
 }
 
+/// The events that are listened for: of contacts of at least `above` newtons, of changes of state, of one object where it is given.
+pub fn filter(contacts: bool, states: bool, above: f64, of: Option<world::Object>) -> PyResult<EventFilter> {
+    let filter = match (contacts, states) {
+        (true, true) => EventFilter::all(),
+        (true, false) => EventFilter::contacts(),
+        (false, true) => EventFilter::states(),
+        (false, false) => return Err(PyValueError::new_err("events are of contacts, of states, or of both")),
+    };
+    if above.is_nan() || above < 0.0 {
+        return Err(PyValueError::new_err(format!("above is {above:?} N; expected 0 or more")));
+    }
+    Ok(of.into_iter().fold(filter.above_n(above), EventFilter::of))
+}
+
 impl Events {
-    pub fn new(world: &World, filter: world::EventFilter) -> Self {
-        Self { world: world.clone(), events: Mutex::new(world.events(filter)) }
+    pub fn new(world: Arc<dyn WorldCalls>, filter: EventFilter) -> Self {
+        let events = Mutex::new(world.listen(filter));
+        Self { world, events }
     }
 
     fn event(&self, py: Python<'_>, event: &world::Event) -> Event {
         let bare = Event {
             kind: event.what.name(),
-            object: Object::new(&self.world, event.object),
+            object: Object::new(&*self.world, event.object),
             text: event.to_string(),
             time: event.at.as_secs_f64(),
             other: event.other.as_deref().map(str::to_owned),
@@ -75,7 +91,7 @@ impl Events {
 impl Events {
     /// The events since the last call, oldest first.
     fn drain(&self, py: Python<'_>) -> Vec<Event> {
-        let all: Vec<_> = self.events.lock().unwrap_or_else(PoisonError::into_inner).drain().collect();
+        let all = self.events.lock().unwrap_or_else(PoisonError::into_inner).take();
         all.iter().map(|event| self.event(py, event)).collect()
     }
 

@@ -3,14 +3,18 @@
 //! In: Python's numbers, numpy arrays, parts as the dataclasses of `package/metachron/parts.py`. Out: objects of Python, errors as its exceptions.
 //! Never here: physics, a lock that Python waits for while a world runs.
 
+mod calls;
 #[cfg_attr(not(feature = "view"), expect(dead_code, reason = "what a picture is asked for is read by what draws it"))]
 mod camera;
 mod checkpoint;
 mod command;
+mod elsewhere;
 mod events;
 mod export;
 mod home;
 mod joints;
+#[cfg_attr(not(feature = "hosts"), path = "no_link.rs")]
+mod link;
 mod numbers;
 mod object;
 mod pickled;
@@ -32,7 +36,11 @@ mod world;
 #[pyo3::pymodule]
 mod _metachron {
     #[pymodule_export]
+    use crate::calls::WorldCalls;
+    #[pymodule_export]
     use crate::checkpoint::Checkpoint;
+    #[pymodule_export]
+    use crate::elsewhere::{RemoteWorld, connect};
     #[pymodule_export]
     use crate::events::{Event, Events};
     #[pymodule_export]

@@ -2,7 +2,7 @@
 //!
 //! In: a name, or an [`Object`] that a world gave. Out: the engine's object. Never here: its state.
 
-use metachron::world::{self, Touched, World};
+use metachron::world::{self, Touched, WorldCalls};
 use pyo3::exceptions::PyTypeError;
 use pyo3::prelude::*;
 use std::sync::Arc;
@@ -46,7 +46,7 @@ impl<'py> FromPyObject<'_, 'py> for Named<'py> {
 
 impl Named<'_> {
     /// The object in this world.
-    pub fn of(&self, world: &World) -> PyResult<world::Object> {
+    pub fn of(&self, world: &dyn WorldCalls) -> PyResult<world::Object> {
         match self {
             Self::Handle(object) => Ok(object.inner),
             Self::Name(name) => world.object(name).map_err(crate::raised::world),
@@ -56,8 +56,8 @@ impl Named<'_> {
 
 impl Object {
     /// The handle of an object of this world.
-    pub fn new(world: &World, inner: world::Object) -> Self {
-        Self { inner, name: name(world, inner).into() }
+    pub fn new(world: &dyn WorldCalls, inner: world::Object) -> Self {
+        Self { inner, name: name(world, inner.into()) }
     }
 }
 
@@ -74,6 +74,6 @@ impl Object {
 }
 
 /// The name of an object, also of one that was removed, or of a static solid.
-pub fn name(world: &World, what: impl Into<Touched>) -> &str {
+pub fn name(world: &dyn WorldCalls, what: Touched) -> Arc<str> {
     world.name(what).unwrap_or_default()
 }

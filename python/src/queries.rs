@@ -40,7 +40,7 @@ impl Hit {
     /// A hit in a world.
     pub fn new(py: Python<'_>, world: &World, hit: &world::Hit) -> Self {
         let [point, normal] = [hit.point_m, hit.normal].map(|v| row(py, v.to_array()).unbind());
-        Self { name: name(world, hit.what).to_owned(), point, normal, distance: hit.distance_m }
+        Self { name: name(world, hit.what).to_string(), point, normal, distance: hit.distance_m }
     }
 }
 
@@ -49,7 +49,7 @@ impl Contact {
     pub fn new(py: Python<'_>, world: &World, contact: &world::ContactNow) -> Self {
         let vectors = [contact.point_m, contact.normal, contact.force_n];
         let [point, normal, force] = vectors.map(|v| row(py, v.to_array()).unbind());
-        let (other, since) = (name(world, contact.with).to_owned(), contact.since.as_secs_f64());
+        let (other, since) = (name(world, contact.with).to_string(), contact.since.as_secs_f64());
         Self { other, since, point, normal, force, depth: contact.depth_m }
     }
 }

@@ -1,7 +1,7 @@
 //! The engine's errors as Python's exceptions, with the engine's own sentences.
 //!
 //! In: errors of scenes and worlds. Out: `KeyError` for a name that there is not, `ValueError` for wrong arguments,
-//! `RuntimeError` for a world or an object that cannot do it any more. Never here: a sentence about physics.
+//! `RuntimeError` for a world or an object that cannot do it any more, `ConnectionError` for a host that is silent. Never here: a sentence about physics.
 
 use metachron::export::ExportError;
 #[cfg(feature = "view")]
@@ -10,7 +10,7 @@ use metachron::scene::{SceneError, SceneProblem};
 #[cfg(feature = "view")]
 use metachron::session::SessionError;
 use metachron::world::{CheckpointError, RecordError, SceneBuildError, WorldError};
-use pyo3::exceptions::{PyKeyError, PyOSError, PyOverflowError, PyRuntimeError, PyValueError};
+use pyo3::exceptions::{PyConnectionError, PyKeyError, PyOSError, PyOverflowError, PyRuntimeError, PyValueError};
 use pyo3::{PyErr, Python};
 
 /// An error of a world.
@@ -29,7 +29,9 @@ fn exception(error: &WorldError, message: String) -> PyErr {
         | WorldError::NoAgent(_)
         | WorldError::NoSensor { .. }
         | WorldError::NoJoint { .. } => PyKeyError::new_err(message),
+        WorldError::Silent { .. } => PyConnectionError::new_err(message),
         WorldError::Foreign
+        | WorldError::Elsewhere(_)
         | WorldError::Gone { .. }
         | WorldError::Stopped
         | WorldError::Stalled { .. }

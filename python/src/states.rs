@@ -6,7 +6,7 @@ use crate::numbers::{array, rows};
 use crate::state::Points;
 use glam::DVec3;
 use metachron::core::Body;
-use metachron::world::World;
+use metachron::world::{Object, WorldCalls};
 use numpy::{PyArray1, PyArray2};
 use pyo3::prelude::*;
 
@@ -30,10 +30,9 @@ pub struct States {
 }
 
 impl States {
-    pub fn of(py: Python<'_>, world: &World) -> Self {
-        let present =
-            world.all_objects().filter_map(|object| Some((world.name(object).ok()?, world.latest(object).ok()?)));
-        let all: Vec<_> = present.collect();
+    pub fn of(py: Python<'_>, world: &dyn WorldCalls) -> Self {
+        let state = |object: Object| Some((world.name(object.into()).ok()?, world.latest(object).ok()?));
+        let all: Vec<_> = world.all_objects().into_iter().filter_map(state).collect();
         let points = || all.iter().map(|(_, state)| Points::of(&state.body));
         let mut starts = vec![0];
         for points in points() {
@@ -48,7 +47,7 @@ impl States {
         let (rotations, spins): (Vec<_>, Vec<_>) = turning.unzip();
         let times: Vec<_> = all.iter().map(|(_, state)| state.moment().as_secs_f64()).collect();
         Self {
-            names: all.iter().map(|(name, _)| (*name).to_owned()).collect(),
+            names: all.iter().map(|(name, _)| name.to_string()).collect(),
             times: array(py, times.into()).unbind(),
             starts: array(py, starts.into()).unbind(),
             positions: vectors(|points| points.positions),

@@ -6,35 +6,30 @@
 use crate::camera::{SIZE, Shot, Viewpoint};
 use crate::checkpoint::Checkpoint;
 use crate::command::Keywords;
-use crate::events::Events;
+use crate::calls::{Given, WorldCalls, apart};
 use crate::export::{Export, Paths};
 use crate::home::Home;
 use crate::joints::{Joints, NamedJoint};
-use crate::numbers::{Rotation, Vector, span};
-use crate::object::{Named, Object};
+use crate::numbers::{Vector, span};
+use crate::object::Named;
 use crate::queries::{Contact, Hit};
 use crate::raised;
-use crate::scene::{Scene, part};
+use crate::scene::Scene;
 use crate::start::{self, WantedPace};
-use crate::state::State;
-use crate::states::States;
 use crate::view::Pictures;
-use glam::{DQuat, DVec3};
 use metachron::contact::joint::{Motor, MotorGoal};
-use metachron::core::{Body, SoftNodes};
 use metachron::export::{Moments, Surface, write_glb};
 use metachron::runtime::{AgentState, TimelineCommand};
 use metachron::world::kinds::ExecutorKind;
-use metachron::world::{self, Command, EventFilter, Pace, SceneText};
+use metachron::world::{self, Pace, SceneText};
 use numpy::{PyArray1, PyArray2, PyArray3};
 use pyo3::exceptions::{PyRuntimeError, PyValueError};
 use pyo3::prelude::*;
-use pyo3::types::PyDict;
 use std::path::PathBuf;
 use std::time::{Duration, Instant};
 
 /// A world that runs; any thread may read and command it. In a `with` block it stops at the end.
-#[pyclass(frozen, module = "metachron")]
+#[pyclass(frozen, extends = WorldCalls, module = "metachron")]
 pub struct World {
     inner: world::World,
     /// The scene that it was started with.
@@ -45,6 +40,9 @@ pub struct World {
     home: Home,
 }
 
+/// A world, on its way to Python.
+pub type Started = PyClassInitializer<World>;
+
 impl Drop for World {
     fn drop(&mut self) {
         if !self.is_at_home() {
@@ -54,25 +52,14 @@ impl Drop for World {
     }
 }
 
-/// Where on an object, under which key, for how long.
-const ANCHORED: [&str; 5] = ["arc", "local", "vertex", "key", "expires"];
-
 /// So long is let pass before Python is asked whether the user has interrupted it.
 const PATIENCE: Duration = Duration::from_millis(20);
 
-/// Keyword arguments.
-type Given<'py> = Bound<'py, PyDict>;
-
-/// Makes a call that may wait for the world, while other threads of Python run.
-fn apart<T: Send>(work: impl FnOnce() -> T + Send) -> T {
-    Python::attach(|py| py.detach(work))
-}
-
 impl World {
     /// A world that was started of this scene.
-    pub fn of(inner: world::World, scene: &world::Scene, text: Option<SceneText>) -> Self {
-        let (scene, pictures) = (scene.clone(), Pictures::of(scene));
-        Self { inner, scene, pictures, text, home: Home::here() }
+    pub fn of(inner: world::World, scene: &world::Scene, text: Option<SceneText>) -> Started {
+        let (scene, pictures, calls) = (scene.clone(), Pictures::of(scene), WorldCalls::here(inner.clone()));
+        PyClassInitializer::from(calls).add_subclass(Self { inner, scene, pictures, text, home: Home::here() })
     }
 
     /// Whether the threads that step it are in this process.
@@ -83,11 +70,6 @@ impl World {
     /// An error where they are in another.
     fn at_home(&self) -> PyResult<&world::World> {
         if self.is_at_home() { Ok(&self.inner) } else { self.home.check("a world").map(|()| &self.inner) }
-    }
-
-    fn send(&self, object: &Named<'_>, command: Command) -> PyResult<()> {
-        let object = object.of(&self.inner)?;
-        apart(|| self.inner.command(object, command)).map_err(raised::world)
     }
 }
 
@@ -101,20 +83,8 @@ impl World {
         text_or_path: &Bound<'_, PyAny>,
         executor: &str,
         pace: Option<&str>,
-    ) -> PyResult<Self> {
+    ) -> PyResult<Started> {
         Scene::from_toml(text_or_path, false, None)?.start(py, executor, pace)
-    }
-
-    /// The object of this name. Raises `KeyError`.
-    fn object(&self, name: &str) -> PyResult<Object> {
-        let object = self.inner.object(name).map_err(raised::world)?;
-        Ok(Object::new(&self.inner, object))
-    }
-
-    /// All objects that are there, the scene's first.
-    #[getter]
-    fn objects(&self) -> Vec<Object> {
-        self.inner.all_objects().map(|object| Object::new(&self.inner, object)).collect()
     }
 
     /// The joints of its scene, and their coordinates.
@@ -129,16 +99,6 @@ impl World {
         self.inner.sensors().iter().map(|sensor| &*sensor.name).collect()
     }
 
-    /// The newest states of all objects, as arrays.
-    fn states(&self, py: Python<'_>) -> States {
-        States::of(py, &self.inner)
-    }
-
-    /// The newest state of an object; it waits for nothing.
-    fn state(&self, object: Named<'_>) -> PyResult<State> {
-        self.inner.latest(object.of(&self.inner)?).map(State).map_err(raised::world)
-    }
-
     /// Why an object failed: it stands still from then on, and its newest state is its last. `None` of one that lives.
     fn fault(&self, object: Named<'_>) -> PyResult<Option<String>> {
         let object = object.of(&self.inner)?;
@@ -147,12 +107,6 @@ impl World {
             AgentState::Parked(reason) => Some(reason),
             _ => None,
         }))
-    }
-
-    /// Simulated time, s.
-    #[getter]
-    fn time(&self, py: Python<'_>) -> f64 {
-        py.detach(|| self.inner.time().as_secs_f64())
     }
 
     /// The executor that runs it.
@@ -176,11 +130,6 @@ impl World {
     #[getter]
     fn dropped(&self, py: Python<'_>) -> f64 {
         py.detach(|| self.inner.given_up().as_secs_f64())
-    }
-
-    /// Equal numbers mean the same states of all objects, bit for bit.
-    fn hash(&self) -> u64 {
-        self.inner.hash()
     }
 
     /// All that the next bit of it needs, objects that joined it included.
@@ -250,123 +199,10 @@ impl World {
         self.stop(py);
     }
 
-    /// A force in world axes; `None` takes back that of the key.
-    #[pyo3(
-        signature = (object, newtons, **keywords),
-        text_signature = "($self, object, newtons, *, arc=None, local=None, vertex=None, key=0, expires=None)"
-    )]
-    fn force(&self, object: Named<'_>, newtons: Option<Vector>, keywords: Option<&Given<'_>>) -> PyResult<()> {
-        let keywords = Keywords::new("force", keywords, &ANCHORED)?;
-        let (anchor, force) = (keywords.anchor()?, newtons.map(|Vector(force)| force));
-        let command = Command::force(anchor, force.unwrap_or_default());
-        self.send(&object, keywords.timed(command, force.is_some())?)
-    }
-
-    /// A torque in world axes; `None` takes back that of the key.
-    #[pyo3(
-        signature = (object, newton_metres, **keywords),
-        text_signature = "($self, object, newton_metres, *, arc=None, local=None, vertex=None, key=0, expires=None)"
-    )]
-    fn torque(&self, object: Named<'_>, newton_metres: Option<Vector>, keywords: Option<&Given<'_>>) -> PyResult<()> {
-        let keywords = Keywords::new("torque", keywords, &ANCHORED)?;
-        let (anchor, torque) = (keywords.anchor()?, newton_metres.map(|Vector(torque)| torque));
-        let command = Command::torque(anchor, torque.unwrap_or_default());
-        self.send(&object, keywords.timed(command, torque.is_some())?)
-    }
-
-    /// An impulse in world axes, once.
-    #[pyo3(
-        signature = (object, newton_seconds, **keywords),
-        text_signature = "($self, object, newton_seconds, *, arc=None, local=None, vertex=None)"
-    )]
-    fn impulse(&self, object: Named<'_>, newton_seconds: Vector, keywords: Option<&Given<'_>>) -> PyResult<()> {
-        let anchor = Keywords::new("impulse", keywords, &["arc", "local", "vertex"])?.anchor()?;
-        self.send(&object, Command::impulse(anchor, newton_seconds.0))
-    }
-
-    /// A spring to a place in space, m; `None` takes back that of the key.
-    #[pyo3(
-        signature = (object, target, **keywords),
-        text_signature = "($self, object, target, *, stiffness=None, damping=0.0, arc=None, local=None, vertex=None, key=0, expires=None)"
-    )]
-    fn spring(&self, object: Named<'_>, target: Option<Vector>, keywords: Option<&Given<'_>>) -> PyResult<()> {
-        let known = [&["stiffness", "damping"][..], &ANCHORED].concat();
-        let keywords = Keywords::new("spring", keywords, &known)?;
-        let (anchor, target) = (keywords.anchor()?, target.map(|Vector(target)| target));
-        let stiffness: Option<f64> = keywords.get("stiffness")?;
-        let damping: f64 = keywords.get("damping")?.unwrap_or(0.0);
-        let Some(stiffness) = stiffness.or(target.is_none().then_some(0.0)) else {
-            return Err(PyValueError::new_err("a spring needs a stiffness, N/m"));
-        };
-        let command = Command::spring(anchor, target.unwrap_or_default(), stiffness, damping);
-        self.send(&object, keywords.timed(command, target.is_some())?)
-    }
-
-    /// Leads a kinematic body to a pose within its next step, and along by a velocity, m/s, and a spin, rad/s; `None` lets it go.
-    #[pyo3(
-        signature = (object, position, rotation = Rotation(DQuat::IDENTITY), **keywords),
-        text_signature = "($self, object, position, rotation=(0.0, 0.0, 0.0, 1.0), *, velocity=(0.0, 0.0, 0.0), spin=(0.0, 0.0, 0.0), expires=None)"
-    )]
-    fn pose(
-        &self,
-        object: Named<'_>,
-        position: Option<Vector>,
-        rotation: Rotation,
-        keywords: Option<&Given<'_>>,
-    ) -> PyResult<()> {
-        let keywords = Keywords::new("pose", keywords, &["velocity", "spin", "expires"])?;
-        let [velocity, spin] = ["velocity", "spin"].map(|name| keywords.get::<Vector>(name));
-        let (velocity, spin) = (velocity?.map_or(DVec3::ZERO, |v| v.0), spin?.map_or(DVec3::ZERO, |v| v.0));
-        let command = Command::pose(position.map_or(DVec3::ZERO, |v| v.0), rotation.0).moving(velocity, spin);
-        self.send(&object, keywords.timed(command, position.is_some())?)
-    }
-
-    /// Puts an object into a state that it had, or another one of as many nodes.
-    fn set_state(&self, object: Named<'_>, state: &State) -> PyResult<()> {
-        let (object, body) = (object.of(&self.inner)?, &state.0.body);
-        apart(|| self.inner.set_state(object, body)).map_err(raised::world)
-    }
-
-    /// Puts the nodes of a soft body to these places, m, (n, 3), with these velocities, m/s; at rest where there are none. How many nodes it has,
-    /// `State.nodes` says.
-    #[pyo3(signature = (object, positions, velocities = None))]
-    fn set_nodes(&self, object: Named<'_>, positions: Vec<Vector>, velocities: Option<Vec<Vector>>) -> PyResult<()> {
-        let object = object.of(&self.inner)?;
-        let plain = |vectors: Vec<Vector>| vectors.into_iter().map(|Vector(vector)| vector).collect::<Vec<_>>();
-        let velocities = velocities.map_or_else(|| vec![DVec3::ZERO; positions.len()], plain);
-        let positions = plain(positions);
-        let mut body = self.inner.latest(object).map_err(raised::world)?.body.clone();
-        match &mut body {
-            Body::Soft(soft) if soft.nodes.is_some() => soft.nodes = Some(SoftNodes { positions, velocities }),
-            Body::Soft(soft) => (soft.positions, soft.velocities) = (positions, velocities),
-            _ => return Err(PyValueError::new_err("only soft bodies are put elsewhere node by node")),
-        }
-        apart(|| self.inner.set_state(object, &body)).map_err(raised::world)
-    }
-
     /// The reading of a sensor of the scene, of the newest states. Raises `KeyError`.
     fn sensor<'py>(&self, py: Python<'py>, name: &str) -> PyResult<Bound<'py, PyArray1<f64>>> {
         let reading = self.inner.sensor(name).map_err(raised::world)?;
         Ok(crate::numbers::array(py, reading.values.into()))
-    }
-
-    /// To another place: a rigid body to this rotation, a deformable turned by it.
-    #[pyo3(signature = (object, position, rotation = Rotation(DQuat::IDENTITY)))]
-    fn teleport(&self, object: Named<'_>, position: Vector, rotation: Rotation) -> PyResult<()> {
-        self.send(&object, Command::teleport(position.0, rotation.0))
-    }
-
-    /// Another velocity, m/s, and spin, rad/s, of all its matter.
-    #[pyo3(signature = (object, velocity, spin = Vector(DVec3::ZERO)))]
-    fn velocity(&self, object: Named<'_>, velocity: Vector, spin: Vector) -> PyResult<()> {
-        self.send(&object, Command::velocity(velocity.0, spin.0))
-    }
-
-    /// Removes the cells of a solid or a sheet within a radius of a line, m; of a point where it has no other end.
-    #[pyo3(signature = (object, start, radius, end = None))]
-    fn carve(&self, object: Named<'_>, start: Vector, radius: f64, end: Option<Vector>) -> PyResult<()> {
-        let to = end.map_or(start.0, |Vector(end)| end);
-        self.send(&object, Command::carve(start.0, to, radius))
     }
 
     /// Drives a joint, by name or by its number in the scene; without a goal, no longer.
@@ -382,19 +218,6 @@ impl World {
         let motor = keywords.motor()?;
         let command = keywords.timed(joint.motor(motor.unwrap_or(idle)), motor.is_some())?;
         apart(|| self.inner.command(joint.body(), command)).map_err(raised::world)
-    }
-
-    /// Takes up another object, which lives from its first step on.
-    fn add(&self, name: &str, what: &Bound<'_, PyAny>) -> PyResult<Object> {
-        let part = part(what)?;
-        let object = what.py().detach(|| self.inner.add(name, part)).map_err(raised::world)?;
-        Ok(Object::new(&self.inner, object))
-    }
-
-    /// Takes an object out; its handle is an error from its next step on.
-    fn remove(&self, object: Named<'_>) -> PyResult<()> {
-        let object = object.of(&self.inner)?;
-        apart(|| self.inner.remove(object)).map_err(raised::world)
     }
 
     /// A picture of the world now, (height, width, 4) of `uint8`: red, green, blue, opacity. `size` is (width, height), default (1280, 720).
@@ -465,23 +288,6 @@ impl World {
         py.detach(|| self.inner.replayed()).transpose().map_err(PyRuntimeError::new_err)
     }
 
-    /// Listens from now on: to contacts of at least `above` newtons, to changes of state, of all objects or one.
-    #[pyo3(signature = (*, contacts = true, states = true, above = 0.0, of = None))]
-    fn events(&self, contacts: bool, states: bool, above: f64, of: Option<Named<'_>>) -> PyResult<Events> {
-        let filter = match (contacts, states) {
-            (true, true) => EventFilter::all(),
-            (true, false) => EventFilter::contacts(),
-            (false, true) => EventFilter::states(),
-            (false, false) => return Err(PyValueError::new_err("events are of contacts, of states, or of both")),
-        };
-        if above.is_nan() || above < 0.0 {
-            return Err(PyValueError::new_err(format!("above is {above:?} N; expected 0 or more")));
-        }
-        let of = of.map(|object| object.of(&self.inner)).transpose()?;
-        let filter = of.into_iter().fold(filter.above_n(above), EventFilter::of);
-        Ok(apart(|| Events::new(&self.inner, filter)))
-    }
-
     /// The contacts of an object now.
     fn contacts(&self, py: Python<'_>, object: Named<'_>) -> PyResult<Vec<Contact>> {
         let all = self.inner.contacts(object.of(&self.inner)?).map_err(raised::world)?;
@@ -500,7 +306,7 @@ impl World {
         Ok(hit.map(|hit| Hit::new(py, &self.inner, &hit)))
     }
 
-    fn __repr__(&self, py: Python<'_>) -> String {
-        format!("<World on {} at {} s>", self.executor(), self.time(py))
+    fn __repr__(&self) -> String {
+        format!("<World on {} at {} s>", self.executor(), self.inner.time().as_secs_f64())
     }
 }

@@ -3,7 +3,7 @@
 use super::devices::DeviceWish;
 use super::exports::ExportPaths;
 #[cfg(feature = "hosts")]
-use super::hosts::args::{HOST_EXAMPLES, HostArgs, VIEW_EXAMPLES, ViewArgs};
+use super::hosts::args::{HOST_EXAMPLES, HostArgs, IDENTITY_EXAMPLES, IdentityCommand, VIEW_EXAMPLES, ViewArgs};
 use clap::builder::PossibleValuesParser;
 use clap::{Args, Parser, Subcommand, ValueHint};
 use metachron_console::values::{CommonArgs, LimitArgs, assignment, seconds, size, target_fps};
@@ -110,6 +110,10 @@ pub enum Command {
     #[cfg(feature = "hosts")]
     #[command(after_help = VIEW_EXAMPLES)]
     View(Box<ViewArgs>),
+    /// Make certificates by which hosts and callers know each other
+    #[cfg(feature = "hosts")]
+    #[command(subcommand, after_help = IDENTITY_EXAMPLES)]
+    Identity(IdentityCommand),
     /// Validate scenes; all problems of the first stage that fails, each at its place in the file
     #[command(after_help = CHECK_EXAMPLES)]
     Check(CheckArgs),

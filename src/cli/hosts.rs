@@ -1,4 +1,5 @@
-//! `host` and `view`: a world that is served to other processes, and a window on one that another process serves.
+//! `host`, `view` and `identity`: a world that is served to other processes, a window on one that another process serves, and certificates for
+//! both.
 //!
 //! In: arguments. Out: a served world and what it carries, second by second; the outputs of `run` of a world elsewhere. Never here: messages,
 //! who is let in.
@@ -6,15 +7,17 @@
 pub mod args;
 mod view;
 
+use super::run::stem;
 use anyhow::Context;
-use args::HostArgs;
+use args::{HostArgs, IdentityCommand};
 use metachron_console::exit::Exit;
 use metachron_console::output::{BadInput, data, message, print_overlaps, warn_priority};
-use metachron_hosts::{Host, HostsError, SceneFiles, Serving, serve};
+use metachron_hosts::{Authority, Host, HostsError, Identity, Refusals, SceneFiles, Serving, serve};
 use metachron_runtime::{AgentHandle, TimelineCommand};
 use metachron_scene::{Source, load};
 use metachron_world::{SceneText, World};
 use serde::Serialize;
+use std::io::IsTerminal;
 use std::sync::Arc;
 use std::sync::mpsc::{RecvTimeoutError, channel};
 use std::time::{Duration, Instant};
@@ -28,7 +31,11 @@ struct Carried {
     /// Cores that the agents' steps took since the last line.
     cpu: f64,
     callers: usize,
+    /// Bytes a second that each caller was sent since the last line.
+    sent_bytes_s: f64,
     refused: RefusedRow,
+    /// Whether anybody on the network may read and command the world.
+    insecure_lan: bool,
 }
 
 #[derive(Debug, Serialize)]
@@ -37,6 +44,7 @@ struct RefusedRow {
     flooded: u64,
     repeated: u64,
     strangers: u64,
+    forbidden: u64,
 }
 
 /// Lines come so often.
@@ -53,39 +61,59 @@ pub(super) fn host(args: &HostArgs) -> anyhow::Result<Exit> {
     let text = SceneText { name, text, folder: None, overrides: args.set.clone() };
     let files = source.files_beside().map_err(BadInput)?;
     let serving = Serving::new(&args.name, &args.listen).scene(SceneFiles { scene: text, files });
+    let serving = serving.operators(&args.operators).viewers(&args.viewers);
+    let serving = if args.insecure_lan { serving.insecure_lan() } else { serving };
+    let identity = args.identity.as_ref().map(Identity::from_file).transpose().map_err(refused)?;
+    let serving = identity.into_iter().fold(serving, Serving::identity);
     let host = serve(Arc::new(world.clone()), serving).map_err(refused)?;
     let (stop, stopped) = channel();
     // no reader waits for a second Ctrl-C
     ctrlc::set_handler(move || stop.send(()).unwrap_or(())).context("Ctrl-C cannot be caught")?;
     message(&format!("`{}` serves {} at {}, until Ctrl-C", args.name, scene.name, args.listen));
+    if host.is_open() {
+        message(&red(INSECURE, std::io::stderr().is_terminal()));
+    }
     if !args.paused {
         world.drive(TimelineCommand::Run);
     }
-    let mut counted = (Instant::now(), 0.0);
+    let mut counted = Counted { at: Instant::now(), cpu_s: 0.0, sent: 0 };
     while matches!(stopped.recv_timeout(LINE_EVERY), Err(RecvTimeoutError::Timeout)) {
         data(&line(&carried(&world, &host, &mut counted), args.json)?)?;
+        host.take_refused().iter().for_each(|(peer, refused)| message(&of_peer(peer, *refused)));
     }
     drop(host);
     world.stop();
     Ok(Exit::Ok)
 }
 
-/// The world and its callers now; `counted` is when CPU time was last read, and its value then, seconds.
-fn carried(world: &World, host: &Host, counted: &mut (Instant, f64)) -> Carried {
-    let now = (Instant::now(), world.agents().iter().map(AgentHandle::cpu_s).sum::<f64>());
+/// The sums at a moment of which lines tell the rates.
+#[derive(Debug, Clone, Copy)]
+struct Counted {
+    at: Instant,
+    cpu_s: f64,
+    sent: u64,
+}
+
+/// The world and its callers now, and what came since `counted`.
+fn carried(world: &World, host: &Host, counted: &mut Counted) -> Carried {
+    let cpu_s = world.agents().iter().map(AgentHandle::cpu_s).sum();
+    let now = Counted { at: Instant::now(), cpu_s, sent: host.sent() };
     let before = std::mem::replace(counted, now);
-    let refused = host.refused();
+    let (span_s, refused) = ((now.at - before.at).as_secs_f64(), host.refused());
     Carried {
         sim_s: world.time().as_secs_f64(),
         agents: world.all_objects().count(),
-        cpu: (now.1 - before.1).max(0.0) / (now.0 - before.0).as_secs_f64(),
+        cpu: (now.cpu_s - before.cpu_s).max(0.0) / span_s,
         callers: host.callers(),
+        sent_bytes_s: (now.sent - before.sent) as f64 / span_s,
         refused: RefusedRow {
             malformed: refused.malformed,
             flooded: refused.flooded,
             repeated: refused.repeated,
             strangers: refused.strangers,
+            forbidden: refused.forbidden,
         },
+        insecure_lan: host.is_open(),
     }
 }
 
@@ -93,16 +121,61 @@ fn line(carried: &Carried, json: bool) -> anyhow::Result<String> {
     if json {
         return Ok(serde_json::to_string(carried)? + "\n");
     }
-    let Carried { sim_s, agents, cpu, callers, refused } = carried;
-    let RefusedRow { malformed, flooded, repeated, strangers } = refused;
-    let refused = malformed + flooded + repeated + strangers;
-    Ok(format!("{sim_s:>9.1} s  {agents} agents  {cpu:.2} cores  {callers} callers  {refused} messages refused\n"))
+    let Carried { sim_s, agents, cpu, callers, sent_bytes_s, refused, insecure_lan } = carried;
+    let sent_kb_s = sent_bytes_s / 1e3;
+    let RefusedRow { malformed, flooded, repeated, strangers, forbidden } = refused;
+    let refused = malformed + flooded + repeated + strangers + forbidden;
+    let open = if *insecure_lan { red("  open to the network", std::io::stdout().is_terminal()) } else { String::new() };
+    Ok(format!(
+        "{sim_s:>9.1} s  {agents} agents  {cpu:.2} cores  {callers} callers, {sent_kb_s:.0} kB/s each  {refused} messages refused{open}\n"
+    ))
+}
+
+/// Said where `--insecure-lan` opens a world, or a view of one, to the network.
+pub(super) const INSECURE: &str =
+    "--insecure-lan: anybody on the network may read and command this world, and nothing is encrypted";
+
+/// In red on a terminal.
+fn red(text: &str, is_terminal: bool) -> String {
+    if is_terminal { format!("\x1b[31m{text}\x1b[0m") } else { text.to_owned() }
+}
+
+/// What was refused of a peer in the last second.
+fn of_peer(peer: &str, refused: Refusals) -> String {
+    let Refusals { malformed, flooded, repeated, strangers, forbidden, .. } = refused;
+    format!(
+        "refused of {peer}: {malformed} malformed, {flooded} too many, {repeated} repeated, {strangers} of strangers, {forbidden} forbidden"
+    )
+}
+
+/// Makes a certificate, and the authority that issues it where there is none.
+pub(super) fn identity(command: &IdentityCommand) -> anyhow::Result<Exit> {
+    let IdentityCommand::New(args) = command;
+    let file = format!("{}.pem", args.name);
+    let authority = if args.authority.exists() {
+        Authority::from_file(&args.authority).map_err(refused)?
+    } else {
+        let authority = Authority::new(&stem(&args.authority.to_string_lossy())).map_err(refused)?;
+        authority.write(&args.authority).map_err(refused)?;
+        message(&format!("{}: a new authority; who has this file can be anybody", args.authority.display()));
+        authority
+    };
+    authority.issue(&args.name, &args.address, args.days).and_then(|identity| identity.write(&file)).map_err(refused)?;
+    let addresses: Vec<_> = std::iter::once(&args.name).chain(&args.address).map(String::as_str).collect();
+    message(&format!("{file}: {} for {} days, reached as {}", args.name, args.days, addresses.join(", ")));
+    Ok(Exit::Ok)
 }
 
 /// An endpoint or a name that cannot be is bad input; a network that fails is a failure.
 fn refused(error: HostsError) -> anyhow::Error {
     match error {
-        HostsError::BadEndpoint { .. } | HostsError::BadName { .. } | HostsError::NeedsCertificates { .. } => {
+        HostsError::BadEndpoint { .. }
+        | HostsError::BadName { .. }
+        | HostsError::NeedsCertificates { .. }
+        | HostsError::IdentityOrNot { .. }
+        | HostsError::NobodyNamed
+        | HostsError::BadIdentity { .. }
+        | HostsError::LongScene { .. } => {
             BadInput(error.to_string()).into()
         }
         other => other.into(),

@@ -59,6 +59,8 @@ fn dispatch(cli: Cli, matches: &clap::ArgMatches) -> anyhow::Result<Exit> {
         Command::Host(args) => hosts::host(&args),
         #[cfg(feature = "hosts")]
         Command::View(args) => hosts::view(&args),
+        #[cfg(feature = "hosts")]
+        Command::Identity(command) => hosts::identity(&command),
         Command::Check(args) => check::command(&args),
         #[cfg(feature = "lab")]
         Command::Chart(args) => metachron_lab::chart(&args),

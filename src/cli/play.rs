@@ -156,7 +156,7 @@ pub(super) fn headless(
         exports.take(record) && go_on(step(record, Some(half * done)))
     })?;
     let unwritten = exports.finish().err().map(|error| error.to_string());
-    if !request.oracle || outcome.interrupted || outcome.unwritten.is_some() {
+    if !request.oracle || outcome.interrupted || outcome.cut_off.is_some() {
         let played = played(&request.scene, outcome, picture);
         return Ok(Played { oracle: request.oracle, failure: played.failure.clone().or(unwritten), ..played });
     }
@@ -261,6 +261,7 @@ fn played(scene: &Scene, outcome: Outcome, picture: Option<PathBuf>) -> Played {
         devices: Vec::new(),
         parked: outcome.agents.iter().filter(|one| matches!(one.stats.state, AgentState::Parked(_))).count() as u32,
         clusters,
+        notes: outcome.notes,
         overlaps: scene.overlaps.iter().map(OverlapReport::of).collect(),
         moved: scene.moved.iter().map(MovedReport::of).collect(),
         oracle: None,
@@ -272,7 +273,7 @@ fn played(scene: &Scene, outcome: Outcome, picture: Option<PathBuf>) -> Played {
         report,
         frames: outcome.frames,
         no_window: None,
-        failure: outcome.unwritten.map(|error| shown_with_causes(&*error)),
+        failure: outcome.cut_off.map(|error| shown_with_causes(&*error)),
         picture,
         unpriced,
         oracle: false,

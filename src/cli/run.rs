@@ -394,6 +394,7 @@ fn print_notes(played: &Played) {
     if let Some(why) = &played.no_window {
         message(&format!("ran without a window: {why}"));
     }
+    played.report.notes.iter().for_each(|note| message(&format!("note: {note}")));
     if played.unpriced {
         message("note: the cost of drawing could not be measured within three seconds: default prices were used");
     }

@@ -25,8 +25,13 @@ struct Host {
 
 impl Host {
     fn of(scene: &Path, arguments: &[&str]) -> Self {
+        Self::at("tcp/127.0.0.1", scene, arguments)
+    }
+
+    /// One that listens at an address.
+    fn at(address: &str, scene: &Path, arguments: &[&str]) -> Self {
         let port = TcpListener::bind("127.0.0.1:0").unwrap().local_addr().unwrap().port();
-        let endpoint = format!("tcp/127.0.0.1:{port}");
+        let endpoint = format!("{address}:{port}");
         let mut process = Process::new(cargo_bin("metachron"));
         process.arg("host").arg(scene).args(["--name", "bench", "--listen", &endpoint, "--json"]).args(arguments);
         let mut process = process.stdout(Stdio::piped()).stderr(Stdio::null()).spawn().unwrap();
@@ -44,7 +49,7 @@ impl Host {
     }
 
     fn connect(&self) -> RemoteWorld {
-        connect(&self.endpoint, None).unwrap()
+        connect(&self.endpoint).unwrap()
     }
 
     fn view(&self, arguments: &[&str]) -> Output {
@@ -76,7 +81,8 @@ fn a_world_that_a_host_serves_is_seen_elsewhere_with_the_files_of_its_scene() {
     std::fs::remove_dir_all(folder.path()).unwrap();
     let said = host.line();
     assert_eq!((said["agents"].as_u64(), said["callers"].as_u64()), (Some(2), Some(0)), "{said}");
-    assert_eq!(said["refused"], serde_json::json!({ "malformed": 0, "flooded": 0, "repeated": 0, "strangers": 0 }));
+    let none = serde_json::json!({ "malformed": 0, "flooded": 0, "repeated": 0, "strangers": 0, "forbidden": 0 });
+    assert_eq!((&said["refused"], &said["insecure_lan"]), (&none, &serde_json::json!(false)));
     let world = host.connect();
     let before_s = world.time().as_secs_f64();
     let seen = host.view(&["--seconds", "1", "--report", "-", "-q"]);
@@ -108,9 +114,50 @@ fn a_host_whose_time_stands_lets_callers_drive_it_and_ends_with_its_signal() {
 }
 
 #[test]
+fn certificates_that_the_command_makes_let_a_viewer_in_and_an_open_world_says_so() {
+    let folder = folder();
+    let issue = |name: &str| {
+        let new = ["identity", "new", name, "--authority", "lab.pem", "--address", "127.0.0.1"];
+        Process::new(cargo_bin("metachron")).args(new).current_dir(&folder).output().unwrap()
+    };
+    for name in ["bench", "screen", "nobody"] {
+        assert!(issue(name).status.success());
+    }
+    assert_eq!(issue("bench").status.code(), Some(2), "a file that is there stays");
+    let pem = |name: &str| folder.path().join(name).to_string_lossy().into_owned();
+    let (bench, screen, nobody) = (pem("bench.pem"), pem("screen.pem"), pem("nobody.pem"));
+    let scene = folder.path().join("scene.toml");
+    let host = Host::at("tls/127.0.0.1", &scene, &["--identity", &bench, "--viewers", "screen"]);
+    let view = |identity: &str| host.view(&["--identity", identity, "--frames", "3", "--report", "-", "-q"]);
+    assert!(view(&screen).status.success());
+    assert_eq!(view(&nobody).status.code(), Some(1));
+    drop(host);
+    let mut open = Host::at("tcp/0.0.0.0", &scene, &["--insecure-lan"]);
+    assert_eq!(open.line()["insecure_lan"], true);
+    let seen = open.view(&["--insecure-lan", "--frames", "3", "--report", "-", "-q"]);
+    let report: serde_json::Value = serde_json::from_slice(&seen.stdout).unwrap();
+    assert!(report["notes"][0].as_str().unwrap().contains("anybody on the network"), "{report}");
+}
+
+#[test]
+fn a_view_of_a_world_whose_time_stands_ends_and_says_so() {
+    let folder = folder();
+    let host = Host::of(&folder.path().join("scene.toml"), &["--paused"]);
+    let seen = host.view(&["--seconds", "0.5", "--report", "-", "-q"]);
+    let said = String::from_utf8_lossy(&seen.stderr).into_owned();
+    assert_eq!(seen.status.code(), Some(1), "{said}");
+    assert!(said.contains("the time of the world has stood at 0 s for 0."), "{said}");
+    let report: serde_json::Value = serde_json::from_slice(&seen.stdout).unwrap();
+    assert!(report["frames"].as_u64().unwrap() > 1, "{report}");
+}
+
+#[test]
 fn an_endpoint_that_cannot_be_is_bad_input_in_one_sentence() {
     for (arguments, what) in [
         (["host", "pendulum", "--listen", "tcp/10.0.0.1"], "is no endpoint"),
+        (["host", "pendulum", "--listen", "tcp/10.0.0.1:7447"], "expected tls/ with an identity, or --insecure-lan"),
+        (["host", "pendulum", "--listen", "tls/127.0.0.1:7447"], "there is no identity"),
+        (["host", "pendulum", "--identity", "none.pem"], "none.pem"),
         (["host", "pendulum", "--name", "a b"], "cannot name a world"),
         (["view", "smoke/127.0.0.1:1", "--headless", "-q"], "is no endpoint"),
     ] {

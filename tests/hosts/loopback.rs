@@ -3,8 +3,9 @@
 use glam::DVec3;
 use metachron::core::{Anchor, Body, SimSpan, SimTime};
 use metachron::geometry::Solid;
-use metachron::hosts::{Host, HostsError, RemoteWorld, SceneFiles, Serving, connect, serve};
+use metachron::hosts::{Calling, Host, HostsError, RemoteWorld, SceneFiles, Serving, connect, serve};
 use metachron::runtime::{Command, TimelineCommand};
+use metachron::scene::{Source, load};
 use metachron::world::kinds::ExecutorKind;
 use metachron::world::{
     EventFilter, GhostWorld, Happening, Rigid, Scene, SceneText, Tube, World, WorldCalls, WorldError,
@@ -32,7 +33,7 @@ fn free_endpoint() -> String {
 fn two_ends(executor: ExecutorKind) -> (World, Host, RemoteWorld) {
     let (here, endpoint) = (World::start(&scene(), executor).unwrap(), free_endpoint());
     let host = serve(Arc::new(here.clone()), Serving::new("bench", &endpoint)).unwrap();
-    let elsewhere = connect(&endpoint, Some(&scene().mark())).unwrap();
+    let elsewhere = connect(Calling::at(&endpoint).scene(scene().mark())).unwrap();
     (here, host, elsewhere)
 }
 
@@ -62,6 +63,61 @@ fn a_state_elsewhere_is_the_state_here_at_the_same_step() {
         assert_eq!(elsewhere.hash().unwrap(), here.hash());
     }
     assert_eq!(here.time(), SimTime::from_nanos(300_000_000));
+}
+
+#[test]
+fn a_caller_that_looks_sees_rounded_states_which_follow_what_joins_and_is_put_back() {
+    let (here, endpoint) = (World::start(&scene(), ExecutorKind::Lockstep).unwrap(), free_endpoint());
+    let _host = serve(Arc::new(here.clone()), Serving::new("bench", &endpoint)).unwrap();
+    let elsewhere = connect(Calling::at(&endpoint).looking()).unwrap();
+    let mark = here.checkpoint().unwrap();
+    let mut ghosts = GhostWorld::of(&scene()).unwrap();
+    for turn in 0..12 {
+        match turn {
+            4 => drop(elsewhere.add("second", Rigid::ball(0.05).mass_kg(0.2).at([1.0, 0.0, 0.5]).into()).unwrap()),
+            8 => elsewhere.restore(&mark).unwrap(),
+            _ => elsewhere.advance(SimSpan::from_millis(30)).unwrap(),
+        }
+        assert_eq!((elsewhere.time(), elsewhere.all_objects().len()), (here.time(), here.all_objects().count()));
+        for object in here.all_objects() {
+            let (seen, is) = (elsewhere.latest(elsewhere.object_of(object.id()).unwrap()).unwrap(), here.latest(object).unwrap());
+            let probe = |body: &Body, at: f64| body.probe(at).unwrap().0;
+            // half of 2⁻¹⁷ m along each axis
+            assert!([0.0, 1.0].iter().all(|at| probe(&seen.body, *at).distance(probe(&is.body, *at)) < 7e-6));
+            assert_eq!(seen.steps, is.steps);
+        }
+        ghosts.follow(&elsewhere).unwrap();
+    }
+    assert_eq!((elsewhere.refused(), elsewhere.is_silent()), (0, false));
+}
+
+#[test]
+fn sixty_frames_a_second_of_the_cavity_are_less_than_a_megabyte_to_look_at() {
+    metachron::scenes::provide();
+    let scene = load(&Source::open("cavity").unwrap(), &[]).unwrap();
+    let (here, endpoint) = (World::start(&scene, ExecutorKind::Lockstep).unwrap(), free_endpoint());
+    let host = serve(Arc::new(here), Serving::new("bench", &endpoint)).unwrap();
+    let frame = SimSpan::from_nanos(16_666_667);
+    // a caller that drives would be sent whole states: both are counted by themselves
+    let bytes = |calling: Calling| {
+        let elsewhere = connect(calling).unwrap();
+        elsewhere.advance(frame).unwrap();
+        let before = host.sent();
+        (0..30).for_each(|_| elsewhere.advance(frame).unwrap());
+        2 * (host.sent() - before)
+    };
+    let (looked_at, whole) = (bytes(Calling::at(&endpoint).looking()), bytes(Calling::at(&endpoint)));
+    println!("cavity at 60 Hz: {looked_at} bytes a second to look at, {whole} whole");
+    assert!(looked_at <= 1_000_000 && looked_at < whole / 4, "{looked_at} of {whole}");
+}
+
+#[test]
+fn a_scene_that_no_caller_could_be_sent_is_refused_at_the_start() {
+    let world = World::start(&scene(), ExecutorKind::Lockstep).unwrap();
+    let files = [("small.obj".to_owned(), vec![1]), ("large.obj".to_owned(), vec![0; 17 << 20])].into();
+    let serving = Serving::new("bench", free_endpoint()).scene(SceneFiles { files, ..SceneFiles::default() });
+    let refused = serve(Arc::new(world), serving).unwrap_err();
+    assert!(matches!(&refused, HostsError::LongScene { longest, .. } if longest == "large.obj"), "{refused}");
 }
 
 #[test]
@@ -155,7 +211,7 @@ fn the_scene_of_a_world_is_read_elsewhere_without_its_folder() {
     let files = SceneFiles { scene, files: [("a.obj".to_owned(), vec![1, 2, 3])].into() };
     let serving = Serving::new("bench", &endpoint).scene(files.clone());
     let _host = serve(Arc::new(world), serving).unwrap();
-    let read = connect(&endpoint, None).unwrap().scene_files().unwrap().unwrap();
+    let read = connect(&endpoint).unwrap().scene_files().unwrap().unwrap();
     assert_eq!((read.files, read.scene.text, read.scene.folder), (files.files, files.scene.text, None));
     let (_here, _host, elsewhere) = two_ends(ExecutorKind::Lockstep);
     assert!(elsewhere.scene_files().unwrap().is_none());
@@ -167,10 +223,10 @@ fn events_are_those_of_the_world() {
     let (mut there, mut is) =
         (elsewhere.listen(EventFilter::contacts()), WorldCalls::listen(&here, EventFilter::contacts()));
     elsewhere.advance(SimSpan::from_millis(600)).unwrap();
-    let (mut seen, expected) = (Vec::new(), is());
+    let (mut seen, expected) = (Vec::new(), is.take());
     until(
         || {
-            seen.extend(there());
+            seen.extend(there.take());
             seen.len() >= expected.len()
         },
         "events that the world has had",
@@ -200,11 +256,11 @@ fn another_scene_is_refused_in_one_sentence() {
         serve(Arc::new(World::start(&scene(), ExecutorKind::Lockstep).unwrap()), Serving::new("bench", &endpoint))
             .unwrap();
     let other = Scene::builder().add("box", Rigid::ball(0.1)).build().unwrap();
-    let refused = connect(&endpoint, Some(&other.mark())).unwrap_err();
+    let refused = connect(Calling::at(&endpoint).scene(other.mark())).unwrap_err();
     assert!(matches!(refused, HostsError::OtherScene { .. }), "{refused}");
-    let nobody = connect(&free_endpoint(), None).unwrap_err();
+    let nobody = connect(&free_endpoint()).unwrap_err();
     assert!(matches!(nobody, HostsError::Network { .. } | HostsError::NoWorld { .. }), "{nobody}");
-    assert!(matches!(connect("tls/bench:7447", None), Err(HostsError::NeedsCertificates { .. })));
+    assert!(matches!(connect("tcp/10.0.0.1:7447"), Err(HostsError::NeedsCertificates { .. })));
 }
 
 /// Carries bytes between a caller and `host` until it is to be silent: its connections stay open then.
@@ -236,7 +292,7 @@ fn a_host_that_goes_silent_is_noticed_and_may_come_back() {
     let (here, endpoint) = (World::start(&scene(), ExecutorKind::Threads).unwrap(), free_endpoint());
     let host = serve(Arc::new(here), Serving::new("bench", &endpoint)).unwrap();
     let is_silent = Arc::new(AtomicBool::new(false));
-    let elsewhere = connect(&relay(&endpoint, &is_silent), None).unwrap();
+    let elsewhere = connect(&relay(&endpoint, &is_silent)).unwrap();
     let ball = elsewhere.object("ball").unwrap();
     until(|| elsewhere.command(ball, Command::wake()).is_ok(), "a host that answers");
     is_silent.store(true, Relaxed);

@@ -7,24 +7,54 @@ use metachron_world::WorldError;
 #[non_exhaustive]
 pub enum HostsError {
     /// The endpoint cannot be read.
-    #[error("\"{endpoint}\" is no endpoint; expected tcp/address:port, such as tcp/127.0.0.1:7447")]
+    #[error("\"{endpoint}\" is no endpoint; expected tcp/ or tls/, an address and a port, such as tcp/127.0.0.1:7447")]
     BadEndpoint {
         /// As given.
         endpoint: String,
     },
-    /// The endpoint is not on this machine.
+    /// The endpoint is not on this machine, and anybody could listen.
     #[error(
-        "\"{endpoint}\" is beyond this machine, and needs certificates, which are not there yet: expected a loopback address such as tcp/127.0.0.1:7447"
+        "\"{endpoint}\" is beyond this machine, where anybody could read and command the world: expected tls/ with an identity, or --insecure-lan"
     )]
     NeedsCertificates {
         /// As given.
         endpoint: String,
     },
-    /// The name of a world cannot be part of a key.
-    #[error("\"{name}\" cannot name a world; expected 1 to 64 of a to z, A to Z, 0 to 9, _ and -")]
+    /// Only one of the two is given: an endpoint with certificates, an identity.
+    #[error("\"{endpoint}\": tls/ and an identity belong together; {has}")]
+    IdentityOrNot {
+        /// As given.
+        endpoint: String,
+        /// What is missing.
+        has: &'static str,
+    },
+    /// With certificates nobody is let in who is not named.
+    #[error("nobody may call the world: with an identity callers are named as operators or viewers")]
+    NobodyNamed,
+    /// A certificate or its file cannot be used.
+    #[error("{file}: {reason}")]
+    BadIdentity {
+        /// The file, or the name of the certificate.
+        file: String,
+        /// Why.
+        reason: String,
+    },
+    /// The name of a world, or of the holder of a certificate, cannot be part of a key.
+    #[error("\"{name}\" cannot name a world or a caller; expected 1 to 64 of a to z, A to Z, 0 to 9, _ and -")]
     BadName {
         /// As given.
         name: String,
+    },
+    /// The scene is too long for the answer to a caller that draws it.
+    #[error(
+        "the text of the scene and its files have {bytes} bytes, and callers are sent at most {max}; the longest file is \"{longest}\"",
+        max = crate::MESSAGE_MAX
+    )]
+    LongScene {
+        /// All bytes.
+        bytes: usize,
+        /// The name of the longest file; of the scene where it has none.
+        longest: String,
     },
     /// The endpoint could not be listened on, or connected to.
     #[error("{endpoint}: {reason}")]

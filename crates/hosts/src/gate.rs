@@ -3,12 +3,13 @@
 //! In: the name of a caller, the number of its call. Out: whether the call is let in, and counts of the refused. Never here:
 //! bytes, the effect of a call.
 
-use std::collections::HashMap;
+use std::collections::{BTreeMap, HashMap};
 use std::time::{Duration, Instant};
 
 /// The most callers at a time.
 pub const SESSIONS_MAX: usize = 64;
-/// The most calls of a caller, and of all strangers together, in a second.
+/// The most calls of a peer in a second: the holder of a certificate with all its sessions; a caller where there are no certificates, and all
+/// strangers together.
 pub const CALLS_MAX: u32 = 10_000;
 
 /// How many messages were refused, by their faults.
@@ -22,38 +23,73 @@ pub struct Refusals {
     pub repeated: u64,
     /// Of callers that have not introduced themselves, whose program is another, or beyond [`SESSIONS_MAX`].
     pub strangers: u64,
+    /// Commands of callers that may only read.
+    pub forbidden: u64,
 }
 
 impl Refusals {
     /// All together.
     #[must_use]
     pub const fn total(&self) -> u64 {
-        self.malformed + self.flooded + self.repeated + self.strangers
+        self.malformed + self.flooded + self.repeated + self.strangers + self.forbidden
+    }
+
+    fn of(&mut self, fault: Fault) -> &mut u64 {
+        match fault {
+            Fault::Malformed => &mut self.malformed,
+            Fault::Flooded => &mut self.flooded,
+            Fault::Repeated => &mut self.repeated,
+            Fault::Stranger => &mut self.strangers,
+            Fault::Forbidden => &mut self.forbidden,
+        }
     }
 }
 
-/// The callers that are let in.
-#[derive(Debug, Default)]
+/// Why a message is refused.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Fault {
+    Malformed,
+    Flooded,
+    Repeated,
+    Stranger,
+    Forbidden,
+}
+
+/// The callers that are let in, each by its name and its session: `name/session`.
+#[derive(Debug)]
 pub(crate) struct Gate {
+    /// Whether names are those of certificates.
+    is_certified: bool,
     callers: HashMap<String, Caller>,
-    strangers: Window,
+    peers: BTreeMap<String, Peer>,
     pub refused: Refusals,
 }
 
-#[derive(Debug, Default)]
+#[derive(Debug)]
 struct Caller {
+    /// The number of its newest call.
     newest: u64,
-    window: Window,
+    is_looking: bool,
 }
 
-/// How many calls came in the second that began then.
+/// How many callers there are, by the states that they are sent.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) struct Callers {
+    /// Those that are sent whole states.
+    pub whole: usize,
+    /// Those that only look.
+    pub looking: usize,
+}
+
+/// What a peer has called in the second that began then, and what was refused since that was last said.
 #[derive(Debug, Default)]
-struct Window {
+struct Peer {
     begun: Option<Instant>,
     calls: u32,
+    refused: Refusals,
 }
 
-impl Window {
+impl Peer {
     fn admits(&mut self, now: Instant) -> bool {
         if self.begun.is_none_or(|begun| now.saturating_duration_since(begun) >= Duration::from_secs(1)) {
             (self.begun, self.calls) = (Some(now), 0);
@@ -63,12 +99,43 @@ impl Window {
     }
 }
 
+/// All callers that no other peer is.
+const STRANGERS: &str = "strangers";
+
 impl Gate {
+    pub fn new(is_certified: bool) -> Self {
+        let (callers, peers) = (HashMap::new(), BTreeMap::new());
+        Self { is_certified, callers, peers, refused: Refusals::default() }
+    }
+
+    /// The peer that a caller is of: there are no more of them than names of certificates, or callers.
+    fn peer(&mut self, caller: &str) -> &mut Peer {
+        let peer = match caller.split_once('/') {
+            Some((name, _)) if self.is_certified => name,
+            _ if self.callers.contains_key(caller) => caller,
+            _ => STRANGERS,
+        };
+        self.peers.entry(peer.to_owned()).or_default()
+    }
+
+    /// Counts a message of a caller that was refused.
+    pub fn refuse(&mut self, caller: &str, fault: Fault) {
+        *self.refused.of(fault) += 1;
+        *self.peer(caller).refused.of(fault) += 1;
+    }
+
+    /// The peers of which messages were refused since the last call of this, and how many.
+    pub fn take_refused(&mut self) -> Vec<(String, Refusals)> {
+        let refused = self.peers.iter_mut().map(|(name, peer)| (name.clone(), std::mem::take(&mut peer.refused)));
+        refused.filter(|(_, refused)| refused.total() > 0).collect()
+    }
+
     /// Whether a caller may call again so soon; asked before its bytes are read.
     pub fn admits(&mut self, caller: &str, now: Instant) -> bool {
-        let window = self.callers.get_mut(caller).map_or(&mut self.strangers, |caller| &mut caller.window);
-        let admitted = window.admits(now);
-        self.refused.flooded += u64::from(!admitted);
+        let admitted = self.peer(caller).admits(now);
+        if !admitted {
+            self.refuse(caller, Fault::Flooded);
+        }
         admitted
     }
 
@@ -76,16 +143,15 @@ impl Gate {
     ///
     /// # Errors
     /// Why not.
-    pub fn greet(&mut self, caller: &str, sequence: u64) -> Result<(), String> {
+    pub fn greet(&mut self, caller: &str, sequence: u64, is_looking: bool) -> Result<(), String> {
         if !self.callers.contains_key(caller) && self.callers.len() >= SESSIONS_MAX {
-            self.refused.strangers += 1;
+            self.refuse(caller, Fault::Stranger);
             return Err(format!("the host has {SESSIONS_MAX} callers already, and takes no more"));
         }
-        let known = self.callers.entry(caller.to_owned()).or_default();
-        if sequence <= known.newest {
-            return Err(self.repeat());
+        if self.callers.get(caller).is_some_and(|known| sequence <= known.newest) || sequence == 0 {
+            return Err(self.repeat(caller));
         }
-        known.newest = sequence;
+        self.callers.insert(caller.to_owned(), Caller { newest: sequence, is_looking });
         Ok(())
     }
 
@@ -95,28 +161,34 @@ impl Gate {
     /// Why not.
     pub fn pass(&mut self, caller: &str, sequence: u64, is_of_run: bool) -> Result<(), String> {
         let Some(known) = self.callers.get_mut(caller) else {
-            self.refused.strangers += 1;
+            self.refuse(caller, Fault::Stranger);
             return Err("a caller introduces itself first".to_owned());
         };
         if !is_of_run || sequence <= known.newest {
-            return Err(self.repeat());
+            return Err(self.repeat(caller));
         }
         known.newest = sequence;
         Ok(())
     }
 
-    fn repeat(&mut self) -> String {
-        self.refused.repeated += 1;
+    fn repeat(&mut self, caller: &str) -> String {
+        self.refuse(caller, Fault::Repeated);
         "the call is an old one, or for another run of the host".to_owned()
     }
 
-    /// A caller has gone.
+    /// A caller has gone. What was refused of it and not yet said is said of strangers.
     pub fn leave(&mut self, caller: &str) {
         self.callers.remove(caller);
+        let Some(mut left) = self.peers.remove(caller) else { return };
+        let strangers = &mut self.peers.entry(STRANGERS.to_owned()).or_default().refused;
+        for fault in [Fault::Malformed, Fault::Flooded, Fault::Repeated, Fault::Stranger, Fault::Forbidden] {
+            *strangers.of(fault) += *left.refused.of(fault);
+        }
     }
 
-    pub fn callers(&self) -> usize {
-        self.callers.len()
+    pub fn callers(&self) -> Callers {
+        let looking = self.callers.values().filter(|caller| caller.is_looking).count();
+        Callers { whole: self.callers.len() - looking, looking }
     }
 }
 
@@ -126,22 +198,36 @@ mod tests {
 
     #[test]
     fn a_caller_is_let_in_once_for_each_number_and_so_often_a_second() {
-        let (mut gate, now) = (Gate::default(), Instant::now());
-        assert!(gate.pass("a", 1, true).is_err());
-        gate.greet("a", 1).unwrap();
-        assert!(gate.pass("a", 1, true).is_err() && gate.pass("a", 2, false).is_err());
-        gate.pass("a", 2, true).unwrap();
-        assert_eq!((0..CALLS_MAX + 5).filter(|_| gate.admits("a", now)).count() as u32, CALLS_MAX);
-        assert!(gate.admits("a", now + Duration::from_secs(1)));
-        assert_eq!(gate.refused, Refusals { malformed: 0, flooded: 5, repeated: 2, strangers: 1 });
+        let (mut gate, now) = (Gate::new(false), Instant::now());
+        assert!(gate.pass("any/a", 1, true).is_err());
+        gate.greet("any/a", 1, false).unwrap();
+        assert!(gate.pass("any/a", 1, true).is_err() && gate.pass("any/a", 2, false).is_err());
+        gate.pass("any/a", 2, true).unwrap();
+        assert_eq!((0..CALLS_MAX + 5).filter(|_| gate.admits("any/a", now)).count() as u32, CALLS_MAX);
+        assert!(gate.admits("any/a", now + Duration::from_secs(1)));
+        assert_eq!(gate.refused, Refusals { flooded: 5, repeated: 2, strangers: 1, ..Refusals::default() });
+        let said: Vec<_> = gate.take_refused().into_iter().map(|(peer, refused)| (peer, refused.total())).collect();
+        assert_eq!(said, [("any/a".to_owned(), 7), (STRANGERS.to_owned(), 1)]);
+        assert!(gate.take_refused().is_empty());
+    }
+
+    #[test]
+    fn the_sessions_of_a_certificate_share_its_calls() {
+        let (mut gate, now) = (Gate::new(true), Instant::now());
+        let sessions: Vec<_> = (0..5).map(|session| format!("bob/{session}")).collect();
+        sessions.iter().for_each(|session| gate.greet(session, 1, false).unwrap());
+        let calls = sessions.iter().cycle().take(2 * CALLS_MAX as usize);
+        assert_eq!(calls.filter(|session| gate.admits(session, now)).count() as u32, CALLS_MAX);
+        assert!(gate.admits("eve/0", now), "another holder has its own");
+        assert_eq!(gate.take_refused().len(), 1);
     }
 
     #[test]
     fn the_sixty_fifth_caller_waits_for_one_to_leave() {
-        let mut gate = Gate::default();
-        (0..SESSIONS_MAX).for_each(|caller| gate.greet(&caller.to_string(), 1).unwrap());
-        assert!(gate.greet("one more", 1).is_err());
+        let mut gate = Gate::new(false);
+        (0..SESSIONS_MAX).for_each(|caller| gate.greet(&caller.to_string(), 1, false).unwrap());
+        assert!(gate.greet("one more", 1, false).is_err());
         gate.leave("7");
-        gate.greet("one more", 1).unwrap();
+        gate.greet("one more", 1, false).unwrap();
     }
 }

@@ -3,22 +3,25 @@
 //! In: anything that answers a world's calls, an endpoint. Out: its states and events sixty times a second, and answers. Never
 //! here: the effect of a call, which the world knows; sessions ([`crate::endpoint`]).
 
-use crate::endpoint::{Side, is_name, open};
+use crate::endpoint::{Place, Side, is_open_to_all, open};
 use crate::error::HostsError;
 use crate::event_wire::WireEvent;
-use crate::gate::{CALLS_MAX, Gate, Refusals};
+use crate::gate::{CALLS_MAX, Callers, Fault, Gate, Refusals};
+use crate::identity::is_name;
 use crate::refusal::Refusal;
-use crate::serving::{SceneFiles, Serving};
-use crate::wire::{BadMessage, Call, Moment, ObjectState, PROGRAM, Reply, Request, Welcome, decode, encode};
+use crate::rounded;
+use crate::serving::{ANYONE, Role, SceneFiles, Serving};
+use crate::wire::{BadMessage, Call, Encoded, MESSAGE_MAX, Moment, ObjectState, PROGRAM, Reply, Request, Welcome, decode, encode};
 use metachron_core::{AgentId, LocalModel, SimSpan, Snapshot};
 use metachron_world::{Checkpoint, EventFilter, EventReader, Part, Touched, WorldCalls, WorldError};
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::{BTreeMap, BTreeSet, HashMap};
 use std::panic::{AssertUnwindSafe, catch_unwind};
-use std::sync::atomic::{AtomicBool, Ordering::Relaxed};
+use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering::Relaxed};
 use std::sync::mpsc::{Receiver, RecvTimeoutError, SyncSender, TrySendError, sync_channel};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
+use zenoh::bytes::ZBytes;
 use zenoh::liveliness::LivelinessToken;
 use zenoh::pubsub::Subscriber;
 use zenoh::query::{Query, Queryable};
@@ -27,8 +30,9 @@ use zenoh::{Session, Wait};
 
 /// States leave so often.
 const PERIOD: Duration = Duration::from_nanos(16_666_667);
-/// So many calls wait for the ones before them; more are refused.
+/// So many calls wait for the ones before them, of so many bytes together; more are refused.
 const WAITING: usize = 256;
+const WAITING_BYTES: usize = 2 * MESSAGE_MAX;
 /// The longest span that one call lets pass: other callers wait for it.
 const SPAN_MAX: SimSpan = SimSpan::from_secs(1);
 
@@ -44,12 +48,22 @@ struct Shared {
     world: Arc<dyn WorldCalls>,
     name: String,
     scene: Option<Box<SceneFiles>>,
+    roles: BTreeMap<String, Role>,
+    is_open: bool,
     /// A number that no run of a host had before.
     run: u64,
     session: Session,
     gate: Mutex<Gate>,
     shown: Mutex<Shown>,
+    /// The bytes of the calls that wait.
+    waiting: AtomicUsize,
     ends: AtomicBool,
+}
+
+/// States that have changed, and as they were shown before.
+struct Changes {
+    moment: Moment,
+    before: HashMap<AgentId, Arc<Snapshot>>,
 }
 
 /// The states that callers were shown.
@@ -57,9 +71,13 @@ struct Shown {
     /// The number of the next message.
     sequence: u64,
     objects: BTreeMap<AgentId, (Arc<str>, Arc<Snapshot>)>,
-    events: EventReader,
+    events: Box<dyn EventReader>,
+    /// Whether there was a caller at the last message: without one nothing is looked at.
+    is_followed: bool,
     /// States that were too long for a message.
     too_long: u64,
+    /// Bytes of all messages of states.
+    sent: u64,
 }
 
 impl std::fmt::Debug for Host {
@@ -71,20 +89,22 @@ impl std::fmt::Debug for Host {
 /// Serves `world`, until the host is dropped.
 ///
 /// # Errors
-/// [`HostsError::BadName`], [`HostsError::BadEndpoint`], [`HostsError::NeedsCertificates`] and [`HostsError::Network`].
+/// [`HostsError`]: nothing is served then.
 pub fn serve(world: Arc<dyn WorldCalls>, serving: Serving) -> Result<Host, HostsError> {
-    let Serving { name, endpoint, scene } = serving;
-    if !is_name(&name) {
-        return Err(HostsError::BadName { name });
-    }
-    let session = open(&endpoint, Side::Host)?;
+    check_scene(serving.scene.as_ref())?;
+    let roles = roles(&serving)?;
+    let Serving { name, endpoint, scene, identity, insecure_lan, .. } = serving;
+    let place = Place { endpoint: &endpoint, identity: identity.as_ref(), insecure_lan };
+    let session = open(place, Side::Host(&roles.keys().map(|name| &**name).collect::<Vec<_>>()))?;
     let failed = |error: zenoh::Error| HostsError::Network { endpoint: endpoint.clone(), reason: error.to_string() };
     let since_1970 = SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default();
     let run = (since_1970.as_nanos() as u64 ^ u64::from(std::process::id())).max(1);
     let events = world.listen(EventFilter::all());
-    let shown = Mutex::new(Shown { sequence: 1, objects: BTreeMap::new(), events, too_long: 0 });
-    let (gate, ends, scene) = (Mutex::default(), AtomicBool::new(false), scene.map(Box::new));
-    let shared = Arc::new(Shared { world, name, scene, run, session, gate, shown, ends });
+    let shown = Mutex::new(Shown { sequence: 1, objects: BTreeMap::new(), events, is_followed: false, too_long: 0, sent: 0 });
+    let gate = Mutex::new(Gate::new(identity.is_some()));
+    let (ends, scene, waiting) = (AtomicBool::new(false), scene.map(Box::new), AtomicUsize::new(0));
+    let is_open = is_open_to_all(&endpoint);
+    let shared = Arc::new(Shared { world, name, scene, roles, is_open, run, session, gate, shown, waiting, ends });
     let (to_calls, calls) = sync_channel(WAITING);
     let (publishing, answering) = (Arc::clone(&shared), Arc::clone(&shared));
     let threads = vec![
@@ -94,18 +114,48 @@ pub fn serve(world: Arc<dyn WorldCalls>, serving: Serving) -> Result<Host, Hosts
     let mut host = Host { shared: Arc::clone(&shared), threads, served: None };
     let (session, key) = (&shared.session, |last: &str| format!("metachron/{}/{last}", shared.name));
     let taking = Arc::clone(&shared);
-    let queryable = session.declare_queryable(key("call/*")).callback(move |query| taking.take(query, &to_calls));
+    let queryable = session.declare_queryable(key("call/*/*")).callback(move |query| taking.take(query, &to_calls));
     let queryable = queryable.wait().map_err(failed)?;
     let leaving = Arc::clone(&shared);
-    let callers = session.liveliness().declare_subscriber(key("caller/*")).callback(move |sample| {
-        if let (SampleKind::Delete, Some(caller)) = (sample.kind(), sample.key_expr().as_str().rsplit('/').next()) {
-            leaving.gate().leave(caller);
+    let callers = session.liveliness().declare_subscriber(key("caller/*/*")).callback(move |sample| {
+        if sample.kind() == SampleKind::Delete {
+            leaving.gate().leave(&caller_of(sample.key_expr().as_str()));
         }
     });
     let callers = callers.wait().map_err(failed)?;
     let token = session.liveliness().declare_token(key("host")).wait().map_err(failed)?;
     host.served = Some((queryable, callers, token));
     Ok(host)
+}
+
+/// Checks that callers can be sent the scene.
+fn check_scene(scene: Option<&SceneFiles>) -> Result<(), HostsError> {
+    let Some(SceneFiles { scene: text, files }) = scene else { return Ok(()) };
+    if encode(&Reply::Scene(scene.cloned().map(Box::new))).is_ok() {
+        return Ok(());
+    }
+    let longest = files.iter().max_by_key(|(_, bytes)| bytes.len()).map_or(&text.name, |(name, _)| name);
+    let bytes = text.text.len() + files.values().map(Vec::len).sum::<usize>();
+    Err(HostsError::LongScene { bytes, longest: longest.clone() })
+}
+
+/// Who may call, and do what: with certificates those who are named, without all.
+fn roles(Serving { name, identity, roles, .. }: &Serving) -> Result<BTreeMap<String, Role>, HostsError> {
+    if let Some(name) = std::iter::once(name).chain(roles.keys()).find(|name| !is_name(name)) {
+        return Err(HostsError::BadName { name: name.clone() });
+    }
+    match (identity, roles.is_empty()) {
+        (Some(_), true) => Err(HostsError::NobodyNamed),
+        (Some(_), false) => Ok(roles.clone()),
+        (None, _) => Ok([(ANYONE.to_owned(), Role::Operator)].into()),
+    }
+}
+
+/// The name and the session of a caller, of a key that ends with them.
+fn caller_of(key: &str) -> String {
+    let mut chunks = key.rsplit('/');
+    let (session, name) = (chunks.next().unwrap_or_default(), chunks.next().unwrap_or_default());
+    format!("{name}/{session}")
 }
 
 fn spawn(name: &str, act: impl FnOnce() + Send + 'static) -> Result<JoinHandle<()>, zenoh::Error> {
@@ -116,13 +166,34 @@ impl Host {
     /// How many callers there are.
     #[must_use]
     pub fn callers(&self) -> usize {
-        self.shared.gate().callers()
+        let Callers { whole, looking } = self.shared.gate().callers();
+        whole + looking
     }
 
     /// How many messages were refused.
     #[must_use]
     pub fn refused(&self) -> Refusals {
         self.shared.gate().refused
+    }
+
+    /// The peers of which messages were refused since the last call of this, and how many of each: holders of certificates, or callers where
+    /// there are none, and all strangers together.
+    #[must_use]
+    pub fn take_refused(&self) -> Vec<(String, Refusals)> {
+        self.shared.gate().take_refused()
+    }
+
+    /// Whether anybody on the network may read and command the world ([`Serving::insecure_lan`]).
+    #[must_use]
+    pub fn is_open(&self) -> bool {
+        self.shared.is_open
+    }
+
+    /// How many bytes of states, events and departures were sent: those of whole states once, and those of rounded ones once, however many
+    /// callers have them.
+    #[must_use]
+    pub fn sent(&self) -> u64 {
+        self.shared.shown().sent
     }
 
     /// How often the state of an object was too long for a message ([`crate::MESSAGE_MAX`]) and was left out.
@@ -162,33 +233,55 @@ impl Shared {
 
     /// Shows callers what has changed; returns the number of the newest message.
     fn publish(&self) -> u64 {
-        let has_callers = self.gate().callers() > 0;
+        let Callers { whole, looking } = self.gate().callers();
         let mut shown = self.shown();
-        let moment = shown.changes(&*self.world, self.run);
-        if has_callers {
-            let mut messages = Vec::new();
-            let Shown { sequence, too_long, .. } = &mut *shown;
-            *too_long += moment.encode_parts(sequence, 1, &mut messages);
-            for bytes in messages {
-                // Ok says nothing: a caller that has missed one finds it by the numbers
-                let _ = self.session.put(format!("metachron/{}/state", self.name), bytes).wait();
+        let was_followed = std::mem::replace(&mut shown.is_followed, whole + looking > 0);
+        if !shown.is_followed {
+            return shown.sequence - 1;
+        }
+        if !was_followed {
+            // nobody has listened
+            shown.events.take();
+        }
+        let Changes { moment, before } = shown.changes(&*self.world, self.run);
+        let (mut messages, mut sent) = (Vec::new(), 0);
+        let Shown { sequence, too_long, .. } = &mut *shown;
+        *too_long += moment.encode_parts(sequence, 1, &mut messages);
+        for Encoded { moment, bytes } in messages {
+            // a caller that has missed one finds it by the numbers
+            let rounded = (looking > 0).then(|| rounded::encode(&moment, &before).ok()).flatten();
+            for (last, bytes) in [("seen", rounded), ("state", (whole > 0).then_some(bytes))] {
+                let Some(bytes) = bytes else { continue };
+                sent += bytes.len() as u64;
+                // Ok says nothing
+                let _ = self.session.put(format!("metachron/{}/{last}", self.name), bytes).wait();
             }
         }
+        shown.sent += sent;
         shown.sequence - 1
     }
 
     /// Lets a call wait for its turn, or refuses it.
     fn take(&self, query: Query, calls: &SyncSender<(String, Query)>) {
-        let caller = query.key_expr().as_str().rsplit('/').next().unwrap_or_default().to_owned();
-        if !is_name(&caller) {
-            self.gate().refused.strangers += 1;
+        let caller = caller_of(query.key_expr().as_str());
+        if !caller.split('/').all(is_name) {
+            self.gate().refuse(&caller, Fault::Stranger);
             return;
         }
         let is_welcome = self.gate().admits(&caller, Instant::now());
-        let unsent =
-            if is_welcome { calls.try_send((caller, query)).err() } else { Some(TrySendError::Full((caller, query))) };
+        let bytes = query.payload().map_or(0, ZBytes::len);
+        let has_room = self.waiting.load(Relaxed) + bytes <= WAITING_BYTES;
+        self.waiting.fetch_add(bytes, Relaxed);
+        let unsent = if is_welcome && has_room {
+            calls.try_send((caller, query)).err()
+        } else {
+            Some(TrySendError::Full((caller, query)))
+        };
         if let Some(TrySendError::Full((caller, query)) | TrySendError::Disconnected((caller, query))) = unsent {
-            self.gate().refused.flooded += u64::from(is_welcome);
+            self.waiting.fetch_sub(bytes, Relaxed);
+            if is_welcome {
+                self.gate().refuse(&caller, Fault::Flooded);
+            }
             let reason = format!("a caller makes at most {CALLS_MAX} calls a second, of which {WAITING} wait");
             self.reply(&caller, &query, refused(Refusal::Other(reason)));
         }
@@ -198,7 +291,10 @@ impl Shared {
     fn answer_on(&self, calls: &Receiver<(String, Query)>) {
         while !self.ends.load(Relaxed) {
             match calls.recv_timeout(PERIOD) {
-                Ok((caller, query)) => self.answer(&caller, &query),
+                Ok((caller, query)) => {
+                    self.waiting.fetch_sub(query.payload().map_or(0, ZBytes::len), Relaxed);
+                    self.answer(&caller, &query);
+                }
                 Err(RecvTimeoutError::Timeout) => {}
                 Err(RecvTimeoutError::Disconnected) => return,
             }
@@ -209,7 +305,7 @@ impl Shared {
         let bytes = query.payload().map(|payload| payload.to_bytes()).unwrap_or_default();
         let answers = match decode::<Request>(&bytes) {
             Err(bad) => {
-                self.gate().refused.malformed += 1;
+                self.gate().refuse(caller, Fault::Malformed);
                 refused(Refusal::Other(bad.to_string()))
             }
             Ok(Request { run, sequence, call }) => match self.admit(caller, run, sequence, &call) {
@@ -218,7 +314,7 @@ impl Shared {
                     // what a caller sends is made into objects before all of it is checked: a fault there is its caller's
                     let done = catch_unwind(AssertUnwindSafe(|| self.act(call)));
                     let done = done.unwrap_or_else(|_| {
-                        self.gate().refused.malformed += 1;
+                        self.gate().refuse(caller, Fault::Malformed);
                         Err(Refusal::Other("the call could not be made: its values contradict each other".to_owned()))
                     });
                     done.unwrap_or_else(refused)
@@ -239,13 +335,21 @@ impl Shared {
     fn admit(&self, caller: &str, run: u64, sequence: u64, call: &Call) -> Result<(), String> {
         let mut gate = self.gate();
         match call {
-            Call::Hello(program) if program != PROGRAM => {
-                gate.refused.strangers += 1;
+            Call::Hello { program, .. } if program != PROGRAM => {
+                gate.refuse(caller, Fault::Stranger);
                 let program: String = program.chars().take(32).collect();
                 Err(format!("the world's host is metachron {PROGRAM}; the caller is {program}"))
             }
-            Call::Hello(_) => gate.greet(caller, sequence),
-            _ => gate.pass(caller, sequence, run == self.run),
+            Call::Hello { is_looking, .. } => gate.greet(caller, sequence, *is_looking),
+            _ => {
+                gate.pass(caller, sequence, run == self.run)?;
+                let name = caller.split('/').next().unwrap_or_default();
+                if call.needs() == Role::Viewer || self.roles.get(name) == Some(&Role::Operator) {
+                    return Ok(());
+                }
+                gate.refuse(caller, Fault::Forbidden);
+                Err(format!("\"{name}\" may read the world, and not command it: its host names operators"))
+            }
         }
     }
 
@@ -253,13 +357,13 @@ impl Shared {
     fn act(&self, call: Call) -> Result<Vec<Vec<u8>>, Refusal> {
         let world = &*self.world;
         let reply = match call {
-            Call::Hello(_) => Reply::Hello(self.welcome()),
+            Call::Hello { .. } => Reply::Hello(self.welcome()),
             Call::All => {
-                let mut messages = Vec::new();
-                let mut shown = self.shown();
+                self.publish();
+                let (mut messages, mut shown) = (Vec::new(), self.shown());
                 let (moment, mut sequence) = (shown.all(world, self.run), shown.sequence - 1);
                 shown.too_long += moment.encode_parts(&mut sequence, 0, &mut messages);
-                return Ok(messages);
+                return Ok(messages.into_iter().map(|encoded| encoded.bytes).collect());
             }
             Call::Command(id, command) => done(0, world.command(world.object_of(id)?, command))?,
             Call::SetState(id, state) => done(0, world.set_state(world.object_of(id)?, &state))?,
@@ -314,8 +418,9 @@ fn refused(refusal: Refusal) -> Vec<Vec<u8>> {
 
 impl Shown {
     /// Takes up the states that are there now: what has changed since the last time.
-    fn changes(&mut self, world: &dyn WorldCalls, run: u64) -> Moment {
+    fn changes(&mut self, world: &dyn WorldCalls, run: u64) -> Changes {
         let (time, mut present, mut states) = (world.time(), BTreeSet::new(), Vec::new());
+        let mut before = HashMap::new();
         for object in world.all_objects() {
             // an object may leave meanwhile
             let Ok(state) = world.latest(object) else { continue };
@@ -328,12 +433,12 @@ impl Shown {
             let name = known.map(|(name, _)| Ok(Arc::clone(name))).unwrap_or_else(|| world.name(object.into()));
             let Ok(name) = name else { continue };
             states.push(ObjectState { id, name: Arc::clone(&name), state: travelling(&state) });
-            self.objects.insert(id, (name, state));
+            before.extend(self.objects.insert(id, (name, state)).map(|(_, state)| (id, state)));
         }
         let gone: Vec<_> = self.objects.keys().filter(|id| !present.contains(id)).copied().collect();
         gone.iter().for_each(|id| drop(self.objects.remove(id)));
-        let events = (self.events)().into_iter().filter_map(WireEvent::of).collect();
-        Moment { run, sequence: 0, time, states, gone, events }
+        let events = self.events.take().into_iter().filter_map(WireEvent::of).collect();
+        Changes { moment: Moment { run, sequence: 0, time, states, gone, events }, before }
     }
 
     /// All states as they were last shown.

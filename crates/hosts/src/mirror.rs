@@ -63,7 +63,38 @@ struct Seen {
     /// A message was missed, or the host was silent: all states are to be asked for.
     is_stale: bool,
     refused: u64,
-    readers: Vec<Weak<Mutex<VecDeque<Event>>>>,
+    readers: Vec<Weak<Mutex<Waiting>>>,
+}
+
+/// Events that wait for their reader, and how many did not get a place.
+#[derive(Debug, Default)]
+struct Waiting {
+    events: VecDeque<Event>,
+    lost: u64,
+}
+
+/// A reader of events.
+struct Listener {
+    waiting: Arc<Mutex<Waiting>>,
+    sieve: EventSieve,
+}
+
+impl Listener {
+    fn waiting(&self) -> MutexGuard<'_, Waiting> {
+        self.waiting.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+impl EventReader for Listener {
+    fn take(&mut self) -> Vec<Event> {
+        let mut events = std::mem::take(&mut self.waiting().events);
+        events.retain(|event| self.sieve.passes(event.object, &event.what));
+        events.into()
+    }
+
+    fn lost(&self) -> u64 {
+        self.waiting().lost
+    }
 }
 
 #[derive(Debug)]
@@ -156,6 +187,11 @@ impl Mirror {
         self.seen().is_stale
     }
 
+    /// A message was missed.
+    pub fn miss(&self) {
+        self.seen().is_stale = true;
+    }
+
     /// A message could not be read.
     pub fn refuse(&self) {
         self.seen().refused += 1;
@@ -237,14 +273,10 @@ impl Mirror {
         known.state.clone().ok_or_else(|| WorldError::Gone { name: known.name.to_string() })
     }
 
-    pub fn listen(&self, filter: EventFilter) -> EventReader {
-        let (waiting, mut sieve) = (Arc::new(Mutex::new(VecDeque::new())), EventSieve::new(filter));
+    pub fn listen(&self, filter: EventFilter) -> Box<dyn EventReader> {
+        let waiting = Arc::<Mutex<Waiting>>::default();
         self.seen().readers.push(Arc::downgrade(&waiting));
-        Box::new(move || {
-            let mut events = std::mem::take(&mut *waiting.lock().unwrap_or_else(PoisonError::into_inner));
-            events.retain(|event| sieve.passes(event.object, &event.what));
-            events.into()
-        })
+        Box::new(Listener { waiting, sieve: EventSieve::new(filter) })
     }
 }
 
@@ -264,10 +296,11 @@ impl Seen {
     fn give(&mut self, events: impl Iterator<Item = Event> + Clone) {
         self.readers.retain(|reader| {
             let Some(waiting) = reader.upgrade() else { return false };
-            let mut waiting = waiting.lock().unwrap_or_else(PoisonError::into_inner);
-            waiting.extend(events.clone());
-            let surplus = waiting.len().saturating_sub(EVENTS_KEPT);
-            waiting.drain(..surplus);
+            let Waiting { events: kept, lost } = &mut *waiting.lock().unwrap_or_else(PoisonError::into_inner);
+            kept.extend(events.clone());
+            let surplus = kept.len().saturating_sub(EVENTS_KEPT);
+            kept.drain(..surplus);
+            *lost += surplus as u64;
             true
         });
     }

@@ -2,10 +2,12 @@
 //!
 //! In: an endpoint. Out: [`RemoteWorld`]. Never here: what was seen of it ([`crate::mirror`]), the bytes of messages.
 
-use crate::endpoint::{LEASE, Side, is_name, open};
+use crate::endpoint::{LEASE, Place, Side, is_open_to_all, open};
 use crate::error::HostsError;
+use crate::identity::{Identity, is_name};
 use crate::mirror::{Mirror, RemoteFrame};
-use crate::serving::SceneFiles;
+use crate::rounded::{Sketched, Sketches};
+use crate::serving::{ANYONE, SceneFiles};
 use crate::wire::{Call, Moment, PROGRAM, Reply, Request, Welcome, decode, encode};
 use metachron_core::{AgentId, Body, SimSpan, SimTime, Snapshot};
 use metachron_runtime::{Command, TimelineCommand};
@@ -14,7 +16,7 @@ use metachron_world::{
 };
 use std::sync::atomic::{AtomicBool, Ordering::Relaxed};
 use std::sync::mpsc::{Receiver, RecvTimeoutError, sync_channel};
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 use zenoh::liveliness::LivelinessToken;
@@ -57,6 +59,9 @@ struct Link {
     session: Session,
     mirror: Arc<Mirror>,
     caller: String,
+    is_open: bool,
+    /// Of a caller that only looks.
+    sketches: Mutex<Option<Sketches>>,
     /// The number of the newest call.
     sequence: Mutex<u64>,
     ends: AtomicBool,
@@ -68,21 +73,81 @@ impl std::fmt::Debug for RemoteWorld {
     }
 }
 
-/// Connects with the world that is served at `endpoint`, `tcp/address:port` of this machine; of the scene `expected`, if that is given.
+/// How a world elsewhere is called.
+#[derive(Debug, Clone)]
+pub struct Calling {
+    endpoint: String,
+    scene: Option<SceneMark>,
+    identity: Option<Identity>,
+    insecure_lan: bool,
+    is_looking: bool,
+}
+
+impl Calling {
+    /// At `endpoint`: `tcp/127.0.0.1:7447` of this machine, or `tls/bench:7447` with an identity.
+    #[must_use]
+    pub fn at(endpoint: impl Into<String>) -> Self {
+        Self { endpoint: endpoint.into(), scene: None, identity: None, insecure_lan: false, is_looking: false }
+    }
+
+    /// A world of another scene is refused.
+    #[must_use]
+    pub fn scene(mut self, mark: SceneMark) -> Self {
+        self.scene = Some(mark);
+        self
+    }
+
+    /// As the holder of a certificate. The host's must be of the same authority and name the address of the endpoint.
+    #[must_use]
+    pub fn identity(mut self, identity: Identity) -> Self {
+        self.identity = Some(identity);
+        self
+    }
+
+    /// To look at: states are rounded, places to 8 µm, and take a fraction of the bytes.
+    #[must_use]
+    pub const fn looking(mut self) -> Self {
+        self.is_looking = true;
+        self
+    }
+
+    /// Lets a `tcp/` endpoint be beyond this machine: anybody on the network may read what is said, or say something else.
+    #[must_use]
+    pub const fn insecure_lan(mut self) -> Self {
+        self.insecure_lan = true;
+        self
+    }
+}
+
+impl From<&str> for Calling {
+    fn from(endpoint: &str) -> Self {
+        Self::at(endpoint)
+    }
+}
+
+impl From<&String> for Calling {
+    fn from(endpoint: &String) -> Self {
+        Self::at(endpoint)
+    }
+}
+
+/// Connects with the world that is served at an endpoint.
 ///
 /// # Errors
 /// [`HostsError`]: nothing is connected then.
-pub fn connect(endpoint: &str, expected: Option<&SceneMark>) -> Result<RemoteWorld, HostsError> {
-    let session = open(endpoint, Side::Caller)?;
-    let failed = |error: zenoh::Error| HostsError::Network { endpoint: endpoint.to_owned(), reason: error.to_string() };
-    let caller = session.zid().to_string();
-    let welcome = greet(&session, &caller).ok_or_else(|| HostsError::NoWorld { endpoint: endpoint.to_owned() })??;
-    check_welcome(&welcome, expected)?;
+pub fn connect(calling: impl Into<Calling>) -> Result<RemoteWorld, HostsError> {
+    let Calling { endpoint, scene, identity, insecure_lan, is_looking } = calling.into();
+    let place = Place { endpoint: &endpoint, identity: identity.as_ref(), insecure_lan };
+    let session = open(place, Side::Caller)?;
+    let failed = |error: zenoh::Error| HostsError::Network { endpoint: endpoint.clone(), reason: error.to_string() };
+    let caller = format!("{}/{}", identity.as_ref().map_or(ANYONE, Identity::name), session.zid());
+    let welcome = greet(&session, &caller, is_looking).ok_or_else(|| HostsError::NoWorld { endpoint: endpoint.clone() })??;
+    check_welcome(&welcome, scene.as_ref())?;
     let mirror = Arc::new(Mirror::new(welcome));
     let of_world = |last: &str| format!("metachron/{}/{last}", mirror.world);
     let token = session.liveliness().declare_token(of_world(&format!("caller/{caller}"))).wait().map_err(failed)?;
     let (to_reader, messages) = sync_channel(WAITING);
-    let states = session.declare_subscriber(of_world("state"));
+    let states = session.declare_subscriber(of_world(if is_looking { "seen" } else { "state" }));
     let states = states.callback(move |sample| drop(to_reader.try_send(sample.payload().to_bytes().into_owned())));
     let states = states.wait().map_err(failed)?;
     let watched = Arc::clone(&mirror);
@@ -90,7 +155,9 @@ pub fn connect(endpoint: &str, expected: Option<&SceneMark>) -> Result<RemoteWor
     let host =
         host.callback(move |sample| watched.set_alive(sample.kind() == SampleKind::Put)).wait().map_err(failed)?;
     // the greeting had the first number
-    let link = Arc::new(Link { session, mirror, caller, sequence: Mutex::new(1), ends: AtomicBool::new(false) });
+    let (sequence, ends, is_open) = (Mutex::new(1), AtomicBool::new(false), is_open_to_all(&endpoint));
+    let sketches = Mutex::new(is_looking.then(Sketches::default));
+    let link = Arc::new(Link { session, mirror, caller, is_open, sketches, sequence, ends });
     link.refresh()?;
     let reading = Arc::clone(&link);
     let reader = std::thread::Builder::new().name("hosts-states".to_owned()).spawn(move || reading.read(&messages));
@@ -99,8 +166,8 @@ pub fn connect(endpoint: &str, expected: Option<&SceneMark>) -> Result<RemoteWor
 }
 
 /// Introduces a caller; `None` where nobody answers.
-fn greet(session: &Session, caller: &str) -> Option<Result<Welcome, HostsError>> {
-    let hello = encode(&Request { run: 0, sequence: 1, call: Call::Hello(PROGRAM.to_owned()) }).ok()?;
+fn greet(session: &Session, caller: &str, is_looking: bool) -> Option<Result<Welcome, HostsError>> {
+    let hello = encode(&Request { run: 0, sequence: 1, call: hello(is_looking) }).ok()?;
     let (often, pause) = GREETING;
     for _ in 0..often {
         let asked = session.get(format!("metachron/*/call/{caller}")).payload(hello.clone()).timeout(LEASE);
@@ -116,6 +183,10 @@ fn greet(session: &Session, caller: &str) -> Option<Result<Welcome, HostsError>>
         }
     }
     None
+}
+
+fn hello(is_looking: bool) -> Call {
+    Call::Hello { program: PROGRAM.to_owned(), is_looking }
 }
 
 /// Checks that a world is one that this program reads, and of the expected scene.
@@ -155,10 +226,7 @@ impl Link {
         let mut refreshed = Instant::now();
         while !self.ends.load(Relaxed) {
             match messages.recv_timeout(LEASE / 20) {
-                Ok(bytes) => match decode(&bytes) {
-                    Ok(Reply::Moment(moment)) => self.mirror.take(moment),
-                    _ => self.mirror.refuse(),
-                },
+                Ok(bytes) => self.take(&bytes),
                 Err(RecvTimeoutError::Timeout) => {}
                 Err(RecvTimeoutError::Disconnected) => return,
             }
@@ -170,12 +238,35 @@ impl Link {
         }
     }
 
+    /// Takes a message of states.
+    fn take(&self, bytes: &[u8]) {
+        let message = match &mut *self.sketches() {
+            Some(sketches) => sketches.decode(bytes),
+            None => match decode(bytes) {
+                Ok(Reply::Moment(moment)) => Ok(Sketched::Next(moment)),
+                _ => return self.mirror.refuse(),
+            },
+        };
+        match message {
+            Ok(Sketched::Next(moment)) => self.mirror.take(moment),
+            Ok(Sketched::Old) => {}
+            Ok(Sketched::Later) => self.mirror.miss(),
+            Err(_) => self.mirror.refuse(),
+        }
+    }
+
+    fn sketches(&self) -> MutexGuard<'_, Option<Sketches>> {
+        self.sketches.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
     /// Introduces the caller again, where its host has forgotten it, and takes all states.
     fn refresh(&self) -> Result<(), WorldError> {
-        self.call(Call::Hello(PROGRAM.to_owned()))?;
+        self.call(hello(self.sketches().is_some()))?;
         let all = self.call(Call::All)?.into_iter();
         let parts = all.map(|part| if let Reply::Moment(part) = part { Ok(part) } else { Err(unexpected()) });
-        self.mirror.take_all(parts.collect::<Result<Vec<Moment>, _>>()?);
+        let parts = parts.collect::<Result<Vec<Moment>, _>>()?;
+        self.sketches().iter_mut().for_each(|sketches| sketches.begin(&parts));
+        self.mirror.take_all(parts);
         Ok(())
     }
 
@@ -268,6 +359,12 @@ impl RemoteWorld {
     #[must_use]
     pub fn is_silent(&self) -> bool {
         self.link().mirror.silence().is_some()
+    }
+
+    /// Whether anybody on the network may read what is said ([`Calling::insecure_lan`]).
+    #[must_use]
+    pub fn is_open(&self) -> bool {
+        self.link().is_open
     }
 
     /// How many messages of the host were refused, because their bytes or numbers cannot be.
@@ -366,7 +463,7 @@ impl WorldCalls for RemoteWorld {
         self.link().mirror.silence().map_or(Ok(()), Err)
     }
 
-    fn listen(&self, filter: EventFilter) -> EventReader {
+    fn listen(&self, filter: EventFilter) -> Box<dyn EventReader> {
         self.link().mirror.listen(filter)
     }
 }

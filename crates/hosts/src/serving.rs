@@ -1,7 +1,9 @@
-//! How a world is served, and the files of its scene that callers may read.
+//! How a world is served: where, to whom, and with which scene.
 //!
-//! In: a name, an endpoint, the text of a scene. Out: the same, for [`crate::serve`]. Never here: files on a disk, the meaning of a text.
+//! In: a name, an endpoint, an identity, names of callers, the text of a scene. Out: the same, for [`crate::serve`]. Never here: a connection,
+//! files on a disk, the meaning of a text.
 
+use crate::identity::Identity;
 use metachron_world::SceneText;
 use std::collections::BTreeMap;
 
@@ -14,25 +16,72 @@ pub struct SceneFiles {
     pub files: BTreeMap<String, Vec<u8>>,
 }
 
+/// What a caller may do.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Role {
+    /// Read states, events, parts, the scene and the hash.
+    Viewer,
+    /// All that the world answers.
+    Operator,
+}
+
+/// The name of all callers where none has a certificate.
+pub(crate) const ANYONE: &str = "anyone";
+
 /// How a world is served.
 #[derive(Debug, Clone)]
 pub struct Serving {
     pub(crate) name: String,
     pub(crate) endpoint: String,
     pub(crate) scene: Option<SceneFiles>,
+    pub(crate) identity: Option<Identity>,
+    pub(crate) roles: BTreeMap<String, Role>,
+    pub(crate) insecure_lan: bool,
 }
 
 impl Serving {
-    /// Under `name`, 1 to 64 of a to z, A to Z, 0 to 9, _ and -, at `endpoint`, such as `tcp/127.0.0.1:7447`.
+    /// Under `name`, 1 to 64 of a to z, A to Z, 0 to 9, _ and -, at `endpoint`: `tcp/127.0.0.1:7447`, which every process of this machine may call,
+    /// or `tls/0.0.0.0:7447` with an identity.
     #[must_use]
     pub fn new(name: impl Into<String>, endpoint: impl Into<String>) -> Self {
-        Self { name: name.into(), endpoint: endpoint.into(), scene: None }
+        let (name, endpoint, roles) = (name.into(), endpoint.into(), BTreeMap::new());
+        Self { name, endpoint, scene: None, identity: None, roles, insecure_lan: false }
     }
 
     /// With its scene, for callers that draw it. The path of a folder stays here.
     #[must_use]
     pub fn scene(mut self, scene: SceneFiles) -> Self {
         self.scene = Some(SceneFiles { scene: SceneText { folder: None, ..scene.scene }, ..scene });
+        self
+    }
+
+    /// At a `tls/` endpoint, to callers with certificates of the same authority that [`Serving::operators`] and [`Serving::viewers`] name.
+    #[must_use]
+    pub fn identity(mut self, identity: Identity) -> Self {
+        self.identity = Some(identity);
+        self
+    }
+
+    /// The holders of these certificates may read and command the world.
+    #[must_use]
+    pub fn operators<T: Into<String>>(mut self, names: impl IntoIterator<Item = T>) -> Self {
+        self.roles.extend(names.into_iter().map(|name| (name.into(), Role::Operator)));
+        self
+    }
+
+    /// The holders of these certificates may read the world, unless they are operators.
+    #[must_use]
+    pub fn viewers<T: Into<String>>(mut self, names: impl IntoIterator<Item = T>) -> Self {
+        for name in names {
+            self.roles.entry(name.into()).or_insert(Role::Viewer);
+        }
+        self
+    }
+
+    /// Lets a `tcp/` endpoint be beyond this machine: anybody on the network may read and command the world then.
+    #[must_use]
+    pub const fn insecure_lan(mut self) -> Self {
+        self.insecure_lan = true;
         self
     }
 }

@@ -7,7 +7,7 @@
 
 use crate::event_wire::WireEvent;
 use crate::refusal::Refusal;
-use crate::serving::SceneFiles;
+use crate::serving::{Role, SceneFiles};
 use metachron_core::{AgentId, Body, SimSpan, SimTime, Snapshot};
 use metachron_runtime::{Command, TimelineCommand};
 use metachron_world::Part;
@@ -16,7 +16,7 @@ use serde::de::DeserializeOwned;
 use std::sync::Arc;
 
 /// The version of all messages: it changes with the meaning of their bytes.
-pub(crate) const VERSION: u8 = 2;
+pub(crate) const VERSION: u8 = 3;
 /// The version of the program, whose parts and states each version has its own of.
 pub(crate) const PROGRAM: &str = env!("CARGO_PKG_VERSION");
 /// The most bytes of one message.
@@ -35,8 +35,8 @@ pub(crate) struct Request {
 /// A call of a world.
 #[derive(Debug, Clone, serde::Serialize, serde::Deserialize)]
 pub(crate) enum Call {
-    /// The first of each caller, with the version of its program.
-    Hello(String),
+    /// The first of each caller, with the version of its program, and whether it only looks: rounded states are sent to it then.
+    Hello { program: String, is_looking: bool },
     /// All states.
     All,
     Command(AgentId, Command),
@@ -51,6 +51,23 @@ pub(crate) enum Call {
     /// The part as which an object joined.
     Part(AgentId),
     Scene,
+}
+
+impl Call {
+    /// The role that it needs: what changes the world, or lets all of it wait, needs an operator.
+    pub const fn needs(&self) -> Role {
+        match self {
+            Self::Hello { .. } | Self::All | Self::Hash | Self::Part(_) | Self::Scene => Role::Viewer,
+            Self::Command(..)
+            | Self::SetState(..)
+            | Self::Drive(_)
+            | Self::Advance(_)
+            | Self::Add(..)
+            | Self::Remove(_)
+            | Self::Checkpoint
+            | Self::Restore(_) => Role::Operator,
+        }
+    }
 }
 
 /// An answer to a call.
@@ -91,6 +108,13 @@ pub(crate) struct Moment {
     /// Objects that have left since.
     pub gone: Vec<AgentId>,
     pub events: Vec<WireEvent>,
+}
+
+/// A message of states and its bytes.
+#[derive(Debug)]
+pub(crate) struct Encoded {
+    pub moment: Moment,
+    pub bytes: Vec<u8>,
 }
 
 /// An object and its newest state.
@@ -143,17 +167,18 @@ pub(crate) fn decode<T: DeserializeOwned>(bytes: &[u8]) -> Result<T, BadMessage>
 }
 
 impl Moment {
-    /// The message in parts that are short enough, the first with the number `sequence`, which rises by `step` after each. An
-    /// object whose state alone is too long is left out; returned is how many were.
-    pub fn encode_parts(mut self, sequence: &mut u64, step: u64, out: &mut Vec<Vec<u8>>) -> u64 {
+    /// The message in parts that are short enough, each with its bytes; the first has the number `sequence`, which rises by `step` after each.
+    /// An object whose state alone is too long is left out; returned is how many were.
+    pub fn encode_parts(mut self, sequence: &mut u64, step: u64, out: &mut Vec<Encoded>) -> u64 {
         self.sequence = *sequence;
         let reply = Reply::Moment(self);
-        if let Ok(bytes) = encode(&reply) {
+        let encoded = encode(&reply);
+        let Reply::Moment(mut first) = reply else { return 1 };
+        if let Ok(bytes) = encoded {
             *sequence += step;
-            out.push(bytes);
+            out.push(Encoded { moment: first, bytes });
             return 0;
         }
-        let Reply::Moment(mut first) = reply else { return 1 };
         if first.states.len() < 2 {
             return 1;
         }

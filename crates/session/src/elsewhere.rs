@@ -11,17 +11,22 @@ use std::time::{Duration, Instant};
 /// The time there is taken to stand when no later one has come for so long.
 const STANDS_AFTER: Duration = Duration::from_millis(250);
 
+/// So many notes are kept: a hundred objects that cannot be shown say no more than a few of them.
+const NOTES_MAX: usize = 8;
+
 /// The world that is shown.
 pub(super) struct Elsewhere {
     pub calls: Arc<dyn WorldCalls>,
     ghosts: GhostWorld,
-    /// Its time when it was first seen.
+    /// Its time when it began to be shown.
     pub first: SimTime,
     /// Its newest time, and when that came.
     newest: SimTime,
     came: Instant,
     /// Why it was not shown whole, or did not take what a user did.
     pub error: Option<WorldError>,
+    /// What all that is shown of it is not without.
+    pub notes: Vec<String>,
 }
 
 impl Elsewhere {
@@ -31,9 +36,14 @@ impl Elsewhere {
     /// [`WorldError::Build`] and [`WorldError::Run`].
     pub fn new(scene: &Scene, calls: Arc<dyn WorldCalls>) -> Result<Self, WorldError> {
         let (ghosts, first) = (GhostWorld::of(scene)?, calls.time());
-        let mut elsewhere = Self { calls, ghosts, first, newest: first, came: Instant::now(), error: None };
+        let mut elsewhere = Self { calls, ghosts, first, newest: first, came: Instant::now(), error: None, notes: Vec::new() };
         elsewhere.follow();
         Ok(elsewhere)
+    }
+
+    /// Counts from now on: opening an adapter takes seconds, in which its time may pass or stand.
+    pub fn begin(&mut self) {
+        (self.first, self.newest, self.came) = (self.calls.time(), self.calls.time(), Instant::now());
     }
 
     /// The world that shows it.
@@ -52,7 +62,19 @@ impl Elsewhere {
 
     /// Whether its time passes.
     pub fn passes(&self) -> bool {
-        self.came.elapsed() < STANDS_AFTER
+        self.stood() < STANDS_AFTER
+    }
+
+    /// For how long its time has stood.
+    pub fn stood(&self) -> Duration {
+        self.came.elapsed()
+    }
+
+    /// Keeps a note, once.
+    pub fn note(&mut self, text: String) {
+        if self.notes.len() < NOTES_MAX && !self.notes.contains(&text) {
+            self.notes.push(text);
+        }
     }
 
     /// Changes the flow of its time.

@@ -19,6 +19,14 @@ pub enum SessionError {
     /// A replay came to something that the recorded run did not.
     #[error("the replay stopped: {0}")]
     Diverged(String),
+    /// The time of a world elsewhere stands, and does not come to the end of the run.
+    #[error("the time of the world has stood at {at_s} s for {stood_s:.1} s: its host lets it pass, or a caller")]
+    Stands {
+        /// Its time, seconds.
+        at_s: f64,
+        /// For how long, seconds of wall time.
+        stood_s: f64,
+    },
     /// A recording could not be written to its end.
     #[error(transparent)]
     Record(#[from] RecordError),

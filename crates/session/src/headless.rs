@@ -17,7 +17,6 @@ use metachron_world::OutputFile;
 use std::path::Path;
 use std::path::PathBuf;
 use std::sync::Arc;
-#[cfg(feature = "picture")]
 use std::time::Duration;
 
 /// When a run ends.
@@ -29,6 +28,16 @@ pub enum End {
     Seconds(f64),
     /// With the recording that is repeated.
     Recording,
+}
+
+impl End {
+    /// For how long the time of a world elsewhere may stand: as long as the run is to last.
+    fn patience(self) -> Duration {
+        match self {
+            Self::Seconds(seconds) => Duration::try_from_secs_f64(seconds).unwrap_or(Duration::MAX),
+            Self::Frames(_) | Self::Recording => Duration::MAX,
+        }
+    }
 }
 
 /// The way in which frames are drawn.
@@ -86,7 +95,8 @@ pub struct Headless {
 ///
 /// # Errors
 /// [`SessionError::Draw`] where the adapter fails, [`SessionError::File`] where a film cannot begin, [`SessionError::Diverged`]. A file that
-/// takes no more ends the run: its outcome says why ([`Outcome::unwritten`]).
+/// takes no more ends the run, and so does a world elsewhere that is silent, or whose time stands for as long as the run is to last: its
+/// outcome says why ([`Outcome::cut_off`]).
 pub fn play_headless(
     mut session: Session,
     mut plan: Headless,
@@ -100,12 +110,12 @@ pub fn play_headless(
     #[cfg(feature = "picture")]
     let mut film = film(&plan, period, due)?;
     let mut interrupted = false;
-    #[cfg_attr(not(feature = "picture"), expect(unused_mut, reason = "only films and pictures fail on the way"))]
-    let mut unwritten: Option<SessionError> = None;
+    let mut cut_off: Option<SessionError> = None;
     loop {
         session.wait_until(due);
         let done = share_done(&session, plan.end)?;
-        if done >= 1.0 || interrupted || unwritten.is_some() || session.recording_failed() {
+        cut_off = cut_off.or_else(|| session.cut_off(plan.end.patience()));
+        if done >= 1.0 || interrupted || cut_off.is_some() || session.recording_failed() {
             break;
         }
         let format = PictureFormat { size: plan.size, style: plan.style };
@@ -113,7 +123,7 @@ pub fn play_headless(
         let record = frame_seen_by(&mut session, &camera, format, &mut plan.drawing, false)?;
         #[cfg(feature = "picture")]
         if let Some(film) = &mut film {
-            unwritten = film.push(session.shown(due), pictured(&session, &camera, &mut plan.drawing)?).err();
+            cut_off = film.push(session.shown(due), pictured(&session, &camera, &mut plan.drawing)?).err();
         }
         interrupted = !go_on(&record, done);
         due = session.shown(due + period);
@@ -122,17 +132,17 @@ pub fn play_headless(
     session.hold();
     #[cfg(feature = "picture")]
     {
-        unwritten = unwritten.or(film.and_then(|film| film.finish(session.shown(due)).err()));
-        unwritten = keep_unwritten(unwritten, write_picture(&mut session, &mut plan))?;
+        cut_off = cut_off.or(film.and_then(|film| film.finish(session.shown(due)).err()));
+        cut_off = keep_first(cut_off, write_picture(&mut session, &mut plan))?;
     }
     let adapter = plan.drawing.adapter();
     let outcome = session.end(adapter, interrupted);
-    Ok(Outcome { unwritten: unwritten.map(Arc::new).or(outcome.unwritten), ..outcome })
+    Ok(Outcome { cut_off: cut_off.map(Arc::new).or(outcome.cut_off), ..outcome })
 }
 
-/// The first file that could not be written: `before`, or the picture. Other errors end the run without an outcome.
+/// What ended the run first: `before`, or a picture that could not be written. Other errors end the run without an outcome.
 #[cfg(feature = "picture")]
-fn keep_unwritten(
+fn keep_first(
     before: Option<SessionError>,
     picture: Result<(), SessionError>,
 ) -> Result<Option<SessionError>, SessionError> {

@@ -165,6 +165,9 @@ pub struct Outcome {
     pub unpriced: bool,
     /// Whether the user ended the run before its end.
     pub interrupted: bool,
-    /// Why a recording, film or picture could not be written; the run ended there.
-    pub unwritten: Option<Arc<SessionError>>,
+    /// Why the run ended before its end, where the user did not end it: a recording, film or picture could not be written, a world elsewhere
+    /// did not answer, or its time stood.
+    pub cut_off: Option<Arc<SessionError>>,
+    /// What its figures and pictures are not without ([`crate::Session::notes`]).
+    pub notes: Vec<String>,
 }

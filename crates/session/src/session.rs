@@ -425,14 +425,14 @@ impl Session {
         self.gather();
         self.reader.finish(self.world.agents());
         let handles = self.world.agents().clone();
-        let clamp = self.clamp();
+        let (clamp, notes) = (self.clamp(), self.notes().to_vec());
         let (scene, policy, law) = (self.scene.name.clone(), self.policy_name(), self.law_name());
         let pace = if self.world.is_free() { "free" } else { "real-time" };
         let given_up = |agent: &AgentHandle| agent.given_up(self.sim_now()).as_secs_f64();
         let given_up_s: Vec<_> = handles.iter().map(given_up).collect();
         let (wall_s, sim_s) = (self.now().saturating_sub(self.begun).as_secs_f64(), self.sim_now().as_secs_f64());
         let stats = self.world.stop();
-        let unwritten = self.world.end_recording().err().map(|error| Arc::new(error.into()));
+        let cut_off = self.world.end_recording().err().map(|error| Arc::new(error.into()));
         let tolerance = |at: usize| error_control::tolerance_status(&self.error_statuses, AgentId(at as u32));
         let last: Vec<_> = handles.iter().map(AgentHandle::latest).collect();
         let drawn = |at: usize| self.levels.get(at).map(|level| level.resolution);
@@ -472,7 +472,8 @@ impl Session {
             clamp,
             unpriced: self.unpriced,
             interrupted,
-            unwritten,
+            cut_off,
+            notes,
         }
     }
 

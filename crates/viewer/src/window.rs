@@ -392,7 +392,8 @@ impl Simulation for WindowSimulation<'_> {
         self.status.messages.extend(self.notices.iter().map(|(_, message)| message.clone()));
         self.status.messages.extend(self.file_error.clone());
         let unanswered = self.session.unanswered().map(|error| error.to_string());
-        self.status.messages.extend(unanswered.map(|text| Message { severity: Severity::Failure, text }));
+        let notes = self.session.notes().iter().cloned().chain(unanswered);
+        self.status.messages.extend(notes.map(|text| Message { severity: Severity::Failure, text }));
         self.status.rewind = self.session.rewind();
         let shown = self.session.rewind().and_then(|rewind| rewind.shown);
         self.status.sim_time = shown.unwrap_or_else(|| self.session.sim_now());

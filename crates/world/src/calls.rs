@@ -4,7 +4,7 @@
 //! connection, threads.
 
 use crate::history::checkpoint::{SceneIdentity, SceneMark};
-use crate::reading::events::{Event, EventFilter};
+use crate::reading::events::{Event, EventFilter, Events};
 use crate::reading::object::{Object, Touched};
 use crate::{Checkpoint, CheckpointError, Part, Scene, World, WorldError};
 use metachron_core::{AgentId, Body, SimSpan, SimTime, Snapshot};
@@ -19,8 +19,23 @@ impl Scene {
     }
 }
 
-/// A reader of events: all since its last call, in the order of their times.
-pub type EventReader = Box<dyn FnMut() -> Vec<Event> + Send>;
+/// A reader of events.
+pub trait EventReader: Send {
+    /// All events since the last call, in the order of their times.
+    fn take(&mut self) -> Vec<Event>;
+    /// How many were overwritten before they were read.
+    fn lost(&self) -> u64;
+}
+
+impl EventReader for Events {
+    fn take(&mut self) -> Vec<Event> {
+        self.drain().collect()
+    }
+
+    fn lost(&self) -> u64 {
+        Self::lost(self)
+    }
+}
 
 /// A world, here or elsewhere, by its calls. Each does as the method of [`World`] of the same name, and has its errors; a world
 /// that runs elsewhere has [`WorldError::Silent`] and [`WorldError::Elsewhere`] besides.
@@ -107,7 +122,7 @@ pub trait WorldCalls: Send + Sync {
     /// [`WorldError::Silent`] of a world elsewhere.
     fn answers(&self) -> Result<(), WorldError>;
     /// Events from now on.
-    fn listen(&self, filter: EventFilter) -> EventReader;
+    fn listen(&self, filter: EventFilter) -> Box<dyn EventReader>;
 }
 
 impl WorldCalls for World {
@@ -187,8 +202,7 @@ impl WorldCalls for World {
         Ok(())
     }
 
-    fn listen(&self, filter: EventFilter) -> EventReader {
-        let mut events = self.events(filter);
-        Box::new(move || events.drain().collect())
+    fn listen(&self, filter: EventFilter) -> Box<dyn EventReader> {
+        Box::new(self.events(filter))
     }
 }

@@ -12,8 +12,8 @@ from .parts import Camera, JointKind, Part, Sensor, Solid
 from .typing import Array, Numbers
 
 __all__ = [
-    "Checkpoint", "Contact", "Event", "Events", "Export", "Hit", "Joint", "Joints", "Object", "Rollout", "Scene", "State", "States", "World",
-    "__version__", "replay", "rollout",
+    "Checkpoint", "Contact", "Event", "Events", "Export", "Hit", "Joint", "Joints", "Object", "RemoteWorld", "Rollout", "Scene", "State", "States",
+    "World", "WorldCalls", "__version__", "connect", "replay", "rollout",
 ]
 
 __version__: Final[str]
@@ -192,13 +192,8 @@ class Checkpoint:
     def time(self) -> float:
         """Simulated time of the state, s."""
 
-@final
-class World:
-    """A world that runs; any thread may read and command it. In a `with` block it stops at the end."""
-
-    @staticmethod
-    def from_toml(text_or_path: str | PathLike[str], executor: _Executor = "lockstep", pace: _Pace | None = None) -> World:
-        """`Scene.from_toml(text_or_path).start(executor, pace)`."""
+class WorldCalls:
+    """What a world answers wherever it runs: any thread may read and command it."""
 
     def object(self, name: str) -> Object:
         """The object of this name. Raises `KeyError`."""
@@ -207,67 +202,19 @@ class World:
     def objects(self) -> list[Object]:
         """All objects that are there, the scene's first."""
 
-    @property
-    def joints(self) -> Joints:
-        """The joints of its scene, and their coordinates."""
-
-    @property
-    def sensors(self) -> list[str]:
-        """The names of the sensors of its scene."""
-
     def states(self) -> States:
         """The newest states of all objects, as arrays."""
 
     def state(self, object: str | Object) -> State:
         """The newest state of an object; it waits for nothing."""
 
-    def fault(self, object: str | Object) -> str | None:
-        """Why an object failed: it stands still from then on, and its newest state is its last. `None` of one that lives."""
-
     @property
     def time(self) -> float:
         """Simulated time, s."""
 
-    @property
-    def executor(self) -> str:
-        """The executor that runs it."""
-
-    @property
-    def pace(self) -> str:
-        """How time passes: `"free"` where it waits for objects, else `"real-time"`, whatever its speed."""
-
-    def set_pace(self, pace: _Pace | float) -> None:
-        """How time passes from now on: `"free"`, `"real-time"`, or so many simulated seconds a second, 0.001 ... 100."""
-
-    @property
-    def dropped(self) -> float:
-        """The most simulated time that one of its objects has not lived, s: its dropped time and its lag now. 0 at the pace `"free"`."""
-
     def hash(self) -> int:
         """Equal numbers mean the same states of all objects, bit for bit."""
 
-    def checkpoint(self) -> Checkpoint:
-        """All that the next bit of it needs, objects that joined it included."""
-
-    def restore(self, checkpoint: Checkpoint) -> None:
-        """Goes back to a checkpoint of this world, or of another of the same scene: from there it repeats its steps, in
-        lockstep to the bit. Objects that joined since are taken out, objects that left since are there again."""
-
-    def advance(self, seconds: float) -> None:
-        """Lets so much simulated time pass: at once in lockstep, on other executors in real time or, at the pace `"free"`, as fast as objects can
-        step. Other threads of Python run meanwhile."""
-
-    def run(self, speed: float = 1.0) -> None:
-        """Lets time pass from now on, so many simulated seconds a second, 0.001 ... 100; the pace is no longer `"free"`. Not in lockstep."""
-
-    def pause(self) -> None:
-        """Stops time."""
-
-    def stop(self) -> None:
-        """Ends the world. Its newest states can still be read."""
-
-    def __enter__(self) -> Self: ...
-    def __exit__(self, *error: Any) -> None: ...
     def force(self, object: str | Object, newtons: Numbers | None, **keywords: Unpack[_Lasting]) -> None:
         """A force in world axes; `None` takes back that of the key."""
 
@@ -293,9 +240,6 @@ class World:
         `State.nodes` says.
         """
 
-    def sensor(self, name: str) -> Array:
-        """The reading of a sensor of the scene, of the newest states. Raises `KeyError`."""
-
     def teleport(self, object: str | Object, position: Numbers, rotation: Numbers = ...) -> None:
         """To another place: a rigid body to this rotation, a deformable turned by it."""
 
@@ -304,9 +248,6 @@ class World:
 
     def carve(self, object: str | Object, start: Numbers, radius: float, end: Numbers | None = ...) -> None:
         """Removes the cells of a solid or a sheet within a radius of a line, m; of a point where it has no other end."""
-
-    def motor(self, joint: str | int, **keywords: Unpack[_Motor]) -> None:
-        """Drives a joint, by name or by its number in the scene; without a goal, no longer."""
 
     def add(self, name: str, what: Part) -> Object:
         """Takes up another object, which lives from its first step on."""
@@ -318,6 +259,83 @@ class World:
         self, *, contacts: bool = True, states: bool = True, above: float = 0.0, of: str | Object | None = None
     ) -> Events:
         """Listens from now on: to contacts of at least `above` newtons, to changes of state, of all objects or one."""
+
+    def checkpoint(self) -> Checkpoint:
+        """All that the next bit of it needs, objects that joined it included."""
+
+    def restore(self, checkpoint: Checkpoint) -> None:
+        """Goes back to a checkpoint of this world, or of another of the same scene."""
+
+    def advance(self, seconds: float) -> None:
+        """Lets so much simulated time pass. Other threads of Python run meanwhile."""
+
+    def run(self, speed: float = 1.0) -> None:
+        """Lets time pass from now on, so many simulated seconds a second, 0.001 ... 100."""
+
+    def pause(self) -> None:
+        """Stops time."""
+
+@final
+class World(WorldCalls):
+    """A world that runs; any thread may read and command it. In a `with` block it stops at the end."""
+
+    @staticmethod
+    def from_toml(text_or_path: str | PathLike[str], executor: _Executor = "lockstep", pace: _Pace | None = None) -> World:
+        """`Scene.from_toml(text_or_path).start(executor, pace)`."""
+
+    @property
+    def joints(self) -> Joints:
+        """The joints of its scene, and their coordinates."""
+
+    @property
+    def sensors(self) -> list[str]:
+        """The names of the sensors of its scene."""
+
+    def fault(self, object: str | Object) -> str | None:
+        """Why an object failed: it stands still from then on, and its newest state is its last. `None` of one that lives."""
+
+    @property
+    def executor(self) -> str:
+        """The executor that runs it."""
+
+    @property
+    def pace(self) -> str:
+        """How time passes: `"free"` where it waits for objects, else `"real-time"`, whatever its speed."""
+
+    def set_pace(self, pace: _Pace | float) -> None:
+        """How time passes from now on: `"free"`, `"real-time"`, or so many simulated seconds a second, 0.001 ... 100."""
+
+    @property
+    def dropped(self) -> float:
+        """The most simulated time that one of its objects has not lived, s: its dropped time and its lag now. 0 at the pace `"free"`."""
+
+    def checkpoint(self) -> Checkpoint:
+        """All that the next bit of it needs, objects that joined it included."""
+
+    def restore(self, checkpoint: Checkpoint) -> None:
+        """Goes back to a checkpoint of this world, or of another of the same scene: from there it repeats its steps, in
+        lockstep to the bit. Objects that joined since are taken out, objects that left since are there again."""
+
+    def advance(self, seconds: float) -> None:
+        """Lets so much simulated time pass: at once in lockstep, on other executors in real time or, at the pace `"free"`, as fast as objects can
+        step. Other threads of Python run meanwhile."""
+
+    def run(self, speed: float = 1.0) -> None:
+        """Lets time pass from now on, so many simulated seconds a second, 0.001 ... 100; the pace is no longer `"free"`. Not in lockstep."""
+
+    def pause(self) -> None:
+        """Stops time."""
+
+    def stop(self) -> None:
+        """Ends the world. Its newest states can still be read."""
+
+    def __enter__(self) -> Self: ...
+    def __exit__(self, *error: Any) -> None: ...
+    def sensor(self, name: str) -> Array:
+        """The reading of a sensor of the scene, of the newest states. Raises `KeyError`."""
+
+    def motor(self, joint: str | int, **keywords: Unpack[_Motor]) -> None:
+        """Drives a joint, by name or by its number in the scene; without a goal, no longer."""
 
     def render(self, size: tuple[int, int] = ..., camera: str | Camera | None = None) -> NDArray[np.uint8]:
         """A picture of the world now, (height, width, 4) of `uint8`: red, green, blue, opacity. `size` is (width, height), default (1280, 720).
@@ -368,6 +386,17 @@ class World:
 
     def nearest(self, point: Numbers, reach: float) -> Hit | None:
         """The nearest point of any surface within `reach` metres."""
+
+@final
+class RemoteWorld(WorldCalls):
+    """A world that another process serves (`connect`): reading shows the newest states that came, what changes it waits for its host's answer.
+
+    Where its host is silent, states stay as they were last seen, and calls raise `ConnectionError`; where it lives again, they go on.
+    """
+
+    @property
+    def is_silent(self) -> bool:
+        """Whether its host is silent: it has ended, or sent nothing for a second."""
 
 @final
 class State:
@@ -601,6 +630,17 @@ class Rollout:
     @property
     def hashes(self) -> NDArray[np.uint64]:
         """(worlds,): as `World.hash`, at the end."""
+
+def connect(
+    endpoint: str, *, scene: Scene | None = None, identity: str | PathLike[str] | None = None, insecure_lan: bool = False
+) -> RemoteWorld:
+    """The world that is served at `endpoint`, such as `"tcp/127.0.0.1:7447"`: by `metachron host`, or by a program. Of the scene `scene`, if that
+    is given. Beyond this machine, at `"tls/..."`, as the `identity` in a file of `metachron identity new`; or at `"tcp/..."` with `insecure_lan`,
+    where anybody on the network may listen and speak.
+
+    Raises `ValueError` for an endpoint or a file that cannot be, another version of the program and another scene, and `ConnectionError` where
+    no world is served.
+    """
 
 def replay(path: str | PathLike[str], scene: Scene | None = None, *, until: float | None = None) -> World:
     """A world on one thread that does again what a recording says, as far as time is let pass, and no further than `until`, s; it takes no commands.

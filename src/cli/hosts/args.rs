@@ -1,14 +1,18 @@
-//! The arguments of `host` and `view`, and their help texts.
+//! The arguments of `host`, `view` and `identity`, and their help texts.
 
 use crate::cli::args::OutputArgs;
-use clap::{Args, ValueHint};
+use clap::{Args, Subcommand, ValueHint};
 use metachron_console::values::{LimitArgs, assignment, seconds, size, target_fps};
+use std::path::PathBuf;
 
 pub const HOST_EXAMPLES: &str = "\
 Examples:
   metachron host cavity                                serves the scene to this machine until Ctrl-C
   metachron host swarm.toml --listen tcp/127.0.0.1:7500 --name swarm --json
-  metachron view tcp/127.0.0.1:7500                    a window on it, in another terminal";
+  metachron view tcp/127.0.0.1:7500                    a window on it, in another terminal
+  metachron host cavity --listen tls/0.0.0.0:7447 --identity bench.pem --operators lab2 --viewers screen
+
+Beyond this machine both ends have certificates (`metachron identity`), and nobody is let in who is not named.";
 
 /// `host`.
 #[derive(Debug, Args)]
@@ -16,9 +20,21 @@ pub struct HostArgs {
     /// A built-in scene or the path of a scene file
     #[arg(value_hint = ValueHint::FilePath)]
     pub scene: String,
-    /// Where callers reach the world: tcp/, a loopback address and a port
+    /// Where callers reach the world: tcp/, a loopback address and a port; or tls/, an address and a port, with --identity
     #[arg(long, value_name = "ENDPOINT", default_value = "tcp/127.0.0.1:7447")]
     pub listen: String,
+    /// The certificate of this host, a file of `metachron identity new`
+    #[arg(long, value_name = "FILE", value_hint = ValueHint::FilePath)]
+    pub identity: Option<PathBuf>,
+    /// Certificates whose holders may read and command the world
+    #[arg(long, value_name = "NAMES", value_delimiter = ',', requires = "identity")]
+    pub operators: Vec<String>,
+    /// Certificates whose holders may read the world
+    #[arg(long, value_name = "NAMES", value_delimiter = ',', requires = "identity")]
+    pub viewers: Vec<String>,
+    /// Let tcp/ be beyond this machine: anybody on the network may read and command the world
+    #[arg(long, conflicts_with = "identity")]
+    pub insecure_lan: bool,
     /// The name of the world: 1 to 64 letters, digits, _ and -
     #[arg(long, default_value = "world")]
     pub name: String,
@@ -39,6 +55,7 @@ pub struct HostArgs {
 pub const VIEW_EXAMPLES: &str = "\
 Examples:
   metachron view tcp/127.0.0.1:7447                    a window on the world that `metachron host` serves there
+  metachron view tls/bench:7447 --identity screen.pem  on a world of another machine
   metachron view tcp/127.0.0.1:7447 --headless --seconds 5 --video seen.y4m --mcap seen.mcap
 
 Frames are drawn here, within a budget of their own. Pause, speed, springs and pressures act on the world where it runs.";
@@ -48,6 +65,12 @@ Frames are drawn here, within a budget of their own. Pause, speed, springs and p
 pub struct ViewArgs {
     /// Where the world is served
     pub endpoint: String,
+    /// The certificate of this viewer, a file of `metachron identity new`, for tls/
+    #[arg(long, value_name = "FILE", value_hint = ValueHint::FilePath)]
+    pub identity: Option<PathBuf>,
+    /// Let tcp/ be beyond this machine: anybody on the network may read and change what is said
+    #[arg(long, conflicts_with = "identity")]
+    pub insecure_lan: bool,
     /// Open no window: pictures, films and files of what is seen
     #[arg(long)]
     pub headless: bool,
@@ -73,4 +96,35 @@ pub struct ViewArgs {
     /// The outputs: files and printed text.
     #[command(flatten)]
     pub output: OutputArgs,
+}
+
+pub const IDENTITY_EXAMPLES: &str = "\
+Examples:
+  metachron identity new bench --authority lab.pem     bench.pem, for a host that is reached as tls/bench:7447
+  metachron identity new bench --authority lab.pem --address 10.0.0.5,bench.lab.example
+  metachron identity new screen --authority lab.pem    screen.pem, for a caller
+
+The first one makes the authority too. Who has lab.pem can be anybody: keep it apart, and give each machine its own file alone.";
+
+/// `identity`.
+#[derive(Debug, Subcommand)]
+pub enum IdentityCommand {
+    /// Make a certificate and its key, in the file NAME.pem that nobody else may read
+    New(NewIdentityArgs),
+}
+
+/// `identity new`.
+#[derive(Debug, Args)]
+pub struct NewIdentityArgs {
+    /// Who has it: 1 to 64 letters, digits, _ and -; `--operators` and `--viewers` name it so
+    pub name: String,
+    /// The authority that issues it; made where there is no such file
+    #[arg(long, value_name = "FILE", value_hint = ValueHint::FilePath)]
+    pub authority: PathBuf,
+    /// Addresses of a host besides its name: names of DNS and IP addresses
+    #[arg(long, value_name = "ADDRESSES", value_delimiter = ',')]
+    pub address: Vec<String>,
+    /// For how many days it is valid, 1 to 3650
+    #[arg(long, value_name = "DAYS", default_value_t = 365, value_parser = clap::value_parser!(i64).range(1..=3650))]
+    pub days: i64,
 }

@@ -3,12 +3,12 @@
 //! In: an endpoint. Out: the outputs of `run`, of the frames drawn here. Never here: steps, which are made where the world runs.
 
 use super::args::ViewArgs;
-use super::refused;
+use super::{INSECURE, refused};
 use crate::cli::play::{GoOn, headless, in_window};
 use crate::cli::run::{Request, RunLength, check_outputs, check_windowless, finish, stem, style};
 use metachron_console::exit::Exit;
 use metachron_console::output::BadInput;
-use metachron_hosts::{RemoteWorld, connect};
+use metachron_hosts::{Calling, HostsError, Identity, RemoteWorld, connect};
 use metachron_scene::{Source, load};
 use metachron_session::Session;
 use metachron_world::{Pace, WorldCalls};
@@ -18,10 +18,13 @@ use std::sync::Arc;
 pub(in super::super) fn view(args: &ViewArgs) -> anyhow::Result<Exit> {
     check_windowless(&args.output, args.headless)?;
     check_outputs(&args.output, None, None)?;
-    let world = connect(&args.endpoint, None).map_err(refused)?;
+    let world = reached(args).map_err(refused)?;
     let request = request(args, &world)?;
     let play = |go_on: GoOn<'_>| {
-        let session = Session::open_elsewhere(request.scene.clone(), Arc::new(world.clone()))?;
+        let mut session = Session::open_elsewhere(request.scene.clone(), Arc::new(world.clone()))?;
+        if world.is_open() {
+            session.note(INSECURE.to_owned());
+        }
         if request.window {
             in_window(session, &request, go_on)
         } else {
@@ -29,6 +32,13 @@ pub(in super::super) fn view(args: &ViewArgs) -> anyhow::Result<Exit> {
         }
     };
     finish(&args.output, &play, &request.scene.name)
+}
+
+/// The world at the endpoint of the arguments.
+fn reached(args: &ViewArgs) -> Result<RemoteWorld, HostsError> {
+    let identity = args.identity.as_ref().map(Identity::from_file).transpose()?;
+    let calling = identity.into_iter().fold(Calling::at(&args.endpoint).looking(), Calling::identity);
+    connect(if args.insecure_lan { calling.insecure_lan() } else { calling })
 }
 
 /// The request to draw the scene that the host says, which is checked as a file is, and must be that of its world.

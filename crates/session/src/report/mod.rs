@@ -65,6 +65,10 @@ pub struct Report {
     /// Devices that led objects, and the forces that they felt; left out where there were none.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub devices: Vec<DeviceReport>,
+    /// What its figures are not without, of a world elsewhere: a link that anybody may listen to, objects that were not shown; left out where
+    /// there is nothing.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub notes: Vec<String>,
     /// Agents that failed and stepped no more.
     pub parked: u32,
     /// The contact clusters of the last states.
@@ -405,6 +409,7 @@ impl Report {
             sensors: vec![SensorReport::default()],
             readings: vec![ReadingReport { values: vec![0.0], ..ReadingReport::default() }],
             devices: vec![DeviceReport::default()],
+            notes: vec![name()],
             parked: 0,
             clusters: vec![ClusterRow { members: vec![name()], steps: vec![1], ..ClusterRow::default() }],
             overlaps: vec![OverlapReport::default()],

@@ -91,6 +91,7 @@ const NAMES: &[&str] = &[
     "/readings/0/kind",
     "/readings/0/at_s",
     "/readings/0/values/0",
+    "/notes/0",
     "/parked",
     "/overlaps/0/depth_m",
     "/moved/0/by_m",

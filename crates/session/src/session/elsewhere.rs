@@ -9,6 +9,7 @@ use metachron_core::SimTime;
 use metachron_runtime::TimelineCommand;
 use metachron_world::{Scene, WorldCalls, WorldError};
 use std::sync::Arc;
+use std::time::Duration;
 
 impl Session {
     /// Shows a world that runs elsewhere, of the same `scene`. No step is made here: levels are chosen and frames are drawn within the budget of
@@ -40,7 +41,32 @@ impl Session {
         self.elsewhere.as_mut()?.error.take()
     }
 
-    /// Simulated seconds that have passed in this session.
+    /// What all that is shown of a world elsewhere is not without: a link that anybody may listen to, objects that cannot be shown.
+    #[must_use]
+    pub fn notes(&self) -> &[String] {
+        self.elsewhere.as_ref().map_or(&[], |elsewhere| &elsewhere.notes)
+    }
+
+    /// Adds a note on a world elsewhere, for its window and its report.
+    pub fn note(&mut self, text: String) {
+        self.elsewhere.iter_mut().for_each(|elsewhere| elsewhere.note(text.clone()));
+    }
+
+    /// Keeps the newest error of a world elsewhere as a note; why a run that is to last for `patience` cannot come to its end: the host does not
+    /// answer, or time has stood for so long.
+    pub(in super::super) fn cut_off(&mut self, patience: Duration) -> Option<SessionError> {
+        if let Some(error) = self.take_error_elsewhere() {
+            self.note(error.to_string());
+        }
+        if let Some(silent) = self.unanswered() {
+            return Some(silent.into());
+        }
+        let stood = self.elsewhere.as_ref()?.stood();
+        let (at_s, stood_s) = (self.sim_now().as_secs_f64(), stood.as_secs_f64());
+        (stood > patience).then_some(SessionError::Stands { at_s, stood_s })
+    }
+
+    /// Simulated seconds that have passed in this session, of a world elsewhere since it began.
     #[must_use]
     pub fn played_s(&self) -> f64 {
         let first = self.elsewhere.as_ref().map_or(SimTime::ZERO, |elsewhere| elsewhere.first);

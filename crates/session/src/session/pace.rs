@@ -2,6 +2,7 @@
 //!
 //! In: a pace, when frames are due. Out: simulated time that has passed by then. Never here: frames, when agents make their turns.
 
+use super::super::elsewhere::Elsewhere;
 use super::Session;
 use metachron_core::{SimSpan, SimTime};
 use metachron_runtime::TimelineCommand;
@@ -21,6 +22,7 @@ impl Session {
         if !self.is_virtual() {
             self.begun = now;
         }
+        self.elsewhere.iter_mut().for_each(Elsewhere::begin);
         if !self.waits_for_agents() && !self.is_elsewhere() && !self.passes() {
             self.world.drive(TimelineCommand::Run);
         }
