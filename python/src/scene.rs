@@ -153,16 +153,25 @@ impl Scene {
     }
 
     /// Joins the rigid bodies `a` and `b`, or `a` and the world. Place and axis of `kind` are in the world's axes, as the bodies are at the start.
-    #[pyo3(signature = (name, kind, a, b = None))]
+    /// A hinge or slide follows the joint `mimic`, one too: its travel is `ratio` times that one's, rad or m for each rad or m.
+    #[pyo3(signature = (name, kind, a, b = None, *, mimic = None, ratio = 1.0))]
     fn joint<'py>(
         mut slf: PyRefMut<'py, Self>,
         name: String,
         kind: &Bound<'py, PyAny>,
         a: &str,
         b: Option<&str>,
+        mimic: Option<&str>,
+        ratio: f64,
     ) -> PyResult<PyRefMut<'py, Self>> {
         let (kind, Vector(at)) = (joint_kind(kind)?, field(kind, "at")?);
-        slf.build(|builder| builder.joint(a, b, kind, at.to_array()).joint_name(name))?;
+        slf.build(|builder| {
+            let joined = builder.joint(a, b, kind, at.to_array()).joint_name(name);
+            match mimic {
+                Some(other) => joined.mimic(other, ratio),
+                None => joined,
+            }
+        })?;
         Ok(slf)
     }
 

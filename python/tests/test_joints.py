@@ -71,6 +71,20 @@ def test_coordinates_put_bodies_where_trigonometry_says() -> None:
     assert (world.joints.velocities == 0.0).all()
 
 
+def test_a_joint_follows_another_by_its_ratio() -> None:
+    scene = mc.Scene(gravity=[0.0, 0.0, 0.0])
+    scene.add("wheel", mc.Box([0.1, 0.1, 0.1], rate=1000)).add("cart", mc.Box([0.1, 0.1, 0.1], at=[0.0, 2.0, 0.0], rate=1000))
+    scene.joint("rail", mc.Prismatic([1.0, 0.0, 0.0], at=[0.0, 2.0, 0.0]), "cart")
+    axle = mc.Revolute([0.0, 1.0, 0.0], at=[0.0, 0.0, 0.0])
+    with pytest.raises(ValueError, match='follows the joint "knee", and the scene has none of that name'):
+        arm().joint("axle", axle, "lower", mimic="knee").start()
+    world = scene.joint("axle", axle, "wheel", mimic="rail", ratio=2.0).start()
+    world.joints.set(velocities={"rail": 0.3})
+    assert world.joints.velocities == pytest.approx([0.3, 0.6])
+    world.advance(0.5)
+    assert world.joints.positions == pytest.approx([0.15, 0.3], abs=1e-6)
+
+
 def test_coordinates_that_cannot_be_are_refused() -> None:
     world = arm().start()
     with pytest.raises(ValueError, match='the position of joint "elbow" is 2.5; expected -1 to 2 rad'):

@@ -34,6 +34,20 @@ pub struct Joint {
     /// Inertia about the axis of a hinge, kg·m², or along that of a slide, kg, ≥ 0: of a rotor behind a gear, which resists changes of the
     /// rate at which b moves against a and is nowhere else. 0 of other kinds.
     pub armature: f64,
+    /// The joint that a hinge or slide follows; none of other kinds.
+    pub mimic: Option<Mimic>,
+}
+
+/// How a hinge or slide follows another: its travel is `ratio` times that of the other joint, and `offset`. The bodies of both joints are
+/// members of one cluster, and bear the reaction.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Mimic {
+    /// The number of the joint that it follows, a hinge or slide too.
+    pub joint: u32,
+    /// Its travel for each radian or metre of the other: within ±1e9.
+    pub ratio: f64,
+    /// Its travel where the other joint is at its zero, rad or m: within ±1e9. Whole turns of hinges without a range do not count.
+    pub offset: f64,
 }
 
 /// The degrees of freedom that a joint locks and leaves free. Axes of a [`Joint`] are in a's shape, of any length above zero.
@@ -159,6 +173,12 @@ pub enum JointError {
         /// Which one.
         what: &'static str,
     },
+    /// A joint follows one that it cannot.
+    #[error("the joint follows joint {joint}; expected another hinge or slide, by its number from 0")]
+    BadMimic {
+        /// The number that it gives.
+        joint: u32,
+    },
     /// A range that ends before it starts.
     #[error("the joint's range is {low} to {high}; its upper limit must not be below its lower limit")]
     EmptyRange {
@@ -186,8 +206,21 @@ impl Joint {
     pub fn new(a: AgentId, b: Option<AgentId>, kind: JointKind) -> Self {
         let (anchor_a_m, anchor_b_m, rest) = (DVec3::ZERO, DVec3::ZERO, DQuat::IDENTITY);
         let (tears_above_n, yields_above_n) = (f64::INFINITY, f64::INFINITY);
-        let (collide, friction, armature) = (false, 0.0, 0.0);
-        Self { a, b, kind, anchor_a_m, anchor_b_m, rest, collide, tears_above_n, yields_above_n, friction, armature }
+        let (collide, friction, armature, mimic) = (false, 0.0, 0.0, None);
+        Self {
+            a,
+            b,
+            kind,
+            anchor_a_m,
+            anchor_b_m,
+            rest,
+            collide,
+            tears_above_n,
+            yields_above_n,
+            friction,
+            armature,
+            mimic,
+        }
     }
 
     /// The same joint with its zero at the initial rotations of the two shapes: rotations to the world's axes.
@@ -216,6 +249,13 @@ impl Joint {
         let most = if self.takes_motor() { NUMBER } else { NONE };
         most.check("friction", self.friction)?;
         most.check("armature", self.armature)?;
+        if let Some(Mimic { joint, ratio, offset }) = self.mimic {
+            if !self.takes_motor() {
+                return Err(JointError::BadMimic { joint });
+            }
+            GOAL.check("ratio to the joint that it follows", ratio)?;
+            GOAL.check("offset from the joint that it follows", offset)?;
+        }
         match self.kind {
             JointKind::Fixed | JointKind::Spherical => Ok(()),
             JointKind::Revolute { axis, range_rad, motor } => {
@@ -235,6 +275,16 @@ impl Joint {
             }
             JointKind::Rope { length_m } => Ok(ABOVE_ZERO.check("length", length_m)?),
         }
+    }
+
+    /// Whether the joint that it follows, one of `all` of which it is number `own`, can lead it.
+    ///
+    /// # Errors
+    /// [`JointError::BadMimic`].
+    pub fn check_mimic(&self, own: u32, all: &[Self]) -> Result<(), JointError> {
+        let Some(Mimic { joint, .. }) = self.mimic else { return Ok(()) };
+        let leads = joint != own && all.get(joint as usize).is_some_and(Self::takes_motor);
+        if leads { Ok(()) } else { Err(JointError::BadMimic { joint }) }
     }
 
     /// Whether bodies with this start satisfy the joint: the shapes' origins and rotations, zero for the world.
@@ -264,7 +314,7 @@ impl Joint {
     }
 }
 
-/// Stiffness, damping and lengths at rest; [`ABOVE_ZERO`] is that of lengths of ropes, [`GOAL`] that of goals of motors.
+/// Stiffness, damping and lengths at rest; [`ABOVE_ZERO`] is that of lengths of ropes, [`GOAL`] that of goals of motors and of followed joints.
 const NUMBER: NumberRange = NumberRange::new(0.0, 1e9, "");
 /// The friction and armature of a joint that is neither hinge nor slide.
 const NONE: NumberRange = NumberRange::new(0.0, 0.0, "");

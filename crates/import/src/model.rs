@@ -185,6 +185,16 @@ pub(crate) struct Joint {
     /// Dry friction and the inertia about or along the axis, of a hinge in N·m and kg·m², of a slide in N and kg.
     pub(crate) friction: f64,
     pub(crate) armature: f64,
+    /// The joint that a hinge or slide follows from where both start.
+    pub(crate) mimic: Option<Mimic>,
+}
+
+/// A joint that another one follows.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct Mimic {
+    pub(crate) joint: String,
+    /// Radians or metres for each radian or metre of that joint.
+    pub(crate) ratio: f64,
 }
 
 /// A rope or spring between two points.
@@ -266,6 +276,11 @@ impl Shape {
 }
 
 impl Kind {
+    /// Whether it leaves one way to go.
+    pub(crate) const fn travels(self) -> bool {
+        matches!(self, Self::Revolute | Self::Prismatic)
+    }
+
     /// The motion from the position at zero, of a joint with this axis at this place.
     pub(crate) fn motion(self, anchor_m: DVec3, axis: DVec3, position: f64) -> Pose {
         let axis = axis.normalize_or_zero();
@@ -295,6 +310,7 @@ impl Joint {
             motor: None,
             friction: 0.0,
             armature: 0.0,
+            mimic: None,
         }
     }
 }

@@ -5,7 +5,7 @@
 
 use crate::imported::LeftOut;
 use crate::model::{
-    Apart, End, Fixed, Joint, Kind, Link, Look, Masks, Mass, Model, Motor, Part, Shape, Tie, TieKind, Why,
+    Apart, End, Fixed, Joint, Kind, Link, Look, Masks, Mass, Mimic, Model, Motor, Part, Shape, Tie, TieKind, Why,
 };
 use crate::pose::{Pose, fixed_angles_deg};
 use glam::{DMat3, DQuat, DVec3};
@@ -251,6 +251,9 @@ fn write_joint(out: &mut String, model: &Model, joint: &Joint, notes: &mut Vec<L
         if value > 0.0 {
             put(out, key, &exact(value));
         }
+    }
+    if let Some(Mimic { joint, ratio }) = &joint.mimic {
+        put(out, "mimic", &format!("{{ joint = {}, ratio = {} }}", quoted(joint), exact(*ratio)));
     }
 }
 

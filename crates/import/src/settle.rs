@@ -48,9 +48,16 @@ pub(crate) fn settle(mut model: Model, fixed_base: bool, notes: &mut Vec<LeftOut
         let parts = if *fate == Fate::Itself { continue } else { std::mem::take(&mut model.links[at].parts) };
         match *fate {
             Fate::PartOf(host, pose) => {
+                // each by itself: moments that no body has are blamed on the link that has them
+                repair(&mut model.links[host], notes)?;
+                repair(&mut model.links[at], notes)?;
                 let moved = parts.into_iter().map(|part| Part { pose: pose.then(part.pose), ..part });
                 let weights = [host, at].map(|link| Weight::given(&model.links[link].mass));
+                let surface = model.links[at].look.surface;
                 let host = &mut model.links[host];
+                if !host.parts.iter().any(|part| part.touches) {
+                    host.look.surface = surface;
+                }
                 host.parts.extend(moved);
                 if let [Some(own), Some(more)] = weights {
                     host.mass = Weight::together(&[own, more.at(pose)]);
@@ -65,6 +72,7 @@ pub(crate) fn settle(mut model: Model, fixed_base: bool, notes: &mut Vec<LeftOut
     }
     move_ties(&mut model, &fates, notes);
     move_joints(&mut model, &fates, notes);
+    drop_mimics(&mut model, notes);
     pass_excluded(&mut model, &fates, &touched);
     keep(&mut model, &fates);
     model.pass_neighbours();
@@ -165,12 +173,16 @@ fn fate(link: &Link, joint: Option<&Joint>, before: &[Fate], model: &Model) -> R
 /// Whether a link that weighs something can be part of the body of another: it has a mass and a surface for all of its solids, and room for so
 /// many.
 fn can_join(link: &Link, host: usize, before: &[Fate], links: &[Link]) -> bool {
-    let of_host = before.iter().zip(links).filter(|(fate, _)| matches!(fate, Fate::PartOf(body, _) if *body == host));
-    let parts: usize = of_host.map(|(_, link)| link.parts.len()).sum();
-    let host = &links[host];
-    [link, host].iter().all(|one| Weight::given(&one.mass).is_some())
-        && link.look.surface == host.look.surface
-        && parts + host.parts.len() + link.parts.len() <= COMPOUND_PARTS_MAX
+    let is_part = |fate: &Fate| matches!(fate, Fate::PartOf(body, _) if *body == host);
+    let joined = before.iter().zip(links).filter(|(fate, _)| is_part(fate)).map(|(_, link)| link);
+    let body: Vec<&Link> = std::iter::once(&links[host]).chain(joined).collect();
+    let parts: usize = body.iter().map(|one| one.parts.len()).sum();
+    // the surface of what is only seen has no meaning
+    let touches = |one: &&Link| one.parts.iter().any(|part| part.touches);
+    let surface = body.iter().copied().find(touches).filter(|_| touches(&link)).map(|one| one.look.surface);
+    [link, &links[host]].iter().all(|one| Weight::given(&one.mass).is_some())
+        && surface.is_none_or(|surface| surface == link.look.surface)
+        && parts + link.parts.len() <= COMPOUND_PARTS_MAX
 }
 
 /// How much longer than its rope a distance may be by rounding alone, metres.
@@ -228,6 +240,17 @@ fn move_joints(model: &mut Model, fates: &[Fate], notes: &mut Vec<LeftOut>) {
         (joint.parent, joint.child) = (one.min(other), child);
         true
     });
+}
+
+/// Lets joints move by themselves that follow one that is gone.
+fn drop_mimics(model: &mut Model, notes: &mut Vec<LeftOut>) {
+    let moving: BTreeSet<String> =
+        model.joints.iter().filter(|joint| joint.kind.travels()).map(|j| j.name.clone()).collect();
+    for joint in &mut model.joints {
+        if let Some(gone) = joint.mimic.take_if(|mimic| !moving.contains(&mimic.joint)) {
+            notes.push(joint.place.note(format!("moves by itself: `{}`, which it follows, is fixed", gone.joint)));
+        }
+    }
 }
 
 /// Leaves the links that remain themselves.

@@ -5,9 +5,9 @@
 
 use crate::imported::{ImportError, LeftOut};
 use crate::meshes::Meshes;
-use crate::model::{Joint, Kind, Link, Look, Mass, Model, Motor, Part, Shape};
+use crate::model::{Joint, Kind, Link, Look, Mass, Mimic, Model, Motor, Part, Shape};
 use crate::pose::{Pose, fixed_angles};
-use crate::xml::{Element, Harmless};
+use crate::xml::{DAMPING_MAX, Element, Harmless, STRENGTH_MAX};
 use glam::{DMat3, DVec3};
 use metachron_geometry::Solid;
 use std::collections::BTreeMap;
@@ -32,8 +32,21 @@ struct Draft<'a> {
     limits: Option<[f64; 2]>,
     motor: Option<Motor>,
     friction: f64,
+    mimic: Option<MimicDraft<'a>>,
     /// Whether the child moves freely.
     is_free: bool,
+}
+
+/// The largest ratio of two travels that a scene has.
+const RATIO_MAX: f64 = 1e6;
+
+/// A joint that another one follows, as the file has it: multiplier · its position + offset.
+#[derive(Clone, Copy)]
+struct MimicDraft<'a> {
+    element: &'a Element,
+    joint: &'a str,
+    multiplier: f64,
+    offset: f64,
 }
 
 /// Reads a robot.
@@ -55,7 +68,8 @@ pub(crate) fn read(root: &Element, mut meshes: Meshes<'_>, notes: &mut Vec<LeftO
     if links.is_empty() {
         return Err(root.wrong("has no `link`"));
     }
-    let drafts = root.children("joint").map(draft).collect::<Result<Vec<_>, _>>()?;
+    let mut drafts = root.children("joint").map(draft).collect::<Result<Vec<_>, _>>()?;
+    drop_mimics(&mut drafts, notes);
     for draft in &drafts {
         for (key, name) in [("parent", draft.parent), ("child", draft.child)] {
             if !links.contains_key(name) {
@@ -71,7 +85,8 @@ pub(crate) fn read(root: &Element, mut meshes: Meshes<'_>, notes: &mut Vec<LeftO
         let mut pose = Pose::IDENTITY;
         if let Some(draft) = above {
             let parent = numbers[draft.parent];
-            let start = start(draft, notes);
+            let start = start(draft, &drafts);
+            note_start(draft, start, notes);
             pose = model.links[parent].pose.then(draft.origin).then(draft.kind.motion(DVec3::ZERO, draft.axis, start));
             if !draft.is_free {
                 model.joints.push(joint(draft, parent, model.links.len(), start));
@@ -141,7 +156,7 @@ fn draft(element: &Element) -> Result<Draft<'_>, ImportError> {
             return Err(element.wrong(format!("is of the type `{other}`; {expected}")));
         }
     };
-    let moves = matches!(kind, Kind::Revolute | Kind::Prismatic);
+    let moves = kind.travels();
     let mut axis = DVec3::X;
     if let Some(given) = moves.then(|| element.child("axis")).flatten() {
         axis = given.numbers("xyz")?.map_or(axis, DVec3::from_array);
@@ -151,9 +166,10 @@ fn draft(element: &Element) -> Result<Draft<'_>, ImportError> {
     }
     let limits = if moves && !turns_freely { Some(limits(element)?) } else { None };
     let (motor, friction) = if moves { brakes(element)? } else { (None, 0.0) };
+    let mimic = if moves { mimic(element)? } else { None };
     let origin = origin(element)?;
     let (parent, child, is_free) = (end("parent")?, end("child")?, kind_name == "floating");
-    Ok(Draft { element, parent, child, origin, kind, axis, limits, motor, friction, is_free })
+    Ok(Draft { element, parent, child, origin, kind, axis, limits, motor, friction, mimic, is_free })
 }
 
 /// The limits of a joint; of one that the file says nothing about both are zero, as in the specification.
@@ -171,19 +187,63 @@ fn limits(element: &Element) -> Result<[f64; 2], ImportError> {
 fn brakes(element: &Element) -> Result<(Option<Motor>, f64), ImportError> {
     let Some(given) = element.child("dynamics") else { return Ok((None, 0.0)) };
     given.read_zeros(&["spring_stiffness", "spring_reference"]);
-    let (damping, friction) = (given.at_least_0("damping")?, given.at_least_0("friction")?);
+    let (damping, friction) = (given.up_to(DAMPING_MAX, "damping")?, given.up_to(STRENGTH_MAX, "friction")?);
     Ok(((damping > 0.0).then_some(Motor::Damper { velocity: 0.0, damping, max_effort: None }), friction))
 }
 
-/// The position at which a joint starts: as near to zero as it may be.
-fn start(draft: &Draft<'_>, notes: &mut Vec<LeftOut>) -> f64 {
-    let Some([lower, upper]) = draft.limits else { return 0.0 };
-    let start = 0.0_f64.clamp(lower, upper);
-    if start != 0.0 {
+/// The joint that a joint follows.
+fn mimic(element: &Element) -> Result<Option<MimicDraft<'_>>, ImportError> {
+    let Some(given) = element.child("mimic") else { return Ok(None) };
+    let [multiplier, offset] = [given.number("multiplier")?.unwrap_or(1.0), given.number("offset")?.unwrap_or(0.0)];
+    if multiplier.abs() > RATIO_MAX {
+        return Err(given.wrong(format!("`multiplier` is {multiplier}; expected -{RATIO_MAX} to {RATIO_MAX}")));
+    }
+    Ok(Some(MimicDraft { element: given, joint: given.needed("joint")?, multiplier, offset }))
+}
+
+fn leader<'d, 'a>(mimic: &MimicDraft<'_>, drafts: &'d [Draft<'a>]) -> Option<&'d Draft<'a>> {
+    drafts.iter().find(|draft| draft.element.text("name") == Some(mimic.joint))
+}
+
+/// Lets joints that follow themselves, a joint that does not move, or none, move by themselves.
+fn drop_mimics(drafts: &mut [Draft<'_>], notes: &mut Vec<LeftOut>) {
+    for at in 0..drafts.len() {
+        let Some(mimic) = drafts[at].mimic else { continue };
+        let mut leads = leader(&mimic, drafts);
+        let why = match leads {
+            None => "there is no joint of that name",
+            Some(leads) if !leads.kind.travels() => "that joint does not move",
+            Some(_) => {
+                // a chain that goes on for longer than there are joints goes round
+                let mut others = 0..drafts.len();
+                while let Some(next) = leads.filter(|_| others.next().is_some()).and_then(|leads| leads.mimic) {
+                    leads = leader(&next, drafts);
+                }
+                if others.next().is_some() {
+                    continue;
+                }
+                "it follows itself"
+            }
+        };
+        notes.push(mimic.element.note(format!("is left out: it names `{}`, and {why}", mimic.joint)));
+        drafts[at].mimic = None;
+    }
+}
+
+/// The position at which a joint starts, within its limits: where the joint that it follows leads it, or else at zero.
+fn start(draft: &Draft<'_>, drafts: &[Draft<'_>]) -> f64 {
+    let led =
+        draft.mimic.and_then(|mimic| Some(mimic.multiplier * start(leader(&mimic, drafts)?, drafts) + mimic.offset));
+    let wanted = led.unwrap_or(0.0);
+    draft.limits.map_or(wanted, |[lower, upper]| wanted.clamp(lower, upper))
+}
+
+/// Lists a joint that starts elsewhere than at zero for its limits.
+fn note_start(draft: &Draft<'_>, start: f64, notes: &mut Vec<LeftOut>) {
+    if start != 0.0 && draft.limits.is_some_and(|limits| limits.contains(&start)) {
         let what = format!("starts at {start}, the end of its limits that is nearest to zero");
         notes.push(draft.element.note(what).harmless());
     }
-    start
 }
 
 fn joint(draft: &Draft<'_>, parent: usize, child: usize, start: f64) -> Joint {
@@ -194,6 +254,7 @@ fn joint(draft: &Draft<'_>, parent: usize, child: usize, start: f64) -> Joint {
         range: draft.limits.map(|limits| limits.map(|end| end - start)),
         motor: draft.motor,
         friction: draft.friction,
+        mimic: draft.mimic.map(|mimic| Mimic { joint: mimic.joint.to_owned(), ratio: mimic.multiplier }),
         ..Joint::weld(draft.element.place.clone(), Some(parent), child)
     }
 }

@@ -11,6 +11,10 @@ use std::rc::Rc;
 /// Deepest nesting of elements: readers recurse.
 pub(crate) const DEPTH_MAX: usize = 200;
 
+/// The largest damping of a scene, N·s/m or N·m·s/rad, and the largest stiffness, friction and armature.
+pub(crate) const DAMPING_MAX: f64 = 1e7;
+pub(crate) const STRENGTH_MAX: f64 = 1e9;
+
 /// An element with all that is in it.
 #[derive(Debug, Clone)]
 pub(crate) struct Element {
@@ -143,10 +147,11 @@ impl Element {
         Ok(self.numbers::<1>(name)?.map(|[value]| value))
     }
 
-    /// A number that is not negative; 0 where there is none.
-    pub(crate) fn at_least_0(&self, name: &str) -> Result<f64, ImportError> {
+    /// A number from zero to `most`, the largest that scenes have of its kind; 0 where there is none.
+    pub(crate) fn up_to(&self, most: f64, name: &str) -> Result<f64, ImportError> {
         let value = self.number(name)?.unwrap_or(0.0);
-        if value < 0.0 { Err(self.wrong(format!("`{name}` is {value}; expected 0 or more"))) } else { Ok(value) }
+        let wrong = || self.wrong(format!("`{name}` is {value}; expected 0 to {most}"));
+        (0.0..=most).contains(&value).then_some(value).ok_or_else(wrong)
     }
 
     /// A number that has to be there.

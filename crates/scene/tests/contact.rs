@@ -82,6 +82,50 @@ fn a_motor_turns_what_its_hinge_holds() {
     assert!((angle - std::f64::consts::FRAC_PI_2).abs() < 1e-3, "{angle} rad");
 }
 
+/// Two balls beside the first one, hinged about z, and one on a slide that starts a decimetre out; `mimic` is that of the slide.
+fn wheels(mimic: &str) -> String {
+    let body = |name: &str, x: f64| {
+        format!(
+            "[[object]]\nname = \"{name}\"\nmodel = \"rigid\"\nshape = \"ball\"\nradius_m = 0.1\nmass_kg = 1\nposition_m = [{x}, 0, 0.5]\n"
+        )
+    };
+    let joint = |kind: &str, a: &str, more: &str| {
+        format!("[[joint]]\nname = \"{a}\"\nkind = \"{kind}\"\na = \"{a}\"\nb = \"world\"\naxis = [0, 0, 1]\n{more}\n")
+    };
+    [
+        body("cart", 1.0),
+        body("wheel", 2.0),
+        joint("prismatic", "cart", &format!("at_b_m = [1, 0, 0.6]\n{mimic}")),
+        joint("revolute", "wheel", "motor = { velocity_rad_s = -0.5 }"),
+        joint("spherical", "ball", "").replace("axis = [0, 0, 1]\n", ""),
+    ]
+    .concat()
+}
+
+#[test]
+fn a_slide_follows_a_hinge_from_where_both_start() {
+    let world = after(&read("", "", &wheels("mimic = { joint = \"wheel\", ratio = 0.2 }")).unwrap(), 1.0);
+    let position = |name: &str| {
+        let state = world.joint_state(world.joint(name).unwrap()).unwrap();
+        state.position
+    };
+    let (cart, wheel) = (position("cart"), position("wheel"));
+    assert!((wheel + 0.5).abs() < 1e-3, "{wheel} rad");
+    // joints hold to a quarter of the depth of contacts
+    assert!((cart - (0.1 + 0.2 * wheel)).abs() < 5e-6, "{cart} m at {wheel} rad");
+}
+
+#[test]
+fn a_mimic_that_cannot_be_is_told_with_what_was_expected() {
+    let mimic = |keys: &str, words: &[&str]| refused("", "", &wheels(&format!("mimic = {{ {keys} }}")), words);
+    mimic("joint = \"weel\"", &["names `weel`, which does not exist", "did you mean `wheel`?"]);
+    mimic("joint = \"cart\"", &["is the joint itself", "expected another revolute or prismatic joint"]);
+    mimic("joint = \"ball\"", &["is neither revolute nor prismatic"]);
+    mimic("joint = \"wheel\", ratio = 1e7", &["`ratio`", "is 10000000", "-1000000 to 1000000"]);
+    let ball = "[[joint]]\nkind = \"spherical\"\na = \"ball\"\nb = \"world\"\nmimic = { joint = \"x\" }";
+    refused("", "", ball, &["`mimic`", "does not belong to a spherical joint"]);
+}
+
 #[test]
 fn a_slow_motor_does_not_fall_asleep() {
     let slide = "[[joint]]\nkind = \"prismatic\"\na = \"ground\"\nb = \"ball\"\nat_a_m = [0, 0, 0.5]\naxis = [1, 0, 0]\nmotor = { velocity_m_s = 1e-3 }";

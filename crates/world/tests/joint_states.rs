@@ -209,6 +209,66 @@ fn coordinates_that_a_joint_cannot_have_are_refused_and_move_nothing() {
     assert!(matches!(other.set_joint_states(&[state(&world, "elbow", 0.1, 0.0)]), Err(WorldError::Foreign)));
 }
 
+/// Two wheels beside each other, the second of which follows the first and leads a rack.
+fn gears() -> SceneBuilder {
+    let wheel = |x: f64| Rigid::cuboid([0.1; 3]).mass_kg(1.0).at([x, 0.0, 0.0]).rate_hz(500.0);
+    let slide = JointKind::Prismatic { axis: DVec3::Z, range_m: Some([-0.3, 0.3]), motor: None };
+    let scene = Scene::builder().gravity([0.0; 3]).add("first", wheel(0.0)).add("second", wheel(1.0));
+    scene
+        .add("rack", wheel(2.0))
+        .joint("rack", None, slide, [2.0, 0.0, 0.0])
+        .joint_name("rack")
+        .mimic("second", 0.1)
+        .joint("first", None, hinge(None), [0.0; 3])
+        .joint_name("first")
+        .joint("second", None, hinge(None), [1.0, 0.0, 0.0])
+        .joint_name("second")
+        .mimic("first", -2.0)
+}
+
+#[test]
+fn joints_that_follow_go_along_with_those_that_are_set() {
+    let world = started(gears());
+    world.set_joint_states(&[state(&world, "first", 0.5, 0.3)]).unwrap();
+    let all = world.joint_states().unwrap();
+    for (found, (position, velocity)) in all.iter().zip([(-0.1, -0.06), (0.5, 0.3), (-1.0, -0.6)]) {
+        assert!((found.position - position).abs() < 1e-12 && (found.velocity - velocity).abs() < 1e-12, "{all:?}");
+    }
+    // and stay together by their own constraint, in one cluster
+    world.advance(SimSpan::from_millis(1000));
+    let [rack, first, second] = [0, 1, 2].map(|at| world.joint_states().unwrap()[at]);
+    assert!((first.position - 0.8).abs() < 1e-6, "all go on at their rates: {first:?}");
+    assert!((second.position + 2.0 * first.position).abs() < 1e-6, "{second:?} of {first:?}");
+    assert!((rack.position - 0.1 * second.position).abs() < 1e-6, "{rack:?} of {second:?}");
+}
+
+#[test]
+fn coordinates_that_part_a_joint_from_the_one_that_it_follows_are_refused() {
+    let world = started(gears());
+    let set = |states: &[JointState]| world.set_joint_states(states).unwrap_err().to_string();
+    let apart = set(&[state(&world, "first", 0.5, 0.0), state(&world, "second", 1.0, 0.0)]);
+    assert_eq!(apart, "the position of joint \"second\" is 1; expected -1, as it follows joint \"first\"");
+    assert!(set(&[state(&world, "second", 0.4, 0.0)]).contains("expected 0, as it follows joint \"first\""));
+    // the rack would go 0.4 m
+    assert!(set(&[state(&world, "first", -2.0, 0.0)]).contains("the position of joint \"rack\" is 0.4"));
+    assert!(world.joint_states().unwrap().iter().all(|state| state.position == 0.0));
+}
+
+#[test]
+fn a_joint_that_cannot_follow_is_refused() {
+    let refused = |scene: SceneBuilder| scene.build().unwrap_err().to_string();
+    let none = refused(gears().mimic("third", 1.0));
+    assert_eq!(none, "a joint follows the joint \"third\", and the scene has none of that name");
+    let itself = refused(gears().mimic("second", 1.0));
+    assert!(
+        itself.ends_with("the joint follows joint 2; expected another hinge or slide, by its number from 0"),
+        "{itself}"
+    );
+    assert!(refused(gears().mimic("first", f64::NAN)).contains("ratio to the joint that it follows"));
+    let ball = gears().joint("first", None, JointKind::Spherical, [0.0; 3]).mimic("second", 1.0);
+    assert!(refused(ball).contains("expected another hinge or slide"));
+}
+
 #[test]
 fn on_threads_coordinates_are_set_while_time_stands() {
     let world = World::start(&arm().build().unwrap(), ExecutorKind::Threads).unwrap();

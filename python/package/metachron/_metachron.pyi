@@ -163,8 +163,13 @@ class Scene:
     def add(self, name: str, what: Part) -> Self:
         """Adds a moving object: a rigid body, a tube, a sheet, a solid or a rope."""
 
-    def joint(self, name: str, kind: JointKind, a: str, b: str | None = None) -> Self:
-        """Joins the rigid bodies `a` and `b`, or `a` and the world. Place and axis of `kind` are in the world's axes, as the bodies are at the start."""
+    def joint(
+        self, name: str, kind: JointKind, a: str, b: str | None = None, *, mimic: str | None = None, ratio: float = 1.0
+    ) -> Self:
+        """Joins the rigid bodies `a` and `b`, or `a` and the world. Place and axis of `kind` are in the world's axes, as the bodies are at the start.
+
+        A hinge or slide follows the joint `mimic`, one too: its travel is `ratio` times that one's, rad or m for each rad or m.
+        """
 
     def sensor(self, name: str, on: Sensor) -> Self:
         """Adds a sensor, which `World.sensor` reads."""

@@ -8,28 +8,35 @@
 //! answer: those of the step before, then those of the answer itself, until the joint holds. Positions are kept as by
 //! RATTLE (AND83): to second order, and a turning body keeps its energy. Theory: docs/theory/clusters.md, eq. 21.
 
+mod mimic;
+mod placed;
+
 use crate::constraint::geometric_stiffness::Tie;
-use crate::constraint::{ConstraintRows, End, FineStep, Frame, Pull, RowOwner, Slides};
+use crate::constraint::{ConstraintRows, FineStep, Pull, RowOwner, Slides};
 use crate::detect::ClusterScene;
 use crate::joint::{Joint, JointKind, Motor, MotorGoal};
 use crate::lists::reset;
 use crate::member::memory::Partner;
 use crate::member::participant::{place_of, relative, velocity};
-use crate::member::{MaterialPoint, Participant, Pose};
+use crate::member::{Participant, Pose};
 use crate::push_out::PUSH_OUT_MAX_M_S;
 use crate::solve::{Hold, JointRow, Side, SideTerm, Spring};
 use glam::{DQuat, DVec3};
-use metachron_core::{Anchor, shortest_turn};
+use metachron_core::shortest_turn;
 use metachron_geometry::narrow_phase::TouchKey;
+use mimic::Mimicking;
+use placed::{Jointed, Placed, Together};
 use std::f64::consts::{PI, TAU};
 
 /// A row that gave this share of the most that it may is not asked whether it holds.
 const YIELDS_SHARE: f64 = 0.999;
 
-/// The keys of the rows of a motor, of friction and of an armature: above those of the rows that hold their joint.
+/// The keys of the rows of a motor, of friction, of an armature and of a travel that follows another: above those of the rows that hold
+/// their joint.
 const MOTOR: u32 = 16;
 const FRICTION: u32 = 17;
 const ARMATURE: u32 = 18;
+const MIMIC: u32 = 19;
 
 /// The joints of a fine step.
 #[derive(Debug, Default)]
@@ -42,6 +49,7 @@ pub(crate) struct Joints {
     pub missed_m: f64,
     held: Vec<Held>,
     parts: Vec<Part>,
+    mimicking: Vec<Mimicking>,
     /// Where members that joints hold will be by the velocities that rows were aimed with last.
     poses: Vec<Option<Pose>>,
 }
@@ -55,18 +63,6 @@ pub struct JointTotal {
     pub joint: u32,
     /// Of the first body on the second, N·m·s of a hinge, N·s of a slide.
     pub impulse: f64,
-}
-
-/// A joint between participants.
-#[derive(Debug, Clone, Copy)]
-struct Jointed {
-    /// Its number in the scene.
-    number: u32,
-    /// As it holds now.
-    joint: Joint,
-    a: usize,
-    /// `None` is the world.
-    b: Option<usize>,
 }
 
 /// A joint as it was laid out.
@@ -123,27 +119,13 @@ struct Off {
     travel: f64,
 }
 
-/// Two points or two turns that a joint holds together, and the owner of their first row.
-#[derive(Clone, Copy)]
-struct Together {
-    sides: [Side; 2],
-    owner: RowOwner,
-}
-
-/// The sides that the motor of a joint drives against each other, along an axis of the world.
-#[derive(Clone, Copy)]
-struct Driven {
-    axis: DVec3,
-    sides: [Side; 2],
-    owner: RowOwner,
-}
-
 impl Joints {
     /// Lays out all joints between participants.
     pub fn gather(&mut self, scene: &ClusterScene, step: &FineStep<'_, '_>, constraints: &mut ConstraintRows) {
         let FineStep { all, progress, .. } = *step;
         self.held.clear();
         self.parts.clear();
+        self.mimicking.clear();
         self.drives = false;
         for (a, one) in all.iter().enumerate() {
             for (number, joint) in scene.joints_of(one.id) {
@@ -159,53 +141,36 @@ impl Joints {
                 self.hold(step, Jointed { number, joint, a, b }, constraints);
             }
         }
+        self.lay_mimics(step, constraints);
         self.aim(all, constraints, |member| &progress[member].v_before[..], step.h_s);
     }
 
     /// Lays out one joint.
     fn hold(&mut self, step: &FineStep<'_, '_>, of: Jointed, constraints: &mut ConstraintRows) {
-        let Jointed { number, joint, a: first, b: second } = of;
-        let all = step.all;
-        let at = |member: usize| all[member].member.pose(&[], 0.0);
-        let (Some(a), Some(b)) = (at(first), second.map_or(Some(Pose::WORLD), at)) else { return };
-        let anchors = [a.place(joint.anchor_a_m), b.place(joint.anchor_b_m)];
-        // on a slide b's anchor meets the matter of a beside it, wherever that is
-        let on_a = if matches!(joint.kind, JointKind::Prismatic { .. }) { anchors[1] } else { anchors[0] };
-        let (Some(point_a), Some(point_b)) =
-            (material(all, Some(first), &a, on_a), material(all, second, &b, anchors[1]))
-        else {
-            return;
-        };
-        let ends = [End { member: Some(first), point: point_a }, End { member: second, point: point_b }];
-        let owner_of_turns = RowOwner::new(first, second, Partner::Joint(number));
-        let Joint { tears_above_n, yields_above_n, .. } = joint;
-        let owner = RowOwner { tears_above_n, yields_above_n, frame: Frame::of(&b), ..owner_of_turns };
+        let joint = of.joint;
+        let Some(placed) = of.placed(step.all) else { return };
+        let Placed { poses: [a, b], ends, axis, points, .. } = placed;
         if let JointKind::Spring { stiffness_n_m, damping_n_s_m, rest_m } = joint.kind {
-            constraints.spring(step, &ends, &Pull { stiffness_n_m, damping_n_s_m, rest_m }, owner);
+            constraints.spring(step, &ends, &Pull { stiffness_n_m, damping_n_s_m, rest_m }, points.owner);
             return;
         }
-        let points = Together { sides: [ends[0].side(), ends[1].side()], owner };
-        // a row that holds a turn gives no force
-        let turns = [a.turns.of_member(first), second.map_or(Side::FIXED, |at| b.turns.of_member(at))];
-        let turns = Together { sides: turns, owner: owner_of_turns };
-        let as_before_n = all[first].memory.recall(owner.partner, TouchKey::default()).force_n;
-        let (axis, now) = (joint.axis(&a, anchors[1] - anchors[0]), joint.off(&a, &b));
+        let as_before_n = step.all[of.a].memory.recall(points.owner.partner, TouchKey::default()).force_n;
         let (rows, rotations) = ([constraints.rows.len(); 2], [a.rotation, b.rotation]);
-        self.held.push(Held { of, axis, rows, now, rotations });
-        self.lay(step, constraints, points, turns);
+        self.held.push(Held { of, axis, rows, now: joint.off(&a, &b), rotations });
+        self.lay(step, constraints, &placed);
         let rows = [rows[0], constraints.rows.len()];
         self.held.last_mut().into_iter().for_each(|held| held.rows = rows);
         let is_point = !matches!(joint.kind, JointKind::Rope { .. });
-        let tie = Tie { ends: &ends, force_n: as_before_n, owner, rows, is_point };
+        let tie = Tie { ends: &ends, force_n: as_before_n, owner: points.owner, rows, is_point };
         constraints.geometric_stiffness.note(step, &tie);
-        let of = if matches!(joint.kind, JointKind::Revolute { .. }) { turns.sides } else { points.sides };
-        resist(step, constraints, &joint, Driven { axis, sides: of, owner: owner_of_turns });
+        resist(step, constraints, &joint, &placed);
     }
 
     /// Lays out the rows of the joint that was noted last.
-    fn lay(&mut self, step: &FineStep<'_, '_>, constraints: &mut ConstraintRows, points: Together, turns: Together) {
+    fn lay(&mut self, step: &FineStep<'_, '_>, constraints: &mut ConstraintRows, placed: &Placed) {
         let at = self.held.len() - 1;
-        let Held { of: Jointed { joint, .. }, axis, .. } = self.held[at];
+        let joint = self.held[at].of.joint;
+        let Placed { axis, points, turns, .. } = *placed;
         let (mut key, mut driven) = (0, None);
         let mut push = |way: Way, of: Together, hold: Hold| {
             let (row, owner) = (constraints.rows.len(), RowOwner { key, ..of.owner });
@@ -226,7 +191,7 @@ impl Joints {
                 push(Way::Turn, turns, Hold::ALL);
             }
             JointKind::Revolute { range_rad, motor, .. } => {
-                driven = motor.zip(Some(turns));
+                driven = motor;
                 push(Way::Point, points, Hold::ALL);
                 push(Way::Turn, turns, Hold::across(axis));
                 if let Some([low, high]) = range_rad {
@@ -236,7 +201,7 @@ impl Joints {
             }
             JointKind::Spherical => push(Way::Point, points, Hold::ALL),
             JointKind::Prismatic { range_m, motor, .. } => {
-                driven = motor.zip(Some(points));
+                driven = motor;
                 push(Way::Point, points, Hold::across(axis));
                 push(Way::Turn, turns, Hold::ALL);
                 if let Some([low, high]) = range_m {
@@ -247,13 +212,12 @@ impl Joints {
             JointKind::Rope { length_m } => push(Way::Below(length_m), points, Hold::pushing(axis)),
             JointKind::Spring { .. } => {}
         }
-        if let Some((motor, Together { sides, .. })) = driven {
-            // a motor's effort is no force that holds its joint together
-            self.drive(step, constraints, &motor, Together { sides, owner: turns.owner });
+        if let Some(motor) = driven {
+            self.drive(step, constraints, &motor, placed.free(&joint));
         }
     }
 
-    /// Lays out the row of a motor of the joint noted last, between spins of a hinge, points of a slide. A push that moves b forward pushes a back.
+    /// Lays out the row of a motor of the joint noted last. A push that moves b forward pushes a back.
     fn drive(&mut self, step: &FineStep<'_, '_>, constraints: &mut ConstraintRows, motor: &Motor, of: Together) {
         let Some(Held { of: Jointed { joint, .. }, axis, now, .. }) = self.held.last().copied() else { return };
         self.drives |= motor.moves();
@@ -307,7 +271,7 @@ impl Joints {
         velocities: impl Fn(usize) -> &'v [DVec3],
         h_s: f64,
     ) -> Aimed {
-        let Self { held, parts, poses, .. } = self;
+        let Self { held, parts, mimicking, poses, .. } = self;
         reset(poses, all.len(), None);
         for member in held.iter().flat_map(|held| [Some(held.of.a), held.of.b]).flatten() {
             poses[member] = poses[member].or_else(|| all[member].member.pose(velocities(member), h_s));
@@ -334,13 +298,19 @@ impl Joints {
                 aimed.miss_m = aimed.miss_m.max(part.way.missed(miss, row));
             }
         }
+        for mimic in &*mimicking {
+            let row = &mut constraints.rows[mimic.row];
+            let miss = mimic.miss(held, poses, h_s);
+            row.target_m_s = relative(&row.sides, &velocities) - DVec3::X * (miss / h_s);
+            aimed.miss_m = aimed.miss_m.max(miss.abs());
+        }
         aimed
     }
 }
 
 /// Lays out the friction of a joint and its armature between the sides that its motor would drive.
-fn resist(step: &FineStep<'_, '_>, constraints: &mut ConstraintRows, joint: &Joint, along: Driven) {
-    let Driven { axis, sides, owner } = along;
+fn resist(step: &FineStep<'_, '_>, constraints: &mut ConstraintRows, joint: &Joint, placed: &Placed) {
+    let (axis, Together { sides, owner }) = (placed.axis, placed.free(joint));
     if joint.friction > 0.0 {
         let row = JointRow::new(sides, Hold::motor(axis, joint.friction * step.h_s));
         constraints.push(step, row, RowOwner { key: FRICTION, owes: true, ..owner });
@@ -469,12 +439,6 @@ impl Pose {
     pub fn place(&self, local_m: DVec3) -> DVec3 {
         self.origin_m + self.rotation * local_m
     }
-}
-
-/// The matter of a participant, or of the world, at `place`.
-fn material(all: &[Participant<'_>], member: Option<usize>, pose: &Pose, place: DVec3) -> Option<MaterialPoint> {
-    let Some(member) = member else { return Some(MaterialPoint::led(place, DVec3::ZERO)) };
-    all[member].member.anchor(Anchor::Local(pose.rotation.conjugate() * (place - pose.centre_m)))
 }
 
 /// The inverse mass of a side along an axis where nothing but its member's own blocks resists, 1/kg, or 1/(kg m²) of a turn.

@@ -157,6 +157,7 @@ impl ClusterScene {
     /// [`JointError`] for a number outside its range.
     pub fn jointed(self, joints: Arc<[Joint]>) -> Result<Self, JointError> {
         joints.iter().try_for_each(Joint::check)?;
+        (0..).zip(joints.iter()).try_for_each(|(number, joint)| joint.check_mimic(number, &joints))?;
         let mut by_body: Vec<u32> = (0..).zip(joints.iter()).map(|(number, _)| number).collect();
         by_body.sort_by_key(|&number| joints[number as usize].a);
         let passing = joints.iter().filter(|joint| !joint.collide);
@@ -218,6 +219,11 @@ impl ClusterScene {
         let first = self.by_body.partition_point(|&number| self.joints[number as usize].a < id);
         let joints = self.by_body[first..].iter().map(|&number| (number, &self.joints[number as usize]));
         joints.take_while(move |(_, joint)| joint.a == id)
+    }
+
+    /// The joint of a number.
+    pub fn joint(&self, number: u32) -> Option<&Joint> {
+        self.joints.get(number as usize)
     }
 
     /// Whether two jointed bodies pass through each other; the lower number first.

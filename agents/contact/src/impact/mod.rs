@@ -250,10 +250,9 @@ impl Impacts {
         let holding = search.contacts.iter().filter(|contact| self.touches(contact, progress));
         let joined = constraints.rows.iter().filter(|row| is_rigid(row));
         for sides in holding.map(|contact| &contact.sides).chain(joined.map(|row| &row.sides)) {
-            let mut both = movers(sides);
-            if let (Some(a), Some(b)) = (both.next(), both.next()) {
-                touching.join(a, b);
-            }
+            let mut all = movers(sides);
+            let Some(first) = all.next() else { continue };
+            all.for_each(|other| touching.join(first, other));
         }
         self.touching = touching;
         reset(&mut self.works, progress.len(), None);
@@ -375,6 +374,9 @@ impl Impacts {
 
 /// The members that a row moves.
 fn movers(sides: &[Side; 2]) -> impl Iterator<Item = usize> + use<> {
-    let of = |side: &Side| (!side.terms().is_empty()).then_some(side.member);
-    of(&sides[0]).into_iter().chain(of(&sides[1]))
+    let of = |side: &Side| {
+        let own = (!side.terms().is_empty()).then_some(side.member);
+        own.into_iter().chain(side.second().map(|part| part.member))
+    };
+    of(&sides[0]).chain(of(&sides[1]))
 }

@@ -76,6 +76,8 @@ pub(crate) struct Remembered {
     pub owed_slip_m: DVec3,
     /// The same of its friction about the normal.
     pub spin: Spin,
+    /// The whole turns of two joints of which one follows the other, rad or metres.
+    pub turned: f64,
 }
 
 /// One pair, with its places by rising names; places of one name by their triangles.

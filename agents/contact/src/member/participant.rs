@@ -231,7 +231,11 @@ pub(crate) fn relative<'a>(sides: &[Side; 2], of: impl Fn(usize) -> &'a [DVec3])
     velocity(&sides[0], &of) - velocity(&sides[1], &of)
 }
 
-/// The velocity of a side with the velocities `of` its member, m/s; zero for one that does not move.
+/// The velocity of a side with the velocities `of` its members, m/s; zero for one that does not move.
 pub(crate) fn velocity<'a>(side: &Side, of: impl Fn(usize) -> &'a [DVec3]) -> DVec3 {
-    if side.terms().is_empty() { DVec3::ZERO } else { side.velocity(of(side.member)) }
+    if side.terms().is_empty() {
+        return DVec3::ZERO;
+    }
+    let own = side.velocity(of(side.member));
+    side.second().map_or(own, |part| own + part.velocity(of(part.member)))
 }

@@ -73,10 +73,7 @@ impl Posed<'_, '_> {
 /// Counts the members of all sides anew.
 fn move_sides(contacts: &mut [Contact], rows: &mut [JointRow], to: impl Fn(usize) -> Option<usize>) {
     let contacts = contacts.iter_mut().flat_map(|contact| &mut contact.sides);
-    let sides = contacts.chain(rows.iter_mut().flat_map(|row| &mut row.sides));
-    for side in sides.filter(|side| !side.terms().is_empty()) {
-        side.member = to(side.member).unwrap_or(side.member);
-    }
+    contacts.chain(rows.iter_mut().flat_map(|row| &mut row.sides)).for_each(|side| side.move_members(&to));
 }
 
 /// Blames the participant whose matrix or velocities are none, of the members at these `places`.

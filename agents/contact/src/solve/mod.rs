@@ -54,7 +54,7 @@ pub use sparse::sparse_factor::SparseFactor;
 pub use statement::error::ProblemError;
 pub use statement::joint::{Hold, JointRow, Pressed, Spring};
 pub use statement::problem::{Block, Contact, Member, Problem, Response, multiply};
-pub use statement::side::{SIDE_TERMS_MAX, Side, SideTerm};
+pub use statement::side::{SIDE_TERMS_MAX, Side, SidePart, SideTerm};
 
 #[cfg(test)]
 mod tests;

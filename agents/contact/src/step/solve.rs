@@ -11,6 +11,7 @@ use crate::lists::refill;
 use crate::member::participant::Progress;
 use crate::member::problem::{Posed, Velocities};
 use crate::member::{Participant, Role};
+use crate::solve::Side;
 use crate::step::plan::times;
 use crate::step::report::ClusterReport;
 use crate::step::{ClusterStepper, On};
@@ -111,7 +112,7 @@ impl ClusterStepper {
         progress.iter_mut().for_each(|state| state.place = (!state.unanswered.is_empty()).then_some(0));
         let sides =
             search.contacts.iter().flat_map(|c| &c.sides).chain(constraints.rows.iter().flat_map(|row| &row.sides));
-        sides.filter(|side| !side.terms().is_empty()).for_each(|side| progress[side.member].place = Some(0));
+        sides.flat_map(Side::parts).for_each(|part| progress[part.member].place = Some(0));
         let involved = progress.iter_mut().filter(|state| state.place.is_some());
         involved.for_each(|state| state.place = count.next());
         refill(
@@ -156,9 +157,11 @@ impl ClusterStepper {
                 hold(&mut owner.both());
             }
         }
-        for (owner, impulse) in constraints.owners.iter().zip(&solution.rows_n_s) {
+        for ((owner, row), impulse) in constraints.owners.iter().zip(&constraints.rows).zip(&solution.rows_n_s) {
             if *impulse != DVec3::ZERO {
                 hold(&mut owner.both());
+                // a row between two joints has members besides its owner's
+                hold(&mut row.sides.iter().flat_map(Side::parts).map(|part| part.member));
             }
         }
         for (one, state) in all.iter().zip(progress) {

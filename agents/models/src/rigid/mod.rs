@@ -20,7 +20,7 @@ mod spec;
 pub use crate::trajectory::Keyframe;
 pub use body::RigidBody;
 pub use kinematic::KinematicBody;
-pub use metachron_contact::joint::{JOINT_GAP_MAX_M, Joint, JointError, JointKind, Motor, MotorGoal};
+pub use metachron_contact::joint::{JOINT_GAP_MAX_M, Joint, JointError, JointKind, Mimic, Motor, MotorGoal};
 pub use spec::{GivenInertia, LIMITS, Led, MASS, Restraint, RigidError, RigidSpec};
 
 #[cfg(test)]

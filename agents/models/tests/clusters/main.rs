@@ -12,6 +12,7 @@ mod joints;
 mod large;
 mod links;
 mod locked;
+mod mimics;
 mod motors;
 mod organ;
 mod overlaps;

@@ -6,7 +6,7 @@
 use super::bodies::BodyReader;
 use crate::imported::ImportError;
 use crate::model::{Joint, Kind, Motor};
-use crate::xml::Element;
+use crate::xml::{DAMPING_MAX, Element, STRENGTH_MAX};
 
 /// Reads the actuators. Actuators of forces give none without a command, and programs command joints themselves.
 ///
@@ -65,14 +65,14 @@ struct Law {
 impl Law {
     /// That of an actuator; `None` for one that is no servo.
     fn of(element: &Element) -> Result<Option<Self>, ImportError> {
-        let gain = |name: &str| if element.has(name) { element.at_least_0(name) } else { Ok(1.0) };
+        let gain = |most: f64, name: &str| if element.has(name) { element.up_to(most, name) } else { Ok(1.0) };
         let law = match element.tag.as_str() {
             "position" => {
-                let (gain, damping) = (gain("kp")?, element.at_least_0("kv")?);
+                let (gain, damping) = (gain(STRENGTH_MAX, "kp")?, element.up_to(DAMPING_MAX, "kv")?);
                 Self { gain, bias: 0.0, stiffness: gain, damping }
             }
             "velocity" => {
-                let gain = gain("kv")?;
+                let gain = gain(DAMPING_MAX, "kv")?;
                 Self { gain, bias: 0.0, stiffness: 0.0, damping: gain }
             }
             "general" if element.text("biastype") == Some("affine") => {

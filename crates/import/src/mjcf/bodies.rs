@@ -26,6 +26,8 @@ pub(super) struct BodyReader<'a> {
     pub(super) model: Model,
     /// For each joint of the model, where the zero of its file is: from its start, radians or metres.
     pub(super) zeros: Vec<f64>,
+    /// And where it starts: from the pose of the file, likewise.
+    pub(super) starts: Vec<f64>,
     pub(super) sites: BTreeMap<String, Site<'a>>,
     /// `None` for a start where the file has its bodies.
     pub(super) keyframe: Option<Keyframe<'a>>,
@@ -116,6 +118,7 @@ impl<'a> BodyReader<'a> {
             notes,
             model: Model::default(),
             zeros: Vec::new(),
+            starts: Vec::new(),
             sites: BTreeMap::new(),
             keyframe: None,
             static_kg: Some(0.0),
@@ -188,8 +191,8 @@ impl<'a> BodyReader<'a> {
             is_lent: false,
         });
         match joint {
-            None => self.push_joint(Joint::weld(place, host.link, index), 0.0),
-            Some(StartedJoint { between, zero, .. }) => between.into_iter().for_each(|one| self.push_joint(one, zero)),
+            None => self.push_joint(StartedJoint::still(Some(Joint::weld(place, host.link, index)))),
+            Some(joint) => self.push_joint(joint),
         }
         let here = Host { link: Some(index), is_fixed, ..above };
         self.note_sites(&contents, here)?;
@@ -212,7 +215,9 @@ impl<'a> BodyReader<'a> {
             let link = self.model.links.len();
             let joint = self.joint(*placed, at, link)?;
             at = Host { link: Some(link), ..at.moved(&joint) };
-            let between = joint.between.ok_or_else(|| free_with_others(*placed))?;
+            if joint.between.is_none() {
+                return Err(free_with_others(*placed));
+            }
             let name = self.unused(None, &format!("{body}-{}", placed.element.text("name").unwrap_or("joint")));
             let (mass, parts, look) = (Mass::None, Vec::new(), Look::default());
             self.model.links.push(Link {
@@ -226,14 +231,17 @@ impl<'a> BodyReader<'a> {
                 look,
                 is_lent: false,
             });
-            self.push_joint(between, joint.zero);
+            self.push_joint(joint);
         }
         Ok(at)
     }
 
-    fn push_joint(&mut self, joint: Joint, zero: f64) {
+    /// Keeps a joint, unless its body is free.
+    fn push_joint(&mut self, StartedJoint { between, zero, start, .. }: StartedJoint) {
+        let Some(joint) = between else { return };
         self.model.joints.push(joint);
         self.zeros.push(zero);
+        self.starts.push(start);
     }
 
     /// Keeps where the sites of a body are; sites that nothing names are not read.

@@ -1,12 +1,16 @@
-//! Equalities between bodies: a point that two share, or all of their pose.
+//! Equalities: a point that two bodies share, or all of their pose; a joint that follows another.
 //!
-//! In: `equality` elements. Out: joints that close loops. Never here: couplings of joints and of tendons (they are listed: scenes have none).
+//! In: `equality` elements. Out: joints that close loops, joints that follow. Never here: couplings of tendons (they are listed: scenes
+//! have none).
 
 use super::bodies::BodyReader;
 use crate::imported::ImportError;
-use crate::model::{Joint, Kind};
+use crate::model::{Joint, Kind, Mimic};
 use crate::xml::Element;
 use glam::DVec3;
+
+/// Coordinates that differ by less are equal, rad or m.
+const ROUNDING: f64 = 1e-9;
 
 /// Reads the equalities.
 ///
@@ -21,13 +25,17 @@ pub(super) fn read(root: &Element, reader: &mut BodyReader<'_>) -> Result<(), Im
         let kind = match element.tag.as_str() {
             "connect" if element.has("body1") && element.has("anchor") => Kind::Spherical,
             "weld" if element.has("body1") => Kind::Fixed,
+            "joint" => {
+                follow(element.read(), reader)?;
+                continue;
+            }
             tag => {
                 element.read_all_within();
                 reader.notes.push(element.note(match tag {
                     "connect" | "weld" => {
                         "is left out: it is between sites; expected `body1`, and of `connect` an `anchor`"
                     }
-                    _ => "is left out: scenes have joints between two bodies, and nothing that couples joints",
+                    _ => "is left out: scenes have joints between two bodies, and joints that follow joints",
                 }));
                 continue;
             }
@@ -57,6 +65,42 @@ pub(super) fn read(root: &Element, reader: &mut BodyReader<'_>) -> Result<(), Im
         let weld = Joint::weld(element.place.clone(), parent, child);
         reader.model.joints.push(Joint { name, kind, anchor_m, ..weld });
     }
+    Ok(())
+}
+
+/// Lets a joint follow another: its way from the file's pose is a polynomial of that of the other, of which scenes have the first power.
+fn follow(element: &Element, reader: &mut BodyReader<'_>) -> Result<(), ImportError> {
+    if !element.has("joint2") {
+        element.read_all_within();
+        reader.notes.push(element.note("is left out: it holds one joint; expected `joint2`, which that one follows"));
+        return Ok(());
+    }
+    let joint = |key: &'static str| {
+        let name = element.needed(key)?;
+        let found = reader.model.joints.iter().position(|joint| joint.name == name && joint.kind.travels());
+        found.ok_or_else(|| element.wrong(format!("names `{name}`, and there is no hinge or slide of that name")))
+    };
+    let [follows, leads] = [joint("joint1")?, joint("joint2")?];
+    let given = element.list("polycoef")?.unwrap_or_default();
+    let power = |at: usize| given.get(at).copied().unwrap_or(f64::from(u8::from(at == 1)));
+    if follows == leads {
+        return Err(element.wrong("ties a joint to itself; expected two joints"));
+    }
+    let before = reader.model.joints[follows].mimic.is_some();
+    let mut note = |what: String| reader.notes.push(element.note(what));
+    if before {
+        note("is left out: a joint of a scene follows one other, and this one does already".to_owned());
+        return Ok(());
+    }
+    if (2..5).any(|at| power(at) != 0.0) {
+        note("has no powers above the first: a joint of a scene follows another by a ratio".to_owned());
+    }
+    let off = reader.starts[follows] - power(0) - power(1) * reader.starts[leads];
+    if off.abs() > ROUNDING {
+        note(format!("holds its joints as they start, {off} from where the file does"));
+    }
+    let joint = reader.model.joints[leads].name.clone();
+    reader.model.joints[follows].mimic = Some(Mimic { joint, ratio: power(1) });
     Ok(())
 }
 

@@ -7,7 +7,7 @@ use super::keyframe::Keyframe;
 use crate::imported::ImportError;
 use crate::model::{Joint, Kind, Motor};
 use crate::pose::Pose;
-use crate::xml::Element;
+use crate::xml::{DAMPING_MAX, Element, STRENGTH_MAX};
 use glam::DVec3;
 
 /// A joint, and where its body starts on it.
@@ -20,12 +20,14 @@ pub(super) struct StartedJoint {
     pub(super) to_spring: Pose,
     /// Where the file's zero is from the start, radians or metres.
     pub(super) zero: f64,
+    /// Where the start is from the pose of the file, likewise.
+    pub(super) start: f64,
 }
 
 impl StartedJoint {
     /// A joint whose body starts where the file has it.
-    const fn still(between: Option<Joint>) -> Self {
-        Self { between, motion: Pose::IDENTITY, to_spring: Pose::IDENTITY, zero: 0.0 }
+    pub(super) const fn still(between: Option<Joint>) -> Self {
+        Self { between, motion: Pose::IDENTITY, to_spring: Pose::IDENTITY, zero: 0.0, start: 0.0 }
     }
 }
 
@@ -81,14 +83,15 @@ impl BodyReader<'_> {
         let axis = frame.rotation * given;
         let spring = element.number("springref")?.unwrap_or(0.0) * unit - at_rest;
         let motor = passive(element, spring - start)?;
-        let [friction, armature] = [element.at_least_0("frictionloss")?, element.at_least_0("armature")?];
+        let [friction, armature] =
+            [element.up_to(STRENGTH_MAX, "frictionloss")?, element.up_to(STRENGTH_MAX, "armature")?];
         if range.is_none() {
             element.read_all(&["limited", "solreflimit", "solimplimit", "margin"]);
         }
         let range = range.map(|range| range.map(|end| end - start));
         let [motion, to_spring] = [start, spring].map(|travel| kind.motion(anchor_m, axis, travel));
         let between = Some(Joint { axis, range, motor, friction, armature, ..joint });
-        Ok(StartedJoint { between, motion, to_spring, zero })
+        Ok(StartedJoint { between, motion, to_spring, zero, start })
     }
 
     /// A body that moves freely: where the keyframe has it in the world, or else as the file has it.
@@ -124,7 +127,7 @@ impl BodyReader<'_> {
 
 /// The spring with a damper, or the damper, that holds a joint by itself.
 fn passive(element: &Element, position: f64) -> Result<Option<Motor>, ImportError> {
-    let (stiffness, damping) = (element.at_least_0("stiffness")?, element.at_least_0("damping")?);
+    let (stiffness, damping) = (element.up_to(STRENGTH_MAX, "stiffness")?, element.up_to(DAMPING_MAX, "damping")?);
     if stiffness > 0.0 {
         return Ok(Some(Motor::Spring { position, stiffness, damping, max_effort: None }));
     }

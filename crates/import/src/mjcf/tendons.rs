@@ -6,7 +6,7 @@
 use super::bodies::BodyReader;
 use crate::imported::ImportError;
 use crate::model::{End, Tie, TieKind};
-use crate::xml::Element;
+use crate::xml::{DAMPING_MAX, Element, STRENGTH_MAX};
 
 /// Reads the tendons.
 ///
@@ -38,7 +38,8 @@ struct Ends {
 /// A tendon between two sites.
 fn tie(element: &Element, sites: [&Element; 2], reader: &mut BodyReader<'_>) -> Result<(), ImportError> {
     let Ends { ends, at_springs_m } = ends(sites, reader)?;
-    let (stiffness_n_m, damping_n_s_m) = (element.at_least_0("stiffness")?, element.at_least_0("damping")?);
+    let (stiffness_n_m, damping_n_s_m) =
+        (element.up_to(STRENGTH_MAX, "stiffness")?, element.up_to(DAMPING_MAX, "damping")?);
     let limits = limits(element, reader.compiler.auto_limits)?.filter(|_| reader.compiler.has_limits);
     let mut push = |kind: TieKind| reader.model.ties.push(Tie { place: element.place.clone(), ends, kind });
     if let Some([least, greatest]) = limits {

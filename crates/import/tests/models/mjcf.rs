@@ -443,14 +443,12 @@ fn bodies_that_share_a_point_or_a_pose_are_joined() {
         <body name="upper" pos="5 0 2"><joint axis="0 1 0"/><geom size="0.1" pos="0.5 0 0"/>
         <body name="lower" pos="1 0 0"><joint axis="0 1 0"/><geom size="0.1" pos="0.5 0 0"/></body></body></worldbody>
         <equality><connect body1="bob" body2="post" anchor="-0.5 0 0"/><weld body1="post" body2="held"/>
-        <connect body1="lower" anchor="1 0 0"/><weld body1="held" active="false"/><joint joint1="a" joint2="b"/></equality>
+        <connect body1="lower" anchor="1 0 0"/><weld body1="held" active="false"/><tendon tendon1="a" tendon2="b"/></equality>
         </mujoco>"#;
     let imported = import(text).unwrap();
     assert_eq!(
         left_out(&imported),
-        [
-            "line 8: equality, joint: is left out: scenes have joints between two bodies, and nothing that couples joints"
-        ]
+        ["line 8: equality, tendon: is left out: scenes have joints between two bodies, and joints that follow joints"]
     );
     let world = start(&imported, &[], 1000.0);
     // from the level a pendulum of a point takes K(1/√2) √(l/g) to its lowest, where a ball has 2/5 r² more than l²
@@ -463,4 +461,78 @@ fn bodies_that_share_a_point_or_a_pose_are_joined() {
     let none = r#"<mujoco><equality><connect body1="none" anchor="0 0 0"/></equality></mujoco>"#;
     let error = import(none).unwrap_err().to_string();
     assert_eq!(error, "line 1: equality, connect: names `none`, and there is no such body");
+}
+
+/// Two wheels with a spring on the first, and an equality between them.
+fn wheels(equality: &str) -> String {
+    format!(
+        r#"<mujoco><compiler angle="radian"/><option gravity="0 0 0"/><worldbody>
+        <body name="a"><joint name="first" stiffness="3" springref="0.5" ref="0.1"/><inertial pos="0 0 0" mass="1" diaginertia="0.02 0.02 0.02"/></body>
+        <body name="b"><joint name="second"/><inertial pos="0 0 0" mass="1" diaginertia="0.02 0.02 0.01"/></body>
+        <body name="c"><joint name="ball" type="ball"/><inertial pos="0 0 0" mass="1" diaginertia="0.02 0.02 0.01"/></body>
+        </worldbody><equality>
+{equality}</equality></mujoco>"#
+    )
+}
+
+#[test]
+fn a_joint_that_an_equality_ties_to_another_goes_with_it() {
+    let ratio = -1.5_f64;
+    let text = wheels(&format!(r#"<joint joint1="second" joint2="first" polycoef="0 {ratio}"/>"#));
+    let imported = import(&text).unwrap();
+    assert_eq!(left_out(&imported), [""; 0]);
+    // a spring that rests 0.4 rad away swings both inertias
+    let omega = (3.0 / (0.02 + ratio * ratio * 0.01)).sqrt();
+    let world = start(&imported, &["first", "second"], 2000.0);
+    for quarter in 1..=4 {
+        let time = f64::from(quarter) * 0.1;
+        advance(&world, 0.1);
+        let expected = 0.4 * (1.0 - (omega * time).cos());
+        let [first, second] = ["first", "second"].map(|joint| position(&world, joint));
+        // a step of first order errs by ω h/2 = 2.5e-3 of the amplitude
+        assert!((first - expected).abs() < 4e-3 * 0.4, "{first} for {expected}");
+        assert!((second - ratio * first).abs() < 1e-7, "{second} of {first}");
+    }
+}
+
+#[test]
+fn an_equality_that_no_joint_of_a_scene_can_keep_is_listed_or_refused() {
+    let listed = |equality: &str| left_out(&import(&wheels(equality)).unwrap());
+    assert_eq!(
+        listed(r#"<joint joint1="first"/>"#),
+        ["line 6: equality, joint: is left out: it holds one joint; expected `joint2`, which that one follows"]
+    );
+    assert_eq!(
+        listed(r#"<joint joint1="first" joint2="second" polycoef="0.2 1 0.5 0 0"/>"#),
+        [
+            "line 6: equality, joint: has no powers above the first: a joint of a scene follows another by a ratio",
+            "line 6: equality, joint: holds its joints as they start, -0.2 from where the file does",
+        ]
+    );
+    let twice = r#"<joint joint1="first" joint2="second"/><joint joint1="first" joint2="second"/>"#;
+    assert!(listed(twice)[0].ends_with("a joint of a scene follows one other, and this one does already"));
+    for (equality, why) in [
+        (r#"<joint joint1="first" joint2="third"/>"#, "names `third`, and there is no hinge or slide of that name"),
+        (r#"<joint joint1="first" joint2="ball"/>"#, "names `ball`, and there is no hinge or slide of that name"),
+        (r#"<joint joint1="first" joint2="first"/>"#, "ties a joint to itself; expected two joints"),
+    ] {
+        let refused = import(&wheels(equality)).unwrap_err().to_string();
+        assert!(refused.ends_with(why), "{refused}");
+    }
+}
+
+#[test]
+fn a_fixed_body_that_nothing_touches_is_part_of_the_body_that_it_is_on() {
+    // seen alone, without a geom, and touched with another friction
+    let inertial = r#"<inertial pos="0 0 0" mass="1" diaginertia="0.02 0.02 0.02"/>"#;
+    let text = format!(
+        r#"<mujoco><worldbody><body name="base"><freejoint/>{inertial}<geom size="0.1" friction="0.7"/>
+        <body name="seen">{inertial}<geom size="0.1" contype="0" conaffinity="0" friction="0.2"/></body>
+        <body name="bare">{inertial}</body>
+        <body name="rough">{inertial}<geom size="0.1" friction="0.9"/></body></body></worldbody></mujoco>"#
+    );
+    let scene = crate::play::scene(&import(&text).unwrap(), &[], 500.0);
+    let names: Vec<&str> = scene.agents.iter().map(|agent| agent.name.as_str()).collect();
+    assert_eq!(names, ["base", "rough"]);
+    assert!((crate::play::body(&scene, "base").mass_kg - 3.0).abs() < 1e-12);
 }

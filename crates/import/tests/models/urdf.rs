@@ -283,9 +283,95 @@ fn a_link_without_mass_at_the_end_of_a_chain_is_part_of_what_it_is_on() {
     assert_eq!((scene.agents.len(), scene.joints.len()), (1, 0));
 }
 
+/// The double pendulum whose elbow follows its shoulder.
+fn mimicking(tilt: [f64; 2], keys: &str) -> String {
+    double_pendulum(tilt).replace(r#"<child link="lower"/>"#, &format!(r#"<child link="lower"/><mimic {keys}/>"#))
+}
+
 #[test]
-fn a_mimic_joint_is_listed() {
-    let robot = double_pendulum([0.0; 2])
-        .replace(r#"<child link="lower"/>"#, r#"<child link="lower"/><mimic joint="shoulder"/>"#);
-    assert_eq!(left_out(&import(&robot).unwrap()), ["line 3: joint `elbow`, mimic: is left out"]);
+fn a_pendulum_whose_elbow_follows_its_shoulder_has_the_frequency_of_its_closed_form() {
+    for ratio in [1.0, -0.6, 2.5] {
+        // of one freedom φ, with both angles against the vertical φ and (1 + r) φ
+        let (m, l, c, i, g) = (1.5_f64, 0.5, 0.2, 0.02, 9.81);
+        let [a, b, d] = [i + m * c * c + m * l * l, m * l * c, i + m * c * c];
+        let [p, q] = [g * (m * c + m * l), g * m * c];
+        let both = 1.0 + ratio;
+        let w2 = (p + q * both * both) / (a + 2.0 * b * both + d * both * both);
+        let amplitude: f64 = 0.01;
+        let robot = mimicking([amplitude, ratio * amplitude], &format!(r#"joint="shoulder" multiplier="{ratio}""#));
+        let imported = import(&robot).unwrap();
+        assert_eq!(left_out(&imported), [""; 0]);
+        let period = std::f64::consts::TAU / w2.sqrt();
+        let world = start(&imported, &["shoulder", "elbow"], 3200.0 / period);
+        let mut at = 0.0;
+        for share in [0.25, 0.5, 1.0] {
+            advance(&world, (share - at) * period);
+            at = share;
+            let expected = amplitude * ((std::f64::consts::TAU * share).cos() - 1.0);
+            let [shoulder, elbow] = ["shoulder", "elbow"].map(|joint| position(&world, joint));
+            // a step of first order errs by ω h/2 = 1e-3 of the amplitude
+            assert!((shoulder - expected).abs() < 2e-3 * amplitude, "ratio {ratio}, {share}: {shoulder}");
+            assert!((elbow - ratio * shoulder).abs() < 1e-7, "ratio {ratio}, {share}: {elbow} of {shoulder}");
+        }
+    }
+}
+
+#[test]
+fn a_joint_starts_where_the_one_that_it_follows_leads_it() {
+    // both rods are level to start with: the shoulder stands at the end of its limits, and the elbow follows it from an offset
+    let robot = mimicking([0.0; 2], r#"joint="shoulder" multiplier="2" offset="-0.6""#).replace(
+        r#"type="continuous"><origin xyz="0 0 2""#,
+        r#"type="revolute"><limit lower="0.4" upper="0.8"/><origin xyz="0 0 2""#,
+    );
+    let imported = import(&robot).unwrap();
+    let listed = ["line 1: joint `shoulder`: starts at 0.4, the end of its limits that is nearest to zero"];
+    assert_eq!(left_out(&imported), listed);
+    let scene = crate::play::scene(&imported, &[], 500.0);
+    // 0.2 rad against the upper rod
+    let angle = crate::play::body(&scene, "lower").rotation.to_scaled_axis().y;
+    assert!((angle - (0.4 + 2.0 * 0.4 - 0.6)).abs() < 1e-9, "{angle} rad");
+}
+
+#[test]
+fn a_joint_that_can_follow_nothing_moves_by_itself_and_is_listed() {
+    for (keys, why) in [
+        (r#"joint="hip""#, "names `hip`, and there is no joint of that name"),
+        (r#"joint="elbow""#, "names `elbow`, and it follows itself"),
+    ] {
+        let listed = left_out(&import(&mimicking([0.0; 2], keys)).unwrap());
+        assert_eq!(listed, [format!("line 3: joint `elbow`, mimic: is left out: it {why}")]);
+    }
+    let refused = import(&mimicking([0.0; 2], r#"joint="shoulder" multiplier="1e9""#)).unwrap_err().to_string();
+    assert!(refused.contains("joint `elbow`, mimic: `multiplier` is 1000000000; expected"), "{refused}");
+}
+
+#[test]
+fn moments_that_no_body_has_are_those_of_the_link_that_has_them() {
+    let link = |name: &str, moment: &str| {
+        format!(
+            r#"<link name="{name}"><inertial><mass value="1"/><inertia ixx="{moment}" iyy="0.01" izz="0.01"/></inertial></link>"#
+        )
+    };
+    let weld = r#"<joint name="weld" type="fixed"><parent link="good"/><child link="bad"/></joint>"#;
+    let robot = format!("<robot>{}\n{}{weld}</robot>", link("good", "0.01"), link("bad", "-0.05"));
+    let imported = import(&robot).unwrap();
+    let listed = left_out(&imported);
+    assert_eq!(listed.len(), 2, "{listed:?}");
+    assert!(listed[0].starts_with("line 2: link `bad`: has moments of inertia that no body has"), "{listed:?}");
+    let spec = crate::play::body(&crate::play::scene(&imported, &[], 500.0), "good");
+    assert!((spec.mass_kg - 2.0).abs() < 1e-12);
+}
+
+#[test]
+fn numbers_that_no_scene_has_are_those_of_the_robot() {
+    for (dynamics, expected) in [
+        (r#"friction="1e10""#, "joint `elbow`, dynamics: `friction` is 10000000000; expected 0 to 1000000000"),
+        (r#"damping="2e7""#, "joint `elbow`, dynamics: `damping` is 20000000; expected 0 to 10000000"),
+        (r#"damping="-1""#, "joint `elbow`, dynamics: `damping` is -1; expected 0 to 10000000"),
+    ] {
+        let robot = double_pendulum([0.0; 2])
+            .replace(r#"<child link="lower"/>"#, &format!(r#"<child link="lower"/><dynamics {dynamics}/>"#));
+        let refused = import(&robot).unwrap_err().to_string();
+        assert!(refused.ends_with(expected), "{refused}");
+    }
 }

@@ -276,8 +276,12 @@ impl Identity {
 fn jointed(spawns: &[AgentSpawn]) -> Vec<Vec<JointedTo>> {
     let mut jointed = vec![Vec::new(); spawns.len()];
     for (spawn, a) in spawns.iter().zip((0..).map(AgentId)) {
-        let joints = spawn.scene.joints_of(a).filter_map(|(number, joint)| Some(JointedTo { number, other: joint.b? }));
-        for joint in joints.filter(|joint| (joint.other.0 as usize) < spawns.len()) {
+        let joints = spawn.scene.joints_of(a).flat_map(|(number, joint)| {
+            let leads = joint.mimic.and_then(|mimic| spawn.scene.joint(mimic.joint));
+            let others = [joint.b, leads.map(|leads| leads.a), leads.and_then(|leads| leads.b)];
+            others.into_iter().flatten().map(move |other| JointedTo { number, other })
+        });
+        for joint in joints.filter(|joint| joint.other != a && (joint.other.0 as usize) < spawns.len()) {
             jointed[a.0 as usize].push(joint);
             jointed[joint.other.0 as usize].push(JointedTo { other: a, ..joint });
         }

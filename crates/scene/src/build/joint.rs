@@ -5,14 +5,14 @@
 
 use super::common::point;
 use super::force_limits::ForceLimits;
-use super::joint_keys::{check_keys, free_motion};
-use super::joint_rules::{PlacedJoint, check_start, contradictions};
+use super::joint_keys::{check_keys, followed, free_motion};
+use super::joint_rules::{PlacedJoint, check_start, contradictions, tie_mimics};
 use super::objects::{NamedObject, Objects};
 use crate::check::{Checker, Place};
 use crate::format::{JointFile, JointKind as Kind};
 use glam::{DQuat, DVec3};
 use metachron_core::AgentId;
-use metachron_models::rigid::{Joint, JointKind};
+use metachron_models::rigid::{Joint, JointKind, Mimic};
 use metachron_world::Spec;
 
 /// The name of the world in joints: no object may have it.
@@ -48,15 +48,18 @@ struct Anchored {
 
 /// The joints of the scene.
 pub(crate) fn joints(c: &mut Checker<'_, '_>, files: &[JointFile], objects: &Objects) -> Vec<Joint> {
-    let placed: Vec<PlacedJoint> =
-        files.iter().enumerate().filter_map(|(i, file)| place_joint(c, i, file, objects)).collect();
+    let mut placed: Vec<PlacedJoint> = (0..files.len()).filter_map(|at| place_joint(c, at, files, objects)).collect();
     contradictions(c, &placed);
+    // a scene with a joint that cannot be is none
+    if placed.len() == files.len() {
+        tie_mimics(&mut placed);
+    }
     placed.into_iter().filter_map(PlacedJoint::joint).collect()
 }
 
 /// Reads one joint and checks that it can hold at the start.
-fn place_joint(c: &mut Checker<'_, '_>, index: usize, file: &JointFile, objects: &Objects) -> Option<PlacedJoint> {
-    let place = c.place(&format!("joint.{index}"));
+fn place_joint(c: &mut Checker<'_, '_>, index: usize, files: &[JointFile], objects: &Objects) -> Option<PlacedJoint> {
+    let (file, place) = (&files[index], c.place(&format!("joint.{index}")));
     let before = c.count();
     let is_complete = check_keys(c, &place, file);
     let (a, b) = (end(c, &place, "a", &file.a, objects), end(c, &place, "b", &file.b, objects));
@@ -79,6 +82,8 @@ fn place_joint(c: &mut Checker<'_, '_>, index: usize, file: &JointFile, objects:
     let to = other_anchor(c, &place, file, b, from)?;
     let free = if is_complete { free_motion(c, &place, file, from.distance(to)) } else { None };
     let limits = ForceLimits::read(c, &place, [file.tears_above_n, file.yields_above_n]);
+    let ratio = file.mimic.as_ref().and_then(|mimic| mimic.ratio).unwrap_or(1.0);
+    let mimic = followed(c, &place, index, files).map(|joint| Mimic { joint, ratio, offset: 0.0 });
     if c.count() > before {
         return None;
     }
@@ -86,7 +91,7 @@ fn place_joint(c: &mut Checker<'_, '_>, index: usize, file: &JointFile, objects:
     // the keys of other kinds are refused
     let friction = file.friction_n_m.or(file.friction_n).unwrap_or(0.0);
     let armature = file.armature_kg_m2.or(file.armature_kg).unwrap_or(0.0);
-    let placed = PlacedJoint { place, ends, anchors, free_motion, collide, limits, friction, armature };
+    let placed = PlacedJoint { place, ends, anchors, free_motion, collide, limits, friction, armature, mimic };
     check_start(c, &placed).then_some(placed)
 }
 
@@ -185,10 +190,10 @@ impl PlacedJoint {
             None => (to, DQuat::IDENTITY),
         };
         let rest = (a.rotation.conjugate() * rotation_b).normalize();
-        let Self { collide, limits: ForceLimits { tears_above_n, yields_above_n }, friction, armature, .. } = *self;
+        let Self { collide, limits: ForceLimits { tears_above_n, yields_above_n }, friction, armature, mimic, .. } =
+            *self;
         let anchor_a_m = a.to_local(from);
-        let limited =
-            Joint { collide, tears_above_n, yields_above_n, friction, armature, ..Joint::new(id, b.agent, kind) };
-        Joint { anchor_a_m, anchor_b_m, rest, ..limited }
+        let limited = Joint { collide, tears_above_n, yields_above_n, ..Joint::new(id, b.agent, kind) };
+        Joint { anchor_a_m, anchor_b_m, rest, friction, armature, mimic, ..limited }
     }
 }

@@ -10,7 +10,7 @@ use metachron_models::rigid::JointKind;
 /// An axis shorter than this has no direction.
 const AXIS_MIN: f64 = 1e-9;
 /// The keys that not all kinds have.
-const OWN: [&str; 12] = [
+const OWN: [&str; 13] = [
     "axis",
     "range_m",
     "range_deg",
@@ -19,6 +19,7 @@ const OWN: [&str; 12] = [
     "friction_n",
     "armature_kg_m2",
     "armature_kg",
+    "mimic",
     "stiffness_n_m",
     "damping_n_s_m",
     "rest_m",
@@ -29,8 +30,8 @@ const OWN: [&str; 12] = [
 const fn keys_of(kind: Kind) -> (&'static [&'static str], &'static [&'static str]) {
     match kind {
         Kind::Fixed | Kind::Spherical => (&[], &[]),
-        Kind::Revolute => (&["axis"], &["range_deg", "motor", "friction_n_m", "armature_kg_m2"]),
-        Kind::Prismatic => (&["axis"], &["range_m", "motor", "friction_n", "armature_kg"]),
+        Kind::Revolute => (&["axis"], &["range_deg", "motor", "friction_n_m", "armature_kg_m2", "mimic"]),
+        Kind::Prismatic => (&["axis"], &["range_m", "motor", "friction_n", "armature_kg", "mimic"]),
         Kind::Spring => (&["stiffness_n_m"], &["damping_n_s_m", "rest_m"]),
         Kind::Rope => (&[], &["length_m"]),
     }
@@ -87,6 +88,29 @@ pub(super) fn check_keys(c: &mut Checker<'_, '_>, place: &Place, file: &JointFil
         c.wrong(place, key, "is missing", format!("{expected}: expected `{key}` in this table"));
     }
     given.len() == needs.len()
+}
+
+/// Whether a joint of this kind has one travel, and can follow another or lead it.
+const fn travels(kind: Kind) -> bool {
+    matches!(kind, Kind::Revolute | Kind::Prismatic)
+}
+
+/// The number of the joint that a joint follows.
+pub(super) fn followed(c: &mut Checker<'_, '_>, place: &Place, own: usize, files: &[JointFile]) -> Option<u32> {
+    let mimic = files[own].mimic.as_ref().filter(|_| travels(files[own].kind))?;
+    let place = place.table("mimic");
+    let names = files.iter().filter_map(|file| file.name.as_deref());
+    if !c.reference(&place, "joint", &mimic.joint, names) {
+        return None;
+    }
+    let at = files.iter().position(|file| file.name.as_ref() == Some(&mimic.joint))?;
+    let what = match &files[at] {
+        _ if at == own => "is the joint itself",
+        leads if !travels(leads.kind) => "is neither revolute nor prismatic",
+        _ => return Some(at as u32),
+    };
+    c.wrong(&place, "joint", what, "expected another revolute or prismatic joint");
+    None
 }
 
 fn axis(c: &mut Checker<'_, '_>, place: &Place, file: &JointFile) -> Option<DVec3> {

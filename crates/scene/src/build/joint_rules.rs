@@ -5,7 +5,7 @@ use super::joint::End;
 use crate::check::{Checker, Place};
 use glam::DVec3;
 use metachron_core::AgentId;
-use metachron_models::rigid::{JOINT_GAP_MAX_M as GAP_MAX_M, JointKind};
+use metachron_models::rigid::{JOINT_GAP_MAX_M as GAP_MAX_M, JointKind, Mimic};
 use std::collections::BTreeMap;
 
 /// Directions that differ by less than this are one direction: sine of the angle.
@@ -25,6 +25,8 @@ pub(super) struct PlacedJoint {
     /// Of a hinge or slide.
     pub(super) friction: f64,
     pub(super) armature: f64,
+    /// The joint that it follows; its offset is none until all joints are placed.
+    pub(super) mimic: Option<Mimic>,
 }
 
 impl PlacedJoint {
@@ -33,6 +35,14 @@ impl PlacedJoint {
         match self.free_motion {
             JointKind::Revolute { axis, .. } | JointKind::Prismatic { axis, .. } => self.ends[0].rotation * axis,
             _ => DVec3::ZERO,
+        }
+    }
+
+    /// How far a turn or slide has gone from its zero at the start, rad or m.
+    fn travel(&self) -> f64 {
+        match self.free_motion {
+            JointKind::Prismatic { .. } => (self.anchors[1] - self.anchors[0]).dot(self.axis()),
+            _ => 0.0,
         }
     }
 
@@ -48,6 +58,16 @@ impl PlacedJoint {
 
     fn is_parallel(&self, other: &Self) -> bool {
         self.axis().cross(other.axis()).length() <= SAME_DIRECTION
+    }
+}
+
+/// Ties joints to those that they follow, where both are at the start: `all` are all joints of the scene.
+pub(super) fn tie_mimics(all: &mut [PlacedJoint]) {
+    let travels: Vec<f64> = all.iter().map(PlacedJoint::travel).collect();
+    for (joint, travel) in all.iter_mut().zip(&travels) {
+        if let Some(mimic) = &mut joint.mimic {
+            mimic.offset = travel - mimic.ratio * travels[mimic.joint as usize];
+        }
     }
 }
 

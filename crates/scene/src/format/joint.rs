@@ -42,6 +42,8 @@ pub struct JointFile {
     pub armature_kg_m2: Option<f64>,
     /// Inertia along the axis of a `prismatic` joint, kg: it resists changes of the rate at which `b` slides against `a`. Default 0.
     pub armature_kg: Option<f64>,
+    /// Another joint that a `revolute` or `prismatic` joint follows, as a gear or a finger of a gripper does.
+    pub mimic: Option<MimicFile>,
     /// Stiffness of a `spring`, N/m.
     pub stiffness_n_m: Option<f64>,
     /// Damping of a `spring`, N·s/m. Default 0.
@@ -60,6 +62,16 @@ pub struct JointFile {
     /// that it holds, or lengthens a `rope` or `spring`, for good. Its torques are not bounded. The report has the
     /// first time under `events`. Default: as much as it takes.
     pub yields_above_n: Option<f64>,
+}
+
+/// Joint that another one follows: the travel of both is tied from where they start, whatever acts on either.
+#[derive(Debug, Clone, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct MimicFile {
+    /// Name of a `revolute` or `prismatic` joint.
+    pub joint: String,
+    /// Radians or metres for each radian or metre of that joint. Default 1.
+    pub ratio: Option<f64>,
 }
 
 /// Motor of a joint: it drives `b` relative to `a` about or along `axis`, the position counted as the joint's range is. A velocity alone is

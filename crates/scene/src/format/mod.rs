@@ -23,7 +23,7 @@ pub use cells::{CellFile, PortalFile, SideKind};
 pub use common::{CommonFile, HoldKind};
 pub use contact::ContactFile;
 pub use coupling::{CouplingFile, CouplingKind, CouplingLaw, FaultsFile, Spot};
-pub use joint::{JointFile, JointKind, MotorFile};
+pub use joint::{JointFile, JointKind, MimicFile, MotorFile};
 pub use rigid::{Axis, PoseKeyFile, RigidFile, Shape, SolidShapeFile};
 pub use scene::{
     CameraFile, CameraFiles, CameraKeyFile, ContactPath, ContactsFile, ProbeFile, SceneFile, SolvesFile, WorldFile,

@@ -94,6 +94,7 @@ const KEYS: Ranges = Ranges(&[
     ("friction_n", RESISTS),
     ("armature_kg_m2", RESISTS),
     ("armature_kg", RESISTS),
+    ("ratio", around(1e6, "")),
     ("stiffness_n_m_rad", STIFFNESS),
     ("damping_n_m_s_rad", DAMPING),
     // springs along a tube, and its peristalsis

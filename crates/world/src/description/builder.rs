@@ -31,7 +31,7 @@ use metachron_contact::detect::{ClusterScene, SolveBudget};
 use metachron_contact::solve::DEPTH_DEFAULT_M;
 use metachron_core::{AgentId, N_MAX, Resolution, ResolutionRange, SimSpan, unit_rotation};
 use metachron_geometry::{Cells, Obstacle, Solid, StaticSolid};
-use metachron_models::rigid::{Joint, JointError, JointKind, RigidSpec};
+use metachron_models::rigid::{Joint, JointError, JointKind, Mimic, RigidSpec};
 pub use rigid::Rigid;
 pub use sensors::SensorOn;
 use sensors::{Mounted, Mounts};
@@ -62,6 +62,12 @@ pub enum SceneBuildError {
     /// A joint names an object that is no rigid body.
     #[error("a joint names \"{name}\", which is no rigid body of the scene")]
     NoBody {
+        /// The name.
+        name: String,
+    },
+    /// A joint follows one that there is not.
+    #[error("a joint follows the joint \"{name}\", and the scene has none of that name")]
+    NoJoint {
         /// The name.
         name: String,
     },
@@ -149,6 +155,14 @@ struct Joined {
     b: Option<String>,
     kind: JointKind,
     at_m: DVec3,
+    mimic: Option<Followed>,
+}
+
+/// The joint that another one follows, by its name.
+#[derive(Debug, Clone, serde::Serialize, serde::Deserialize)]
+struct Followed {
+    joint: String,
+    ratio: f64,
 }
 
 /// The parts that can be added to a scene: a [`Rigid`] body, a [`Tube`], a [`Soft`] body, or an agent of your own
@@ -263,7 +277,18 @@ impl SceneBuilder {
     /// are in the axes of the world, as the bodies are at the start. Springs and ropes, which have two ends, are not for this.
     #[must_use]
     pub fn joint(mut self, a: impl Into<String>, b: Option<&str>, kind: JointKind, at_m: [f64; 3]) -> Self {
-        self.joints.push(Joined { name: String::new(), a: a.into(), b: b.map(str::to_owned), kind, at_m: at_m.into() });
+        let (name, b, at_m, mimic) = (String::new(), b.map(str::to_owned), at_m.into(), None);
+        self.joints.push(Joined { name, a: a.into(), b, kind, at_m, mimic });
+        self
+    }
+
+    /// Lets the joint that was added last, a hinge or a slide, follow another one from where both start, as a gear does: its travel is `ratio`
+    /// times that of the joint of this name, radians or metres for each radian or metre, within ±1e9. Either drives the other.
+    #[must_use]
+    pub fn mimic(mut self, joint: impl Into<String>, ratio: f64) -> Self {
+        if let Some(last) = self.joints.last_mut() {
+            last.mimic = Some(Followed { joint: joint.into(), ratio });
+        }
         self
     }
 
@@ -310,7 +335,13 @@ impl SceneBuilder {
             ids.zip(parts).map(|(id, (name, part))| member(id, name, part, gravity)).collect();
         let agents = agents?;
         let joint_names: Vec<_> = joints.iter().map(|joined| joined.name.clone()).collect();
-        let joints: Result<Arc<[_]>, _> = joints.iter().map(|joined| joined.between(&agents)).collect();
+        let joints =
+            joints.iter().map(|joined| joined.between(&agents, &joint_names)).collect::<Result<Vec<_>, _>>()?;
+        for (number, joint) in (0..).zip(&joints) {
+            let name = || agents[joint.a.0 as usize].name.clone();
+            let bad = |error: JointError| SceneBuildError::BadJoint { name: name(), reason: error.to_string() };
+            joint.check_mimic(number, &joints).map_err(bad)?;
+        }
         let mounts = Mounts { agents: &agents, fixed: &obstacles, joints: &joint_names };
         let sensors: Result<Vec<_>, _> = sensors.into_iter().map(|mounted| mounts.sensor(mounted)).collect();
         let sensors = sensors?;
@@ -338,7 +369,7 @@ impl SceneBuilder {
             contacts: true,
             contact_depth_m,
             contact_budget,
-            joints: joints?,
+            joints: joints.into(),
             joint_names,
             sensors,
             couplings: Vec::new(),
@@ -371,8 +402,8 @@ impl SceneBuilder {
 }
 
 impl Joined {
-    /// The joint of these agents.
-    fn between(&self, agents: &[Member]) -> Result<Joint, SceneBuildError> {
+    /// The joint of these agents, among joints of these names.
+    fn between(&self, agents: &[Member], joints: &[String]) -> Result<Joint, SceneBuildError> {
         let body = |name: &String| {
             let found = agents.iter().find(|member| member.name == *name);
             let spec = found.and_then(|member| if let Spec::Rigid(spec) = &member.spec { Some(spec) } else { None });
@@ -386,7 +417,14 @@ impl Joined {
         if let JointKind::Revolute { axis, .. } | JointKind::Prismatic { axis, .. } = &mut kind {
             *axis = a.rotation.conjugate() * *axis;
         }
+        let mimic = self.mimic.as_ref().map(|followed| {
+            let found = joints.iter().position(|name| *name == followed.joint && !name.is_empty());
+            let joint = found.ok_or_else(|| SceneBuildError::NoJoint { name: followed.joint.clone() })? as u32;
+            // both are at their zero
+            Ok(Mimic { joint, ratio: followed.ratio, offset: 0.0 })
+        });
         let joint = Joint {
+            mimic: mimic.transpose()?,
             anchor_a_m: local(a),
             anchor_b_m: b.map_or(self.at_m, |(_, spec)| local(spec)),
             ..Joint::new(id, b.map(|(id, _)| id), kind)

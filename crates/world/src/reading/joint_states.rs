@@ -9,12 +9,13 @@ use crate::description::kinds::ExecutorKind;
 use crate::error::WorldError;
 use crate::world::World;
 use glam::{DQuat, DVec3};
-use metachron_contact::joint::{JOINT_GAP_MAX_M, Joint, JointKind};
+use metachron_contact::joint::{JOINT_GAP_MAX_M, Joint, JointKind, Mimic};
 use metachron_contact::member::Pose;
 use metachron_contact::{Input, SetMotion};
 use metachron_core::{AgentId, AttachmentEventKind, AttachmentId, Body, shortest_turn};
 use metachron_runtime::{AwaitedMotion, Command};
 use std::collections::{BTreeMap, BTreeSet, VecDeque};
+use std::f64::consts::TAU;
 
 /// The largest turn by which coordinates may leave a loop open, radians: as far as [`JOINT_GAP_MAX_M`] at a metre.
 const JOINT_GAP_MAX_RAD: f64 = JOINT_GAP_MAX_M;
@@ -148,7 +149,7 @@ impl World {
     /// Puts joints to coordinates before the next step, and with them all bodies that they carry. The root of a tree of
     /// joints stays: the world, a kinematic body, or of a tree that nothing holds its body of the lowest number. Joints
     /// that are not named keep their places and rates, also spherical and fixed ones; torn ones, springs and ropes
-    /// carry nothing. Joints of a loop are set together, all but one, to coordinates that close it within 1 mm and 1
+    /// carry nothing. A joint that follows another one goes along with it. Joints of a loop are set together, all but one, to coordinates that close it within 1 mm and 1
     /// mrad; the next step brings their rates together.
     ///
     /// # Errors
@@ -161,6 +162,7 @@ impl World {
             self.check_coordinate(joint, position, velocity)?;
             set.insert(joint.number(), Coordinate { position, velocity });
         }
+        self.set_followers(&mut set)?;
         self.put_joints(&set)
     }
 
@@ -202,6 +204,43 @@ impl World {
             None if !position.is_finite() => bad("position", position, "a finite number".to_owned()),
             _ => Ok(()),
         }
+    }
+
+    /// Sets the joints that follow those that are set, and checks those that are set themselves.
+    fn set_followers(&self, set: &mut BTreeMap<u32, Coordinate>) -> Result<(), WorldError> {
+        let joints: Vec<_> = self.joints().filter_map(|listed| Some((listed.at, listed.joint.mimic?))).collect();
+        let led = |set: &BTreeMap<u32, Coordinate>, mimic: &Mimic| {
+            let Coordinate { position, velocity } = *set.get(&mimic.joint)?;
+            Some(Coordinate { position: mimic.ratio * position + mimic.offset, velocity: mimic.ratio * velocity })
+        };
+        // a joint may follow one that follows another
+        while let Some((at, coordinate)) = joints
+            .iter()
+            .filter(|(at, _)| !set.contains_key(&at.number()))
+            .find_map(|(at, mimic)| Some((*at, led(set, mimic)?)))
+        {
+            self.check_coordinate(at, coordinate.position, coordinate.velocity)?;
+            set.insert(at.number(), coordinate);
+        }
+        for (at, mimic) in &joints {
+            let Some(found) = set.get(&at.number()) else { continue };
+            let leads = self.joints().nth(mimic.joint as usize);
+            let position = match (led(set, mimic), leads) {
+                (Some(wanted), _) => wanted.position,
+                (None, Some(leads)) => mimic.ratio * self.joint_state(leads.at)?.position + mimic.offset,
+                (None, None) => continue,
+            };
+            let spec = self.joint_with_coordinate(*at)?;
+            let off = found.position - position;
+            let off =
+                if matches!(spec.kind, JointKind::Revolute { .. }) { off - (off / TAU).round() * TAU } else { off };
+            if off.abs() > JOINT_GAP_MAX_M {
+                let wanted = format!("{position}, as it follows joint {}", self.joint_name(mimic.joint));
+                let (joint, value) = (self.joint_name(at.number()), found.position);
+                return Err(WorldError::BadCoordinate { joint, what: "position", value, wanted });
+            }
+        }
+        Ok(())
     }
 
     /// Moves the bodies that joints with these coordinates carry.

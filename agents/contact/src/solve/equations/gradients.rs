@@ -5,7 +5,7 @@
 //! well enough for a law of contact. Theory: `docs/theory/clusters.md`, section 6 and eq. 8b and 15.
 
 use super::coupled::Coupled;
-use super::members::{Members, Size};
+use super::members::{Members, Size, is_positive};
 use super::rows::Rows;
 use super::skew::Skew;
 use crate::lists::{refill, reset};
@@ -219,12 +219,6 @@ impl Gradients {
             }
         }
     }
-}
-
-/// Whether a symmetric matrix is positive definite, by its leading minors.
-fn is_positive(matrix: &DMat3) -> bool {
-    let [x, y] = [matrix.x_axis, matrix.y_axis];
-    matrix.is_finite() && x.x > 0.0 && x.x * y.y > x.y * y.x && matrix.determinant() > 0.0
 }
 
 /// A change of the solution, and the part of the right side that it answers.

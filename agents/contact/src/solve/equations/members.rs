@@ -111,9 +111,10 @@ impl Members {
     }
 }
 
-/// Whether a symmetric matrix is positive definite (Sylvester's criterion); not where a number is none.
-fn is_positive(m: &DMat3) -> bool {
-    m.x_axis.x > 0.0 && m.x_axis.x * m.y_axis.y - m.x_axis.y * m.y_axis.x > 0.0 && m.determinant() > 0.0
+/// Whether a symmetric matrix is positive definite (Sylvester's criterion); not where a number is none or has no end.
+pub(super) fn is_positive(m: &DMat3) -> bool {
+    let [x, y] = [m.x_axis, m.y_axis];
+    m.is_finite() && x.x > 0.0 && x.x * y.y > x.y * y.x && m.determinant() > 0.0
 }
 
 /// The larger of two sizes; one that is not a number stays.

@@ -7,7 +7,7 @@
 use crate::solve::cones::cone::{Law, Projection, tangential};
 use crate::solve::statement::joint::{Hold, JointRow, Pressed};
 use crate::solve::statement::problem::{Contact, Problem, SLIP_SHARE};
-use crate::solve::statement::side::Side;
+use crate::solve::statement::side::{Side, SidePart};
 use glam::{DMat3, DVec3};
 use std::ops::Range;
 
@@ -194,11 +194,13 @@ impl Rows {
         let start = self.terms.len();
         let to_frame = DMat3::from_diagonal(row.held) * row.frame.transpose();
         for (side, sign) in sides.iter().zip([1.0, -1.0]) {
-            for term in side.terms() {
-                let (block, map) = (offsets[side.member] + term.block, to_frame * term.map * sign);
-                match self.terms[start..].iter_mut().find(|t| t.block == block) {
-                    Some(known) => known.map += map,
-                    None => self.terms.push(Term { block, map }),
+            for SidePart { member, terms } in side.parts() {
+                for term in terms {
+                    let (block, map) = (offsets[member] + term.block, to_frame * term.map * sign);
+                    match self.terms[start..].iter_mut().find(|t| t.block == block) {
+                        Some(known) => known.map += map,
+                        None => self.terms.push(Term { block, map }),
+                    }
                 }
             }
         }

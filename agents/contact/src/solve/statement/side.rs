@@ -1,4 +1,4 @@
-//! One side of a contact: which blocks of which member its point moves with.
+//! One side of a contact or row: which blocks of which member its point moves with, or how two members move against each other.
 //!
 //! In: blocks and the maps from their velocities to that of the point. Out: the same as a list of fixed length, without storage of
 //! its own. Never here: where the point is. Theory: `docs/theory/clusters.md`, eq. 1.
@@ -34,19 +34,36 @@ impl SideTerm {
     }
 }
 
-/// A point of a member; of a static solid it is [`Side::FIXED`].
+/// A point of a member, or the motion of two members against each other; of a static solid it is [`Side::FIXED`].
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Side {
     /// The member, by its place in the problem; without meaning where the side is fixed.
     pub member: usize,
     terms: [SideTerm; SIDE_TERMS_MAX],
+    /// How many terms are those of `member`; the terms up to `end` are those of `other`.
     count: usize,
+    other: usize,
+    end: usize,
+}
+
+/// The terms of a side that are one member's.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct SidePart<'a> {
+    /// The member, by its place in the problem.
+    pub member: usize,
+    /// Its blocks that move the side.
+    pub terms: &'a [SideTerm],
 }
 
 impl Side {
     /// A point that does not move, whatever is given to it.
-    pub const FIXED: Self =
-        Self { member: 0, terms: [SideTerm { block: 0, map: DMat3::ZERO }; SIDE_TERMS_MAX], count: 0 };
+    pub const FIXED: Self = Self {
+        member: 0,
+        terms: [SideTerm { block: 0, map: DMat3::ZERO }; SIDE_TERMS_MAX],
+        count: 0,
+        other: 0,
+        end: 0,
+    };
 
     /// A point whose velocity is the sum of its `terms`.
     ///
@@ -56,14 +73,14 @@ impl Side {
         let mut side = Self { member, ..Self::FIXED };
         let room = side.terms.get_mut(..terms.len()).ok_or(ProblemError::LongSide { terms: terms.len() })?;
         room.copy_from_slice(terms);
-        side.count = terms.len();
+        (side.count, side.end) = (terms.len(), terms.len());
         Ok(side)
     }
 
     /// A node itself.
     #[must_use]
     pub fn node(member: usize, block: usize) -> Self {
-        let mut side = Self { member, count: 1, ..Self::FIXED };
+        let mut side = Self { member, count: 1, end: 1, ..Self::FIXED };
         side.terms[0] = SideTerm::weighted(block, 1.0);
         side
     }
@@ -71,7 +88,7 @@ impl Side {
     /// A point of a rigid body whose block 0 is the velocity of its centre and whose block 1 is its spin, at `arm_m` from the centre.
     #[must_use]
     pub fn rigid(member: usize, arm_m: DVec3) -> Self {
-        let mut side = Self { count: 2, ..Self::node(member, 0) };
+        let mut side = Self { count: 2, end: 2, ..Self::node(member, 0) };
         side.terms[1] = SideTerm::spin(1, arm_m);
         side
     }
@@ -80,6 +97,33 @@ impl Side {
     #[must_use]
     pub fn of_member(self, member: usize) -> Self {
         Self { member, ..self }
+    }
+
+    /// Counts its members anew; one that `to` does not know keeps its place.
+    pub(crate) fn move_members(&mut self, to: impl Fn(usize) -> Option<usize>) {
+        if self.count > 0 {
+            self.member = to(self.member).unwrap_or(self.member);
+        }
+        if self.end > self.count {
+            self.other = to(self.other).unwrap_or(self.other);
+        }
+    }
+
+    /// How a point, or spin, moves against another, each of one member at most, as `map` sees it.
+    ///
+    /// # Errors
+    /// [`ProblemError::LongSide`] for more than [`SIDE_TERMS_MAX`] terms of both.
+    pub fn against(point: &Self, from: &Self, map: DMat3) -> Result<Self, ProblemError> {
+        let mapped = |side: &Self, map: DMat3| side.terms.map(|term| SideTerm { map: map * term.map, ..term });
+        let (near, far) = (mapped(point, map), mapped(from, -map));
+        if point.count == 0 {
+            return Self::new(from.member, &far[..from.count]);
+        }
+        let mut side = Self::new(point.member, &near[..point.count])?;
+        (side.other, side.end) = (from.member, point.count + from.count);
+        let room = side.terms.get_mut(point.count..side.end);
+        room.ok_or(ProblemError::LongSide { terms: side.end })?.copy_from_slice(&far[..from.count]);
+        Ok(side)
     }
 
     /// Makes the arm of a point of a body that moves as a whole longer, by a vector in metres; `turns` is the body's spin.
@@ -97,9 +141,29 @@ impl Side {
         self.terms().iter().map(|term| term.map * blocks[term.block]).sum()
     }
 
-    /// The blocks that move the point; none of a fixed one.
+    /// The blocks of its member that move the point; none of a fixed one.
     #[must_use]
     pub fn terms(&self) -> &[SideTerm] {
         &self.terms[..self.count]
+    }
+
+    /// The second member of a motion of two against each other.
+    #[must_use]
+    pub fn second(&self) -> Option<SidePart<'_>> {
+        (self.end > self.count).then(|| SidePart { member: self.other, terms: &self.terms[self.count..self.end] })
+    }
+
+    /// Its members: none of a fixed side, one of a point, two of a motion against each other.
+    pub fn parts(&self) -> impl Iterator<Item = SidePart<'_>> {
+        let first = (self.count > 0).then(|| SidePart { member: self.member, terms: self.terms() });
+        first.into_iter().chain(self.second())
+    }
+}
+
+impl SidePart<'_> {
+    /// The velocity that the blocks of its member give the side by themselves.
+    #[must_use]
+    pub fn velocity(&self, blocks: &[DVec3]) -> DVec3 {
+        self.terms.iter().map(|term| term.map * blocks[term.block]).sum()
     }
 }

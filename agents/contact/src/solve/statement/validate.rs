@@ -5,7 +5,7 @@
 use super::error::ProblemError;
 use super::joint::{Hold, JointRow, Pressed};
 use super::problem::{Block, Contact, Member, Problem};
-use super::side::{Side, SideTerm};
+use super::side::{Side, SidePart, SideTerm};
 use glam::{DMat3, DVec3};
 
 /// By how much a frame may miss being orthonormal, and a diagonal block being symmetric against its largest entry.
@@ -110,9 +110,9 @@ fn sides_fault(sides: &[Side; 2], members: &[Member<'_>]) -> Option<&'static str
     if sides.iter().all(|side| side.terms().is_empty()) {
         return Some("neither side moves");
     }
-    sides.iter().filter(|side| !side.terms().is_empty()).find_map(|side| {
-        let Some(member) = members.get(side.member) else { return Some("a side names a member that there is not") };
-        let all = |holds: fn(&SideTerm, usize) -> bool| side.terms().iter().all(|term| holds(term, member.free.len()));
+    sides.iter().flat_map(Side::parts).find_map(|SidePart { member, terms }| {
+        let Some(member) = members.get(member) else { return Some("a side names a member that there is not") };
+        let all = |holds: fn(&SideTerm, usize) -> bool| terms.iter().all(|term| holds(term, member.free.len()));
         first_fault([
             (all(|term, size| term.block < size), "a side names a block that its member has not"),
             (all(|term, _| term.map.is_finite()), "a map of a side is not finite"),
