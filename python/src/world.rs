@@ -3,10 +3,10 @@
 //! In: commands by objects' names or handles. Out: states, events, answers. While time passes Python's own lock is free.
 //! Never here: the meaning of a command.
 
+use crate::calls::{Given, WorldCalls, apart};
 use crate::camera::{SIZE, Shot, Viewpoint};
 use crate::checkpoint::Checkpoint;
 use crate::command::Keywords;
-use crate::calls::{Given, WorldCalls, apart};
 use crate::export::{Export, Paths};
 use crate::home::Home;
 use crate::joints::{Joints, NamedJoint};
