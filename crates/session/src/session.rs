@@ -15,6 +15,7 @@ mod recording;
 mod rewind;
 
 use super::assemble;
+use super::assemble::Governors;
 #[cfg(feature = "picture")]
 use super::calibrate;
 use super::coupling_record::{Coupling, Couplings};
@@ -155,7 +156,10 @@ impl Session {
     /// # Errors
     /// [`SessionError::World`], also for a factor outside its range; nothing runs then.
     pub fn open(scene: Scene, pace: Pace) -> Result<Self, SessionError> {
-        Self::open_as(scene, |scene, govern| {
+        // nothing is known of this machine yet, and its first turns are to be in time
+        let is_beside_a_clock = scene.executor != ExecutorKind::Lockstep && pace != Pace::Free;
+        let governors = if is_beside_a_clock { Governors::from_coarsest(&scene) } else { Governors::of(&scene) };
+        Self::open_as(scene, governors, |scene, govern| {
             let world = World::start_governed(scene, scene.executor, govern)?;
             // a world to which nothing was done is recorded without its state
             if pace != Pace::RealTime {
@@ -167,10 +171,10 @@ impl Session {
 
     fn open_as(
         mut scene: Scene,
+        mut governors: Governors,
         start: impl FnOnce(&Scene, Govern<'_>) -> Result<World, SessionError>,
     ) -> Result<Self, SessionError> {
         let machine = machine(&scene);
-        let mut governors = assemble::Governors::of(&scene);
         let world = start(&scene, &mut |member| governors.governor(member))?;
         scene.executor = world.executor();
         let controlled = governors.controlled;
