@@ -86,6 +86,8 @@ pub struct Session {
     next_camera: Option<Camera>,
     /// Time from reading the camera to the finished picture, seconds, smoothed.
     lag_s: f64,
+    /// Time of a choice, seconds, smoothed.
+    choice_s: f64,
     /// When real time began to pass.
     begun: Duration,
     warm_up: usize,
@@ -209,6 +211,7 @@ impl Session {
             last_seen_by: None,
             next_camera: None,
             lag_s: 0.0,
+            choice_s: 0.0,
             begun: Duration::ZERO,
             warm_up: 0,
             finished: 0,
@@ -383,6 +386,7 @@ impl Session {
         let lag_s = 1e-3 * record.lag_ms;
         self.lag_s = if self.finished == 0 { lag_s } else { self.lag_s + LAG_NEWS * (lag_s - self.lag_s) };
         self.measure_thread();
+        self.learn_choice();
         self.finished += 1;
         self.last_start = Some(started);
         let cold = !self.is_virtual() && self.finished <= WARM_UP_FRAMES;
