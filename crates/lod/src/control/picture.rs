@@ -254,8 +254,8 @@ impl PictureControl {
             Policy::Adaptive => (self.adaptive.slowness(), self.adaptive.margin().max(query.margin)),
             _ => (1.0, query.margin),
         };
-        // policies that choose by size or by the last frame's time leave nothing out for a cost
-        if self.policy.predicts() {
+        // policies that choose by size or by the last frame's time leave nothing out for a cost, and those as printed choose it as a level
+        if self.policy.predicts() && !self.policy.has_printed_benefit() {
             self.vanish.update(&FrameQuery { margin, ..query }, &self.groups, slowness);
         } else {
             self.vanish.clear();
