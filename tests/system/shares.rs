@@ -309,7 +309,7 @@ fn time_that_stays_unspent_goes_into_quality_where_the_scene_says_so() {
     assert_eq!(plain.frames[10].frame_ms, raised.frames[10].frame_ms, "not at once");
 }
 
-/// The library halfway along its path, drawn on the declared machine, with a frame and a pixel as they were measured with its shadings, at `frame_hz`: milliseconds of the 30th frame, how many of the objects
+/// The library halfway along its path, drawn on the machine whose prices were measured, at `frame_hz`: milliseconds of the 30th frame, how many of the objects
 /// in view that have a texture are drawn with it, of how many, and their triangles.
 fn library(policy: &str, frame_hz: f64) -> (f64, [u32; 2], f64) {
     let set = [
@@ -317,12 +317,7 @@ fn library(policy: &str, frame_hz: f64) -> (f64, [u32; 2], f64) {
         ("target.policy", format!("\"{policy}\"")),
         ("target.frame_hz", format!("{frame_hz:?}")),
         ("target.render_scale", "[1.0, 1.0]".to_owned()),
-        ("machine.draw_setup_ms", "0.24".to_owned()),
-        ("machine.draw_pixel_ns", "4.8".to_owned()),
-        ("machine.shading.flat", "{ triangle_us = 0.20, pixel_ns = 1.7 }".to_owned()),
-        ("machine.shading.gouraud", "{ pixel_ns = 4.0 }".to_owned()),
-        ("machine.shading.per-pixel", "{ pixel_ns = 4.3 }".to_owned()),
-        ("machine.shading.textured", "{ triangle_us = 0.35, pixel_ns = 9.9 }".to_owned()),
+        ("machine.preset", "\"llvmpipe\"".to_owned()),
     ];
     let source = Source::open(concat!(env!("CARGO_MANIFEST_DIR"), "/scenes/library.toml")).expect("a built-in scene");
     let scene = metachron_scene::load(&source, &set.map(|(key, value)| (key.to_owned(), value)));

@@ -130,13 +130,15 @@ pub(super) const PLATES: [Plate; 8] = [
         name: "fs93-11",
         title: "the library in full detail and under two targets (FS93, fig. 11)",
         paper: Paper::Library,
+        // the prices of an adapter, on which pixels and textures cost as they did on the paper's machine
+        changes: &[("machine.preset", "\"llvmpipe\"")],
         frames: [40, 12],
         panels: &[
             panel("a", Full, 1.0).polygons(19_821),
-            panel("b", Greedy, 4.0).live(1.5).polygons(4_217),
-            panel("c", Greedy, 6.0).live(2.0).polygons(1_389),
-            panel("b, default", Adaptive, 4.0).live(1.5).polygons(4_217),
-            panel("c, default", Adaptive, 6.0).live(2.0).polygons(1_389),
+            panel("b", Greedy, 1.6).live(1.5).polygons(4_217),
+            panel("c", Greedy, 2.5).live(2.0).polygons(1_389),
+            panel("b, default", Adaptive, 1.6).live(1.5).polygons(4_217),
+            panel("c, default", Adaptive, 2.5).live(2.0).polygons(1_389),
         ],
         sights: &[Sight::Eye, Sight::Levels, Sight::Difference],
         ..MIDDLE

@@ -44,6 +44,8 @@ pub(in super::super) struct Found {
     /// Objects in view that are left out, and groups that are drawn as one.
     holes: u32,
     impostors: usize,
+    /// Objects in view that are drawn with a texture.
+    textured: u32,
     /// Likeness to full detail; NaN without an adapter.
     ssim: f64,
     psnr_db: f64,
@@ -130,6 +132,7 @@ impl<const F: usize, const LIVE: bool> Experiment for Figures<F, LIVE> {
             paper_triangles,
             holes: own.holes,
             impostors: own.impostors,
+            textured: own.textured,
             ssim: pictures.and_then(|(picture, full)| ssim(picture, full)).unwrap_or(f64::NAN),
             psnr_db: pictures.map_or(f64::NAN, psnr_db),
         })

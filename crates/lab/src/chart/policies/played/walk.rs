@@ -27,8 +27,14 @@ pub(in super::super) enum Times {
 
 /// A machine whose frame times follow the objects and their shading, with the noise of `docs/theory/budget.md`, section 10. The time
 /// for choosing is that measured on one core with the default policy (`chart policies`, selection).
-const DECLARED: [(&str, &str); 12] = [
+const DECLARED: [(&str, &str); 4] = [
     ("executor", "lockstep"),
+    ("machine.choose_object_ns", "50"),
+    ("machine.noise", "0.01"),
+    ("machine.wander", "0.05"),
+];
+/// Its prices of drawing, where no preset is named.
+const DECLARED_PRICES: [(&str, &str); 8] = [
     ("machine.draw_setup_ms", "0.1"),
     ("machine.draw_pixel_ns", "0.2"),
     ("machine.draw_object_us", "0.5"),
@@ -37,9 +43,6 @@ const DECLARED: [(&str, &str); 12] = [
     ("machine.shading.gouraud.triangle_us", "0.14"),
     ("machine.shading.flat.pixel_ns", "0.3"),
     ("machine.shading.gouraud.pixel_ns", "0.5"),
-    ("machine.choose_object_ns", "50"),
-    ("machine.noise", "0.01"),
-    ("machine.wander", "0.05"),
 ];
 
 /// Greatest number of pictures compared in the first round, evenly along a path, and least number of frames between two: a comparison takes as long as
@@ -252,11 +255,14 @@ pub(in super::super) struct Opening<'a> {
 
 /// Opens a scene before the first frame; also names the adapter that draws it.
 pub(super) fn opened(scene: &Opening<'_>, times: Times) -> anyhow::Result<(String, FlyThrough)> {
+    let is_preset = scene.changes.iter().any(|(key, _)| *key == "machine.preset");
     let declared = if times == Times::Declared { DECLARED.as_slice() } else { &[] };
+    let prices = if times == Times::Declared && !is_preset { DECLARED_PRICES.as_slice() } else { &[] };
     // the policies of the papers are compared at one number of pixels
     let overrides: Vec<_> = [("target.render_scale", "1.0")]
         .iter()
         .chain(declared)
+        .chain(prices)
         .chain(scene.changes)
         .map(|(key, value)| ((*key).to_owned(), (*value).to_owned()))
         .collect();
