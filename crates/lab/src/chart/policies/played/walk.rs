@@ -9,7 +9,7 @@ use super::row::frame;
 use crate::chart::policies::numeric::{Row, deviation95, mean, within};
 use anyhow::Context;
 use metachron_lod::control::Policy;
-use metachron_render::{Gpu, Offscreen, PictureFile, RendererOptions, Size, psnr_db, ssim};
+use metachron_render::{Gpu, Offscreen, PictureFile, RendererOptions, Size, flip, psnr_db, ssim};
 use metachron_scene::papers::{Choices, Paper};
 use metachron_scene::{Source, load};
 use metachron_session::{Drawing, FlyThrough, FrameRecord};
@@ -109,8 +109,9 @@ pub(in super::super) fn measure(shown: &Shown<'_>, case: &Case, times: Times) ->
     let (full, own, target_s) = measured.unwrap_or_else(|_| (Arc::default(), Arc::default(), f64::NAN));
     let target_ms = 1e3 * target_s;
     let pairs = own.pictures.iter().zip(&full.pictures);
-    let likeness: Vec<_> = pairs.filter_map(|(a, b)| Some((ssim(a, b)?, psnr_db(a, b)?.min(ALIKE_DB)))).collect();
-    let column = |of: fn(&(f64, f64)) -> f64| likeness.iter().map(of).collect::<Vec<_>>();
+    let likeness: Vec<_> =
+        pairs.filter_map(|(a, b)| Some([ssim(a, b)?, flip(b, a)?, psnr_db(a, b)?.min(ALIKE_DB)])).collect();
+    let column = |at: usize| likeness.iter().map(|row| row[at]).collect::<Vec<_>>();
     let pairs = own.frames.iter().zip(&full.frames);
     let frames: Vec<_> = pairs.map(|(row, full)| frame(row, full.frame_ms / target_ms, target_ms)).collect();
     let text = |of: &mut dyn Iterator<Item = String>| of.collect::<Vec<_>>().join(" ");
@@ -118,9 +119,10 @@ pub(in super::super) fn measure(shown: &Shown<'_>, case: &Case, times: Times) ->
         adapter: own.adapter.clone(),
         target_ms,
         spread95: deviation95(&own.again_ms),
-        ssim: mean(&column(|l| l.0)),
-        ssim_least: within(&column(|l| l.0), 0.0),
-        psnr_db: mean(&column(|l| l.1)),
+        ssim: mean(&column(0)),
+        ssim_least: within(&column(0), 0.0),
+        flip: mean(&column(1)),
+        psnr_db: mean(&column(2)),
         times: text(&mut frames.iter().map(|frame| format!("{:.3}", frame.time))),
         primitives: text(&mut own.frames.iter().map(|row| format!("{}/{}/{}", row.triangles, row.lines, row.points))),
         ..Row::of(&case.setting, case.policy, &[frames])
