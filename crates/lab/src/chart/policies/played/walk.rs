@@ -26,9 +26,11 @@ pub(in super::super) enum Times {
 }
 
 /// A machine whose frame times follow the objects and their shading, with the noise of `docs/theory/budget.md`, section 10. The time
-/// for choosing is that measured on one core with the default policy (`chart policies`, selection).
-const DECLARED: [(&str, &str); 4] = [
+/// for choosing is that measured on one core with the default policy (`chart policies`, selection); there is no other core to choose beside
+/// drawing.
+const DECLARED: [(&str, &str); 5] = [
     ("executor", "lockstep"),
+    ("machine.cores", "1"),
     ("machine.choose_object_ns", "50"),
     ("machine.noise", "0.01"),
     ("machine.wander", "0.05"),
