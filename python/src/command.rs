@@ -55,7 +55,7 @@ impl<'a, 'py> Keywords<'a, 'py> {
         let command = command.key(self.get("key")?.unwrap_or(0));
         let expires: Option<f64> = self.get("expires")?;
         Ok(match expires {
-            Some(seconds) => command.lasting(span("expires", seconds)?),
+            Some(seconds) => command.expires_after(span("expires", seconds)?),
             None => command,
         })
     }

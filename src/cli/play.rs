@@ -12,7 +12,7 @@ use metachron_lod::Bound;
 use metachron_render::Size;
 #[cfg(feature = "render")]
 use metachron_render::{Gpu, GpuError, Offscreen, RendererOptions};
-use metachron_runtime::{AgentState, Spread};
+use metachron_runtime::{AgentState, Percentiles};
 use metachron_session::report::{
     AgentReport, BudgetReport, ClusterRow, CouplingError, CouplingReport, EventReport, MovedReport, OverlapReport,
     ProbeReport, Quantiles, ReadingReport, ReferenceReport, Report, SensorReport, summarise, summarise_choices,
@@ -327,8 +327,8 @@ fn agent(scene: &Scene, agent: &AgentOutcome) -> AgentReport {
     }
 }
 
-fn quantiles(spread: Spread) -> Quantiles {
-    Quantiles { p50: spread.p50_s * 1e3, p99: spread.p99_s * 1e3 }
+fn quantiles(times: Percentiles) -> Quantiles {
+    Quantiles { p50: times.p50_s * 1e3, p99: times.p99_s * 1e3 }
 }
 
 /// The clusters of more than one member, or with contacts, by their leaders.

@@ -97,7 +97,7 @@ fn the_schema_bounds_a_number_by_the_range_of_the_models_specification() {
     let schema = json_schema();
     for model in ["sheet", "solid", "rope"] {
         let keys = &schema["$defs"][model]["properties"];
-        for (name, range) in soft::MATTER.0.iter().filter(|(name, _)| keys.get(name).is_some()) {
+        for (name, range) in soft::MATERIAL.0.iter().filter(|(name, _)| keys.get(name).is_some()) {
             let bounds = [&keys[name]["minimum"], &keys[name]["maximum"]].map(serde_json::Value::as_f64);
             assert_eq!(bounds, [Some(range.least), Some(range.greatest)], "{model}.{name}");
         }
@@ -116,14 +116,14 @@ fn ranges_in(line: &str) -> Vec<(f64, f64)> {
 #[test]
 fn the_documentation_of_pythons_parts_has_the_ranges_of_the_models() {
     let text = std::fs::read_to_string("python/package/metachron/parts.py").unwrap();
-    let matter = |name: &str| soft::MATTER.get(name).unwrap();
+    let material = |name: &str| soft::MATERIAL.get(name).unwrap();
     let fields: [(&str, &str, &[NumberRange]); 6] = [
         ("_Placed", "restitution", &[RESTITUTION]),
         ("_Moving", "mass", &[rigid::MASS]),
-        ("_Soft", "young", &[matter("young_pa")]),
-        ("_Soft", "poisson", &[matter("poisson")]),
-        ("_Soft", "density", &[matter("density_kg_m3")]),
-        ("_Soft", "damping", &[matter("damping_per_s"), matter("damping_s")]),
+        ("_Soft", "young", &[material("young_pa")]),
+        ("_Soft", "poisson", &[material("poisson")]),
+        ("_Soft", "density", &[material("density_kg_m3")]),
+        ("_Soft", "damping", &[material("damping_per_s"), material("damping_s")]),
     ];
     for (class, field, ranges) in fields {
         let (_, body) = text.split_once(&format!("class {class}")).expect(class);

@@ -145,7 +145,7 @@ pub struct StepContext<'a> {
     /// The agents in possible contact or grasp with this one, in either direction, and those with ledger impulses still to settle.
     pub neighbours: &'a [Neighbour],
     /// Springs of the user on this agent.
-    pub hands: &'a [AnchorSpring],
+    pub user_springs: &'a [AnchorSpring],
     /// Forces of the user on this agent, in the mean of the macro step.
     pub forces: &'a [AnchorForce],
     /// Motors that the user has set, of joints whose first body this agent is.
@@ -319,7 +319,7 @@ impl<'a> StepContext<'a> {
     /// The context of a step at `time` without neighbours, springs and links, for tests and for agents that nothing acts on.
     #[must_use]
     pub fn alone(me: AgentId, time: SimTime) -> Self {
-        Self { me, time, neighbours: &[], hands: &[], forces: &[], motors: &[], pose: None, links: &[] }
+        Self { me, time, neighbours: &[], user_springs: &[], forces: &[], motors: &[], pose: None, links: &[] }
     }
 
     /// Every spring on this agent: the user's, and the grasps of tools, with their tips extrapolated to `time`.
@@ -338,7 +338,7 @@ impl<'a> StepContext<'a> {
                 damping_n_s_m: grasp.damping_n_s_m,
             })
         });
-        self.hands.iter().copied().chain(grasps)
+        self.user_springs.iter().copied().chain(grasps)
     }
 }
 
@@ -369,7 +369,7 @@ impl Law {
     }
 }
 
-/// A lasting bilateral coupling between a point of this agent and one of another.
+/// A persistent bilateral coupling between a point of this agent and one of another.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Link {
     /// The agent on the other side.

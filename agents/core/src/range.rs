@@ -6,9 +6,9 @@
 //! ```
 //! use metachron_core::{NumberRange, Ranges};
 //!
-//! const MATTER: Ranges = Ranges(&[("poisson", NumberRange::new(0.0, 0.499, ""))]);
-//! assert!(MATTER.check([0.3]).is_ok());
-//! let error = MATTER.check([0.5]).unwrap_err();
+//! const MATERIAL: Ranges = Ranges(&[("poisson", NumberRange::new(0.0, 0.499, ""))]);
+//! assert!(MATERIAL.check([0.3]).is_ok());
+//! let error = MATERIAL.check([0.5]).unwrap_err();
 //! assert_eq!(error.to_string(), "poisson is 0.5; expected a number from 0 to 0.499");
 //! ```
 

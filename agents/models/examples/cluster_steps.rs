@@ -14,7 +14,7 @@ mod table;
 
 use bodies::{block, rope, solid};
 use glam::DVec3;
-use metachron_models::soft::{Side, SoftBody, SoftMatter, SoftShape, SoftSpec};
+use metachron_models::soft::{Side, SoftBody, SoftMaterial, SoftShape, SoftSpec};
 use std::time::Instant;
 use table::{Placed, Table, placed};
 
@@ -47,9 +47,9 @@ const LIST: [Played; 15] = [
         name: "soft cube of 1331, slides",
         table: || {
             let spec = solid(DVec3::Z * 0.0502, DVec3::splat(0.1), [10; 3], 12e3);
-            let matter = SoftMatter { poisson: 0.4, density_kg_m3: 1050.0, damping_per_s: 0.2, ..spec.matter };
+            let material = SoftMaterial { poisson: 0.4, density_kg_m3: 1050.0, damping_per_s: 0.2, ..spec.material };
             Table::new(vec![placed(
-                SoftBody::new(SoftSpec { matter, velocity: DVec3::X * 1.0, ..spec }).unwrap(),
+                SoftBody::new(SoftSpec { material, velocity: DVec3::X * 1.0, ..spec }).unwrap(),
                 false,
             )])
         },
@@ -137,8 +137,8 @@ fn pile(wide: usize, layers: usize) -> Table {
 /// A cube of 0.1 m of so many cells along each edge, of the stuff of an organ, on the floor.
 fn organ(cells: u32) -> Placed {
     let spec = solid(DVec3::Z * 0.0502, DVec3::splat(0.1), [cells; 3], 12e3);
-    let matter = SoftMatter { poisson: 0.4, density_kg_m3: 1050.0, damping_per_s: 0.2, ..spec.matter };
-    placed(SoftBody::new(SoftSpec { matter, ..spec }).unwrap(), false)
+    let material = SoftMaterial { poisson: 0.4, density_kg_m3: 1050.0, damping_per_s: 0.2, ..spec.material };
+    placed(SoftBody::new(SoftSpec { material, ..spec }).unwrap(), false)
 }
 
 /// The inside of a fine skin, in a cage of 800 vertices, grown to its bed, under a ball.

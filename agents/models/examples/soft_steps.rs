@@ -5,7 +5,7 @@ use metachron_contact::StepContext;
 use metachron_contact::step::LoneStepper;
 use metachron_core::{AgentId, SimSpan, SimTime};
 use metachron_geometry::ContactTraits;
-use metachron_models::soft::{MaterialLaw, Side, SoftBody, SoftMatter, SoftShape, SoftSpec};
+use metachron_models::soft::{MaterialLaw, Side, SoftBody, SoftMaterial, SoftShape, SoftSpec};
 use std::time::Instant;
 
 const WARM_UP: u32 = 20;
@@ -14,7 +14,7 @@ const STEPS: u32 = 40;
 fn main() {
     for cells in [4, 6, 8, 10, 12, 15, 19] {
         let shape = SoftShape::Box { size_m: DVec3::splat(0.1), segments: [cells; 3] };
-        let matter = SoftMatter {
+        let material = SoftMaterial {
             young_pa: 12e3,
             poisson: 0.4,
             density_kg_m3: 1050.0,
@@ -22,11 +22,11 @@ fn main() {
             damping_s: 0.0,
             law: MaterialLaw::Corotational,
         };
-        step(&format!("cube of {:5} nodes", (cells + 1).pow(3)), shape, matter, Side::Bottom);
+        step(&format!("cube of {:5} nodes", (cells + 1).pow(3)), shape, material, Side::Bottom);
     }
     for cells in [10, 20, 30, 60] {
         let shape = SoftShape::Sheet { size_m: [0.3; 2], thickness_m: 0.004, segments: [cells; 2] };
-        let matter = SoftMatter {
+        let material = SoftMaterial {
             young_pa: 1e5,
             poisson: 0.3,
             density_kg_m3: 1050.0,
@@ -34,15 +34,15 @@ fn main() {
             damping_s: 0.0,
             law: MaterialLaw::Corotational,
         };
-        step(&format!("sheet of {:4} nodes", (cells + 1).pow(2)), shape, matter, Side::Left);
+        step(&format!("sheet of {:4} nodes", (cells + 1).pow(2)), shape, material, Side::Left);
     }
 }
 
-fn step(name: &str, shape: SoftShape, matter: SoftMatter, held: Side) {
+fn step(name: &str, shape: SoftShape, material: SoftMaterial, held: Side) {
     let spec = SoftSpec {
         shape,
         nodes: None,
-        matter,
+        material,
         position: DVec3::ZERO,
         rotation: DQuat::IDENTITY,
         velocity: DVec3::ZERO,

@@ -173,16 +173,17 @@ impl Run<'_> {
 }
 
 impl Run<'_> {
-    fn step(&mut self, dt: SimSpan, hands: &[AnchorSpring]) -> Result<(), StepError> {
-        let context = StepContext { neighbours: self.neighbours, hands, ..StepContext::alone(ME, self.time) };
+    fn step(&mut self, dt: SimSpan, user_springs: &[AnchorSpring]) -> Result<(), StepError> {
+        let context = StepContext { neighbours: self.neighbours, user_springs, ..StepContext::alone(ME, self.time) };
         self.stepper.step(self.agent.as_mut(), dt, context)?;
         self.time += dt;
         Ok(())
     }
 
     /// A step that must succeed.
-    fn must_step(&mut self, dt: SimSpan, hands: &[AnchorSpring]) -> Result<(), String> {
-        self.step(dt, hands).map_err(|error| format!("a valid step at {} s failed: {error}", self.time.as_secs_f64()))
+    fn must_step(&mut self, dt: SimSpan, user_springs: &[AnchorSpring]) -> Result<(), String> {
+        self.step(dt, user_springs)
+            .map_err(|error| format!("a valid step at {} s failed: {error}", self.time.as_secs_f64()))
     }
 
     fn snapshot(&self) -> Snapshot {

@@ -18,8 +18,8 @@ pub(crate) struct WholeMotion {
 
 impl WholeMotion {
     /// Moves the body whose masses and points these are.
-    pub fn new(motion: &SetMotion, matter: impl Iterator<Item = (f64, DVec3)>) -> Self {
-        let (mass_kg, moment) = matter.fold((0.0, DVec3::ZERO), |(mass, sum), (m, x)| (mass + m, sum + x * m));
+    pub fn new(motion: &SetMotion, masses: impl Iterator<Item = (f64, DVec3)>) -> Self {
+        let (mass_kg, moment) = masses.fold((0.0, DVec3::ZERO), |(mass, sum), (m, x)| (mass + m, sum + x * m));
         let centre_m = moment / mass_kg;
         Self {
             centre_m,

@@ -84,7 +84,7 @@ fn swung() -> Tube {
     };
     let mut stepper = LoneStepper::default();
     for k in 0..40 {
-        let around = StepContext { hands: &[hand], ..StepContext::alone(AgentId(0), at(0.004 * f64::from(k))) };
+        let around = StepContext { user_springs: &[hand], ..StepContext::alone(AgentId(0), at(0.004 * f64::from(k))) };
         stepper.step(&mut tube, SimSpan::from_secs_f64(0.004).unwrap(), around).unwrap();
     }
     tube

@@ -10,7 +10,7 @@ use metachron_models::rigid::{KinematicBody, Led, Restraint, RigidBody, RigidSpe
 use metachron_models::rod::Integrator;
 use metachron_models::rod::Tube;
 use metachron_models::rod::{Material, Section, TubeSpec, WallModel};
-use metachron_models::soft::{MaterialLaw, Side, SoftBody, SoftMatter, SoftShape, SoftSpec};
+use metachron_models::soft::{MaterialLaw, Side, SoftBody, SoftMaterial, SoftShape, SoftSpec};
 use metachron_models::synthetic::{Synthetic, SyntheticSpec};
 use metachron_models::tool::Tool;
 use metachron_models::tool::{Keyframe, ToolSpec};
@@ -83,7 +83,7 @@ fn tube_spec(integrator: Integrator, substeps: u32, (clamp, damping_per_s): (boo
 }
 
 fn soft_spec(shape: SoftShape) -> SoftSpec {
-    let matter = SoftMatter {
+    let material = SoftMaterial {
         young_pa: 2e4,
         poisson: 0.4,
         density_kg_m3: 1050.0,
@@ -94,7 +94,7 @@ fn soft_spec(shape: SoftShape) -> SoftSpec {
     SoftSpec {
         shape,
         nodes: None,
-        matter,
+        material,
         position: DVec3::Z,
         rotation: DQuat::from_rotation_x(0.3),
         velocity: DVec3::ZERO,
@@ -144,8 +144,8 @@ fn a_kinematic_body_and_a_held_solid_carry_a_load_of_any_rate() {
         let shape = SoftShape::Box { size_m: DVec3::new(0.1, 0.1, 0.05), segments: [4, 4, 2] };
         let corner = DVec3::new(-0.05, -0.05, 0.0);
         let spec = SoftSpec { position: corner, rotation: DQuat::IDENTITY, ..soft_spec(shape) };
-        let matter = SoftMatter { young_pa: 2e5, damping_s: 0.01, ..spec.matter };
-        Box::new(SoftBody::new(SoftSpec { matter, held: vec![Side::Bottom], ..spec }).unwrap()) as Box<dyn Agent>
+        let material = SoftMaterial { young_pa: 2e5, damping_s: 0.01, ..spec.material };
+        Box::new(SoftBody::new(SoftSpec { material, held: vec![Side::Bottom], ..spec }).unwrap()) as Box<dyn Agent>
     };
     for (make, stands_m) in [(&still as &dyn Fn() -> Box<dyn Agent>, DVec3::Z * 0.02), (&held, DVec3::Z * 0.05)] {
         let load = Load { make, stands_m, half_m: 0.02, mass_kg: 0.3, settles_s: 1.0 };

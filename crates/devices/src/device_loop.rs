@@ -175,7 +175,7 @@ impl DeviceLoop {
         } else {
             Command::pose(position_m, rotation).moving(velocity_m_s, spin_rad_s)
         };
-        self.world.command(self.object, command.lasting(LEADS))
+        self.world.command(self.object, command.expires_after(LEADS))
     }
 
     /// The wrench on the object where the handle is, by the newest state; it fades where no other state comes.

@@ -74,7 +74,7 @@ impl Skeleton {
             return &self.frames;
         }
         self.find_slopes(curve);
-        self.find_spread(curve);
+        self.find_density(curve);
         self.place(curve, intervals(curve.arc_m[nodes - 1], eps_m));
         turn_least(&mut self.frames, start_normal(curve));
         follow_twist(&mut self.frames, curve);
@@ -91,7 +91,7 @@ impl Skeleton {
     ///
     /// A chord deviates from an arc by κ ε²/8, so equal errors require a density of √κ; the 1 keeps straight stretches sampled, and 1/L
     /// keeps the noise of an almost straight curve from dominating the density.
-    fn find_spread(&mut self, curve: &CurveState) {
+    fn find_density(&mut self, curve: &CurveState) {
         let last = curve.arc_m.len() - 1;
         let bend = |i: usize| {
             let h = curve.arc_m[i + 1] - curve.arc_m[i];

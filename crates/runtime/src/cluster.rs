@@ -2,18 +2,18 @@
 //!
 //! In: the members at the leader's time, the peers that each of them sees. Out: their new states, their bonds, members
 //! that have lost touch.
-//! Never here: how members come and go ([`seats`]), what else belongs to a turn ([`turn`]), the problem itself
+//! Never here: how members come and go ([`handover`]), what else belongs to a turn ([`turn`]), the problem itself
 //! ([`metachron_contact::step`]).
 
 mod attachments;
 mod common_time;
 mod contacts;
 mod exclusion;
+mod handover;
 mod macro_step;
 mod membership;
 mod notes;
 mod places;
-mod seats;
 mod solve_budget;
 #[cfg(test)]
 mod tests;
@@ -21,9 +21,9 @@ mod turn;
 
 pub(super) use attachments::JointedTo;
 use attachments::{held_by_joints, held_by_links};
+pub(super) use handover::{Handover, Led, assign_leaders, close_remaining, hand_over, return_arrivals};
 pub(super) use membership::{Epoch, Membership};
 pub(super) use places::{Place, Placed, check_places, put_back, take_apart};
-pub(super) use seats::{Handover, Led, assign_leaders, close_remaining, hand_over, return_arrivals};
 pub(super) use solve_budget::SolveBound;
 use solve_budget::{FactorPrice, Solved};
 pub(super) use turn::Leap;
@@ -51,7 +51,7 @@ use std::sync::Arc;
 const STRETCHED_MAX_S: f64 = 1.0 / 60.0;
 
 /// The cluster side of an agent: its contacts, joints and bonds, and the solvers of the steps that it leads.
-pub(super) struct ClusterSeat {
+pub(super) struct MemberState {
     scene: Arc<ClusterScene>,
     /// Joints that hold it to other agents, the torn ones too.
     jointed: Vec<JointedTo>,
@@ -103,7 +103,7 @@ pub(super) struct ClusterSeat {
     ids: Vec<AgentId>,
 }
 
-/// The solvers of the steps that a seat leads, and of the steps that repeat them.
+/// The solvers of the steps that an agent leads, and of the steps that repeat them.
 pub(super) struct Steppers {
     stepper: Option<Box<ClusterStepper>>,
     doubling: Option<Box<StepDoubling>>,
@@ -160,17 +160,17 @@ impl StepPlan {
     }
 }
 
-/// A bug: only agents with a seat are stepped in clusters.
-const NO_SEAT: &str = "has no seat in a cluster";
+/// A bug: only members are stepped in clusters.
+const NOT_A_MEMBER: &str = "is not a member of clusters";
 
-impl std::fmt::Debug for ClusterSeat {
+impl std::fmt::Debug for MemberState {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        f.debug_struct("ClusterSeat").field("bonds", &self.bonds).finish_non_exhaustive()
+        f.debug_struct("MemberState").field("bonds", &self.bonds).finish_non_exhaustive()
     }
 }
 
-impl ClusterSeat {
-    /// A seat in the clusters of `scene`, of which `jointed` are its joints; `asynchronous` of an agent that has pairs with clocks
+impl MemberState {
+    /// The state of a member in the clusters of `scene`, of which `jointed` are its joints; `asynchronous` of an agent that has pairs with clocks
     /// of their own.
     pub fn new(scene: Arc<ClusterScene>, jointed: Vec<JointedTo>, asynchronous: bool) -> Self {
         Self {
@@ -355,8 +355,9 @@ impl AgentRunner {
             return self.step_cluster(plan, factors_max, dt);
         }
         let (me, time, neighbours) = (self.shared.id, self.pace.time(), self.observer.neighbours());
-        let Acting { springs: hands, forces, motors, pose } = prepared(&mut self.loads, time, dt);
-        let context = StepContext { me, time, neighbours, hands, forces, motors, pose: *pose, links: &self.links };
+        let Acting { springs: user_springs, forces, motors, pose } = prepared(&mut self.loads, time, dt);
+        let context =
+            StepContext { me, time, neighbours, user_springs, forces, motors, pose: *pose, links: &self.links };
         let report = self.model.step(dt, &context)?;
         let done = &self.shared.gauges.work;
         done.set(done.get() + report.work);
@@ -373,8 +374,8 @@ impl AgentRunner {
     /// How many steps each member makes, and the length of the macro step.
     fn plan(&mut self, span: Span) -> Result<(Plan, SimSpan), String> {
         let time = self.pace.time();
-        let Some(mut wishes) = self.cluster.as_mut().map(|seat| std::mem::take(&mut seat.wishes)) else {
-            return Err(NO_SEAT.to_owned());
+        let Some(mut wishes) = self.cluster.as_mut().map(|member| std::mem::take(&mut member.wishes)) else {
+            return Err(NOT_A_MEMBER.to_owned());
         };
         wishes.clear();
         wishes.extend(self.wish());
@@ -389,8 +390,8 @@ impl AgentRunner {
             }
             Span::AtMost(most) => plan.macro_s.min(most.as_secs_f64()),
         };
-        if let Some(seat) = &mut self.cluster {
-            seat.wishes = wishes;
+        if let Some(member) = &mut self.cluster {
+            member.wishes = wishes;
         }
         if let Some(broken) = self.model.broken().or_else(|| self.led.all().find_map(|actor| actor.model.broken())) {
             return Err(broken.to_owned());
@@ -418,7 +419,7 @@ impl AgentRunner {
     pub fn look_first(&mut self) -> &[AgentId] {
         let step = PlannedStep { start: self.pace.scene_time(), dt: self.pace.dt() };
         self.look_among(step, &Membership::default());
-        self.cluster.as_ref().map_or(&[], |seat| &seat.bonds)
+        self.cluster.as_ref().map_or(&[], |member| &member.bonds)
     }
 
     /// Looks around for itself and for all that step with it.
@@ -440,12 +441,12 @@ impl AgentRunner {
         self.observe(step, members);
         let now = self.pace.time();
         let Self { shared, observer, peers, writer, links, cluster, .. } = self;
-        let Some(seat) = cluster else { return };
+        let Some(member) = cluster else { return };
         let grasped = newest(writer, |mine| mine.body.tool().and_then(|tool| tool.grasp)).map(|grasp| grasp.target);
-        seat.bond(observer, grasped, links, shared);
+        member.bond(observer, grasped, links, shared);
         // a new member stays for at least 0.2 s: two bodies that change clusters in turn would never be stepped
         // together
-        let ClusterSeat { memory, bonds, .. } = &mut **seat;
+        let MemberState { memory, bonds, .. } = &mut **member;
         bonds.iter().for_each(|id| memory.meet(*id, now));
         // one of shorter steps does not look as far ahead, and has to hear of it before it steps past
         if let Some(broad_phase) = peers.broad_phase.get() {
@@ -469,7 +470,7 @@ impl AgentRunner {
             });
             // it is parked where its state is written
             rested.unwrap_or_else(|reason| actor.model.note_unwound(&reason));
-            actor.cluster.iter_mut().for_each(|seat| seat.drift_m = 0.0);
+            actor.cluster.iter_mut().for_each(|member| member.drift_m = 0.0);
         });
     }
 }

@@ -52,7 +52,7 @@ pub use executors::threads::{AUTO_THREADS_MAX, THREADS_MAX, Threads};
 pub use lock_free::slot::{LatestSlot, SlotWriter};
 pub use records::events::{AgentEvent, ContactEvent, EVENTS_KEPT, EventKind};
 pub use records::governor::{Demand, Governor, TurnMeasure};
-pub use records::histogram::Spread;
+pub use records::histogram::Percentiles;
 pub use records::metrics::{AgentState, AgentStats, STALLED_FOR_GOOD};
 pub use records::probe::{SAMPLES_MAX, Sample, WatchedPoint};
 pub use records::streams::StreamReader;

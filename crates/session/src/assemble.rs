@@ -184,7 +184,7 @@ pub fn members(scene: &Scene) -> Vec<Vec<usize>> {
 
 /// The part of control's description of an actor that is the same in every frame, until one joins.
 #[derive(Debug, Clone, Copy, Default)]
-pub struct Lasting {
+pub struct FixedPart {
     /// The actor of the innermost group that it is in.
     pub group: Option<usize>,
     /// Triangles at every level, of an agent that is one mesh per level.
@@ -192,11 +192,11 @@ pub struct Lasting {
 }
 
 /// That of every actor: agents, then scenery, then groups.
-pub fn lasting(scene: &Scene) -> Vec<Lasting> {
+pub fn fixed_parts(scene: &Scene) -> Vec<FixedPart> {
     let first = scene.agents.len() + scene.scenery.len();
-    let agents = scene.agents.iter().map(|member| Lasting { group: None, triangles: triangles(&member.spec) });
-    let mut all: Vec<Lasting> = agents.collect();
-    all.resize(first + scene.groups.len(), Lasting::default());
+    let agents = scene.agents.iter().map(|member| FixedPart { group: None, triangles: triangles(&member.spec) });
+    let mut all: Vec<FixedPart> = agents.collect();
+    all.resize(first + scene.groups.len(), FixedPart::default());
     // inner groups come first
     for (at, (group, members)) in scene.groups.iter().zip(members(scene)).enumerate() {
         for member in members.into_iter().chain(group.groups.clone().map(|inner| first + inner)) {
@@ -282,18 +282,18 @@ pub fn law(target: &Target) -> Law {
     }
 }
 
-/// A scene and the lasting part of every actor's description.
+/// A scene and the fixed part of every actor's description.
 #[derive(Clone, Copy)]
 pub struct Actors<'a> {
     pub scene: &'a Scene,
-    pub lasting: &'a [Lasting],
+    pub fixed_parts: &'a [FixedPart],
 }
 
 /// Updates `views`, control's description of every object of the scene view in the order of its actors, for the objects in `updated`.
 pub fn update_views(views: &mut Vec<ObjectView>, seen: &[Visibility], updated: &[usize], of: Actors<'_>) {
     let view = |at: usize| {
-        let lasting = of.lasting.get(at).copied().unwrap_or_default();
-        ObjectView { group: lasting.group, ..view_at(at, &seen[at], of.scene, lasting.triangles) }
+        let fixed = of.fixed_parts.get(at).copied().unwrap_or_default();
+        ObjectView { group: fixed.group, ..view_at(at, &seen[at], of.scene, fixed.triangles) }
     };
     if views.len() != seen.len() {
         views.clear();

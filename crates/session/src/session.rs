@@ -64,8 +64,8 @@ pub struct Session {
     visible_resolution: VisibleResolution,
     reader: Reader,
     views: Vec<ObjectView>,
-    /// The lasting part of every actor's description.
-    lasting: Vec<assemble::Lasting>,
+    /// The fixed part of every actor's description.
+    fixed_parts: Vec<assemble::FixedPart>,
     levels: Vec<Level>,
     couplings: Couplings,
     trace: Option<Trace>,
@@ -197,7 +197,7 @@ impl Session {
             world,
             elsewhere: None,
             views: Vec::new(),
-            lasting: assemble::lasting(&scene),
+            fixed_parts: assemble::fixed_parts(&scene),
             levels: Vec::new(),
             couplings: Couplings::default(),
             trace: None,

@@ -21,8 +21,8 @@ pub struct WorldView {
     scene_view: SceneView,
     control: PictureControl,
     views: Vec<ObjectView>,
-    /// The lasting part of every actor's description.
-    lasting: Vec<assemble::Lasting>,
+    /// The fixed part of every actor's description.
+    fixed_parts: Vec<assemble::FixedPart>,
 }
 
 impl WorldView {
@@ -36,7 +36,7 @@ impl WorldView {
             scene_view: assemble::scene_view(scene),
             control,
             views: Vec::new(),
-            lasting: assemble::lasting(scene),
+            fixed_parts: assemble::fixed_parts(scene),
             scene: scene.clone(),
         }
     }
@@ -61,7 +61,7 @@ impl WorldView {
     pub fn compose(&mut self, camera: &Camera, size: Size) -> &Picture {
         self.gather();
         self.scene_view.survey(camera, size);
-        let of = assemble::Actors { scene: &self.scene, lasting: &self.lasting };
+        let of = assemble::Actors { scene: &self.scene, fixed_parts: &self.fixed_parts };
         assemble::update_views(&mut self.views, self.scene_view.seen(), self.scene_view.updated(), of);
         let plan = self.control.plan(&self.views);
         let levels: Vec<Level> =
@@ -77,7 +77,7 @@ impl WorldView {
             world.joined(agent.id()).into_iter().for_each(|member| assemble::join(scene, scene_view, member));
         }
         if scene.agents.len() > before {
-            self.lasting = assemble::lasting(scene);
+            self.fixed_parts = assemble::fixed_parts(scene);
         }
         let agents = || world.agents().iter().take(scene.agents.len());
         // no state before the newest: the picture shown last may be long ago

@@ -4,7 +4,7 @@
 use glam::{DQuat, DVec3};
 use metachron_core::{Body, SimSpan};
 use metachron_geometry::{ContactTraits, ShapeKind, Solid};
-use metachron_models::soft::{MaterialLaw, Side, SoftBody, SoftMatter, SoftShape, SoftSpec};
+use metachron_models::soft::{MaterialLaw, Side, SoftBody, SoftMaterial, SoftShape, SoftSpec};
 use metachron_world::kinds::ExecutorKind;
 use metachron_world::{Command, Custom, EventFilter, Happening, Object, Rigid, Scene, World, WorldError};
 use std::sync::Arc;
@@ -22,7 +22,7 @@ fn slab(at: DVec3) -> SoftSpec {
     SoftSpec {
         shape: SoftShape::Box { size_m, segments: [7, 7, 2] },
         nodes: None,
-        matter: SoftMatter {
+        material: SoftMaterial {
             young_pa: 1e5,
             poisson: 0.3,
             density_kg_m3: 1000.0,
@@ -49,13 +49,13 @@ fn scene() -> Scene {
     let lies = SoftSpec { held, gravity: DVec3::Z * -9.81, ..slab(DVec3::ZERO) };
     let shape = SoftShape::Rope { path_m: vec![DVec3::ZERO, DVec3::X], radius_m: 0.005, segments: 4 };
     // damping would slow it
-    let undamped = SoftMatter { damping_per_s: 0.0, ..slab(AWAY).matter };
+    let undamped = SoftMaterial { damping_per_s: 0.0, ..slab(AWAY).material };
     let ball = Rigid::ball(0.03).mass_kg(0.05).at([0.0, 0.0, 0.5 + CELL_M + 0.03]).rate_hz(120.0);
     Scene::builder()
         .fixed("floor", Solid::Plane)
         .add("slab", soft(lies))
         .add("ball", ball)
-        .add("flier", soft(SoftSpec { velocity: FLIES_M_S, matter: undamped, ..slab(AWAY) }))
+        .add("flier", soft(SoftSpec { velocity: FLIES_M_S, material: undamped, ..slab(AWAY) }))
         .add("rope", soft(SoftSpec { shape, ..slab(DVec3::Y * 9.0) }))
         .build()
         .unwrap()

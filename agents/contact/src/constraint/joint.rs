@@ -177,9 +177,9 @@ impl Joints {
             return;
         };
         let ends = [End { member: Some(first), point: point_a }, End { member: second, point: point_b }];
-        let lasting = RowOwner::new(first, second, Partner::Joint(number));
+        let owner_of_turns = RowOwner::new(first, second, Partner::Joint(number));
         let Joint { tears_above_n, yields_above_n, .. } = joint;
-        let owner = RowOwner { tears_above_n, yields_above_n, frame: Frame::of(&b), ..lasting };
+        let owner = RowOwner { tears_above_n, yields_above_n, frame: Frame::of(&b), ..owner_of_turns };
         if let JointKind::Spring { stiffness_n_m, damping_n_s_m, rest_m } = joint.kind {
             constraints.spring(step, &ends, &Pull { stiffness_n_m, damping_n_s_m, rest_m }, owner);
             return;
@@ -187,7 +187,7 @@ impl Joints {
         let points = Together { sides: [ends[0].side(), ends[1].side()], owner };
         // a row that holds a turn gives no force
         let turns = [a.turns.of_member(first), second.map_or(Side::FIXED, |at| b.turns.of_member(at))];
-        let turns = Together { sides: turns, owner: lasting };
+        let turns = Together { sides: turns, owner: owner_of_turns };
         let as_before_n = all[first].memory.recall(owner.partner, TouchKey::default()).force_n;
         let (axis, now) = (joint.axis(&a, anchors[1] - anchors[0]), joint.off(&a, &b));
         let (rows, rotations) = ([constraints.rows.len(); 2], [a.rotation, b.rotation]);
@@ -199,7 +199,7 @@ impl Joints {
         let tie = Tie { ends: &ends, force_n: as_before_n, owner, rows, is_point };
         constraints.geometric_stiffness.note(step, &tie);
         let of = if matches!(joint.kind, JointKind::Revolute { .. }) { turns.sides } else { points.sides };
-        resist(step, constraints, &joint, Driven { axis, sides: of, owner: lasting });
+        resist(step, constraints, &joint, Driven { axis, sides: of, owner: owner_of_turns });
     }
 
     /// Lays out the rows of the joint that was noted last.

@@ -46,8 +46,8 @@ pub(super) struct LocalQuery<'a> {
     pub place: usize,
     /// Its blocks.
     pub blocks: &'a [usize],
-    /// The lasting forces of all partners on each block, N or N·m.
-    pub lasting: &'a [DVec3],
+    /// The persistent forces of all partners on each block, N or N·m.
+    pub persistent: &'a [DVec3],
 }
 
 impl ClusterStepper {
@@ -96,7 +96,7 @@ impl ClusterStepper {
             let pushed = state.dv_known.get(block).copied().unwrap_or(DVec3::ZERO);
             let free = (state.dv_free[block] - pushed) / own_s;
             let row = &into.compliance[at * blocks.len()..(at + 1) * blocks.len()];
-            let pushed: DVec3 = row.iter().zip(query.lasting).map(|(w, force)| *w * *force).sum();
+            let pushed: DVec3 = row.iter().zip(query.persistent).map(|(w, force)| *w * *force).sum();
             // a held body goes on as it does: its contacts take up any change by forces
             let acceleration = if held { DVec3::ZERO } else { free + pushed };
             into.blocks.push(LocalBlock { slot: member.slot_of(block), velocity: state.v_before[block], acceleration });

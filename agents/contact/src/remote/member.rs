@@ -115,10 +115,10 @@ impl RemoteMember {
         let moved_s = if since_s > 0.0 { since_s } else { age_s }.min(model.step_s);
         for (at, InFlight { impulse, way }) in flight.iter().enumerate() {
             let force = partner.and_then(|partner| partner.forces.get(at)).copied().unwrap_or(DVec3::ZERO);
-            let lasting = force * age_s;
-            let new = (*impulse - lasting) * acts;
+            let persistent = force * age_s;
+            let new = (*impulse - persistent) * acts;
             deviation[at] += new;
-            carried[at] += if model.held { new * moved_s } else { *way * (1.0 - share_of(lasting, *impulse)) };
+            carried[at] += if model.held { new * moved_s } else { *way * (1.0 - share_of(persistent, *impulse)) };
             // it goes on only as far as it is given
             for (row, gain) in self.gain_m_s2.iter_mut().enumerate() {
                 *gain -= model.compliance[row * deviation.len() + at] * force;

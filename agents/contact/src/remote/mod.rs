@@ -237,7 +237,7 @@ impl Pairs {
         });
         for ((way, sum), weight) in carried.iter_mut().zip(&*sums).zip(&*weight) {
             let force = *sum / dt_s;
-            let lasts = lasting(force, *weight).dot(force) / force.length_squared().max(f64::MIN_POSITIVE);
+            let lasts = persistent(force, *weight).dot(force) / force.length_squared().max(f64::MIN_POSITIVE);
             *way *= 1.0 - lasts.clamp(0.0, 1.0);
         }
         if carried.iter().any(|way| *way != DVec3::ZERO) {
@@ -316,15 +316,15 @@ impl Pairs {
         }
         for (at, all) in goes_on.iter_mut().enumerate() {
             let Some(weight) = weight.get(blocks[at]) else { continue };
-            // the lasting force is shared as the whole was given
-            let (lasts, whole) = (lasting(*all, *weight), all.dot(*weight));
+            // the persistent force is shared as the whole was given
+            let (lasts, whole) = (persistent(*all, *weight), all.dot(*weight));
             for partner in &mut model.partners {
                 let share = if whole > 0.0 { partner.forces[at].dot(*weight) / whole } else { 0.0 };
                 partner.forces[at] = lasts * share;
             }
             *all = lasts;
         }
-        let query = LocalQuery { place, blocks, lasting: goes_on };
+        let query = LocalQuery { place, blocks, persistent: goes_on };
         stepper.local_model(all, &query, columns, model);
     }
 
@@ -354,9 +354,9 @@ impl std::fmt::Debug for Pairs {
     }
 }
 
-/// The lasting part of a force on a free block: the block's weight where the force bears it, and no impact (docs/theory/coupling.md,
+/// The persistent part of a force on a free block: the block's weight where the force bears it, and no impact (docs/theory/coupling.md,
 /// section 3). A force of half the weight bears it already: a body that hops a little is not let fall.
-fn lasting(force: DVec3, weight: DVec3) -> DVec3 {
+fn persistent(force: DVec3, weight: DVec3) -> DVec3 {
     let square = weight.length_squared();
     if square > 0.0 { weight * (force.dot(weight) / (BEARS_SHARE * square)).clamp(0.0, 1.0) } else { DVec3::ZERO }
 }

@@ -256,7 +256,7 @@ impl ClusterStepper {
         self.torn().is_empty() && self.yielded().is_empty()
     }
 
-    /// Whether members that are calm may rest: not where an attachment has just given way, which may have kept them still until now, or where
+    /// Whether members that hardly move may rest: not where an attachment has just given way, which may have kept them still until now, or where
     /// a motor keeps a joint moving, however slowly.
     #[must_use]
     pub fn lets_rest(&self) -> bool {

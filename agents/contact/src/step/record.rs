@@ -79,10 +79,10 @@ impl ClusterStepper {
             let impulse = solution.contacts_n_s[k];
             let owed_slip_m = contact.owed_slip_after(impulse, solution.contacts_m_s[k], h_s);
             // sides that rebound hold each other no more
-            let (lasting, spin) =
+            let (persistent, spin) =
                 if impacts.of(k).is_some() { (DVec3::ZERO, Spin::default()) } else { (impulse, owner.spin) };
             let load_n = contact.load_n_s / h_s;
-            let (key, force_n, overlap_m) = (owner.key, lasting / h_s, contact.overlap_m);
+            let (key, force_n, overlap_m) = (owner.key, persistent / h_s, contact.overlap_m);
             let push = owner.push_row.map_or(DVec3::ZERO, |row| solution.rows_n_s[row]);
             let push_n = push.length() / h_s;
             let place = Remembered { key, force_n, load_n, overlap_m, push_n, owed_slip_m, spin };
@@ -160,7 +160,7 @@ struct Steps {
 impl Participant<'_> {
     /// Whether a user leads it in this step.
     fn is_led_by_user(&self) -> bool {
-        let is_held = || self.context.hands.iter().any(|spring| spring.by.is_none());
+        let is_held = || self.context.user_springs.iter().any(|spring| spring.by.is_none());
         self.member.is_led() && (self.context.pose.is_some() || is_held())
     }
 

@@ -437,7 +437,7 @@ fn insert(physics: &mut PhysicsWorld, one: &Participant<'_>, body: &Placed<'_>, 
     let axes = DMat3::from_quat(body.rotation);
     let inertia = axes.transpose() * inertia * axes;
     let com = body.shape.com_local.as_vec3();
-    let matter = MassProperties::with_inertia_matrix(com, mass_kg as f32, inertia.as_mat3());
+    let mass = MassProperties::with_inertia_matrix(com, mass_kg as f32, inertia.as_mat3());
     let builder = RigidBodyBuilder::dynamic()
         .pose(body.pose(origin_m))
         .can_sleep(false)
@@ -446,7 +446,7 @@ fn insert(physics: &mut PhysicsWorld, one: &Participant<'_>, body: &Placed<'_>, 
         .allow_fast_rotation(true)
         // the members' own flight, a part of the change of their velocities, has the gyroscopic part
         .gyroscopic_forces_enabled(false);
-    let collider = skin(body.shape.shape.clone(), body.form).mass_properties(matter);
+    let collider = skin(body.shape.shape.clone(), body.form).mass_properties(mass);
     let (handle, _) = physics.insert(builder, collider.user_data(Side::Body(one.id).name()));
     Known { id: one.id, member: 0, handle, mass_kg, inertia, radius_m: body.shape.radius_m, touched: false }
 }

@@ -181,7 +181,7 @@ impl Cage {
             let volumes_m3 = volumes.map(|volume| volume * scale);
             self.cells.push(CageCell { corners, fill: (fill(volumes) * scale).min(1.0), volumes_m3 });
         }
-        self.spread_cells();
+        self.extend_cells();
         Some(())
     }
 
@@ -202,7 +202,7 @@ impl Cage {
     }
 
     /// Gives each place without a cell that of a neighbour, outwards from the cells.
-    fn spread_cells(&mut self) {
+    fn extend_cells(&mut self) {
         let mut reached: Vec<usize> = (0..self.cell_at.len()).filter(|at| self.cell_at[*at] != NONE).collect();
         let mut next = 0;
         while next < reached.len() {
@@ -307,7 +307,7 @@ impl Cage {
             let [i, j, k] = place.to_array().map(|at| at.round() as usize);
             self.cell_at[i + self.counts[0] * (j + self.counts[1] * k)] = number;
         }
-        self.spread_cells();
+        self.extend_cells();
     }
 
     /// How a point of the surface at rest moves with the cage: linear in one of the six tetrahedra of its cell, continuous from cell to cell

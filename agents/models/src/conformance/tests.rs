@@ -95,7 +95,7 @@ impl OwnSteps for Row {
             self.height += 1e-12;
         }
         let dt_s = check_span(dt)?;
-        if context.hands.iter().any(|hand| !hand.target.is_finite()) {
+        if context.user_springs.iter().any(|hand| !hand.target.is_finite()) {
             if !self.breaks(Promise::Finite) {
                 return Err(StepError::Diverged { model: "row", dt_s, what: "a hand".to_owned() });
             }

@@ -14,7 +14,7 @@ use std::sync::Arc;
 
 /// A rigid body with its own clock.
 pub struct RigidBody {
-    pub(super) spread: MassDistribution,
+    pub(super) distribution: MassDistribution,
     pub(super) flight: Flight,
     pub(super) may_sleep: bool,
     pub(super) motion: Motion,
@@ -44,23 +44,23 @@ impl RigidBody {
     /// [`RigidError`] for a shape without volume, a plane and a number outside its range.
     pub fn new(spec: RigidSpec) -> Result<Self, RigidError> {
         spec.check_numbers()?;
-        let spread = MassDistribution::of_body(&spec)?;
+        let distribution = MassDistribution::of_body(&spec)?;
         let rotation = spec.rotation.normalize();
         let mut motion = Motion {
-            position: spec.position + rotation * spread.com,
+            position: spec.position + rotation * distribution.com,
             rotation,
             velocity: spec.restraint.translation(spec.velocity),
             angular: DVec3::ZERO,
         };
-        motion.set_spin(&spread, spec.restraint.rotation(spec.spin));
+        motion.set_spin(&distribution, spec.restraint.rotation(spec.spin));
         let flight = Flight { gravity: spec.restraint.translation(spec.gravity), restraint: spec.restraint };
-        let shape = SolidShape::moving(&spec.solid, spread.com)?;
+        let shape = SolidShape::moving(&spec.solid, distribution.com)?;
         let radius_m = shape.radius_m;
         let kind = ShapeKind::Solid(shape);
         let RigidSpec { friction, restitution, traits, .. } = spec;
         let form = CollisionShape { kind, friction, restitution, traits };
         let mut body = Self {
-            spread,
+            distribution,
             flight,
             may_sleep: spec.sleep,
             motion,
@@ -73,7 +73,7 @@ impl RigidBody {
             steps: 0,
             unknowns: Unknowns::default(),
         };
-        body.unknowns.start([body.motion.velocity, body.motion.spin(&body.spread)]);
+        body.unknowns.start([body.motion.velocity, body.motion.spin(&body.distribution)]);
         Ok(body)
     }
 
@@ -82,12 +82,12 @@ impl RigidBody {
     /// A snapshot holds the position of the centre of mass: a point `p` of the shape is at `position + rotation * (p − com_local)`.
     #[must_use]
     pub fn com_local(&self) -> DVec3 {
-        self.spread.com
+        self.distribution.com
     }
 
     /// The speed that its spin gives to its farthest point, m/s.
     pub(super) fn swing_m_s(&self) -> f64 {
-        self.radius_m * self.motion.spin(&self.spread).length()
+        self.radius_m * self.motion.spin(&self.distribution).length()
     }
 
     /// The box around it.
@@ -115,14 +115,14 @@ impl Agent for RigidBody {
     }
 
     fn set_motion(&mut self, set: &SetMotion) -> bool {
-        let Self { motion, spread, flight: Flight { restraint, .. }, .. } = self;
-        let origin_m = set.position_m.unwrap_or(motion.position - motion.rotation * spread.com);
-        let spin_rad_s = restraint.rotation(set.spin_rad_s.unwrap_or_else(|| motion.spin(spread)));
+        let Self { motion, distribution, flight: Flight { restraint, .. }, .. } = self;
+        let origin_m = set.position_m.unwrap_or(motion.position - motion.rotation * distribution.com);
+        let spin_rad_s = restraint.rotation(set.spin_rad_s.unwrap_or_else(|| motion.spin(distribution)));
         let rotation = set.rotation.map_or(motion.rotation, DQuat::normalize);
         let velocity = restraint.translation(set.velocity_m_s.unwrap_or(motion.velocity));
-        let mut to = Motion { position: origin_m + rotation * spread.com, rotation, velocity, ..*motion };
-        to.set_spin(spread, spin_rad_s);
-        if !to.is_sane(spread) {
+        let mut to = Motion { position: origin_m + rotation * distribution.com, rotation, velocity, ..*motion };
+        to.set_spin(distribution, spin_rad_s);
+        if !to.is_sane(distribution) {
             return false;
         }
         *motion = to;
@@ -136,7 +136,7 @@ impl Agent for RigidBody {
         let Body::Rigid(state) = state else { return Err("a rigid body has the state of one".to_owned()) };
         let rotation = state.rotation.normalize();
         let set = SetMotion {
-            position_m: Some(state.position - rotation * self.spread.com),
+            position_m: Some(state.position - rotation * self.distribution.com),
             rotation: Some(rotation),
             velocity_m_s: Some(state.velocity),
             spin_rad_s: Some(state.spin),
@@ -158,9 +158,9 @@ impl Agent for RigidBody {
             position: self.motion.position,
             rotation: self.motion.rotation,
             velocity: self.motion.velocity,
-            spin: self.motion.spin(&self.spread),
+            spin: self.motion.spin(&self.distribution),
         });
-        into.energy_j = self.motion.energy_j(&self.spread, self.flight.gravity);
+        into.energy_j = self.motion.energy_j(&self.distribution, self.flight.gravity);
         into.residual_m = (self.motion.position.abs().max_element() + self.radius_m) * f64::EPSILON;
         (into.at_rest, into.acceleration) = (self.at_rest, self.acceleration);
         into.angular_acceleration = self.angular_acceleration;
@@ -175,11 +175,11 @@ impl Agent for RigidBody {
     }
 
     fn momentum(&self) -> (DVec3, DVec3) {
-        let linear = self.motion.velocity * self.spread.mass_kg;
+        let linear = self.motion.velocity * self.distribution.mass_kg;
         (linear, self.motion.position.cross(linear) + self.motion.angular)
     }
 
     fn mass_kg(&self) -> f64 {
-        self.spread.mass_kg
+        self.distribution.mass_kg
     }
 }

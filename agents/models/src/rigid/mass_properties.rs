@@ -205,11 +205,11 @@ mod tests {
         let about_com_kg_m2 = turn * DMat3::from_diagonal(DVec3::new(0.03, 0.04, 0.05)) * turn.transpose();
         let given = super::super::GivenInertia { com_m: DVec3::X, about_com_kg_m2 };
         let ball = RigidSpec::free(Solid::Ball { radius_m: 0.1 }, DVec3::ZERO, 2.0);
-        let spread = MassDistribution::of_body(&RigidSpec { inertia: Some(given), ..ball }).unwrap();
-        let axes = DMat3::from_quat(spread.axes);
-        let back = axes * DMat3::from_diagonal(spread.moments) * axes.transpose();
+        let distribution = MassDistribution::of_body(&RigidSpec { inertia: Some(given), ..ball }).unwrap();
+        let axes = DMat3::from_quat(distribution.axes);
+        let back = axes * DMat3::from_diagonal(distribution.moments) * axes.transpose();
         assert!(back.abs_diff_eq(about_com_kg_m2, 1e-16), "{back}"); // rounding of numbers near 0.05
-        assert_eq!((spread.com, spread.mass_kg), (DVec3::X, 2.0));
+        assert_eq!((distribution.com, distribution.mass_kg), (DVec3::X, 2.0));
     }
 
     #[test]

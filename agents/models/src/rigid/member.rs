@@ -41,12 +41,12 @@ pub(super) struct Unknowns {
     /// Velocity and spin at the end of the step without contact, and now.
     pub(super) free: [DVec3; 2],
     now: [DVec3; 2],
-    kept: Option<Kept>,
+    saved: Option<SavedState>,
 }
 
 /// A state to go back to.
 #[derive(Debug, Clone, Copy)]
-struct Kept {
+struct SavedState {
     motion: Motion,
     acceleration: DVec3,
     angular_acceleration: DVec3,
@@ -58,7 +58,7 @@ struct Kept {
 impl Default for Unknowns {
     fn default() -> Self {
         let block = |at| Block { row: at, column: at, value: DMat3::IDENTITY };
-        Self { blocks: [block(0), block(1)], free: [DVec3::ZERO; 2], now: [DVec3::ZERO; 2], kept: None }
+        Self { blocks: [block(0), block(1)], free: [DVec3::ZERO; 2], now: [DVec3::ZERO; 2], saved: None }
     }
 }
 
@@ -77,8 +77,8 @@ impl Unknowns {
 impl RigidBody {
     /// The inertia tensor in world axes, kg·m².
     fn inertia(&self) -> DMat3 {
-        let to_world = DMat3::from_quat(self.motion.rotation * self.spread.axes);
-        to_world * DMat3::from_diagonal(self.spread.moments) * to_world.transpose()
+        let to_world = DMat3::from_quat(self.motion.rotation * self.distribution.axes);
+        to_world * DMat3::from_diagonal(self.distribution.moments) * to_world.transpose()
     }
 
     /// Its motion after `h_s` seconds with the velocities `v`; by its own free flight where nothing has touched it.
@@ -86,11 +86,11 @@ impl RigidBody {
         let mut motion = self.motion;
         let Flight { restraint, .. } = self.flight;
         let given = restraint.rotation(v[SPIN] - self.unknowns.free[SPIN]);
-        let given = self.motion.inertia_times(&self.spread, given);
+        let given = self.motion.inertia_times(&self.distribution, given);
         if !touched {
             motion.angular += given;
             motion.velocity += restraint.translation(v[0] - self.unknowns.free[0]);
-            motion.fly(&self.spread, &self.flight, h_s);
+            motion.fly(&self.distribution, &self.flight, h_s);
             return motion;
         }
         if restraint.angular_damping_per_s > 0.0 {
@@ -99,16 +99,16 @@ impl RigidBody {
         motion.angular += given;
         motion.velocity = restraint.translation(v[0]);
         motion.position += motion.velocity * h_s;
-        motion.turn_held(&self.spread, &restraint, h_s);
+        motion.turn_held(&self.distribution, &restraint, h_s);
         motion
     }
 
     /// How it answers impulses: along and about locked axes not at all.
     pub(super) fn answers(&self) -> Inertia {
         let Restraint { locked_rotation, .. } = self.flight.restraint;
-        let inverse_mass = self.flight.restraint.translation(DVec3::splat(self.spread.mass_kg.recip()));
+        let inverse_mass = self.flight.restraint.translation(DVec3::splat(self.distribution.mass_kg.recip()));
         let inverse_inertia = if locked_rotation == [false; 3] {
-            self.motion.inverse_inertia(&self.spread)
+            self.motion.inverse_inertia(&self.distribution)
         } else {
             inverse_of_free(self.inertia(), locked_rotation)
         };
@@ -117,13 +117,13 @@ impl RigidBody {
 
     /// Its blocks: where an axis is locked, it is as heavy there as nothing that touches it moves, and no impulse is left over.
     fn masses(&self) -> [DMat3; 2] {
-        let (mass, inertia) = (DMat3::from_diagonal(DVec3::splat(self.spread.mass_kg)), self.inertia());
+        let (mass, inertia) = (DMat3::from_diagonal(DVec3::splat(self.distribution.mass_kg)), self.inertia());
         let Restraint { locked_translation, locked_rotation, .. } = self.flight.restraint;
         if !self.flight.restraint.locks() {
             return [mass, inertia];
         }
-        let heaviest = self.spread.moments.max_element();
-        [locked(mass, locked_translation, self.spread.mass_kg), locked(inertia, locked_rotation, heaviest)]
+        let heaviest = self.distribution.moments.max_element();
+        [locked(mass, locked_translation, self.distribution.mass_kg), locked(inertia, locked_rotation, heaviest)]
     }
 
     fn diverged(&self, dt_s: f64, what: &str) -> StepError {
@@ -138,13 +138,13 @@ impl ClusterMember for RigidBody {
 
     fn begin(&mut self, h_s: f64) -> Result<(), StepError> {
         let mut flight = self.motion;
-        flight.fly_predicted(&self.spread, &self.flight, h_s);
+        flight.fly_predicted(&self.distribution, &self.flight, h_s);
         let masses = self.masses();
         let Unknowns { blocks, free, now, .. } = &mut self.unknowns;
-        *now = [self.motion.velocity, self.motion.spin(&self.spread)];
-        *free = [flight.velocity, flight.spin(&self.spread)];
+        *now = [self.motion.velocity, self.motion.spin(&self.distribution)];
+        *free = [flight.velocity, flight.spin(&self.distribution)];
         blocks.iter_mut().zip(masses).for_each(|(block, mass)| block.value = mass);
-        if flight.is_sane(&self.spread) {
+        if flight.is_sane(&self.distribution) {
             Ok(())
         } else {
             Err(self.diverged(h_s, "the body left the coordinate range"))
@@ -170,7 +170,7 @@ impl ClusterMember for RigidBody {
 
     fn carry(&mut self, impulses_n_s2: &[DVec3]) {
         let Flight { restraint, .. } = self.flight;
-        self.motion.position += restraint.translation(impulses_n_s2[0] / self.spread.mass_kg);
+        self.motion.position += restraint.translation(impulses_n_s2[0] / self.distribution.mass_kg);
         let turn = inverse_of_free(self.inertia(), restraint.locked_rotation) * impulses_n_s2[SPIN];
         if turn != DVec3::ZERO {
             self.motion.rotation = (glam::DQuat::from_scaled_axis(turn) * self.motion.rotation).normalize();
@@ -179,12 +179,12 @@ impl ClusterMember for RigidBody {
 
     fn keep(&mut self) {
         let Self { motion, acceleration, angular_acceleration, still_s, at_rest, steps, .. } = *self;
-        self.unknowns.kept = Some(Kept { motion, acceleration, angular_acceleration, still_s, at_rest, steps });
+        self.unknowns.saved = Some(SavedState { motion, acceleration, angular_acceleration, still_s, at_rest, steps });
     }
 
     fn go_back(&mut self) {
-        let Some(kept) = self.unknowns.kept else { return };
-        let Kept { motion, acceleration, angular_acceleration, still_s, at_rest, steps } = kept;
+        let Some(saved) = self.unknowns.saved else { return };
+        let SavedState { motion, acceleration, angular_acceleration, still_s, at_rest, steps } = saved;
         (self.motion, self.acceleration, self.angular_acceleration) = (motion, acceleration, angular_acceleration);
         (self.still_s, self.at_rest, self.steps) = (still_s, at_rest, steps);
     }
@@ -192,13 +192,13 @@ impl ClusterMember for RigidBody {
     fn end(&mut self, &StepEnd { v, h_s, touched, .. }: &StepEnd<'_>) -> Result<(), StepError> {
         let before = self.motion;
         self.motion = self.moved(v, h_s, touched);
-        if !self.motion.is_sane(&self.spread) {
+        if !self.motion.is_sane(&self.distribution) {
             self.motion = before;
             return Err(self.diverged(h_s, "the body left the coordinate range"));
         }
-        let spin = self.motion.spin(&self.spread);
+        let spin = self.motion.spin(&self.distribution);
         self.acceleration = (self.motion.velocity - before.velocity) / h_s;
-        self.angular_acceleration = (spin - before.spin(&self.spread)) / h_s;
+        self.angular_acceleration = (spin - before.spin(&self.distribution)) / h_s;
         self.unknowns.now = [self.motion.velocity, spin];
         self.steps += 1;
         self.at_rest = false;
@@ -230,7 +230,7 @@ impl MemberMotion for RigidBody {
     fn pose(&self, v: &[DVec3], t_s: f64) -> Option<Pose> {
         let motion = if t_s > 0.0 { self.moved(v, t_s, v != self.unknowns.free) } else { self.motion };
         let Motion { position, rotation, .. } = motion;
-        let origin_m = position - rotation * self.spread.com;
+        let origin_m = position - rotation * self.distribution.com;
         let turns = Side::node(0, SPIN);
         Some(Pose { centre_m: position, origin_m, rotation, turns, led_rad_s: DVec3::ZERO })
     }
@@ -238,7 +238,7 @@ impl MemberMotion for RigidBody {
     fn locked(&self) -> Option<Locked> {
         let Flight { restraint, .. } = self.flight;
         let Restraint { locked_translation, locked_rotation, .. } = restraint;
-        let (mass_kg, inertia) = (self.spread.mass_kg, self.inertia());
+        let (mass_kg, inertia) = (self.distribution.mass_kg, self.inertia());
         restraint.locks().then_some(Locked { locked_translation, locked_rotation, mass_kg, inertia })
     }
 

@@ -179,7 +179,7 @@ impl RigidSpec {
     /// Its centre of mass in the axes of its shape, metres; their origin where the shape is none.
     #[must_use]
     pub fn com_local(&self) -> DVec3 {
-        MassDistribution::of_body(self).map_or(DVec3::ZERO, |spread| spread.com)
+        MassDistribution::of_body(self).map_or(DVec3::ZERO, |distribution| distribution.com)
     }
 
     /// Shifts its start and its keyframes, metres.

@@ -55,7 +55,7 @@ pub fn limit(skeleton: &RestCurve, count: usize) -> usize {
 /// Distributes `count` segments over the rest length in proportion to `density` (one per interval of `arcs`, per metre; eq. 25).
 ///
 /// `arcs` are the arc lengths at which the density changes, from 0 to L.
-pub fn spread(arcs: &[f64], density: &[f64], count: usize, into: &mut Vec<f64>) {
+pub fn place_nodes(arcs: &[f64], density: &[f64], count: usize, into: &mut Vec<f64>) {
     let last = arcs.len() - 1;
     let total: f64 = density.iter().zip(arcs.windows(2)).map(|(d, s)| d * (s[1] - s[0])).sum();
     let (mut left, mut gone) = (0, 0.0);
@@ -105,7 +105,7 @@ impl Discretization {
             let mut bend: Vec<f64> = tangents.windows(2).map(|t| (t[1] - t[0]).length() / even).collect();
             densities(&mut bend, &vec![even; count]);
             let coarse = arcs.clone();
-            spread(&coarse, &bend, count, &mut arcs);
+            place_nodes(&coarse, &bend, count, &mut arcs);
         }
         division.rebuild(skeleton, &arcs);
         division

@@ -10,16 +10,16 @@ use glam::DVec3;
 
 /// Removes `excess` joules of kinetic energy, or all there is: of all motion where an end is held, else of the motion
 /// beside the rigid motion with the same momentum.
-pub fn remove(excess: f64, state: &mut RodState, matter: &RodMaterial, division: &Discretization) {
-    let held = matter.held[0] || matter.held[1];
-    let rigid = if held { Rigid::default() } else { Rigid::of(state, matter, division) };
+pub fn remove(excess: f64, state: &mut RodState, material: &RodMaterial, division: &Discretization) {
+    let held = material.held[0] || material.held[1];
+    let rigid = if held { Rigid::default() } else { Rigid::of(state, material, division) };
     rigid.add(state, -1.0);
-    state.measure_motion(matter, division);
+    state.measure_motion(material, division);
     let kinetic = state.kinetic_j;
     let share = if kinetic > 0.0 { (1.0 - excess / kinetic).max(0.0).sqrt() } else { 0.0 };
     state.u.iter_mut().for_each(|u| *u *= share);
     rigid.add(state, 1.0);
-    state.measure_motion(matter, division);
+    state.measure_motion(material, division);
 }
 
 /// A rigid motion: velocity of a centre, and a spin.
@@ -32,18 +32,18 @@ struct Rigid {
 
 impl Rigid {
     /// The rigid motion with the momentum of `state`.
-    fn of(state: &RodState, matter: &RodMaterial, division: &Discretization) -> Self {
-        let mass = matter.mu * division.total_m();
+    fn of(state: &RodState, material: &RodMaterial, division: &Discretization) -> Self {
+        let mass = material.mu * division.total_m();
         let weighted = division.length.iter().zip(state.x.windows(2)).map(|(&l, x)| (x[0] + x[1]) * (0.5 * l));
         let centre = weighted.sum::<DVec3>() / division.total_m();
-        let (linear, angular) = state.momentum(matter, division);
+        let (linear, angular) = state.momentum(material, division);
         let mut inertia = Sym3::default();
         for (k, &l) in division.length.iter().enumerate() {
             let (a, b) = (state.x[k] - centre, state.x[k + 1] - centre);
-            let m = matter.mu * l / 6.0;
+            let m = material.mu * l / 6.0;
             let square = m * (a.length_squared() + b.length_squared() + (a + b).length_squared());
             let spread = Sym3::outer(a, -m) + Sym3::outer(b, -m) + Sym3::outer(a + b, -m);
-            let own = matter.rotary * l;
+            let own = material.rotary * l;
             inertia += Sym3::identity(square + own) + spread + Sym3::outer(state.t[k], own);
         }
         let about = angular - centre.cross(linear);
@@ -70,11 +70,11 @@ mod tests {
     #[test]
     fn removing_energy_keeps_momentum() {
         let tube = free_tube(12);
-        let (matter, division) = (tube.matter(), tube.division());
+        let (material, division) = (tube.material(), tube.division());
         let mut state = shake(&tube, 3);
-        let (energy, momentum) = (state.kinetic_j, state.momentum(matter, division));
-        remove(0.3 * energy, &mut state, matter, division);
-        let (after, kept) = (state.kinetic_j, state.momentum(matter, division));
+        let (energy, momentum) = (state.kinetic_j, state.momentum(material, division));
+        remove(0.3 * energy, &mut state, material, division);
+        let (after, kept) = (state.kinetic_j, state.momentum(material, division));
         // rounding of sums of a dozen terms
         assert!((after - 0.7 * energy).abs() < 1e-12 * energy, "{after} of {energy}");
         assert!((kept.0 - momentum.0).length() < 1e-12 * momentum.0.length());

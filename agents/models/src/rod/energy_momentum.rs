@@ -25,7 +25,7 @@ pub fn fill_mean(problem: &SubstepProblem<'_>, now: &RodState, next: &RodState, 
 
 /// Change of momentum, weight, stretch and shear (eq. 45, 47).
 fn fill_segments(problem: &SubstepProblem<'_>, now: &RodState, next: &RodState, rhs: &mut [DVec3]) {
-    let RodMaterial { ea, ga, mu, rotary, gravity, .. } = *problem.matter;
+    let RodMaterial { ea, ga, mu, rotary, gravity, .. } = *problem.material;
     let h = problem.h;
     let want = |slot: usize| now.u[slot] - next.u[slot];
     let stiffness = DVec3::new(ga, ga, ea);
@@ -51,11 +51,11 @@ fn fill_segments(problem: &SubstepProblem<'_>, now: &RodState, next: &RodState, 
 
 /// Bend and twist (eq. 48).
 fn fill_joints(problem: &SubstepProblem<'_>, now: &RodState, next: &RodState, rhs: &mut [DVec3]) {
-    let SubstepProblem { matter, division, .. } = *problem;
+    let SubstepProblem { material, division, .. } = *problem;
     let (count, wall) = (now.q.len(), division.wall);
     let ends = |k: usize| (now.q[k], next.q[k]);
     let soft = |k: usize| now.softening.get(k);
-    if matter.clamp[0] {
+    if material.clamp[0] {
         rhs[1] -= moment(problem, 0, [(wall[0], wall[0]), ends(0)], soft(0)) * problem.h;
     }
     for k in 1..count {
@@ -63,7 +63,7 @@ fn fill_joints(problem: &SubstepProblem<'_>, now: &RodState, next: &RodState, rh
         rhs[2 * k - 1] += m;
         rhs[2 * k + 1] -= m;
     }
-    if matter.clamp[1] {
+    if material.clamp[1] {
         rhs[2 * count - 1] += moment(problem, count, [ends(count - 1), (wall[1], wall[1])], soft(count)) * problem.h;
     }
 }
@@ -75,12 +75,12 @@ fn moment(
     [left, right]: [(DQuat, DQuat); 2],
     softening: Option<&Softening>,
 ) -> DVec3 {
-    let SubstepProblem { matter, division, .. } = *problem;
+    let SubstepProblem { material, division, .. } = *problem;
     let joints = [Joint::between(division, k, left.0, right.0), Joint::between(division, k, left.1, right.1)];
     let own = [left.0.conjugate() * joints[0].strain, left.1.conjugate() * joints[1].strain];
     let strains = own[0] + own[1];
     let bend = softening.map_or(strains.truncate(), |softening| softening.of(strains.truncate()));
-    let sum = DVec3::new(matter.ei, matter.ei, matter.gj) * division.joint[k] * bend.extend(strains.z);
+    let sum = DVec3::new(material.ei, material.ei, material.gj) * division.joint[k] * bend.extend(strains.z);
     let m = (left.0 * sum + left.1 * sum) * 0.5;
     let theta = (joints[0].theta + joints[1].theta) * 0.5;
     let across = theta.cross(m);
@@ -116,12 +116,12 @@ mod tests {
     #[test]
     fn mean_forces_do_work_equal_to_the_energy_change_and_keep_momentum() {
         let tube = free_tube(9);
-        let (matter, division) = (tube.matter(), tube.division());
+        let (material, division) = (tube.material(), tube.division());
         let (mut now, mut next) = (shake(&tube, 3), shake(&tube, 8));
         // elasticity only: both velocities are zero
         now.u.fill(DVec3::ZERO);
         next.u.fill(DVec3::ZERO);
-        let problem = SubstepProblem { matter, division, springs: &[], h: 1.0, integrator: Default::default() };
+        let problem = SubstepProblem { material, division, springs: &[], h: 1.0, integrator: Default::default() };
         let (mut rows, mut rhs) = (vec![Row::ZERO; now.u.len()], vec![DVec3::ZERO; now.u.len()]);
         fill_mean(&problem, &now, &next, &mut rows, &mut rhs);
         let mut work = 0.0;

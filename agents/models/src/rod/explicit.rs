@@ -29,7 +29,7 @@ impl Stepper {
         self.assemble_light(now, problem, true);
         self.factor_and_solve()?;
         let Self { rhs, projector, .. } = self;
-        let rod = DividedRod { matter: problem.matter, division: problem.division };
+        let rod = DividedRod { material: problem.material, division: problem.division };
         projector.project(now, rhs, rod, problem.h);
         self.advance(now, problem, true);
         self.check_finite()
@@ -48,7 +48,7 @@ impl Stepper {
         }
         let iterate = Iterate { start: now, at: now, first: true };
         add_springs(problem, &iterate, rows, rhs);
-        hold_ends(problem.matter, rows, rhs);
+        hold_ends(problem.material, rows, rhs);
     }
 
     fn check_finite(&self) -> Result<(), Divergence> {
@@ -58,7 +58,7 @@ impl Stepper {
 
 /// (1 + h c) M in rows: consistent, or lumped.
 fn fill_masses(problem: &SubstepProblem<'_>, at: &RodState, lumped: bool, rows: &mut [Row]) {
-    let RodMaterial { mu, rotary, damping, .. } = *problem.matter;
+    let RodMaterial { mu, rotary, damping, .. } = *problem.material;
     let slow = 1.0 + problem.h * damping;
     let (own, beside) = if lumped { (0.5, 0.0) } else { (1.0 / 3.0, 1.0 / 6.0) };
     rows[0] = Row::ZERO;
@@ -72,7 +72,7 @@ fn fill_masses(problem: &SubstepProblem<'_>, at: &RodState, lumped: bool, rows: 
 
 /// M v_n + h f(x_n), with consistent mass.
 fn fill_forces(problem: &SubstepProblem<'_>, now: &RodState, rhs: &mut [DVec3]) {
-    let RodMaterial { mu, rotary, .. } = *problem.matter;
+    let RodMaterial { mu, rotary, .. } = *problem.material;
     let h = problem.h;
     rhs[0] = now.force[0] * h;
     for (k, (&l, &t)) in problem.division.length.iter().zip(&now.t).enumerate() {
@@ -85,7 +85,7 @@ fn fill_forces(problem: &SubstepProblem<'_>, now: &RodState, rhs: &mut [DVec3]) 
 
 /// M v_n + h · weight, with lumped mass.
 fn fill_weights(problem: &SubstepProblem<'_>, now: &RodState, rhs: &mut [DVec3]) {
-    let RodMaterial { mu, rotary, gravity, .. } = *problem.matter;
+    let RodMaterial { mu, rotary, gravity, .. } = *problem.material;
     let h = problem.h;
     rhs[0] = DVec3::ZERO;
     for (k, (&l, &t)) in problem.division.length.iter().zip(&now.t).enumerate() {

@@ -15,7 +15,7 @@ use super::step::{Divergence, Setting, Stepper, TURN_MAX_RAD};
 use super::system::SubstepProblem;
 use super::tube::Tube;
 use super::wall::{Sections, Wall};
-use attachments::lasting;
+use attachments::unyielding;
 use glam::{DMat3, DVec2, DVec3};
 use metachron_contact::member::{
     Attachments, ClusterMember, MemberMotion, OwnAttachment, OwnFailure, Role, SkinPoint, Slid, StepEnd, StepSystem,
@@ -43,12 +43,12 @@ pub(super) struct Unknowns {
     quiet_before: bool,
     /// The forces of its attachments that may tear in the last step.
     attached: Vec<OwnAttachment>,
-    kept: Kept,
+    saved: SavedState,
 }
 
 /// A state to go back to.
 #[derive(Debug, Clone, Default)]
-struct Kept {
+struct SavedState {
     now: RodState,
     wall: Sections,
     past: History,
@@ -73,7 +73,7 @@ const RISES: f64 = 2.0;
 impl Tube {
     /// Whether the node at this slot is held in place.
     fn is_held(&self, slot: usize) -> bool {
-        (slot == 0 && self.matter.held[0]) || (slot + 1 == self.now.u.len() && self.matter.held[1])
+        (slot == 0 && self.material.held[0]) || (slot + 1 == self.now.u.len() && self.material.held[1])
     }
 
     /// The side of a point a share along a segment, `radius` from the centre line (a vector, metres).
@@ -190,32 +190,32 @@ impl ClusterMember for Tube {
 
     fn keep(&mut self) {
         let Self { now, wall, rest, time, acceleration, at_rest, steps, unknowns, stepper, springs, .. } = self;
-        let kept = &mut unknowns.kept;
-        kept.slid.clear();
-        kept.slid.extend(springs.iter().map(|spring| spring.slid));
-        kept.now.copy_from(now);
-        wall.iter().for_each(|wall| kept.wall.copy_from(&wall.now));
-        kept.past.copy_from(&stepper.past);
-        kept.rest.copy_from(rest);
-        (kept.time, kept.at_rest, kept.steps, kept.quiet_before) = (*time, *at_rest, *steps, unknowns.quiet_before);
-        kept.acceleration = *acceleration;
-        kept.own_substeps = unknowns.own_substeps;
+        let saved = &mut unknowns.saved;
+        saved.slid.clear();
+        saved.slid.extend(springs.iter().map(|spring| spring.slid));
+        saved.now.copy_from(now);
+        wall.iter().for_each(|wall| saved.wall.copy_from(&wall.now));
+        saved.past.copy_from(&stepper.past);
+        saved.rest.copy_from(rest);
+        (saved.time, saved.at_rest, saved.steps, saved.quiet_before) = (*time, *at_rest, *steps, unknowns.quiet_before);
+        saved.acceleration = *acceleration;
+        saved.own_substeps = unknowns.own_substeps;
     }
 
     fn go_back(&mut self) {
-        let Self { now, wall, rest, time, acceleration, at_rest, steps, unknowns, matter, division, stepper, .. } =
+        let Self { now, wall, rest, time, acceleration, at_rest, steps, unknowns, material, division, stepper, .. } =
             self;
-        let kept = &unknowns.kept;
-        self.springs.iter_mut().zip(&kept.slid).for_each(|(spring, slid)| spring.slid = *slid);
-        now.copy_from(&kept.now);
-        wall.iter_mut().for_each(|wall| wall.now.copy_from(&kept.wall));
-        stepper.past.copy_from(&kept.past);
+        let saved = &unknowns.saved;
+        self.springs.iter_mut().zip(&saved.slid).for_each(|(spring, slid)| spring.slid = *slid);
+        now.copy_from(&saved.now);
+        wall.iter_mut().for_each(|wall| wall.now.copy_from(&saved.wall));
+        stepper.past.copy_from(&saved.past);
         // a copy has no forces
-        now.strain(matter, division);
-        rest.copy_from(&kept.rest);
-        (*time, *at_rest, *steps, unknowns.quiet_before) = (kept.time, kept.at_rest, kept.steps, kept.quiet_before);
-        *acceleration = kept.acceleration;
-        unknowns.own_substeps = kept.own_substeps;
+        now.strain(material, division);
+        rest.copy_from(&saved.rest);
+        (*time, *at_rest, *steps, unknowns.quiet_before) = (saved.time, saved.at_rest, saved.steps, saved.quiet_before);
+        *acceleration = saved.acceleration;
+        unknowns.own_substeps = saved.own_substeps;
         self.follow_pressure(self.time);
         self.present_velocities();
     }
@@ -284,7 +284,7 @@ impl ClusterMember for Tube {
     fn give_way(&mut self, failure: OwnFailure) {
         match failure {
             OwnFailure::Slips(place, by) => {
-                let first = lasting(&self.springs).len();
+                let first = unyielding(&self.springs).len();
                 self.springs.iter_mut().skip(first).nth(place).into_iter().for_each(|spring| spring.slid += by);
             }
             OwnFailure::Tears(number) if !self.let_go.contains(&number) => {
@@ -370,7 +370,7 @@ impl Tube {
             let problem = whole_step(setting, h_s);
             let rise_j = stepper.follow_cluster(now, &problem, velocities, is_free);
             if rise_j > 0.0 {
-                energy_limiter::remove(rise_j, &mut stepper.next, setting.matter, setting.division);
+                energy_limiter::remove(rise_j, &mut stepper.next, setting.material, setting.division);
             }
             // the next step has no two steps of one kind before it
             stepper.past.forget();
@@ -385,9 +385,9 @@ impl Tube {
 
 /// A step of `h_s` seconds in one piece. Springs on the tube, and its own springs that yield, are rows of the cluster's problem.
 fn whole_step<'a>(setting: &Setting<'a>, h_s: f64) -> SubstepProblem<'a> {
-    let Setting { matter, division, integrator, .. } = *setting;
-    let springs = lasting(setting.springs);
-    SubstepProblem { matter, division, springs, h: h_s, integrator }
+    let Setting { material, division, integrator, .. } = *setting;
+    let springs = unyielding(setting.springs);
+    SubstepProblem { material, division, springs, h: h_s, integrator }
 }
 
 /// Nothing joins the centre line to a wall that gives within a step (eq. 66).

@@ -16,12 +16,12 @@ const PROJECTED: f64 = 0.8;
 impl Integrator {
     /// The longest substep for a valid result while nothing is stretched, seconds; `None` where any length
     /// is allowed (eq. 38, 39).
-    pub(super) fn longest_substep_s(self, matter: &RodMaterial, division: &Discretization) -> Option<f64> {
+    pub(super) fn longest_substep_s(self, material: &RodMaterial, division: &Discretization) -> Option<f64> {
         match self {
-            Self::SymplecticEuler => Some(2.0 / fastest_rad_s(matter, division)),
+            Self::SymplecticEuler => Some(2.0 / fastest_rad_s(material, division)),
             Self::Xpbd => {
                 let finest = division.length.iter().copied().fold(f64::INFINITY, f64::min);
-                let slow = matter.rotary / matter.ei.max(0.5 * matter.gj);
+                let slow = material.rotary / material.ei.max(0.5 * material.gj);
                 Some(finest * libm::sqrt(SOFTER * PROJECTED * slow))
             }
             Self::ImplicitEuler | Self::Bdf2 | Self::EnergyMomentum => None,
@@ -36,7 +36,7 @@ impl Tube {
     /// A stretched tube needs shorter ones: it halves its substeps by itself.
     #[must_use]
     pub fn longest_substep_s(&self) -> Option<f64> {
-        self.spec.integrator.longest_substep_s(&self.matter, &self.division)
+        self.spec.integrator.longest_substep_s(&self.material, &self.division)
     }
 
     /// Whether the substeps of a step of `dt_s` seconds are short enough for the integrator.
@@ -47,8 +47,8 @@ impl Tube {
 
 /// An upper bound of every frequency of the divided tube at rest, rad/s: the frequency of a single segment bounds stretch and shear,
 /// the greatest row sum bounds bend and twist, and both together bound their sum (eq. 38).
-fn fastest_rad_s(matter: &RodMaterial, division: &Discretization) -> f64 {
-    let RodMaterial { ea, ga, ei, gj, mu, rotary, clamp, .. } = *matter;
+fn fastest_rad_s(material: &RodMaterial, division: &Discretization) -> f64 {
+    let RodMaterial { ea, ga, ei, gj, mu, rotary, clamp, .. } = *material;
     let count = division.segments();
     let bend = ei.max(0.5 * gj);
     let square = |k: usize| {

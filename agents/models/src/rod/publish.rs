@@ -27,7 +27,7 @@ impl Tube {
         into.resolution = Some(self.resolution);
         into.nodes = Some(self.now.x.len() as u32);
         into.energy_j = self.energy_j();
-        into.residual_m = residual::estimate_m(&self.now, &self.matter, &self.division);
+        into.residual_m = residual::estimate_m(&self.now, &self.material, &self.division);
         (into.at_rest, into.acceleration) = (self.at_rest, self.acceleration);
         into.bounds = Some(bounds(&self.now, self.widest_m()));
         self.publish_curve(into);
@@ -38,7 +38,7 @@ impl Tube {
     /// # Errors
     /// The reason why the curve does not fit; nothing is changed then.
     pub(super) fn take_curve(&mut self, curve: &CurveState) -> Result<(), String> {
-        let (last, held) = (self.now.x.len() - 1, self.matter.held);
+        let (last, held) = (self.now.x.len() - 1, self.material.held);
         let is_held = |node: usize| node == 0 && held[0] || node == last && held[1];
         check_nodes(&self.now.x, [&curve.positions, &curve.velocities], is_held)?;
         if curve.frames.len() != self.now.q.len() {
@@ -48,19 +48,19 @@ impl Tube {
         if let Some(at) = curve.frames.iter().position(|q| unit_rotation(*q).is_none()) {
             return Err(format!("frame {at} of the state is no rotation"));
         }
-        let Self { now, matter, division, .. } = self;
+        let Self { now, material, division, .. } = self;
         for (node, (x, v)) in curve.positions.iter().zip(&curve.velocities).enumerate() {
             if !is_held(node) {
                 (now.x[node], now.u[2 * node]) = (*x, *v);
             }
         }
         for (part, q) in curve.frames.iter().enumerate() {
-            let is_clamped = part == 0 && matter.clamp[0] || part + 1 == last && matter.clamp[1];
+            let is_clamped = part == 0 && material.clamp[0] || part + 1 == last && material.clamp[1];
             if !is_clamped {
                 (now.q[part], now.u[2 * part + 1]) = (q.normalize(), DVec3::ZERO);
             }
         }
-        now.strain(matter, division);
+        now.strain(material, division);
         self.begin_anew();
         Ok(())
     }

@@ -3,7 +3,7 @@
 //! In: the old division and state, the new division. Out: the new state: same length and mass, the same linear momentum to
 //! rounding, angular momentum and shape to O(ε²). Never here: when to do it. Theory: docs/theory/rod.md, eq. 25, 30–32.
 
-use super::discretization::{Discretization, densities, spread};
+use super::discretization::{Discretization, densities, place_nodes};
 use super::rotation::between;
 use super::state::{RodMaterial, RodState};
 use glam::{DQuat, DVec3};
@@ -40,25 +40,25 @@ impl Remesher {
             beside / old.length[k]
         }));
         densities(&mut self.bend, &old.length);
-        spread(&old.arc_m, &self.bend, count, &mut self.arcs);
+        place_nodes(&old.arc_m, &self.bend, count, &mut self.arcs);
         &self.arcs
     }
 
     /// Writes the state of `old` into `to` on division `new`.
-    pub fn transfer(&mut self, matter: &RodMaterial, old: MeshedRod<'_>, to: &mut RodState, new: &Discretization) {
+    pub fn transfer(&mut self, material: &RodMaterial, old: MeshedRod<'_>, to: &mut RodState, new: &Discretization) {
         to.resize(new.segments());
-        self.sample(matter, old);
-        self.shape(matter, old, to, new);
-        self.motion(matter, old, to, new);
+        self.sample(material, old);
+        self.shape(material, old, to, new);
+        self.motion(material, old, to, new);
     }
 
     /// Samples rotations and strains of the old segments relative to rest.
-    fn sample(&mut self, matter: &RodMaterial, old: MeshedRod<'_>) {
+    fn sample(&mut self, material: &RodMaterial, old: MeshedRod<'_>) {
         let MeshedRod { state: from, division: old } = old;
         self.rotations.clear();
         self.at.clear();
         self.strains.clear();
-        if matter.clamp[0] {
+        if material.clamp[0] {
             self.rotations.push(DQuat::IDENTITY); // a wall does not turn
             self.at.push(0.0);
         }
@@ -67,14 +67,14 @@ impl Remesher {
             self.at.push(old.middle_m(k));
             self.strains.push(from.q[k].conjugate() * from.e[k] - DVec3::Z * old.chord[k]);
         }
-        if matter.clamp[1] {
+        if material.clamp[1] {
             self.rotations.push(DQuat::IDENTITY);
             self.at.push(old.total_m());
         }
     }
 
     /// Frames by interpolated rotations (eq. 30), positions by summing the strained segments (eq. 31).
-    fn shape(&self, matter: &RodMaterial, rod: MeshedRod<'_>, to: &mut RodState, new: &Discretization) {
+    fn shape(&self, material: &RodMaterial, rod: MeshedRod<'_>, to: &mut RodState, new: &Discretization) {
         let MeshedRod { state: from, division: old } = rod;
         to.x[0] = from.x[0];
         for k in 0..new.segments() {
@@ -83,14 +83,14 @@ impl Remesher {
             let strain = self.strain_at(old, s) + DVec3::Z * new.chord[k];
             to.x[k + 1] = to.x[k] + to.q[k] * strain * new.length[k];
         }
-        self.place(matter, rod, to, new);
+        self.place(material, rod, to, new);
     }
 
     /// Restores held ends, or the centre of mass where none is held.
-    fn place(&self, matter: &RodMaterial, rod: MeshedRod<'_>, to: &mut RodState, new: &Discretization) {
+    fn place(&self, material: &RodMaterial, rod: MeshedRod<'_>, to: &mut RodState, new: &Discretization) {
         let MeshedRod { state: from, division: old } = rod;
         let gap = from.x[old.segments()] - to.x[new.segments()];
-        match matter.held {
+        match material.held {
             [true, false] => {}
             [false, true] => to.x.iter_mut().for_each(|x| *x += gap),
             [true, true] => {
@@ -106,7 +106,7 @@ impl Remesher {
     }
 
     /// Velocities by interpolation, then the missing momentum spread evenly over the free nodes (eq. 32).
-    fn motion(&self, matter: &RodMaterial, rod: MeshedRod<'_>, to: &mut RodState, new: &Discretization) {
+    fn motion(&self, material: &RodMaterial, rod: MeshedRod<'_>, to: &mut RodState, new: &Discretization) {
         let MeshedRod { state: from, division: old } = rod;
         let count = new.segments();
         for (k, &s) in new.arc_m.iter().enumerate() {
@@ -118,7 +118,7 @@ impl Remesher {
             let right = (left + 1).min(old.segments() - 1);
             to.u[2 * k + 1] = from.u[2 * left + 1].lerp(from.u[2 * right + 1], w.clamp(0.0, 1.0));
         }
-        let free = |k: usize| !(matter.held[0] && k == 0 || matter.held[1] && k == count);
+        let free = |k: usize| !(material.held[0] && k == 0 || material.held[1] && k == count);
         let share = |k: usize| {
             let before = if k > 0 { new.length[k - 1] } else { 0.0 };
             0.5 * (before + if k < count { new.length[k] } else { 0.0 })

@@ -7,11 +7,11 @@ use super::discretization::Discretization;
 use super::state::{Joint, RodMaterial, RodState};
 
 /// max over joints of |κ − κ₀| l̄²/8: second order in ε, zero in the stress-free state (eq. 29).
-pub fn estimate_m(state: &RodState, matter: &RodMaterial, division: &Discretization) -> f64 {
+pub fn estimate_m(state: &RodState, material: &RodMaterial, division: &Discretization) -> f64 {
     let count = division.segments();
     let inner = (1..count).map(|k| (k, state.q[k - 1], state.q[k]));
-    let start = matter.clamp[0].then(|| (0, division.wall[0], state.q[0]));
-    let end = matter.clamp[1].then(|| (count, state.q[count - 1], division.wall[1]));
+    let start = material.clamp[0].then(|| (0, division.wall[0], state.q[0]));
+    let end = material.clamp[1].then(|| (count, state.q[count - 1], division.wall[1]));
     let sagitta = |(k, before, after)| {
         let joint = Joint::between(division, k, before, after);
         // at a wall l̄ is half a segment; the wall mirrors the other half

@@ -53,7 +53,7 @@ impl Stepper {
         self.predict(now, &start, h, problem.h);
         let mut converged = false;
         for done in 1..=BDF2_ITERATIONS.1 {
-            self.next.strain(problem.matter, problem.division);
+            self.next.strain(problem.material, problem.division);
             let iterate = Iterate { start: &start, at: &self.next, first: false };
             assemble(&problem, &iterate, &mut self.rows, &mut self.rhs);
             if self.factor.factor(&self.rows).is_err() {
@@ -67,7 +67,7 @@ impl Stepper {
                 break;
             }
         }
-        self.next.strain(problem.matter, problem.division);
+        self.next.strain(problem.material, problem.division);
         self.ahead = start;
         converged
     }
@@ -105,15 +105,15 @@ impl Stepper {
     ///
     /// Damping of the mean velocity would not act on motion that changes sign in every substep.
     fn solve_energy_momentum(&mut self, now: &RodState, problem: &SubstepProblem<'_>) -> bool {
-        let decay = libm::exp(-0.5 * problem.h * problem.matter.damping);
-        let undamped = RodMaterial { damping: 0.0, ..*problem.matter };
+        let decay = libm::exp(-0.5 * problem.h * problem.material.damping);
+        let undamped = RodMaterial { damping: 0.0, ..*problem.material };
         let mut start = std::mem::take(&mut self.ahead);
         start.copy_from(now);
         start.u.iter_mut().for_each(|u| *u *= decay);
-        let converged = self.solve_undamped(&start, &SubstepProblem { matter: &undamped, ..*problem });
+        let converged = self.solve_undamped(&start, &SubstepProblem { material: &undamped, ..*problem });
         self.ahead = start;
         self.next.u.iter_mut().for_each(|u| *u *= decay);
-        self.next.strain(problem.matter, problem.division);
+        self.next.strain(problem.material, problem.division);
         converged
     }
 
@@ -122,10 +122,10 @@ impl Stepper {
         let tangent = SubstepProblem { h: half, ..*problem };
         self.predict_mean(now, problem.h);
         for _ in 0..MEAN_ITERATIONS {
-            self.next.strain(problem.matter, problem.division);
+            self.next.strain(problem.material, problem.division);
             fill_matrix(&tangent, &self.next, &mut self.rows, &mut self.rhs);
             fill_mean(&tangent, now, &self.next, &mut self.rows, &mut self.rhs);
-            hold_ends(problem.matter, &mut self.rows, &mut self.rhs);
+            hold_ends(problem.material, &mut self.rows, &mut self.rhs);
             if self.factor.factor(&self.rows).is_err() {
                 return false;
             }
@@ -182,11 +182,11 @@ impl Stepper {
 
     /// The kinetic energy of the change of velocities in `rhs`, J, with lumped masses.
     fn change_j(&self, problem: &SubstepProblem<'_>) -> f64 {
-        let matter = problem.matter;
+        let material = problem.material;
         let part = |(k, l): (usize, &f64)| {
             let (a, w, b) = (self.rhs[2 * k], self.rhs[2 * k + 1], self.rhs[2 * k + 2]);
-            let nodes = matter.mu * 0.25 * (a.length_squared() + b.length_squared());
-            l * (nodes + matter.rotary * 0.5 * w.length_squared())
+            let nodes = material.mu * 0.25 * (a.length_squared() + b.length_squared());
+            l * (nodes + material.rotary * 0.5 * w.length_squared())
         };
         problem.division.length.iter().enumerate().map(part).sum()
     }

@@ -37,7 +37,7 @@ pub struct RodMaterial {
 #[derive(Debug, Clone, Copy)]
 pub struct DividedRod<'a> {
     /// The material.
-    pub matter: &'a RodMaterial,
+    pub material: &'a RodMaterial,
     /// The division.
     pub division: &'a Discretization,
 }
@@ -124,19 +124,19 @@ impl RodState {
     }
 
     /// Computes strains, forces and energies of this state (eq. 2–10).
-    pub fn strain(&mut self, matter: &RodMaterial, division: &Discretization) {
+    pub fn strain(&mut self, material: &RodMaterial, division: &Discretization) {
         self.elastic_j = 0.0;
         self.gravity_j = 0.0;
         self.stretch = 0.0;
         self.force[0] = DVec3::ZERO;
-        self.stretch_and_shear(matter, division);
-        self.measure_motion(matter, division);
-        self.bend_and_twist(matter, division);
+        self.stretch_and_shear(material, division);
+        self.measure_motion(material, division);
+        self.bend_and_twist(material, division);
     }
 
     /// Forces of every segment: n = C u − s₀ EA t on its ends, −l n × u on its frame (eq. 7, 8), and its weight.
-    fn stretch_and_shear(&mut self, matter: &RodMaterial, division: &Discretization) {
-        let RodMaterial { ea, ga, mu, gravity, .. } = *matter;
+    fn stretch_and_shear(&mut self, material: &RodMaterial, division: &Discretization) {
+        let RodMaterial { ea, ga, mu, gravity, .. } = *material;
         let tension_max = TENSION_SHARE * ga.min(ea);
         let count = self.q.len();
         let (x, q, length, chord) = (&self.x[..=count], &self.q[..count], &division.length[..count], &division.chord);
@@ -163,41 +163,41 @@ impl RodState {
     }
 
     /// Moments of every joint, and of the walls that hold clamped ends (eq. 5, 6, 9).
-    fn bend_and_twist(&mut self, matter: &RodMaterial, division: &Discretization) {
+    fn bend_and_twist(&mut self, material: &RodMaterial, division: &Discretization) {
         if !self.softening.is_empty() {
-            return self.bend_soft_sections(matter, division);
+            return self.bend_soft_sections(material, division);
         }
         let count = self.q.len();
-        if matter.clamp[0] {
+        if material.clamp[0] {
             let joint = Joint::between(division, 0, division.wall[0], self.q[0]);
-            let moment = joint.moment(matter, director(division.wall[0]), &mut self.elastic_j);
+            let moment = joint.moment(material, director(division.wall[0]), &mut self.elastic_j);
             self.force[1] -= moment;
         }
         for k in 1..count {
             let joint = Joint::between(division, k, self.q[k - 1], self.q[k]);
-            let moment = joint.moment(matter, self.t[k - 1], &mut self.elastic_j);
+            let moment = joint.moment(material, self.t[k - 1], &mut self.elastic_j);
             self.force[2 * k - 1] += moment;
             self.force[2 * k + 1] -= moment;
         }
-        if matter.clamp[1] {
+        if material.clamp[1] {
             let joint = Joint::between(division, count, self.q[count - 1], division.wall[1]);
-            let moment = joint.moment(matter, self.t[count - 1], &mut self.elastic_j);
+            let moment = joint.moment(material, self.t[count - 1], &mut self.elastic_j);
             self.force[2 * count - 1] += moment;
         }
     }
 
     /// The same where walls give: a section that is flat bends more easily across its flat sides (eq. 62).
-    fn bend_soft_sections(&mut self, matter: &RodMaterial, division: &Discretization) {
+    fn bend_soft_sections(&mut self, material: &RodMaterial, division: &Discretization) {
         let count = self.q.len();
         self.curvature.clear();
         self.curvature.resize(count + 1, DVec2::ZERO);
-        let first = usize::from(!matter.clamp[0]);
-        let last = if matter.clamp[1] { count } else { count - 1 };
+        let first = usize::from(!material.clamp[0]);
+        let last = if material.clamp[1] { count } else { count - 1 };
         for k in first..=last {
             let before = if k == 0 { division.wall[0] } else { self.q[k - 1] };
             let after = if k == count { division.wall[1] } else { self.q[k] };
             let joint = Joint::between(division, k, before, after);
-            let (moment, curvature) = joint.soft_moment(matter, before, &self.softening[k], &mut self.elastic_j);
+            let (moment, curvature) = joint.soft_moment(material, before, &self.softening[k], &mut self.elastic_j);
             self.curvature[k] = curvature;
             if k > 0 {
                 self.force[2 * k - 1] += moment;
@@ -209,7 +209,7 @@ impl RodState {
     }
 
     /// Recomputes the kinetic energy from the velocities (eq. 10). Needs directors.
-    pub fn measure_motion(&mut self, matter: &RodMaterial, division: &Discretization) {
+    pub fn measure_motion(&mut self, material: &RodMaterial, division: &Discretization) {
         let (mut linear, mut rotary, mut a) = (0.0, 0.0, self.u[0]);
         for ((pair, t), &l) in self.u[1..].chunks_exact(2).zip(&self.t).zip(&division.length) {
             let (w, b) = (pair[0], pair[1]);
@@ -218,18 +218,18 @@ impl RodState {
             rotary += l * (w.length_squared() + about * about);
             a = b;
         }
-        self.kinetic_j = matter.mu * linear / 6.0 + 0.5 * matter.rotary * rotary;
+        self.kinetic_j = material.mu * linear / 6.0 + 0.5 * material.rotary * rotary;
     }
 
     /// Linear momentum, kg·m/s, and angular momentum about the origin, kg·m²/s. Needs directors.
-    pub fn momentum(&self, matter: &RodMaterial, division: &Discretization) -> (DVec3, DVec3) {
+    pub fn momentum(&self, material: &RodMaterial, division: &Discretization) -> (DVec3, DVec3) {
         let (mut linear, mut angular) = (DVec3::ZERO, DVec3::ZERO);
         for (k, &l) in division.length.iter().enumerate() {
             let (va, w, vb) = (self.u[2 * k], self.u[2 * k + 1], self.u[2 * k + 2]);
-            let (xa, xb, m) = (self.x[k], self.x[k + 1], matter.mu * l);
+            let (xa, xb, m) = (self.x[k], self.x[k + 1], material.mu * l);
             linear += (va + vb) * (0.5 * m);
             angular += (xa.cross(va * 2.0 + vb) + xb.cross(vb * 2.0 + va)) * (m / 6.0);
-            angular += (w + self.t[k] * self.t[k].dot(w)) * (matter.rotary * l);
+            angular += (w + self.t[k] * self.t[k].dot(w)) * (material.rotary * l);
         }
         (linear, angular)
     }
@@ -261,9 +261,9 @@ impl Joint {
 
     /// The moment that turns the segment before the joint forward and the one after it back (eq. 6, 9).
     #[inline(always)]
-    fn moment(&self, matter: &RodMaterial, axis: DVec3, energy_j: &mut f64) -> DVec3 {
+    fn moment(&self, material: &RodMaterial, axis: DVec3, energy_j: &mut f64) -> DVec3 {
         let Self { strain, inverse, .. } = *self;
-        let m = (strain * matter.ei + axis * ((matter.gj - matter.ei) * axis.dot(strain))) * inverse;
+        let m = (strain * material.ei + axis * ((material.gj - material.ei) * axis.dot(strain))) * inverse;
         *energy_j += 0.5 * strain.dot(m);
         self.carried(m)
     }
@@ -272,13 +272,13 @@ impl Joint {
     #[inline(always)]
     fn soft_moment(
         &self,
-        matter: &RodMaterial,
+        material: &RodMaterial,
         before: DQuat,
         softening: &Softening,
         energy_j: &mut f64,
     ) -> (DVec3, DVec2) {
         let own = before.conjugate() * self.strain * self.inverse;
-        let m = before * (softening.of(own.truncate()) * matter.ei).extend(matter.gj * own.z);
+        let m = before * (softening.of(own.truncate()) * material.ei).extend(material.gj * own.z);
         *energy_j += 0.5 * self.strain.dot(m);
         (self.carried(m), own.truncate())
     }

@@ -31,7 +31,7 @@ const STRAIN_SLACK: f64 = 1e-10;
 /// Constants of a step.
 pub struct Setting<'a> {
     /// The material.
-    pub matter: &'a RodMaterial,
+    pub material: &'a RodMaterial,
     /// The division.
     pub division: &'a Discretization,
     /// Attachments.
@@ -97,7 +97,7 @@ impl Stepper {
         while elapsed < ticks {
             let h = tick * size as f64;
             let problem = SubstepProblem {
-                matter: setting.matter,
+                material: setting.material,
                 division: setting.division,
                 springs: setting.springs,
                 h,
@@ -168,7 +168,7 @@ impl Stepper {
             return Ok(Verdict::TooFar);
         }
         if rise > 0.0 {
-            energy_limiter::remove(rise, &mut self.next, problem.matter, problem.division);
+            energy_limiter::remove(rise, &mut self.next, problem.material, problem.division);
         }
         if finite && self.next.is_finite() { Ok(Verdict::Good) } else { Err(Divergence { slot: None }) }
     }
@@ -248,7 +248,7 @@ impl Stepper {
             next.u[2 * k + 1] = spin;
             next.q[k] = unit(exp(turn * h) * from);
         }
-        next.strain(problem.matter, problem.division);
+        next.strain(problem.material, problem.division);
     }
 
     /// Energy of `next` beyond that of `now`, less rounding, J (eq. 27).
@@ -258,7 +258,7 @@ impl Stepper {
         let at_work = self.next.kinetic_j + self.next.elastic_j + now.elastic_j + lifted;
         // the sums themselves round at their own size, and positions at theirs
         let sums = f64::EPSILON * 64.0 * (before.abs() + after.abs() + now.gravity_j.abs());
-        let rounding = sums + STRAIN_SLACK * STRAIN_SLACK * problem.matter.ea * problem.division.total_m();
+        let rounding = sums + STRAIN_SLACK * STRAIN_SLACK * problem.material.ea * problem.division.total_m();
         after - before - ENERGY_SLACK * at_work - rounding
     }
 }

@@ -33,7 +33,7 @@ impl Tube {
             let axis = director(frames[left]);
             let before = if k == 0 { division.wall[0] } else { frames[left] };
             let after = if k == last { division.wall[1] } else { frames[right] };
-            let is_free = k == 0 && !self.matter.clamp[0] || k == last && !self.matter.clamp[1];
+            let is_free = k == 0 && !self.material.clamp[0] || k == last && !self.material.clamp[1];
             let bent = if is_free { DVec3::ZERO } else { Joint::between(&division, k, before, after).curvature() };
             let twist = axis.dot(bent);
             let outer = (bent - axis * twist).length() * radii_m[k];

@@ -16,7 +16,7 @@ use glam::{DMat3, DQuat, DVec3};
 #[derive(Clone, Copy)]
 pub struct SubstepProblem<'a> {
     /// The material.
-    pub matter: &'a RodMaterial,
+    pub material: &'a RodMaterial,
     /// The division.
     pub division: &'a Discretization,
     /// Attachments.
@@ -49,7 +49,7 @@ pub fn assemble(problem: &SubstepProblem<'_>, iterate: &Iterate<'_>, rows: &mut 
     fill_matrix(problem, iterate.at, rows, rhs);
     fill_right_side(problem, iterate, rhs);
     add_springs(problem, iterate, rows, rhs);
-    hold_ends(problem.matter, rows, rhs);
+    hold_ends(problem.material, rows, rhs);
 }
 
 /// Fills `rows` with stiffness and mass about `at`, and sizes `rhs` (eq. 12–15).
@@ -62,7 +62,7 @@ pub fn fill_matrix(problem: &SubstepProblem<'_>, at: &RodState, rows: &mut Vec<R
 
 /// Mass, stretch and shear: D = (GA − b) I + (EA − GA) t tᵀ is the clamped stiffness (eq. 12, 13).
 fn fill_segments(problem: &SubstepProblem<'_>, at: &RodState, rows: &mut [Row]) {
-    let RodMaterial { ea, ga, mu, rotary, damping, .. } = *problem.matter;
+    let RodMaterial { ea, ga, mu, rotary, damping, .. } = *problem.material;
     let (h2, slow) = (problem.h * problem.h, 1.0 + problem.h * damping);
     let (sixth, turn) = (slow * mu / 6.0, slow * rotary);
     let count = at.q.len();
@@ -93,20 +93,20 @@ fn fill_segments(problem: &SubstepProblem<'_>, at: &RodState, rows: &mut [Row]) 
 
 /// Bend and twist about the joint's mean director, without their geometric terms (eq. 14).
 fn fill_joints(problem: &SubstepProblem<'_>, at: &RodState, rows: &mut [Row]) {
-    let SubstepProblem { matter, division, .. } = *problem;
+    let SubstepProblem { material, division, .. } = *problem;
     let (h2, count) = (problem.h * problem.h, at.q.len());
     let soft = |k: usize, axis: DVec3| {
         let axes = if k == 0 { division.wall[0] } else { at.q[k - 1] };
-        softened(&at.softening[k], axes, axis) * (h2 * division.joint[k] * matter.ei)
+        softened(&at.softening[k], axes, axis) * (h2 * division.joint[k] * material.ei)
     };
     let stiffness = |k: usize, axis: DVec3| {
         let size = axis.length_squared();
         let scale = h2 * division.joint[k];
-        let twist = if size > 0.0 { scale * (matter.gj - matter.ei) / size } else { 0.0 };
-        let round = Sym3::identity(scale * matter.ei) + Sym3::outer(axis, twist);
+        let twist = if size > 0.0 { scale * (material.gj - material.ei) / size } else { 0.0 };
+        let round = Sym3::identity(scale * material.ei) + Sym3::outer(axis, twist);
         if at.softening.is_empty() { round } else { round + soft(k, axis) }
     };
-    if matter.clamp[0] {
+    if material.clamp[0] {
         rows[1].diag += stiffness(0, at.t[0]);
     }
     for k in 1..count {
@@ -115,7 +115,7 @@ fn fill_joints(problem: &SubstepProblem<'_>, at: &RodState, rows: &mut [Row]) {
         rows[2 * k + 1].diag += joint;
         rows[2 * k + 1].far = joint * -1.0;
     }
-    if matter.clamp[1] {
+    if material.clamp[1] {
         rows[2 * count - 1].diag += stiffness(count, at.t[count - 1]);
     }
 }
@@ -133,7 +133,7 @@ fn softened(softening: &Softening, axes: DQuat, director: DVec3) -> Sym3 {
 
 /// r = M (v_n − v_i) − h c M v_i + h f (eq. 11), the spin of v_n turned by its own gyroscopic torque (eq. 19).
 fn fill_right_side(problem: &SubstepProblem<'_>, iterate: &Iterate<'_>, rhs: &mut [DVec3]) {
-    let RodMaterial { mu, rotary, damping, .. } = *problem.matter;
+    let RodMaterial { mu, rotary, damping, .. } = *problem.material;
     let (h, slow) = (problem.h, 1.0 + problem.h * damping);
     let (start, force) = (iterate.start, &iterate.at.force);
     let count = start.q.len();
@@ -175,15 +175,15 @@ pub fn add_springs(problem: &SubstepProblem<'_>, iterate: &Iterate<'_>, rows: &m
 }
 
 /// Removes the positions of held ends from the system: their velocity is zero under any load.
-pub fn hold_ends(matter: &RodMaterial, rows: &mut [Row], rhs: &mut [DVec3]) {
+pub fn hold_ends(material: &RodMaterial, rows: &mut [Row], rhs: &mut [DVec3]) {
     let last = rows.len() - 1;
-    if matter.held[0] {
+    if material.held[0] {
         rows[0].diag = Sym3::identity(1.0);
         rows[1].near = DMat3::ZERO;
         rows[2].far = Sym3::ZERO;
         rhs[0] = DVec3::ZERO;
     }
-    if matter.held[1] {
+    if material.held[1] {
         rows[last] = Row { diag: Sym3::identity(1.0), ..Row::ZERO };
         rhs[last] = DVec3::ZERO;
     }

@@ -32,7 +32,7 @@ pub const STRETCH_WARN: f64 = 1.4;
 pub struct Tube {
     pub(super) spec: TubeSpec,
     pub(super) skeleton: RestCurve,
-    pub(super) matter: RodMaterial,
+    pub(super) material: RodMaterial,
     pub(super) division: Discretization,
     pub(super) now: RodState,
     pub(super) stepper: Stepper,
@@ -79,21 +79,21 @@ impl Tube {
             None => discretization::segments_for(&skeleton, resolution.eps_m),
         };
         let division = Discretization::first(&skeleton, count);
-        let matter = matter_of(&spec);
+        let material = material_of(&spec);
         let mut now = RodState::at_rest(&division);
         let wall = match spec.wall {
             WallModel::Prescribed => None,
             WallModel::Gives => Some(Wall::round(WallLaw::of(&spec.section), division.segments() + 1)),
         };
         wall.iter().for_each(|wall| wall.soften(&mut now.softening));
-        now.strain(&matter, &division);
+        now.strain(&material, &division);
         let form = CollisionShape { traits: spec.traits, ..CollisionShape::new(ShapeKind::Chain, spec.friction) };
         let mut tube = Self {
             resolution: nearest_resolution(resolution, &skeleton, count),
             acceleration: spec.gravity,
             spec,
             skeleton,
-            matter,
+            material,
             division,
             now,
             stepper: Stepper::default(),
@@ -131,11 +131,11 @@ impl Tube {
         dt: f64,
         act: impl FnOnce(&mut Stepper, &mut RodState, &Setting<'_>) -> T,
     ) -> T {
-        let Self { stepper, now, matter, division, springs, .. } = self;
+        let Self { stepper, now, material, division, springs, .. } = self;
         let substeps = self.spec.substeps;
         let integrator = self.spec.integrator;
-        let longest_s = integrator.longest_substep_s(matter, division).unwrap_or(f64::INFINITY);
-        act(stepper, now, &Setting { matter, division, springs, dt, substeps, integrator, longest_s })
+        let longest_s = integrator.longest_substep_s(material, division).unwrap_or(f64::INFINITY);
+        act(stepper, now, &Setting { material, division, springs, dt, substeps, integrator, longest_s })
     }
 
     /// The numbers it was built from.
@@ -205,7 +205,7 @@ impl Tube {
     pub fn warnings(&self) -> Vec<String> {
         let mut list = vec![];
         if self.now.stretch > STRETCH_WARN {
-            let RodMaterial { ea, ga, .. } = self.matter;
+            let RodMaterial { ea, ga, .. } = self.material;
             let limit = if ea > ga { ea / (ea - ga) } else { f64::INFINITY };
             list.push(format!(
                 "the tube is stretched to {:.2} times its length; the rod model is valid up to {limit:.2} (warning from {STRETCH_WARN}): use a stiffer or lighter tube",
@@ -278,8 +278,8 @@ impl Tube {
 /// Access for tests.
 #[cfg(test)]
 impl Tube {
-    pub(super) fn matter(&self) -> &RodMaterial {
-        &self.matter
+    pub(super) fn material(&self) -> &RodMaterial {
+        &self.material
     }
 
     pub(super) fn division(&self) -> &Discretization {
@@ -293,7 +293,7 @@ impl Tube {
     /// Replaces the state, for violent starts; its strains are recomputed.
     pub(super) fn set_state(&mut self, mut state: RodState) {
         self.wall.iter().for_each(|wall| wall.soften(&mut state.softening));
-        state.strain(&self.matter, &self.division);
+        state.strain(&self.material, &self.division);
         self.now = state;
     }
 }
@@ -308,7 +308,7 @@ impl Tube {
     }
 }
 
-fn matter_of(spec: &TubeSpec) -> RodMaterial {
+fn material_of(spec: &TubeSpec) -> RodMaterial {
     let s = &spec.section;
     RodMaterial {
         ea: s.ea_n,

@@ -24,7 +24,7 @@ pub struct Projector {
 
 /// Constants of a projection.
 struct Constants<'a> {
-    matter: &'a RodMaterial,
+    material: &'a RodMaterial,
     division: &'a Discretization,
     /// 1/h².
     rate2: f64,
@@ -33,7 +33,7 @@ struct Constants<'a> {
 impl Projector {
     /// Projects the state that `velocities` reach from `now` in `h` seconds, and corrects them to reach the projected one.
     pub fn project(&mut self, now: &RodState, velocities: &mut [DVec3], rod: DividedRod<'_>, h: f64) {
-        let constants = Constants { matter: rod.matter, division: rod.division, rate2: 1.0 / (h * h) };
+        let constants = Constants { material: rod.material, division: rod.division, rate2: 1.0 / (h * h) };
         let count = now.q.len();
         self.predict(now, velocities, h);
         for k in 0..count {
@@ -74,7 +74,7 @@ impl Projector {
 
     /// C = Rᵀ u − s₀ ẑ with compliance K⁻¹/l (eq. 41).
     fn segment(&mut self, k: usize, constants: &Constants<'_>) {
-        let RodMaterial { ea, ga, rotary, .. } = *constants.matter;
+        let RodMaterial { ea, ga, rotary, .. } = *constants.material;
         let (l, q) = (constants.division.length[k], self.q[k]);
         let u = q.conjugate() * ((self.x[k + 1] - self.x[k]) / l);
         let (wa, wb) = (constants.inverse_mass(k), constants.inverse_mass(k + 1));
@@ -97,7 +97,7 @@ impl Projector {
 
     /// C = log(R_{k−1}ᵀ R_k) − ψ⁰ with compliance l̄ B⁻¹; at an end only where a wall clamps it (eq. 42).
     fn joint(&mut self, k: usize, constants: &Constants<'_>) {
-        let RodMaterial { ei, gj, rotary, clamp, .. } = *constants.matter;
+        let RodMaterial { ei, gj, rotary, clamp, .. } = *constants.material;
         let count = self.q.len();
         if (k == 0 && !clamp[0]) || (k == count && !clamp[1]) {
             return;
@@ -130,11 +130,11 @@ impl Projector {
 impl Constants<'_> {
     /// Inverse mass of a node; zero where it is held.
     fn inverse_mass(&self, node: usize) -> f64 {
-        let (length, held) = (&self.division.length, self.matter.held);
+        let (length, held) = (&self.division.length, self.material.held);
         if (node == 0 && held[0]) || (node == length.len() && held[1]) {
             return 0.0;
         }
         let beside = [node.checked_sub(1), Some(node)].into_iter().flatten();
-        2.0 / (self.matter.mu * beside.filter_map(|k| length.get(k)).sum::<f64>())
+        2.0 / (self.material.mu * beside.filter_map(|k| length.get(k)).sum::<f64>())
     }
 }

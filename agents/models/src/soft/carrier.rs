@@ -105,9 +105,9 @@ impl Carrier {
     }
 
     /// The nodes' values at a material point that may be beyond them: trilinear in the cells of a cage, linear past them.
-    pub fn spread(&self, material_m: DVec3, list: &[DVec3]) -> DVec3 {
+    pub fn interpolate(&self, material_m: DVec3, list: &[DVec3]) -> DVec3 {
         match self {
-            Self::Cage(cage) => spread_in(cage, material_m, list),
+            Self::Cage(cage) => interpolate_in(cage, material_m, list),
             Self::Lattice(lattice) => lattice.carry(material_m).mean(list),
         }
     }
@@ -121,7 +121,7 @@ impl Carrier {
     }
 }
 
-fn spread_in(cage: &Cage, at_m: DVec3, list: &[DVec3]) -> DVec3 {
+fn interpolate_in(cage: &Cage, at_m: DVec3, list: &[DVec3]) -> DVec3 {
     let (cell, share) = cage.locate(at_m);
     let inner = share.clamp(DVec3::ZERO, DVec3::ONE);
     let beyond = share - inner;

@@ -9,7 +9,7 @@ use super::hexahedron::{Hexahedron, HexahedronKind};
 use super::material::Law;
 use super::membrane::Membrane;
 use super::shell_bending::ShellBending;
-use super::spec::{SoftMatter, SoftShape, SoftSpec};
+use super::spec::{SoftMaterial, SoftShape, SoftSpec};
 use super::system::System;
 use super::tetrahedron::Tetrahedron;
 use glam::{DQuat, DVec3};
@@ -59,9 +59,9 @@ impl FeMesh {
         };
         spec.held.iter().for_each(|side| mesh.hold_cage(cage, *side, &spec.shape));
         let place = |bits: usize| DVec3::from_array([0, 1, 2].map(|axis| (bits >> axis & 1) as f64));
-        mesh.kinds.push(HexahedronKind::new(std::array::from_fn(|bits| place(bits) * cage.cell_m()), &spec.matter));
+        mesh.kinds.push(HexahedronKind::new(std::array::from_fn(|bits| place(bits) * cage.cell_m()), &spec.material));
         for CageCell { corners, fill, volumes_m3 } in cage.cells() {
-            let mass_kg = volumes_m3.map(|volume| volume * spec.matter.density_kg_m3);
+            let mass_kg = volumes_m3.map(|volume| volume * spec.material.density_kg_m3);
             corners.iter().zip(mass_kg).for_each(|(node, mass)| mesh.mass_kg[*node as usize] += mass);
             mesh.hexahedra.push(Hexahedron {
                 vertices: *corners,
@@ -115,13 +115,13 @@ impl FeMesh {
             grid.on(*side).for_each(|vertex| mesh.held[vertex as usize] = true);
         }
         match shape {
-            SoftShape::Sheet { size_m, thickness_m, .. } => mesh.sheet(&grid, *size_m, *thickness_m, &spec.matter),
-            SoftShape::Box { size_m, .. } => mesh.solid(&grid, &spec.matter, |share| *size_m * share),
-            SoftShape::Ball { radius_m, .. } => mesh.solid(&grid, &spec.matter, |share| ball(share) * *radius_m),
+            SoftShape::Sheet { size_m, thickness_m, .. } => mesh.sheet(&grid, *size_m, *thickness_m, &spec.material),
+            SoftShape::Box { size_m, .. } => mesh.solid(&grid, &spec.material, |share| *size_m * share),
+            SoftShape::Ball { radius_m, .. } => mesh.solid(&grid, &spec.material, |share| ball(share) * *radius_m),
             SoftShape::Embedded { .. } => {} // its mesh is that of a cage
             SoftShape::Tetrahedra { mesh, regions } => return Self::tetrahedral(mesh, regions, spec),
             SoftShape::Shell { surface, thickness_m } => return Self::shell(surface, *thickness_m, spec),
-            SoftShape::Rope { path_m, radius_m, .. } => mesh.rope(&grid, path_m, *radius_m, &spec.matter),
+            SoftShape::Rope { path_m, radius_m, .. } => mesh.rope(&grid, path_m, *radius_m, &spec.material),
         }
         let sag = |row: [u32; 3], rest: &[DVec3]| sagitta(row, rest).length();
         mesh.rows = grid.rows().into_iter().map(|row| (row, sag(row, &mesh.rest))).collect();
@@ -147,13 +147,13 @@ impl FeMesh {
         }
     }
 
-    fn solid(&mut self, grid: &Grid, matter: &SoftMatter, place_of: impl Fn(DVec3) -> DVec3) {
+    fn solid(&mut self, grid: &Grid, material: &SoftMaterial, place_of: impl Fn(DVec3) -> DVec3) {
         self.place(grid, place_of);
         for [i, j, k] in grid.places().filter(|place| (0..3).all(|axis| place[axis] < grid.cells[axis])) {
             let vertices = std::array::from_fn(|bits| grid.at([i + (bits & 1), j + (bits >> 1 & 1), k + (bits >> 2)]));
             let corners: [DVec3; 8] = vertices.map(|vertex: u32| self.rest[vertex as usize]);
-            let kind = self.kind_of(corners, matter);
-            let mass_kg = self.kinds[kind].volumes_m3.map(|volume| volume * matter.density_kg_m3);
+            let kind = self.kind_of(corners, material);
+            let mass_kg = self.kinds[kind].volumes_m3.map(|volume| volume * material.density_kg_m3);
             vertices.iter().zip(mass_kg).for_each(|(vertex, mass)| self.mass_kg[*vertex as usize] += mass);
             self.hexahedra.push(Hexahedron { vertices, kind, fill: 1.0, mass_kg, turn: DQuat::IDENTITY });
         }
@@ -162,8 +162,8 @@ impl FeMesh {
     }
 
     /// The kind of a cell with these corners: one for all of equal shape.
-    fn kind_of(&mut self, corners: [DVec3; 8], matter: &SoftMatter) -> usize {
-        let kind = HexahedronKind::new(corners, matter);
+    fn kind_of(&mut self, corners: [DVec3; 8], material: &SoftMaterial) -> usize {
+        let kind = HexahedronKind::new(corners, material);
         let known = self.kinds.iter().position(|known| known.is_like(&kind));
         known.unwrap_or_else(|| {
             self.kinds.push(kind);
@@ -191,16 +191,16 @@ impl FeMesh {
         }
     }
 
-    fn rope(&mut self, grid: &Grid, path_m: &[DVec3], radius_m: f64, matter: &SoftMatter) {
+    fn rope(&mut self, grid: &Grid, path_m: &[DVec3], radius_m: f64, material: &SoftMaterial) {
         let count = grid.cells[0];
         let total: f64 = path_m.windows(2).map(|pair| pair[0].distance(pair[1])).sum();
         let section = std::f64::consts::PI * radius_m * radius_m;
         let rest_m = total / count as f64;
         self.rest = (0..=count).map(|i| along(path_m, rest_m * i as f64)).collect();
         for i in 0..count as u32 {
-            self.bars.push(Bar { ends: [i, i + 1], rest_m, ea_n: matter.young_pa * section });
+            self.bars.push(Bar { ends: [i, i + 1], rest_m, ea_n: material.young_pa * section });
             self.edges.push([i, i + 1]);
-            let half = 0.5 * rest_m * section * matter.density_kg_m3;
+            let half = 0.5 * rest_m * section * material.density_kg_m3;
             self.mass_kg[i as usize] += half;
             self.mass_kg[i as usize + 1] += half;
         }
@@ -274,7 +274,7 @@ impl FeMesh {
     }
 
     /// The von Mises stress of elastic forces at every vertex, Pa: the mean of the elements around it by volume.
-    pub fn von_mises_pa(&self, positions: &[DVec3], matter: &SoftMatter) -> Vec<f64> {
+    pub fn von_mises_pa(&self, positions: &[DVec3], material: &SoftMaterial) -> Vec<f64> {
         let mut sums = vec![[0.0; 2]; self.rest.len()];
         let mut add = |vertices: &[u32], volume: f64, stress_pa: f64| {
             for vertex in vertices {
@@ -283,12 +283,12 @@ impl FeMesh {
             }
         };
         for bar in &self.bars {
-            add(&bar.ends, bar.rest_m, matter.young_pa * bar.strain(positions).abs());
+            add(&bar.ends, bar.rest_m, material.young_pa * bar.strain(positions).abs());
         }
         for membrane in &self.membranes {
             add(membrane.vertices(), membrane.mass_kg().iter().sum(), membrane.von_mises_pa(positions));
         }
-        let law = Law::of(matter);
+        let law = Law::of(material);
         for cell in &self.hexahedra {
             let deformation = { *cell }.deformation(&self.kinds[cell.kind], positions);
             add(&cell.vertices, cell.mass_kg.iter().sum(), deformation.von_mises_pa(&law));

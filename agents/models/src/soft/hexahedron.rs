@@ -5,7 +5,7 @@
 
 use super::deformation::{ConstantStrain, Deformation, first_turn, follow_turn, outer};
 use super::material::{Lame, Law, Material};
-use super::spec::SoftMatter;
+use super::spec::SoftMaterial;
 use super::system::System;
 use glam::{DMat3, DQuat, DVec3};
 use metachron_core::skyline_cholesky::{BlockIndex, SkylineCholesky};
@@ -62,8 +62,8 @@ fn slopes(at: DVec3) -> [DVec3; 8] {
 
 impl HexahedronKind {
     /// The kind of a cell with these corners at rest, metres.
-    pub fn new(corners: [DVec3; 8], matter: &SoftMatter) -> Self {
-        let Lame { mu, lambda } = Lame::of(matter);
+    pub fn new(corners: [DVec3; 8], material: &SoftMaterial) -> Self {
+        let Lame { mu, lambda } = Lame::of(material);
         let jacobian = |at: DVec3| slopes(at).iter().zip(&corners).fold(DMat3::ZERO, |j, (s, x)| j + outer(*x, *s));
         let middle = jacobian(DVec3::ZERO);
         let mut whole = [[DMat3::ZERO; MODES]; MODES];
@@ -97,7 +97,7 @@ impl HexahedronKind {
         let gradients = gradients.map(|g| g / volume);
         let rest = corners.map(|x| x - corners[0]);
         let mut stiffness = Box::new(condensed(&whole));
-        let law = match Law::of(matter) {
+        let law = match Law::of(material) {
             Law::Corotational(_) => None,
             law @ Law::Ogden(_) => Some(law),
         };

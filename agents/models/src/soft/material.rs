@@ -2,7 +2,7 @@
 //!
 //! In: three stretches. Out: the energy of a volume and its derivatives. Never here: elements. Theory: docs/theory/soft.md, eq. 25–27.
 
-use super::spec::{MaterialLaw, SoftMatter};
+use super::spec::{MaterialLaw, SoftMaterial};
 
 /// The response of a material to three principal stretches.
 #[derive(Debug, Clone, Copy)]
@@ -29,8 +29,8 @@ pub(super) struct Lame {
 }
 
 impl Lame {
-    pub fn of(matter: &SoftMatter) -> Self {
-        let SoftMatter { young_pa, poisson, .. } = *matter;
+    pub fn of(material: &SoftMaterial) -> Self {
+        let SoftMaterial { young_pa, poisson, .. } = *material;
         let mu = 0.5 * young_pa / (1.0 + poisson);
         Self { mu, lambda: young_pa * poisson / ((1.0 + poisson) * (1.0 - 2.0 * poisson)) }
     }
@@ -44,9 +44,9 @@ pub(super) enum Law {
 }
 
 impl Law {
-    pub fn of(matter: &SoftMatter) -> Self {
-        let lame = Lame::of(matter);
-        match matter.law {
+    pub fn of(material: &SoftMaterial) -> Self {
+        let lame = Lame::of(material);
+        match material.law {
             MaterialLaw::Corotational => Self::Corotational(lame),
             MaterialLaw::NeoHookean => Self::Ogden(Ogden { lame, exponent: 2.0 }),
             MaterialLaw::Ogden { exponent } => Self::Ogden(Ogden { lame, exponent }),
@@ -129,8 +129,8 @@ impl Material for Ogden {
 mod tests {
     use super::*;
 
-    fn matter(law: MaterialLaw, poisson: f64) -> SoftMatter {
-        SoftMatter { young_pa: 1e4, poisson, density_kg_m3: 1e3, damping_per_s: 0.0, damping_s: 0.0, law }
+    fn material(law: MaterialLaw, poisson: f64) -> SoftMaterial {
+        SoftMaterial { young_pa: 1e4, poisson, density_kg_m3: 1e3, damping_per_s: 0.0, damping_s: 0.0, law }
     }
 
     const LAWS: [MaterialLaw; 5] = [
@@ -144,7 +144,7 @@ mod tests {
     #[test]
     fn slopes_are_those_of_the_energy_and_curvatures_those_of_the_slopes() {
         for law in LAWS {
-            let law = Law::of(&matter(law, 0.4));
+            let law = Law::of(&material(law, 0.4));
             for at in [[1.0, 1.0, 1.0], [1.3, 0.9, 0.7], [2.0, 0.5, 0.2], [1.1, 0.8, -0.4]] {
                 let here = law.respond(at);
                 for i in 0..3 {
@@ -168,8 +168,8 @@ mod tests {
     #[test]
     fn near_rest_all_laws_are_that_of_hooke() {
         for law in LAWS {
-            let matter = matter(law, 0.4);
-            let (law, hooke) = (Law::of(&matter), Lame::of(&matter).respond([1.0; 3]));
+            let material = material(law, 0.4);
+            let (law, hooke) = (Law::of(&material), Lame::of(&material).respond([1.0; 3]));
             let rest = law.respond([1.0; 3]);
             assert!(rest.energy.abs() < 1e-9 && rest.slope.iter().all(|slope| slope.abs() < 1e-9), "{law:?}");
             for (ours, wanted) in rest.curvature.iter().flatten().zip(hooke.curvature.iter().flatten()) {
@@ -192,8 +192,8 @@ mod tests {
     fn what_keeps_its_volume_is_pulled_as_the_closed_form_says() {
         // P = (2 μ/a) (λ^(a − 1) − λ^(−a/2 − 1)), of an incompressible Ogden material of one term; a = 2 is Neo-Hookean
         for (law, a) in [(MaterialLaw::NeoHookean, 2.0), (LAWS[2], 8.0), (LAWS[3], -4.0)] {
-            let matter = matter(law, 0.499_999);
-            let (law, mu) = (Law::of(&matter), Lame::of(&matter).mu);
+            let material = material(law, 0.499_999);
+            let (law, mu) = (Law::of(&material), Lame::of(&material).mu);
             for along in [0.7_f64, 0.9, 1.2, 1.6] {
                 let across = free_across(&law, along);
                 let pull = law.respond([along, across, across]).slope[0];

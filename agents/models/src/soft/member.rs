@@ -29,12 +29,12 @@ pub(super) struct Unknowns {
     start: Vec<DVec3>,
     /// The velocity of all vertices that answers, in sum, the momentum that the step leaves unanswered, m/s.
     owed_m_s: DVec3,
-    kept: Kept,
+    saved: SavedState,
 }
 
 /// A state to go back to.
 #[derive(Debug, Clone, Default)]
-struct Kept {
+struct SavedState {
     positions: Vec<DVec3>,
     velocities: Vec<DVec3>,
     turns: Vec<DQuat>,
@@ -146,24 +146,24 @@ impl ClusterMember for SoftBody {
     }
 
     fn keep(&mut self) {
-        let kept = &mut self.unknowns.kept;
-        kept.positions.clone_from(&self.positions);
-        kept.velocities.clone_from(&self.velocities);
-        kept.turns.clear();
-        kept.turns.extend(self.mesh.turns());
-        self.skin.iter_mut().for_each(|skin| kept.apart.clone_from(skin.apart()));
-        kept.acceleration = self.acceleration;
-        (kept.quiet_s, kept.at_rest, kept.steps) = (self.quiet_s, self.at_rest, self.steps);
+        let saved = &mut self.unknowns.saved;
+        saved.positions.clone_from(&self.positions);
+        saved.velocities.clone_from(&self.velocities);
+        saved.turns.clear();
+        saved.turns.extend(self.mesh.turns());
+        self.skin.iter_mut().for_each(|skin| saved.apart.clone_from(skin.apart()));
+        saved.acceleration = self.acceleration;
+        (saved.quiet_s, saved.at_rest, saved.steps) = (self.quiet_s, self.at_rest, self.steps);
     }
 
     fn go_back(&mut self) {
-        let kept = &self.unknowns.kept;
-        self.positions.clone_from(&kept.positions);
-        self.velocities.clone_from(&kept.velocities);
-        self.mesh.set_turns(&kept.turns);
-        self.skin.iter_mut().for_each(|skin| skin.apart().clone_from(&kept.apart));
-        self.acceleration = kept.acceleration;
-        (self.quiet_s, self.at_rest, self.steps) = (kept.quiet_s, kept.at_rest, kept.steps);
+        let saved = &self.unknowns.saved;
+        self.positions.clone_from(&saved.positions);
+        self.velocities.clone_from(&saved.velocities);
+        self.mesh.set_turns(&saved.turns);
+        self.skin.iter_mut().for_each(|skin| skin.apart().clone_from(&saved.apart));
+        self.acceleration = saved.acceleration;
+        (self.quiet_s, self.at_rest, self.steps) = (saved.quiet_s, saved.at_rest, saved.steps);
         self.follow();
     }
 

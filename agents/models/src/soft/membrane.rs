@@ -4,7 +4,7 @@
 //! St. Venant–Kirchhoff in the plane.
 
 use super::deformation::outer;
-use super::spec::SoftMatter;
+use super::spec::SoftMaterial;
 use super::system::System;
 use glam::{DMat2, DMat3, DVec2, DVec3};
 
@@ -32,14 +32,14 @@ struct Strained {
 
 impl Membrane {
     /// A triangle whose flat corners are `flat`, metres, `thickness_m` thick.
-    pub fn new(vertices: [u32; 3], flat: [DVec2; 3], thickness_m: f64, matter: &SoftMatter) -> Self {
-        let SoftMatter { young_pa, poisson, .. } = *matter;
+    pub fn new(vertices: [u32; 3], flat: [DVec2; 3], thickness_m: f64, material: &SoftMaterial) -> Self {
+        let SoftMaterial { young_pa, poisson, .. } = *material;
         let sides = DMat2::from_cols(flat[1] - flat[0], flat[2] - flat[0]);
         let inverse = sides.inverse();
         let (b, c) = (inverse.row(0), inverse.row(1));
         let volume_m3 = 0.5 * sides.determinant().abs() * thickness_m;
         let lame_pa = [0.5 * young_pa / (1.0 + poisson), young_pa * poisson / (1.0 - poisson * poisson)];
-        let mass_kg = [volume_m3 * matter.density_kg_m3 / 3.0; 3];
+        let mass_kg = [volume_m3 * material.density_kg_m3 / 3.0; 3];
         Self { vertices, gradients: [-b - c, b, c], volume_m3, mass_kg, lame_pa }
     }
 

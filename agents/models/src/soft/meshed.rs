@@ -6,8 +6,8 @@ use super::fe_mesh::{FeMesh, edges_of};
 use super::grid::Side;
 use super::material::Law;
 use super::membrane::Membrane;
-use super::shell_bending::{ShellBending, ShellMatter};
-use super::spec::{RegionMatter, SoftMatter, SoftSpec};
+use super::shell_bending::{ShellBending, ShellMaterial};
+use super::spec::{RegionMaterial, SoftMaterial, SoftSpec};
 use super::tetrahedron::Tetrahedron;
 use glam::{DVec2, DVec3};
 use metachron_geometry::{Aabb, Tetrahedra, Triangles};
@@ -15,16 +15,16 @@ use std::collections::HashMap;
 
 impl FeMesh {
     /// The tetrahedra of a mesh.
-    pub fn tetrahedral(mesh: &Tetrahedra, regions: &[RegionMatter], spec: &SoftSpec) -> Self {
+    pub fn tetrahedral(mesh: &Tetrahedra, regions: &[RegionMaterial], spec: &SoftSpec) -> Self {
         let mut division = Self::of_points(&mesh.points);
-        let matters: Vec<SoftMatter> =
-            std::iter::once(spec.matter).chain(regions.iter().map(|region| region.matter)).collect();
-        division.laws = matters.iter().map(Law::of).collect();
+        let materials: Vec<SoftMaterial> =
+            std::iter::once(spec.material).chain(regions.iter().map(|region| region.material)).collect();
+        division.laws = materials.iter().map(Law::of).collect();
         for (at, corners) in mesh.corners.iter().enumerate() {
             let of_region = |number: &i64| regions.iter().position(|region| region.region == *number);
             let material = mesh.regions.get(at).and_then(of_region).map_or(0, |region| region + 1);
             let places = corners.map(|corner| mesh.points[corner as usize]);
-            let element = Tetrahedron::new(*corners, places, material, matters[material].density_kg_m3);
+            let element = Tetrahedron::new(*corners, places, material, materials[material].density_kg_m3);
             corners.iter().zip(element.mass_kg).for_each(|(corner, mass)| division.mass_kg[*corner as usize] += mass);
             division.tetrahedra.push(element);
         }
@@ -43,19 +43,19 @@ impl FeMesh {
         division.radius_m = 0.5 * thickness_m;
         division.triangles.clone_from(&surface.triangles);
         for corners in &surface.triangles {
-            let element = Membrane::new(*corners, flattened(&surface.points, *corners), thickness_m, &spec.matter);
+            let element = Membrane::new(*corners, flattened(&surface.points, *corners), thickness_m, &spec.material);
             corners.iter().zip(element.mass_kg()).for_each(|(at, mass)| division.mass_kg[*at as usize] += mass);
             division.membranes.push(element);
         }
-        division.bend_shell(thickness_m, &spec.matter);
+        division.bend_shell(thickness_m, &spec.material);
         division.edges = edges_of(&division.triangles);
         division.hold(&spec.held);
         division
     }
 
     /// Lists how the triangles of a shell bend with those across their sides.
-    pub fn bend_shell(&mut self, thickness_m: f64, matter: &SoftMatter) {
-        let bent = ShellMatter::new(matter, thickness_m);
+    pub fn bend_shell(&mut self, thickness_m: f64, material: &SoftMaterial) {
+        let bent = ShellMaterial::new(material, thickness_m);
         // the corner across each side of a triangle, in the direction of the neighbour
         let mut across: HashMap<[u32; 2], u32> = HashMap::with_capacity(3 * self.triangles.len());
         for [a, b, c] in &self.triangles {

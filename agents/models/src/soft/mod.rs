@@ -38,6 +38,6 @@ mod tetrahedron;
 pub use body::SoftBody;
 pub use grid::Side;
 pub use spec::{
-    LENGTH, MATTER, MaterialLaw, NodeSpacing, RegionMatter, SEGMENTS, SoftError, SoftMatter, SoftShape, SoftSpec,
+    LENGTH, MATERIAL, MaterialLaw, NodeSpacing, RegionMaterial, SEGMENTS, SoftError, SoftMaterial, SoftShape, SoftSpec,
     VERTICES_MAX,
 };

@@ -23,7 +23,7 @@ const BALANCED_M: f64 = 1e-7;
 
 /// The quantities that a change of nodes keeps.
 #[derive(Debug, Clone, Copy)]
-struct Kept {
+struct Invariants {
     energy_j: f64,
     momentum: DVec3,
     /// Centre of mass, metres, and the motion of the whole.
@@ -79,25 +79,25 @@ impl SoftBody {
         self.woken();
     }
 
-    fn kept(&self) -> Kept {
+    fn kept(&self) -> Invariants {
         let mass = self.mesh.mass_kg.iter().sum::<f64>();
         let centre = self.mesh.mass_kg.iter().zip(&self.positions).map(|(m, x)| *x * *m).sum::<DVec3>() / mass;
         let (whole, inertia) = self.rigid_motion(centre);
-        Kept { energy_j: self.energy_j(), momentum: self.linear_momentum(), centre, whole, inertia }
+        Invariants { energy_j: self.energy_j(), momentum: self.linear_momentum(), centre, whole, inertia }
     }
 
     /// Where the present carrier has the nodes of another one, and how fast (eq. 17, 23).
     fn at_nodes(&self, carrier: &Carrier, mesh: &FeMesh) -> (Vec<DVec3>, Vec<DVec3>) {
         let rotation = self.spec.rotation.normalize();
-        let spread = |at_m: DVec3, list: &[DVec3]| {
-            self.skin.as_ref().map_or(DVec3::ZERO, |skin| skin.carrier.spread(at_m, list))
+        let interpolate = |at_m: DVec3, list: &[DVec3]| {
+            self.skin.as_ref().map_or(DVec3::ZERO, |skin| skin.carrier.interpolate(at_m, list))
         };
         let nodes = carrier.nodes_m().iter().zip(&mesh.rest).zip(&mesh.held);
         let of = |((material_m, rest), held): ((&DVec3, &DVec3), &bool)| {
             if *held {
                 return (self.spec.position + rotation * *rest, DVec3::ZERO);
             }
-            (spread(*material_m, &self.positions), spread(*material_m, &self.velocities))
+            (interpolate(*material_m, &self.positions), interpolate(*material_m, &self.velocities))
         };
         nodes.map(of).unzip()
     }
@@ -113,7 +113,7 @@ impl SoftBody {
         let of = |((force, mass), held): ((&DVec3, &f64), &bool)| if *held { -weight } else { *force / *mass };
         let elastic_m_s2: Vec<DVec3> = nodes.map(of).collect();
         let Some(skin) = &self.skin else { return vec![] };
-        carrier.nodes_m().iter().map(|node_m| skin.carrier.spread(*node_m, &elastic_m_s2)).collect()
+        carrier.nodes_m().iter().map(|node_m| skin.carrier.interpolate(*node_m, &elastic_m_s2)).collect()
     }
 
     /// Moves new nodes to where elastic forces accelerate them as they did the old ones, by steps from rest: a body that was at rest is again,
@@ -149,7 +149,7 @@ impl SoftBody {
 
     /// Moves the nodes that are not held so that linear momentum is as it was, and, where none is held, the centre of mass and angular
     /// momentum too (eq. 18).
-    fn keep_momentum(&mut self, before: &Kept) {
+    fn keep_momentum(&mut self, before: &Invariants) {
         if self.mesh.held.contains(&true) {
             // the hold takes up the difference of the centre, and gives that of momentum
             let missing = before.momentum - self.linear_momentum();

@@ -6,7 +6,7 @@
 use super::body::SoftBody;
 use super::division::form;
 use super::fe_mesh::{FeMesh, edges_of};
-use super::spec::{SoftError, SoftMatter, SoftShape};
+use super::spec::{SoftError, SoftMaterial, SoftShape};
 use glam::DVec3;
 use metachron_contact::Carving;
 use metachron_core::Removed;
@@ -34,7 +34,7 @@ impl FeMesh {
     }
 
     /// Removes cells of a body of `shape`; a vertex without any cell is held, without mass.
-    fn remove(&mut self, is_gone: &[bool], shape: &SoftShape, matter: &SoftMatter) {
+    fn remove(&mut self, is_gone: &[bool], shape: &SoftShape, material: &SoftMaterial) {
         let mut gone = is_gone.iter().copied();
         let mut is_left = || !gone.next().unwrap_or_default();
         self.hexahedra.retain(|_| is_left());
@@ -46,7 +46,7 @@ impl FeMesh {
             let mut left = is_left.iter();
             self.triangles.retain(|_| left.next() == Some(&true));
             self.list_edges();
-            self.bend_anew(shape, matter);
+            self.bend_anew(shape, material);
         }
         let mut mass_kg = vec![0.0; self.rest.len()];
         for cell in self.cells() {
@@ -139,7 +139,7 @@ impl SoftBody {
     pub(super) fn leave_out(&mut self, is_gone: &[bool]) {
         let Self { skin, mesh, form, spec, .. } = self;
         let shape = skin.as_ref().and_then(|skin| skin.carrier.lattice()).unwrap_or(&spec.shape);
-        mesh.remove(is_gone, shape, &spec.matter);
+        mesh.remove(is_gone, shape, &spec.material);
         let triangles = match (skin, &form.kind) {
             (Some(skin), ShapeKind::Surface(surface)) => {
                 let is_left: Vec<bool> = mesh.mass_kg.iter().map(|mass| *mass > 0.0).collect();

@@ -7,7 +7,7 @@ use super::bending::BendingElement;
 use super::fe_mesh::FeMesh;
 use super::grid::Grid;
 use super::membrane::Membrane;
-use super::spec::{SoftMatter, SoftShape};
+use super::spec::{SoftMaterial, SoftShape};
 use glam::DVec2;
 
 /// A flat sheet of equal cells.
@@ -27,7 +27,7 @@ impl Plate {
 
 impl FeMesh {
     /// The triangles of a sheet of `grid`, and how they bend.
-    pub(super) fn sheet(&mut self, grid: &Grid, size_m: [f64; 2], thickness_m: f64, matter: &SoftMatter) {
+    pub(super) fn sheet(&mut self, grid: &Grid, size_m: [f64; 2], thickness_m: f64, material: &SoftMaterial) {
         let [nx, ny, _] = grid.cells;
         let plate = Plate::of(size_m, thickness_m, grid);
         let step = plate.step;
@@ -40,14 +40,14 @@ impl FeMesh {
             // alternating diagonals favour no direction
             let halves = if (i + j) % 2 == 0 { [[a, b, c], [a, c, d]] } else { [[a, b, d], [b, c, d]] };
             for corners in halves {
-                let membrane = Membrane::new(corners, self.flat(corners), thickness_m, matter);
+                let membrane = Membrane::new(corners, self.flat(corners), thickness_m, material);
                 corners.iter().zip(membrane.mass_kg()).for_each(|(at, mass)| self.mass_kg[*at as usize] += mass);
                 self.membranes.push(membrane);
                 self.triangles.push(corners);
             }
         }
         self.list_edges();
-        self.bend_sheet(grid, plate, matter);
+        self.bend_sheet(grid, plate, material);
         self.radius_m = 0.5 * thickness_m;
     }
 
@@ -56,9 +56,9 @@ impl FeMesh {
     }
 
     /// Lists the bending elements of a flat grid of cells, where there are triangles: D (|κx|² + |κy|² + 2 ν κx·κy + 2 (1 − ν) |κxy|²)/2.
-    fn bend_sheet(&mut self, grid: &Grid, plate: Plate, matter: &SoftMatter) {
-        let (step, poisson) = (plate.step, matter.poisson);
-        let rigidity_n_m = matter.young_pa * plate.thickness_m.powi(3) / (12.0 * (1.0 - poisson * poisson));
+    fn bend_sheet(&mut self, grid: &Grid, plate: Plate, material: &SoftMaterial) {
+        let (step, poisson) = (plate.step, material.poisson);
+        let rigidity_n_m = material.young_pa * plate.thickness_m.powi(3) / (12.0 * (1.0 - poisson * poisson));
         let cell = step.x * step.y;
         let far = [1.0 / (step.x * step.x), 1.0 / (step.y * step.y)];
         let joined = |a: u32, b: u32| self.edges.binary_search(&[a.min(b), a.max(b)]).is_ok();
@@ -103,13 +103,13 @@ impl FeMesh {
     }
 
     /// Lists the bending elements anew, after triangles were taken away from a sheet of `shape`.
-    pub fn bend_anew(&mut self, shape: &SoftShape, matter: &SoftMatter) {
+    pub fn bend_anew(&mut self, shape: &SoftShape, material: &SoftMaterial) {
         match shape {
             SoftShape::Sheet { size_m, thickness_m, .. } => {
                 let grid = Grid::of(shape);
-                self.bend_sheet(&grid, Plate::of(*size_m, *thickness_m, &grid), matter);
+                self.bend_sheet(&grid, Plate::of(*size_m, *thickness_m, &grid), material);
             }
-            SoftShape::Shell { thickness_m, .. } => self.bend_shell(*thickness_m, matter),
+            SoftShape::Shell { thickness_m, .. } => self.bend_shell(*thickness_m, material),
             _ => {}
         }
     }

@@ -4,7 +4,7 @@
 //! Theory: docs/theory/soft.md, eq. 32, 33 (GGRZ06): as functions of angles, forces have no sum and no torque.
 
 use super::deformation::outer;
-use super::spec::SoftMatter;
+use super::spec::SoftMaterial;
 use super::system::System;
 use glam::{DMat3, DVec2, DVec3};
 
@@ -53,7 +53,7 @@ fn fold([a, b, c, d]: [DVec3; 4]) -> Fold {
 
 impl ShellBending {
     /// The bending of the triangle `corners` at rest; `across` are the corners over the edges opposite to each, where there are triangles.
-    pub fn new(corners: [u32; 3], across: [Option<u32>; 3], rest_m: &[DVec3], bent: &ShellMatter) -> Self {
+    pub fn new(corners: [u32; 3], across: [Option<u32>; 3], rest_m: &[DVec3], bent: &ShellMaterial) -> Self {
         let [a, b, c] = corners;
         let vertices = [a, b, c, across[0].unwrap_or(a), across[1].unwrap_or(b), across[2].unwrap_or(c)];
         let at = corners.map(|vertex| rest_m[vertex as usize]);
@@ -136,15 +136,15 @@ impl ShellBending {
 
 /// How stiffly a sheet bends.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct ShellMatter {
+pub(super) struct ShellMaterial {
     /// E t³/12 (1 − ν²), N·m.
     pub rigidity_n_m: f64,
     pub poisson: f64,
 }
 
-impl ShellMatter {
-    pub fn new(matter: &SoftMatter, thickness_m: f64) -> Self {
-        let SoftMatter { young_pa, poisson, .. } = *matter;
+impl ShellMaterial {
+    pub fn new(material: &SoftMaterial, thickness_m: f64) -> Self {
+        let SoftMaterial { young_pa, poisson, .. } = *material;
         let rigidity_n_m = young_pa * thickness_m.powi(3) / (12.0 * (1.0 - poisson * poisson));
         Self { rigidity_n_m, poisson }
     }
@@ -173,7 +173,7 @@ mod tests {
     #[test]
     fn what_is_bent_to_a_cylinder_has_the_energy_of_a_plate() {
         // triangles of equal sides, and one with three unlike neighbours: ½ D A κ² where the strip is short against the radius
-        let bent = ShellMatter { rigidity_n_m: 2.0, poisson: 0.0 };
+        let bent = ShellMaterial { rigidity_n_m: 2.0, poisson: 0.0 };
         let flat = [
             [0.0, 0.0],
             [1.0, 0.0],

@@ -9,8 +9,8 @@ use metachron_geometry::{
 };
 use std::sync::Arc;
 
-/// Ranges of the numbers of [`SoftMatter`]. At a Poisson's ratio of 0.5 a material is incompressible, which its elements cannot be.
-pub const MATTER: Ranges = Ranges(&[
+/// Ranges of the numbers of [`SoftMaterial`]. At a Poisson's ratio of 0.5 a material is incompressible, which its elements cannot be.
+pub const MATERIAL: Ranges = Ranges(&[
     ("young_pa", NumberRange::new(1.0, 1e11, "Pa")),
     ("poisson", NumberRange::new(0.0, 0.499, "")),
     ("density_kg_m3", NumberRange::new(1.0, 1e5, "kg/m³")),
@@ -31,7 +31,7 @@ pub struct SoftSpec {
     /// coarser nodes. `None`: the vertices of the shape's lattice are the nodes.
     pub nodes: Option<NodeSpacing>,
     /// Its material.
-    pub matter: SoftMatter,
+    pub material: SoftMaterial,
     /// Position of its first corner, or of a ball's centre, at the start, metres.
     pub position: DVec3,
     /// Rotation from its own axes to the world's.
@@ -52,9 +52,9 @@ pub struct SoftSpec {
     pub sleep: bool,
 }
 
-/// The material of a soft body; [`MATTER`] has the ranges of its numbers.
+/// The material of a soft body; [`MATERIAL`] has the ranges of its numbers.
 #[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
-pub struct SoftMatter {
+pub struct SoftMaterial {
     /// Young's modulus, Pa.
     pub young_pa: f64,
     /// Poisson's ratio.
@@ -86,11 +86,11 @@ pub enum MaterialLaw {
 
 /// The material of a region of a mesh.
 #[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
-pub struct RegionMatter {
+pub struct RegionMaterial {
     /// The number of the region in the mesh.
     pub region: i64,
     /// Its material. The damping of a body is that of all of it.
-    pub matter: SoftMatter,
+    pub material: SoftMaterial,
 }
 
 /// How far apart the nodes are that carry a skin.
@@ -143,7 +143,7 @@ pub enum SoftShape {
         /// The mesh in the body's own axes.
         mesh: Arc<Tetrahedra>,
         /// Regions of another material than the body's.
-        regions: Vec<RegionMatter>,
+        regions: Vec<RegionMaterial>,
     },
     /// A sheet of a triangle mesh, of whatever shape at rest.
     Shell {
@@ -296,7 +296,7 @@ impl SoftShape {
             }
             Self::Tetrahedra { mesh, regions } => {
                 mesh.check()?;
-                regions.iter().try_for_each(|region| region.matter.check())?;
+                regions.iter().try_for_each(|region| region.material.check())?;
             }
             Self::Shell { surface, thickness_m } => {
                 LENGTH.check("the thickness", *thickness_m)?;
@@ -428,10 +428,10 @@ fn check_sheet(surface: &Triangles) -> Result<(), SoftError> {
     Ok(())
 }
 
-impl SoftMatter {
+impl SoftMaterial {
     fn check(&self) -> Result<(), SoftError> {
         let Self { young_pa, poisson, density_kg_m3, damping_per_s, damping_s, law } = *self;
-        MATTER.check([young_pa, poisson, density_kg_m3, damping_per_s, damping_s])?;
+        MATERIAL.check([young_pa, poisson, density_kg_m3, damping_per_s, damping_s])?;
         let MaterialLaw::Ogden { exponent } = law else { return Ok(()) };
         let is_good = (1.0..=20.0).contains(&exponent.abs());
         OutOfRange::unless(is_good, "the exponent of Ogden", exponent, "a number from 1 to 20, or from −20 to −1")?;
@@ -464,7 +464,7 @@ impl SoftSpec {
             let finest = self.shape.divided_by(nodes.eps_m.min(nodes.range_m.0));
             finest.ok_or(SoftError::NoSpacing { model: self.shape.model() })?.check()?;
         }
-        self.matter.check()?;
+        self.material.check()?;
         FRICTION.check("friction", self.friction)?;
         vector("the position", self.position)?;
         vector("the velocity", self.velocity)?;

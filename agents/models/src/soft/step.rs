@@ -32,9 +32,9 @@ impl SoftBody {
     /// Assembles the system of a substep of `h` seconds at the present positions.
     pub(super) fn assemble(&mut self, h: f64) {
         let Self { system, mesh, positions, spec, .. } = self;
-        system.begin(h * (h + spec.matter.damping_s));
+        system.begin(h * (h + spec.material.damping_s));
         mesh.add(positions, system);
-        let inertia = 1.0 + h * spec.matter.damping_per_s;
+        let inertia = 1.0 + h * spec.material.damping_per_s;
         for (vertex, &mass) in mesh.mass_kg.iter().enumerate() {
             system.weigh(vertex, DMat3::from_diagonal(DVec3::splat(mass * inertia)));
             system.push(vertex as u32, spec.gravity * mass);

@@ -17,7 +17,7 @@ impl SoftBody {
         }
         state.resolution.into_iter().for_each(|resolution| self.set_resolution(resolution));
         self.set_state(&state.body).ok()?;
-        let of_nodes = self.mesh.von_mises_pa(&self.positions, &self.spec.matter);
+        let of_nodes = self.mesh.von_mises_pa(&self.positions, &self.spec.material);
         let Some(skin) = &self.skin else { return Some(of_nodes) };
         // weights of a point beside its cell may be below zero
         let carried =

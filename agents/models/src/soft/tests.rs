@@ -13,7 +13,7 @@ mod skins;
 mod spaced;
 mod statics;
 
-use super::{MaterialLaw, RegionMatter, Side, SoftBody, SoftError, SoftMatter, SoftShape, SoftSpec};
+use super::{MaterialLaw, RegionMaterial, Side, SoftBody, SoftError, SoftMaterial, SoftShape, SoftSpec};
 use glam::{DMat3, DQuat, DVec3};
 use metachron_contact::step::LoneStepper;
 use metachron_contact::{Agent, SetMotion, StepContext};
@@ -21,7 +21,7 @@ use metachron_core::{AgentId, Body, SimSpan, SimTime, Snapshot, SoftState};
 use metachron_geometry::{ContactTraits, ShapeKind, Tetrahedra, Triangles};
 use std::sync::Arc;
 
-const MATTER: SoftMatter = SoftMatter {
+const MATERIAL: SoftMaterial = SoftMaterial {
     young_pa: 1e5,
     poisson: 0.3,
     density_kg_m3: 1000.0,
@@ -37,7 +37,7 @@ fn spec(shape: SoftShape) -> SoftSpec {
     SoftSpec {
         shape,
         nodes: None,
-        matter: MATTER,
+        material: MATERIAL,
         position: DVec3::ZERO,
         rotation: DQuat::IDENTITY,
         velocity: DVec3::ZERO,
@@ -90,7 +90,8 @@ fn tetrahedra(size_m: DVec3, cells: [u32; 3]) -> Tetrahedra {
 fn tetrahedral() -> SoftShape {
     let mut mesh = tetrahedra(DVec3::new(0.2, 0.1, 0.1), [4, 2, 2]);
     mesh.regions = (0..mesh.corners.len() as i64).map(|at| at / 48).collect();
-    let stiff = RegionMatter { region: 1, matter: SoftMatter { young_pa: 3e5, density_kg_m3: 2000.0, ..MATTER } };
+    let stiff =
+        RegionMaterial { region: 1, material: SoftMaterial { young_pa: 3e5, density_kg_m3: 2000.0, ..MATERIAL } };
     SoftShape::Tetrahedra { mesh: Arc::new(mesh), regions: vec![stiff] }
 }
 
@@ -116,7 +117,7 @@ fn shell() -> SoftShape {
 /// Free bodies of every kind of element and law.
 fn all() -> Vec<SoftSpec> {
     let shapes = [SHEET, solid(), SoftShape::Ball { radius_m: 0.1, segments: 4 }, rope(), tetrahedral(), shell()];
-    let of = |law, shape| SoftSpec { matter: SoftMatter { law, ..MATTER }, ..spec(shape) };
+    let of = |law, shape| SoftSpec { material: SoftMaterial { law, ..MATERIAL }, ..spec(shape) };
     let mut all: Vec<SoftSpec> = shapes.map(spec).into();
     all.push(of(MaterialLaw::NeoHookean, solid()));
     all.push(of(MaterialLaw::NeoHookean, tetrahedral()));
@@ -254,8 +255,8 @@ fn a_body_that_is_put_half_a_turn_away_is_as_relaxed_there() {
 #[test]
 fn an_invalid_spec_is_refused_with_its_limit() {
     let fails = |spec: SoftSpec| SoftBody::new(spec).err().expect("must be refused").to_string();
-    let rubber = SoftMatter { poisson: 0.5, ..MATTER };
-    assert!(fails(SoftSpec { matter: rubber, ..spec(solid()) }).contains("0.49"));
+    let rubber = SoftMaterial { poisson: 0.5, ..MATERIAL };
+    assert!(fails(SoftSpec { material: rubber, ..spec(solid()) }).contains("0.49"));
     assert!(fails(SoftSpec { held: vec![Side::Top], ..spec(SHEET) }).contains("a sheet has no side `top`"));
     let fine = SoftShape::Ball { radius_m: 0.1, segments: 40 };
     assert!(fails(spec(fine)).contains("68921 vertices; at most 10000"));

@@ -36,12 +36,12 @@ pub(super) struct Unknowns {
     led_rad_s: DVec3,
     jaw_per_s: f64,
     /// The state from which the macro step may begin again.
-    kept: Option<Kept>,
+    saved: Option<SavedState>,
 }
 
 /// The state of a tool.
 #[derive(Debug, Clone, Copy)]
-struct Kept {
+struct SavedState {
     tool: ToolState,
     commanded: PointMotion,
     drive: Drive,
@@ -75,7 +75,7 @@ impl Unknowns {
             led_m_s: DVec3::ZERO,
             led_rad_s: DVec3::ZERO,
             jaw_per_s: 0.0,
-            kept: None,
+            saved: None,
         }
     }
 }
@@ -101,7 +101,7 @@ impl Tool {
 impl Tool {
     /// Takes over its goal from the start of a macro step on.
     pub(super) fn begin_at(&mut self, context: &StepContext<'_>) {
-        let hand = context.hands.first().copied();
+        let hand = context.user_springs.first().copied();
         let is_near = hand.is_some() && self.may_catch(context);
         (self.unknowns.time, self.unknowns.hand, self.unknowns.is_near) = (context.time, hand, is_near);
     }
@@ -175,13 +175,13 @@ impl ClusterMember for Tool {
         let Unknowns { time, hand, .. } = self.unknowns;
         let Self { tool, commanded, lag_m, speed_m_s, at_rest, steps, .. } = *self;
         let (drive, jaws) = (self.drive, self.jaws);
-        let kept = Kept { tool, commanded, drive, jaws, lag_m, speed_m_s, at_rest, steps, time, hand };
-        self.unknowns.kept = Some(kept);
+        let saved = SavedState { tool, commanded, drive, jaws, lag_m, speed_m_s, at_rest, steps, time, hand };
+        self.unknowns.saved = Some(saved);
     }
 
     fn go_back(&mut self) {
-        let Some(kept) = self.unknowns.kept else { return };
-        let Kept { tool, commanded, drive, jaws, lag_m, speed_m_s, at_rest, steps, time, hand } = kept;
+        let Some(saved) = self.unknowns.saved else { return };
+        let SavedState { tool, commanded, drive, jaws, lag_m, speed_m_s, at_rest, steps, time, hand } = saved;
         (self.tool, self.commanded, self.drive, self.jaws) = (tool, commanded, drive, jaws);
         (self.lag_m, self.speed_m_s, self.at_rest, self.steps) = (lag_m, speed_m_s, at_rest, steps);
         (self.unknowns.time, self.unknowns.hand) = (time, hand);

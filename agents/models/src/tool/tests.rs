@@ -69,9 +69,9 @@ impl Stage {
         Self { tool, stepper, time: SimTime::ZERO, neighbours: vec![tube()] }
     }
 
-    fn step_with(&mut self, hands: &[AnchorSpring]) -> Result<StepReport, StepError> {
+    fn step_with(&mut self, user_springs: &[AnchorSpring]) -> Result<StepReport, StepError> {
         let dt = SimSpan::from_secs_f64(DT_S).unwrap();
-        let context = StepContext { neighbours: &self.neighbours, hands, ..StepContext::alone(ME, self.time) };
+        let context = StepContext { neighbours: &self.neighbours, user_springs, ..StepContext::alone(ME, self.time) };
         let report = self.stepper.step(&mut self.tool, dt, context)?;
         self.time += dt;
         Ok(report)
@@ -243,8 +243,8 @@ fn a_tube_out_of_reach_is_not_grasped() {
 fn a_user_spring_moves_the_tip_without_a_jump_and_the_tool_returns_to_its_script() {
     let mut stage = Stage::new(spec(vec![key(0.0, DVec3::Y, 0.7)]));
     let (mut before, target) = (state(&stage.tool), DVec3::new(0.5, 1.0, 0.5));
-    let mut step = |stage: &mut Stage, hands: &[AnchorSpring]| {
-        let report = stage.step_with(hands).unwrap();
+    let mut step = |stage: &mut Stage, user_springs: &[AnchorSpring]| {
+        let report = stage.step_with(user_springs).unwrap();
         let now = state(&stage.tool);
         // 0.7 m at 60/s: no faster than 0.7·60/e m/s, so no farther than that in a step
         assert!(now.tip.distance(before.tip) < 0.7 * 60.0 / std::f64::consts::E * DT_S * 1.01);

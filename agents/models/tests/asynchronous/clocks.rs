@@ -20,7 +20,7 @@ pub type Tamper = fn(&mut dyn Agent, &mut Snapshot);
 pub struct Clocked {
     pub agent: Box<dyn Agent>,
     pub rate_hz: f64,
-    pub hands: Vec<AnchorSpring>,
+    pub user_springs: Vec<AnchorSpring>,
     pub links: Vec<Link>,
     pub time: SimTime,
     /// Its newest state, and the one that others see: the newest whose time has come, or the newest.
@@ -58,7 +58,7 @@ impl Clocks {
         self.all.push(Clocked {
             agent: Box::new(agent),
             rate_hz,
-            hands: vec![],
+            user_springs: vec![],
             links: vec![],
             time: SimTime::ZERO,
             own,
@@ -111,7 +111,7 @@ impl Clocks {
         let Clocked {
             agent,
             rate_hz,
-            hands,
+            user_springs,
             links,
             time,
             own,
@@ -125,7 +125,7 @@ impl Clocks {
         } = &mut all[me];
         let id = AgentId(me as u32);
         let dt = SimSpan::from_secs_f64(1.0 / *rate_hz).unwrap();
-        let context = StepContext { neighbours: &neighbours, hands, links, ..StepContext::alone(id, *time) };
+        let context = StepContext { neighbours: &neighbours, user_springs, links, ..StepContext::alone(id, *time) };
         let mut list: Vec<Participant<'_>> = Vec::with_capacity(8);
         let member = agent.member().unwrap();
         list.push(Participant {

@@ -7,7 +7,7 @@ use metachron_contact::{Agent, AnchorSpring, Law};
 use metachron_core::{Anchor, Snapshot};
 use metachron_geometry::{ContactTraits, Obstacle, Solid};
 use metachron_models::rigid::{RigidBody, RigidSpec};
-use metachron_models::soft::{MaterialLaw, SoftBody, SoftMatter, SoftShape, SoftSpec};
+use metachron_models::soft::{MaterialLaw, SoftBody, SoftMaterial, SoftShape, SoftSpec};
 
 /// The column: its edges, metres.
 const SIZE_M: DVec3 = DVec3::new(0.06, 0.06, 0.06);
@@ -42,7 +42,7 @@ fn press(young_pa: f64, rate_hz: f64, due: bool, tamper: Option<Tamper>) -> Felt
     let mut forces = vec![];
     while clocks.all[tip].time.as_secs_f64() < 1.5 {
         let at_s = clocks.all[tip].time.as_secs_f64();
-        clocks.all[tip].hands = vec![AnchorSpring {
+        clocks.all[tip].user_springs = vec![AnchorSpring {
             by: None,
             anchor: Anchor::Local(DVec3::ZERO),
             target: DVec3::Z * (SIZE_M.z + TIP_M - PRESS_M * (at_s / 0.2).min(1.0)),
@@ -69,7 +69,7 @@ fn column(young_pa: f64) -> SoftBody {
     let spec = SoftSpec {
         shape: SoftShape::Box { size_m: SIZE_M, segments: [2, 2, 4] },
         nodes: None,
-        matter: SoftMatter {
+        material: SoftMaterial {
             young_pa,
             poisson: 0.3,
             density_kg_m3: 1000.0,

@@ -67,7 +67,7 @@ fn nothing_is_allocated_once_warm() {
     let at = |x: f64| ball(DVec3::X * x, DVec3::ZERO, 1.0, 0.0);
     let [left, right] = [clocks.add(at(0.0), 240.0), clocks.add(at(0.0999), 60.0)];
     for (at, pull) in [(left, 1.0), (right, -1.0)] {
-        clocks.all[at].hands = vec![super::links::hand(DVec3::X * (0.05 + pull * 0.01), 100.0)];
+        clocks.all[at].user_springs = vec![super::links::hand(DVec3::X * (0.05 + pull * 0.01), 100.0)];
     }
     let mut late = 0;
     clocks.play(1.0, |clocks, me| {

@@ -39,7 +39,7 @@ fn what_hangs_by_a_ledger_link_stretches_it_by_its_weight() {
         let mut clocks = Clocks::new(Law::Off, &[]);
         let above = clocks.add(ball(1.0), rates[0]);
         let below = clocks.add(ball(1.0 - LENGTH_M), rates[1]);
-        clocks.all[above].hands = vec![hand(DVec3::Z, 1000.0)];
+        clocks.all[above].user_springs = vec![hand(DVec3::Z, 1000.0)];
         clocks.link([above, below], link(STIFFNESS_N_M, LENGTH_M, Law::Ledger));
         clocks.play(4.0, |_, _| ());
         let (high, low) = (clocks.rigid(above).position.z, clocks.rigid(below).position.z);

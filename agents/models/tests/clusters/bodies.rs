@@ -5,10 +5,10 @@ use glam::{DQuat, DVec3};
 use metachron_geometry::{ContactTraits, Solid};
 use metachron_models::rigid::{RigidBody, RigidSpec};
 use metachron_models::rod::{Material, Section, Tube, TubeSpec};
-use metachron_models::soft::{MaterialLaw, Side, SoftBody, SoftMatter, SoftShape, SoftSpec};
+use metachron_models::soft::{MaterialLaw, Side, SoftBody, SoftMaterial, SoftShape, SoftSpec};
 
-pub fn matter(young_pa: f64) -> SoftMatter {
-    SoftMatter {
+pub fn material(young_pa: f64) -> SoftMaterial {
+    SoftMaterial {
         young_pa,
         poisson: 0.3,
         density_kg_m3: 1000.0,
@@ -22,7 +22,7 @@ fn soft(shape: SoftShape, position: DVec3, young_pa: f64) -> SoftSpec {
     SoftSpec {
         shape,
         nodes: None,
-        matter: matter(young_pa),
+        material: material(young_pa),
         position,
         rotation: DQuat::IDENTITY,
         velocity: DVec3::ZERO,

@@ -117,7 +117,7 @@ fn what_is_linked_or_gripped_says_what_finer_steps_find_to_a_factor_of_three() {
     let lift = |table: &mut Table| {
         let t_s = table.time.as_secs_f64();
         for (body, side) in [(1, -1.0), (2, 1.0)] {
-            table.bodies[body].hands = [-0.01, 0.01]
+            table.bodies[body].user_springs = [-0.01, 0.01]
                 .map(|y| AnchorSpring {
                     by: None,
                     anchor: Anchor::Local(DVec3::Y * y),
@@ -182,7 +182,7 @@ fn a_deformable_that_is_let_go_says_what_finer_steps_find_to_a_factor_of_three()
             let held = || {
                 let mut table = Table::among(vec![made()], &[]).at_rates(rate_hz, rate_hz);
                 let anchor = if number == 0 { Anchor::Arc(0.0) } else { Anchor::Vertex(0) };
-                table.bodies[0].hands = vec![AnchorSpring {
+                table.bodies[0].user_springs = vec![AnchorSpring {
                     by: None,
                     anchor,
                     target,

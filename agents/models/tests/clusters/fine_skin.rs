@@ -5,7 +5,7 @@ use crate::table::{Findings, Table, placed};
 use glam::DVec3;
 use metachron_contact::AnchorSpring;
 use metachron_core::Anchor;
-use metachron_models::soft::{SoftBody, SoftMatter, SoftShape, SoftSpec};
+use metachron_models::soft::{SoftBody, SoftMaterial, SoftShape, SoftSpec};
 use std::sync::Arc;
 
 const RADIUS_M: f64 = 0.05;
@@ -15,9 +15,9 @@ const EPS_M: f64 = 0.017;
 fn rested(segments: u32) -> Findings {
     let surface = Arc::new(SoftShape::Ball { radius_m: RADIUS_M, segments }.skin().unwrap());
     let base = solid(DVec3::Z * (RADIUS_M + 1e-4), DVec3::ZERO, [1; 3], 8e3);
-    let matter = SoftMatter { damping_per_s: 8.0, damping_s: 0.01, ..base.matter };
+    let material = SoftMaterial { damping_per_s: 8.0, damping_s: 0.01, ..base.material };
     let shape = SoftShape::Embedded { surface, eps_m: EPS_M, range_m: (EPS_M, EPS_M) };
-    let mut table = Table::new(vec![placed(SoftBody::new(SoftSpec { shape, matter, ..base }).unwrap(), false)]);
+    let mut table = Table::new(vec![placed(SoftBody::new(SoftSpec { shape, material, ..base }).unwrap(), false)]);
     table.play(0.7)
 }
 
@@ -40,11 +40,11 @@ fn cube(push_n: f64) -> (Table, Findings) {
     let size_m = DVec3::splat(0.06);
     let surface = Arc::new(SoftShape::Box { size_m, segments: [24; 3] }.skin().unwrap());
     let base = solid(DVec3::new(0.0, 0.0, 0.0301), size_m, [1; 3], 2e5);
-    let matter = SoftMatter { damping_per_s: 2.0, damping_s: 0.005, ..base.matter };
+    let material = SoftMaterial { damping_per_s: 2.0, damping_s: 0.005, ..base.material };
     let shape = SoftShape::Embedded { surface, eps_m: 0.03, range_m: (0.03, 0.03) };
-    let mut body = placed(SoftBody::new(SoftSpec { shape, matter, ..base }).unwrap(), false);
+    let mut body = placed(SoftBody::new(SoftSpec { shape, material, ..base }).unwrap(), false);
     let side = Anchor::Vertex(side_middle(size_m));
-    body.hands.push(AnchorSpring {
+    body.user_springs.push(AnchorSpring {
         by: None,
         anchor: side,
         target: DVec3::new(1e3 + 0.03, 0.0, 0.03),

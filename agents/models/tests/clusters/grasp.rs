@@ -7,7 +7,7 @@ use metachron_contact::AnchorSpring;
 use metachron_core::Anchor;
 use metachron_geometry::Solid;
 use metachron_models::rigid::{RigidBody, RigidSpec};
-use metachron_models::soft::{SoftBody, SoftMatter, SoftSpec};
+use metachron_models::soft::{SoftBody, SoftMaterial, SoftSpec};
 
 const FRICTION: f64 = 0.8;
 /// Each finger closes this far in this time, waits, and rises at this speed for one second.
@@ -63,7 +63,7 @@ fn grip(cube: Placed, cube_hz: f64, fingers_hz: f64) -> Grip {
                     stiffness_n_m: 100.0,
                     damping_n_s_m: 1.0,
                 };
-                table.bodies[finger + 1].hands = anchors().map(spring).to_vec();
+                table.bodies[finger + 1].user_springs = anchors().map(spring).to_vec();
             }
             table.step();
         }
@@ -96,8 +96,8 @@ fn a_rigid_cube_is_lifted_without_slip_or_creep() {
 fn a_soft_cube_is_lifted_without_creep() {
     for (cube_hz, fingers_hz) in [(60.0, 60.0), (60.0, 240.0)] {
         let spec = solid(DVec3::new(0.0, 0.0, 0.0151), DVec3::splat(0.03), [3; 3], 1e5);
-        let matter = SoftMatter { density_kg_m3: 1850.0, ..spec.matter };
-        let cube = placed(SoftBody::new(SoftSpec { friction: FRICTION, matter, ..spec }).unwrap(), false);
+        let material = SoftMaterial { density_kg_m3: 1850.0, ..spec.material };
+        let cube = placed(SoftBody::new(SoftSpec { friction: FRICTION, material, ..spec }).unwrap(), false);
         let Grip { slip_m, creep_m_s, risen_m } = grip(cube, cube_hz, fingers_hz);
         // it sags in the fingers
         assert!(slip_m <= 1e-4 && creep_m_s.abs() <= 1e-6, "slip {slip_m} m, creep {creep_m_s} m/s");

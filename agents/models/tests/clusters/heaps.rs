@@ -56,7 +56,7 @@ fn a_user_lifts_a_box_off_a_heap_and_feels_its_weight() {
     heap.step();
     let (stiffness_n_m, above_m) = (200.0, 0.1);
     let target = heap.middle(lifted).0 + DVec3::Z * above_m;
-    heap.bodies[lifted].hands = vec![AnchorSpring {
+    heap.bodies[lifted].user_springs = vec![AnchorSpring {
         by: None,
         anchor: Anchor::Local(DVec3::ZERO),
         target,

@@ -325,7 +325,7 @@ fn a_hinge_stops_at_both_ends_of_its_range() {
                     stiffness_n_m: 10.0,
                     damping_n_s_m: 0.0,
                 };
-                table.bodies[0].hands.push(spring);
+                table.bodies[0].user_springs.push(spring);
             }
             table.step();
             let rotation = state(&table, 0).rotation;

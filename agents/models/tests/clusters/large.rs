@@ -3,13 +3,13 @@
 use crate::bodies::{block, solid, tube};
 use crate::table::{Placed, Table, placed};
 use glam::DVec3;
-use metachron_models::soft::{SoftBody, SoftMatter, SoftSpec};
+use metachron_models::soft::{SoftBody, SoftMaterial, SoftSpec};
 
 /// A cube of 0.1 m of so many cells along each edge, of the stuff of an organ, above the floor.
 fn organ(cells: u32, bottom_m: f64) -> Placed {
     let spec = solid(DVec3::Z * (bottom_m + 0.05), DVec3::splat(0.1), [cells; 3], 12e3);
-    let matter = SoftMatter { poisson: 0.4, density_kg_m3: 1050.0, damping_per_s: 0.2, ..spec.matter };
-    placed(SoftBody::new(SoftSpec { matter, ..spec }).unwrap(), false)
+    let material = SoftMaterial { poisson: 0.4, density_kg_m3: 1050.0, damping_per_s: 0.2, ..spec.material };
+    placed(SoftBody::new(SoftSpec { material, ..spec }).unwrap(), false)
 }
 
 #[test]

@@ -9,7 +9,7 @@ use metachron_core::{AgentId, Body, Snapshot};
 use metachron_drawable::{Generator, generate_surface};
 use metachron_geometry::{Solid, Triangles};
 use metachron_models::rigid::{RigidBody, RigidSpec};
-use metachron_models::soft::{MaterialLaw, Side, SoftBody, SoftMatter, SoftShape, SoftSpec};
+use metachron_models::soft::{MaterialLaw, Side, SoftBody, SoftMaterial, SoftShape, SoftSpec};
 use std::sync::Arc;
 
 /// Where the probe presses and the ball rests, above the bed, metres.
@@ -22,7 +22,7 @@ fn organ(eps_m: f64) -> SoftBody {
     let liver = generate_surface(Generator::Liver, 0, 4000);
     let points = liver.points.iter().map(|point| *point * 0.1).collect();
     let surface = Arc::new(Triangles { points, ..liver });
-    let matter = SoftMatter {
+    let material = SoftMaterial {
         young_pa: 8e3,
         poisson: 0.45,
         density_kg_m3: 1060.0,
@@ -34,7 +34,7 @@ fn organ(eps_m: f64) -> SoftBody {
         traits: metachron_geometry::ContactTraits::default(),
         shape: SoftShape::Embedded { surface, eps_m, range_m: (FINEST_M, 0.035) },
         nodes: None,
-        matter,
+        material,
         position: DVec3::Z * 0.027,
         rotation: DQuat::IDENTITY,
         velocity: DVec3::ZERO,

@@ -5,7 +5,7 @@ use crate::table::{Table, placed};
 use glam::{DQuat, DVec3};
 use metachron_core::{Body, Snapshot};
 use metachron_geometry::{Triangles, near_triangle};
-use metachron_models::soft::{Side, SoftBody, SoftMatter, SoftShape, SoftSpec};
+use metachron_models::soft::{Side, SoftBody, SoftMaterial, SoftShape, SoftSpec};
 use std::sync::Arc;
 
 const THICKNESS_M: f64 = 0.004;
@@ -15,8 +15,8 @@ fn strip(self_contact: bool) -> SoftSpec {
     let base = sheet(DVec3::ZERO, 0.2, 1);
     let shape = SoftShape::Sheet { size_m: [0.3, 0.05], thickness_m: THICKNESS_M, segments: [30, 5] };
     let rotation = DQuat::from_rotation_y(-1.45);
-    let matter = SoftMatter { young_pa: 2e4, damping_per_s: 2.0, ..base.matter };
-    SoftSpec { shape, matter, rotation, position: DVec3::new(0.0, -0.025, 0.003), self_contact, ..base }
+    let material = SoftMaterial { young_pa: 2e4, damping_per_s: 2.0, ..base.material };
+    SoftSpec { shape, material, rotation, position: DVec3::new(0.0, -0.025, 0.003), self_contact, ..base }
 }
 
 fn skin(table: &Table, body: usize) -> Vec<DVec3> {
@@ -71,10 +71,10 @@ fn a_strip_that_folds_lies_on_itself_in_layers() {
 fn the_legs_of_a_horseshoe_meet_and_bear() {
     let surface = slotted();
     let base = solid(DVec3::ZERO, DVec3::ONE, [1; 3], 3e4);
-    let matter = SoftMatter { damping_per_s: 5.0, ..base.matter };
+    let material = SoftMaterial { damping_per_s: 5.0, ..base.material };
     let shape = SoftShape::Embedded { surface: Arc::new(surface.clone()), eps_m: 0.01, range_m: (0.01, 0.01) };
     let held = vec![Side::Bottom];
-    let spec = SoftSpec { shape, matter, position: DVec3::new(0.0, -0.02, 0.0), held, self_contact: true, ..base };
+    let spec = SoftSpec { shape, material, position: DVec3::new(0.0, -0.02, 0.0), held, self_contact: true, ..base };
     let rest = surface.points.clone();
     let plate = block(DVec3::new(0.09, 0.0, 0.076), DVec3::new(0.03, 0.03, 0.005), 0.1, 0.0);
     let mut table = Table::new(vec![placed(SoftBody::new(spec).unwrap(), true), plate]).at_rates(480.0, 480.0);

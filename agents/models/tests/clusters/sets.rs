@@ -1,6 +1,6 @@
 //! Three sets of scenes in which nothing was chosen because it works: pairs, bodies that tip over their ground, piles of boxes.
 
-use crate::bodies::{block, matter, rigid, rope, sheet, solid, tube, turned};
+use crate::bodies::{block, material, rigid, rope, sheet, solid, tube, turned};
 use crate::stacks::{Draw, Outcome, play};
 use crate::table::{Placed, Table, placed};
 use glam::{DQuat, DVec3};
@@ -68,7 +68,7 @@ fn of_kind(kind: u64, height_m: f64) -> (Placed, f64) {
     match kind {
         0 => {
             let ball = SoftShape::Ball { radius_m: 0.04, segments: 4 };
-            (soft(up(0.04), SoftSpec { shape: ball, position: up(0.04), matter: matter(1e5), ..cube }), 0.08)
+            (soft(up(0.04), SoftSpec { shape: ball, position: up(0.04), material: material(1e5), ..cube }), 0.08)
         }
         1 => (soft(up(0.03), cube), 0.06),
         2 => (soft(up(0.015), solid(up(0.015), DVec3::new(0.14, 0.14, 0.03), [5, 5, 2], 1e5)), 0.03),

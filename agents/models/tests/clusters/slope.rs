@@ -1,11 +1,11 @@
 //! Coulomb's law on a slope: how fast each model slides on a plane and on a skin, and that it stays where it sticks.
 
-use crate::bodies::{leaning, matter, rigid, rope, sheet, solid, tube};
+use crate::bodies::{leaning, material, rigid, rope, sheet, solid, tube};
 use crate::table::{GRAVITY, Placed, Table, placed, plane};
 use glam::{DQuat, DVec3};
 use metachron_geometry::Solid;
 use metachron_models::rigid::{RigidBody, RigidSpec};
-use metachron_models::soft::{Side, SoftBody, SoftMatter, SoftSpec};
+use metachron_models::soft::{Side, SoftBody, SoftMaterial, SoftSpec};
 
 const SLOPE_RAD: f64 = 0.21;
 /// How far all start above their slope, metres.
@@ -62,9 +62,9 @@ fn every_model_slides_down_a_plane_as_fast_as_coulomb_says() {
 #[test]
 fn every_model_slides_down_a_skin_as_fast_as_coulomb_says() {
     for number in 0..5 {
-        let stiff = SoftMatter { young_pa: 1e7, ..matter(1e7) };
+        let stiff = SoftMaterial { young_pa: 1e7, ..material(1e7) };
         let slope = solid(DVec3::new(0.1, 0.0, -0.02), DVec3::new(0.6, 0.16, 0.04), [15, 4, 1], 1e7);
-        let slope = SoftSpec { matter: stiff, friction: 0.02, held: vec![Side::Bottom], ..slope };
+        let slope = SoftSpec { material: stiff, friction: 0.02, held: vec![Side::Bottom], ..slope };
         let slope = placed(SoftBody::new(leaning(slope, lean())).unwrap(), true);
         let (name, body) = bodies(-0.1, 0.0).swap_remove(number);
         let mut table = Table::among(vec![slope, body], &[]);

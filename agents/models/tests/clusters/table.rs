@@ -22,7 +22,7 @@ pub struct Placed {
     pub held: bool,
     /// Its links, as its scene gives them, and the springs of the user on it.
     pub links: Vec<Link>,
-    pub hands: Vec<AnchorSpring>,
+    pub user_springs: Vec<AnchorSpring>,
     memory: ContactMemory,
     grips: Vec<Grip>,
 }
@@ -76,8 +76,8 @@ pub fn spring(stiffness_n_m: f64, damping_n_s_m: f64, rest_m: f64) -> Link {
 
 /// A body with its rate.
 pub fn placed(agent: impl Agent + 'static, held: bool) -> Placed {
-    let (links, hands, memory, grips) = (vec![], vec![], ContactMemory::default(), vec![]);
-    Placed { agent: Box::new(agent), rate_hz: 60.0, held, links, hands, memory, grips }
+    let (links, user_springs, memory, grips) = (vec![], vec![], ContactMemory::default(), vec![]);
+    Placed { agent: Box::new(agent), rate_hz: 60.0, held, links, user_springs, memory, grips }
 }
 
 /// A plane through the origin whose normal is the z that `rotation` leads to.
@@ -197,9 +197,13 @@ impl Table {
         let apart: Vec<_> = (0..self.bodies.len() as u32).map(|id| (AgentId(id), Law::Off)).collect();
         let laws = if self.touching { &[][..] } else { &apart };
         for ((id, body), (role, wanted_s)) in (0..).zip(&mut self.bodies).zip(wishes) {
-            let Placed { agent, memory, grips, links, hands, .. } = body;
-            let context =
-                StepContext { neighbours: &neighbours, hands, links, ..StepContext::alone(AgentId(id), self.time) };
+            let Placed { agent, memory, grips, links, user_springs, .. } = body;
+            let context = StepContext {
+                neighbours: &neighbours,
+                user_springs,
+                links,
+                ..StepContext::alone(AgentId(id), self.time)
+            };
             let member = agent.member().unwrap();
             let parts = plan.parts_in(role, wanted_s);
             all.push(Participant {

@@ -66,7 +66,7 @@ fn a_ramp_tears_a_joint_within_one_step_of_its_threshold() {
             let target = DVec3::X * (speed_m_s * table.time.as_secs_f64());
             let (anchor, target_velocity) = (CENTRE, DVec3::X * speed_m_s);
             let hand = AnchorSpring { by: None, anchor, target, target_velocity, stiffness_n_m, damping_n_s_m: 0.0 };
-            table.bodies[0].hands = vec![hand];
+            table.bodies[0].user_springs = vec![hand];
             table.step();
             if let [torn] = *table.torn() {
                 // the hand's force at the end of a step is that of the whole step, 100 N a second

@@ -95,7 +95,7 @@ fn a_user_leads_a_tool_to_the_target_and_does_not_pull_at_it() {
     let (anchor, target_velocity) = (Anchor::Local(DVec3::ZERO), DVec3::ZERO);
     // stiffness and damping have no say
     let hand = AnchorSpring { by: None, anchor, target, target_velocity, stiffness_n_m: 1e6, damping_n_s_m: 0.0 };
-    table.bodies[0].hands.push(hand);
+    table.bodies[0].user_springs.push(hand);
     while table.time.as_secs_f64() < 0.5 {
         table.step();
         assert_eq!(state(&table, 0).force_n, 0.0);

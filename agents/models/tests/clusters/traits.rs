@@ -219,7 +219,7 @@ fn a_body_that_is_a_sensor_tells_of_another_body_each_time_and_neither_is_moved(
         stiffness_n_m: 40.0,
         damping_n_s_m: 0.0,
     };
-    table.bodies[1].hands.push(spring);
+    table.bodies[1].user_springs.push(spring);
     // the period of 1 kg on 40 N/m is 0.993 s: it is in the eye twice in each
     let seen = sensed(&mut table, 0, ContactPartner::Agent(AgentId(1)), 1.05);
     assert_eq!((seen.touching, seen.begins, seen.ends), (false, 2, 2));

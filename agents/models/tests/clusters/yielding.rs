@@ -217,11 +217,11 @@ fn an_attachment_that_yields_where_it_is_pulled_holds_beside_that() {
         stiffness_n_m: 0.4 * weight_n / 0.04,
         damping_n_s_m: 0.0,
     };
-    table.bodies[0].hands = vec![hand];
+    table.bodies[0].user_springs = vec![hand];
     while table.time.as_secs_f64() < 0.5 {
         table.step();
     }
-    table.bodies[0].hands.clear();
+    table.bodies[0].user_springs.clear();
     while table.time.as_secs_f64() < 3.0 {
         table.step();
     }

@@ -28,7 +28,7 @@ pub(crate) struct Member {
     /// The length of a step that it wants, seconds.
     pub(crate) step_s: f64,
     /// Springs from fixed points.
-    hands: Vec<AnchorSpring>,
+    user_springs: Vec<AnchorSpring>,
     /// Its neighbours outside the cluster.
     neighbours: Vec<Neighbour>,
     memory: ContactMemory,
@@ -44,8 +44,8 @@ impl Cluster {
     /// Adds an agent that wants steps of `step_s` seconds; `None` for one that is no member of clusters.
     pub(crate) fn add(&mut self, mut agent: Box<dyn Agent>, step_s: f64) -> Option<AgentId> {
         agent.member()?;
-        let (hands, neighbours, memory, grips) = Default::default();
-        self.members.push(Member { agent, step_s, hands, neighbours, memory, grips });
+        let (user_springs, neighbours, memory, grips) = Default::default();
+        self.members.push(Member { agent, step_s, user_springs, neighbours, memory, grips });
         Some(AgentId(self.members.len() as u32 - 1))
     }
 
@@ -63,8 +63,8 @@ impl Cluster {
         let dt = SimSpan::from_secs_f64(plan.macro_s).map_or(most, |dt| dt.min(most));
         let mut all = recycled(std::mem::take(participants));
         for ((id, one), (role, step_s)) in (0..).map(AgentId).zip(members.iter_mut()).zip(roles) {
-            let Member { agent, hands, neighbours, memory, grips, .. } = one;
-            let context = StepContext { neighbours, hands, ..StepContext::alone(id, *time) };
+            let Member { agent, user_springs, neighbours, memory, grips, .. } = one;
+            let context = StepContext { neighbours, user_springs, ..StepContext::alone(id, *time) };
             let parts = plan.parts_in(role, step_s);
             all.extend(agent.member().map(|member| Participant {
                 id,
@@ -119,10 +119,10 @@ impl StepHarness {
     }
 
     /// Attaches fixed springs to an agent, instead of the springs it had.
-    pub(super) fn attach_springs(&mut self, id: AgentId, hands: impl IntoIterator<Item = AnchorSpring>) {
-        let own = &mut self.cluster.members[id.0 as usize].hands;
+    pub(super) fn attach_springs(&mut self, id: AgentId, user_springs: impl IntoIterator<Item = AnchorSpring>) {
+        let own = &mut self.cluster.members[id.0 as usize].user_springs;
         own.clear();
-        own.extend(hands);
+        own.extend(user_springs);
     }
 
     /// Sets the neighbours of an agent that are not in the harness.

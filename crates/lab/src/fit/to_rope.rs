@@ -46,8 +46,8 @@ pub(super) fn put(table: &mut Table, member: &Member) -> usize {
         changes += set(table, "path_m", path_m.iter().map(point).collect::<Array>().into());
     }
     changes += set(table, "segments", i64::from(*segments).into());
-    changes += set(table, "young_pa", rounded(spec.matter.young_pa).into());
-    changes += set(table, "density_kg_m3", rounded(spec.matter.density_kg_m3).into());
+    changes += set(table, "young_pa", rounded(spec.material.young_pa).into());
+    changes += set(table, "density_kg_m3", rounded(spec.material.density_kg_m3).into());
     changes += set(table, "friction", spec.friction.into());
     if !spec.held.is_empty() {
         let end = |side: &Side| if *side == Side::Left { "start" } else { "end" };

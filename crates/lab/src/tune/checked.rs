@@ -85,7 +85,7 @@ pub(super) fn check(
 /// Settling time of the fitted plant after the same pushes: as many of them, with its scatter, and by the same median.
 fn predicted_s(on: &Identified, law: Law, rate: f64, times: usize) -> Option<f64> {
     let noise = if on.live { on.plant.line.scatter } else { 0.0 };
-    let trial = Trial { start: Start::Rate(rate), seconds: WATCH_S.1, noise, ..Trial::calm(law, on.target_hz) };
+    let trial = Trial { start: Start::Rate(rate), seconds: WATCH_S.1, noise, ..Trial::undisturbed(law, on.target_hz) };
     let played = |seed| -> Vec<After> {
         let beats = play(&on.plant, &Trial { seed, ..trial });
         beats.iter().map(|beat| (beat.time_s, beat.part / on.target_hz)).collect()

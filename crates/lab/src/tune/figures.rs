@@ -48,7 +48,7 @@ fn fit(plant: &Plant) -> Panel {
 }
 
 fn undisturbed_trial(on: &Identified, candidate: impl Into<Candidate>, rate: f64, seconds: f64) -> Trial {
-    Trial { start: Start::Rate(rate), seconds, ..Trial::calm(candidate, on.target_hz) }
+    Trial { start: Start::Rate(rate), seconds, ..Trial::undisturbed(candidate, on.target_hz) }
 }
 
 /// How a law's points are drawn.

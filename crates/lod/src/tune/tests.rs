@@ -21,7 +21,7 @@ fn plant(dead_time: usize, n: (u8, u8)) -> Plant {
 }
 
 fn played(plant: &Plant, candidate: impl Into<Candidate>, rate: f64, seconds: f64) -> Vec<TrialFrame> {
-    play(plant, &Trial { start: Start::Rate(rate), seconds, ..Trial::calm(candidate, TARGET_HZ) })
+    play(plant, &Trial { start: Start::Rate(rate), seconds, ..Trial::undisturbed(candidate, TARGET_HZ) })
 }
 
 /// t/T_set of (7), (9) and (10) on x = ln polygons, with λ, worked out on exact polygons.
@@ -117,11 +117,11 @@ fn a_clamped_loop_leaves_its_clamp_without_windup() {
     let target_hz = 0.9 / (0.7 * plant.time_range(1.0).least_s);
     let settled = |frames: &[TrialFrame]| frames.iter().position(|b| (b.ratio - 1.0).abs() < 0.05).expect("it settles");
     for law in [Law::CORRECTED, Law::Corrected { kappa: 0.3, lead: 0.3, margin: 0.1 }] {
-        let calm = Trial { seconds: 3.0, ..Trial::calm(law, target_hz) };
-        let frames = play(&plant, &Trial { disturbance: Disturbance::Speed(2.0), ..calm });
+        let undisturbed = Trial { seconds: 3.0, ..Trial::undisturbed(law, target_hz) };
+        let frames = play(&plant, &Trial { disturbance: Disturbance::Speed(2.0), ..undisturbed });
         assert!(frames[5].status.clamped().is_some(), "{law:?}: {:?}", frames[5].status);
         let fast = frames.iter().position(|b| b.ratio < 1.0).expect("the machine becomes faster");
-        let fresh = settled(&play(&plant, &Trial { speed: 2.0, start: Start::Rate(1e3), ..calm }));
+        let fresh = settled(&play(&plant, &Trial { speed: 2.0, start: Start::Rate(1e3), ..undisturbed }));
         let after = settled(&frames[fast..]);
         assert!(after.abs_diff(fresh) <= 2, "{law:?}: {after} frames after the clamp, {fresh} without one");
     }
@@ -146,8 +146,12 @@ fn the_adaptive_policy_corrects_the_share_given_by_its_filter() {
 #[test]
 fn the_adaptive_policy_settles_at_its_predicted_time_on_machines_of_other_speeds() {
     for (speed, rate) in [(1.0, 0.4), (1.0, 2.5), (2.0, 0.4), (0.5, 2.5)] {
-        let trial =
-            Trial { speed, start: Start::Rate(rate), seconds: 3.0, ..Trial::calm(Candidate::ADAPTIVE, TARGET_HZ) };
+        let trial = Trial {
+            speed,
+            start: Start::Rate(rate),
+            seconds: 3.0,
+            ..Trial::undisturbed(Candidate::ADAPTIVE, TARGET_HZ)
+        };
         let measured = Measures::of(&play(&plant(0, (0, 5)), &trial));
         assert!(
             measured.settle_s.is_some_and(|s| s <= 1.0) && measured.cycle.is_none(),

@@ -10,7 +10,7 @@ use crate::lock_free::sleep::SleepRegistry;
 use crate::lock_free::slot::LatestSlot;
 use crate::records::events::{AgentEvent, EventKind};
 use crate::records::histogram::Histogram;
-use crate::records::histogram::Spread;
+use crate::records::histogram::Percentiles;
 use crate::records::metrics::{AgentState, AgentStats, Metrics, REMOVED};
 use crate::records::probe::{Sample, Trace};
 use crate::records::streams::{EventStreams, Rings, StreamReader};
@@ -138,7 +138,7 @@ impl Shared {
             turn_s: gauges.turn_s.get(),
             work: gauges.work.get(),
             cpu_s: gauges.cpu_s(),
-            age: self.ages().as_ref().map_or_else(Spread::default, |ages| ages.spread()),
+            age: self.ages().as_ref().map_or_else(Percentiles::default, |ages| ages.percentiles()),
             late: gauges.late(),
             misses: gauges.misses.load(Relaxed),
             lived: span(&gauges.stepped) + span(&gauges.rested),

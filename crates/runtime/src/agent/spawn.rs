@@ -8,7 +8,7 @@ use super::agent_spawn::{AgentSpawn, RATE_MAX_HZ};
 use super::agents::{Agents, RunAgents};
 use super::form_slot::FormSlot;
 use super::handle::{AgentHandle, Identity, Shared};
-use crate::cluster::{ClusterSeat, Handover, JointedTo, Led, assign_leaders};
+use crate::cluster::{Handover, JointedTo, Led, MemberState, assign_leaders};
 use crate::commands::mailbox::Mailbox;
 use crate::lock_free::sleep::SleepRegistry;
 use crate::lock_free::slot::SlotWriter;
@@ -113,7 +113,7 @@ pub(crate) fn assemble(mut spawns: Vec<AgentSpawn>, helpers: Helpers) -> Result<
     let actors = spawns.into_iter().zip(live).zip(writers).map(|((spawn, live), writer)| {
         let shared = Arc::clone(&live);
         let jointed = std::mem::take(&mut jointed[shared.id.0 as usize]);
-        actor(shared, Seated { spawn, jointed, writer }, &peers)
+        actor(shared, Spawned { spawn, jointed, writer }, &peers)
     });
     let mut actors: Vec<_> = actors.collect();
     actors.iter_mut().for_each(AgentRunner::publish_initial);
@@ -143,7 +143,7 @@ impl RunAgents {
         if peers.broad_phase.get().is_none() && peers.may_meet(&shared) {
             peers.begin_broad_phase();
         }
-        let mut actor = actor(shared, Seated { spawn, jointed: Vec::new(), writer }, peers);
+        let mut actor = actor(shared, Spawned { spawn, jointed: Vec::new(), writer }, peers);
         actor.pace = AgentClock::new(now, actor.pace.wanted());
         actor.publish_initial();
         handles.push(handle);
@@ -171,7 +171,7 @@ impl RunAgents {
             None => SlotWriter::new(Snapshot::default()),
         };
         let shared = Arc::new(shared(id, &mut spawn, &self.sleep, &writer, false));
-        Box::new(actor(shared, Seated { spawn, jointed: Vec::new(), writer }, &self.peers))
+        Box::new(actor(shared, Spawned { spawn, jointed: Vec::new(), writer }, &self.peers))
     }
 
     /// Checks that an agent can join a run that goes on.
@@ -333,15 +333,15 @@ fn shared(
 }
 
 /// The parts of an agent that is assembled.
-struct Seated {
+struct Spawned {
     spawn: AgentSpawn,
     /// The joints that hold it to others.
     jointed: Vec<JointedTo>,
     writer: SlotWriter<Snapshot>,
 }
 
-fn actor(shared: Arc<Shared>, parts: Seated, peers: &Arc<Peers>) -> AgentRunner {
-    let Seated { spawn, jointed, writer } = parts;
+fn actor(shared: Arc<Shared>, parts: Spawned, peers: &Arc<Peers>) -> AgentRunner {
+    let Spawned { spawn, jointed, writer } = parts;
     let id = shared.id;
     let mut links: Vec<AgentId> = Vec::with_capacity(spawn.links.len());
     for link in spawn.links {
@@ -352,7 +352,7 @@ fn actor(shared: Arc<Shared>, parts: Seated, peers: &Arc<Peers>) -> AgentRunner 
     let mut asynchronous = shared.laws.iter().map(|(_, law)| *law).chain(spawn.attached.iter().map(|link| link.law));
     let asynchronous = asynchronous.any(Law::is_asynchronous);
     let is_member = shared.handover().is_some();
-    let cluster = is_member.then(|| Box::new(ClusterSeat::new(spawn.scene, jointed, asynchronous)));
+    let cluster = is_member.then(|| Box::new(MemberState::new(spawn.scene, jointed, asynchronous)));
     // within a cluster there are no messages to lose, and no clock of its own to disturb
     let faults = if !is_member || asynchronous { spawn.faults } else { Faults::default() };
     let model = Model::new(spawn.agent, Arc::clone(&shared));

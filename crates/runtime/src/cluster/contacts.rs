@@ -3,7 +3,7 @@
 //! In: the impulses of each pair in a step. Out: the member's contacts, events. A contact that lasts less than a step
 //! begins at its end, and ends with the next. Never here: contacts that only sense.
 
-use super::ClusterSeat;
+use super::MemberState;
 use crate::records::events::{AgentEvent, ContactEvent, EventKind};
 use crate::records::streams::EventStreams;
 use metachron_contact::member::Partner;
@@ -13,7 +13,7 @@ use metachron_core::{ContactPartner, ContactState, SimSpan, SimTime};
 /// By which factor a contact presses more where it is told of again.
 const GREW_BY: f64 = 1.25;
 
-impl ClusterSeat {
+impl MemberState {
     /// Takes in the totals of pairs in a step of `dt` that ends `now`.
     pub(super) fn note_contacts(&mut self, totals: &[PairTotal], dt: SimSpan, now: SimTime, streams: &EventStreams) {
         let dt_s = dt.as_secs_f64();

@@ -2,7 +2,7 @@
 //!
 //! In: a leader, the reason of a failure, models that are broken or have refused. Out: a leader whose cluster steps again, or why that is parked.
 //! One whose code has panicked is parked; one that has refused steps by itself, to fail alone or not at all. Never here: the step
-//! ([`super::macro_step`]), agents that lose touch ([`super::seats`]).
+//! ([`super::macro_step`]), agents that lose touch ([`super::handover`]).
 
 use super::Span;
 use crate::turn::agent_runner::{AgentRunner, StepOutcome};

@@ -4,7 +4,7 @@
 //! where they were, and the models of the members to blame know it ([`crate::turn::model`]). Never here: what becomes
 //! of these ([`super::exclusion`]), who is a member.
 
-use super::{ClusterSeat, NO_SEAT, Wish, prepared};
+use super::{MemberState, NOT_A_MEMBER, Wish, prepared};
 use crate::commands::loads::Acting;
 use crate::turn::agent_runner::{AgentRunner, StepOutcome};
 use crate::turn::helpers::Helped;
@@ -67,7 +67,7 @@ impl Making<'_, '_> {
     }
 }
 
-/// All of a leader's seat that a macro step works with, taken out of it.
+/// All of a leader's state that a macro step works with, taken out of it.
 struct Lent {
     scene: Arc<ClusterScene>,
     stepper: Box<ClusterStepper>,
@@ -89,7 +89,7 @@ struct Attempt {
     rests: Result<bool, String>,
 }
 
-impl ClusterSeat {
+impl MemberState {
     /// Lends the solvers and storage of the macro step that `me` leads as its `steps`-th.
     fn lend(&mut self, steps: u64, me: AgentId) -> Lent {
         let schedule = self.schedule;
@@ -132,8 +132,8 @@ impl AgentRunner {
         dt: SimSpan,
     ) -> Result<StepOutcome, String> {
         let (id, steps) = (self.shared.id, self.metrics.turns());
-        let Some(mut lent) = self.cluster.as_mut().map(|seat| seat.lend(steps, id)) else {
-            return Err(NO_SEAT.to_owned());
+        let Some(mut lent) = self.cluster.as_mut().map(|member| member.lend(steps, id)) else {
+            return Err(NOT_A_MEMBER.to_owned());
         };
         lent.stepper.set_factors_max(factors_max);
         lent.doubling.iter_mut().for_each(|doubling| doubling.set_factors_max(factors_max));
@@ -145,8 +145,8 @@ impl AgentRunner {
             self.note_errors(doubling, dt);
         }
         let report = attempt.made.as_ref().ok().map(|made| self.note_made(&lent.stepper, made, dt));
-        if let Some(seat) = &mut self.cluster {
-            seat.take_back(lent, &attempt);
+        if let Some(member) = &mut self.cluster {
+            member.take_back(lent, &attempt);
         }
         let Attempt { made, rests } = attempt;
         let at_rest = rests.unwrap_or(false);
@@ -156,7 +156,7 @@ impl AgentRunner {
         }
     }
 
-    /// Makes a macro step with the lent solvers of its seat.
+    /// Makes a macro step with its lent solvers.
     fn try_macro_step(&mut self, lent: &mut Lent, plan: Plan, dt: SimSpan) -> Attempt {
         let time = self.pace.time();
         let Lent { scene, stepper, doubling, remotes, helped, wishes, participants, sides, .. } = lent;
@@ -187,7 +187,7 @@ impl AgentRunner {
             let size = making.list.iter().map(Participant::size).sum();
             peers.helpers.make(size, helped, |threads| making.make(threads))
         };
-        let made = if is_whole { contained(make) } else { Err(NO_SEAT.to_owned()) };
+        let made = if is_whole { contained(make) } else { Err(NOT_A_MEMBER.to_owned()) };
         let rests = contained(|| Ok(made.is_ok() && making.conclude(meets)));
         (*participants, *sides) = (recycled(list), recycled(pairs));
         self.led = led;
@@ -208,11 +208,11 @@ impl AgentRunner {
     fn participant(&mut self, time: SimTime, dt: SimSpan, parts: u32) -> Option<(Participant<'_>, Option<&mut Pairs>)> {
         let id = self.shared.id;
         let Self { model, observer, loads, links, shared, cluster, .. } = self;
-        let ClusterSeat { memory, grips, asynchronous, parts: own_parts, .. } = &mut **cluster.as_mut()?;
+        let MemberState { memory, grips, asynchronous, parts: own_parts, .. } = &mut **cluster.as_mut()?;
         *own_parts = parts;
-        let Acting { springs: hands, forces, motors, pose } = prepared(loads, time, dt);
+        let Acting { springs: user_springs, forces, motors, pose } = prepared(loads, time, dt);
         let (neighbours, pose) = (observer.neighbours(), *pose);
-        let context = StepContext { me: id, time, neighbours, hands, forces, motors, pose, links };
+        let context = StepContext { me: id, time, neighbours, user_springs, forces, motors, pose, links };
         let laws = &shared.laws;
         let (member, alone_s) = (model.member().ok()??, self.pace.wanted().as_secs_f64());
         let participant = Participant { id, member, context, laws, memory, parts, alone_s, grips };

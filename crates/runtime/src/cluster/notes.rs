@@ -1,11 +1,11 @@
 //! The notes that a macro step leaves with the members of a cluster: how it was solved, its error, impulses of pairs,
 //! groups that still belong together.
 //!
-//! In: a stepper after a macro step. Out: the published data of each member's seat. Never here: the step itself.
+//! In: a stepper after a macro step. Out: the published data of each member. Never here: the step itself.
 
 use super::attachments::held_by_links;
 use super::solve_budget::Solved;
-use super::{AgentRunner, ClusterSeat};
+use super::{AgentRunner, MemberState};
 use crate::records::events::{AgentEvent, EventKind};
 use crate::records::metrics::add;
 use metachron_contact::constraint::FailedAttachment;
@@ -17,7 +17,7 @@ use metachron_core::{
     SimSpan, SimTime,
 };
 
-impl ClusterSeat {
+impl MemberState {
     /// Notes the impulses between it and `with` in a step of `dt_s` seconds: by contact, or by one of the links between
     /// them.
     fn note_pair(&mut self, total: &PairTotal, with: AgentId, kind: PairKind, dt_s: f64) {
@@ -39,10 +39,10 @@ impl AgentRunner {
     /// Notes how the step was made and solved.
     pub(super) fn note_solves(&mut self, report: &ClusterReport, dt: SimSpan) {
         let (leader, step_s) = (self.shared.id, dt.as_secs_f64());
-        let Some(seat) = &mut self.cluster else { return };
+        let Some(member) = &mut self.cluster else { return };
         let ClusterReport { contacts, factors, products, unfinished, level, miss_m_s, depth_m, .. } = *report;
-        seat.solved = Some(Solved::from(report));
-        let solves = &mut seat.solves;
+        member.solved = Some(Solved::from(report));
+        let solves = &mut member.solves;
         solves.contacts = contacts;
         solves.problems += u64::from(report.fine_steps);
         solves.factors += u64::from(factors);
@@ -52,26 +52,26 @@ impl AgentRunner {
         (solves.depth_m, solves.deepest_m) = (depth_m, solves.deepest_m.max(depth_m));
         let mut solves = Some(*solves);
         self.each_member(|actor| {
-            if let Some(seat) = &mut actor.cluster {
+            if let Some(member) = &mut actor.cluster {
                 // the solves of the leader, which is the first
-                seat.state = Some(ClusterState { leader, parts: seat.parts, step_s, solves: solves.take() });
+                member.state = Some(ClusterState { leader, parts: member.parts, step_s, solves: solves.take() });
             }
         });
     }
 
     /// Hands every member how far a step of `dt` is from the same in halves.
     pub(super) fn note_errors(&mut self, doubling: &StepDoubling, dt: SimSpan) {
-        let Some(seat) = &mut self.cluster else { return };
-        let span_s = seat.schedule.finish_step(dt.as_secs_f64()).then_some(seat.schedule.span_s());
+        let Some(member) = &mut self.cluster else { return };
+        let span_s = member.schedule.finish_step(dt.as_secs_f64()).then_some(member.schedule.span_s());
         if doubling.apart_m().is_empty() {
-            seat.schedule.cancel();
+            member.schedule.cancel();
         }
         let mut apart_m = doubling.apart_m().iter();
         self.each_member(|actor| {
-            if let (Some(seat), Some(apart_m)) = (&mut actor.cluster, apart_m.next())
+            if let (Some(member), Some(apart_m)) = (&mut actor.cluster, apart_m.next())
                 && let Some(span_s) = span_s
             {
-                seat.drift_m = drift_m(*apart_m, span_s);
+                member.drift_m = drift_m(*apart_m, span_s);
             }
         });
     }
@@ -81,13 +81,13 @@ impl AgentRunner {
         let (dt_s, now) = (dt.as_secs_f64(), self.pace.time() + dt);
         let mut place = 0;
         self.each_member(|actor| {
-            let (me, Some(seat)) = (place, &mut actor.cluster) else { return };
-            seat.pairs.retain_mut(|pair| {
+            let (me, Some(member)) = (place, &mut actor.cluster) else { return };
+            member.pairs.retain_mut(|pair| {
                 (pair.contacts, pair.force_n, pair.penetration_m) = (0, 0.0, 0.0);
-                pair.kind == PairKind::Attachment || seat.memory.near(now).any(|id| id == pair.with)
+                pair.kind == PairKind::Attachment || member.memory.near(now).any(|id| id == pair.with)
             });
             for total in stepper.totals_of(me).iter().filter(|total| total.contacts > 0) {
-                let apart = |with: AgentId| seat.asynchronous.as_ref().is_some_and(|pairs| pairs.meets(with));
+                let apart = |with: AgentId| member.asynchronous.as_ref().is_some_and(|pairs| pairs.meets(with));
                 let pair = match total.partner {
                     Partner::Agent(with) => Some((with, PairKind::Cluster)),
                     Partner::Link(number) => {
@@ -97,20 +97,20 @@ impl AgentRunner {
                     _ => None,
                 };
                 if let Some((with, kind)) = pair.filter(|(with, _)| !apart(*with)) {
-                    seat.note_pair(total, with, kind, dt_s);
+                    member.note_pair(total, with, kind, dt_s);
                 }
             }
-            seat.wrench = stepper.wrench_of(me) * dt_s.recip();
+            member.wrench = stepper.wrench_of(me) * dt_s.recip();
             let own = stepper.efforts().iter().filter(|total| total.member == me);
-            seat.efforts.clear();
-            seat.efforts.extend(own.map(|total| JointEffort { joint: total.joint, effort: total.impulse / dt_s }));
-            seat.note_contacts(stepper.totals_of(me), dt, now, &actor.shared.streams);
-            seat.work = stepper.work_of(me);
+            member.efforts.clear();
+            member.efforts.extend(own.map(|total| JointEffort { joint: total.joint, effort: total.impulse / dt_s }));
+            member.note_contacts(stepper.totals_of(me), dt, now, &actor.shared.streams);
+            member.work = stepper.work_of(me);
             let done = &actor.shared.gauges.work;
-            done.set(done.get() + seat.work);
+            done.set(done.get() + member.work);
             let times = stepper.strain_left(me);
-            let began = times > 0.0 && !seat.under_resolved;
-            seat.under_resolved = times > 0.0;
+            let began = times > 0.0 && !member.under_resolved;
+            member.under_resolved = times > 0.0;
             add(&actor.shared.gauges.under_resolved, u64::from(times > 0.0));
             if began {
                 let kind = EventKind::UnderResolved(times);
@@ -122,24 +122,24 @@ impl AgentRunner {
 
     /// Notes which of the agents that it leads still belong together at the end of a step, `now`.
     pub(super) fn note_groups(&mut self, now: SimTime) {
-        let Some(seat) = &mut self.cluster else { return };
-        let (mut groups, mut ids) = (std::mem::take(&mut seat.groups), std::mem::take(&mut seat.ids));
+        let Some(member) = &mut self.cluster else { return };
+        let (mut groups, mut ids) = (std::mem::take(&mut member.groups), std::mem::take(&mut member.ids));
         ids.clear();
         self.each_member(|actor| ids.push(actor.shared.id));
         groups.reset(ids.len());
         let mut places = 0..;
         self.each_member(|actor| {
-            let (Some(place), Some(seat)) = (places.next(), &actor.cluster) else { return };
-            let tied = held_by_links(&actor.links, &seat.memory);
-            for other in seat.memory.near(now).chain(tied).chain(seat.bonds.iter().copied()) {
+            let (Some(place), Some(member)) = (places.next(), &actor.cluster) else { return };
+            let tied = held_by_links(&actor.links, &member.memory);
+            for other in member.memory.near(now).chain(tied).chain(member.bonds.iter().copied()) {
                 if let Ok(other) = ids.binary_search(&other) {
                     groups.join(place, other);
                 }
             }
         });
         self.led.note_groups(self.pace.time(), &mut groups);
-        if let Some(seat) = &mut self.cluster {
-            (seat.groups, seat.ids) = (groups, ids);
+        if let Some(member) = &mut self.cluster {
+            (member.groups, member.ids) = (groups, ids);
         }
     }
 }
@@ -154,7 +154,7 @@ impl AgentRunner {
         self.each_member(|actor| ids.push(actor.shared.id));
         let mut places = 0..;
         self.each_member(|actor| {
-            let (Some(place), Some(seat)) = (places.next(), &mut actor.cluster) else { return };
+            let (Some(place), Some(member)) = (places.next(), &mut actor.cluster) else { return };
             let yielded = stepper.yielded().iter().map(|one| (one, AttachmentEventKind::Yielded));
             let all = yielded.chain(stepper.torn().iter().map(|one| (one, AttachmentEventKind::Tore)));
             for (failed, kind) in all.filter(|(one, _)| one.member == place) {
@@ -166,7 +166,7 @@ impl AgentRunner {
                     _ => continue,
                 };
                 let with = other.map(|other| ids[other]);
-                seat.events.push(AttachmentEvent { attachment, kind, with, at, force_n });
+                member.events.push(AttachmentEvent { attachment, kind, with, at, force_n });
                 actor.shared.streams.event(&AgentEvent { at: actor.pace.time() + dt, kind: EventKind::AttachmentGave });
             }
         });

@@ -1,9 +1,9 @@
 //! Where the runners of all agents are: at home, with a leader, or on the way to one or back.
 //!
 //! In: the places of a run between events. Out: all runners, by their numbers, each with its place; and the same again from that.
-//! Never here: why an agent is led ([`super::seats`]).
+//! Never here: why an agent is led ([`super::handover`]).
 
-use super::seats::Seat;
+use super::handover::LedAgent;
 use crate::agent::agents::Agents;
 use crate::agent::handle::AgentHandle;
 use crate::turn::agent_runner::AgentRunner;
@@ -50,8 +50,8 @@ pub(in super::super) fn take_apart(
 
 fn take(mut runner: Box<AgentRunner>, place: Place, all: &mut [Option<Placed>]) {
     let leader = runner.id();
-    let led = runner.led.seats.drain(..);
-    let led = led.map(|Seat { actor, group }| (actor, Place::Led { leader, group })).collect::<Vec<_>>();
+    let led = runner.led.agents.drain(..);
+    let led = led.map(|LedAgent { actor, group }| (actor, Place::Led { leader, group })).collect::<Vec<_>>();
     for (runner, place) in led.into_iter().chain([(runner, place)]) {
         let at = runner.id().0 as usize;
         all[at] = runner.kept().map(|runner| Placed { runner, place });
@@ -89,7 +89,7 @@ pub(in super::super) fn put_back(all: Vec<Option<Placed>>, handles: &Agents) -> 
         let Place::Led { leader, group } = place else { continue };
         // both lists rise by numbers
         if let Ok(at) = others.binary_search_by_key(&leader, |placed| placed.runner.id()) {
-            others[at].runner.led.seats.push(Seat { actor: runner, group });
+            others[at].runner.led.agents.push(LedAgent { actor: runner, group });
         }
     }
     others.sort_by_key(|placed| match placed.place {

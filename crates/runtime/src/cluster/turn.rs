@@ -1,6 +1,6 @@
 //! The turn of a leader: it steps all members of its cluster, and nobody else notices.
 //!
-//! In: agents that hand their turns over ([`super::seats`]). Out: the states, metrics and commands of each as if it made its turns itself.
+//! In: agents that hand their turns over ([`super::handover`]). Out: the states, metrics and commands of each as if it made its turns itself.
 //!
 //! admit      agents that want to be led
 //! gather     each to the leader's time: one that is behind steps alone, one that is ahead waits
@@ -68,8 +68,8 @@ impl AgentRunner {
         let mut any = std::mem::take(carved);
         led.each(|actor| any |= std::mem::take(&mut actor.carved));
         if any {
-            cluster.iter_mut().for_each(|seat| seat.forget_features());
-            led.each(|actor| actor.cluster.iter_mut().for_each(|seat| seat.forget_features()));
+            cluster.iter_mut().for_each(|member| member.forget_features());
+            led.each(|actor| actor.cluster.iter_mut().for_each(|member| member.forget_features()));
         }
     }
 
@@ -131,20 +131,20 @@ impl AgentRunner {
 
     /// The steps of its own within the last turn.
     pub fn own_steps(&self) -> u32 {
-        self.cluster.as_ref().and_then(|seat| seat.state).map_or(1, |state| state.parts)
+        self.cluster.as_ref().and_then(|member| member.state).map_or(1, |state| state.parts)
     }
 
     /// Shares the time of a turn out among itself and the members that stepped with it, by their work; its own share.
     /// Each governor answers for its agent alone: of the deformables in one cluster the one that is too fine gives way.
     pub fn share_work(&mut self, work_s: f64) -> f64 {
-        let work = |actor: &Self| actor.cluster.as_ref().map_or(0.0, |seat| seat.work);
+        let work = |actor: &Self| actor.cluster.as_ref().map_or(0.0, |member| member.work);
         let own = work(self);
         let all = own + self.led.all().filter(|actor| actor.open.is_some()).map(work).sum::<f64>();
         let share_s = |part: f64| if all > 0.0 { work_s * part / all } else { work_s };
         self.led.each(|actor| {
             let part = work(actor);
-            if let Some(seat) = &mut actor.cluster {
-                seat.work_s = share_s(part);
+            if let Some(member) = &mut actor.cluster {
+                member.work_s = share_s(part);
             }
         });
         share_s(own)
@@ -156,7 +156,7 @@ impl AgentRunner {
         let (mut published, leader) = (true, self.id());
         self.led.each(|actor| {
             let Some(open) = actor.open.take() else { return };
-            let work_s = actor.cluster.as_ref().map_or(0.0, |seat| seat.work_s);
+            let work_s = actor.cluster.as_ref().map_or(0.0, |member| member.work_s);
             published &= actor.record_step(&open, timeline, took.ended, work_s);
             actor.record_turn(&open, leader, took);
             if let Err(reason) = contained(|| actor.run_governor(timeline, &open, work_s)) {
@@ -203,11 +203,11 @@ impl AgentRunner {
 
     /// Learns the price of a factor from the turn that `took` so long.
     pub fn note_price(&mut self, timeline: &Timeline, took: Took) {
-        let Some(seat) = &mut self.cluster else { return };
-        if let Some(solved) = seat.solved.take()
+        let Some(member) = &mut self.cluster else { return };
+        if let Some(solved) = member.solved.take()
             && !timeline.is_free()
         {
-            seat.price.note(solved, took.ended.saturating_sub(took.begun).as_secs_f64());
+            member.price.note(solved, took.ended.saturating_sub(took.begun).as_secs_f64());
         }
     }
 }

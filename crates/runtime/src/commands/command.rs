@@ -134,7 +134,7 @@ impl Command {
     /// The same for this long, in the agent's time, from when the agent takes it; a command that acts once or for good
     /// stays so.
     #[must_use]
-    pub const fn lasting(mut self, span: SimSpan) -> Self {
+    pub const fn expires_after(mut self, span: SimSpan) -> Self {
         match &mut self {
             Self::Spring(spring) => spring.lasts = Some(span),
             Self::Force(force) => force.lasts = Some(span),
@@ -145,10 +145,10 @@ impl Command {
         self
     }
 
-    /// [`Command::lasting`] in milliseconds.
+    /// [`Command::expires_after`] in milliseconds.
     #[must_use]
     pub const fn for_ms(self, milliseconds: u64) -> Self {
-        self.lasting(SimSpan::from_millis(milliseconds))
+        self.expires_after(SimSpan::from_millis(milliseconds))
     }
 
     /// Takes back the spring, the force or the motor of its key, or the pose.

@@ -10,11 +10,11 @@ use metachron_core::{SimSpan, SimTime};
 /// All that users do to an agent.
 #[derive(Debug, Default, serde::Serialize, serde::Deserialize)]
 pub(crate) struct Loads {
-    springs: Vec<Lasting<AnchorSpring>>,
-    forces: Vec<Lasting<AnchorForce>>,
-    motors: Vec<Lasting<SetMotor>>,
+    springs: Vec<Timed<AnchorSpring>>,
+    forces: Vec<Timed<AnchorForce>>,
+    motors: Vec<Timed<SetMotor>>,
     /// At most one, as it is when the agent takes it.
-    poses: Vec<Lasting<Led>>,
+    poses: Vec<Timed<Led>>,
     impulses: Vec<TimedImpulse>,
     /// The loads of the step that was prepared last.
     #[serde(skip)]
@@ -45,7 +45,7 @@ struct Led {
 }
 
 #[derive(Debug, Clone, Copy, serde::Serialize, serde::Deserialize)]
-struct Lasting<T> {
+struct Timed<T> {
     key: u32,
     what: T,
     /// From when on it no longer acts; `None` where it acts until it is taken back.
@@ -109,19 +109,19 @@ impl Loads {
     }
 }
 
-impl<T> Lasting<T> {
+impl<T> Timed<T> {
     fn acts(&self, at: SimTime) -> bool {
         self.until.is_none_or(|until| at < until)
     }
 }
 
 /// Replaces each entry by the one that was sent with the same key.
-fn update<T, U>(mine: &mut Vec<Lasting<U>>, sent: &mut Vec<Keyed<T>>, now: SimTime, taken: impl Fn(T) -> U) {
+fn update<T, U>(mine: &mut Vec<Timed<U>>, sent: &mut Vec<Keyed<T>>, now: SimTime, taken: impl Fn(T) -> U) {
     for Keyed { key, what, lasts } in sent.drain(..) {
         mine.retain(|old| old.key != key);
         let place = mine.partition_point(|old| old.key < key);
         if let Some(what) = what {
-            mine.insert(place, Lasting { key, what: taken(what), until: lasts.map(|span| now + span) });
+            mine.insert(place, Timed { key, what: taken(what), until: lasts.map(|span| now + span) });
         }
     }
 }

@@ -319,7 +319,7 @@ impl AgentRunner {
     /// Tells readers of its events that it went back, and its contacts in the state that it went back to.
     fn record_rewound(&self) {
         self.record_event(EventKind::Rewound);
-        self.cluster.iter().for_each(|seat| seat.record_contacts(self.pace.time(), &self.shared.streams));
+        self.cluster.iter().for_each(|member| member.record_contacts(self.pace.time(), &self.shared.streams));
     }
 }
 

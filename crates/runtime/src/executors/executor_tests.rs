@@ -16,7 +16,7 @@ use metachron_core::{AgentId, SimTime};
 use metachron_geometry::{Obstacle, Solid};
 use metachron_models::rigid::{RigidBody, RigidSpec};
 use metachron_models::rod::{Material, Section, Tube, TubeSpec};
-use metachron_models::soft::{MaterialLaw, SoftBody, SoftMatter, SoftShape, SoftSpec};
+use metachron_models::soft::{MaterialLaw, SoftBody, SoftMaterial, SoftShape, SoftSpec};
 use plate::Plate;
 use std::sync::Arc;
 use std::thread;
@@ -139,7 +139,7 @@ fn a_plate_of_ones_own_carries_a_ball_and_a_tube_and_feels_their_weight_on_every
 
 /// Bodies of every kind that touch or fall on each other, large enough for helpers.
 fn heaped() -> Vec<AgentSpawn> {
-    let matter = SoftMatter {
+    let material = SoftMaterial {
         young_pa: 1e5,
         poisson: 0.3,
         density_kg_m3: 1000.0,
@@ -151,7 +151,7 @@ fn heaped() -> Vec<AgentSpawn> {
         traits: metachron_geometry::ContactTraits::default(),
         shape: SoftShape::Box { size_m: DVec3::new(0.2, 0.2, 0.05), segments: [6, 6, 2] },
         nodes: None,
-        matter,
+        material,
         position: DVec3::new(-0.1, -0.1, 1e-4),
         rotation: DQuat::IDENTITY,
         velocity: DVec3::ZERO,

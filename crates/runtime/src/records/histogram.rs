@@ -1,6 +1,6 @@
 //! Histogram of durations: percentiles of any number of times in little memory.
 //!
-//! In: times. Out: percentiles to 2 %, as [`Spread`]. An agent has two histograms, and there may be a hundred thousand agents: counters are
+//! In: times. Out: percentiles to 2 %, as [`Percentiles`]. An agent has two histograms, and there may be a hundred thousand agents: counters are
 //! laid out in pages, one for each doubling of time, and only the pages that are used exist (a log-linear histogram as in HdrHistogram,
 //! whose smallest takes 9 kB); a page is a cache line. When a counter is full, all are halved: earlier times then count for half. Never
 //! here: clocks, locks.
@@ -21,7 +21,7 @@ const PAGES_AT_ONCE: usize = 2;
 
 /// Two percentiles and the maximum of a set of times, seconds.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub struct Spread {
+pub struct Percentiles {
     /// The median, to 2 %.
     pub p50_s: f64,
     /// The 99th percentile, to 2 %.
@@ -77,13 +77,13 @@ impl Histogram {
     }
 
     /// The percentiles of all counted times; zeros if there are none.
-    pub fn spread(&self) -> Spread {
-        let [p50_s, p99_s] = self.percentiles([0.5, 0.99]).map(|us| us as f64 * 1e-6);
-        Spread { p50_s, p99_s, max_s: self.longest_us as f64 * 1e-6 }
+    pub fn percentiles(&self) -> Percentiles {
+        let [p50_s, p99_s] = self.quantiles([0.5, 0.99]).map(|us| us as f64 * 1e-6);
+        Percentiles { p50_s, p99_s, max_s: self.longest_us as f64 * 1e-6 }
     }
 
     /// For each of the rising `shares` the least time that is not exceeded by this share of times, microseconds.
-    fn percentiles<const N: usize>(&self, shares: [f64; N]) -> [u64; N] {
+    fn quantiles<const N: usize>(&self, shares: [f64; N]) -> [u64; N] {
         let wanted = shares.map(|share| ((share * self.count as f64).ceil() as u64).max(1));
         let mut found = [self.longest_us; N];
         let (mut seen, mut next) = (0, 0);
@@ -137,7 +137,7 @@ mod tests {
             times.record(Duration::from_nanos((us * 1e3) as u64));
             theirs.saturating_record(us as u64);
         }
-        for (found, share) in times.percentiles([0.1, 0.5, 0.9, 0.99]).iter().zip([0.1, 0.5, 0.9, 0.99]) {
+        for (found, share) in times.quantiles([0.1, 0.5, 0.9, 0.99]).iter().zip([0.1, 0.5, 0.9, 0.99]) {
             let exact = theirs.value_at_quantile(share) as f64;
             // half a counter of ours is at most 1/64 of its time wide, one of theirs 1/1000
             assert!((*found as f64 / exact - 1.0).abs() < 1.0 / 64.0 + 1e-3, "{found} for {exact}");
@@ -154,11 +154,11 @@ mod tests {
     fn percentiles_are_right_to_two_hundredths() {
         let mut times = Histogram::default();
         (1..=1000).for_each(|us| times.record(Duration::from_micros(us * 10)));
-        let spread = times.spread();
-        assert!((spread.p50_s - 5e-3).abs() < 1e-4, "{spread:?}");
-        assert!((spread.p99_s - 9.9e-3).abs() < 2e-4, "{spread:?}");
-        assert_eq!(spread.max_s, 10e-3);
-        assert_eq!(Histogram::default().spread(), Spread::default());
+        let found = times.percentiles();
+        assert!((found.p50_s - 5e-3).abs() < 1e-4, "{found:?}");
+        assert!((found.p99_s - 9.9e-3).abs() < 2e-4, "{found:?}");
+        assert_eq!(found.max_s, 10e-3);
+        assert_eq!(Histogram::default().percentiles(), Percentiles::default());
     }
 
     proptest::proptest! {
@@ -167,7 +167,7 @@ mod tests {
             let mut times = Histogram::default();
             us.iter().for_each(|us| times.record(Duration::from_micros(*us)));
             let exact = sorted(us.iter().map(|us| (*us).min(LONGEST_US)).collect(), &[0.5, 0.99]);
-            for (found, exact) in times.percentiles([0.5, 0.99]).iter().zip(exact) {
+            for (found, exact) in times.quantiles([0.5, 0.99]).iter().zip(exact) {
                 let found = *found as f64;
                 // a counter is at most 1/32 of its time wide
                 assert!((found - exact).abs() <= exact / 64.0, "{found} for {exact}");
@@ -197,7 +197,7 @@ mod tests {
             times.record_often(Duration::from_micros(20), 60);
             times.record_often(Duration::from_micros(30), 40);
         }
-        assert_eq!(times.percentiles([0.5, 0.89, 0.93, 0.97]), [10, 10, 20, 30]);
+        assert_eq!(times.quantiles([0.5, 0.89, 0.93, 0.97]), [10, 10, 20, 30]);
         assert!((32_768..=131_072).contains(&times.count), "{}", times.count);
     }
 
@@ -205,7 +205,7 @@ mod tests {
     fn a_time_beyond_the_scale_counts_as_the_longest() {
         let mut times = Histogram::default();
         times.record(Duration::from_secs(1000));
-        assert!(times.spread().max_s >= 10.0);
+        assert!(times.percentiles().max_s >= 10.0);
     }
 
     #[test]

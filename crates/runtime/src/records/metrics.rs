@@ -3,7 +3,7 @@
 //! In: turns, from the thread that makes them. Out: [`AgentStats`]. Each number is one atomic word: consistent in itself, and as new as the
 //! last turn. Never here: locks on the agent's side, printing.
 
-use super::histogram::{Histogram, Spread};
+use super::histogram::{Histogram, Percentiles};
 use crate::time::agent_clock::AgentClock;
 use arc_swap::ArcSwapOption;
 use metachron_core::{AgentId, Archive, ArchiveError, Resolution, SimSpan, SimTime, archive_values};
@@ -62,9 +62,9 @@ pub struct AgentStats {
     /// CPU time of its turns so far, seconds; measured, in lockstep too.
     pub cpu_s: f64,
     /// Age of its newest state when a reader used it ([`crate::AgentHandle::record_age`]).
-    pub age: Spread,
+    pub age: Percentiles,
     /// Delay between the release of its turns and their start, wall time.
-    pub late: Spread,
+    pub late: Percentiles,
     /// Turns published after the end of their step.
     pub misses: u64,
     /// Simulated time that it has lived: the sum of its steps, and its time at rest.
@@ -92,7 +92,7 @@ pub struct AgentStats {
 impl AgentStats {
     /// The figures of an agent that has left and of which nothing is kept.
     pub(crate) fn of_removed(id: AgentId, name: &str) -> Self {
-        let (none, times) = (SimSpan::ZERO, Spread::default());
+        let (none, times) = (SimSpan::ZERO, Percentiles::default());
         Self {
             id,
             name: name.into(),
@@ -297,13 +297,13 @@ impl Metrics {
         self.cpu_nanos.load(Relaxed) as f64 * 1e-9
     }
 
-    pub fn late(&self) -> Spread {
+    pub fn late(&self) -> Percentiles {
         let [p50_s, p99_s, max_s] = [0, 1, 2].map(|k| self.late[k].get());
-        Spread { p50_s, p99_s, max_s }
+        Percentiles { p50_s, p99_s, max_s }
     }
 
-    fn set_late(&self, spread: Spread) {
-        for (gauge, value) in self.late.iter().zip([spread.p50_s, spread.p99_s, spread.max_s]) {
+    fn set_late(&self, times: Percentiles) {
+        for (gauge, value) in self.late.iter().zip([times.p50_s, times.p99_s, times.max_s]) {
             gauge.set(value);
         }
     }
@@ -405,7 +405,7 @@ impl MetricsWriter {
 
     /// Updates the percentiles: too expensive for every turn.
     pub fn flush(&self, gauges: &Metrics) {
-        gauges.set_late(self.late.spread());
+        gauges.set_late(self.late.percentiles());
     }
 
     fn count_rate(&mut self, gauges: &Metrics, now: SimTime) {

@@ -341,8 +341,8 @@ mod tests {
         let n = 20_000_u64;
         let x: Vec<f64> = (0..n).map(|frame| machine.frame_time(1.0, frame, Duration::ZERO).as_secs_f64()).collect();
         let spikes = x.iter().filter(|x| **x > 1.3).count() as f64 / n as f64;
-        let calm: Vec<f64> = x.iter().map(|x| if *x > 1.3 { x / SPIKE } else { *x } - 1.0).collect();
-        let moment = |lag: usize| calm.iter().zip(&calm[lag..]).map(|(a, b)| a * b).sum::<f64>() / n as f64;
+        let residuals: Vec<f64> = x.iter().map(|x| if *x > 1.3 { x / SPIKE } else { *x } - 1.0).collect();
+        let moment = |lag: usize| residuals.iter().zip(&residuals[lag..]).map(|(a, b)| a * b).sum::<f64>() / n as f64;
         // 19 frames of memory leave about a thousand independent ones: errors of 2 % of the deviation, four of them
         assert!((moment(0).sqrt() - 0.05).abs() < 0.004, "deviation {}", moment(0).sqrt());
         assert!((moment(1) / moment(0) - 0.9).abs() < 0.03, "kept {}", moment(1) / moment(0));

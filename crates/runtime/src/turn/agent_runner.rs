@@ -11,7 +11,7 @@
 use super::helpers::Helped;
 use super::model::{Model, contained};
 use crate::agent::handle::Shared;
-use crate::cluster::{ClusterSeat, Led};
+use crate::cluster::{Led, MemberState};
 use crate::commands::loads::Loads;
 use crate::lock_free::slot::SlotWriter;
 use crate::neighbours::observation::{Observer, Peers};
@@ -45,7 +45,7 @@ pub(crate) struct AgentRunner {
     /// The users' commands that act on it; `None` of an agent that was never sent any.
     pub loads: Option<Box<Loads>>,
     /// Its place in a contact cluster; `None` of an agent that is no member of any.
-    pub cluster: Option<Box<ClusterSeat>>,
+    pub cluster: Option<Box<MemberState>>,
     /// The agents it leads.
     pub led: Led,
     pub metrics: MetricsWriter,
@@ -159,7 +159,7 @@ impl AgentRunner {
     /// Ends the turn that `took` so long: `turn_s` seconds of the caller, turns of the agents that it leads included.
     pub fn finish(&mut self, timeline: &Timeline, took: Took, turn_s: f64) -> Next {
         let wall = took.ended;
-        let work_s = self.cluster.as_ref().map_or(turn_s, |seat| seat.helped().core_s(turn_s));
+        let work_s = self.cluster.as_ref().map_or(turn_s, |member| member.helped().core_s(turn_s));
         // it waited, or another agent leads it from now on
         let Some(open) = self.open.take() else {
             let next = self.seek_leader().map_or(Next::Due, Next::Join);
@@ -221,8 +221,8 @@ impl AgentRunner {
     /// Accounts for a turn that took `wall` time of the caller, shared equally with the agents it leads.
     pub fn count(&mut self, wall: Duration) {
         let mut helped = Helped::default();
-        let mut take = |seat: Option<&mut Box<ClusterSeat>>| {
-            let Helped { waited, cpu } = seat.map_or_else(Helped::default, |seat| seat.take_helped());
+        let mut take = |member: Option<&mut Box<MemberState>>| {
+            let Helped { waited, cpu } = member.map_or_else(Helped::default, |member| member.take_helped());
             helped.waited += waited;
             helped.cpu += cpu;
         };
@@ -252,7 +252,7 @@ impl AgentRunner {
     pub fn settle(&mut self, share: f64) {
         let nanos = (std::mem::take(&mut self.unsettled_ns) as f64 * share) as u64;
         self.add_cpu(nanos);
-        self.led.each(|seat| seat.settle(share));
+        self.led.each(|member| member.settle(share));
     }
 
     /// Completes the metrics at the end of a run: a resting agent has rested until now, and the last state is published.
@@ -265,7 +265,7 @@ impl AgentRunner {
             self.metrics.pace(&self.shared.gauges, &self.pace);
         }
         self.metrics.flush(&self.shared.gauges);
-        self.led.each(|seat| seat.close_account(timeline, wall));
+        self.led.each(|member| member.close_account(timeline, wall));
     }
 
     /// Parks the agent for good, for this reason.
@@ -417,7 +417,7 @@ impl AgentRunner {
         self.shared.gauges.set_resting(false);
         self.record_event(EventKind::Wakes);
         self.notify_reader();
-        self.led.each(|seat| seat.resume(timeline, wall));
+        self.led.each(|member| member.resume(timeline, wall));
     }
 }
 

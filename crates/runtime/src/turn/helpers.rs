@@ -202,8 +202,8 @@ mod tests {
         let (mut stepper, mut helped) = (ClusterStepper::default(), Helped::default());
         let (dt, mut time, mut contacts) = (SimSpan::from_nanos(4_000_000), SimTime::ZERO, 0);
         for _ in 0..60 {
-            let seats = tubes.iter_mut().zip(&mut kept).zip((0..).map(AgentId));
-            let mut all: Vec<_> = seats
+            let agents = tubes.iter_mut().zip(&mut kept).zip((0..).map(AgentId));
+            let mut all: Vec<_> = agents
                 .map(|((tube, (memory, grips)), id)| {
                     let context = StepContext::alone(id, time);
                     Participant {

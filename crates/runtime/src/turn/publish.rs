@@ -50,8 +50,8 @@ impl AgentRunner {
         let finite = self.writer.fill(|into| {
             into.clear();
             model.call(|agent| agent.write_snapshot(into))?;
-            if let Some(seat) = cluster {
-                seat.complete(into);
+            if let Some(member) = cluster {
+                member.complete(into);
             }
             (into.time, into.clock_offset, into.at_rest) = (time, clock_offset, at_rest);
             Ok::<_, String>(into.is_finite())

@@ -12,7 +12,7 @@ use glam::{DQuat, DVec3};
 use metachron_core::{Anchor, Body};
 use metachron_drawable::generate_surface;
 use metachron_geometry::{Aabb, Cage, Triangles, open_edge, subdivided};
-use metachron_models::soft::{MaterialLaw, Side, SoftBody, SoftMatter, SoftShape, SoftSpec, VERTICES_MAX};
+use metachron_models::soft::{MaterialLaw, Side, SoftBody, SoftMaterial, SoftShape, SoftSpec, VERTICES_MAX};
 use std::sync::Arc;
 
 const POISSON_DEFAULT: f64 = 0.4;
@@ -46,10 +46,10 @@ pub(super) fn sheet(
     } else {
         DVec3::ZERO
     };
-    let matter = SoftMatter { poisson: file.poisson.unwrap_or(POISSON_DEFAULT), ..matter(soft) };
+    let material = SoftMaterial { poisson: file.poisson.unwrap_or(POISSON_DEFAULT), ..material(soft) };
     let rotation = rotation(file.rotation_deg);
     let position = point(file.position_m) - rotation * half;
-    let spec = SoftSpec { position, rotation, matter, held, ..spec(context, shape, soft) };
+    let spec = SoftSpec { position, rotation, material, held, ..spec(context, shape, soft) };
     Some(divided(c, place, spec, eps_m))
 }
 
@@ -88,10 +88,10 @@ pub(super) fn solid(
     }
     let poisson = file.poisson.unwrap_or(POISSON_DEFAULT);
     let law = soft_mesh::law(c, place, file.law, file.exponent, poisson);
-    let matter = SoftMatter { poisson, law, ..matter(soft) };
+    let material = SoftMaterial { poisson, law, ..material(soft) };
     match (&mut shape, &file.regions) {
         (SoftShape::Tetrahedra { mesh, regions }, Some(files)) => {
-            *regions = soft_mesh::regions(c, place, files, mesh, &matter);
+            *regions = soft_mesh::regions(c, place, files, mesh, &material);
         }
         (_, Some(_)) => {
             c.wrong(place, "regions", "do not belong to this shape", "expected them with a mesh of tetrahedra alone");
@@ -101,7 +101,7 @@ pub(super) fn solid(
     let half = if let SoftShape::Box { size_m, .. } = shape { 0.5 * size_m } else { DVec3::ZERO };
     let (rotation, self_contact) = (rotation(file.rotation_deg), soft.self_contact.unwrap_or(false));
     let position = point(file.position_m) - rotation * half;
-    let spec = SoftSpec { position, rotation, matter, held, self_contact, ..spec(context, shape, soft) };
+    let spec = SoftSpec { position, rotation, material, held, self_contact, ..spec(context, shape, soft) };
     Some(BuiltSoft { spec, eps_m })
 }
 
@@ -294,8 +294,8 @@ fn divided(c: &mut Checker<'_, '_>, place: &Place, spec: SoftSpec, eps_m: Option
 }
 
 /// The material of a soft body, as far as all have it.
-fn matter(soft: &SoftFile) -> SoftMatter {
-    SoftMatter {
+fn material(soft: &SoftFile) -> SoftMaterial {
+    SoftMaterial {
         young_pa: soft.young_pa,
         poisson: POISSON_DEFAULT,
         density_kg_m3: soft.density_kg_m3.unwrap_or(1050.0),
@@ -310,7 +310,7 @@ fn spec(context: &ModelContext<'_>, shape: SoftShape, soft: &SoftFile) -> SoftSp
     SoftSpec {
         shape,
         nodes: None,
-        matter: matter(soft),
+        material: material(soft),
         position: DVec3::ZERO,
         rotation: DQuat::IDENTITY,
         velocity: point(soft.velocity_m_s),

@@ -12,7 +12,7 @@ use crate::demand::Cost;
 use crate::format::{LawKind, RegionFile, SheetFile, SolidFile};
 use metachron_core::NumberRange;
 use metachron_geometry::{Aabb, Tetrahedra, Triangles, branch, opposed, pieces, welded};
-use metachron_models::soft::{MaterialLaw, RegionMatter, SoftMatter, SoftShape, VERTICES_MAX};
+use metachron_models::soft::{MaterialLaw, RegionMaterial, SoftMaterial, SoftShape, VERTICES_MAX};
 use std::sync::Arc;
 
 /// The law that the keys of a scene name, for this Poisson's ratio; keys that do not belong together are reported.
@@ -99,9 +99,9 @@ pub(super) fn regions(
     place: &Place,
     files: &[RegionFile],
     mesh: &Tetrahedra,
-    matter: &SoftMatter,
-) -> Vec<RegionMatter> {
-    let mut regions: Vec<RegionMatter> = vec![];
+    material: &SoftMaterial,
+) -> Vec<RegionMaterial> {
+    let mut regions: Vec<RegionMaterial> = vec![];
     for (at, file) in files.iter().enumerate() {
         let here = place.entry("regions", at);
         let region = file.region;
@@ -120,17 +120,17 @@ pub(super) fn regions(
         if regions.iter().any(|known| known.region == region) {
             c.wrong(&here, "region", format!("is {region}, which has a material already"), "expected each region once");
         }
-        let poisson = file.poisson.unwrap_or(matter.poisson);
+        let poisson = file.poisson.unwrap_or(material.poisson);
         let own = law(c, &here, file.law, file.exponent, poisson);
-        let law = if file.law.is_some() { own } else { matter.law };
-        let matter = SoftMatter {
+        let law = if file.law.is_some() { own } else { material.law };
+        let material = SoftMaterial {
             young_pa: file.young_pa,
             poisson,
-            density_kg_m3: file.density_kg_m3.unwrap_or(matter.density_kg_m3),
+            density_kg_m3: file.density_kg_m3.unwrap_or(material.density_kg_m3),
             law,
-            ..*matter
+            ..*material
         };
-        regions.push(RegionMatter { region, matter });
+        regions.push(RegionMaterial { region, material });
     }
     regions
 }

@@ -5,14 +5,14 @@ use super::ranges::within;
 use super::tube::End;
 use super::value::OneOrRange;
 use metachron_drawable::Generator;
-use metachron_models::soft::{MATTER, Side};
+use metachron_models::soft::{MATERIAL, Side};
 use schemars::JsonSchema;
 use serde::Deserialize;
 
 /// The keys of a sheet, solid or rope alike.
 #[derive(Debug, Clone, Copy, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
-#[schemars(transform = within(MATTER))]
+#[schemars(transform = within(MATERIAL))]
 pub struct SoftFile {
     /// Young's modulus, Pa.
     pub young_pa: f64,
@@ -33,7 +33,7 @@ pub struct SoftFile {
 /// A soft sheet that stretches and bends: flat, or of the shape of a mesh.
 #[derive(Debug, Clone, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
-#[schemars(transform = within(MATTER))]
+#[schemars(transform = within(MATERIAL))]
 pub struct SheetFile {
     /// Length along its x and y axes, metres. Needed without `file`.
     pub size_m: Option<[f64; 2]>,
@@ -63,7 +63,7 @@ pub struct SheetFile {
 /// A soft solid: a box, a ball, or the volume within a closed surface.
 #[derive(Debug, Clone, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
-#[schemars(transform = within(MATTER))]
+#[schemars(transform = within(MATERIAL))]
 pub struct SolidFile {
     /// Its shape. `box`: `size_m`. `ball`: `radius_m`. `mesh`: `file` or `generate`.
     pub shape: SoftShapeKind,
@@ -141,7 +141,7 @@ metachron_core::choices! {
 /// A region of a mesh of tetrahedra.
 #[derive(Debug, Clone, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
-#[schemars(transform = within(MATTER))]
+#[schemars(transform = within(MATERIAL))]
 pub struct RegionFile {
     /// Its number: of gmsh the physical group, or the volume's own where it has none; of VTK the cell data `region`, `gmsh:physical`,
     /// `medit:ref`, `material` or `CellEntityIds`, the first of these that there is.

@@ -2,7 +2,7 @@
 //!
 //! In: one row per frame. Out: shares, errors and spreads. Never here: measuring.
 
-use super::frames::Spread;
+use super::frames::Statistics;
 use crate::FrameRecord;
 use serde::Serialize;
 
@@ -20,17 +20,17 @@ pub struct ChoiceSummary {
     /// 19 of 20 frames took the predicted time to within this part of it; `None` for a policy without predictions.
     pub model_error: Option<f64>,
     /// Time for gathering states and finding visible objects.
-    pub cull_ms: Option<Spread>,
+    pub cull_ms: Option<Statistics>,
     /// Time for choosing levels.
-    pub select_ms: Option<Spread>,
+    pub select_ms: Option<Statistics>,
     /// Time for building the picture and drawing it.
-    pub draw_ms: Option<Spread>,
+    pub draw_ms: Option<Statistics>,
     /// From reading the camera to the finished picture.
-    pub lag_ms: Option<Spread>,
+    pub lag_ms: Option<Statistics>,
     /// Objects in view that were left out for lack of time, over all frames.
     pub holes: Option<u64>,
     /// Passes of a hierarchical search that goes on from the frame before (MB97); `None` for other policies.
-    pub passes: Option<Spread>,
+    pub passes: Option<Statistics>,
     /// Objects per frame in cells that the eye reached through portals, and objects in no cell in view.
     pub potentially_visible: Option<f64>,
     /// Objects per frame in view: where there are cells, the objects that portals leave in view.
@@ -87,12 +87,12 @@ pub struct ScaleSummary {
 /// Summarises the choices of `frames`.
 #[must_use]
 pub fn summarise_choices(frames: &[FrameRecord]) -> ChoiceSummary {
-    let spread = |of: fn(&FrameRecord) -> f64| Spread::of(frames.iter().map(of));
-    let some = |of: fn(&FrameRecord) -> Option<f64>| Spread::of(frames.iter().filter_map(of));
+    let statistics = |of: fn(&FrameRecord) -> f64| Statistics::of(frames.iter().map(of));
+    let some = |of: fn(&FrameRecord) -> Option<f64>| Statistics::of(frames.iter().filter_map(of));
     let any = !frames.is_empty();
     let seen = frames.iter().map(|row| row.objects).sum::<u64>().max(1) as f64;
     let total = |of: fn(&FrameRecord) -> u32| frames.iter().map(|row| u64::from(of(row))).sum::<u64>();
-    let mean = |of: fn(&FrameRecord) -> f64| spread(of).map_or(0.0, |s| s.mean);
+    let mean = |of: fn(&FrameRecord) -> f64| statistics(of).map_or(0.0, |s| s.mean);
     let share = |of| any.then(|| total(of) as f64 / seen);
     ChoiceSummary {
         value_over_bound: some(|row| row.value_over_bound).map(|s| s.mean),
@@ -101,17 +101,17 @@ pub fn summarise_choices(frames: &[FrameRecord]) -> ChoiceSummary {
         reversals: share(|row| row.reversals),
         model_error: some(|row| row.predicted_ms.map(|predicted| (row.frame_ms / predicted - 1.0).abs()))
             .map(|s| s.p95),
-        cull_ms: spread(|row| row.cull_ms),
-        select_ms: spread(|row| row.select_ms),
-        draw_ms: spread(|row| row.draw_ms),
-        lag_ms: spread(|row| row.lag_ms),
+        cull_ms: statistics(|row| row.cull_ms),
+        select_ms: statistics(|row| row.select_ms),
+        draw_ms: statistics(|row| row.draw_ms),
+        lag_ms: statistics(|row| row.lag_ms),
         holes: any.then(|| total(|row| row.holes)),
         passes: some(|row| (row.passes > 0).then_some(f64::from(row.passes))),
-        potentially_visible: spread(|row| row.potentially_visible as f64).map(|s| s.mean),
-        visible: spread(|row| row.objects as f64).map(|s| s.mean),
-        drawn: spread(|row| row.drawn as f64).map(|s| s.mean),
+        potentially_visible: statistics(|row| row.potentially_visible as f64).map(|s| s.mean),
+        visible: statistics(|row| row.objects as f64).map(|s| s.mean),
+        drawn: statistics(|row| row.drawn as f64).map(|s| s.mean),
         render_scale: scales(frames),
-        shadows: Spread::of(frames.iter().map(|row| f64::from(u8::from(row.shadows)))).map(|spread| spread.mean),
+        shadows: Statistics::of(frames.iter().map(|row| f64::from(u8::from(row.shadows)))).map(|spread| spread.mean),
         primitives: any.then(|| PrimitiveSummary {
             triangles: mean(|row| row.triangles as f64),
             points: mean(|row| row.points as f64),
@@ -128,7 +128,7 @@ pub fn summarise_choices(frames: &[FrameRecord]) -> ChoiceSummary {
 }
 
 fn scales(frames: &[FrameRecord]) -> Option<ScaleSummary> {
-    let spread = Spread::of(frames.iter().map(|row| row.render_scale))?;
+    let spread = Statistics::of(frames.iter().map(|row| row.render_scale))?;
     frames.last().map(|last| ScaleSummary { end: last.render_scale, mean: spread.mean, least: spread.min })
 }
 

@@ -21,7 +21,7 @@ pub const SETTLE_HOLD: usize = 20;
 
 /// Mean, spread and percentiles of a measured time, milliseconds.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Serialize)]
-pub struct Spread {
+pub struct Statistics {
     /// Mean.
     pub mean: f64,
     /// Standard deviation (of the whole, not of a sample).
@@ -42,11 +42,11 @@ pub struct Spread {
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct FrameSummary {
     /// Work of the frames; `None` where there was no frame, or frames were not drawn and have no declared cost.
-    pub frame_ms: Option<Spread>,
+    pub frame_ms: Option<Statistics>,
     /// The adapter's own time; `None` where it has no time stamps or nothing was drawn.
-    pub gpu_ms: Option<Spread>,
+    pub gpu_ms: Option<Statistics>,
     /// Paced distance between frames; `None` without any.
-    pub interval_ms: Option<Spread>,
+    pub interval_ms: Option<Statistics>,
     /// Standard deviation of x over binding frames; `None` without any.
     pub binding_stddev: Option<f64>,
     /// Mean of |x − 1| over binding frames; `None` without any.
@@ -57,7 +57,7 @@ pub struct FrameSummary {
     pub settle_frames: Option<u64>,
 }
 
-impl Spread {
+impl Statistics {
     /// The spread of `values`; `None` where there are none. Values that are not finite are left out.
     #[must_use]
     pub fn of(values: impl IntoIterator<Item = f64>) -> Option<Self> {
@@ -102,9 +102,9 @@ pub fn summarise(frames: &[FrameRecord], target_ms: f64) -> FrameSummary {
         (Some(mean_and_stddev(&binding).1), Some(error))
     };
     FrameSummary {
-        frame_ms: Spread::of(frames.iter().map(|row| row.frame_ms)),
-        gpu_ms: Spread::of(frames.iter().filter_map(|row| row.gpu_ms)),
-        interval_ms: Spread::of(frames.iter().map(|row| row.interval_ms)),
+        frame_ms: Statistics::of(frames.iter().map(|row| row.frame_ms)),
+        gpu_ms: Statistics::of(frames.iter().filter_map(|row| row.gpu_ms)),
+        interval_ms: Statistics::of(frames.iter().map(|row| row.interval_ms)),
         binding_stddev,
         avg_err,
         missed_share: (!x.is_empty()).then(|| missed as f64 / x.len() as f64),
@@ -115,7 +115,7 @@ pub fn summarise(frames: &[FrameRecord], target_ms: f64) -> FrameSummary {
 /// The same for `frames` that were not drawn and have no declared cost: only their intervals are known.
 #[must_use]
 pub fn summarise_undrawn(frames: &[FrameRecord]) -> FrameSummary {
-    FrameSummary { interval_ms: Spread::of(frames.iter().map(|row| row.interval_ms)), ..summarise(&[], 1.0) }
+    FrameSummary { interval_ms: Statistics::of(frames.iter().map(|row| row.interval_ms)), ..summarise(&[], 1.0) }
 }
 
 /// The first frame after which the running median stays close to the later mean.
@@ -155,7 +155,7 @@ mod tests {
 
     #[test]
     fn percentiles_are_values_that_were_measured() {
-        let spread = Spread::of((1..=100).map(f64::from)).unwrap();
+        let spread = Statistics::of((1..=100).map(f64::from)).unwrap();
         assert_eq!((spread.min, spread.p50, spread.p95, spread.p99, spread.max), (1.0, 50.0, 95.0, 99.0, 100.0));
         assert_eq!(spread.mean, 50.5);
         // of 1 … n: sqrt((n² - 1)/12); sums of a hundred terms round in the last digits
@@ -208,7 +208,7 @@ mod tests {
     proptest! {
         #[test]
         fn the_order_of_percentiles_holds_for_any_values(values in proptest::collection::vec(any::<f64>(), 0..60)) {
-            if let Some(s) = Spread::of(values.iter().copied()) {
+            if let Some(s) = Statistics::of(values.iter().copied()) {
                 prop_assert!(s.min <= s.p50 && s.p50 <= s.p95 && s.p95 <= s.p99 && s.p99 <= s.max);
             }
             let _ = summarise(&rows(values, 1.0), 1.0);

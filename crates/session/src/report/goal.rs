@@ -176,14 +176,14 @@ fn unknown_field(path: &str, part: &str, here: &Value) -> GoalError {
 
 #[cfg(test)]
 mod tests {
-    use super::super::{Spread, summarise, summarise_choices};
+    use super::super::{Statistics, summarise, summarise_choices};
     use super::*;
     use proptest::prelude::*;
 
     fn report() -> Report {
         let mut report = Report::template();
         report.summary.missed_share = Some(0.02);
-        report.summary.frame_ms = Some(Spread { p99: 40.0, ..Spread::default() });
+        report.summary.frame_ms = Some(Statistics { p99: 40.0, ..Statistics::default() });
         report.agents[0].name = "intestine".to_owned();
         report.agents[0].rate_hz = 200.0;
         report

@@ -9,7 +9,7 @@ mod summary;
 
 pub use choices::{ChoiceSummary, PrimitiveSummary, ScaleSummary, ShadingSummary, summarise_choices};
 pub use frames::{
-    BINDING, FrameSummary, MISS, SETTLE_BAND, SETTLE_HOLD, SETTLE_MEDIAN, Spread, summarise, summarise_undrawn,
+    BINDING, FrameSummary, MISS, SETTLE_BAND, SETTLE_HOLD, SETTLE_MEDIAN, Statistics, summarise, summarise_undrawn,
 };
 pub use goal::{Goal, GoalError, Verdict};
 

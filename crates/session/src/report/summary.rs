@@ -2,7 +2,7 @@
 
 use super::{
     AgentReport, ChoiceSummary, CouplingReport, EventReport, FrameSummary, ReferenceReport, Report, ScaleSummary,
-    SensorReport, Spread,
+    SensorReport, Statistics,
 };
 use metachron_devices::DeviceReport;
 use std::fmt::Write;
@@ -68,7 +68,7 @@ fn frame_line(out: &mut String, summary: &FrameSummary, target_ms: f64) {
         let _ = writeln!(out, "frame  not measured: nothing was drawn and no drawing cost is declared");
         return;
     };
-    let Spread { mean, p99, max, .. } = work;
+    let Statistics { mean, p99, max, .. } = work;
     let late = 100.0 * missed;
     let _ =
         writeln!(out, "frame  {mean:.2} ms mean, {p99:.2} p99, {max:.2} max, target {target_ms:.2}; {late:.2} % late");

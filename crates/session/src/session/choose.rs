@@ -78,7 +78,7 @@ impl Session {
     /// Finds the objects seen by `camera`, with the pixels that they are drawn with.
     pub fn survey(&mut self, camera: &Camera, size: Size) {
         self.scene_view.survey(camera, size.scaled(self.control.render_scale()));
-        let of = assemble::Actors { scene: &self.scene, lasting: &self.lasting };
+        let of = assemble::Actors { scene: &self.scene, fixed_parts: &self.fixed_parts };
         assemble::update_views(&mut self.views, self.scene_view.seen(), self.scene_view.updated(), of);
     }
 

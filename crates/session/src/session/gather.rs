@@ -44,7 +44,7 @@ impl Session {
         });
         if self.scene.agents.len() > before {
             (before..self.scene.agents.len()).for_each(|_| self.visible_resolution.join());
-            self.lasting = assemble::lasting(&self.scene);
+            self.fixed_parts = assemble::fixed_parts(&self.scene);
             self.levels.clear();
         }
         let time = shown.unwrap_or(now);

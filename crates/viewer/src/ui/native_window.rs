@@ -273,8 +273,8 @@ impl Pace {
 
     /// Due time of the next picture; `still` allows a long interval.
     fn next(&self, still: bool) -> Instant {
-        let calm = self.started.filter(|_| still).map(|started| started + STILL_PERIOD);
-        calm.map_or(self.due, |calm| calm.max(self.due))
+        let next = self.started.filter(|_| still).map(|started| started + STILL_PERIOD);
+        next.map_or(self.due, |next| next.max(self.due))
     }
 
     /// Counts a picture that starts now; returns the time since the one before.

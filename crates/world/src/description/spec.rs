@@ -10,7 +10,7 @@ use metachron_contact::Agent;
 use metachron_core::{Body, CurveState, ResolutionRange, Snapshot};
 use metachron_geometry::{Aabb, ContactTraits, cage_counts};
 use metachron_models::rod::{Integrator, Tube, TubeSpec};
-use metachron_models::soft::{MaterialLaw, NodeSpacing, Side, SoftBody, SoftMatter, SoftShape, SoftSpec};
+use metachron_models::soft::{MaterialLaw, NodeSpacing, Side, SoftBody, SoftMaterial, SoftShape, SoftSpec};
 use std::f64::consts::PI;
 
 /// How an agent is divided into elements, and how its steps are integrated.
@@ -199,7 +199,7 @@ fn rope_of(tube: &TubeSpec, segments: u32) -> Option<SoftSpec> {
     let spec = SoftSpec {
         shape: SoftShape::Rope { path_m: centre_line(tube)?, radius_m, segments },
         nodes: None,
-        matter: SoftMatter {
+        material: SoftMaterial {
             young_pa: tube.section.ea_n / area_m2,
             poisson: 0.3,
             density_kg_m3: tube.section.mass_per_length_kg_m / area_m2,

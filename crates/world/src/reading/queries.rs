@@ -152,15 +152,15 @@ impl World {
         let mut near = Vec::new();
         for (number, solid) in (0..).zip(self.surroundings().statics()) {
             if solid.bounds().meets(*within) {
-                near.push(Near { what: Touched::Fixed(number), matter: PublishedShape::default() });
+                near.push(Near { what: Touched::Fixed(number), shape: PublishedShape::default() });
             }
         }
         for agent in self.agents().iter() {
             let Some(form) = agent.form() else { continue };
-            let mut matter = PublishedShape::default();
-            let known = matter.bring(&agent.latest().body, 0.0);
-            if known && matter.placed(&form).is_some_and(|placed| placed.bounds().meets(*within)) {
-                near.push(Near { what: Touched::Object(self.tag().object(agent.id())), matter });
+            let mut shape = PublishedShape::default();
+            let known = shape.bring(&agent.latest().body, 0.0);
+            if known && shape.placed(&form).is_some_and(|placed| placed.bounds().meets(*within)) {
+                near.push(Near { what: Touched::Object(self.tag().object(agent.id())), shape });
             }
         }
         near
@@ -185,7 +185,7 @@ pub struct Cast<'a> {
 /// Something near a query.
 struct Near {
     what: Touched,
-    matter: PublishedShape,
+    shape: PublishedShape,
 }
 
 /// The solid of a query.
@@ -228,7 +228,7 @@ impl Probe {
             }
             Touched::Object(object) => {
                 let shape = world.agents().of(object.id())?.form()?;
-                touches(&mine, &near.matter.placed(&shape)?, reach_m, scratch, found);
+                touches(&mine, &near.shape.placed(&shape)?, reach_m, scratch, found);
             }
         }
         let best = found.iter().min_by(|a, b| a.gap_m.total_cmp(&b.gap_m))?;

@@ -61,9 +61,9 @@ fn contact_laws(scene: &Scene) -> Vec<PairLaw> {
     let contacts = scene.couplings.iter().filter(|c| c.kind == CouplingKind::Contact);
     let mut laws: BTreeMap<_, _> = contacts.map(|c| ((c.a.min(c.b), c.a.max(c.b)), c.law)).collect();
     if !scene.contacts {
-        let matter: Vec<AgentId> =
+        let solid: Vec<AgentId> =
             scene.agents.iter().filter(|m| !matches!(m.spec, Spec::Synthetic(_))).map(|m| m.id).collect();
-        let pairs = matter.iter().enumerate().flat_map(|(at, a)| matter[at + 1..].iter().map(move |b| (*a, *b)));
+        let pairs = solid.iter().enumerate().flat_map(|(at, a)| solid[at + 1..].iter().map(move |b| (*a, *b)));
         for pair in pairs {
             laws.entry(pair).or_insert(Law::Off);
         }

@@ -29,7 +29,7 @@ impl Attachments for Tube {
     }
 
     fn own_spring(&self, place: usize) -> Option<OwnSpring> {
-        let spring = self.springs.get(lasting(&self.springs).len() + place)?;
+        let spring = self.springs.get(unyielding(&self.springs).len() + place)?;
         let position = *self.unknowns.places.get(spring.node)?;
         let side = if self.is_held(2 * spring.node) { Side::FIXED } else { Side::node(0, 2 * spring.node) };
         Some(OwnSpring {
@@ -52,7 +52,7 @@ impl Tube {
         let Self { spec, springs, now, unknowns, .. } = self;
         let attached = &mut unknowns.attached;
         attached.clear();
-        for spring in lasting(springs) {
+        for spring in unyielding(springs) {
             let (number, force_n) = (spring.attachment, spring.force(now.x[spring.node], now.u[2 * spring.node]));
             let tears_above_n = spec.attachments[number as usize].tears_above_n;
             if tears_above_n == f64::INFINITY {
@@ -67,6 +67,6 @@ impl Tube {
 }
 
 /// Its springs that never yield.
-pub(super) fn lasting(springs: &[NodeSpring]) -> &[NodeSpring] {
+pub(super) fn unyielding(springs: &[NodeSpring]) -> &[NodeSpring] {
     &springs[..springs.partition_point(|spring| !spring.yields())]
 }

@@ -51,7 +51,7 @@ pub fn shake(tube: &Tube, seed: u64) -> RodState {
     state.u.iter_mut().for_each(|u| *u = random.vector() * 2.0);
     state.x.iter_mut().for_each(|x| *x += random.vector() * 0.004);
     state.q.iter_mut().for_each(|q| *q = rotation::unit(rotation::exp(random.vector() * 0.3) * *q));
-    state.strain(tube.matter(), tube.division());
+    state.strain(tube.material(), tube.division());
     state
 }
 

@@ -168,11 +168,11 @@ fn the_published_force_of_a_pull_is_what_moves_the_tube() {
 
 fn published_force_moves(integrator: Integrator) {
     let mut tube = free_tube_by(integrator, 16, 8.0);
-    let hands = [pull(0.43, DVec3::new(0.5, 0.2, 0.1)), pull(0.9, DVec3::new(0.9, 0.0, -0.3))];
+    let user_springs = [pull(0.43, DVec3::new(0.5, 0.2, 0.1)), pull(0.9, DVec3::new(0.9, 0.0, -0.3))];
     let (mut stepper, mut time) = (LoneStepper::default(), SimTime::ZERO);
     for _ in 0..100 {
         let before = tube.momentum().0;
-        let context = StepContext { hands: &hands, ..StepContext::alone(AgentId(0), time) };
+        let context = StepContext { user_springs: &user_springs, ..StepContext::alone(AgentId(0), time) };
         stepper.step(&mut tube, millis(8.0), context).unwrap();
         let force: DVec3 = stepper.grips().iter().map(|g| g.force_n).sum();
         let gained = (tube.momentum().0 - before) / 8e-3;
@@ -188,10 +188,10 @@ fn a_tube_on_a_spring_hangs_where_its_weight_balances_the_spring() {
     spec.gravity = DVec3::NEG_Z * 9.81;
     spec.damping_per_s = 8.0;
     let mut tube = Tube::new(spec).unwrap();
-    let hands = [pull(0.5, DVec3::new(0.5, 0.0, 0.0))];
+    let user_springs = [pull(0.5, DVec3::new(0.5, 0.0, 0.0))];
     let (mut stepper, mut time) = (LoneStepper::default(), SimTime::ZERO);
     for _ in 0..2000 {
-        let context = StepContext { hands: &hands, ..StepContext::alone(AgentId(0), time) };
+        let context = StepContext { user_springs: &user_springs, ..StepContext::alone(AgentId(0), time) };
         stepper.step(&mut tube, millis(10.0), context).unwrap();
         time += millis(10.0);
     }
@@ -242,8 +242,8 @@ fn a_tube_at_rest_reports_it_and_wakes_when_pulled() {
         assert!(!asleep || time > SimTime::from_nanos(500_000_000));
     }
     assert!(asleep);
-    let hands = [pull(1.0, DVec3::new(1.0, 0.0, 0.0))];
-    let context = StepContext { hands: &hands, ..StepContext::alone(AgentId(0), time) };
+    let user_springs = [pull(1.0, DVec3::new(1.0, 0.0, 0.0))];
+    let context = StepContext { user_springs: &user_springs, ..StepContext::alone(AgentId(0), time) };
     assert!(!stepper.step(&mut tube, millis(10.0), context).unwrap().at_rest);
 }
 

@@ -103,7 +103,7 @@ fn a_cantilever_with_a_load_at_its_tip_is_the_elastica() {
         let mut stepper = LoneStepper::default();
         // in longer steps a rod that hardly stretches creeps to its rest (docs/theory/rod.md, section 4)
         for _ in 0..5000 {
-            let context = StepContext { hands: &[hand], ..StepContext::alone(AgentId(0), SimTime::ZERO) };
+            let context = StepContext { user_springs: &[hand], ..StepContext::alone(AgentId(0), SimTime::ZERO) };
             stepper.step(&mut tube, millis(2.0), context).unwrap();
         }
         let error = (*tube.state().x.last().unwrap() - want).length();

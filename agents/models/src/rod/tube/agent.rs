@@ -17,7 +17,7 @@ use std::sync::Arc;
 impl Tube {
     /// Whether it is held somewhere, so that nothing puts it elsewhere.
     fn stays(&self) -> bool {
-        self.matter.held.contains(&true) || !self.spec.attachments.is_empty()
+        self.material.held.contains(&true) || !self.spec.attachments.is_empty()
     }
 }
 
@@ -47,7 +47,7 @@ impl Agent for Tube {
     /// A tube of which an end or a part is held stays where it is, and takes velocities.
     fn set_motion(&mut self, set: &SetMotion) -> bool {
         let stays = self.stays();
-        let Self { now, matter, division, .. } = self;
+        let Self { now, material, division, .. } = self;
         let whole = WholeMotion::new(set, division.node_lengths_m().zip(now.x.iter().copied()));
         if whole.shifts() && stays {
             return false;
@@ -60,13 +60,13 @@ impl Agent for Tube {
             let end = if part == 0 { 0 } else { 1 };
             let is_end = if slot % 2 == 0 { part == 0 || part == count } else { part == 0 || part + 1 == count };
             *u = match slot % 2 {
-                0 if is_end && matter.held[end] => DVec3::ZERO,
+                0 if is_end && material.held[end] => DVec3::ZERO,
                 0 => whole.velocity(now.x[part], *u),
-                _ if is_end && matter.clamp[end] => DVec3::ZERO,
+                _ if is_end && material.clamp[end] => DVec3::ZERO,
                 _ => whole.spin(*u),
             };
         }
-        now.strain(matter, division);
+        now.strain(material, division);
         self.begin_anew();
         true
     }
@@ -97,12 +97,12 @@ impl Agent for Tube {
         self.division.rebuild(&self.skeleton, arcs);
         let mut next = RodState::default();
         let old = MeshedRod { state: &self.now, division: &old };
-        self.remesher.transfer(&self.matter, old, &mut next, &self.division);
+        self.remesher.transfer(&self.material, old, &mut next, &self.division);
         if let Some(wall) = &mut self.wall {
             wall.transfer(old.division, &self.division);
             wall.soften(&mut next.softening);
         }
-        next.strain(&self.matter, &self.division);
+        next.strain(&self.material, &self.division);
         self.now = next;
         self.lay_out_springs();
         self.begin_anew();
@@ -121,10 +121,10 @@ impl Agent for Tube {
     }
 
     fn momentum(&self) -> (DVec3, DVec3) {
-        self.now.momentum(&self.matter, &self.division)
+        self.now.momentum(&self.material, &self.division)
     }
 
     fn mass_kg(&self) -> f64 {
-        self.matter.mu * self.length_m()
+        self.material.mu * self.length_m()
     }
 }

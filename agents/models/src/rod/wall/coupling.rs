@@ -33,7 +33,7 @@ impl Tube {
             division: &self.division,
             drive: Drive { filling: self.filling(), squeeze_m: &squeeze_m },
             curvature: &self.now.curvature,
-            damping_per_s: self.matter.damping,
+            damping_per_s: self.material.damping,
             h_s,
         });
         (self.squeeze_m, self.wall) = (squeeze_m, Some(wall));
@@ -43,7 +43,7 @@ impl Tube {
     /// Moves the wall at `rates` for the `h_s` seconds begun, as far as that makes no energy (eq. 66).
     pub(in crate::rod) fn end_wall(&mut self, rates: &[DVec3], h_s: f64) {
         let filling = self.filling();
-        let Self { wall, now, matter, division, squeeze_m, .. } = self;
+        let Self { wall, now, material, division, squeeze_m, .. } = self;
         let Some(wall) = wall else { return };
         let work_j = wall.work_j(rates);
         let before = [now.elastic_j, wall.energy_j(division, filling), wall.muscle_j(division, squeeze_m)];
@@ -52,7 +52,7 @@ impl Tube {
         for share in SHARES {
             wall.advance(rates, share, h_s);
             wall.soften(&mut now.softening);
-            now.strain(matter, division);
+            now.strain(material, division);
             let after = [now.elastic_j, wall.energy_j(division, filling), wall.muscle_j(division, squeeze_m)];
             let work_j = share * work_j;
             let at_work: f64 = before.iter().chain(&after).map(|part| part.abs()).sum::<f64>() + work_j.abs();

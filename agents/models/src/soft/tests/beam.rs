@@ -4,7 +4,7 @@ use super::*;
 
 const LENGTH_M: f64 = 0.4;
 const HEIGHT_M: f64 = 0.1;
-const BENT: SoftMatter = SoftMatter { young_pa: 1e6, ..MATTER };
+const BENT: SoftMaterial = SoftMaterial { young_pa: 1e6, ..MATERIAL };
 /// Length of a step, seconds: some five hundred in a period.
 const STEP_S: f64 = 1e-4;
 /// How many cells are across the beam, from the coarsest on.
@@ -22,7 +22,7 @@ fn beam(across: u32) -> SoftBody {
     let eps_m = HEIGHT_M / f64::from(across);
     let surface = Arc::new(Triangles { points, ..skin });
     let shape = SoftShape::Embedded { surface, eps_m, range_m: (eps_m, eps_m) };
-    SoftBody::new(SoftSpec { matter: BENT, ..spec(shape) }).unwrap()
+    SoftBody::new(SoftSpec { material: BENT, ..spec(shape) }).unwrap()
 }
 
 /// The frequency of the first bending mode, Hz: after half a period its share comes back through where it was.

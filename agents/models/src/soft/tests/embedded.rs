@@ -27,8 +27,8 @@ fn ball_shape(eps_m: f64) -> SoftShape {
 
 /// The deepest point of a body held at its left after it has come to rest.
 fn sag(shape: SoftShape, young_pa: f64, gravity: DVec3) -> f64 {
-    let matter = SoftMatter { young_pa, damping_per_s: 20.0, ..MATTER };
-    let mut body = SoftBody::new(SoftSpec { matter, held: vec![Side::Left], gravity, ..spec(shape) }).unwrap();
+    let material = SoftMaterial { young_pa, damping_per_s: 20.0, ..MATERIAL };
+    let mut body = SoftBody::new(SoftSpec { material, held: vec![Side::Left], gravity, ..spec(shape) }).unwrap();
     let start = state(&body);
     run(&mut body, 0.01, 600);
     state(&body).positions.iter().zip(&start.positions).map(|(now, was)| now.distance(*was)).fold(0.0, f64::max)
@@ -46,7 +46,7 @@ fn mass_is_that_of_the_volume_and_free_fall_is_exact() {
     for eps_m in [0.2, 0.07, 0.03] {
         let mut body = SoftBody::new(SoftSpec { gravity: G, ..spec(ball_shape(eps_m)) }).unwrap();
         let SoftShape::Embedded { surface, .. } = &body.spec.shape else { panic!() };
-        let mass = surface.volume_m3() * MATTER.density_kg_m3;
+        let mass = surface.volume_m3() * MATERIAL.density_kg_m3;
         assert!((body.mass_kg() / mass - 1.0).abs() < 1e-12);
         run(&mut body, 0.01, 50);
         for v in state(&body).velocities {
@@ -91,8 +91,9 @@ fn shaken_in_cage(shape: SoftShape) -> SoftBody {
 
 #[test]
 fn a_change_of_spacing_leaves_the_skin_where_it_is() {
-    let matter = SoftMatter { young_pa: 1e6, damping_per_s: 20.0, ..MATTER };
-    let mut body = SoftBody::new(SoftSpec { matter, held: vec![Side::Left], gravity: G, ..spec(bar(0.0125)) }).unwrap();
+    let material = SoftMaterial { young_pa: 1e6, damping_per_s: 20.0, ..MATERIAL };
+    let mut body =
+        SoftBody::new(SoftSpec { material, held: vec![Side::Left], gravity: G, ..spec(bar(0.0125)) }).unwrap();
     run(&mut body, 0.01, 300);
     let before = state(&body).positions;
     for (eps_m, within) in [(0.025, 1e-3), (0.05, 3e-3)] {

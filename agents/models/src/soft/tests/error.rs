@@ -13,9 +13,9 @@ fn the_spatial_error_of_a_hanging_rope_is_estimated_within_a_factor_of_three() {
     for (span, segments) in [(0.5, 10), (0.5, 20), (0.5, 40), (0.8, 10), (0.8, 20), (0.8, 40)] {
         let low = DVec3::new(0.5 * span, 0.0, -0.5 * libm::sqrt(1.0 - span * span));
         let shape = SoftShape::Rope { path_m: vec![DVec3::ZERO, low, DVec3::X * span], radius_m: 0.005, segments };
-        let matter = SoftMatter { young_pa: 1e8, damping_per_s: 20.0, ..MATTER };
+        let material = SoftMaterial { young_pa: 1e8, damping_per_s: 20.0, ..MATERIAL };
         let held = vec![Side::Left, Side::Right];
-        let mut body = SoftBody::new(SoftSpec { matter, gravity: G, held, ..spec(shape) }).unwrap();
+        let mut body = SoftBody::new(SoftSpec { material, gravity: G, held, ..spec(shape) }).unwrap();
         run(&mut body, 0.02, 1000);
         let (estimated, truth) = (snapshot(&body).residual_m, off_the_catenary(&body.positions, span));
         let ratio = estimated / truth;

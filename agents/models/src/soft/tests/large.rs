@@ -9,7 +9,7 @@ fn cube(cells: u32) -> SoftShape {
     SoftShape::Box { size_m: DVec3::splat(0.1), segments: [cells; 3] }
 }
 
-const ORGAN: SoftMatter = SoftMatter {
+const ORGAN: SoftMaterial = SoftMaterial {
     young_pa: 12e3,
     poisson: 0.4,
     density_kg_m3: 1050.0,
@@ -20,7 +20,7 @@ const ORGAN: SoftMatter = SoftMatter {
 
 #[test]
 fn gradients_give_the_velocities_of_a_factor() {
-    let held = SoftSpec { matter: ORGAN, gravity: G, held: vec![Side::Bottom], ..spec(cube(8)) };
+    let held = SoftSpec { material: ORGAN, gravity: G, held: vec![Side::Bottom], ..spec(cube(8)) };
     let mut body = SoftBody::new(held).unwrap();
     let mut factor = SparseFactor::default();
     for step in 0..100 {
@@ -43,16 +43,16 @@ fn gradients_give_the_velocities_of_a_factor() {
 
 #[test]
 fn what_is_stiff_is_factored() {
-    let stiff = SoftMatter { young_pa: 1e8, ..ORGAN };
-    let mut body = SoftBody::new(SoftSpec { matter: stiff, held: vec![Side::Bottom], ..spec(cube(8)) }).unwrap();
+    let stiff = SoftMaterial { young_pa: 1e8, ..ORGAN };
+    let mut body = SoftBody::new(SoftSpec { material: stiff, held: vec![Side::Bottom], ..spec(cube(8)) }).unwrap();
     body.predict(0.01, Purpose::Own).unwrap();
     assert!(body.system.response().is_some(), "gradients would take thousands of products");
 }
 
 #[test]
 fn a_large_solid_that_wobbles_keeps_its_momentum_and_makes_no_energy() {
-    let matter = SoftMatter { damping_per_s: 0.0, ..ORGAN };
-    let mut body = SoftBody::new(SoftSpec { matter, velocity: DVec3::X, ..spec(cube(9)) }).unwrap();
+    let material = SoftMaterial { damping_per_s: 0.0, ..ORGAN };
+    let mut body = SoftBody::new(SoftSpec { material, velocity: DVec3::X, ..spec(cube(9)) }).unwrap();
     for (v, x) in body.velocities.iter_mut().zip(&body.positions) {
         *v += DVec3::new(2.0 * x.z, -x.x, 3.0 * x.y);
     }

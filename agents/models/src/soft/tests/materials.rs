@@ -3,8 +3,8 @@
 use super::*;
 use crate::soft::material::{Law, Material};
 
-fn damped(law: MaterialLaw, poisson: f64) -> SoftMatter {
-    SoftMatter { damping_per_s: 20.0, poisson, law, young_pa: 1e4, ..MATTER }
+fn damped(law: MaterialLaw, poisson: f64) -> SoftMaterial {
+    SoftMaterial { damping_per_s: 20.0, poisson, law, young_pa: 1e4, ..MATERIAL }
 }
 
 /// The pull P at a stretch along a bar that is free across, Pa.
@@ -18,8 +18,8 @@ fn pull(law: &Law, along: f64) -> f64 {
 }
 
 /// How much longer a bar hung by its end gets under its weight: P(λ(X)) = ρ g (L − X), by Simpson's rule.
-fn hung_longer(matter: &SoftMatter, length_m: f64) -> f64 {
-    let law = Law::of(matter);
+fn hung_longer(material: &SoftMaterial, length_m: f64) -> f64 {
+    let law = Law::of(material);
     let stretch = |pulled: f64| {
         let (mut low, mut high) = (0.5, 4.0);
         for _ in 0..60 {
@@ -29,7 +29,7 @@ fn hung_longer(matter: &SoftMatter, length_m: f64) -> f64 {
         low
     };
     let count = 40;
-    let at = |i: u32| stretch(matter.density_kg_m3 * 9.81 * length_m * f64::from(i) / f64::from(count)) - 1.0;
+    let at = |i: u32| stretch(material.density_kg_m3 * 9.81 * length_m * f64::from(i) / f64::from(count)) - 1.0;
     let weight = |i: u32| if i == 0 || i == count { 1.0 } else { f64::from(2 + 2 * (i % 2)) };
     (0..=count).map(|i| weight(i) * at(i)).sum::<f64>() * length_m / (3.0 * f64::from(count))
 }
@@ -42,14 +42,14 @@ fn a_bar_hung_by_one_end_stretches_as_its_law_says() {
         (MaterialLaw::Ogden { exponent: 6.0 }, 0.15),
         (MaterialLaw::Corotational, 0.2),
     ] {
-        let matter = damped(law, 0.1);
-        let wanted = hung_longer(&matter, size_m.x);
+        let material = damped(law, 0.1);
+        let wanted = hung_longer(&material, size_m.x);
         assert!(wanted / size_m.x > least, "{wanted}"); // far from small strains
         let box_of = SoftShape::Box { size_m, segments: [16, 2, 2] };
         let mesh = SoftShape::Tetrahedra { mesh: Arc::new(tetrahedra(size_m, [16, 2, 2])), regions: vec![] };
         // the held end cannot grow narrow, least of all that of tetrahedra
         for (shape, most) in [(box_of, 0.015), (mesh, 0.025)] {
-            let spec = SoftSpec { matter, gravity: DVec3::X * 9.81, held: vec![Side::Left], ..spec(shape) };
+            let spec = SoftSpec { material, gravity: DVec3::X * 9.81, held: vec![Side::Left], ..spec(shape) };
             let mut body = SoftBody::new(spec).unwrap();
             run(&mut body, 0.01, 600);
             let ends = state(&body).positions.into_iter().zip(&body.mesh.rest).filter(|(_, rest)| rest.x == size_m.x);
@@ -67,9 +67,9 @@ fn tetrahedra_come_to_the_sag_of_a_beam_at_second_order() {
     let wanted = w * length.powi(4) / (8.0 * 1e5 * i) + w * length * length / (2.0 * 5.0 / 6.0 * 5e4 * a);
     let errors = [2, 4].map(|across| {
         let mesh = Arc::new(tetrahedra(DVec3::new(length, side, side), [4 * across, across, across]));
-        let matter = SoftMatter { young_pa: 1e5, poisson: 0.0, damping_per_s: 20.0, ..MATTER };
+        let material = SoftMaterial { young_pa: 1e5, poisson: 0.0, damping_per_s: 20.0, ..MATERIAL };
         let shape = SoftShape::Tetrahedra { mesh, regions: vec![] };
-        let spec = SoftSpec { matter, gravity: G * 0.1, held: vec![Side::Left], ..spec(shape) };
+        let spec = SoftSpec { material, gravity: G * 0.1, held: vec![Side::Left], ..spec(shape) };
         let mut body = SoftBody::new(spec).unwrap();
         // only the face itself is held
         body.mesh.held = body.mesh.rest.iter().map(|rest| rest.x == 0.0).collect();
@@ -103,9 +103,9 @@ fn a_strip_of_an_irregular_mesh_bends_like_a_plate() {
         if (i + j) % 2 == 0 { [[a, b, c], [a, c, d]] } else { [[a, b, d], [b, c, d]] }
     });
     let surface = Arc::new(Triangles { points, triangles: triangles.collect() });
-    let matter = SoftMatter { young_pa: 1e8, poisson: 0.0, damping_per_s: 20.0, ..MATTER };
+    let material = SoftMaterial { young_pa: 1e8, poisson: 0.0, damping_per_s: 20.0, ..MATERIAL };
     let shape = SoftShape::Shell { surface, thickness_m: thickness };
-    let mut body = SoftBody::new(SoftSpec { matter, gravity: G, ..spec(shape) }).unwrap();
+    let mut body = SoftBody::new(SoftSpec { material, gravity: G, ..spec(shape) }).unwrap();
     let first = length / f64::from(cells[0]);
     body.mesh.held = body.mesh.rest.iter().map(|rest| rest.x < 1.5 * first).collect();
     body.system = body.mesh.system(&body.positions);
@@ -120,7 +120,7 @@ fn a_strip_of_an_irregular_mesh_bends_like_a_plate() {
 #[test]
 fn what_is_turned_inside_out_comes_back() {
     for spec in all().into_iter().filter(|spec| spec.shape.model() == "solid") {
-        let spec = SoftSpec { matter: SoftMatter { damping_per_s: 20.0, ..spec.matter }, ..spec };
+        let spec = SoftSpec { material: SoftMaterial { damping_per_s: 20.0, ..spec.material }, ..spec };
         let mut body = SoftBody::new(spec).unwrap();
         let middle = body.mesh.rest.iter().sum::<DVec3>() / body.mesh.rest.len() as f64;
         body.positions.iter_mut().for_each(|x| x.x = 2.0 * middle.x - x.x);
@@ -129,7 +129,7 @@ fn what_is_turned_inside_out_comes_back() {
             body.energy_j() < 1e-6,
             "{:?} {:?}: {} J",
             body.spec.shape.model(),
-            body.spec.matter.law,
+            body.spec.material.law,
             body.energy_j()
         );
     }

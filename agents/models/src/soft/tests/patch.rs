@@ -39,20 +39,20 @@ fn distorted(law: MaterialLaw) -> SoftBody {
         *point += random(at) * cell_m * 0.25;
     }
     let shape = SoftShape::Tetrahedra { mesh: Arc::new(mesh), regions: vec![] };
-    SoftBody::new(SoftSpec { matter: SoftMatter { law, ..MATTER }, ..spec(shape) }).unwrap()
+    SoftBody::new(SoftSpec { material: SoftMaterial { law, ..MATERIAL }, ..spec(shape) }).unwrap()
 }
 
 /// A ball of six-sided cells, none of them a box.
 fn rounded(law: MaterialLaw) -> SoftBody {
     let shape = SoftShape::Ball { radius_m: 0.1, segments: 4 };
-    SoftBody::new(SoftSpec { matter: SoftMatter { law, ..MATTER }, ..spec(shape) }).unwrap()
+    SoftBody::new(SoftSpec { material: SoftMaterial { law, ..MATERIAL }, ..spec(shape) }).unwrap()
 }
 
 /// A ball in a cage whose cells it cuts.
 fn caged(law: MaterialLaw) -> SoftBody {
     let surface = Arc::new(SoftShape::Ball { radius_m: 0.1, segments: 10 }.skin().unwrap());
     let shape = SoftShape::Embedded { surface, eps_m: 0.025, range_m: (0.025, 0.025) };
-    SoftBody::new(SoftSpec { matter: SoftMatter { law, ..MATTER }, ..spec(shape) }).unwrap()
+    SoftBody::new(SoftSpec { material: SoftMaterial { law, ..MATERIAL }, ..spec(shape) }).unwrap()
 }
 
 const LAWS: [MaterialLaw; 3] =
@@ -94,7 +94,7 @@ fn a_cage_that_deforms_alike_all_over_carries_its_skin_and_has_the_energy_of_its
             .for_each(|(x, wanted)| assert!(x.distance(wanted) < 1e-10, "{law:?}: {x} {wanted}"));
         let SoftShape::Embedded { surface, .. } = &body.spec.shape else { panic!() };
         let stretches = Deformation::of(deformed(), DQuat::from_rotation_x(0.4)).stretches;
-        let wanted_j = Law::of(&body.spec.matter).respond(stretches).energy * surface.volume_m3();
+        let wanted_j = Law::of(&body.spec.material).respond(stretches).energy * surface.volume_m3();
         assert!((body.energy_j() / wanted_j - 1.0).abs() < 1e-9, "{law:?}: {} J, {wanted_j} wanted", body.energy_j());
     }
 }

@@ -63,9 +63,9 @@ fn mass_and_momentum_are_what_is_left_and_what_went() {
 fn a_bar_without_half_of_its_cells_hangs_as_much_longer_as_a_thinner_one() {
     // eight layers along x, of 2 × 2 cells: without those at one side of y a bar of half the section and half the weight
     let size_m = DVec3::new(0.4, 0.1, 0.1);
-    let matter = SoftMatter { poisson: 0.0, young_pa: 1e5, damping_per_s: 20.0, ..MATTER };
+    let material = SoftMaterial { poisson: 0.0, young_pa: 1e5, damping_per_s: 20.0, ..MATERIAL };
     let longer = |shape: SoftShape, cut: bool| {
-        let spec = SoftSpec { matter, gravity: DVec3::X * 9.81, held: vec![Side::Left], ..spec(shape) };
+        let spec = SoftSpec { material, gravity: DVec3::X * 9.81, held: vec![Side::Left], ..spec(shape) };
         let mut body = SoftBody::new(spec).unwrap();
         if cut {
             let upper: Vec<usize> =
@@ -88,9 +88,9 @@ fn a_sheet_without_half_of_its_triangles_sags_as_a_narrower_one() {
         thickness_m: 0.002,
         segments: [8, segments],
     };
-    let matter = SoftMatter { young_pa: 5e6, damping_per_s: 5.0, ..MATTER };
+    let material = SoftMaterial { young_pa: 5e6, damping_per_s: 5.0, ..MATERIAL };
     let sagged = |shape: SoftShape, cut: bool| {
-        let spec = SoftSpec { matter, gravity: G, held: vec![Side::Left], ..spec(shape) };
+        let spec = SoftSpec { material, gravity: G, held: vec![Side::Left], ..spec(shape) };
         let mut body = SoftBody::new(spec).unwrap();
         if cut {
             let outer = Carving { from_m: DVec3::new(-1.0, 0.2, 0.0), to_m: DVec3::new(1.0, 0.2, 0.0), radius_m: 0.1 };
@@ -146,7 +146,7 @@ fn what_is_cut_in_two_parts_falls_apart_and_is_where_its_parts_are() {
     assert_eq!(gone.cells, 8);
     // 4 of its sides were seen, each 2 × 2 squares; the two that are seen now have as many each
     assert_eq!(gone.triangles, 2 * (4 - 2) * 4);
-    assert!((gone.mass_kg - 0.1 * 0.1 * 0.1 * MATTER.density_kg_m3).abs() < 1e-12 && gone.momentum.length() < 1e-14);
+    assert!((gone.mass_kg - 0.1 * 0.1 * 0.1 * MATERIAL.density_kg_m3).abs() < 1e-12 && gone.momentum.length() < 1e-14);
     run(&mut body, 0.005, 100);
     let bounds = body.bounds();
     assert!(bounds.low.x < -0.05 && bounds.high.x > 0.35, "{bounds:?}");
@@ -169,7 +169,7 @@ fn the_skin_loses_the_triangles_of_the_cells_and_closes_over_what_was_inside() {
         let ShapeKind::Surface(skin) = &form.kind else { panic!("a skin") };
         let surface = Triangles { points: state(&body).positions, triangles: skin.triangles.to_vec() };
         assert_eq!(metachron_geometry::is_closed(&surface), is_closed);
-        let volume = body.mass_kg() / MATTER.density_kg_m3;
+        let volume = body.mass_kg() / MATERIAL.density_kg_m3;
         if is_closed && body.spec.shape.model() == "solid" && body.mesh.laws.is_empty() {
             assert!((surface.volume_m3() / volume - 1.0).abs() < 1e-12, "{} {volume}", surface.volume_m3());
         }

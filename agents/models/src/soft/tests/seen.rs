@@ -22,8 +22,9 @@ fn pixel_m(distance_m: f64, fov_deg: f64) -> f64 {
 
 /// The liver of `organ`, the sheet of `mesentery`, and the rope of `catenary` with spacings of its own.
 fn pictured() -> [Pictured; 3] {
-    let matter = |young_pa, poisson| SoftMatter { young_pa, poisson, damping_per_s: 4.0, damping_s: 0.004, ..MATTER };
-    let of = |shape, held, matter| SoftSpec { matter, held, gravity: G, ..spec(shape) };
+    let material =
+        |young_pa, poisson| SoftMaterial { young_pa, poisson, damping_per_s: 4.0, damping_s: 0.004, ..MATERIAL };
+    let of = |shape, held, material| SoftSpec { material, held, gravity: G, ..spec(shape) };
     let nodes = |range_m: (f64, f64)| Some(NodeSpacing { eps_m: range_m.0, range_m });
     let liver = generate_surface(Generator::Liver, 0, 4000);
     let points = liver.points.iter().map(|point| *point * 0.1).collect();
@@ -37,17 +38,21 @@ fn pictured() -> [Pictured; 3] {
     let upright = DQuat::from_rotation_x(std::f64::consts::FRAC_PI_2);
     [
         Pictured {
-            spec: of(organ, vec![Side::Bottom], matter(8e3, 0.45)),
+            spec: of(organ, vec![Side::Bottom], material(8e3, 0.45)),
             range_m: organ_m,
             pixel_m: pixel_m(0.38, 34.0),
         },
         Pictured {
-            spec: SoftSpec { nodes: nodes(sheet_m), rotation: upright, ..of(sheet, vec![Side::Far], matter(8e4, 0.4)) },
+            spec: SoftSpec {
+                nodes: nodes(sheet_m),
+                rotation: upright,
+                ..of(sheet, vec![Side::Far], material(8e4, 0.4))
+            },
             range_m: sheet_m,
             pixel_m: pixel_m(0.45, 38.0),
         },
         Pictured {
-            spec: SoftSpec { nodes: nodes(rope_m), ..of(rope, vec![Side::Left, Side::Right], matter(2e6, 0.3)) },
+            spec: SoftSpec { nodes: nodes(rope_m), ..of(rope, vec![Side::Left, Side::Right], material(2e6, 0.3)) },
             range_m: rope_m,
             pixel_m: pixel_m(0.38, 36.0),
         },

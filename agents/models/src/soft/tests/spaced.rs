@@ -45,8 +45,8 @@ fn shaken_on(spec: SoftSpec) -> SoftBody {
 fn the_finest_spacing_moves_as_the_lattice_itself() {
     for (shape, finest) in [(fine_sheet(), 0.015), (fine_rope(), 0.025)] {
         let mut bodies = [spaced(shape.clone(), finest), spec(shape)].map(|spec| {
-            let matter = SoftMatter { young_pa: 1e6, ..MATTER };
-            shaken_on(SoftSpec { matter, gravity: G, held: vec![Side::Left], ..spec })
+            let material = SoftMaterial { young_pa: 1e6, ..MATERIAL };
+            shaken_on(SoftSpec { material, gravity: G, held: vec![Side::Left], ..spec })
         });
         bodies.iter_mut().for_each(|body| run(body, 0.005, 40));
         assert_eq!(state(&bodies[0]).positions, state(&bodies[1]).positions);
@@ -110,9 +110,9 @@ fn sixty_changes_of_spacing_a_second_keep_mass_and_momentum_and_never_add_energy
 
 #[test]
 fn held_under_gravity_no_change_of_spacing_leaves_more_energy_than_there_was_or_rest_has() {
-    let matter = SoftMatter { young_pa: 1e6, damping_per_s: 3.0, ..MATTER };
+    let material = SoftMaterial { young_pa: 1e6, damping_per_s: 3.0, ..MATERIAL };
     for (shape, length_m) in both() {
-        let held = |eps_m| SoftSpec { matter, gravity: G, held: vec![Side::Left], ..spaced(shape.clone(), eps_m) };
+        let held = |eps_m| SoftSpec { material, gravity: G, held: vec![Side::Left], ..spaced(shape.clone(), eps_m) };
         // another path to the least energy that each spacing can have: steps from the start until it hangs still
         let rest_j = SHARES.map(|share| {
             let mut body = SoftBody::new(held(share * length_m)).unwrap();
@@ -142,10 +142,10 @@ fn held_under_gravity_no_change_of_spacing_leaves_more_energy_than_there_was_or_
 
 #[test]
 fn a_change_of_spacing_leaves_the_skin_where_it_is() {
-    let matter = SoftMatter { young_pa: 1e6, damping_per_s: 20.0, ..MATTER };
+    let material = SoftMaterial { young_pa: 1e6, damping_per_s: 20.0, ..MATERIAL };
     for (shape, length_m) in both() {
         let spec =
-            SoftSpec { matter, gravity: G, held: vec![Side::Left, Side::Right], ..spaced(shape, length_m / 20.0) };
+            SoftSpec { material, gravity: G, held: vec![Side::Left, Side::Right], ..spaced(shape, length_m / 20.0) };
         let mut body = SoftBody::new(spec).unwrap();
         run(&mut body, 0.01, 300);
         let before = state(&body).positions;
@@ -163,8 +163,8 @@ fn a_change_of_spacing_leaves_the_skin_where_it_is() {
 #[test]
 fn a_hand_keeps_its_vertex_of_the_skin_through_changes_of_spacing() {
     for (shape, length_m) in both() {
-        let matter = SoftMatter { young_pa: 1e6, damping_per_s: 10.0, ..MATTER };
-        let mut body = SoftBody::new(SoftSpec { matter, ..spaced(shape, length_m / 20.0) }).unwrap();
+        let material = SoftMaterial { young_pa: 1e6, damping_per_s: 10.0, ..MATERIAL };
+        let mut body = SoftBody::new(SoftSpec { material, ..spaced(shape, length_m / 20.0) }).unwrap();
         let vertex = 7;
         let target = body.seen()[vertex as usize] + DVec3::Z * 0.05;
         let (stiffness_n_m, damping_n_s_m, anchor) = (50.0, 1.0, Anchor::Vertex(vertex));
@@ -173,7 +173,7 @@ fn a_hand_keeps_its_vertex_of_the_skin_through_changes_of_spacing() {
         let mut stepper = LoneStepper::default();
         for cells in [5.0, 20.0, 8.0, 3.0] {
             body.set_resolution(at(length_m / cells));
-            let context = StepContext { hands: &[pull], ..StepContext::alone(AgentId(0), SimTime::ZERO) };
+            let context = StepContext { user_springs: &[pull], ..StepContext::alone(AgentId(0), SimTime::ZERO) };
             for _ in 0..200 {
                 stepper.step(&mut body, dt(0.01), context).unwrap();
             }

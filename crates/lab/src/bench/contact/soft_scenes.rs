@@ -10,11 +10,11 @@ use glam::{DQuat, DVec3};
 use metachron_geometry::Solid;
 use metachron_models::rigid::RigidSpec;
 use metachron_models::rod::{Material, Section, TubeSpec};
-use metachron_models::soft::{MaterialLaw, SoftMatter, SoftShape, SoftSpec};
+use metachron_models::soft::{MaterialLaw, SoftMaterial, SoftShape, SoftSpec};
 
 /// A soft body of the bodies of `agents/models/tests/clusters`.
 fn soft(shape: SoftShape, position: DVec3, young_pa: f64) -> SoftSpec {
-    let matter = SoftMatter {
+    let material = SoftMaterial {
         young_pa,
         poisson: 0.3,
         density_kg_m3: 1000.0,
@@ -22,7 +22,7 @@ fn soft(shape: SoftShape, position: DVec3, young_pa: f64) -> SoftSpec {
         damping_s: 0.0,
         law: MaterialLaw::Corotational,
     };
-    bodies::soft(shape, matter, position)
+    bodies::soft(shape, material, position)
 }
 
 fn solid(middle: DVec3, size_m: DVec3, segments: [u32; 3], young_pa: f64) -> SoftSpec {

@@ -8,7 +8,7 @@ use glam::{DQuat, DVec3};
 use metachron_geometry::{Obstacle, Solid};
 use metachron_models::rigid::{RigidBody, RigidSpec};
 use metachron_models::rod::{Tube, TubeSpec, WallModel};
-use metachron_models::soft::{MaterialLaw, Side, SoftMatter, SoftShape, SoftSpec};
+use metachron_models::soft::{MaterialLaw, Side, SoftMaterial, SoftShape, SoftSpec};
 use metachron_scene::{Source, load};
 use metachron_world::Spec;
 
@@ -24,7 +24,7 @@ const PLATE_KG: f64 = 0.2;
 const SHEET_M: f64 = 0.3;
 
 /// Soft tissue.
-const TISSUE: SoftMatter = SoftMatter {
+const TISSUE: SoftMaterial = SoftMaterial {
     young_pa: 12e3,
     poisson: 0.4,
     density_kg_m3: 1050.0,
@@ -34,8 +34,8 @@ const TISSUE: SoftMatter = SoftMatter {
 };
 
 /// A free soft body.
-pub(in super::super) fn soft(shape: SoftShape, matter: SoftMatter, position: DVec3) -> SoftSpec {
-    SoftSpec { position, friction: 0.5, ..plain_soft(shape, matter) }
+pub(in super::super) fn soft(shape: SoftShape, material: SoftMaterial, position: DVec3) -> SoftSpec {
+    SoftSpec { position, friction: 0.5, ..plain_soft(shape, material) }
 }
 
 /// The cube, free just above the floor, of so many cells along each edge.
@@ -64,18 +64,18 @@ pub(super) fn floor() -> Obstacle {
 
 /// A sheet of 4 mm of so many cells along each edge that hangs from one of its sides.
 pub(super) fn hung_sheet(cells: u32) -> SoftSpec {
-    let matter = SoftMatter { young_pa: 1e5, poisson: 0.3, ..TISSUE };
-    SoftSpec { held: vec![Side::Left], ..soft(sheet(cells), matter, DVec3::ZERO) }
+    let material = SoftMaterial { young_pa: 1e5, poisson: 0.3, ..TISSUE };
+    SoftSpec { held: vec![Side::Left], ..soft(sheet(cells), material, DVec3::ZERO) }
 }
 
 /// The same sheet, free, limp and nearly upright on the floor, so that it falls on its lower edge and folds; it touches itself.
 pub(in super::super) fn falling_sheet(cells: u32) -> SoftSpec {
     /// From level, radians.
     const UPRIGHT_RAD: f64 = 1.45;
-    let matter = SoftMatter { young_pa: 2e4, poisson: 0.3, damping_per_s: 2.0, ..TISSUE };
+    let material = SoftMaterial { young_pa: 2e4, poisson: 0.3, damping_per_s: 2.0, ..TISSUE };
     let rotation = DQuat::from_rotation_y(-UPRIGHT_RAD);
     let position = DVec3::new(0.0, -0.5 * SHEET_M, 0.003);
-    SoftSpec { rotation, self_contact: true, ..soft(sheet(cells), matter, position) }
+    SoftSpec { rotation, self_contact: true, ..soft(sheet(cells), material, position) }
 }
 
 fn sheet(cells: u32) -> SoftShape {

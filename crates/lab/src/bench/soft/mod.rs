@@ -19,7 +19,7 @@ use glam::DVec3;
 use metachron_console::output::message;
 use metachron_contact::Agent;
 use metachron_models::rod::WallModel;
-use metachron_models::soft::{SoftBody, SoftMatter, SoftSpec};
+use metachron_models::soft::{SoftBody, SoftMaterial, SoftSpec};
 use peer::Cube;
 use serde::{Deserialize, Serialize};
 use std::time::Duration;
@@ -254,8 +254,8 @@ impl Case {
 fn held(cells: u32, limits: &Limits) -> anyhow::Result<Row> {
     let spec = bodies::held_cube(cells);
     let nodes = spec.shape.vertices() as usize;
-    let matter = SoftMatter { damping_per_s: FINE_DAMPING_PER_S, ..spec.matter };
-    let finer = SoftSpec { matter, ..spec.clone() };
+    let material = SoftMaterial { damping_per_s: FINE_DAMPING_PER_S, ..spec.material };
+    let finer = SoftSpec { material, ..spec.clone() };
     let mut play = Play::new(vec![boxed(spec)?], &[], STEP_S)?;
     let before = play.points(0);
     play.measured(limits.settle)?;

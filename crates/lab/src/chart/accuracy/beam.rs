@@ -5,7 +5,7 @@ use super::diagram::{Benchmark, Case};
 use super::play::Play;
 use glam::DVec3;
 use metachron_models::rod::Integrator;
-use metachron_models::soft::{MaterialLaw, Side, SoftMatter, SoftShape, SoftSpec};
+use metachron_models::soft::{MaterialLaw, Side, SoftMaterial, SoftShape, SoftSpec};
 
 /// The benchmark.
 pub(in super::super) struct SolidBeam;
@@ -14,7 +14,7 @@ pub(in super::super) struct SolidBeam;
 const HEIGHTS: [(&str, f64); 2] = [("h = L/10", 0.1), ("h = L/20", 0.05)];
 const LENGTH_M: f64 = 0.4;
 /// So stiff that the sag is below 0.2 % of the length: beam theory is one of small angles.
-const MATTER: SoftMatter = SoftMatter {
+const MATERIAL: SoftMaterial = SoftMaterial {
     young_pa: 1e9,
     poisson: 0.0,
     density_kg_m3: 1000.0,
@@ -40,7 +40,7 @@ impl Benchmark for SolidBeam {
         let across = if case.segments < 16 { 1 } else { 2 };
         let shape =
             SoftShape::Box { size_m: DVec3::new(LENGTH_M, side, side), segments: [case.segments, across, across] };
-        let mut play = Play::soft(SoftSpec { held: vec![Side::Left], ..plain_soft(shape, MATTER) }, case)?;
+        let mut play = Play::soft(SoftSpec { held: vec![Side::Left], ..plain_soft(shape, MATERIAL) }, case)?;
         let before = play.point(1.0).z;
         let sound = play.run(SECONDS, &[]);
         let error = ((before - play.point(1.0).z) / sag_m(side) - 1.0).abs();
@@ -50,8 +50,8 @@ impl Benchmark for SolidBeam {
 
 /// w L⁴/8EI + w L²/2κGA, κ = 5/6, G = E/2.
 fn sag_m(side: f64) -> f64 {
-    let (area, young) = (side * side, MATTER.young_pa);
-    let weight_n_m = MATTER.density_kg_m3 * GRAVITY * area;
+    let (area, young) = (side * side, MATERIAL.young_pa);
+    let weight_n_m = MATERIAL.density_kg_m3 * GRAVITY * area;
     let bend = young * area * area / 12.0;
     let shear = 5.0 / 6.0 * 0.5 * young * area;
     weight_n_m * LENGTH_M.powi(4) / (8.0 * bend) + weight_n_m * LENGTH_M.powi(2) / (2.0 * shear)

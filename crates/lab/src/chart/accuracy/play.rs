@@ -74,12 +74,12 @@ impl Play {
     }
 
     /// Steps on for `seconds` under `hands`; whether every step succeeded.
-    pub(super) fn run(&mut self, seconds: f64, hands: &[AnchorSpring]) -> bool {
+    pub(super) fn run(&mut self, seconds: f64, user_springs: &[AnchorSpring]) -> bool {
         let until = self.time.as_secs_f64() + seconds - 0.5 * self.dt.as_secs_f64();
         let start = ThreadTime::now();
         let mut sound = true;
         while sound && self.time.as_secs_f64() < until {
-            let context = StepContext { hands, ..StepContext::alone(AgentId(0), self.time) };
+            let context = StepContext { user_springs, ..StepContext::alone(AgentId(0), self.time) };
             match self.stepper.step(&mut *self.agent, self.dt, context) {
                 Ok(report) => self.substeps += u64::from(report.substeps * self.substeps_each),
                 Err(_) => sound = false,

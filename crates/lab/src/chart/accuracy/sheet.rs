@@ -4,7 +4,7 @@ use super::super::stability::common::{GRAVITY, plain_soft};
 use super::diagram::{Benchmark, Case};
 use super::play::Play;
 use metachron_models::rod::Integrator;
-use metachron_models::soft::{MaterialLaw, Side, SoftMatter, SoftShape, SoftSpec};
+use metachron_models::soft::{MaterialLaw, Side, SoftMaterial, SoftShape, SoftSpec};
 
 /// The benchmark.
 pub(in super::super) struct Sheet;
@@ -32,7 +32,7 @@ impl Benchmark for Sheet {
         let (_, young_pa) = MODULI.into_iter().find(|(name, _)| *name == case.case)?;
         let segments = [case.segments, (case.segments / 4).max(1)];
         let shape = SoftShape::Sheet { size_m: [SPAN_M, WIDTH_M], thickness_m: THICKNESS_M, segments };
-        let matter = SoftMatter {
+        let material = SoftMaterial {
             young_pa,
             poisson: 0.0,
             density_kg_m3: DENSITY_KG_M3,
@@ -40,7 +40,8 @@ impl Benchmark for Sheet {
             damping_s: 0.0,
             law: MaterialLaw::Corotational,
         };
-        let mut play = Play::soft(SoftSpec { held: vec![Side::Left, Side::Right], ..plain_soft(shape, matter) }, case)?;
+        let mut play =
+            Play::soft(SoftSpec { held: vec![Side::Left, Side::Right], ..plain_soft(shape, material) }, case)?;
         let sound = play.run(SECONDS, &[]);
         let error = (-play.lowest_m() - sag_m(young_pa)).abs() / SPAN_M;
         sound.then_some((play, error))

@@ -64,7 +64,7 @@ struct Actor {
     /// The state visible to others, and the one visible before.
     shown: [Arc<Snapshot>; 2],
     /// Springs from fixed points.
-    hands: Vec<AnchorSpring>,
+    user_springs: Vec<AnchorSpring>,
     links: Vec<Link>,
     /// Its weight, for an audit.
     weight: Weight,
@@ -112,7 +112,7 @@ impl StepHarness {
             rate_hz,
             own,
             shown,
-            hands: Vec::new(),
+            user_springs: Vec::new(),
             links: Vec::new(),
             weight,
             last_s: 0.0,
@@ -122,8 +122,8 @@ impl StepHarness {
     }
 
     /// Attaches fixed springs to an agent.
-    pub(in super::super) fn attach_springs(&mut self, id: AgentId, hands: Vec<AnchorSpring>) {
-        self.actors[id.0 as usize].hands = hands;
+    pub(in super::super) fn attach_springs(&mut self, id: AgentId, user_springs: Vec<AnchorSpring>) {
+        self.actors[id.0 as usize].user_springs = user_springs;
     }
 
     /// An agent's own newest state, visible to others or not.
@@ -177,8 +177,8 @@ impl StepHarness {
         let actor = &mut self.actors[i];
         let time = actor.own.time;
         let dt = SimSpan::from_secs_f64(stretch / actor.rate_hz).unwrap_or(SimSpan::ZERO);
-        let Actor { agent, own, hands, links, cluster, weight, .. } = actor;
-        let context = StepContext { neighbours: &neighbours, hands, links, ..StepContext::alone(me, time) };
+        let Actor { agent, own, user_springs, links, cluster, weight, .. } = actor;
+        let context = StepContext { neighbours: &neighbours, user_springs, links, ..StepContext::alone(me, time) };
         cluster.step(agent.as_mut(), &self.scene, Around { context, law: self.law }, dt)?;
         actor.last_s = dt.as_secs_f64();
         own.clear();

@@ -41,7 +41,7 @@ pub(in super::super) fn push_off_n(approach: Approach, stiffness_n_m: f64, dampi
 /// Overlaps of two skins.
 #[derive(Default)]
 pub(in super::super) struct Overlaps {
-    matter: PublishedShape,
+    shape: PublishedShape,
     narrow: NarrowPhaseScratch,
     touches: Vec<Touch>,
 }
@@ -59,15 +59,15 @@ impl Overlaps {
         let since_s = if extrapolate { one.context.time.secs_after(other.snapshot.time) } else { 0.0 };
         let (Some(skin), Some(form)) = (one.member.skin(), other.form.as_deref()) else { return };
         let body = &other.snapshot.body;
-        if !self.matter.bring(body, since_s) {
+        if !self.shape.bring(body, since_s) {
             return;
         }
-        let Some(theirs) = self.matter.placed(form) else { return };
+        let Some(theirs) = self.shape.placed(form) else { return };
         touches(&skin, &theirs, 0.0, &mut self.narrow, &mut self.touches);
         let friction = (skin.form.friction * form.friction).sqrt();
         for touch in self.touches.iter().filter(|touch| touch.gap_m < 0.0) {
             let side = one.member.skin_point(&touch.on_a, ContactSide::first(touch.normal)).side;
-            let velocity_m_s = side.velocity(one.member.system().velocities) - self.matter.velocity(body, &touch.on_b);
+            let velocity_m_s = side.velocity(one.member.system().velocities) - self.shape.velocity(body, &touch.on_b);
             let approach = Approach { gap_m: touch.gap_m, normal: touch.normal, velocity_m_s };
             let impulse = push_off_n(approach, stiffness_n_m, damping_n_s_m, friction) * dt_s;
             known.push(KnownImpulse { member: 0, side, impulse });

@@ -6,7 +6,7 @@ use metachron_core::Anchor;
 use metachron_geometry::{ContactTraits, Solid};
 use metachron_models::rigid::RigidSpec;
 use metachron_models::rod::{Material, Section, TubeSpec};
-use metachron_models::soft::{SoftMatter, SoftShape, SoftSpec};
+use metachron_models::soft::{SoftMaterial, SoftShape, SoftSpec};
 
 /// Gravity of the Earth, m/s².
 pub(crate) const GRAVITY: f64 = 9.81;
@@ -29,11 +29,11 @@ pub(in super::super) fn plain_body(solid: Solid, position: DVec3, mass_kg: f64) 
 }
 
 /// A soft body under gravity, attached nowhere, no friction.
-pub(crate) fn plain_soft(shape: SoftShape, matter: SoftMatter) -> SoftSpec {
+pub(crate) fn plain_soft(shape: SoftShape, material: SoftMaterial) -> SoftSpec {
     SoftSpec {
         shape,
         nodes: None,
-        matter,
+        material,
         position: DVec3::ZERO,
         rotation: DQuat::IDENTITY,
         velocity: DVec3::ZERO,

@@ -64,7 +64,7 @@ struct ControlledValue {
     range: (f64, f64),
     value: f64,
     orders: Orders,
-    calm: u32,
+    turns_within: u32,
     patience: u32,
     /// The value before the last coarsening, if that is not confirmed yet.
     coarsened_from: Option<f64>,
@@ -87,7 +87,7 @@ impl ControlledValue {
     fn new(range: (f64, f64), start: f64, orders: Orders) -> Self {
         let range = (range.0, range.1.max(range.0));
         let value = start.clamp(range.0, range.1);
-        Self { range, value, orders, calm: 0, patience: PATIENCE.0, coarsened_from: None }
+        Self { range, value, orders, turns_within: 0, patience: PATIENCE.0, coarsened_from: None }
     }
 
     fn steers(&self) -> bool {
@@ -116,13 +116,13 @@ impl ControlledValue {
             self.value = before;
         }
         if self.value > before {
-            (self.coarsened_from, self.calm) = (Some(before), 0);
+            (self.coarsened_from, self.turns_within) = (Some(before), 0);
         }
         self.value != before
     }
 
     fn refine(&mut self, error_m: f64, allowed_m: f64) {
-        self.calm = 0;
+        self.turns_within = 0;
         let wanted = libm::pow(SET * allowed_m / error_m, 1.0 / self.orders.least).max(1.0 / REFINE_MAX);
         self.value = (self.value * wanted).max(self.range.0);
         if let Some(from) = self.coarsened_from.take() {
@@ -132,11 +132,11 @@ impl ControlledValue {
     }
 
     fn coarsen(&mut self, error_m: f64, allowed_m: f64) {
-        self.calm = self.calm.saturating_add(1);
-        if self.calm >= PROOF * self.patience && self.coarsened_from.take().is_some() {
+        self.turns_within = self.turns_within.saturating_add(1);
+        if self.turns_within >= PROOF * self.patience && self.coarsened_from.take().is_some() {
             self.patience = (self.patience / 2).max(PATIENCE.0);
         }
-        if error_m < LEAST * allowed_m && self.calm >= self.patience {
+        if error_m < LEAST * allowed_m && self.turns_within >= self.patience {
             let wanted = libm::pow(SET * allowed_m / error_m.max(f64::MIN_POSITIVE), 1.0 / self.orders.greatest);
             self.value = (self.value * wanted.min(COARSEN_MAX)).min(self.range.1);
         }

@@ -314,8 +314,8 @@ mod tests {
         let found = Prices::fitted(&pictures(1, &machine)).unwrap().by_lines();
         // without interruptions: no model predicts these
         let others = pictures(2, &machine);
-        let calm = others.iter().filter(|p| p.seconds < 1.3 * machine.predict_s(p));
-        let mut errors: Vec<_> = calm.map(|p| (found.predict_s(p) / p.seconds - 1.0).abs()).collect();
+        let ordinary = others.iter().filter(|p| p.seconds < 1.3 * machine.predict_s(p));
+        let mut errors: Vec<_> = ordinary.map(|p| (found.predict_s(p) / p.seconds - 1.0).abs()).collect();
         errors.sort_by(f64::total_cmp);
         assert!(errors[errors.len() * 95 / 100] < 0.1, "{:?} of {found:?}", errors[errors.len() * 95 / 100]);
     }

@@ -37,7 +37,7 @@ pub struct Explanation {
 
 /// Starts of the trials, as fractions of the target rate.
 const STARTS: [f64; 7] = [0.25, 0.4, 0.63, 1.0, 1.6, 2.5, 4.0];
-/// Duration of a calm trial, seconds.
+/// Duration of a trial without a disturbance, seconds.
 const TRIAL_S: f64 = 12.0;
 /// A loop whose ε̂ stays within this relative range is at rest.
 const REST_BAND: f64 = 1e-4;
@@ -46,11 +46,11 @@ const REST_BAND: f64 = 1e-4;
 #[must_use]
 pub fn explain(plant: &Plant, candidate: impl Into<Candidate>, target_hz: f64) -> Explanation {
     let candidate = candidate.into();
-    let calm = |rate: f64| {
-        let trial = Trial { start: Start::Rate(rate), seconds: TRIAL_S, ..Trial::calm(candidate, target_hz) };
+    let undisturbed = |rate: f64| {
+        let trial = Trial { start: Start::Rate(rate), seconds: TRIAL_S, ..Trial::undisturbed(candidate, target_hz) };
         play(plant, &trial)
     };
-    let played = STARTS.map(calm);
+    let played = STARTS.map(undisturbed);
     let runs = played.each_ref().map(|frames| Measures::of(frames));
     let set_s = candidate.set_share() / target_hz;
     let mut explanation = Explanation {

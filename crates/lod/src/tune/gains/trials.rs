@@ -104,10 +104,14 @@ pub fn judge(plant: &Plant, candidate: impl Into<Candidate>, target_hz: f64, ext
     let far = |speed: f64| libm::fabs(libm::log(speed));
     let own = asked.iter().copied().min_by(|a, b| far(*a).total_cmp(&far(*b))).unwrap_or(1.0);
     let seconds = 1e-3 * extent.millis as f64;
-    let calm =
-        |speed: f64, rate: f64| Trial { speed, start: Start::Rate(rate), seconds, ..Trial::calm(candidate, target_hz) };
-    let starts: Vec<_> = asked.iter().flat_map(|&speed| STARTS.map(|rate| calm(speed, rate))).collect();
-    let upset = disturbed(&calm(own, 1.0), plant.line.scatter, extent);
+    let undisturbed = |speed: f64, rate: f64| Trial {
+        speed,
+        start: Start::Rate(rate),
+        seconds,
+        ..Trial::undisturbed(candidate, target_hz)
+    };
+    let starts: Vec<_> = asked.iter().flat_map(|&speed| STARTS.map(|rate| undisturbed(speed, rate))).collect();
+    let upset = disturbed(&undisturbed(own, 1.0), plant.line.scatter, extent);
     let played = measure(plant, &[starts.clone(), upset.clone()].concat(), extent.threads);
     let (settling, upset_by) = played.split_at(starts.len());
     let mean = |value: fn(&Measures) -> f64| mean(&upset, upset_by, value);
@@ -183,11 +187,11 @@ impl Margins {
 }
 
 /// Trials with every disturbance and every seed; one of each that the seed does not change.
-fn disturbed(calm: &Trial, noise: f64, extent: Extent) -> Vec<Trial> {
+fn disturbed(undisturbed: &Trial, noise: f64, extent: Extent) -> Vec<Trial> {
     let of = |disturbance: Disturbance| {
         let by_chance = disturbance.is_random() || noise > NOISE_LEAST;
         let seeds = if by_chance { extent.seeds.max(1) } else { 1 };
-        (1..=seeds).map(move |seed| Trial { disturbance, seed, noise, start: Start::Target, ..*calm })
+        (1..=seeds).map(move |seed| Trial { disturbance, seed, noise, start: Start::Target, ..*undisturbed })
     };
     Disturbance::ALL.into_iter().flat_map(of).collect()
 }
@@ -263,10 +267,10 @@ mod tests {
 
     #[test]
     fn trials_without_randomness_run_once_and_weigh_as_much() {
-        let calm = Trial::calm(Law::CORRECTED, 30.0);
+        let undisturbed = Trial::undisturbed(Law::CORRECTED, 30.0);
         let extent = Extent { seeds: 10, millis: 500, threads: None };
-        let still = disturbed(&calm, 0.0, extent);
-        assert_eq!((still.len(), disturbed(&calm, 0.01, extent).len()), (17, 80));
+        let still = disturbed(&undisturbed, 0.0, extent);
+        assert_eq!((still.len(), disturbed(&undisturbed, 0.01, extent).len()), (17, 80));
         let plant = Plant::identify(&observed(7e-3, 0.22e-6, 0)).unwrap();
         let ten = |trial: &Trial| (1..=10).map(|seed| Trial { seed, ..*trial }).collect::<Vec<_>>();
         let all: Vec<_> = still.iter().filter(|trial| trial.seed == 1).flat_map(ten).collect();

@@ -97,6 +97,7 @@ fn learning(plant: &Plant, set_s: f64, target_hz: f64, speed: f64) -> f64 {
 
 /// The starting ε̂ of a law that is placed at the target time.
 fn rest_of(candidate: Candidate, plant: &Plant, target_hz: f64, speed: f64) -> f64 {
-    let trial = Trial { speed, start: Start::Target, seconds: 0.5 / target_hz, ..Trial::calm(candidate, target_hz) };
+    let trial =
+        Trial { speed, start: Start::Target, seconds: 0.5 / target_hz, ..Trial::undisturbed(candidate, target_hz) };
     play(plant, &trial).first().map_or(1.0, |frame| frame.eps_hat)
 }

@@ -40,7 +40,7 @@ pub fn fixed_points(plant: &Plant, candidate: Candidate, target_hz: f64) -> Vec<
         Candidate::Feedback(Law::Printed { beta, .. }) => {
             crossings(&along_the_line(plant, candidate, target_hz, beta), set_s)
         }
-        Candidate::Adaptive { .. } => end_of_calm_trial(plant, candidate, target_hz),
+        Candidate::Adaptive { .. } => end_of_undisturbed_trial(plant, candidate, target_hz),
     }
 }
 
@@ -98,9 +98,9 @@ fn crossings(places: &[(f64, f64)], set_s: f64) -> Vec<FixedPoint> {
     first.into_iter().chain(within).chain(last).collect()
 }
 
-/// The single fixed point of a predicting policy, which budgets by its prediction: the end of a calm trial.
-fn end_of_calm_trial(plant: &Plant, candidate: Candidate, target_hz: f64) -> Vec<FixedPoint> {
-    let trial = Trial { start: Start::Target, seconds: REST_S, ..Trial::calm(candidate, target_hz) };
+/// The single fixed point of a predicting policy, which budgets by its prediction: the end of a trial without a disturbance.
+fn end_of_undisturbed_trial(plant: &Plant, candidate: Candidate, target_hz: f64) -> Vec<FixedPoint> {
+    let trial = Trial { start: Start::Target, seconds: REST_S, ..Trial::undisturbed(candidate, target_hz) };
     let last = play(plant, &trial).last().map(|frame| FixedPoint {
         eps_hat: frame.eps_hat,
         ratio: frame.ratio,

@@ -43,7 +43,7 @@ pub struct Trial {
 impl Trial {
     /// Ten seconds at rest on the plant's own machine, without noise.
     #[must_use]
-    pub fn calm(candidate: impl Into<Candidate>, target_hz: f64) -> Self {
+    pub fn undisturbed(candidate: impl Into<Candidate>, target_hz: f64) -> Self {
         Self {
             candidate: candidate.into(),
             target_hz,
@@ -214,7 +214,7 @@ mod tests {
     use super::*;
 
     fn trial(start: Start) -> Trial {
-        Trial { start, seed: 1, seconds: 2.0, ..Trial::calm(Law::CORRECTED, 30.0) }
+        Trial { start, seed: 1, seconds: 2.0, ..Trial::undisturbed(Law::CORRECTED, 30.0) }
     }
 
     #[test]

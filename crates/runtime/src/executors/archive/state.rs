@@ -177,7 +177,7 @@ impl AgentRunner {
         archive.fixed("whether it has a governor", self.governor.is_some())?;
         self.governor.iter_mut().try_for_each(|governor| governor.archive(archive))?;
         archive.fixed("whether it is a member of clusters", self.cluster.is_some())?;
-        self.cluster.iter_mut().try_for_each(|seat| seat.archive(archive))?;
+        self.cluster.iter_mut().try_for_each(|member| member.archive(archive))?;
         archive.option(self.writer.filled_mut(), Arc::default, |state, archive| archive.snapshot(state))?;
         self.observer.archive(archive)
     }
@@ -217,7 +217,7 @@ impl AgentRunner {
             filled: self.writer.filled_mut().take(),
             loads: self.loads.take(),
             neighbour_list: self.observer.neighbour_list_mut().take(),
-            steppers: self.cluster.as_mut().map(|seat| seat.take_steppers()),
+            steppers: self.cluster.as_mut().map(|member| member.take_steppers()),
         }
     }
 
@@ -226,8 +226,8 @@ impl AgentRunner {
         *self.writer.filled_mut() = filled;
         self.loads = loads;
         *self.observer.neighbour_list_mut() = neighbour_list;
-        if let (Some(seat), Some(steppers)) = (&mut self.cluster, steppers) {
-            seat.put_steppers(steppers);
+        if let (Some(member), Some(steppers)) = (&mut self.cluster, steppers) {
+            member.put_steppers(steppers);
         }
     }
 }

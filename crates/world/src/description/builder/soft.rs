@@ -5,7 +5,7 @@
 use super::RATE_DEFAULT_HZ;
 use glam::{DQuat, DVec3};
 use metachron_geometry::{ContactTraits, Triangles};
-use metachron_models::soft::{MaterialLaw, Side, SoftMatter, SoftShape, SoftSpec};
+use metachron_models::soft::{MaterialLaw, Side, SoftMaterial, SoftShape, SoftSpec};
 use std::sync::Arc;
 
 /// Friction, Poisson's ratio and density (kg/m³) of a soft body where it does not say otherwise.
@@ -35,7 +35,7 @@ impl Soft {
             _ => DVec3::ZERO,
         };
         let self_contact = !matches!(shape.model(), "solid");
-        let matter = SoftMatter {
+        let material = SoftMaterial {
             young_pa: YOUNG_PA,
             poisson: POISSON,
             density_kg_m3: DENSITY_KG_M3,
@@ -46,7 +46,7 @@ impl Soft {
         let spec = SoftSpec {
             shape,
             nodes: None,
-            matter,
+            material,
             position: DVec3::ZERO,
             rotation: DQuat::IDENTITY,
             velocity: DVec3::ZERO,
@@ -99,14 +99,14 @@ impl Soft {
         turned: DQuat => spec.rotation;
         /// Velocity at the start, m/s.
         velocity_m_s: [f64; 3] => spec.velocity;
-        /// Young's modulus, Pa; its range is in [`MATTER`](metachron_models::soft::MATTER), as are the next three.
-        young_pa: f64 => spec.matter.young_pa;
+        /// Young's modulus, Pa; its range is in [`MATERIAL`](metachron_models::soft::MATERIAL), as are the next three.
+        young_pa: f64 => spec.material.young_pa;
         /// Poisson's ratio.
-        poisson: f64 => spec.matter.poisson;
+        poisson: f64 => spec.material.poisson;
         /// Density, kg/m³.
-        density_kg_m3: f64 => spec.matter.density_kg_m3;
+        density_kg_m3: f64 => spec.material.density_kg_m3;
         /// How the stress of a solid follows from its strain.
-        law: MaterialLaw => spec.matter.law;
+        law: MaterialLaw => spec.material.law;
         /// The sides that never move; of a rope left is its start and right its end.
         hold: &[Side] => spec.held;
         /// Coulomb friction coefficient of its skin, within [`FRICTION`](metachron_geometry::FRICTION).
@@ -122,7 +122,7 @@ impl Soft {
     /// Damping of its motion, 1/s, and of its strains, s.
     #[must_use]
     pub const fn damping(mut self, per_s: f64, of_strain_s: f64) -> Self {
-        (self.spec.matter.damping_per_s, self.spec.matter.damping_s) = (per_s, of_strain_s);
+        (self.spec.material.damping_per_s, self.spec.material.damping_s) = (per_s, of_strain_s);
         self
     }
 

@@ -41,8 +41,8 @@ impl Benchmark for EndMoment {
         let [rises, stays] = SECONDS;
         let mut sound = true;
         while sound && play.time_s() < rises + stays {
-            let hands = couple(&play, moment * (play.time_s() / rises).min(1.0));
-            sound = play.run(case.dt_ms * 1e-3, &hands);
+            let user_springs = couple(&play, moment * (play.time_s() / rises).min(1.0));
+            sound = play.run(case.dt_ms * 1e-3, &user_springs);
         }
         let error = LOOKS.map(|s| at(&play, s).distance(circle_m(angle, s))).into_iter().fold(0.0, f64::max);
         sound.then_some((play, error))

@@ -188,8 +188,8 @@ pub(crate) fn settled(times: &[f64], step: usize, later: std::ops::Range<usize>)
         near.sort_by(f64::total_cmp);
         near[SETTLE_MEDIAN / 2]
     };
-    let calm = |k: &usize| (0..SETTLE_HOLD).all(|j| (median(step + k + j) / goal - 1.0).abs() <= SETTLE_BAND);
-    (0..later.end - step - SETTLE_HOLD - SETTLE_MEDIAN).find(calm).map_or(f64::NAN, |k| k as f64)
+    let holds = |k: &usize| (0..SETTLE_HOLD).all(|j| (median(step + k + j) / goal - 1.0).abs() <= SETTLE_BAND);
+    (0..later.end - step - SETTLE_HOLD - SETTLE_MEDIAN).find(holds).map_or(f64::NAN, |k| k as f64)
 }
 
 #[cfg(test)]

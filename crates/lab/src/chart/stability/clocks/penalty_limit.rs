@@ -99,11 +99,11 @@ fn decays(case: &Case, stiffness_n_m: f64) -> bool {
     let Some(Pair { play, zero_j, .. }) = set else { return false };
     let start_j = play.raw_j() - zero_j;
     // under the weight springs and contact sag below the zero of energy: energy above it is kinetic
-    let mut calm = true;
+    let mut is_stable = true;
     let ended = play.run(SECONDS, |play, _| {
         let left = (play.raw_j() - zero_j) / start_j;
-        calm = calm && left < 10.0 && (play.time().as_secs_f64() < LATE_S || left < LEFT);
-        calm
+        is_stable = is_stable && left < 10.0 && (play.time().as_secs_f64() < LATE_S || left < LEFT);
+        is_stable
     });
-    calm && ended.time().as_secs_f64() >= SECONDS - 0.2
+    is_stable && ended.time().as_secs_f64() >= SECONDS - 0.2
 }

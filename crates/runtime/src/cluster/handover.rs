@@ -32,15 +32,15 @@ type Arrival = Box<AgentRunner>;
 #[derive(Default)]
 pub(in super::super) struct Led {
     /// By rising numbers.
-    pub(super) seats: Vec<Seat>,
+    pub(super) agents: Vec<LedAgent>,
     /// All that step as one in this turn, the leader among them.
     pub(super) membership: Membership,
 }
 
 /// One that is led.
-pub(super) struct Seat {
+pub(super) struct LedAgent {
     pub actor: Box<AgentRunner>,
-    /// Zero while it stays; else it leaves, together with the seats of the same number.
+    /// Zero while it stays; else it leaves, together with the agents of the same number.
     pub group: usize,
 }
 
@@ -89,36 +89,36 @@ impl Led {
     }
 
     pub fn is_empty(&self) -> bool {
-        self.seats.is_empty()
+        self.agents.is_empty()
     }
 
     pub fn len(&self) -> usize {
-        self.seats.len()
+        self.agents.len()
     }
 
     pub fn ids(&self) -> impl Iterator<Item = AgentId> {
-        self.seats.iter().map(|seat| seat.actor.id())
+        self.agents.iter().map(|member| member.actor.id())
     }
 
     pub fn each(&mut self, mut visit: impl FnMut(&mut AgentRunner)) {
-        self.seats.iter_mut().for_each(|seat| visit(&mut seat.actor));
+        self.agents.iter_mut().for_each(|member| visit(&mut member.actor));
     }
 
     /// All of them, by rising numbers.
     pub fn all(&self) -> impl Iterator<Item = &AgentRunner> {
-        self.seats.iter().map(|seat| &*seat.actor)
+        self.agents.iter().map(|member| &*member.actor)
     }
 
     /// The members at `time`, by rising numbers.
     pub fn members_at(&mut self, time: SimTime) -> impl Iterator<Item = &mut AgentRunner> {
-        self.seats.iter_mut().map(|seat| &mut *seat.actor).filter(move |actor| actor.pace.time() == time)
+        self.agents.iter_mut().map(|member| &mut *member.actor).filter(move |actor| actor.pace.time() == time)
     }
 
     /// Visits the members at `time`, each with all that step as one.
     pub fn each_at(&mut self, time: SimTime, mut visit: impl FnMut(&mut AgentRunner, &Membership)) {
-        let Self { seats, membership } = self;
-        let here = seats.iter_mut().filter(|seat| seat.actor.pace.time() == time);
-        here.for_each(|seat| visit(&mut seat.actor, membership));
+        let Self { agents, membership } = self;
+        let here = agents.iter_mut().filter(|member| member.actor.pace.time() == time);
+        here.for_each(|member| visit(&mut member.actor, membership));
     }
 
     /// All that step as one, the leader among them, when that was last noted.
@@ -128,41 +128,41 @@ impl Led {
 
     /// Notes which agents step as one with `leader` at `time`.
     pub fn note_membership(&mut self, leader: AgentId, time: SimTime) {
-        let Self { seats, membership } = self;
-        membership.set(leader, seats.iter().filter(|s| s.actor.pace.time() == time).map(|s| s.actor.id()));
+        let Self { agents, membership } = self;
+        membership.set(leader, agents.iter().filter(|s| s.actor.pace.time() == time).map(|s| s.actor.id()));
     }
 
     /// Notes which of the members at `time` still belong together: the leader is the first of `sets`, they follow by
     /// rising numbers.
     pub fn note_groups(&mut self, time: SimTime, sets: &mut DisjointSets) {
-        let members = self.seats.iter_mut().filter(|seat| seat.actor.pace.time() == time);
-        members.zip(1..).for_each(|(seat, place)| seat.group = sets.lowest(place));
+        let members = self.agents.iter_mut().filter(|member| member.actor.pace.time() == time);
+        members.zip(1..).for_each(|(member, place)| member.group = sets.lowest(place));
     }
 
     /// Lets parked agents return.
     pub fn release_parked(&mut self) {
-        self.seats.extract_if(.., |seat| seat.actor.is_parked()).for_each(|mut seat| {
-            if seat.actor.shared.gauges.has_left() {
-                seat.actor.vanish();
-                seat.actor.forget();
+        self.agents.extract_if(.., |member| member.actor.is_parked()).for_each(|mut member| {
+            if member.actor.shared.gauges.has_left() {
+                member.actor.vanish();
+                member.actor.forget();
             }
-            seat.actor.return_turns();
+            member.actor.return_turns();
         });
     }
 
     /// Lets the members return that have refused the step that was made last, each by itself.
     pub(super) fn release_refusing(&mut self) {
-        let refusing = self.seats.extract_if(.., |seat| seat.actor.model.take_refused());
-        refusing.for_each(|seat| seat.actor.return_turns());
+        let refusing = self.agents.extract_if(.., |member| member.actor.model.take_refused());
+        refusing.for_each(|member| member.actor.return_turns());
     }
 
     /// Adds `actor` and all it leads.
     fn admit(&mut self, mut actor: Box<AgentRunner>) {
         // where it will be when it makes its own turns again is not known
         actor.was_near = None;
-        self.seats.append(&mut actor.led.seats);
-        self.seats.push(Seat { actor, group: 0 });
-        self.seats.sort_unstable_by_key(|seat| seat.actor.id());
+        self.agents.append(&mut actor.led.agents);
+        self.agents.push(LedAgent { actor, group: 0 });
+        self.agents.sort_unstable_by_key(|member| member.actor.id());
     }
 }
 
@@ -175,7 +175,7 @@ impl AgentRunner {
         }
         // an arrival may have arrivals of its own
         while at < self.led.len() {
-            let arrived = self.led.seats[at].actor.next_arrival();
+            let arrived = self.led.agents[at].actor.next_arrival();
             at = if let Some(actor) = arrived {
                 self.admit(actor);
                 0
@@ -201,9 +201,9 @@ impl AgentRunner {
         if self.led.is_empty() {
             return;
         }
-        let leaving = self.led.seats.extract_if(.., |seat| seat.group != 0);
-        let mut leaving: Vec<Seat> = leaving.collect();
-        leaving.sort_unstable_by_key(|seat| (seat.group, seat.actor.id()));
+        let leaving = self.led.agents.extract_if(.., |member| member.group != 0);
+        let mut leaving: Vec<LedAgent> = leaving.collect();
+        leaving.sort_unstable_by_key(|member| (member.group, member.actor.id()));
         return_groups(leaving);
     }
 
@@ -218,13 +218,13 @@ impl AgentRunner {
 
     /// Lets all it leads return, each by itself: agents that belong together find together again.
     pub fn release_all(&mut self) {
-        self.led.seats.drain(..).for_each(|seat| seat.actor.return_turns());
+        self.led.agents.drain(..).for_each(|member| member.actor.return_turns());
     }
 
     /// Lets all it leads return, led by the lowest of them: they go on as one without it.
     pub(super) fn release_together(&mut self) {
-        let mut leaving: Vec<Seat> = self.led.seats.drain(..).collect();
-        leaving.iter_mut().for_each(|seat| seat.group = 1);
+        let mut leaving: Vec<LedAgent> = self.led.agents.drain(..).collect();
+        leaving.iter_mut().for_each(|member| member.group = 1);
         return_groups(leaving);
     }
 
@@ -252,7 +252,7 @@ impl AgentRunner {
     /// number. An agent at another time would make up for that alone, and is not led before the two have come together.
     pub fn seek_leader(&self) -> Option<AgentId> {
         self.shared.handover()?;
-        let led = self.led.seats.iter().map(|seat| &*seat.actor);
+        let led = self.led.agents.iter().map(|member| &*member.actor);
         let leaders = std::iter::once(self).chain(led).filter_map(AgentRunner::bonded_leader);
         leaders.min().filter(|leader| *leader < self.id() && self.is_at_the_time_of(*leader))
     }
@@ -270,10 +270,10 @@ impl AgentRunner {
 }
 
 /// Lets groups of equal number return, each led by its lowest.
-fn return_groups(leaving: Vec<Seat>) {
+fn return_groups(leaving: Vec<LedAgent>) {
     let mut leaving = leaving.into_iter().peekable();
-    while let Some(Seat { actor: mut leader, group }) = leaving.next() {
-        while let Some(next) = leaving.next_if(|seat| seat.group == group) {
+    while let Some(LedAgent { actor: mut leader, group }) = leaving.next() {
+        while let Some(next) = leaving.next_if(|member| member.group == group) {
             leader.led.admit(next.actor);
         }
         leader.return_turns();

@@ -17,7 +17,7 @@ fn led(anchor: DVec3, target: DVec3, [stiffness_n_m, damping_n_s_m]: [f64; 2]) -
     let mut body = placed(RigidBody::new(cube).unwrap(), false);
     let anchor = Anchor::Local(anchor);
     let target_velocity = DVec3::ZERO;
-    body.hands.push(AnchorSpring { by: None, anchor, target, target_velocity, stiffness_n_m, damping_n_s_m });
+    body.user_springs.push(AnchorSpring { by: None, anchor, target, target_velocity, stiffness_n_m, damping_n_s_m });
     Table::among(vec![body], &[plane(DQuat::IDENTITY, 0.5)])
 }
 
