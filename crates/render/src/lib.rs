@@ -40,6 +40,8 @@ pub use gpu::depth_image::DepthImage;
 #[cfg(feature = "gpu")]
 pub use gpu::draw::{DrawError, DrawTimes, Renderer, RendererOptions, Target};
 #[cfg(feature = "gpu")]
+pub use gpu::flip::flip;
+#[cfg(feature = "gpu")]
 pub use gpu::image_metrics::{psnr_db, ssim};
 #[cfg(feature = "gpu")]
 pub use gpu::offscreen;

@@ -26,15 +26,23 @@ use std::sync::Arc;
 /// loop.
 pub(super) struct Governors {
     share: f64,
+    /// Whether agents that keep a rate begin at their coarsest.
+    from_coarsest: bool,
     gains: RateGains,
     /// The shared data so far.
     pub controlled: ControlledAgents,
 }
 
 impl Governors {
-    /// Of the agents of `scene`.
+    /// Of the agents of `scene`, each of which begins as the scene has it.
     pub fn of(scene: &Scene) -> Self {
-        Self { share: share(scene), gains: rate_gains(scene), controlled: ControlledAgents::default() }
+        let controlled = ControlledAgents::default();
+        Self { share: share(scene), from_coarsest: false, gains: rate_gains(scene), controlled }
+    }
+
+    /// Of the agents of `scene`, of which those that keep a rate begin at their coarsest.
+    pub fn from_coarsest(scene: &Scene) -> Self {
+        Self { from_coarsest: true, ..Self::of(scene) }
     }
 
     /// The governor of one agent's dt and ε; none where the scene fixes both.
@@ -44,7 +52,10 @@ impl Governors {
             return error_governor(member, tolerance_m, meshed, &mut self.controlled);
         }
         let limits = rate_limits(member, self.share);
-        let control = RateControl::new(limits, self.gains, meshed.then_some(member.start.eps_m));
+        let control = match self.from_coarsest {
+            true => RateControl::from_coarsest(limits, self.gains),
+            false => RateControl::new(limits, self.gains, meshed.then_some(member.start.eps_m)),
+        };
         if !control.steers() {
             return None;
         }

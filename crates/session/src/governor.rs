@@ -14,6 +14,10 @@ use std::sync::Arc;
 pub(super) struct RateGovernor(pub RateControl, pub Arc<AgentBudget>);
 
 impl Governor for RateGovernor {
+    fn begins_with(&self) -> Demand {
+        self.0.begins_with().map_or_else(Demand::default, |demand| demanded(demand, None))
+    }
+
     fn after_step(&mut self, measure: &TurnMeasure) -> Demand {
         let Self(control, budget) = self;
         control.set_share(budget.share());
@@ -28,7 +32,7 @@ impl Governor for RateGovernor {
         if let Some(load) = control.full_load() {
             budget.report_load(load);
         }
-        demanded(demand, measure)
+        demand.map_or_else(Demand::default, |demand| demanded(demand, measure.resolution))
     }
 
     fn archive(&mut self, archive: &mut Archive<'_>) -> Result<(), ArchiveError> {
@@ -49,7 +53,7 @@ impl Governor for ErrorGovernor {
         let turn = ErrorMeasure { space_m, time_m: drift_m, dt_s: measure.dt.as_secs_f64() };
         let demand = control.after_turn(&turn);
         status.publish(control.rest());
-        demanded(demand, measure)
+        demand.map_or_else(Demand::default, |demand| demanded(demand, measure.resolution))
     }
 
     fn archive(&mut self, archive: &mut Archive<'_>) -> Result<(), ArchiveError> {
@@ -60,9 +64,8 @@ impl Governor for ErrorGovernor {
     }
 }
 
-/// Converts control's demand to the runtime's type; the primitive level n stays as it is.
-fn demanded(demand: Option<RateDemand>, measure: &TurnMeasure) -> Demand {
-    let Some(demand) = demand else { return Demand::default() };
-    let n = measure.resolution.map_or(0, |held| held.n);
+/// Converts control's demand to the runtime's type; the primitive level n stays as `held` has it.
+fn demanded(demand: RateDemand, held: Option<Resolution>) -> Demand {
+    let n = held.map_or(0, |held| held.n);
     Demand { dt: SimSpan::from_secs_f64(demand.dt_s), resolution: demand.eps_m.map(|eps_m| Resolution { eps_m, n }) }
 }

@@ -15,6 +15,7 @@ mod recording;
 mod rewind;
 
 use super::assemble;
+use super::assemble::Governors;
 #[cfg(feature = "picture")]
 use super::calibrate;
 use super::coupling_record::{Coupling, Couplings};
@@ -85,6 +86,8 @@ pub struct Session {
     next_camera: Option<Camera>,
     /// Time from reading the camera to the finished picture, seconds, smoothed.
     lag_s: f64,
+    /// Time of a choice, seconds, smoothed.
+    choice_s: f64,
     /// When real time began to pass.
     begun: Duration,
     warm_up: usize,
@@ -155,7 +158,10 @@ impl Session {
     /// # Errors
     /// [`SessionError::World`], also for a factor outside its range; nothing runs then.
     pub fn open(scene: Scene, pace: Pace) -> Result<Self, SessionError> {
-        Self::open_as(scene, |scene, govern| {
+        // nothing is known of this machine yet, and its first turns are to be in time
+        let is_beside_a_clock = scene.executor != ExecutorKind::Lockstep && pace != Pace::Free;
+        let governors = if is_beside_a_clock { Governors::from_coarsest(&scene) } else { Governors::of(&scene) };
+        Self::open_as(scene, governors, |scene, govern| {
             let world = World::start_governed(scene, scene.executor, govern)?;
             // a world to which nothing was done is recorded without its state
             if pace != Pace::RealTime {
@@ -167,10 +173,10 @@ impl Session {
 
     fn open_as(
         mut scene: Scene,
+        mut governors: Governors,
         start: impl FnOnce(&Scene, Govern<'_>) -> Result<World, SessionError>,
     ) -> Result<Self, SessionError> {
         let machine = machine(&scene);
-        let mut governors = assemble::Governors::of(&scene);
         let world = start(&scene, &mut |member| governors.governor(member))?;
         scene.executor = world.executor();
         let controlled = governors.controlled;
@@ -205,6 +211,7 @@ impl Session {
             last_seen_by: None,
             next_camera: None,
             lag_s: 0.0,
+            choice_s: 0.0,
             begun: Duration::ZERO,
             warm_up: 0,
             finished: 0,
@@ -379,6 +386,7 @@ impl Session {
         let lag_s = 1e-3 * record.lag_ms;
         self.lag_s = if self.finished == 0 { lag_s } else { self.lag_s + LAG_NEWS * (lag_s - self.lag_s) };
         self.measure_thread();
+        self.learn_choice();
         self.finished += 1;
         self.last_start = Some(started);
         let cold = !self.is_virtual() && self.finished <= WARM_UP_FRAMES;

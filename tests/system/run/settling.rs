@@ -78,6 +78,29 @@ fn the_tube_scene_is_on_target_within_a_second_from_four_times_too_coarse_and_to
 }
 
 #[test]
+fn a_load_that_swings_by_a_fifth_leaves_n_of_the_tube() {
+    let folder = tempfile::tempdir().unwrap();
+    let csv = folder.path().join("frames.csv").to_string_lossy().into_owned();
+    for every_s in [0.25, 0.5, 1.0] {
+        let entry =
+            |k: u32| format!("{{ at_s = {}, factor = {} }}", every_s * f64::from(k), [0.8, 1.2][k as usize % 2]);
+        let load = (0..(10.0 / every_s) as u32).map(entry).collect::<Vec<_>>().join(", ");
+        let load = format!("machine.load=[{load}]");
+        for policy in ["feedback", "adaptive"] {
+            let run =
+                ["--target-fps", "60", "--policy", policy, "--seconds", "10", "--set", &load, "--frames-csv", &csv];
+            lockstep("tube", &run);
+            let text = std::fs::read_to_string(&csv).unwrap();
+            let mut lines = text.lines();
+            let column = lines.next().unwrap().split(',').position(|name| name == "n").unwrap();
+            let n: Vec<&str> = lines.map(|row| row.split(',').nth(column).unwrap()).collect();
+            let changes = n.windows(2).filter(|pair| pair[0] != pair[1]).count();
+            assert!(changes <= 2, "{policy}, every {every_s} s: {changes} changes");
+        }
+    }
+}
+
+#[test]
 fn past_its_reach_the_picture_rests_on_its_clamp_and_leaves_without_windup() {
     for (unreachable_hz, coarsest) in [(5.0, false), (190.0, true)] {
         let mut play = Play::of("tube", unreachable_hz, &[]);

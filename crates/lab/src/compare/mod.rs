@@ -12,7 +12,7 @@ use film::Film;
 use metachron_console::exit::Exit;
 use metachron_console::files::{check_unread, write_file};
 use metachron_console::output::{BadInput, data, message};
-use metachron_render::ssim;
+use metachron_render::{PictureFile, flip, ssim};
 use std::path::{Path, PathBuf};
 
 /// The page; its films stand where it says so.
@@ -50,7 +50,8 @@ pub fn command(args: &CompareArgs) -> anyhow::Result<Exit> {
     }
     let pairs = (0..films.len()).flat_map(|b| (0..b).map(move |a| (a, b)));
     let pairs = pairs.map(|(a, b)| (&films[a], &films[b]));
-    let likeness = table!(pairs, |(a, b)| left: a.name, right: b.name, ssim(4): ssim_of(a, b));
+    let likeness =
+        table!(pairs, |(a, b)| left: a.name, right: b.name, ssim(4): mean_of(a, b, ssim), flip(4): mean_of(a, b, flip));
     write_page(&films, &args.out)?;
     data(&likeness.text())?;
     message(&format!(
@@ -64,11 +65,11 @@ fn too_few() -> BadInput {
     BadInput("there are fewer than two films; expected at least two, or --votes".to_owned())
 }
 
-/// Likeness of two films, the mean over some of their frames.
-fn ssim_of(a: &Film, b: &Film) -> f64 {
+/// Likeness or difference of two films, the mean over some of their frames.
+fn mean_of(a: &Film, b: &Film, of: fn(&PictureFile, &PictureFile) -> Option<f64>) -> f64 {
     let count = a.frames.len().min(b.frames.len());
     let at = (0..count).step_by(count.div_ceil(COMPARED).max(1));
-    let values: Vec<f64> = at.filter_map(|k| ssim(&a.picture(k), &b.picture(k))).collect();
+    let values: Vec<f64> = at.filter_map(|k| of(&a.picture(k), &b.picture(k))).collect();
     values.iter().sum::<f64>() / values.len() as f64
 }
 

@@ -6,6 +6,7 @@
 mod ahead;
 mod scaled;
 mod settings;
+mod tubes;
 
 use super::choice::adaptive::AdaptiveChoice;
 use super::choice::feedback::{Feedback, POLYGONS_AT_ONE, unseen};
@@ -33,12 +34,16 @@ use crate::cost::pipeline::Pipeline;
 use crate::cost::value::Value;
 use ahead::Ahead;
 use metachron_core::{AgentId, Resolution};
+use tubes::TubeLevels;
 
 /// The share of a new measurement in the smoothed speed on the screen: about five frames of memory.
 const SPEED_NEWS: f64 = 0.2;
 
 /// A smaller change of a frame's fixed part, as a fraction of the target, is ignored: it fluctuates, and levels should not follow that.
 const FIXED_TREMBLE: f64 = 0.01;
+
+/// The levels n of tubes go by a mean over this long, seconds.
+const N_MEMORY_S: f64 = 2.0;
 
 /// The fraction of a frame that policies with a prediction leave free for a lag, which is a bound and not a goal: a camera that starts to move makes a frame 2.4 % longer than predicted.
 const LAG_MARGIN: f64 = 0.03;
@@ -79,6 +84,7 @@ pub struct PictureControl {
     ladders: Ladders,
     groups: Groups,
     vanish: Vanish,
+    tubes: TubeLevels,
     changes: Changes,
     /// Speeds on the screen, smoothed, by object.
     speeds: Vec<(AgentId, Option<f64>)>,
@@ -119,6 +125,7 @@ impl PictureControl {
             ladders: Ladders::default(),
             groups: Groups::default(),
             vanish: Vanish::default(),
+            tubes: TubeLevels::default(),
             changes: Changes::default(),
             speeds: Vec::new(),
             views: Vec::new(),
@@ -182,15 +189,22 @@ impl PictureControl {
     }
 
     fn choose(&mut self, levels: &mut Vec<LevelDemand>) -> Promise {
+        let mut promise = Promise { feasible: true, ..Promise::default() };
         match self.policy {
             Policy::Full => self.plan_full(levels),
             Policy::Feedback => self.feedback.plan(&self.views, levels),
             _ => {
                 levels.extend(self.views.iter().map(|seen| unseen(&seen.view)));
-                return self.choose_by_cost(levels);
+                promise = self.choose_by_cost(levels);
             }
         }
-        Promise { feasible: true, ..Promise::default() }
+        // the printed law has an n of its own, full detail the finest
+        let own_n = self.policy == Policy::Full
+            || self.policy == Policy::Feedback && matches!(self.feedback.law(), Law::Printed { .. });
+        if !own_n {
+            self.tubes.hold(&self.views, levels, N_MEMORY_S * self.target_hz);
+        }
+        promise
     }
 
     /// Target time of a frame: its share of a second, or the lag if that is less.
@@ -240,8 +254,8 @@ impl PictureControl {
             Policy::Adaptive => (self.adaptive.slowness(), self.adaptive.margin().max(query.margin)),
             _ => (1.0, query.margin),
         };
-        // policies that choose by size or by the last frame's time leave nothing out for a cost
-        if self.policy.predicts() {
+        // policies that choose by size or by the last frame's time leave nothing out for a cost, and those as printed choose it as a level
+        if self.policy.predicts() && !self.policy.has_printed_benefit() {
             self.vanish.update(&FrameQuery { margin, ..query }, &self.groups, slowness);
         } else {
             self.vanish.clear();

@@ -5,6 +5,7 @@
 pub mod benchmark;
 pub mod depth_image;
 pub mod draw;
+pub mod flip;
 mod full_screen;
 pub mod image_metrics;
 pub mod offscreen;

@@ -6,6 +6,11 @@ use metachron_core::{Archive, ArchiveError, Resolution, SimSpan};
 
 /// Controls one agent by the times of its turns.
 pub trait Governor: Send {
+    /// The demand with which its agent begins, asked for once, before the first turn; none by default.
+    fn begins_with(&self) -> Demand {
+        Demand::default()
+    }
+
     /// Called after every turn; its demand holds from the next turn on.
     fn after_step(&mut self, measure: &TurnMeasure) -> Demand;
 

@@ -2,6 +2,7 @@
 //!
 //! In: a scene, the calls of a world of it. Out: a session whose agents are ghosts, with its own frames and budget. Never here: a connection.
 
+use super::super::assemble::Governors;
 use super::super::elsewhere::Elsewhere;
 use super::super::error::SessionError;
 use super::Session;
@@ -19,7 +20,8 @@ impl Session {
     /// [`SessionError::World`].
     pub fn open_elsewhere(scene: Scene, calls: Arc<dyn WorldCalls>) -> Result<Self, SessionError> {
         let elsewhere = Elsewhere::new(&scene, calls)?;
-        let mut session = Self::open_as(scene, |_, _| Ok(elsewhere.shown().clone()))?;
+        let governors = Governors::of(&scene);
+        let mut session = Self::open_as(scene, governors, |_, _| Ok(elsewhere.shown().clone()))?;
         session.elsewhere = Some(elsewhere);
         Ok(session)
     }

@@ -84,6 +84,24 @@ mod tests {
     }
 
     #[test]
+    fn beside_a_real_clock_an_agent_begins_at_its_coarsest_and_elsewhere_as_the_scene_has_it() {
+        let begins = |executor: &str, pace: Pace| {
+            let source = Source::memory("load", TOO_MUCH.as_bytes()).unwrap();
+            let scene = load(&source, &[("executor".to_owned(), format!("\"{executor}\""))]).unwrap();
+            // time is held
+            let session = Session::open(scene, pace).unwrap();
+            let eps_m = session.agents()[0].latest().resolution.map(|held| held.eps_m);
+            (eps_m, session.end(None, false).agents[0].stats.dt.as_nanos())
+        };
+        for executor in ["threads", "pool"] {
+            assert_eq!(begins(executor, Pace::RealTime), (Some(0.06), 16_000_000), "{executor}");
+            assert_eq!(begins(executor, Pace::Factor(0.5)), (Some(0.06), 16_000_000), "{executor}");
+            assert_eq!(begins(executor, Pace::Free), (Some(0.01), 2_000_000), "{executor}");
+        }
+        assert_eq!(begins("lockstep", Pace::RealTime), (Some(0.01), 2_000_000));
+    }
+
+    #[test]
     fn at_the_free_pace_neither_time_nor_steps_nor_detail_are_given_up() {
         for executor in ["lockstep", "threads", "pool"] {
             let outcome = played(executor, Pace::Free);

@@ -3,6 +3,7 @@
 //! In: a session before its first frame, a place to write to; a recording. Out: a recording; a session whose frames show it.
 //! Never here: the contents of a recording ([`metachron_world::Recording`]), arguments.
 
+use super::super::assemble::Governors;
 use super::super::error::SessionError;
 use super::Session;
 use metachron_core::SimTime;
@@ -16,7 +17,8 @@ impl Session {
     /// # Errors
     /// [`SessionError::Replay`] where the recording is of another scene; [`SessionError::World`].
     pub fn replay(scene: Scene, recording: Recording, until: Option<SimTime>) -> Result<Self, SessionError> {
-        Self::open_as(scene, |scene, govern| Ok(World::replay_governed(scene, govern, recording, until)?))
+        let governors = Governors::of(&scene);
+        Self::open_as(scene, governors, |scene, govern| Ok(World::replay_governed(scene, govern, recording, until)?))
     }
 
     /// Writes down from now on all commands to its agents, with the text of the scene, so that [`Session::replay`] can

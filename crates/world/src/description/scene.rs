@@ -141,7 +141,7 @@ pub struct View {
 #[derive(Debug, Clone, PartialEq, Default)]
 #[cfg_attr(feature = "serde", derive(serde::Deserialize, schemars::JsonSchema), serde(default, deny_unknown_fields))]
 pub struct Machine {
-    /// The preset to start from: `two-cores-software` (default) or `workstation`.
+    /// The preset to start from: `two-cores-software` (default), `workstation` or `llvmpipe`, whose prices of drawing were measured.
     pub preset: String,
     /// Cores that agents and frames share.
     pub cores: Option<u32>,

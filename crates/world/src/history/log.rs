@@ -23,6 +23,8 @@ pub(crate) struct Log {
     mode: Mutex<Mode>,
     /// Whether it is recorded or replayed: governors look at this alone where it is not.
     is_in_use: AtomicBool,
+    /// What governors asked for before the first turns of their agents.
+    starts: Mutex<Vec<(AgentId, Demand)>>,
 }
 
 #[derive(Default)]
@@ -40,6 +42,7 @@ pub(crate) enum Mode {
 pub(crate) struct Script {
     /// For each agent its governor's answers, each after so many turns with none.
     demands: BTreeMap<AgentId, VecDeque<(u32, Demand)>>,
+    starts: BTreeMap<AgentId, Demand>,
     played: usize,
     of: usize,
     fault: Option<String>,
@@ -49,13 +52,18 @@ impl Log {
     /// The log of a world that repeats `recording`.
     pub fn of_replay(recording: &Recording) -> Self {
         let mut demands: BTreeMap<AgentId, VecDeque<_>> = BTreeMap::new();
+        let mut starts = BTreeMap::new();
         for entry in &recording.entries {
-            if let Entry::Demand(agent, turns_before, demand) = entry {
-                demands.entry(*agent).or_default().push_back((*turns_before, *demand));
+            match entry {
+                Entry::Demand(agent, turns_before, demand) => {
+                    demands.entry(*agent).or_default().push_back((*turns_before, *demand));
+                }
+                Entry::Start(agent, demand) => drop(starts.insert(*agent, *demand)),
+                _ => {}
             }
         }
-        let script = Script { demands, played: 0, of: recording.entries.len(), fault: None };
-        Self { mode: Mutex::new(Mode::Replayed(script)), is_in_use: AtomicBool::new(true) }
+        let script = Script { demands, starts, played: 0, of: recording.entries.len(), fault: None };
+        Self { mode: Mutex::new(Mode::Replayed(script)), is_in_use: AtomicBool::new(true), ..Self::default() }
     }
 
     /// Writes down a call that is about to be made.
@@ -143,7 +151,12 @@ impl Log {
         if matches!(*mode, Mode::Recorded(..)) {
             return Err(RecordError::Recorded);
         }
-        let (recorder, order) = begin(matches!(*mode, Mode::Fresh))?;
+        let is_fresh = matches!(*mode, Mode::Fresh);
+        let (mut recorder, order) = begin(is_fresh)?;
+        if is_fresh {
+            // a checkpoint, with which any other recording begins, has it
+            self.starts().iter().for_each(|(agent, demand)| recorder.note(Entry::Start(*agent, *demand)));
+        }
         *mode = Mode::Recorded(recorder, order);
         self.is_in_use.store(true, Release);
         Ok(())
@@ -186,6 +199,22 @@ impl Log {
 
     fn mode(&self) -> MutexGuard<'_, Mode> {
         self.mode.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    fn starts(&self) -> MutexGuard<'_, Vec<(AgentId, Demand)>> {
+        self.starts.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// The demand of the governor of `agent` before its first turn: by `answer`, or by the recording.
+    fn start(&self, agent: AgentId, answer: impl FnOnce() -> Demand) -> Demand {
+        if let Mode::Replayed(script) = &*self.mode() {
+            return script.starts.get(&agent).copied().unwrap_or_default();
+        }
+        let demand = answer();
+        if demand != Demand::default() {
+            self.starts().push((agent, demand));
+        }
+        demand
     }
 
     /// The demand of the governor of `agent` after a turn: by `answer`, or by the recording.
@@ -275,6 +304,11 @@ struct LoggedGovernor {
 }
 
 impl Governor for LoggedGovernor {
+    fn begins_with(&self) -> Demand {
+        let Self { agent, inner, log } = self;
+        log.start(*agent, || inner.begins_with())
+    }
+
     fn after_step(&mut self, turn: &TurnMeasure) -> Demand {
         let Self { agent, inner, log } = self;
         log.demand(*agent, || inner.after_step(turn))

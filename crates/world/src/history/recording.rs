@@ -20,7 +20,7 @@ use std::time::Duration;
 /// The first bytes of every file.
 const MAGIC: [u8; 8] = *b"METACREC";
 /// The version of the format: it changes with the meaning of the bytes.
-const FORMAT: u32 = 7;
+const FORMAT: u32 = 8;
 /// Bytes of a chunk before its contents: length, its complement and checksum.
 const CHUNK_HEAD: usize = 4 + 4 + 8;
 /// So many entries are written at once: a process that is killed loses the newest ones, about a second of a frame loop.
@@ -66,6 +66,8 @@ pub(crate) enum Entry {
     Drive(TimelineCommand),
     /// In real time: the state in which it began, as the bytes of a checkpoint's file.
     Begin(Vec<u8>),
+    /// The governor of an agent asked for this before its first turn.
+    Start(AgentId, Demand),
     /// In real time: from now on time passes by this timeline.
     Timeline(Timeline),
     /// In real time: the next object that joins begins at this moment.
@@ -308,7 +310,10 @@ impl Recording {
 
     /// The agents whose governors have asked for something.
     pub(super) fn governed(&self) -> BTreeSet<AgentId> {
-        let asked = |entry: &Entry| if let Entry::Demand(agent, ..) = entry { Some(*agent) } else { None };
+        let asked = |entry: &Entry| match entry {
+            Entry::Demand(agent, ..) | Entry::Start(agent, _) => Some(*agent),
+            _ => None,
+        };
         self.entries.iter().filter_map(asked).collect()
     }
 

@@ -139,7 +139,7 @@ impl Player {
             Entry::Add(name, part) => self.add(name, *part)?,
             Entry::Remove(id) => self.run.run_mut().remove(id).map_err(|error| error.to_string())?,
             Entry::Restore(bytes) => self.restore(&bytes)?,
-            Entry::Demand(..) => {}
+            Entry::Start(..) | Entry::Demand(..) => {}
             Entry::Check(expected) => self.check(expected, "has")?,
             Entry::End(expected) => self.check(expected, "ends with")?,
         }

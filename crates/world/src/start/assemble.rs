@@ -9,14 +9,14 @@ use crate::error::WorldError;
 use crate::{Member, Scene, Spec};
 use metachron_contact::Agent;
 use metachron_contact::detect::{ClusterScene, Passage};
-use metachron_core::OutOfRange;
+use metachron_core::{OutOfRange, Resolution};
 use metachron_geometry::Obstacle;
 use metachron_models::rigid::{KinematicBody, RigidBody};
 use metachron_models::rod::Tube;
 use metachron_models::soft::SoftBody;
 use metachron_models::synthetic::Synthetic;
 use metachron_models::tool::Tool;
-use metachron_runtime::{AUTO_THREADS_MAX, AgentSpawn, Governor, Machine, StepPrice, WatchedPoint};
+use metachron_runtime::{AUTO_THREADS_MAX, AgentSpawn, Demand, Governor, Machine, StepPrice, WatchedPoint};
 use std::borrow::Cow;
 use std::sync::Arc;
 
@@ -93,15 +93,20 @@ fn spawn(
     govern: Govern<'_>,
     ties: &mut Ties,
 ) -> Result<AgentSpawn, WorldError> {
-    let agent = build(member, executor)
+    let mut agent = build(member, executor)
         .map_err(|reason| WorldError::Build { name: member.name.clone(), reason: reason.to_string() })?;
     let watches = scene.probes.iter().filter(|probe| probe.agent == member.id);
     let watches = watches.filter_map(|probe| Some(WatchedPoint { at: probe.at, every: probe.every? }));
+    let governor = govern(member);
+    let Demand { dt, resolution } = governor.as_ref().map_or_else(Demand::default, |governor| governor.begins_with());
+    if let Some(Resolution { eps_m, .. }) = resolution {
+        agent.set_resolution(member.simulation.clamp(Resolution { eps_m, n: member.start.n }));
+    }
     Ok(AgentSpawn {
         name: member.name.clone(),
         agent,
         rate_hz: member.pace.rate_hz,
-        dt: member.pace.dt,
+        dt: dt.unwrap_or(member.pace.dt),
         dt_range: member.pace.dt_range,
         range: Some(member.simulation),
         links: member.links.clone(),
@@ -110,7 +115,7 @@ fn spawn(
         scene: Arc::default(),
         faults: faults(member.faults),
         watches: watches.collect(),
-        governor: govern(member),
+        governor,
     })
 }
 

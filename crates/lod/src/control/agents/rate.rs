@@ -111,6 +111,9 @@ const DEAD: (f64, f64) = (-0.223, 0.049);
 /// Target inside the dead zone.
 const MIDDLE: f64 = 0.5 * (DEAD.0 + DEAD.1);
 
+/// Windows of a beginning at the coarsest: of 1, 2 and 4 turns, so that three refinements are made within seven turns.
+const BEGINNING: u32 = 3;
+
 #[derive(Debug, Clone, Copy, Default, serde::Serialize, serde::Deserialize)]
 struct Window {
     turns: u32,
@@ -180,6 +183,8 @@ pub struct RateControl {
     /// z before the last demand, if that refined and is not confirmed yet.
     refined_from: Option<f64>,
     rest: Option<Bound>,
+    /// Windows of its beginning that are left.
+    beginning: u32,
 }
 
 impl RateControl {
@@ -208,7 +213,17 @@ impl RateControl {
             patience: PATIENCE.0,
             refined_from: None,
             rest: None,
+            beginning: 0,
         }
+    }
+
+    /// A controller of an agent that begins at its coarsest ε and longest step, and refines within its first turns as far as they leave time
+    /// (control.md, eq. 19c).
+    #[must_use]
+    pub fn from_coarsest(limits: RateLimits, gains: RateGains) -> Self {
+        let control = Self::new(limits, gains, None);
+        let top = control.top;
+        Self { aim: top, own_target: top, sent: top, beginning: BEGINNING, ..control }
     }
 
     /// Whether anything can be controlled: fixed values switch the controller off.
@@ -222,6 +237,12 @@ impl RateControl {
         if share > 0.0 {
             self.limits.share = share.clamp(1e-3, 1.0);
         }
+    }
+
+    /// The demand with which the agent begins; `None` of a controller that takes it as it is.
+    #[must_use]
+    pub fn begins_with(&self) -> Option<RateDemand> {
+        (self.beginning > 0).then(|| self.demand())
     }
 
     /// The fraction of its period that the agent's work may take.
@@ -265,9 +286,23 @@ impl RateControl {
             return None;
         }
         let window = std::mem::take(&mut self.window);
-        self.note(&window);
-        self.learn(&window);
+        if self.beginning > 0 {
+            self.begin(&window);
+        } else {
+            self.note(&window);
+            self.learn(&window);
+        }
         self.demand_if_worth_it()
+    }
+
+    /// Refines from the coarsest by one window, by a factor of four in work at most. What a far coarser level says of the finest is forgotten with
+    /// the next window, and first turns say nothing of others.
+    fn begin(&mut self, window: &Window) {
+        self.beginning -= 1;
+        self.full = FullLoad::default();
+        self.full.note(window.work_s / window.wanted_s * libm::exp(self.sent));
+        let to = self.full.mean().map_or(self.top, |full| libm::log(full / self.limits.share) - MIDDLE);
+        self.aim = to.max(self.own_target - ERROR_MAX).clamp(0.0, self.top);
     }
 
     /// Adds a turn to the window; `true` when the window is full. An invalid measurement is left out.
@@ -290,6 +325,9 @@ impl RateControl {
         window.over_s += (work_s - wanted_s).max(0.0);
         window.wanted_s += wanted_s;
         window.late += turn.real_period_s / wanted_s;
+        if self.beginning > 0 {
+            return window.turns >= 1 << (BEGINNING - self.beginning);
+        }
         // a turn of an agent that takes more than a core lasts long: before anything is known of it, its first turns are enough
         let is_lost = self.full.mean().is_none() && window.work_s > window.wanted_s;
         window.span_s >= WINDOW_S && (window.turns >= WINDOW_TURNS || is_lost)

@@ -53,25 +53,30 @@ impl Select {
         }
         let selection = self.solve(policy, query, &problem, &objects);
         self.last.clear();
+        let mut holes = 0;
         for (&at, level) in objects.iter().zip(&selection.levels) {
             self.last.insert(query.views[at].view.id, *level);
-            set(query, at, *level, levels);
+            let rung = if has_null(policy, query, at) { level.and_then(|level| level.checked_sub(1)) } else { *level };
+            holes += u32::from(rung.is_none());
+            set(query, at, rung, levels);
         }
-        promise(query, &selection)
+        Promise { holes, ..promise(query, &selection) }
     }
 
-    /// The rungs of an object as entries.
+    /// The rungs of an object as entries; before them "no polygons at all" where that is a level as any other (FS93, §3).
     fn entries(&self, policy: Policy, query: &FrameQuery<'_>, at: usize) -> Vec<Entry> {
         let (SizedView { view, .. }, rungs) = (&query.views[at], &query.ladders.of(at).rungs);
         let last = self.last.get(&view.id).copied();
-        let steps = rungs.len().max(2) as f64 - 1.0;
+        let null = has_null(policy, query, at).then(|| Entry::new(0, 0));
+        let first = usize::from(null.is_some());
+        let steps = (first + rungs.len()).max(2) as f64 - 1.0;
         let change = |level: usize| last.flatten().map_or(0.0, |last| (level as f64 - f64::from(last)).abs() / steps);
         let weight = query.weight(at);
         let entry = |(level, rung): (usize, &Rung)| match policy.has_printed_benefit() {
-            true => query.entry_of(rung, benefit::printed(view, rung, change(level), query.sliders)),
+            true => query.entry_of(rung, benefit::printed(view, rung, change(first + level), query.sliders)),
             false => query.entry(weight, rung),
         };
-        rungs.iter().enumerate().map(entry).collect()
+        null.into_iter().chain(rungs.iter().enumerate().map(entry)).collect()
     }
 
     fn solve(&self, policy: Policy, query: &FrameQuery<'_>, problem: &Problem, objects: &[usize]) -> Selection {
@@ -79,7 +84,8 @@ impl Select {
             Policy::Static => by_size(query, problem, objects, STATIC_PX),
             Policy::Threshold => by_size(query, problem, objects, self.threshold.threshold_px()),
             Policy::GreedyIncremental => {
-                let rungs = |at: usize| query.ladders.of(at).rungs.len() as u32;
+                let rungs =
+                    |at: usize| query.ladders.of(at).rungs.len() as u32 + u32::from(has_null(policy, query, at));
                 let last = |at: &usize| {
                     let level = self.last.get(&query.views[*at].view.id).copied().flatten();
                     level.filter(|level| *level < rungs(*at))
@@ -93,6 +99,12 @@ impl Select {
             _ => funkhouser::greedy(problem, Scan::Skip),
         }
     }
+}
+
+/// Whether an object may be left out in favour of more detail of others, as printed. Other policies leave something out as the last resort alone
+/// ([`super::vanish`]).
+fn has_null(policy: Policy, query: &FrameQuery<'_>, at: usize) -> bool {
+    policy.has_printed_benefit() && query.views[at].view.may_vanish
 }
 
 /// Draws an object at a rung, or leaves it out.
@@ -119,7 +131,7 @@ fn promise(query: &FrameQuery<'_>, selection: &Selection) -> Promise {
         value: selection.value as f64,
         upper: selection.upper,
         feasible: selection.feasible,
-        holes: selection.levels.iter().filter(|level| level.is_none()).count() as u32,
+        holes: 0,
         passes: 0,
     }
 }

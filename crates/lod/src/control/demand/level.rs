@@ -104,7 +104,9 @@ impl LastCut {
         };
         let before = self.cut.map(|(_, n)| n);
         let n = match view.kind {
-            Kind::Tube { length_m, radius_m } => tube_level(polygons, length_m, radius_m, view.range, before),
+            Kind::Tube { length_m, radius_m } => {
+                hysteresis::floor(before, tube_rho(polygons, length_m, radius_m, view.range))
+            }
             Kind::Primitive { ref triangles, .. } => primitive_level(polygons, triangles, view.range.n, before),
             Kind::Counted { least, .. } => octaves(polygons / f64::from(least.max(1))),
             Kind::Group { .. } => open(view),
@@ -166,18 +168,33 @@ fn level(n: u8) -> usize {
     usize::from(n.min(N_MAX))
 }
 
-/// The level at which a tube's quads are nearest to square: ⌊ρ⌋ with a band (control.md, eq. 15), where ε stays in its range.
-fn tube_level(polygons: f64, length_m: f64, radius_m: f64, range: ResolutionRange, before: Option<u8>) -> u8 {
+/// Whether ε has so little room that n makes a tube's polygons.
+pub(crate) fn is_narrow(range: ResolutionRange) -> bool {
+    range.eps_m.1 < NARROW * range.eps_m.0
+}
+
+/// The pair nearest to level `n` that has these polygons, to the rounding of one interval.
+pub(crate) fn tube_cut(range: ResolutionRange, length_m: f64, polygons: f64, n: u8) -> Resolution {
+    let (finest, coarsest) = range.eps_m;
+    let per_m = polygons / (PATCH_TRIANGLES * length_m);
+    let (least, most) = (libm::ceil(libm::log2(finest * per_m)), libm::floor(libm::log2(coarsest * per_m)));
+    // ε is inside its range at these; casts of floats saturate
+    let n = n.max(least as u8).min(most as u8).clamp(range.n.0, range.n.1);
+    let intervals = libm::round(polygons / (PATCH_TRIANGLES * two_to(n))).max(1.0);
+    // a hair longer than an interval, so that rounding makes no further one
+    range.clamp(Resolution { eps_m: length_m / intervals * (1.0 + 1e-12), n })
+}
+
+/// The level at which a tube's quads are nearest to square: ρ, whose floor is n (control.md, eq. 15), where ε stays in its range.
+pub(crate) fn tube_rho(polygons: f64, length_m: f64, radius_m: f64, range: ResolutionRange) -> f64 {
     // ε at level n is 2ⁿ / per_m
     let per_m = polygons / (PATCH_TRIANGLES * length_m);
     let (finest, coarsest) = range.eps_m;
-    let rho = if coarsest < NARROW * finest {
-        libm::log2(coarsest * per_m)
-    } else {
-        let square = libm::log2(PI * radius_m * polygons / (36.0 * length_m));
-        square.max(libm::log2(finest * per_m) + 1.0 + BAND).min(libm::log2(coarsest * per_m) - BAND)
-    };
-    hysteresis::floor(before, rho)
+    if is_narrow(range) {
+        return libm::log2(coarsest * per_m);
+    }
+    let square = libm::log2(PI * radius_m * polygons / (36.0 * length_m));
+    square.max(libm::log2(finest * per_m) + 1.0 + BAND).min(libm::log2(coarsest * per_m) - BAND)
 }
 
 /// The highest level whose triangles fit, with hysteresis of half an octave in both directions.

@@ -113,7 +113,8 @@ pub(super) fn summary(rows: &[Row]) -> Table {
         error95(3): median(policy, |row| row.model_error95), spread95(3): median(policy, |row| row.spread95),
         error(2): median(policy, error), reversals(5): median(policy, |row| row.reversals),
         triangles: median(policy, |row| row.polygons), ssim(4): median(policy, |row| row.ssim),
-        ssim_least(4): median(policy, |row| row.ssim_least), holes(4): median(policy, |row| row.holes))
+        ssim_least(4): median(policy, |row| row.ssim_least), flip(4): median(policy, |row| row.flip),
+        holes(4): median(policy, |row| row.holes))
 }
 
 #[cfg(test)]

@@ -71,6 +71,8 @@ pub(crate) struct Row {
     /// Likeness to full detail: the mean and the least of the pictures compared.
     pub(crate) ssim: f64,
     pub(crate) ssim_least: f64,
+    /// Difference from it that is seen when the two take turns, the mean.
+    pub(crate) flip: f64,
     pub(crate) psnr_db: f64,
     /// The time of every frame as a part of T, separated by spaces; empty where the figure plays the frames again.
     pub(crate) times: String,

@@ -13,7 +13,7 @@ use crate::chart::{
 };
 use figures::{Changes, Limit, PLATES, Panel, Plate};
 use metachron_lod::control::Policy;
-use metachron_render::{PictureFile, psnr_db, ssim};
+use metachron_render::{PictureFile, flip, psnr_db, ssim};
 use serde::{Deserialize, Serialize};
 use sheet::{difference, sheet};
 use std::sync::{Arc, Mutex, PoisonError};
@@ -44,8 +44,12 @@ pub(in super::super) struct Found {
     /// Objects in view that are left out, and groups that are drawn as one.
     holes: u32,
     impostors: usize,
+    /// Objects in view that are drawn with a texture.
+    textured: u32,
     /// Likeness to full detail; NaN without an adapter.
     ssim: f64,
+    /// Difference from it that is seen, likewise.
+    flip: f64,
     psnr_db: f64,
 }
 
@@ -103,7 +107,7 @@ impl<const F: usize, const LIVE: bool> Experiment for Figures<F, LIVE> {
     const ALONE: bool = true;
     const TABLE: fn(&[Row]) -> Table = table!(|r| panel: r.case.panel, policy: r.case.policy, T_ms(3): r.target_ms,
         frame_ms(3): r.frame_ms, triangles: r.triangles, paper: r.paper_triangles, left_out: r.holes,
-        impostors: r.impostors, ssim(4): r.ssim, psnr_db(1): r.psnr_db);
+        impostors: r.impostors, textured: r.textured, ssim(4): r.ssim, flip(4): r.flip, psnr_db(1): r.psnr_db);
 
     fn cases(quick: bool) -> Vec<Case> {
         let frames = PLATES[F].approach(quick).frames;
@@ -130,7 +134,9 @@ impl<const F: usize, const LIVE: bool> Experiment for Figures<F, LIVE> {
             paper_triangles,
             holes: own.holes,
             impostors: own.impostors,
+            textured: own.textured,
             ssim: pictures.and_then(|(picture, full)| ssim(picture, full)).unwrap_or(f64::NAN),
+            flip: pictures.and_then(|(picture, full)| flip(full, picture)).unwrap_or(f64::NAN),
             psnr_db: pictures.map_or(f64::NAN, psnr_db),
         })
     }

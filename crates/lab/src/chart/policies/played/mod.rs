@@ -102,7 +102,7 @@ mod tests {
             // only a policy with a bound has `value` and `proven`, and only measured times have a spread
             let mut expected = vec!["spread95"];
             expected.extend(["value", "proven"].iter().filter(|_| row.policy == "robin-hood"));
-            expected.extend(["ssim", "ssim_least", "psnr_db"].iter().filter(|_| !drawn));
+            expected.extend(["ssim", "ssim_least", "flip", "psnr_db"].iter().filter(|_| !drawn));
             assert_eq!(unknown, expected, "{}", row.policy);
         }
     }

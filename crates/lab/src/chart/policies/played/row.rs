@@ -37,5 +37,5 @@ pub(in super::super) fn table(rows: &[Row]) -> Table {
         run: r.miss_run, overshoot(3): r.overshoot, model(4): r.model_error, model95(4): r.model_error95,
         spread95(3): r.spread95, value(4): r.value_over_bound, proven(3): r.certified, changes(4): r.changes,
         reversals(5): r.reversals, holes(4): r.holes, triangles: r.polygons, choosing(4): r.choosing, ssim(4): r.ssim,
-        ssim_least(4): r.ssim_least, psnr_db(1): r.psnr_db, frames: r.frames)
+        ssim_least(4): r.ssim_least, flip(4): r.flip, psnr_db(1): r.psnr_db, frames: r.frames)
 }

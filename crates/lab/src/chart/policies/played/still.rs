@@ -59,6 +59,8 @@ pub(in super::super) struct Still {
     pub(in super::super) holes: u32,
     /// Groups that are drawn as one.
     pub(in super::super) impostors: usize,
+    /// Objects in view that are drawn with a texture.
+    pub(in super::super) textured: u32,
     /// The pictures that were asked for; none where nothing draws.
     pub(in super::super) pictures: Vec<(Sight, PictureFile)>,
 }
@@ -96,6 +98,7 @@ pub(in super::super) fn still(request: &StillRequest<'_>) -> anyhow::Result<Stil
         triangles: last.triangles,
         holes: last.holes,
         impostors,
+        textured: last.textured,
         pictures: pictures.collect::<anyhow::Result<_>>()?,
     })
 }

@@ -35,6 +35,12 @@ impl Agent {
         Self { control, full_s, bursts: None, now, time_s: 0.0, demands: Vec::new() }
     }
 
+    fn from_coarsest(full_s: f64) -> Self {
+        let control = RateControl::from_coarsest(limits(), RateGains::default());
+        let now = control.begins_with().expect("a beginning");
+        Self { control, now, ..Self::new(full_s) }
+    }
+
     fn work_s(&self) -> f64 {
         let in_one = |b: &Bursts| self.time_s < b.until_s && self.time_s % b.every_s < b.for_s;
         let times = self.bursts.filter(in_one).map_or(1.0, |b| b.times);
@@ -101,6 +107,30 @@ fn an_agent_that_takes_many_cores_is_at_its_coarsest_after_a_window() {
         assert!(at_s < 0.25 + times * PERIOD_S && first.eps_m == Some(0.02), "{times}: {:?}", agent.demands);
         assert!(first.dt_s > 0.9 * 0.016, "{times}: {first:?}");
     }
+}
+
+#[test]
+fn an_agent_that_begins_at_its_coarsest_is_where_one_from_its_finest_comes_to_within_seven_turns_and_never_late() {
+    for part in [0.01, 0.3, 0.7, 1.5, 6.0] {
+        let full_s = part * PERIOD_S;
+        let (mut agent, mut other) = (Agent::from_coarsest(full_s), Agent::new(full_s));
+        assert_eq!(agent.now, RateDemand { dt_s: 0.016, eps_m: Some(0.02) });
+        for turn in 0..7 {
+            agent.run(1e-9); // one turn
+            assert!(agent.load() < 1.06, "{part}, turn {turn}: {}", agent.load());
+        }
+        other.run(20.0);
+        let z = |of: &RateDemand| limits().z_of(of);
+        // both rest within the dead zone, which is 0.27 wide
+        assert!((z(&agent.now) - z(&other.now)).abs() < 0.28, "{part}: {:?} {:?}", agent.now, other.now);
+        let early = agent.demands.len();
+        agent.run(20.0);
+        assert!(agent.demands.len() <= early + 1, "{part}: {:?}", agent.demands);
+    }
+    // from the coarsest to the finest is a factor of 15.4: two steps of a factor of four, however little there is to do
+    let mut idle = Agent::from_coarsest(1e-6 * PERIOD_S);
+    (0..7).for_each(|_| idle.run(1e-9));
+    assert_eq!((idle.demands.len(), idle.now), (2, RateDemand { dt_s: PERIOD_S, eps_m: Some(0.005) }));
 }
 
 #[test]
