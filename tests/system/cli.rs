@@ -109,7 +109,8 @@ fn import_writes_the_meshes_that_scenes_do_not_read_and_its_list_as_json() {
         ball("b", "<mesh filename=\"t.obj\" scale=\"1 -1 1\"/>"),
         ball("c", "<sphere radius=\"0.1\"/>"),
     ];
-    let robot = format!("<robot name=\"r\">{}{}{}<loop_joint/></robot>", links.concat(), hinge("a", "b"), hinge("b", "c"));
+    let robot =
+        format!("<robot name=\"r\">{}{}{}<loop_joint/></robot>", links.concat(), hinge("a", "b"), hinge("b", "c"));
     std::fs::write(path("r.urdf"), robot).unwrap();
     let refused = metachron(&["import", &path("r.urdf")]);
     assert!(code(&refused) == 2 && err(&refused).contains("expected --out FILE"), "{}", err(&refused));
