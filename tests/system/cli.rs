@@ -109,14 +109,15 @@ fn import_writes_the_meshes_that_scenes_do_not_read_and_its_list_as_json() {
         ball("b", "<mesh filename=\"t.obj\" scale=\"1 -1 1\"/>"),
         ball("c", "<sphere radius=\"0.1\"/>"),
     ];
-    let robot = format!("<robot name=\"r\">{}{}{}<mimic/></robot>", links.concat(), hinge("a", "b"), hinge("b", "c"));
+    let robot =
+        format!("<robot name=\"r\">{}{}{}<loop_joint/></robot>", links.concat(), hinge("a", "b"), hinge("b", "c"));
     std::fs::write(path("r.urdf"), robot).unwrap();
     let refused = metachron(&["import", &path("r.urdf")]);
     assert!(code(&refused) == 2 && err(&refused).contains("expected --out FILE"), "{}", err(&refused));
     let done = metachron(&["import", &path("r.urdf"), "--fixed-base", "--json", "--out", &path("scene.toml")]);
     assert_eq!(code(&done), 0, "{}", err(&done));
     let list: serde_json::Value = serde_json::from_slice(&done.stdout).unwrap();
-    assert_eq!(list["changes_motion"][0]["element"], "mimic");
+    assert_eq!(list["changes_motion"][0]["element"], "loop_joint");
     assert_eq!(
         (list["files"][0].as_str(), list["harmless"].as_array().unwrap().len()),
         (Some("scene-meshes/t.obj"), 0)

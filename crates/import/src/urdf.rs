@@ -16,7 +16,7 @@ use std::collections::BTreeMap;
 /// the motion of a joint that does not move have no meaning.
 pub(crate) const HARMLESS: Harmless = Harmless {
     elements: "visual material color texture transmission safety_controller calibration sensor plugin ros2_control verbose \
-        self_collision_checking axis limit dynamics implicitSpringDamper provideFeedback selfCollide",
+        self_collision_checking axis limit dynamics mimic implicitSpringDamper provideFeedback selfCollide",
     containers: "gazebo",
     attributes: "effort velocity command_effort current gear_velocity version type id dont_collapse",
 };
@@ -86,7 +86,7 @@ pub(crate) fn read(root: &Element, mut meshes: Meshes<'_>, notes: &mut Vec<LeftO
         if let Some(draft) = above {
             let parent = numbers[draft.parent];
             let start = start(draft, &drafts);
-            note_start(draft, start, notes);
+            note_start(draft, &drafts, notes);
             pose = model.links[parent].pose.then(draft.origin).then(draft.kind.motion(DVec3::ZERO, draft.axis, start));
             if !draft.is_free {
                 model.joints.push(joint(draft, parent, model.links.len(), start));
@@ -230,20 +230,34 @@ fn drop_mimics(drafts: &mut [Draft<'_>], notes: &mut Vec<LeftOut>) {
     }
 }
 
-/// The position at which a joint starts, within its limits: where the joint that it follows leads it, or else at zero.
+/// The position at which a joint starts: the one that it wants, within its limits.
 fn start(draft: &Draft<'_>, drafts: &[Draft<'_>]) -> f64 {
-    let led =
-        draft.mimic.and_then(|mimic| Some(mimic.multiplier * start(leader(&mimic, drafts)?, drafts) + mimic.offset));
-    let wanted = led.unwrap_or(0.0);
+    let wanted = wanted(draft, drafts);
     draft.limits.map_or(wanted, |[lower, upper]| wanted.clamp(lower, upper))
 }
 
-/// Lists a joint that starts elsewhere than at zero for its limits.
-fn note_start(draft: &Draft<'_>, start: f64, notes: &mut Vec<LeftOut>) {
-    if start != 0.0 && draft.limits.is_some_and(|limits| limits.contains(&start)) {
-        let what = format!("starts at {start}, the end of its limits that is nearest to zero");
-        notes.push(draft.element.note(what).harmless());
+/// The position where the joint that it follows leads a joint, or else zero.
+fn wanted(draft: &Draft<'_>, drafts: &[Draft<'_>]) -> f64 {
+    let led = |mimic: MimicDraft<'_>| Some(mimic.multiplier * start(leader(&mimic, drafts)?, drafts) + mimic.offset);
+    draft.mimic.and_then(led).unwrap_or(0.0)
+}
+
+/// Lists a joint that starts elsewhere than it wants to.
+fn note_start(draft: &Draft<'_>, drafts: &[Draft<'_>], notes: &mut Vec<LeftOut>) {
+    let (start, wanted) = (start(draft, drafts), wanted(draft, drafts));
+    if start == wanted {
+        return;
     }
+    notes.push(match draft.mimic {
+        Some(MimicDraft { joint, .. }) => {
+            let what = format!("starts at {start} and follows `{joint}` from there: its limits end before {wanted}");
+            draft.element.note(what)
+        }
+        None => {
+            let what = format!("starts at {start}, the end of its limits that is nearest to zero");
+            draft.element.note(what).harmless()
+        }
+    });
 }
 
 fn joint(draft: &Draft<'_>, parent: usize, child: usize, start: f64) -> Joint {

@@ -330,6 +330,11 @@ fn a_joint_starts_where_the_one_that_it_follows_leads_it() {
     // 0.2 rad against the upper rod
     let angle = crate::play::body(&scene, "lower").rotation.to_scaled_axis().y;
     assert!((angle - (0.4 + 2.0 * 0.4 - 0.6)).abs() < 1e-9, "{angle} rad");
+    // as far as its own limits let it
+    let elbow = r#"type="continuous"><origin xyz="0 0 -0.5""#;
+    let limited = r#"type="revolute"><limit lower="-1" upper="0.1"/><origin xyz="0 0 -0.5""#;
+    let listed = left_out(&import(&robot.replace(elbow, limited)).unwrap());
+    assert!(listed[0].contains("joint `elbow`: starts at 0.1 and follows `shoulder` from there"), "{listed:?}");
 }
 
 #[test]
