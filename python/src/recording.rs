@@ -19,7 +19,12 @@ use std::path::PathBuf;
 /// that is no recording of this version, or is of another scene.
 #[pyfunction]
 #[pyo3(signature = (path, scene = None, *, until = None))]
-pub fn replay(py: Python<'_>, path: PathBuf, scene: Option<PyRef<'_, Scene>>, until: Option<f64>) -> PyResult<Py<World>> {
+pub fn replay(
+    py: Python<'_>,
+    path: PathBuf,
+    scene: Option<PyRef<'_, Scene>>,
+    until: Option<f64>,
+) -> PyResult<Py<World>> {
     let recording = Recording::read(&path).map_err(raised::record)?;
     let until = until.map(|seconds| span("until", seconds)).transpose()?.map(|span| SimTime::ZERO + span);
     let scene = match (scene, recording.scene()) {

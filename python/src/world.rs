@@ -3,10 +3,10 @@
 //! In: commands by objects' names or handles. Out: states, events, answers. While time passes Python's own lock is free.
 //! Never here: the meaning of a command.
 
+use crate::calls::{Given, WorldCalls, apart};
 use crate::camera::{SIZE, Shot, Viewpoint};
 use crate::checkpoint::Checkpoint;
 use crate::command::Keywords;
-use crate::calls::{Given, WorldCalls, apart};
 use crate::export::{Export, Paths};
 use crate::home::Home;
 use crate::joints::{Joints, NamedJoint};
@@ -54,7 +54,12 @@ const PATIENCE: Duration = Duration::from_millis(20);
 
 impl World {
     /// A world that was started of this scene.
-    pub fn of(py: Python<'_>, inner: world::World, scene: &world::Scene, text: Option<SceneText>) -> PyResult<Py<Self>> {
+    pub fn of(
+        py: Python<'_>,
+        inner: world::World,
+        scene: &world::Scene,
+        text: Option<SceneText>,
+    ) -> PyResult<Py<Self>> {
         let (scene, pictures, calls) = (scene.clone(), Pictures::of(scene), WorldCalls::here(inner.clone()));
         let world = Self { inner, scene, pictures, text, home: Home::here() };
         Py::new(py, PyClassInitializer::from(calls).add_subclass(world))

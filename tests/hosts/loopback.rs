@@ -80,7 +80,8 @@ fn a_caller_that_looks_sees_rounded_states_which_follow_what_joins_and_is_put_ba
         }
         assert_eq!((elsewhere.time(), elsewhere.all_objects().len()), (here.time(), here.all_objects().count()));
         for object in here.all_objects() {
-            let (seen, is) = (elsewhere.latest(elsewhere.object_of(object.id()).unwrap()).unwrap(), here.latest(object).unwrap());
+            let (seen, is) =
+                (elsewhere.latest(elsewhere.object_of(object.id()).unwrap()).unwrap(), here.latest(object).unwrap());
             let probe = |body: &Body, at: f64| body.probe(at).unwrap().0;
             // half of 2⁻¹⁷ m along each axis
             assert!([0.0, 1.0].iter().all(|at| probe(&seen.body, *at).distance(probe(&is.body, *at)) < 7e-6));

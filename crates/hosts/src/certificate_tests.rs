@@ -90,7 +90,9 @@ fn a_call_under_the_name_of_another_certificate_reaches_nobody() {
         get.into_iter().filter(|answer| answer.result().is_ok()).count()
     };
     assert_eq!(answers("metachron/bench/call/eye/1", hello(PROGRAM)), 1);
-    for spoofed in ["metachron/bench/call/op/1", "metachron/bench/call/*/1", "metachron/**", "metachron/bench/call/eye/x/1"] {
+    for spoofed in
+        ["metachron/bench/call/op/1", "metachron/bench/call/*/1", "metachron/**", "metachron/bench/call/eye/x/1"]
+    {
         assert_eq!(answers(spoofed, hello(PROGRAM)), 0, "{spoofed}");
     }
     // a state, and another caller's or the host's end of life

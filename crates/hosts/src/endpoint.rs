@@ -66,7 +66,9 @@ pub(crate) fn open(place: Place<'_>, side: Side<'_>) -> Result<Session, HostsErr
 fn tls(identity: &Identity, side: Side<'_>) -> Vec<(&'static str, String)> {
     let [certificate, key, authority] = identity.in_base64().map(|base64| format!("\"{base64}\""));
     let (own_certificate, own_key) = match side {
-        Side::Host(_) => ("transport/link/tls/listen_certificate_base64", "transport/link/tls/listen_private_key_base64"),
+        Side::Host(_) => {
+            ("transport/link/tls/listen_certificate_base64", "transport/link/tls/listen_private_key_base64")
+        }
         Side::Caller => {
             ("transport/link/tls/connect_certificate_base64", "transport/link/tls/connect_private_key_base64")
         }
@@ -120,7 +122,11 @@ fn check(Place { endpoint, identity, insecure_lan }: Place<'_>) -> Result<(), Ho
     let (protocol, address) = endpoint.split_once('/').ok_or_else(bad)?;
     let (host, port) = address.rsplit_once(':').ok_or_else(bad)?;
     let is_host = |byte: u8| byte.is_ascii_alphanumeric() || b".-_[]:".contains(&byte);
-    if !["tcp", "tls"].contains(&protocol) || host.is_empty() || !host.bytes().all(is_host) || port.parse::<u16>().is_err() {
+    if !["tcp", "tls"].contains(&protocol)
+        || host.is_empty()
+        || !host.bytes().all(is_host)
+        || port.parse::<u16>().is_err()
+    {
         return Err(bad());
     }
     let unlike = |has| Err(HostsError::IdentityOrNot { endpoint: endpoint.to_owned(), has });
@@ -160,14 +166,25 @@ mod tests {
         for endpoint in ["tcp/127.0.0.1:7447", "tcp/localhost:1", "tcp/[::1]:7447", "tcp/127.8.0.1:0"] {
             assert!(checked(endpoint).is_ok() && !is_open_to_all(endpoint), "{endpoint}");
         }
-        for endpoint in ["tcp/0.0.0.0:7447", "tcp/10.0.0.1:7447", "tcp/[::]:7447", "tcp/localhost.evil:1", "tcp/bench:1"] {
+        for endpoint in
+            ["tcp/0.0.0.0:7447", "tcp/10.0.0.1:7447", "tcp/[::]:7447", "tcp/localhost.evil:1", "tcp/bench:1"]
+        {
             assert!(matches!(checked(endpoint), Err(HostsError::NeedsCertificates { .. })), "{endpoint}");
             assert!(check(Place { endpoint, identity: None, insecure_lan: true }).is_ok() && is_open_to_all(endpoint));
         }
         for endpoint in ["tls/bench:7447", "tls/127.0.0.1:1"] {
             assert!(matches!(checked(endpoint), Err(HostsError::IdentityOrNot { .. })), "{endpoint}");
         }
-        let bad = ["", "tcp", "tcp/127.0.0.1", "tcp/127.0.0.1:70000", "tcp/127.0.0.1:1#x=2", "smoke/127.0.0.1:1", "tcp/a\"]:1", "udp/127.0.0.1:1"];
+        let bad = [
+            "",
+            "tcp",
+            "tcp/127.0.0.1",
+            "tcp/127.0.0.1:70000",
+            "tcp/127.0.0.1:1#x=2",
+            "smoke/127.0.0.1:1",
+            "tcp/a\"]:1",
+            "udp/127.0.0.1:1",
+        ];
         for endpoint in bad {
             assert!(matches!(checked(endpoint), Err(HostsError::BadEndpoint { .. })), "{endpoint}");
         }

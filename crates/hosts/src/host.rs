@@ -11,7 +11,9 @@ use crate::identity::is_name;
 use crate::refusal::Refusal;
 use crate::rounded;
 use crate::serving::{ANYONE, Role, SceneFiles, Serving};
-use crate::wire::{BadMessage, Call, Encoded, MESSAGE_MAX, Moment, ObjectState, PROGRAM, Reply, Request, Welcome, decode, encode};
+use crate::wire::{
+    BadMessage, Call, Encoded, MESSAGE_MAX, Moment, ObjectState, PROGRAM, Reply, Request, Welcome, decode, encode,
+};
 use metachron_core::{AgentId, LocalModel, SimSpan, Snapshot};
 use metachron_world::{Checkpoint, EventFilter, EventReader, Part, Touched, WorldCalls, WorldError};
 use std::collections::{BTreeMap, BTreeSet, HashMap};
@@ -100,7 +102,8 @@ pub fn serve(world: Arc<dyn WorldCalls>, serving: Serving) -> Result<Host, Hosts
     let since_1970 = SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default();
     let run = (since_1970.as_nanos() as u64 ^ u64::from(std::process::id())).max(1);
     let events = world.listen(EventFilter::all());
-    let shown = Mutex::new(Shown { sequence: 1, objects: BTreeMap::new(), events, is_followed: false, too_long: 0, sent: 0 });
+    let shown =
+        Mutex::new(Shown { sequence: 1, objects: BTreeMap::new(), events, is_followed: false, too_long: 0, sent: 0 });
     let gate = Mutex::new(Gate::new(identity.is_some()));
     let (ends, scene, waiting) = (AtomicBool::new(false), scene.map(Box::new), AtomicUsize::new(0));
     let is_open = is_open_to_all(&endpoint);

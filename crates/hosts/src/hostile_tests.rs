@@ -33,7 +33,8 @@ fn stranger(endpoint: &str) -> Session {
 
 /// The answer to bytes that are sent as a call.
 fn ask(session: &Session, caller: &str, bytes: Vec<u8>) -> Option<Reply> {
-    let answers = session.get(format!("metachron/bench/call/anyone/{caller}")).payload(bytes).timeout(Duration::from_secs(5));
+    let answers =
+        session.get(format!("metachron/bench/call/anyone/{caller}")).payload(bytes).timeout(Duration::from_secs(5));
     let answer = answers.wait().unwrap().recv().ok()?;
     decode(&answer.result().ok()?.payload().to_bytes()).ok()
 }

@@ -53,7 +53,8 @@ impl Identity {
         let keys = blocks(&text, "PRIVATE KEY");
         let ([own, authority], [key]) = (&*certificates, &*keys) else {
             let (certificates, keys) = (certificates.len(), keys.len());
-            let wanted = "expected its certificate, its key and its authority's certificate, as of `metachron identity new`";
+            let wanted =
+                "expected its certificate, its key and its authority's certificate, as of `metachron identity new`";
             return Err(bad(format!("it has {certificates} certificates and {keys} keys; {wanted}")));
         };
         let (name, ends) = holder(own).ok_or_else(|| bad("its certificate names nobody".to_owned()))?;
@@ -111,7 +112,9 @@ impl Authority {
             ([certificate], [key]) => Ok(Self { certificate: certificate.clone(), key: key.clone() }),
             (certificates, keys) => {
                 let (certificates, keys) = (certificates.len(), keys.len());
-                Err(bad(format!("it has {certificates} certificates and {keys} keys; expected an authority's one of each")))
+                Err(bad(format!(
+                    "it has {certificates} certificates and {keys} keys; expected an authority's one of each"
+                )))
             }
         }
     }
@@ -140,8 +143,7 @@ impl Authority {
             let mut params = params(name, days);
             params.subject_alt_names = subject_alt_names;
             params.key_usages = vec![KeyUsagePurpose::DigitalSignature];
-            params.extended_key_usages =
-                vec![ExtendedKeyUsagePurpose::ServerAuth, ExtendedKeyUsagePurpose::ClientAuth];
+            params.extended_key_usages = vec![ExtendedKeyUsagePurpose::ServerAuth, ExtendedKeyUsagePurpose::ClientAuth];
             params.use_authority_key_identifier_extension = true;
             let key = KeyPair::generate()?;
             let certificate = params.signed_by(&key, &issuer)?.pem();
@@ -187,6 +189,7 @@ fn write_new(path: &Path, blocks: &[&str]) -> Result<(), HostsError> {
     options.write(true).create_new(true);
     #[cfg(unix)]
     std::os::unix::fs::OpenOptionsExt::mode(&mut options, 0o600);
-    let written = options.open(path).and_then(|mut file| blocks.iter().try_for_each(|block| file.write_all(block.as_bytes())));
+    let written =
+        options.open(path).and_then(|mut file| blocks.iter().try_for_each(|block| file.write_all(block.as_bytes())));
     written.map_err(|error| HostsError::BadIdentity { file: path.display().to_string(), reason: error.to_string() })
 }

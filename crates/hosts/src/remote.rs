@@ -141,7 +141,8 @@ pub fn connect(calling: impl Into<Calling>) -> Result<RemoteWorld, HostsError> {
     let session = open(place, Side::Caller)?;
     let failed = |error: zenoh::Error| HostsError::Network { endpoint: endpoint.clone(), reason: error.to_string() };
     let caller = format!("{}/{}", identity.as_ref().map_or(ANYONE, Identity::name), session.zid());
-    let welcome = greet(&session, &caller, is_looking).ok_or_else(|| HostsError::NoWorld { endpoint: endpoint.clone() })??;
+    let welcome =
+        greet(&session, &caller, is_looking).ok_or_else(|| HostsError::NoWorld { endpoint: endpoint.clone() })??;
     check_welcome(&welcome, scene.as_ref())?;
     let mirror = Arc::new(Mirror::new(welcome));
     let of_world = |last: &str| format!("metachron/{}/{last}", mirror.world);

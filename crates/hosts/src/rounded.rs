@@ -103,7 +103,8 @@ impl Sketches {
         if plain.len() > MESSAGE_MAX {
             return Err(BadMessage::TooLong(plain.len()));
         }
-        let Sketch { mut moment, bodies } = postcard::from_bytes(&plain).map_err(|error| malformed(error.to_string()))?;
+        let Sketch { mut moment, bodies } =
+            postcard::from_bytes(&plain).map_err(|error| malformed(error.to_string()))?;
         if bodies.len() != moment.states.len() {
             return Err(malformed("it has another number of bodies than of states".to_owned()));
         }
@@ -197,7 +198,8 @@ mod tests {
 
     /// A tube that waves, at a step.
     fn wave(step: u32) -> Arc<Snapshot> {
-        let node = |at: u32| DVec3::new(0.01 * f64::from(at), 0.1 * f64::from(at + step).sin(), 0.3 + 1e-4 * f64::from(step));
+        let node =
+            |at: u32| DVec3::new(0.01 * f64::from(at), 0.1 * f64::from(at + step).sin(), 0.3 + 1e-4 * f64::from(step));
         let frame = |at: u32| DQuat::from_rotation_x(0.1 * f64::from(at + step));
         let curve = CurveState {
             arc_m: (0..200).map(|at| 0.01 * f64::from(at)).collect(),
@@ -228,8 +230,10 @@ mod tests {
             let Ok(Sketched::Next(read)) = sketches.decode(&sent(step, step - 1)) else { panic!("the next one") };
             let (there, is) = (&read.states[0].state, wave(step));
             let (Body::Curve(there_is), Body::Curve(is_there)) = (&there.body, &is.body) else { panic!("a tube") };
-            let place = (there_is.positions.iter().zip(&is_there.positions)).map(|(a, b)| (*a - *b).abs().max_element());
-            let speed = (there_is.velocities.iter().zip(&is_there.velocities)).map(|(a, b)| (*a - *b).abs().max_element());
+            let place =
+                (there_is.positions.iter().zip(&is_there.positions)).map(|(a, b)| (*a - *b).abs().max_element());
+            let speed =
+                (there_is.velocities.iter().zip(&is_there.velocities)).map(|(a, b)| (*a - *b).abs().max_element());
             // half of 2⁻¹⁷ m and of 2⁻¹² m/s
             assert!(place.fold(0.0, f64::max) <= 3.9e-6 && speed.fold(0.0, f64::max) <= 1.3e-4);
             assert!(there_is.frames.iter().zip(&is_there.frames).all(|(a, b)| a.angle_between(*b) < 3e-5));
@@ -252,7 +256,8 @@ mod tests {
         let mut sketches = Sketches::default();
         sketches.begin(&[moment(1)]);
         // a body that is not there, and a number of bodies that is not that of states
-        let foreign = Moment { states: vec![ObjectState { id: AgentId(9), ..moment(2).states[0].clone() }], ..moment(2) };
+        let foreign =
+            Moment { states: vec![ObjectState { id: AgentId(9), ..moment(2).states[0].clone() }], ..moment(2) };
         let known = HashMap::from([(AgentId(9), wave(1))]);
         assert!(sketches.decode(&encode(&foreign, &known).unwrap()).is_err());
         // 64 MiB of zeros

@@ -36,7 +36,10 @@ pub(crate) struct Request {
 #[derive(Debug, Clone, serde::Serialize, serde::Deserialize)]
 pub(crate) enum Call {
     /// The first of each caller, with the version of its program, and whether it only looks: rounded states are sent to it then.
-    Hello { program: String, is_looking: bool },
+    Hello {
+        program: String,
+        is_looking: bool,
+    },
     /// All states.
     All,
     Command(AgentId, Command),

@@ -37,7 +37,8 @@ fn a_hundred_megabytes_in_one_message_take_no_memory_of_the_host() {
     let payload = ZBytes::from(vec![1; 100_000_000]);
     std::fs::write("/proc/self/clear_refs", "5").unwrap();
     let before = memory("VmRSS");
-    let asked = session.get("metachron/bench/call/anyone/peer").payload(payload.clone()).timeout(Duration::from_secs(20));
+    let asked =
+        session.get("metachron/bench/call/anyone/peer").payload(payload.clone()).timeout(Duration::from_secs(20));
     assert_eq!(asked.wait().unwrap().into_iter().filter(|answer| answer.result().is_ok()).count(), 0);
     let grown = memory("VmHWM").saturating_sub(before);
     println!("100 MB in one message: {} KiB more memory", grown >> 10);
