@@ -55,9 +55,10 @@ pub fn connect(
     scene: Option<PyRef<'_, Scene>>,
     identity: Option<PathBuf>,
     insecure_lan: bool,
-) -> PyResult<PyClassInitializer<RemoteWorld>> {
+) -> PyResult<Py<RemoteWorld>> {
     let scene = scene.map(|scene| scene.resolved()).transpose()?.map(|scene| scene.mark());
     let wanted = Wanted { endpoint, scene, identity, insecure_lan };
     let calls = py.detach(|| link::connect(wanted))?;
-    Ok(PyClassInitializer::from(WorldCalls::elsewhere(Arc::clone(&calls))).add_subclass(RemoteWorld { calls }))
+    let world = PyClassInitializer::from(WorldCalls::elsewhere(Arc::clone(&calls)));
+    Py::new(py, world.add_subclass(RemoteWorld { calls }))
 }

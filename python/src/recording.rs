@@ -6,7 +6,7 @@
 use crate::numbers::span;
 use crate::raised;
 use crate::scene::Scene;
-use crate::world::{Started, World};
+use crate::world::World;
 use metachron::core::SimTime;
 use metachron::world::{self, Recording};
 use pyo3::exceptions::PyValueError;
@@ -19,7 +19,12 @@ use std::path::PathBuf;
 /// that is no recording of this version, or is of another scene.
 #[pyfunction]
 #[pyo3(signature = (path, scene = None, *, until = None))]
-pub fn replay(py: Python<'_>, path: PathBuf, scene: Option<PyRef<'_, Scene>>, until: Option<f64>) -> PyResult<Started> {
+pub fn replay(
+    py: Python<'_>,
+    path: PathBuf,
+    scene: Option<PyRef<'_, Scene>>,
+    until: Option<f64>,
+) -> PyResult<Py<World>> {
     let recording = Recording::read(&path).map_err(raised::record)?;
     let until = until.map(|seconds| span("until", seconds)).transpose()?.map(|span| SimTime::ZERO + span);
     let scene = match (scene, recording.scene()) {
@@ -31,5 +36,5 @@ pub fn replay(py: Python<'_>, path: PathBuf, scene: Option<PyRef<'_, Scene>>, un
         }
     };
     let inner = py.detach(|| world::World::replay(&scene, recording, until)).map_err(raised::checkpoint)?;
-    Ok(World::of(inner, &scene, None))
+    World::of(py, inner, &scene, None)
 }

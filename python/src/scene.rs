@@ -10,7 +10,7 @@ use crate::raised;
 use crate::sensor::mount;
 use crate::soft::soft;
 use crate::start::started;
-use crate::world::{Started, World};
+use crate::world::World;
 use metachron::contact::joint::JointKind;
 use metachron::core::NoSuchChoice;
 use metachron::geometry::Solid;
@@ -192,13 +192,13 @@ impl Scene {
     /// `"real-time"`, the default on other executors, it passes beside the clock, and an object that is too slow for it does; in lockstep that
     /// is by what the scene's declared machine costs.
     #[pyo3(signature = (executor = "lockstep", pace = None))]
-    pub fn start(&self, py: Python<'_>, executor: &str, pace: Option<&str>) -> PyResult<Started> {
+    pub fn start(&self, py: Python<'_>, executor: &str, pace: Option<&str>) -> PyResult<Py<World>> {
         let text = match &self.inner {
             Inner::Built(_) => None,
             Inner::Read(_, text) => Some((**text).clone()),
         };
         let scene = self.resolved()?;
-        Ok(World::of(started(py, &scene, executor, pace)?, &scene, text))
+        World::of(py, started(py, &scene, executor, pace)?, &scene, text)
     }
 }
 

@@ -40,9 +40,6 @@ pub struct World {
     home: Home,
 }
 
-/// A world, on its way to Python.
-pub type Started = PyClassInitializer<World>;
-
 impl Drop for World {
     fn drop(&mut self) {
         if !self.is_at_home() {
@@ -57,9 +54,15 @@ const PATIENCE: Duration = Duration::from_millis(20);
 
 impl World {
     /// A world that was started of this scene.
-    pub fn of(inner: world::World, scene: &world::Scene, text: Option<SceneText>) -> Started {
+    pub fn of(
+        py: Python<'_>,
+        inner: world::World,
+        scene: &world::Scene,
+        text: Option<SceneText>,
+    ) -> PyResult<Py<Self>> {
         let (scene, pictures, calls) = (scene.clone(), Pictures::of(scene), WorldCalls::here(inner.clone()));
-        PyClassInitializer::from(calls).add_subclass(Self { inner, scene, pictures, text, home: Home::here() })
+        let world = Self { inner, scene, pictures, text, home: Home::here() };
+        Py::new(py, PyClassInitializer::from(calls).add_subclass(world))
     }
 
     /// Whether the threads that step it are in this process.
@@ -83,7 +86,7 @@ impl World {
         text_or_path: &Bound<'_, PyAny>,
         executor: &str,
         pace: Option<&str>,
-    ) -> PyResult<Started> {
+    ) -> PyResult<Py<Self>> {
         Scene::from_toml(text_or_path, false, None)?.start(py, executor, pace)
     }
 

@@ -125,7 +125,8 @@ fn line(carried: &Carried, json: bool) -> anyhow::Result<String> {
     let sent_kb_s = sent_bytes_s / 1e3;
     let RefusedRow { malformed, flooded, repeated, strangers, forbidden } = refused;
     let refused = malformed + flooded + repeated + strangers + forbidden;
-    let open = if *insecure_lan { red("  open to the network", std::io::stdout().is_terminal()) } else { String::new() };
+    let open =
+        if *insecure_lan { red("  open to the network", std::io::stdout().is_terminal()) } else { String::new() };
     Ok(format!(
         "{sim_s:>9.1} s  {agents} agents  {cpu:.2} cores  {callers} callers, {sent_kb_s:.0} kB/s each  {refused} messages refused{open}\n"
     ))
@@ -160,7 +161,10 @@ pub(super) fn identity(command: &IdentityCommand) -> anyhow::Result<Exit> {
         message(&format!("{}: a new authority; who has this file can be anybody", args.authority.display()));
         authority
     };
-    authority.issue(&args.name, &args.address, args.days).and_then(|identity| identity.write(&file)).map_err(refused)?;
+    authority
+        .issue(&args.name, &args.address, args.days)
+        .and_then(|identity| identity.write(&file))
+        .map_err(refused)?;
     let addresses: Vec<_> = std::iter::once(&args.name).chain(&args.address).map(String::as_str).collect();
     message(&format!("{file}: {} for {} days, reached as {}", args.name, args.days, addresses.join(", ")));
     Ok(Exit::Ok)
@@ -175,9 +179,7 @@ fn refused(error: HostsError) -> anyhow::Error {
         | HostsError::IdentityOrNot { .. }
         | HostsError::NobodyNamed
         | HostsError::BadIdentity { .. }
-        | HostsError::LongScene { .. } => {
-            BadInput(error.to_string()).into()
-        }
+        | HostsError::LongScene { .. } => BadInput(error.to_string()).into(),
         other => other.into(),
     }
 }

@@ -66,6 +66,11 @@ fn foreign_expired_and_unnamed_certificates_and_none_are_let_in_nowhere() {
     let bare = connect(&endpoint.replace("tls/", "tcp/")).unwrap_err();
     assert!(matches!(bare, HostsError::Network { .. }), "{bare}");
     assert!(matches!(connect(&endpoint), Err(HostsError::IdentityOrNot { .. })));
+    let serving = |at: &str| Serving::new("bench", at);
+    let without = serve(Arc::new(world.clone()), serving("tcp/127.0.0.1:0").viewers(["eye"]));
+    assert!(matches!(without, Err(HostsError::IdentityOrNot { .. })), "names without certificates");
+    let nobody = serving("tls/127.0.0.1:0").identity(authority.issue("bench", &[], 1).unwrap());
+    assert!(matches!(serve(Arc::new(world.clone()), nobody), Err(HostsError::NobodyNamed)));
     assert_eq!((host.callers(), host.refused().total(), world.time().as_nanos()), (0, 0, 0));
     called(&endpoint, authority.issue("op", &[], 1).unwrap()).unwrap();
 }

@@ -143,14 +143,18 @@ fn check_scene(scene: Option<&SceneFiles>) -> Result<(), HostsError> {
 }
 
 /// Who may call, and do what: with certificates those who are named, without all.
-fn roles(Serving { name, identity, roles, .. }: &Serving) -> Result<BTreeMap<String, Role>, HostsError> {
+fn roles(Serving { name, endpoint, identity, roles, .. }: &Serving) -> Result<BTreeMap<String, Role>, HostsError> {
     if let Some(name) = std::iter::once(name).chain(roles.keys()).find(|name| !is_name(name)) {
         return Err(HostsError::BadName { name: name.clone() });
     }
     match (identity, roles.is_empty()) {
         (Some(_), true) => Err(HostsError::NobodyNamed),
         (Some(_), false) => Ok(roles.clone()),
-        (None, _) => Ok([(ANYONE.to_owned(), Role::Operator)].into()),
+        (None, false) => {
+            let has = "callers are named, and nobody could know them";
+            Err(HostsError::IdentityOrNot { endpoint: endpoint.clone(), has })
+        }
+        (None, true) => Ok([(ANYONE.to_owned(), Role::Operator)].into()),
     }
 }
 

@@ -36,7 +36,8 @@ impl Elsewhere {
     /// [`WorldError::Build`] and [`WorldError::Run`].
     pub fn new(scene: &Scene, calls: Arc<dyn WorldCalls>) -> Result<Self, WorldError> {
         let (ghosts, first) = (GhostWorld::of(scene)?, calls.time());
-        let mut elsewhere = Self { calls, ghosts, first, newest: first, came: Instant::now(), error: None, notes: Vec::new() };
+        let mut elsewhere =
+            Self { calls, ghosts, first, newest: first, came: Instant::now(), error: None, notes: Vec::new() };
         elsewhere.follow();
         Ok(elsewhere)
     }
