@@ -5,6 +5,7 @@
 
 use super::convex::Convex;
 use super::robin_hood;
+use super::vanish::STAY_FACTOR;
 use crate::control::demand::plan::{LevelDemand, SizedView};
 use crate::control::demand::policy::Policy;
 use crate::control::demand::query::{FrameQuery, Promise, TICKS, demand, left_out};
@@ -72,8 +73,10 @@ impl Select {
         let steps = (first + rungs.len()).max(2) as f64 - 1.0;
         let change = |level: usize| last.flatten().map_or(0.0, |last| (level as f64 - f64::from(last)).abs() / steps);
         let weight = query.weight(at);
+        // what was drawn does not go out for a slight change of size
+        let stays = if first > 0 && last.flatten() > Some(0) { STAY_FACTOR } else { 1.0 };
         let entry = |(level, rung): (usize, &Rung)| match policy.has_printed_benefit() {
-            true => query.entry_of(rung, benefit::printed(view, rung, change(first + level), query.sliders)),
+            true => query.entry_of(rung, stays * benefit::printed(view, rung, change(first + level), query.sliders)),
             false => query.entry(weight, rung),
         };
         null.into_iter().chain(rungs.iter().enumerate().map(entry)).collect()

@@ -8,7 +8,7 @@ use crate::control::demand::query::FrameQuery;
 
 /// Factor of the benefit per cost of an object that was drawn in the frame before: it does not go out for a slight
 /// change of size.
-const STAY_FACTOR: f64 = 1.25;
+pub(super) const STAY_FACTOR: f64 = 1.25;
 
 /// An object comes back where this fraction of the time stays free: it does not come in for a slight change of time.
 const COME_BACK: f64 = 0.05;
