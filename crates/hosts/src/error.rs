@@ -47,12 +47,13 @@ pub enum HostsError {
     },
     /// The scene is too long for the answer to a caller that draws it.
     #[error(
-        "the text of the scene and its files have {bytes} bytes, and callers are sent at most {max}; the longest file is \"{longest}\"",
-        max = crate::MESSAGE_MAX
+        "the text of the scene and its files have {bytes} bytes, and callers are sent at most {most}; the longest file is \"{longest}\""
     )]
     LongScene {
         /// All bytes.
         bytes: usize,
+        /// The most that there may be.
+        most: usize,
         /// The name of the longest file; of the scene where it has none.
         longest: String,
     },

@@ -139,7 +139,7 @@ fn check_scene(scene: Option<&SceneFiles>) -> Result<(), HostsError> {
     }
     let longest = files.iter().max_by_key(|(_, bytes)| bytes.len()).map_or(&text.name, |(name, _)| name);
     let bytes = text.text.len() + files.values().map(Vec::len).sum::<usize>();
-    Err(HostsError::LongScene { bytes, longest: longest.clone() })
+    Err(HostsError::LongScene { bytes, most: MESSAGE_MAX, longest: longest.clone() })
 }
 
 /// Who may call, and do what: with certificates those who are named, without all.
