@@ -6,7 +6,7 @@ from typing import Any, Final, Literal, TypedDict, final
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from typing_extensions import Required, Self, Unpack
+from typing_extensions import Required, Self, Unpack, disjoint_base
 
 from .parts import Camera, JointKind, Part, Sensor, Solid
 from .typing import Array, Numbers
@@ -197,6 +197,7 @@ class Checkpoint:
     def time(self) -> float:
         """Simulated time of the state, s."""
 
+@disjoint_base
 class WorldCalls:
     """What a world answers wherever it runs: any thread may read and command it."""
 
@@ -506,7 +507,7 @@ class States:
 
 @final
 class Events:
-    """Listens to a world. An object keeps its newest 128 events until they are drained."""
+    """Listens to a world. An object keeps its newest 128 events until they are drained; of a world elsewhere all objects together 4096."""
 
     def drain(self) -> list[Event]:
         """The events since the last call, oldest first."""
