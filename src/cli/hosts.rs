@@ -158,7 +158,7 @@ pub(super) fn identity(command: &IdentityCommand) -> anyhow::Result<Exit> {
     } else {
         let authority = Authority::new(&stem(&args.authority.to_string_lossy())).map_err(refused)?;
         authority.write(&args.authority).map_err(refused)?;
-        message(&format!("{}: a new authority; who has this file can be anybody", args.authority.display()));
+        message(&format!("{}: a new authority; who has this file can pose as anybody", args.authority.display()));
         authority
     };
     authority

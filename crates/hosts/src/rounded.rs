@@ -109,7 +109,7 @@ impl Sketches {
         if bodies.len() != moment.states.len() {
             return Err(malformed("it has another number of bodies than of states".to_owned()));
         }
-        if moment.sequence != self.sequence + 1 {
+        if Some(moment.sequence) != self.sequence.checked_add(1) {
             return Ok(if moment.sequence <= self.sequence { Sketched::Old } else { Sketched::Later });
         }
         for (object, sent) in moment.states.iter_mut().zip(bodies) {

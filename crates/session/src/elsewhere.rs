@@ -25,7 +25,7 @@ pub(super) struct Elsewhere {
     came: Instant,
     /// Why it was not shown whole, or did not take what a user did.
     pub error: Option<WorldError>,
-    /// What all that is shown of it is not without.
+    /// Warnings about all that is shown of it.
     pub notes: Vec<String>,
 }
 

@@ -43,7 +43,7 @@ impl Session {
         self.elsewhere.as_mut()?.error.take()
     }
 
-    /// What all that is shown of a world elsewhere is not without: a link that anybody may listen to, objects that cannot be shown.
+    /// Warnings about all that is shown of a world elsewhere: a link that anybody may listen to, objects that cannot be shown.
     #[must_use]
     pub fn notes(&self) -> &[String] {
         self.elsewhere.as_ref().map_or(&[], |elsewhere| &elsewhere.notes)

@@ -149,8 +149,8 @@ impl World {
     /// Puts joints to coordinates before the next step, and with them all bodies that they carry. The root of a tree of
     /// joints stays: the world, a kinematic body, or of a tree that nothing holds its body of the lowest number. Joints
     /// that are not named keep their places and rates, also spherical and fixed ones; torn ones, springs and ropes
-    /// carry nothing. A joint that follows another one goes along with it. Joints of a loop are set together, all but one, to coordinates that close it within 1 mm and 1
-    /// mrad; the next step brings their rates together.
+    /// carry nothing. A joint that follows another one goes along with it. Joints of a loop are set together, all but one, to
+    /// coordinates that close it within 1 mm and 1 mrad; the next step brings their rates together.
     ///
     /// # Errors
     /// [`WorldError::BadCoordinate`] for a coordinate that is outside the joint's range by more than 1 mm or 1 mrad, or

@@ -20,7 +20,7 @@ pub(super) struct Mimicking {
     held: [usize; 2],
     pub(super) row: usize,
     mimic: Mimic,
-    /// The whole turns of both in the gap between them, rad or metres of the one that follows.
+    /// Whole turns of both counted so far, in the unit of the one that follows.
     turned: f64,
 }
 
