@@ -168,6 +168,6 @@ pub struct Outcome {
     /// Why the run ended before its end, where the user did not end it: a recording, film or picture could not be written, a world elsewhere
     /// did not answer, or its time stood.
     pub cut_off: Option<Arc<SessionError>>,
-    /// What its figures and pictures are not without ([`crate::Session::notes`]).
+    /// Warnings about its figures and pictures ([`crate::Session::notes`]).
     pub notes: Vec<String>,
 }

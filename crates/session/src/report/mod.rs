@@ -65,7 +65,7 @@ pub struct Report {
     /// Devices that led objects, and the forces that they felt; left out where there were none.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub devices: Vec<DeviceReport>,
-    /// What its figures are not without, of a world elsewhere: a link that anybody may listen to, objects that were not shown; left out where
+    /// Warnings about its figures, of a world elsewhere: a link that anybody may listen to, objects that were not shown; left out where
     /// there is nothing.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub notes: Vec<String>,
