@@ -155,6 +155,7 @@ impl Scene {
     /// Joins the rigid bodies `a` and `b`, or `a` and the world. Place and axis of `kind` are in the world's axes, as the bodies are at the start.
     ///
     /// A hinge or slide follows the joint `mimic`, one too: its travel is `ratio` times that one's, rad or m for each rad or m.
+    #[expect(clippy::too_many_arguments, reason = "a call in Python has keywords")]
     #[pyo3(signature = (name, kind, a, b = None, *, mimic = None, ratio = 1.0))]
     fn joint<'py>(
         mut slf: PyRefMut<'py, Self>,
