@@ -21,7 +21,7 @@ use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use std::sync::Arc;
 
-/// What a world answers wherever it runs: any thread may read and command it.
+/// The calls that a world answers wherever it runs: any thread may read and command it.
 #[pyclass(frozen, subclass, module = "metachron")]
 pub struct WorldCalls {
     pub calls: Arc<dyn world::WorldCalls>,

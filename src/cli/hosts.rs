@@ -141,7 +141,7 @@ fn red(text: &str, is_terminal: bool) -> String {
     if is_terminal { format!("\x1b[31m{text}\x1b[0m") } else { text.to_owned() }
 }
 
-/// What was refused of a peer in the last second.
+/// The line that says which messages of a peer were refused in the last second.
 fn of_peer(peer: &str, refused: Refusals) -> String {
     let Refusals { malformed, flooded, repeated, strangers, forbidden, .. } = refused;
     format!(

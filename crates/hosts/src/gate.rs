@@ -75,13 +75,13 @@ struct Caller {
 /// How many callers there are, by the states that they are sent.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) struct Callers {
-    /// Those that are sent whole states.
+    /// Callers that are sent whole states.
     pub whole: usize,
-    /// Those that only look.
+    /// Callers that only look.
     pub looking: usize,
 }
 
-/// What a peer has called in the second that began then, and what was refused since that was last said.
+/// The calls of a peer in the second that began then, and its messages that were refused since that was last said.
 #[derive(Debug, Default)]
 struct Peer {
     begun: Option<Instant>,

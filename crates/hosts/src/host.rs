@@ -142,7 +142,7 @@ fn check_scene(scene: Option<&SceneFiles>) -> Result<(), HostsError> {
     Err(HostsError::LongScene { bytes, most: MESSAGE_MAX, longest: longest.clone() })
 }
 
-/// Who may call, and do what: with certificates those who are named, without all.
+/// The callers that are let in, and their roles: with certificates the named ones, without them all.
 fn roles(Serving { name, endpoint, identity, roles, .. }: &Serving) -> Result<BTreeMap<String, Role>, HostsError> {
     if let Some(name) = std::iter::once(name).chain(roles.keys()).find(|name| !is_name(name)) {
         return Err(HostsError::BadName { name: name.clone() });

@@ -28,7 +28,7 @@ pub struct Identity {
     authority: String,
 }
 
-/// A certificate that others are issued by, with its key: one PEM file. Who has it can be anybody.
+/// A certificate that others are issued by, with its key: one PEM file. Its holder can issue any name.
 pub struct Authority {
     certificate: String,
     key: String,
@@ -154,7 +154,7 @@ impl Authority {
     }
 }
 
-/// What all certificates of a name have.
+/// The part that all certificates of a name share.
 fn params(name: &str, days: i64) -> CertificateParams {
     let mut params = CertificateParams::default();
     params.distinguished_name = DistinguishedName::new();

@@ -16,7 +16,7 @@ pub struct SceneFiles {
     pub files: BTreeMap<String, Vec<u8>>,
 }
 
-/// What a caller may do.
+/// The rights of a caller.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Role {
     /// Read states, events, parts, the scene and the hash.

@@ -140,7 +140,7 @@ pub fn play_headless(
     Ok(Outcome { cut_off: cut_off.map(Arc::new).or(outcome.cut_off), ..outcome })
 }
 
-/// What ended the run first: `before`, or a picture that could not be written. Other errors end the run without an outcome.
+/// The first reason for the run's end: `before`, or a picture that could not be written. Other errors end the run without an outcome.
 #[cfg(feature = "picture")]
 fn keep_first(
     before: Option<SessionError>,

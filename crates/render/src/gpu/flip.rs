@@ -50,7 +50,7 @@ pub fn flip(a: &PictureFile, b: &PictureFile) -> Option<f64> {
     Some(all.sum::<f64>() / a.colours.len() as f64)
 }
 
-/// What is seen of a picture.
+/// A picture as an eye sees it.
 struct Seen {
     /// L*a*b* of every pixel as blurred by the eye, colours as faint as the light is (Hunt).
     colours: Vec<[f64; 3]>,

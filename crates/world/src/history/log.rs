@@ -23,7 +23,7 @@ pub(crate) struct Log {
     mode: Mutex<Mode>,
     /// Whether it is recorded or replayed: governors look at this alone where it is not.
     is_in_use: AtomicBool,
-    /// What governors asked for before the first turns of their agents.
+    /// The demands of governors before the first turns of their agents.
     starts: Mutex<Vec<(AgentId, Demand)>>,
 }
 

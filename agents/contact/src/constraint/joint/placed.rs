@@ -67,7 +67,7 @@ impl Jointed {
 }
 
 impl Placed {
-    /// What the joint lets move along its axis, spins of a hinge, points of a slide: what acts between them is no force that holds it together.
+    /// The sides that the joint leaves free along its axis, spins of a hinge, points of a slide: a force between them does not hold it together.
     pub(super) fn free(&self, joint: &Joint) -> Together {
         let of = if matches!(joint.kind, JointKind::Revolute { .. }) { &self.turns } else { &self.points };
         Together { sides: of.sides, owner: self.turns.owner }

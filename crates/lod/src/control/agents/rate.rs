@@ -178,7 +178,7 @@ pub struct RateControl {
     sent: f64,
     /// Windows in a row in which others delayed the agent, and in which they did not.
     late: usize,
-    turns_in_time: u32,
+    windows_in_time: u32,
     patience: u32,
     /// z before the last demand, if that refined and is not confirmed yet.
     refined_from: Option<f64>,
@@ -209,7 +209,7 @@ impl RateControl {
             visible: 0.0,
             sent: start,
             late: 0,
-            turns_in_time: 0,
+            windows_in_time: 0,
             patience: PATIENCE.0,
             refined_from: None,
             rest: None,
@@ -347,11 +347,11 @@ impl RateControl {
     fn learn(&mut self, window: &Window) {
         let lateness = window.late / f64::from(window.turns) - window.over_s / window.wanted_s;
         self.late = if lateness > LATE { self.late + 1 } else { 0 };
-        self.turns_in_time = if self.late > 0 { 0 } else { self.turns_in_time.saturating_add(1) };
+        self.windows_in_time = if self.late > 0 { 0 } else { self.windows_in_time.saturating_add(1) };
         if self.late >= IN_A_ROW {
             self.coarsen_for_others(lateness);
         }
-        if self.turns_in_time >= 2 * self.patience && self.refined_from.take().is_some() {
+        if self.windows_in_time >= 2 * self.patience && self.refined_from.take().is_some() {
             self.patience = (self.patience / 2).max(PATIENCE.0);
         }
         let Some(full) = self.full.mean() else { return };
@@ -384,7 +384,7 @@ impl RateControl {
 
     /// With time to spare: refines, once delays by others have ceased for long enough.
     fn refine(&mut self, to: f64) {
-        if self.turns_in_time >= self.patience {
+        if self.windows_in_time >= self.patience {
             let part = if self.patience == PATIENCE.0 { self.gains.refine * (self.own_target - to) } else { 0.0 };
             self.aim = to.max(self.own_target - part.max(REFINE_MAX)).max(0.0);
         }
@@ -393,7 +393,7 @@ impl RateControl {
     fn demand_if_worth_it(&mut self) -> Option<RateDemand> {
         if self.is_worth_it(self.own_target, self.aim) {
             if self.aim < self.own_target {
-                (self.refined_from, self.turns_in_time) = (Some(self.own_target), 0);
+                (self.refined_from, self.windows_in_time) = (Some(self.own_target), 0);
             }
             self.own_target = self.aim;
         }
