@@ -199,7 +199,7 @@ class Checkpoint:
 
 @disjoint_base
 class WorldCalls:
-    """What a world answers wherever it runs: any thread may read and command it."""
+    """The calls that a world answers wherever it runs: any thread may read and command it."""
 
     def object(self, name: str) -> Object:
         """The object of this name. Raises `KeyError`."""
