@@ -228,6 +228,11 @@ impl MemberState {
         }
     }
 
+    /// Notes that its body was put where no step has led it.
+    pub fn note_placed(&mut self) {
+        self.memory.note_placed();
+    }
+
     /// Forgets the history of contacts on edges and triangles of skins.
     pub fn forget_features(&mut self) {
         self.memory.forget_features();

@@ -53,16 +53,16 @@ pub(crate) struct RowOwner {
     pub own: Option<usize>,
     /// Whether it takes back its creep: true for a row that holds a velocity and knows no position.
     pub owes: bool,
-    /// The whole turns of two joints that it keeps together, rad or metres.
-    pub turned: f64,
+    /// The travels of two joints that it keeps together ([`Remembered::travels`](crate::member::memory::Remembered)).
+    pub travels: [f64; 2],
 }
 
 impl RowOwner {
     /// The owner of the first row of a tie that holds no member, neither tears nor yields and owes nothing.
     pub fn new(member: usize, other: Option<usize>, partner: Partner) -> Self {
         let (tears_above_n, yields_above_n) = (f64::INFINITY, f64::INFINITY);
-        let (hold, frame, own, owes, turned) = (None, Frame::WORLD, None, false, 0.0);
-        Self { member, other, partner, key: 0, hold, tears_above_n, yields_above_n, frame, own, owes, turned }
+        let (hold, frame, own, owes, travels) = (None, Frame::WORLD, None, false, [0.0; 2]);
+        Self { member, other, partner, key: 0, hold, tears_above_n, yields_above_n, frame, own, owes, travels }
     }
 
     /// The way that its row owes after a step that gave `impulse_n_s` (eq. 13).

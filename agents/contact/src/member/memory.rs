@@ -76,8 +76,8 @@ pub(crate) struct Remembered {
     pub owed_slip_m: DVec3,
     /// The same of its friction about the normal.
     pub spin: Spin,
-    /// The whole turns of two joints of which one follows the other, rad or metres.
-    pub turned: f64,
+    /// The travels of two joints of which one follows the other, with their whole turns, rad or metres: first of the one that follows.
+    pub travels: [f64; 2],
 }
 
 /// One pair, with its places by rising names; places of one name by their triangles.
@@ -139,6 +139,8 @@ pub struct ContactMemory {
     unfinished: Vec<UnfinishedLoad>,
     /// The bodies that touched a sensor, or the sensors that the body touched, sorted by partners. They stay.
     sensed: Vec<SensorTouch>,
+    /// Whether the body is where its last step ended.
+    goes_on: bool,
 }
 
 /// The impulse of an attachment since its force was last looked at.
@@ -152,13 +154,14 @@ pub(crate) struct UnfinishedLoad {
 
 impl Clone for ContactMemory {
     fn clone(&self) -> Self {
-        let Self { pairs, torn, slips, unfinished, sensed } = self;
+        let Self { pairs, torn, slips, unfinished, sensed, goes_on } = self;
         let (pairs, torn, slips) = (pairs.clone(), torn.clone(), slips.clone());
-        Self { pairs, torn, slips, unfinished: unfinished.clone(), sensed: sensed.clone() }
+        Self { pairs, torn, slips, unfinished: unfinished.clone(), sensed: sensed.clone(), goes_on: *goes_on }
     }
 
     fn clone_from(&mut self, from: &Self) {
-        let Self { pairs, torn, slips, unfinished, sensed } = self;
+        let Self { pairs, torn, slips, unfinished, sensed, goes_on } = self;
+        *goes_on = from.goes_on;
         pairs.clone_from(&from.pairs);
         torn.clone_from(&from.torn);
         slips.clone_from(&from.slips);
@@ -252,6 +255,7 @@ impl ContactMemory {
 
     /// Replaces the places of every pair by those noted since, and forgets pairs that have not been near at `now`.
     pub(crate) fn turn(&mut self, now: SimTime) {
+        self.goes_on = true;
         for pair in &mut self.pairs {
             std::mem::swap(&mut pair.places, &mut pair.next);
             pair.next.clear();
@@ -368,6 +372,16 @@ impl ContactMemory {
     /// The same, to let it slip on.
     pub(crate) fn slip(&mut self, partner: Partner) -> &mut Slip {
         entry(&mut self.slips, &partner, |slip| slip.partner, || Slip::none(partner))
+    }
+
+    /// Notes that the body was put where no step has led it.
+    pub fn note_placed(&mut self) {
+        self.goes_on = false;
+    }
+
+    /// Whether the body is where its last step ended: it was not put somewhere since, and has made a step.
+    pub(crate) const fn goes_on(&self) -> bool {
+        self.goes_on
     }
 
     /// Forgets places that are named by edges and triangles of skins, where one has lost some and others have their numbers now.

@@ -85,7 +85,7 @@ impl ClusterStepper {
             let (key, force_n, overlap_m) = (owner.key, persistent / h_s, contact.overlap_m);
             let push = owner.push_row.map_or(DVec3::ZERO, |row| solution.rows_n_s[row]);
             let push_n = push.length() / h_s;
-            let place = Remembered { key, force_n, load_n, overlap_m, push_n, owed_slip_m, spin, turned: 0.0 };
+            let place = Remembered { key, force_n, load_n, overlap_m, push_n, owed_slip_m, spin, travels: [0.0; 2] };
             all[owner.member].memory.pair(owner.partner).next.push(place);
             let impulse = impulse + push + impacts.contacts_n_s.get(k).copied().unwrap_or_default();
             external.note(all, owner.member, &contact.sides[1], -impulse);
@@ -124,7 +124,7 @@ impl ClusterStepper {
             }
             let owed_slip_m = owner.owed_slip_m(row, impulse, &self.progress, h_s);
             let (key, force_n) = (place_key(owner.key), impulse / h_s);
-            let place = Remembered { key, force_n, owed_slip_m, turned: owner.turned, ..Remembered::default() };
+            let place = Remembered { key, force_n, owed_slip_m, travels: owner.travels, ..Remembered::default() };
             all[owner.member].memory.pair(owner.partner).next.push(place);
         }
         joints.note_efforts(constraints, &solution.rows_n_s, &mut sums.efforts);

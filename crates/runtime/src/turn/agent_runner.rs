@@ -326,6 +326,10 @@ impl AgentRunner {
         if let Some(motion) = &pending.motion {
             moved |= self.model.call(|agent| agent.set_motion(motion))?;
         }
+        let moves = pending.motion.is_some_and(|motion| motion.position_m.is_some() || motion.rotation.is_some());
+        if moved && (moves || pending.state.is_some()) {
+            self.cluster.iter_mut().for_each(|member| member.note_placed());
+        }
         // others find it where it is now
         if moved { self.write_snapshot(self.pace.time(), false) } else { Ok(()) }
     }

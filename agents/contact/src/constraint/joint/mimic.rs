@@ -13,6 +13,11 @@ use crate::solve::{Hold, JointRow, Side};
 use glam::{DMat3, DVec3};
 use std::f64::consts::TAU;
 
+/// Two joints are together where the one that follows is no farther from where it is led, rad or m.
+const TOGETHER: f64 = 1e-3;
+/// The most whole turns of a leader that are looked for, either way, where a joint was put somewhere.
+const TURNS_MAX: i32 = 64;
+
 /// A joint that follows another.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Mimicking {
@@ -20,8 +25,8 @@ pub(super) struct Mimicking {
     held: [usize; 2],
     pub(super) row: usize,
     mimic: Mimic,
-    /// Whole turns of both counted so far, in the unit of the one that follows.
-    turned: f64,
+    /// The travels of both with the whole turns of hinges.
+    travels: [f64; 2],
 }
 
 impl Joints {
@@ -30,18 +35,34 @@ impl Joints {
         for (at, follower) in self.held.iter().enumerate() {
             let Some(mimic) = follower.of.joint.mimic else { continue };
             let Some(leading) = self.held.iter().position(|held| held.of.number == mimic.joint) else { continue };
-            let sides = [follower.travel_side(step, 1.0), self.held[leading].travel_side(step, mimic.ratio)];
+            let both = [at, leading].map(|at| &self.held[at]);
+            let sides = [both[0].travel_side(step, 1.0), both[1].travel_side(step, mimic.ratio)];
             let [Some(follows), Some(leads)] = sides else { continue };
             let row = JointRow::new([follows, leads], Hold::along(DVec3::X));
             let owner = RowOwner::new(follower.of.a, follower.of.b, Partner::Joint(follower.of.number));
-            let before = step.all[follower.of.a].memory.recall(owner.partner, place_key(MIMIC)).turned;
-            let mut mimicking = Mimicking { held: [at, leading], row: constraints.rows.len(), mimic, turned: before };
-            mimicking.turn(&self.held);
-            if constraints.push(step, row, RowOwner { key: MIMIC, turned: mimicking.turned, ..owner }) {
+            let owner = RowOwner { key: MIMIC, travels: travels(step, both, mimic, &owner), ..owner };
+            let mimicking =
+                Mimicking { held: [at, leading], row: constraints.rows.len(), mimic, travels: owner.travels };
+            if constraints.push(step, row, owner) {
                 self.mimicking.push(mimicking);
             }
         }
     }
+}
+
+/// The travels of two joints, each as near as whole turns let it be to where it was before the last step. Where somebody has put a body of
+/// theirs somewhere else since, nothing is known of turns but that the two are together.
+fn travels(step: &FineStep<'_, '_>, both: [&Held; 2], mimic: Mimic, owner: &RowOwner) -> [f64; 2] {
+    let now = both.map(|held| held.now.travel);
+    let mut bodies = both.into_iter().flat_map(|held| [Some(held.of.a), held.of.b]).flatten();
+    if bodies.any(|body| !step.all[body].memory.goes_on()) {
+        return mimic.together(both.map(|held| &held.of.joint), now);
+    }
+    let before = step.all[owner.member].memory.recall(owner.partner, place_key(MIMIC)).travels;
+    std::array::from_fn(|at| match turns_round(&both[at].of.joint) {
+        true => now[at] + ((before[at] - now[at]) / TAU).round() * TAU,
+        false => now[at],
+    })
 }
 
 impl Held {
@@ -55,35 +76,36 @@ impl Held {
 }
 
 impl Mimicking {
-    /// Finds the turns with which the two are nearest to each other: angles are known but for whole turns. The one that leads has gone on by
-    /// one at most since the last step.
-    fn turn(&mut self, held: &[Held]) {
-        let before = *self;
-        let travels = self.held.map(|at| held[at].now.travel);
-        let [follower_turns, leader_turns] = self.held.map(|at| turns_round(&held[at].of.joint));
-        let leading: &[f64] = if leader_turns { &[0.0, 1.0, -1.0] } else { &[0.0] };
-        for turns in leading {
-            let mut next = Self { turned: before.turned - TAU * turns * before.mimic.ratio, ..before };
-            if follower_turns {
-                next.turned -= (next.gap(travels) / TAU).round() * TAU;
-            }
-            if next.gap(travels).abs() < self.gap(travels).abs() {
-                *self = next;
-            }
-        }
-    }
-
-    /// How far the one that follows is ahead of where the other leads it.
-    fn gap(&self, [follows, leads]: [f64; 2]) -> f64 {
-        follows + self.turned - self.mimic.ratio * leads - self.mimic.offset
-    }
-
-    /// How far that is off at the end of the step: a gap that the step begins with is taken back as fast as an overlap of contacts.
+    /// How far the two are off at the end of the step: a gap that the step begins with is taken back as fast as an overlap of contacts.
     pub(super) fn miss(&self, held: &[Held], poses: &[Option<Pose>], h_s: f64) -> f64 {
-        let now = self.gap(self.held.map(|at| held[at].now.travel));
-        let then = self.gap(self.held.map(|at| held[at].after(poses).0.travel));
+        let both = self.held.map(|at| &held[at]);
+        let moved = both.map(|held| held.after(poses).0.travel - held.now.travel);
+        let now = self.mimic.gap(self.travels);
         let most = PUSH_OUT_MAX_M_S * h_s;
-        then - (now - now.clamp(-most, most))
+        now.clamp(-most, most) + moved[0] - self.mimic.ratio * moved[1]
+    }
+}
+
+impl Mimic {
+    /// The travels of a joint that follows and of its leader with the whole turns that are known of neither: the fewest of the leader, of as many
+    /// as [`TURNS_MAX`], with which the two are together. Travels that no turns bring together are as they were given, but for turns of the one that follows.
+    #[must_use]
+    pub fn together(&self, joints: [&Joint; 2], travels: [f64; 2]) -> [f64; 2] {
+        let [follower_turns, leader_turns] = joints.map(turns_round);
+        let turned = |turns: f64| {
+            let [follows, leads] = [travels[0], travels[1] + TAU * turns];
+            let round = if follower_turns { (self.gap([follows, leads]) / TAU).round() } else { 0.0 };
+            [follows - TAU * round, leads]
+        };
+        let fewest = (0..=TURNS_MAX).flat_map(|turns| [turns, -turns]).map(|turns| turned(f64::from(turns)));
+        let mut candidates = fewest.take(if leader_turns { usize::MAX } else { 1 });
+        candidates.find(|turned| self.gap(*turned).abs() <= TOGETHER).unwrap_or_else(|| turned(0.0))
+    }
+
+    /// How far the travel of the one that follows is ahead of where its leader leads it, rad or m.
+    #[must_use]
+    pub fn gap(&self, [follows, leads]: [f64; 2]) -> f64 {
+        follows - self.ratio * leads - self.offset
     }
 }
 
