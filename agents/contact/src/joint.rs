@@ -46,7 +46,7 @@ pub struct Mimic {
     pub joint: u32,
     /// Its travel for each radian or metre of the other: within ±1e9.
     pub ratio: f64,
-    /// Its travel where the other joint is at its zero, rad or m: within ±1e9. Whole turns of hinges without a range do not count.
+    /// Its travel where the other joint is at its zero, rad or m: within ±1e9.
     pub offset: f64,
 }
 

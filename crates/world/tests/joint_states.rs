@@ -243,6 +243,33 @@ fn joints_that_follow_go_along_with_those_that_are_set() {
 }
 
 #[test]
+fn coordinates_beyond_half_a_turn_are_read_and_set_again() {
+    let wheel = |x: f64| Rigid::cuboid([0.1; 3]).mass_kg(1.0).at([x, 0.0, 0.0]).rate_hz(500.0);
+    let scene = Scene::builder().gravity([0.0; 3]).add("first", wheel(0.0)).add("second", wheel(1.0));
+    let scene = scene.joint("first", None, hinge(None), [0.0; 3]).joint_name("first");
+    let scene = scene.joint("second", None, hinge(None), [1.0, 0.0, 0.0]).joint_name("second").mimic("first", 0.3);
+    let world = started(scene);
+    world.set_joint_states(&[state(&world, "first", 0.0, 3.0)]).unwrap();
+    world.advance(SimSpan::from_millis(3000));
+    let read = world.joint_states().unwrap();
+    let turned = 9.0 - std::f64::consts::TAU;
+    for (found, wanted) in read.iter().zip([turned, 2.7]) {
+        assert!((found.position - wanted).abs() < 1e-6, "{read:?}");
+    }
+    world.advance(SimSpan::from_millis(1000));
+    world.set_joint_states(&read).unwrap();
+    world.advance(SimSpan::from_millis(100));
+    let on = world.joint_states().unwrap();
+    // the last step ends within the time that passed
+    let moved = [0, 1].map(|joint| on[joint].position - read[joint].position);
+    assert!((0.29..0.301).contains(&moved[0]) && (moved[1] - 0.3 * moved[0]).abs() < 1e-6, "{moved:?}");
+    assert!((on[0].velocity - 3.0).abs() < 1e-6 && (on[1].velocity - 0.9).abs() < 1e-6, "{on:?}");
+    // no turn of the one that leads brings these together
+    let apart = JointState { position: read[1].position + 0.5, ..read[1] };
+    assert!(matches!(world.set_joint_states(&[read[0], apart]), Err(WorldError::BadCoordinate { .. })));
+}
+
+#[test]
 fn coordinates_that_part_a_joint_from_the_one_that_it_follows_are_refused() {
     let world = started(gears());
     let set = |states: &[JointState]| world.set_joint_states(states).unwrap_err().to_string();

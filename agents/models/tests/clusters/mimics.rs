@@ -148,3 +148,51 @@ fn gears_that_start_apart_come_together_half_way() {
     // the world turns the other way against a body that turns: both meet half-way
     assert!((leads - led - 0.2).abs() < 1e-5 && (leads + led).abs() < 1e-5, "{leads} and {led} rad");
 }
+
+/// A screw of 10 mm a radian in a nut that has 20 mm of room either way: a motor turns it, its nut follows.
+fn screw(effort: f64) -> Table {
+    let slide = JointKind::Prismatic { axis: DVec3::Z, range_m: Some([-0.02, 0.02]), motor: None };
+    let turned = Motor { goal: MotorGoal::Velocity(5.0), max_effort: effort };
+    let nut = Joint { mimic: follows(1, PITCH_M), ..on_world(1, slide, DVec3::X) };
+    let bodies = [weightless(0.0, 1.0), weightless(1.0, 1.0)];
+    party(bodies, [nut, on_world(0, hinge(Some(turned)), DVec3::ZERO)], 240.0)
+}
+
+const PITCH_M: f64 = 0.01;
+
+/// How far the nut has moved, m, and the screw has turned in a step, rad.
+fn of_screw(table: &mut Table) -> [f64; 2] {
+    let before = state(table, 0).rotation;
+    table.step();
+    // the world turns the other way against a body that turns
+    let turned = (state(table, 0).rotation * before.conjugate()).to_scaled_axis().y;
+    [-state(table, 1).position.z, -turned]
+}
+
+#[test]
+fn a_screw_whose_nut_is_at_its_stop_stands_and_forgets_no_turn() {
+    for effort in [0.2, 20.0, 2000.0, 2e5] {
+        let mut table = screw(effort);
+        let mut turned = 0.0;
+        // 20 mm are 0.32 turns: then it would have turned eleven times
+        for step in 0..240 * 15 {
+            let [nut_m, turn] = of_screw(&mut table);
+            turned += turn;
+            assert!(nut_m < 0.02 + 1e-5, "{nut_m} m after {step} steps at {effort} N m");
+            assert!((nut_m - PITCH_M * turned).abs() < 1e-5, "{nut_m} m at {turned} rad, {effort} N m");
+        }
+        assert!((turned - 0.02 / PITCH_M).abs() < 1e-3, "{turned} rad at {effort} N m");
+    }
+}
+
+#[test]
+fn a_screw_that_forces_its_stop_never_lets_its_nut_slip_by_a_turn() {
+    // 1e11 N on a nut of 1 kg: more than a stop can bear
+    let mut table = screw(1e9);
+    let mut before_m = 0.0;
+    for step in 0..240 * 15 {
+        let [nut_m, _] = of_screw(&mut table);
+        assert!(nut_m > before_m - 1e-3, "{before_m} m, then {nut_m} m after {step} steps");
+        before_m = nut_m;
+    }
+}

@@ -15,7 +15,6 @@ use metachron_contact::{Input, SetMotion};
 use metachron_core::{AgentId, AttachmentEventKind, AttachmentId, Body, shortest_turn};
 use metachron_runtime::{AwaitedMotion, Command};
 use std::collections::{BTreeMap, BTreeSet, VecDeque};
-use std::f64::consts::TAU;
 
 /// The largest turn by which coordinates may leave a loop open, radians: as far as [`JOINT_GAP_MAX_M`] at a metre.
 const JOINT_GAP_MAX_RAD: f64 = JOINT_GAP_MAX_M;
@@ -225,17 +224,15 @@ impl World {
         for (at, mimic) in &joints {
             let Some(found) = set.get(&at.number()) else { continue };
             let leads = self.joints().nth(mimic.joint as usize);
-            let position = match (led(set, mimic), leads) {
-                (Some(wanted), _) => wanted.position,
-                (None, Some(leads)) => mimic.ratio * self.joint_state(leads.at)?.position + mimic.offset,
-                (None, None) => continue,
+            let Some(leads) = leads else { continue };
+            let led_by = match set.get(&mimic.joint) {
+                Some(leads) => leads.position,
+                None => self.joint_state(leads.at)?.position,
             };
-            let spec = self.joint_with_coordinate(*at)?;
-            let off = found.position - position;
-            let off =
-                if matches!(spec.kind, JointKind::Revolute { .. }) { off - (off / TAU).round() * TAU } else { off };
-            if off.abs() > JOINT_GAP_MAX_M {
-                let wanted = format!("{position}, as it follows joint {}", self.joint_name(mimic.joint));
+            let travels = mimic.together([self.joint_with_coordinate(*at)?, leads.joint], [found.position, led_by]);
+            if mimic.gap(travels).abs() > JOINT_GAP_MAX_M {
+                let wanted = mimic.ratio * led_by + mimic.offset;
+                let wanted = format!("{wanted}, as it follows joint {}", self.joint_name(mimic.joint));
                 let (joint, value) = (self.joint_name(at.number()), found.position);
                 return Err(WorldError::BadCoordinate { joint, what: "position", value, wanted });
             }

@@ -5,7 +5,7 @@
 
 use super::{Held, Joints, MIMIC};
 use crate::constraint::{ConstraintRows, FineStep, RowOwner, place_key};
-use crate::joint::{Joint, JointKind, Mimic};
+use crate::joint::{JOINT_GAP_MAX_M, Joint, JointKind, Mimic};
 use crate::member::Pose;
 use crate::member::memory::Partner;
 use crate::push_out::PUSH_OUT_MAX_M_S;
@@ -13,9 +13,7 @@ use crate::solve::{Hold, JointRow, Side};
 use glam::{DMat3, DVec3};
 use std::f64::consts::TAU;
 
-/// Two joints are together where the one that follows is no farther from where it is led, rad or m.
-const TOGETHER: f64 = 1e-3;
-/// The most whole turns of a leader that are looked for, either way, where a joint was put somewhere.
+/// The most whole turns of a leader that are looked for, either way, where both joints go round.
 const TURNS_MAX: i32 = 64;
 
 /// A joint that follows another.
@@ -87,8 +85,8 @@ impl Mimicking {
 }
 
 impl Mimic {
-    /// The travels of a joint that follows and of its leader with the whole turns that are known of neither: the fewest of the leader, of as many
-    /// as [`TURNS_MAX`], with which the two are together. Travels that no turns bring together are as they were given, but for turns of the one that follows.
+    /// The travels of a joint that follows and of its leader with whole turns, where these are known of neither: the fewest of the leader with
+    /// which the two are together within [`JOINT_GAP_MAX_M`]. Where there are none the leader's travel is the given one.
     #[must_use]
     pub fn together(&self, joints: [&Joint; 2], travels: [f64; 2]) -> [f64; 2] {
         let [follower_turns, leader_turns] = joints.map(turns_round);
@@ -97,9 +95,12 @@ impl Mimic {
             let round = if follower_turns { (self.gap([follows, leads]) / TAU).round() } else { 0.0 };
             [follows - TAU * round, leads]
         };
-        let fewest = (0..=TURNS_MAX).flat_map(|turns| [turns, -turns]).map(|turns| turned(f64::from(turns)));
-        let mut candidates = fewest.take(if leader_turns { usize::MAX } else { 1 });
-        candidates.find(|turned| self.gap(*turned).abs() <= TOGETHER).unwrap_or_else(|| turned(0.0))
+        // the turns of a screw are those that its nut says
+        let of_nut = (self.gap(travels) / (TAU * self.ratio)).round();
+        let some = (1..=TURNS_MAX).flat_map(|turns| [turns, -turns]).map(f64::from);
+        let turns = [0.0, of_nut].into_iter().chain(some).take(if leader_turns { usize::MAX } else { 1 });
+        let mut together = turns.map(turned).filter(|travels| self.gap(*travels).abs() <= JOINT_GAP_MAX_M);
+        together.next().unwrap_or_else(|| turned(0.0))
     }
 
     /// How far the travel of the one that follows is ahead of where its leader leads it, rad or m.
