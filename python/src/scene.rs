@@ -154,9 +154,9 @@ impl Scene {
 
     /// Joins the rigid bodies `a` and `b`, or `a` and the world. Place and axis of `kind` are in the world's axes, as the bodies are at the start.
     ///
-    /// A hinge or slide follows the joint `mimic`, one too: its travel is `ratio` times that one's, rad or m for each rad or m.
+    /// A hinge or slide follows the joint `mimic`, one too: its travel is `ratio` (1) times that one's, rad or m for each rad or m.
     #[expect(clippy::too_many_arguments, reason = "a call in Python has keywords")]
-    #[pyo3(signature = (name, kind, a, b = None, *, mimic = None, ratio = 1.0))]
+    #[pyo3(signature = (name, kind, a, b = None, *, mimic = None, ratio = None))]
     fn joint<'py>(
         mut slf: PyRefMut<'py, Self>,
         name: String,
@@ -164,13 +164,16 @@ impl Scene {
         a: &str,
         b: Option<&str>,
         mimic: Option<&str>,
-        ratio: f64,
+        ratio: Option<f64>,
     ) -> PyResult<PyRefMut<'py, Self>> {
         let (kind, Vector(at)) = (joint_kind(kind)?, field(kind, "at")?);
+        if let (None, Some(ratio)) = (mimic, ratio) {
+            return Err(PyValueError::new_err(format!("`ratio` is {ratio}, and there is no `mimic`; expected both")));
+        }
         slf.build(|builder| {
             let joined = builder.joint(a, b, kind, at.to_array()).joint_name(name);
             match mimic {
-                Some(other) => joined.mimic(other, ratio),
+                Some(other) => joined.mimic(other, ratio.unwrap_or(1.0)),
                 None => joined,
             }
         })?;

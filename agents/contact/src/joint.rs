@@ -44,7 +44,7 @@ pub struct Joint {
 pub struct Mimic {
     /// The number of the joint that it follows, a hinge or slide too.
     pub joint: u32,
-    /// Its travel for each radian or metre of the other: within ±1e9.
+    /// Its travel for each radian or metre of the other: within ±1e6.
     pub ratio: f64,
     /// Its travel where the other joint is at its zero, rad or m: within ±1e9.
     pub offset: f64,
@@ -174,7 +174,9 @@ pub enum JointError {
         what: &'static str,
     },
     /// A joint follows one that it cannot.
-    #[error("the joint follows joint {joint}; expected another hinge or slide, by its number from 0")]
+    #[error(
+        "the joint follows joint {joint}; expected another hinge or slide that does not follow it in turn, by its number from 0"
+    )]
     BadMimic {
         /// The number that it gives.
         joint: u32,
@@ -253,7 +255,7 @@ impl Joint {
             if !self.takes_motor() {
                 return Err(JointError::BadMimic { joint });
             }
-            GOAL.check("ratio to the joint that it follows", ratio)?;
+            RATIO.check("ratio to the joint that it follows", ratio)?;
             GOAL.check("offset from the joint that it follows", offset)?;
         }
         match self.kind {
@@ -277,13 +279,17 @@ impl Joint {
         }
     }
 
-    /// Whether the joint that it follows, one of `all` of which it is number `own`, can lead it.
+    /// Whether the joint that it follows, one of `all` of which it is number `own`, can lead it: joints that followed each other in a ring would
+    /// lock, but where their ratios multiply to one.
     ///
     /// # Errors
     /// [`JointError::BadMimic`].
     pub fn check_mimic(&self, own: u32, all: &[Self]) -> Result<(), JointError> {
         let Some(Mimic { joint, .. }) = self.mimic else { return Ok(()) };
-        let leads = joint != own && all.get(joint as usize).is_some_and(Self::takes_motor);
+        let above = |number: &u32| Some(all.get(*number as usize)?.mimic?.joint);
+        // a ring further up is the error of its own joints
+        let leads = std::iter::successors(Some(joint), above).take(all.len()).all(|number| number != own);
+        let leads = leads && all.get(joint as usize).is_some_and(Self::takes_motor);
         if leads { Ok(()) } else { Err(JointError::BadMimic { joint }) }
     }
 
@@ -320,6 +326,7 @@ const NUMBER: NumberRange = NumberRange::new(0.0, 1e9, "");
 const NONE: NumberRange = NumberRange::new(0.0, 0.0, "");
 const ABOVE_ZERO: NumberRange = NumberRange { least: 1e-9, ..NUMBER };
 const GOAL: NumberRange = NumberRange { least: -1e9, ..NUMBER };
+const RATIO: NumberRange = NumberRange::new(-1e6, 1e6, "");
 const ANGLE: NumberRange = NumberRange::new(-std::f64::consts::PI, std::f64::consts::PI, "rad");
 
 fn range(what: &'static str, [low, high]: [f64; 2], within: NumberRange) -> Result<(), JointError> {

@@ -7,7 +7,7 @@ use crate::imported::{ImportError, LeftOut};
 use crate::meshes::Meshes;
 use crate::model::{Joint, Kind, Link, Look, Mass, Mimic, Model, Motor, Part, Shape};
 use crate::pose::{Pose, fixed_angles};
-use crate::xml::{DAMPING_MAX, Element, Harmless, STRENGTH_MAX};
+use crate::xml::{DAMPING_MAX, Element, Harmless, RATIO_MAX, STRENGTH_MAX};
 use glam::{DMat3, DVec3};
 use metachron_geometry::Solid;
 use std::collections::BTreeMap;
@@ -33,12 +33,12 @@ struct Draft<'a> {
     motor: Option<Motor>,
     friction: f64,
     mimic: Option<MimicDraft<'a>>,
+    /// The position where the joint that it follows leads it, or else zero, and that within its limits, where it starts.
+    wanted: f64,
+    start: f64,
     /// Whether the child moves freely.
     is_free: bool,
 }
-
-/// The largest ratio of two travels that a scene has.
-const RATIO_MAX: f64 = 1e6;
 
 /// A joint that another one follows, as the file has it: multiplier · its position + offset.
 #[derive(Clone, Copy)]
@@ -69,7 +69,8 @@ pub(crate) fn read(root: &Element, mut meshes: Meshes<'_>, notes: &mut Vec<LeftO
         return Err(root.wrong("has no `link`"));
     }
     let mut drafts = root.children("joint").map(draft).collect::<Result<Vec<_>, _>>()?;
-    drop_mimics(&mut drafts, notes);
+    let leaders = drop_mimics(&mut drafts, notes);
+    find_starts(&mut drafts, &leaders);
     for draft in &drafts {
         for (key, name) in [("parent", draft.parent), ("child", draft.child)] {
             if !links.contains_key(name) {
@@ -85,11 +86,11 @@ pub(crate) fn read(root: &Element, mut meshes: Meshes<'_>, notes: &mut Vec<LeftO
         let mut pose = Pose::IDENTITY;
         if let Some(draft) = above {
             let parent = numbers[draft.parent];
-            let start = start(draft, &drafts);
-            note_start(draft, &drafts, notes);
-            pose = model.links[parent].pose.then(draft.origin).then(draft.kind.motion(DVec3::ZERO, draft.axis, start));
+            note_start(draft, notes);
+            let moved = draft.kind.motion(DVec3::ZERO, draft.axis, draft.start);
+            pose = model.links[parent].pose.then(draft.origin).then(moved);
             if !draft.is_free {
-                model.joints.push(joint(draft, parent, model.links.len(), start));
+                model.joints.push(joint(draft, parent, model.links.len()));
             }
         }
         numbers.insert(element.needed("name")?, model.links.len());
@@ -169,7 +170,8 @@ fn draft(element: &Element) -> Result<Draft<'_>, ImportError> {
     let mimic = if moves { mimic(element)? } else { None };
     let origin = origin(element)?;
     let (parent, child, is_free) = (end("parent")?, end("child")?, kind_name == "floating");
-    Ok(Draft { element, parent, child, origin, kind, axis, limits, motor, friction, mimic, is_free })
+    let (wanted, start) = (0.0, 0.0);
+    Ok(Draft { element, parent, child, origin, kind, axis, limits, motor, friction, mimic, wanted, start, is_free })
 }
 
 /// The limits of a joint; of one that the file says nothing about both are zero, as in the specification.
@@ -201,50 +203,48 @@ fn mimic(element: &Element) -> Result<Option<MimicDraft<'_>>, ImportError> {
     Ok(Some(MimicDraft { element: given, joint: given.needed("joint")?, multiplier, offset }))
 }
 
-fn leader<'d, 'a>(mimic: &MimicDraft<'_>, drafts: &'d [Draft<'a>]) -> Option<&'d Draft<'a>> {
-    drafts.iter().find(|draft| draft.element.text("name") == Some(mimic.joint))
-}
-
-/// Lets joints that follow themselves, a joint that does not move, or none, move by themselves.
-fn drop_mimics(drafts: &mut [Draft<'_>], notes: &mut Vec<LeftOut>) {
+/// Lets joints that follow themselves, a joint that does not move, or none, move by themselves; the joint that each of the others follows.
+fn drop_mimics(drafts: &mut [Draft<'_>], notes: &mut Vec<LeftOut>) -> Vec<Option<usize>> {
+    // of joints of one name the first
+    let named = drafts.iter().enumerate().rev().filter_map(|(at, draft)| Some((draft.element.text("name")?, at)));
+    let named: BTreeMap<&str, usize> = named.collect();
+    let leader = |draft: &Draft<'_>| draft.mimic.and_then(|mimic| named.get(mimic.joint).copied());
+    let mut leaders: Vec<_> = drafts.iter().map(leader).collect();
     for at in 0..drafts.len() {
         let Some(mimic) = drafts[at].mimic else { continue };
-        let mut leads = leader(&mimic, drafts);
-        let why = match leads {
+        let mut above = std::iter::successors(leaders[at], |joint| leaders[*joint]).take(drafts.len());
+        let why = match leaders[at] {
             None => "there is no joint of that name",
-            Some(leads) if !leads.kind.travels() => "that joint does not move",
-            Some(_) => {
-                // a chain that goes on for longer than there are joints goes round
-                let mut others = 0..drafts.len();
-                while let Some(next) = leads.filter(|_| others.next().is_some()).and_then(|leads| leads.mimic) {
-                    leads = leader(&next, drafts);
-                }
-                if others.next().is_some() {
-                    continue;
-                }
-                "it follows itself"
-            }
+            Some(leads) if !drafts[leads].kind.travels() => "that joint does not move",
+            Some(_) if above.any(|joint| joint == at) => "it follows itself",
+            Some(_) => continue,
         };
         notes.push(mimic.element.note(format!("is left out: it names `{}`, and {why}", mimic.joint)));
-        drafts[at].mimic = None;
+        (drafts[at].mimic, leaders[at]) = (None, None);
+    }
+    leaders
+}
+
+/// Finds the positions at which joints start: each after the one that it follows.
+fn find_starts(drafts: &mut [Draft<'_>], leaders: &[Option<usize>]) {
+    let mut is_found = vec![false; drafts.len()];
+    for at in 0..drafts.len() {
+        let mut chain: Vec<usize> =
+            std::iter::successors(Some(at), |joint| leaders[*joint].filter(|above| !is_found[*above])).collect();
+        while let Some(at) = chain.pop() {
+            let led = drafts[at].mimic.zip(leaders[at]);
+            let wanted = led.map_or(0.0, |(mimic, leads)| mimic.multiplier * drafts[leads].start + mimic.offset);
+            let draft = &mut drafts[at];
+            draft.wanted = wanted;
+            draft.start = draft.limits.map_or(wanted, |[lower, upper]| wanted.clamp(lower, upper));
+            is_found[at] = true;
+        }
     }
 }
 
-/// The position at which a joint starts: the one that it wants, within its limits.
-fn start(draft: &Draft<'_>, drafts: &[Draft<'_>]) -> f64 {
-    let wanted = wanted(draft, drafts);
-    draft.limits.map_or(wanted, |[lower, upper]| wanted.clamp(lower, upper))
-}
-
-/// The position where the joint that it follows leads a joint, or else zero.
-fn wanted(draft: &Draft<'_>, drafts: &[Draft<'_>]) -> f64 {
-    let led = |mimic: MimicDraft<'_>| Some(mimic.multiplier * start(leader(&mimic, drafts)?, drafts) + mimic.offset);
-    draft.mimic.and_then(led).unwrap_or(0.0)
-}
-
 /// Lists a joint that starts elsewhere than it wants to.
-fn note_start(draft: &Draft<'_>, drafts: &[Draft<'_>], notes: &mut Vec<LeftOut>) {
-    let (start, wanted) = (start(draft, drafts), wanted(draft, drafts));
+fn note_start(draft: &Draft<'_>, notes: &mut Vec<LeftOut>) {
+    let Draft { start, wanted, .. } = *draft;
     if start == wanted {
         return;
     }
@@ -260,12 +260,12 @@ fn note_start(draft: &Draft<'_>, drafts: &[Draft<'_>], notes: &mut Vec<LeftOut>)
     });
 }
 
-fn joint(draft: &Draft<'_>, parent: usize, child: usize, start: f64) -> Joint {
+fn joint(draft: &Draft<'_>, parent: usize, child: usize) -> Joint {
     Joint {
         name: draft.element.text("name").unwrap_or_default().to_owned(),
         kind: draft.kind,
         axis: draft.axis,
-        range: draft.limits.map(|limits| limits.map(|end| end - start)),
+        range: draft.limits.map(|limits| limits.map(|end| end - draft.start)),
         motor: draft.motor,
         friction: draft.friction,
         mimic: draft.mimic.map(|mimic| Mimic { joint: mimic.joint.to_owned(), ratio: mimic.multiplier }),

@@ -14,6 +14,8 @@ pub(crate) const DEPTH_MAX: usize = 200;
 /// The largest damping of a scene, N·s/m or N·m·s/rad, and the largest stiffness, friction and armature.
 pub(crate) const DAMPING_MAX: f64 = 1e7;
 pub(crate) const STRENGTH_MAX: f64 = 1e9;
+/// The largest ratio of the travels of two joints that a scene has.
+pub(crate) const RATIO_MAX: f64 = 1e6;
 
 /// An element with all that is in it.
 #[derive(Debug, Clone)]

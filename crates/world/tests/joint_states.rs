@@ -288,9 +288,11 @@ fn a_joint_that_cannot_follow_is_refused() {
     assert_eq!(none, "a joint follows the joint \"third\", and the scene has none of that name");
     let itself = refused(gears().mimic("second", 1.0));
     assert!(
-        itself.ends_with("the joint follows joint 2; expected another hinge or slide, by its number from 0"),
+        itself.ends_with("the joint follows joint 2; expected another hinge or slide that does not follow it in turn, by its number from 0"),
         "{itself}"
     );
+    let ring = refused(gears().joint("first", None, hinge(None), [0.0; 3]).joint_name("third").mimic("third", 1.0));
+    assert!(ring.contains("that does not follow it in turn"), "{ring}");
     assert!(refused(gears().mimic("first", f64::NAN)).contains("ratio to the joint that it follows"));
     let ball = gears().joint("first", None, JointKind::Spherical, [0.0; 3]).mimic("second", 1.0);
     assert!(refused(ball).contains("expected another hinge or slide"));

@@ -164,11 +164,11 @@ class Scene:
         """Adds a moving object: a rigid body, a tube, a sheet, a solid or a rope."""
 
     def joint(
-        self, name: str, kind: JointKind, a: str, b: str | None = None, *, mimic: str | None = None, ratio: float = 1.0
+        self, name: str, kind: JointKind, a: str, b: str | None = None, *, mimic: str | None = None, ratio: float | None = None
     ) -> Self:
         """Joins the rigid bodies `a` and `b`, or `a` and the world. Place and axis of `kind` are in the world's axes, as the bodies are at the start.
 
-        A hinge or slide follows the joint `mimic`, one too: its travel is `ratio` times that one's, rad or m for each rad or m.
+        A hinge or slide follows the joint `mimic`, one too: its travel is `ratio` (1) times that one's, rad or m for each rad or m.
         """
 
     def sensor(self, name: str, on: Sensor) -> Self:

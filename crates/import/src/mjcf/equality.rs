@@ -6,7 +6,7 @@
 use super::bodies::BodyReader;
 use crate::imported::ImportError;
 use crate::model::{Joint, Kind, Mimic};
-use crate::xml::Element;
+use crate::xml::{Element, RATIO_MAX};
 use glam::DVec3;
 
 /// Coordinates that differ by less are equal, rad or m.
@@ -86,10 +86,24 @@ fn follow(element: &Element, reader: &mut BodyReader<'_>) -> Result<(), ImportEr
     if follows == leads {
         return Err(element.wrong("ties a joint to itself; expected two joints"));
     }
+    if power(1).abs() > RATIO_MAX {
+        let what = format!("`polycoef` has the ratio {}; expected -{RATIO_MAX} to {RATIO_MAX}", power(1));
+        return Err(element.wrong(what));
+    }
     let before = reader.model.joints[follows].mimic.is_some();
+    let joints = &reader.model.joints;
+    let above = |joint: &usize| {
+        let mimic = joints[*joint].mimic.as_ref()?;
+        joints.iter().position(|joint| joint.name == mimic.joint)
+    };
+    let is_ring = std::iter::successors(Some(leads), above).any(|joint| joint == follows);
     let mut note = |what: String| reader.notes.push(element.note(what));
     if before {
         note("is left out: a joint of a scene follows one other, and this one does already".to_owned());
+        return Ok(());
+    }
+    if is_ring {
+        note(format!("is left out: `{}` follows this joint already", joints[leads].name));
         return Ok(());
     }
     if (2..5).any(|at| power(at) != 0.0) {

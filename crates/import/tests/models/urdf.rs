@@ -1,10 +1,11 @@
 //! URDF robots.
 
 use crate::play::{advance, left_out, position, start};
-use metachron_import::{Folders, ImportError, urdf};
+use metachron_import::{Folders, ImportError, Imported, urdf};
+use metachron_world::World;
 use std::path::Path;
 
-fn import(text: &str) -> Result<metachron_import::Imported, ImportError> {
+fn import(text: &str) -> Result<Imported, ImportError> {
     urdf(text, Path::new("."))
 }
 
@@ -54,21 +55,30 @@ fn a_double_pendulum_has_the_frequencies_of_its_closed_form() {
         let robot = double_pendulum([amplitude, ratio * amplitude]);
         let imported = import(&robot).unwrap();
         assert_eq!(left_out(&imported), [""; 0]);
-        // after a quarter, a half and a whole period, which are whole steps: x(t) = A cos(ω t), counted from the start
-        let period = std::f64::consts::TAU / w2.sqrt();
-        let world = start(&imported, &["shoulder", "elbow"], 3200.0 / period);
-        let mut at = 0.0;
-        for share in [0.25, 0.5, 1.0] {
-            advance(&world, (share - at) * period);
-            at = share;
-            let expected = amplitude * ((std::f64::consts::TAU * share).cos() - 1.0);
-            for (joint, scale) in [("shoulder", 1.0), ("elbow", ratio)] {
-                let wrong = (position(&world, joint) - scale * expected).abs();
-                // a step of first order errs by ω h/2 = 1e-3 of the amplitude, of the pair of angles the larger one's
-                assert!(wrong < 2e-3 * amplitude * ratio.abs().max(1.0), "{joint}, mode {w2}, {share}: {wrong}");
-            }
+        swings(&imported, w2, amplitude, ratio);
+    }
+}
+
+/// Checks the angles of a double pendulum after a quarter, a half and a whole period, which are whole steps: the first is A cos(ω t), counted from
+/// the start, and the second `ratio` times that. Returns the world at the end.
+fn swings(imported: &Imported, w2: f64, amplitude: f64, ratio: f64) -> World {
+    let period = std::f64::consts::TAU / w2.sqrt();
+    let world = start(imported, &["shoulder", "elbow"], 3200.0 / period);
+    let mut at = 0.0;
+    for share in [0.25, 0.5, 1.0] {
+        advance(&world, (share - at) * period);
+        at = share;
+        let expected = amplitude * ((std::f64::consts::TAU * share).cos() - 1.0);
+        for (joint, scale) in [("shoulder", 1.0), ("elbow", ratio)] {
+            let wrong = (position(&world, joint) - scale * expected).abs();
+            // a step of first order errs by ω h/2 = 1e-3 of the amplitude, of the pair of angles the larger one's
+            assert!(
+                wrong < 2e-3 * amplitude * ratio.abs().max(1.0),
+                "{joint}, ω² = {w2}, ratio {ratio}, {share}: {wrong}"
+            );
         }
     }
+    world
 }
 
 #[test]
@@ -301,18 +311,9 @@ fn a_pendulum_whose_elbow_follows_its_shoulder_has_the_frequency_of_its_closed_f
         let robot = mimicking([amplitude, ratio * amplitude], &format!(r#"joint="shoulder" multiplier="{ratio}""#));
         let imported = import(&robot).unwrap();
         assert_eq!(left_out(&imported), [""; 0]);
-        let period = std::f64::consts::TAU / w2.sqrt();
-        let world = start(&imported, &["shoulder", "elbow"], 3200.0 / period);
-        let mut at = 0.0;
-        for share in [0.25, 0.5, 1.0] {
-            advance(&world, (share - at) * period);
-            at = share;
-            let expected = amplitude * ((std::f64::consts::TAU * share).cos() - 1.0);
-            let [shoulder, elbow] = ["shoulder", "elbow"].map(|joint| position(&world, joint));
-            // a step of first order errs by ω h/2 = 1e-3 of the amplitude
-            assert!((shoulder - expected).abs() < 2e-3 * amplitude, "ratio {ratio}, {share}: {shoulder}");
-            assert!((elbow - ratio * shoulder).abs() < 1e-7, "ratio {ratio}, {share}: {elbow} of {shoulder}");
-        }
+        let world = swings(&imported, w2, amplitude, ratio);
+        let [shoulder, elbow] = ["shoulder", "elbow"].map(|joint| position(&world, joint));
+        assert!((elbow - ratio * shoulder).abs() < 1e-7, "ratio {ratio}: {elbow} of {shoulder}");
     }
 }
 

@@ -52,7 +52,7 @@ pub(crate) fn joints(c: &mut Checker<'_, '_>, files: &[JointFile], objects: &Obj
     contradictions(c, &placed);
     // a scene with a joint that cannot be is none
     if placed.len() == files.len() {
-        tie_mimics(&mut placed);
+        tie_mimics(c, &mut placed);
     }
     placed.into_iter().filter_map(PlacedJoint::joint).collect()
 }

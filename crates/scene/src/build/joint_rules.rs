@@ -61,8 +61,22 @@ impl PlacedJoint {
     }
 }
 
-/// Ties joints to those that they follow, where both are at the start: `all` are all joints of the scene.
-pub(super) fn tie_mimics(all: &mut [PlacedJoint]) {
+/// Ties joints to those that they follow, where both are at the start, and reports joints that follow themselves: `all` are all joints of the
+/// scene.
+pub(super) fn tie_mimics(c: &mut Checker<'_, '_>, all: &mut [PlacedJoint]) {
+    for (own, joint) in all.iter().enumerate() {
+        let above = |number: &usize| Some(all[*number].mimic?.joint as usize);
+        let mut leaders = std::iter::successors(above(&own), above).take(all.len());
+        if leaders.any(|number| number == own) {
+            let what = "follows this joint in turn";
+            c.wrong(
+                &joint.place.table("mimic"),
+                "joint",
+                what,
+                "expected a joint that moves by itself, or follows another one",
+            );
+        }
+    }
     let travels: Vec<f64> = all.iter().map(PlacedJoint::travel).collect();
     for (joint, travel) in all.iter_mut().zip(&travels) {
         if let Some(mimic) = &mut joint.mimic {
