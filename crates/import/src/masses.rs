@@ -90,7 +90,7 @@ fn weight(link: &Link) -> Option<Weight> {
         Mass::OfParts => {
             let solids = link.parts.iter().filter_map(|part| match &part.shape {
                 Shape::Solid(solid) => Some((solid.volume_m3().ok()?, part.density_kg_m3?)),
-                Shape::Hull { .. } | Shape::Ellipsoid { .. } => None,
+                Shape::Hull { .. } | Shape::Ellipsoid { .. } | Shape::Ground { .. } => None,
             });
             let mut sum = Weight { mass_kg: 0.0, moment_kg_m2: 0.0 };
             for (volume_m3, density_kg_m3) in solids {
@@ -113,7 +113,7 @@ pub(crate) fn kilograms(mass: &Mass, parts: &[Part]) -> Option<f64> {
             let weighing = parts.iter().filter(|part| part.density_kg_m3 != Some(0.0));
             let weights = weighing.map(|part| match &part.shape {
                 Shape::Solid(solid) => Some(solid.volume_m3().ok()? * part.density_kg_m3?),
-                Shape::Hull { .. } | Shape::Ellipsoid { .. } => None,
+                Shape::Hull { .. } | Shape::Ellipsoid { .. } | Shape::Ground { .. } => None,
             });
             weights.sum()
         }

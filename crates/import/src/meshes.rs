@@ -100,6 +100,32 @@ impl<'a> Meshes<'a> {
         }
     }
 
+    /// Ground that stays, as its surface is.
+    pub(crate) fn ground(&mut self, name: &str, surface: Triangles) -> Result<Shape, String> {
+        let key = format!("ground {name}");
+        let file = match self.made.get(&key) {
+            Some(file) => file.clone(),
+            None => {
+                check_far(&surface)?;
+                self.write(key, name, &surface)
+            }
+        };
+        Ok(Shape::Ground { file })
+    }
+
+    /// The bytes of a file that `element` names, or why they cannot be read.
+    ///
+    /// # Errors
+    /// Where there is no such file.
+    pub(crate) fn bytes(&self, element: &Element, name: &str) -> Result<Result<Vec<u8>, String>, ImportError> {
+        let path = self.folders.find(element, name)?;
+        Ok(self
+            .folders
+            .read
+            .ok_or("no file is read here".to_owned())
+            .and_then(|read| read(&path).map_err(|why| why.to_string())))
+    }
+
     /// The surface that a hull was made of, in metres; `None` where it cannot be read.
     pub(crate) fn surface(&self, file: &str, scale: f64) -> Option<Triangles> {
         match self.surfaces.get(file) {
@@ -160,20 +186,24 @@ impl<'a> Meshes<'a> {
         if let Some(file) = self.made.get(&key) {
             return Ok(Shape::Hull { file: file.clone(), scale: 1.0 });
         }
-        if let Some(bad) = surface.points.iter().position(|point| point.abs().max_element() > FAR_M) {
-            return Err(format!("point {} is more than {FAR_M:.0} m from its origin", bad + 1));
-        }
+        check_far(&surface)?;
         let hull = hull_triangles(&surface.points).map_err(|why| why.to_string())?;
+        let file = self.write(key, stem, &hull);
+        self.surfaces.insert(file.clone(), surface);
+        Ok(Shape::Hull { file, scale: 1.0 })
+    }
+
+    /// A new OBJ file.
+    fn write(&mut self, key: String, stem: &str, surface: &Triangles) -> String {
         let mut text = String::new();
-        for point in &hull.points {
+        for point in &surface.points {
             writeln!(text, "v {} {} {}", point.x, point.y, point.z).expect("a string takes all");
         }
-        for [a, b, c] in hull.triangles.iter().map(|corners| corners.map(|corner| corner + 1)) {
+        for [a, b, c] in surface.triangles.iter().map(|corners| corners.map(|corner| corner + 1)) {
             writeln!(text, "f {a} {b} {c}").expect("a string takes all");
         }
         let file = self.unused(stem, "obj");
-        self.surfaces.insert(file.clone(), surface);
-        Ok(Shape::Hull { file: self.push(key, file, text.into_bytes()), scale: 1.0 })
+        self.push(key, file, text.into_bytes())
     }
 
     fn push(&mut self, key: String, path: String, bytes: Vec<u8>) -> String {
@@ -190,6 +220,14 @@ impl<'a> Meshes<'a> {
         let is_new = |path: &String| !taken().any(|file| file.eq_ignore_ascii_case(path));
         let first = format!("{}/{stem}.{kind}", self.folder);
         std::iter::once(first.clone()).chain(more).find(is_new).unwrap_or(first)
+    }
+}
+
+/// Checks that a surface is no larger than scenes are.
+fn check_far(surface: &Triangles) -> Result<(), String> {
+    match surface.points.iter().position(|point| point.abs().max_element() > FAR_M) {
+        Some(bad) => Err(format!("point {} is more than {FAR_M:.0} m from its origin", bad + 1)),
+        None => Ok(()),
     }
 }
 

@@ -144,6 +144,10 @@ pub(crate) enum Shape {
         file: String,
         semi_axes_m: DVec3,
     },
+    /// The closed surface of ground that stays, of a file.
+    Ground {
+        file: String,
+    },
 }
 
 /// A solid of the world.
@@ -270,7 +274,7 @@ impl Shape {
     fn file(&self) -> Option<&str> {
         match self {
             Self::Solid(_) => None,
-            Self::Hull { file, .. } | Self::Ellipsoid { file, .. } => Some(file),
+            Self::Hull { file, .. } | Self::Ellipsoid { file, .. } | Self::Ground { file } => Some(file),
         }
     }
 }

@@ -149,6 +149,7 @@ fn write_shape(out: &mut String, shape: &Shape) {
             ("hull", std::iter::once(("file", quoted(file))).chain(scale).collect())
         }
         Shape::Ellipsoid { file, .. } => ("hull", vec![("file", quoted(file))]),
+        Shape::Ground { file } => ("mesh", vec![("file", quoted(file))]),
     };
     put(out, "shape", &quoted(name));
     for (key, value) in keys {

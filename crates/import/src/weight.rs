@@ -19,6 +19,9 @@ pub(crate) struct Weight {
 }
 
 impl Weight {
+    /// That of a surface that stays.
+    pub(crate) const NONE: Self = Self { mass_kg: 0.0, com_m: DVec3::ZERO, inertia_kg_m2: DMat3::ZERO };
+
     /// That of a body whose moments are given, in its axes.
     pub(crate) fn given(mass: &Mass) -> Option<Self> {
         let Mass::Given { mass_kg, com_m, inertia_kg_m2: Some(inertia_kg_m2) } = *mass else { return None };

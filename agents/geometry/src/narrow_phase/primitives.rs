@@ -2,14 +2,14 @@
 //!
 //! In: a form and its place. Out: its pieces with bounds. Never here: contacts.
 
-use super::shape_cache::{ShapeCache, ToolSolid};
+use super::shape_cache::{PartShape, ShapeCache, ToolSolid};
 use super::skins::skin_tree::PlacedSkin;
 use crate::solids::capsule_chain::foot;
 use crate::solids::signed_distance::{Ball, Field};
 use crate::{Aabb, Place, PlacedShape, ShapeKind, ShapePose, SolidShape, SurfaceShape};
 use crate::{CompoundPart, Solid, ToolShape};
 use glam::{DQuat, DVec3};
-use rapier3d::parry::shape::{Shape, SharedShape};
+use rapier3d::parry::shape::Shape;
 
 /// The pieces of a form, each made where it is asked for: most forms have one, and a store for as many as any can have would be cleared and
 /// moved about with every pair that is looked at.
@@ -19,7 +19,7 @@ pub(super) enum Pieces<'a> {
     One(Option<Piece<'a>>),
     Compound {
         parts: &'a [CompoundPart],
-        shapes: &'a [Option<SharedShape>],
+        shapes: &'a [Option<PartShape>],
         /// Where its axes' origin is.
         origin: DVec3,
         rotation: DQuat,
@@ -141,8 +141,10 @@ impl<'a> Pieces<'a> {
         match *self {
             Self::One(piece) => piece.filter(|_| number == 0),
             Self::Compound { parts, shapes, origin, rotation, known } => {
-                let (part, shape) = (parts.get(number)?, shapes.get(number)?.as_ref()?);
-                Some(Standing::part(part, origin, rotation).piece(&part.solid, shape.as_ref(), known))
+                let (part, PartShape { shape, radius_m }) = (parts.get(number)?, shapes.get(number)?.as_ref()?);
+                let (origin, rotation) = (origin + rotation * part.position_m, rotation * part.rotation);
+                let at = Standing { origin, rotation, around: Ball { centre: origin, radius_m: *radius_m } };
+                Some(at.piece(&part.solid, shape.as_ref(), known))
             }
             Self::Tool { shape, solids, tip, rotation, jaw } => {
                 let (solid, part) = (solids.get(number)?, shape.parts(jaw)[number]);
@@ -170,12 +172,6 @@ struct Standing {
 }
 
 impl Standing {
-    /// A part of a compound whose axes are here.
-    fn part(part: &CompoundPart, origin: DVec3, rotation: DQuat) -> Self {
-        let (origin, rotation) = (origin + rotation * part.position_m, rotation * part.rotation);
-        Self { origin, rotation, around: Ball { centre: origin, radius_m: part.solid.radius_about_m(DVec3::ZERO) } }
-    }
-
     /// The piece of a solid.
     fn piece<'a>(self, solid: &'a Solid, shape: &'a dyn Shape, known: &'a ShapeCache) -> Piece<'a> {
         let Self { origin, rotation, around } = self;

@@ -29,7 +29,13 @@ pub(super) struct ShapeCache {
 /// The shapes of the parts of a compound, `None` of a part that has none.
 struct CompoundShapes {
     parts: Arc<[CompoundPart]>,
-    shapes: Box<[Option<SharedShape>]>,
+    shapes: Box<[Option<PartShape>]>,
+}
+
+/// The shape of a part of a compound, and how far it reaches from its own origin, metres.
+pub(super) struct PartShape {
+    pub shape: SharedShape,
+    pub radius_m: f64,
 }
 
 /// A part of a tool as a solid.
@@ -88,8 +94,10 @@ impl ShapeCache {
 
     fn prepare_compound(&mut self, parts: &Arc<[CompoundPart]>) {
         if self.compound(parts).is_none() {
-            let shapes = parts.iter().map(|part| part.solid.to_moving_shape().ok()).collect();
-            self.compounds.push(CompoundShapes { parts: Arc::clone(parts), shapes });
+            let shape = |CompoundPart { solid, .. }: &CompoundPart| {
+                Some(PartShape { shape: solid.to_moving_shape().ok()?, radius_m: solid.radius_about_m(DVec3::ZERO) })
+            };
+            self.compounds.push(CompoundShapes { parts: Arc::clone(parts), shapes: parts.iter().map(shape).collect() });
         }
     }
 
@@ -112,7 +120,7 @@ impl ShapeCache {
     }
 
     /// The cached shapes of the parts of a compound, `None` of a part that has none.
-    pub fn compound(&self, parts: &Arc<[CompoundPart]>) -> Option<&[Option<SharedShape>]> {
+    pub fn compound(&self, parts: &Arc<[CompoundPart]>) -> Option<&[Option<PartShape>]> {
         Some(&self.compounds.iter().find(|known| Arc::ptr_eq(&known.parts, parts))?.shapes)
     }
 

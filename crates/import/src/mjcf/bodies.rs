@@ -21,6 +21,7 @@ use std::collections::{BTreeMap, BTreeSet};
 pub(super) struct BodyReader<'a> {
     pub(super) compiler: &'a Compiler,
     pub(super) meshes: BTreeMap<String, Mesh<'a>>,
+    pub(super) height_fields: BTreeMap<String, &'a Element>,
     pub(super) files: Meshes<'a>,
     pub(super) notes: &'a mut Vec<LeftOut>,
     pub(super) model: Model,
@@ -114,6 +115,7 @@ impl<'a> BodyReader<'a> {
         Self {
             compiler,
             meshes: BTreeMap::new(),
+            height_fields: BTreeMap::new(),
             files,
             notes,
             model: Model::default(),

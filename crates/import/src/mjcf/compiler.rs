@@ -62,6 +62,12 @@ impl Compiler {
         Ok(settings)
     }
 
+    /// The path of a mesh or height field that an element names.
+    pub(super) fn in_mesh_folder(&self, file: &str) -> String {
+        let folder = self.mesh_folder.trim_end_matches('/');
+        if folder.is_empty() { file.to_owned() } else { format!("{folder}/{file}") }
+    }
+
     /// The pose that an element's `pos` and rotation give it.
     pub(super) fn pose(&self, element: &Element) -> Result<Pose, ImportError> {
         let position = element.numbers("pos")?.map_or(DVec3::ZERO, DVec3::from_array);

@@ -4,6 +4,8 @@
 
 use super::bodies::{BodyReader, Placed, z_to};
 use super::compiler::Compiler;
+use super::height_fields::{Ground, Heights};
+use crate::folders::extension;
 use crate::imported::ImportError;
 use crate::model::{Masks, Part, Shape, Surface};
 use crate::pose::Pose;
@@ -51,9 +53,7 @@ pub(super) fn meshes<'a>(root: &'a Element, compiler: &Compiler) -> Result<BTree
         let scale = element.numbers("scale")?.unwrap_or([1.0; 3]);
         let (stem, points) = if let Some(file) = element.text("file") {
             let stem = std::path::Path::new(file).file_stem().and_then(|stem| stem.to_str()).unwrap_or(file);
-            let folder = compiler.mesh_folder.trim_end_matches('/');
-            let file = if folder.is_empty() { file.to_owned() } else { format!("{folder}/{file}") };
-            (stem, MeshPoints::File(file))
+            (stem, MeshPoints::File(compiler.in_mesh_folder(file)))
         } else if let Some(all) = element.list("vertex")? {
             let scaled = |point: &[f64]| DVec3::from_slice(point) * DVec3::from_array(scale);
             ("mesh", MeshPoints::Here(all.chunks_exact(3).map(scaled).collect()))
@@ -64,6 +64,14 @@ pub(super) fn meshes<'a>(root: &'a Element, compiler: &Compiler) -> Result<BTree
         found.insert(name, Mesh { element, points, scale });
     }
     Ok(found)
+}
+
+/// The height fields of a file by name: that of the file where they have none.
+pub(super) fn height_fields(root: &Element) -> BTreeMap<String, &Element> {
+    let all = root.children("asset").flat_map(|asset| asset.children("hfield"));
+    let stem = |file: &str| Some(std::path::Path::new(file).file_stem()?.to_str()?.to_owned());
+    let name = |field: &Element| field.text("name").map(str::to_owned).or_else(|| stem(field.text("file")?));
+    all.filter_map(|field| Some((name(field)?, field))).collect()
 }
 
 impl BodyReader<'_> {
@@ -99,7 +107,7 @@ impl BodyReader<'_> {
             (Some(mass), Shape::Solid(solid)) => {
                 Some(mass / solid.volume_m3().map_err(|why| element.wrong(why.to_string()))?)
             }
-            (Some(_), Shape::Hull { .. } | Shape::Ellipsoid { .. }) => None,
+            (Some(_), Shape::Hull { .. } | Shape::Ellipsoid { .. } | Shape::Ground { .. }) => None,
         };
         let colour = element.numbers::<4>("rgba")?;
         let colour = colour.map(|[r, g, b, _]| [r, g, b].map(|c| (c.clamp(0.0, 1.0) * 255.0).round() as u8));
@@ -135,6 +143,7 @@ impl BodyReader<'_> {
                 return Ok(self.files.ellipsoid(DVec3::new(edge(0)?, across, along)).map(|shape| (shape, pose)));
             }
             "mesh" => return Ok(self.mesh(element)?.map(|shape| (shape, pose))),
+            "hfield" => return Ok(self.height_field(element)?.map(|(shape, own)| (shape, pose.then(own)))),
             other => return Ok(Err(format!("scenes have no {other}"))),
         };
         Ok(Ok((Shape::Solid(solid), pose)))
@@ -153,12 +162,44 @@ impl BodyReader<'_> {
         Ok(hull)
     }
 
+    /// The ground of a height field and where that is, or why there is none.
+    fn height_field(&mut self, element: &Element) -> Result<Result<(Shape, Pose), String>, ImportError> {
+        let name = element.needed("hfield")?;
+        let Some(field) = self.height_fields.get(name).copied() else {
+            return Err(element.wrong(format!("names the height field `{name}`, and there is none of that name")));
+        };
+        let size = field.numbers::<4>("size")?.unwrap_or_default();
+        if size.iter().any(|value| *value <= 0.0) {
+            return Err(field.wrong(format!("`size` is {size:?}; expected four lengths of more than zero")));
+        }
+        let heights = match field.text("file") {
+            None => Heights::here(field)?,
+            Some(file) if extension(file) == "png" => {
+                return Ok(Err(format!("`{file}`: expected `elevation`, or MuJoCo's binary file")));
+            }
+            Some(file) => {
+                let bytes = self.files.bytes(field, &self.compiler.in_mesh_folder(file))?;
+                match bytes.and_then(|bytes| Heights::read(&bytes)) {
+                    Ok(heights) => heights,
+                    Err(why) => return Ok(Err(format!("`{file}`: {why}"))),
+                }
+            }
+        };
+        Ok(match heights.ground(size) {
+            Ground::Even { solid, below_m } => {
+                Ok((Shape::Solid(solid), Pose { position: DVec3::NEG_Z * below_m, ..Pose::IDENTITY }))
+            }
+            Ground::Uneven(surface) => self.files.ground(name, surface).map(|shape| (shape, Pose::IDENTITY)),
+        })
+    }
+
     /// The weight of a geom in the axes of its body; `None` where its mesh cannot be read.
     pub(super) fn weight(&self, geom: &Geom) -> Option<Weight> {
         let density_kg_m3 = geom.density_kg_m3.unwrap_or(DENSITY_DEFAULT_KG_M3);
         let own = match &geom.part.shape {
             Shape::Solid(solid) => Weight::of_solid(solid, density_kg_m3)?,
             Shape::Ellipsoid { semi_axes_m, .. } => Weight::of_ellipsoid(*semi_axes_m, density_kg_m3),
+            Shape::Ground { .. } => Weight::NONE,
             Shape::Hull { file, scale } => Weight::of_surface(&self.files.surface(file, *scale)?, density_kg_m3)?,
         };
         Some(geom.mass_kg.map_or(own, |mass_kg| own.with_mass(mass_kg)).at(geom.part.pose))

@@ -57,3 +57,11 @@ pub fn advance(world: &World, seconds: f64) {
 pub fn left_out(imported: &Imported) -> Vec<String> {
     imported.left_out.iter().map(ToString::to_string).collect()
 }
+
+/// Where the centre of mass of a body is.
+pub fn centre(world: &metachron_world::World, name: &str) -> glam::DVec3 {
+    let metachron_core::Body::Rigid(state) = world.latest(world.object(name).unwrap()).unwrap().body else {
+        panic!("a rigid body")
+    };
+    state.position
+}
