@@ -2,6 +2,7 @@
 //!
 //! In: objects by their names or handles, commands, parts. Out: states, objects, answers. Never here: the meaning of a command, a connection.
 
+use crate::all_states::States;
 use crate::checkpoint::Checkpoint;
 use crate::command::Keywords;
 use crate::events::{Events, filter};
@@ -11,7 +12,6 @@ use crate::object::{Named, Object};
 use crate::raised;
 use crate::scene::part;
 use crate::state::State;
-use crate::states::States;
 use glam::{DQuat, DVec3};
 use metachron::core::{Body, SimSpan, SoftNodes};
 use metachron::runtime::{SPEED_RANGE, TimelineCommand};

@@ -3,6 +3,7 @@
 //! In: Python's numbers, numpy arrays, parts as the dataclasses of `package/metachron/parts.py`. Out: objects of Python, errors as its exceptions.
 //! Never here: physics, a lock that Python waits for while a world runs.
 
+mod all_states;
 mod calls;
 #[cfg_attr(not(feature = "view"), expect(dead_code, reason = "what a picture is asked for is read by what draws it"))]
 mod camera;
@@ -27,7 +28,6 @@ mod sensor;
 mod soft;
 mod start;
 mod state;
-mod states;
 #[cfg_attr(not(feature = "view"), path = "no_view.rs")]
 mod view;
 mod world;
@@ -35,6 +35,8 @@ mod world;
 /// The items that the package re-exports; `_metachron.pyi` has their arguments.
 #[pyo3::pymodule]
 mod _metachron {
+    #[pymodule_export]
+    use crate::all_states::States;
     #[pymodule_export]
     use crate::calls::WorldCalls;
     #[pymodule_export]
@@ -59,8 +61,6 @@ mod _metachron {
     use crate::scene::Scene;
     #[pymodule_export]
     use crate::state::State;
-    #[pymodule_export]
-    use crate::states::States;
     #[pymodule_export]
     use crate::world::World;
 

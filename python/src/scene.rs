@@ -154,15 +154,18 @@ impl Scene {
 
     /// Joins the rigid bodies `a` and `b`, or `a` and the world. Place and axis of `kind` are in the world's axes, as the bodies are at the start.
     ///
+    /// `friction` is dry, beside a motor: N·m of a hinge or a ball, N of a slide. `armature` is the inertia of a rotor behind its gear: kg·m², of a slide kg.
     /// A hinge or slide follows the joint `mimic`, one too: its travel is `ratio` (1) times that one's, rad or m for each rad or m.
     #[expect(clippy::too_many_arguments, reason = "a call in Python has keywords")]
-    #[pyo3(signature = (name, kind, a, b = None, *, mimic = None, ratio = None))]
+    #[pyo3(signature = (name, kind, a, b = None, *, friction = 0.0, armature = 0.0, mimic = None, ratio = None))]
     fn joint<'py>(
         mut slf: PyRefMut<'py, Self>,
         name: String,
         kind: &Bound<'py, PyAny>,
         a: &str,
         b: Option<&str>,
+        friction: f64,
+        armature: f64,
         mimic: Option<&str>,
         ratio: Option<f64>,
     ) -> PyResult<PyRefMut<'py, Self>> {
@@ -172,6 +175,7 @@ impl Scene {
         }
         slf.build(|builder| {
             let joined = builder.joint(a, b, kind, at.to_array()).joint_name(name);
+            let joined = joined.joint_friction(friction).joint_armature(armature);
             match mimic {
                 Some(other) => joined.mimic(other, ratio.unwrap_or(1.0)),
                 None => joined,

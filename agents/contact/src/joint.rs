@@ -29,7 +29,7 @@ pub struct Joint {
     /// The force that it gives at most, N, > 0, below that at which it tears: a greater load moves the place at which it holds, a
     /// rope's length or a spring's length at rest. Its torque is not bounded. Infinite where it never yields.
     pub yields_above_n: f64,
-    /// Dry friction of a hinge, N·m, or a slide, N, ≥ 0, beside its motor; 0 of other kinds.
+    /// Dry friction of a hinge or a ball in its socket, N·m, or a slide, N, ≥ 0, beside its motor; 0 of other kinds.
     pub friction: f64,
     /// Inertia about the axis of a hinge, kg·m², or along that of a slide, kg, ≥ 0: of a rotor behind a gear, which resists changes of the
     /// rate at which b moves against a and is nowhere else. 0 of other kinds.
@@ -248,7 +248,7 @@ impl Joint {
         OutOfRange::unless(tears_n > 0.0, "tearing force", tears_n, "above zero")?;
         let yields_first = yields_n > 0.0 && (yields_n < tears_n || yields_n == f64::INFINITY);
         OutOfRange::unless(yields_first, "yield force", yields_n, "above zero and below the tearing force")?;
-        let most = if self.takes_motor() { NUMBER } else { NONE };
+        let most = if self.takes_motor() || self.kind == JointKind::Spherical { NUMBER } else { NONE };
         most.check("friction", self.friction)?;
         most.check("armature", self.armature)?;
         if let Some(Mimic { joint, ratio, offset }) = self.mimic {
@@ -322,7 +322,7 @@ impl Joint {
 
 /// Stiffness, damping and lengths at rest; [`ABOVE_ZERO`] is that of lengths of ropes, [`GOAL`] that of goals of motors and of followed joints.
 const NUMBER: NumberRange = NumberRange::new(0.0, 1e9, "");
-/// The friction and armature of a joint that is neither hinge nor slide.
+/// The friction and armature of a joint that is neither hinge, slide nor ball.
 const NONE: NumberRange = NumberRange::new(0.0, 0.0, "");
 const ABOVE_ZERO: NumberRange = NumberRange { least: 1e-9, ..NUMBER };
 const GOAL: NumberRange = NumberRange { least: -1e9, ..NUMBER };

@@ -236,6 +236,14 @@ fn write_joint(out: &mut String, model: &Model, joint: &Joint, notes: &mut Vec<L
         put(out, "at_a_m", &vector(at));
     }
     let Some(unit) = Unit::of(joint.kind) else { return };
+    for (key, value) in [(unit.friction, joint.friction), (unit.armature, joint.armature)] {
+        if value > 0.0 {
+            put(out, key, &exact(value));
+        }
+    }
+    if joint.kind == Kind::Spherical {
+        return;
+    }
     put(out, "axis", &vector(from.rotation * joint.axis.normalize() * sign));
     match joint.range {
         Some(range) if unit.is_angle && range.iter().any(|end| end.abs() > ANGLE_MAX_RAD) => {
@@ -247,11 +255,6 @@ fn write_joint(out: &mut String, model: &Model, joint: &Joint, notes: &mut Vec<L
     }
     if let Some(motor) = joint.motor {
         put(out, "motor", &unit.motor(within(motor, joint, notes)));
-    }
-    for (key, value) in [(unit.friction, joint.friction), (unit.armature, joint.armature)] {
-        if value > 0.0 {
-            put(out, key, &exact(value));
-        }
     }
     if let Some(Mimic { joint, ratio }) = &joint.mimic {
         put(out, "mimic", &format!("{{ joint = {}, ratio = {} }}", quoted(joint), exact(*ratio)));
@@ -293,7 +296,7 @@ fn within(motor: Motor, joint: &Joint, notes: &mut Vec<LeftOut>) -> Motor {
     Motor::Spring { position: position.clamp(least, greatest), stiffness, damping, max_effort }
 }
 
-/// The names in scenes of the values of a joint that turns, or slides.
+/// The names in scenes of the values of a joint that turns, or slides; of a ball those of its friction and armature.
 struct Unit {
     is_angle: bool,
     range: &'static str,
@@ -309,7 +312,7 @@ struct Unit {
 impl Unit {
     const fn of(kind: Kind) -> Option<Self> {
         match kind {
-            Kind::Revolute => Some(Self {
+            Kind::Revolute | Kind::Spherical => Some(Self {
                 is_angle: true,
                 range: "range_deg",
                 position: "position_deg",
@@ -331,7 +334,7 @@ impl Unit {
                 friction: "friction_n",
                 armature: "armature_kg",
             }),
-            Kind::Fixed | Kind::Spherical => None,
+            Kind::Fixed => None,
         }
     }
 

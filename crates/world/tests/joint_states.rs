@@ -243,6 +243,22 @@ fn joints_that_follow_go_along_with_those_that_are_set() {
 }
 
 #[test]
+fn friction_and_an_armature_of_a_joint_slow_it_down() {
+    let (friction, armature, inertia) = (0.01, 0.02, 2.0 / 3.0 * 0.1 * 0.1);
+    let wheel = Rigid::cuboid([0.1; 3]).mass_kg(1.0).rate_hz(500.0);
+    let scene = Scene::builder().gravity([0.0; 3]).add("wheel", wheel).joint("wheel", None, hinge(None), [0.0; 3]);
+    let world = started(scene.joint_name("axle").joint_friction(friction).joint_armature(armature));
+    world.set_joint_states(&[state(&world, "axle", 0.0, 1.0)]).unwrap();
+    world.advance(SimSpan::from_millis(1000));
+    let found = world.joint_states().unwrap()[0].velocity;
+    // within a step
+    assert!((found - (1.0 - friction / (armature + inertia))).abs() < 2e-3, "{found} rad/s");
+    let refused = Scene::builder().add("ball", Rigid::ball(0.1)).joint("ball", None, JointKind::Fixed, [0.0; 3]);
+    let refused = refused.joint_friction(0.1).build().unwrap_err().to_string();
+    assert!(refused.contains("friction") && refused.contains("0.1"), "{refused}");
+}
+
+#[test]
 fn coordinates_beyond_half_a_turn_are_read_and_set_again() {
     let wheel = |x: f64| Rigid::cuboid([0.1; 3]).mass_kg(1.0).at([x, 0.0, 0.0]).rate_hz(500.0);
     let scene = Scene::builder().gravity([0.0; 3]).add("first", wheel(0.0)).add("second", wheel(1.0));

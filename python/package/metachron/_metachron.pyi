@@ -164,10 +164,20 @@ class Scene:
         """Adds a moving object: a rigid body, a tube, a sheet, a solid or a rope."""
 
     def joint(
-        self, name: str, kind: JointKind, a: str, b: str | None = None, *, mimic: str | None = None, ratio: float | None = None
+        self,
+        name: str,
+        kind: JointKind,
+        a: str,
+        b: str | None = None,
+        *,
+        friction: float = 0.0,
+        armature: float = 0.0,
+        mimic: str | None = None,
+        ratio: float | None = None,
     ) -> Self:
         """Joins the rigid bodies `a` and `b`, or `a` and the world. Place and axis of `kind` are in the world's axes, as the bodies are at the start.
 
+        `friction` is dry, beside a motor: N·m of a hinge or a ball, N of a slide. `armature` is the inertia of a rotor behind its gear: kg·m², of a slide kg.
         A hinge or slide follows the joint `mimic`, one too: its travel is `ratio` (1) times that one's, rad or m for each rad or m.
         """
 

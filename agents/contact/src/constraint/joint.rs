@@ -310,15 +310,16 @@ impl Joints {
 
 /// Lays out the friction of a joint and its armature between the sides that its motor would drive.
 fn resist(step: &FineStep<'_, '_>, constraints: &mut ConstraintRows, joint: &Joint, placed: &Placed) {
-    let (axis, Together { sides, owner }) = (placed.axis, placed.free(joint));
+    let Together { sides, owner } = placed.free(joint);
+    let hold = if joint.kind == JointKind::Spherical { Hold::ALL } else { Hold::along(placed.axis) };
     if joint.friction > 0.0 {
-        let row = JointRow::new(sides, Hold::motor(axis, joint.friction * step.h_s));
+        let row = JointRow::new(sides, hold.limited(joint.friction * step.h_s));
         constraints.push(step, row, RowOwner { key: FRICTION, owes: true, ..owner });
     }
     if joint.armature > 0.0 {
         let target_m_s = relative(&sides, |member| &step.progress[member].v_before);
         let compliance_per_kg = Some(joint.armature.recip());
-        let row = JointRow { target_m_s, compliance_per_kg, ..JointRow::new(sides, Hold::along(axis)) };
+        let row = JointRow { target_m_s, compliance_per_kg, ..JointRow::new(sides, hold) };
         constraints.push(step, row, RowOwner { key: ARMATURE, ..owner });
     }
 }

@@ -365,10 +365,16 @@ fn a_body_on_a_slide_falls_along_it_and_stops_at_its_end() {
 }
 
 #[test]
-fn friction_and_an_armature_act_between_the_two_bodies_of_a_hinge() {
+fn friction_and_an_armature_act_between_the_two_bodies_of_a_hinge_or_a_ball() {
+    for kind in [JointKind::Revolute { axis: DVec3::X, range_rad: None, motor: None }, JointKind::Spherical] {
+        slow_down(kind);
+    }
+}
+
+/// Two bodies on a joint, of which one turns against the other about x until friction stops it.
+fn slow_down(kind: JointKind) {
     let at = |x: f64| RigidSpec { gravity: DVec3::ZERO, ..block(DVec3::splat(0.1), DVec3::X * x, 1.5) };
     let spun = RigidSpec { spin: DVec3::X * 3.0, ..at(0.0) };
-    let kind = JointKind::Revolute { axis: DVec3::X, range_rad: None, motor: None };
     let ends = Joint {
         anchor_a_m: DVec3::X * 0.1,
         anchor_b_m: DVec3::X * -0.1,
@@ -385,6 +391,21 @@ fn friction_and_an_armature_act_between_the_two_bodies_of_a_hinge() {
         let wanted = (3.0 - slows_rad_s2 * f64::from(step) / 100.0).max(0.0);
         assert!((a - b - wanted).abs() < 2e-3, "step {step}: {} rad/s for {wanted}", a - b);
         assert!((inertia * (a + b - 3.0)).abs() < 1e-9, "step {step}");
+    }
+}
+
+#[test]
+fn the_friction_of_a_ball_acts_against_its_turn_about_whatever_axis_and_holds_it() {
+    let axis = DVec3::new(1.0, -2.0, 2.0) / 3.0;
+    let spun = RigidSpec { gravity: DVec3::ZERO, spin: axis * 3.0, ..block(DVec3::splat(0.1), DVec3::ZERO, 1.5) };
+    let (friction, armature) = (0.05, 0.02);
+    let mut table = party([spun], [Joint { armature, friction, ..on_world(JointKind::Spherical) }], 100.0);
+    let slows_rad_s2 = friction / (1.5 * 0.2 * 0.2 / 6.0 + armature);
+    for step in 1..=200 {
+        table.step();
+        let wanted = axis * (3.0 - slows_rad_s2 * f64::from(step) / 100.0).max(0.0);
+        let found = state(&table, 0).spin;
+        assert!(found.distance(wanted) < 2e-3, "step {step}: {found} rad/s for {wanted}");
     }
 }
 

@@ -61,6 +61,9 @@ impl BodyReader<'_> {
         let place = element.place.clone();
         let name = element.text("name").unwrap_or_default().to_owned();
         let joint = Joint { name, kind, anchor_m, ..Joint::weld(place, parent, child) };
+        let [friction, armature] =
+            [element.up_to(STRENGTH_MAX, "frictionloss")?, element.up_to(STRENGTH_MAX, "armature")?];
+        let joint = Joint { friction, armature, ..joint };
         if kind == Kind::Spherical {
             element.read_all(&["axis", "ref", "springref"]);
             return self.ball(joint);
@@ -83,14 +86,12 @@ impl BodyReader<'_> {
         let axis = frame.rotation * given;
         let spring = element.number("springref")?.unwrap_or(0.0) * unit - at_rest;
         let motor = passive(element, spring - start)?;
-        let [friction, armature] =
-            [element.up_to(STRENGTH_MAX, "frictionloss")?, element.up_to(STRENGTH_MAX, "armature")?];
         if range.is_none() {
             element.read_all(&["limited", "solreflimit", "solimplimit", "margin"]);
         }
         let range = range.map(|range| range.map(|end| end - start));
         let [motion, to_spring] = [start, spring].map(|travel| kind.motion(anchor_m, axis, travel));
-        let between = Some(Joint { axis, range, motor, friction, armature, ..joint });
+        let between = Some(Joint { axis, range, motor, ..joint });
         Ok(StartedJoint { between, motion, to_spring, zero, start })
     }
 

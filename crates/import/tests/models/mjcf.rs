@@ -350,6 +350,18 @@ fn a_flag_turns_all_off_that_bounds_or_holds() {
 }
 
 #[test]
+fn the_friction_and_armature_of_a_ball_are_those_of_its_joint() {
+    let ball = r#"<joint type="ball" frictionloss="0.2" armature="0.3" damping="0.1"/>"#;
+    let text = format!(r#"<mujoco><worldbody><body name="a">{ball}<geom size="0.1"/></body></worldbody></mujoco>"#);
+    let imported = import(&text).unwrap();
+    assert_eq!(left_out(&imported), ["line 1: body `a`, joint: `damping` is left out"]);
+    let joint = "kind = \"spherical\"";
+    let has = [joint, "friction_n_m = 0.2", "armature_kg_m2 = 0.3"].map(|words| imported.toml.contains(words));
+    assert_eq!(has, [true; 3], "{}", imported.toml);
+    crate::play::scene(&imported, &[], 500.0);
+}
+
+#[test]
 fn what_changes_the_motion_comes_first_and_zeros_change_none() {
     let text = r#"<mujoco><option timestep="0.01" density="1.2" viscosity="0"/><worldbody><light/><body name="a">
         <joint name="hinge" armature="0.1" frictionloss="2" damping="3"/>

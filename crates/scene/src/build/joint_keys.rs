@@ -29,7 +29,8 @@ const OWN: [&str; 13] = [
 /// The keys of each kind that not all kinds have: required ones, then optional ones.
 const fn keys_of(kind: Kind) -> (&'static [&'static str], &'static [&'static str]) {
     match kind {
-        Kind::Fixed | Kind::Spherical => (&[], &[]),
+        Kind::Fixed => (&[], &[]),
+        Kind::Spherical => (&[], &["friction_n_m", "armature_kg_m2"]),
         Kind::Revolute => (&["axis"], &["range_deg", "motor", "friction_n_m", "armature_kg_m2", "mimic"]),
         Kind::Prismatic => (&["axis"], &["range_m", "motor", "friction_n", "armature_kg", "mimic"]),
         Kind::Spring => (&["stiffness_n_m"], &["damping_n_s_m", "rest_m"]),

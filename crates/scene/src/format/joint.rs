@@ -33,11 +33,12 @@ pub struct JointFile {
     pub range_deg: Option<[f64; 2]>,
     /// Motor of a `revolute` or `prismatic` joint.
     pub motor: Option<MotorFile>,
-    /// Dry friction of a `revolute` joint, N·m, beside its motor. Default 0.
+    /// Dry friction of a `revolute` joint, N·m, beside its motor, or of a `spherical` one. Default 0.
     pub friction_n_m: Option<f64>,
     /// Dry friction of a `prismatic` joint, N, beside its motor. Default 0.
     pub friction_n: Option<f64>,
-    /// Inertia about the axis of a `revolute` joint, kg·m², of a rotor behind its gear: it resists changes of the rate at which `b` turns against `a`.
+    /// Inertia about the axis of a `revolute` joint, kg·m², of a rotor behind its gear, or about every axis of a `spherical` one: it resists changes of
+    /// the rate at which `b` turns against `a`.
     /// Default 0.
     pub armature_kg_m2: Option<f64>,
     /// Inertia along the axis of a `prismatic` joint, kg: it resists changes of the rate at which `b` slides against `a`. Default 0.

@@ -155,6 +155,8 @@ struct Joined {
     b: Option<String>,
     kind: JointKind,
     at_m: DVec3,
+    friction: f64,
+    armature: f64,
     mimic: Option<Followed>,
 }
 
@@ -277,13 +279,28 @@ impl SceneBuilder {
     /// are in the axes of the world, as the bodies are at the start. Springs and ropes, which have two ends, are not for this.
     #[must_use]
     pub fn joint(mut self, a: impl Into<String>, b: Option<&str>, kind: JointKind, at_m: [f64; 3]) -> Self {
-        let (name, b, at_m, mimic) = (String::new(), b.map(str::to_owned), at_m.into(), None);
-        self.joints.push(Joined { name, a: a.into(), b, kind, at_m, mimic });
+        let (name, b, at_m) = (String::new(), b.map(str::to_owned), at_m.into());
+        let (friction, armature, mimic) = (0.0, 0.0, None);
+        self.joints.push(Joined { name, a: a.into(), b, kind, at_m, friction, armature, mimic });
+        self
+    }
+
+    /// Gives the joint that was added last dry friction, beside its motor: N·m of a hinge or a ball in its socket, N of a slide, 0 to 1e9.
+    #[must_use]
+    pub fn joint_friction(mut self, friction: f64) -> Self {
+        self.joints.last_mut().into_iter().for_each(|joint| joint.friction = friction);
+        self
+    }
+
+    /// Gives the joint that was added last the inertia of a rotor behind its gear: kg·m² of a hinge or a ball in its socket, kg of a slide, 0 to 1e9.
+    #[must_use]
+    pub fn joint_armature(mut self, armature: f64) -> Self {
+        self.joints.last_mut().into_iter().for_each(|joint| joint.armature = armature);
         self
     }
 
     /// Lets the joint that was added last, a hinge or a slide, follow another one from where both start, as a gear does: its travel is `ratio`
-    /// times that of the joint of this name, radians or metres for each radian or metre, within ±1e9. Either drives the other.
+    /// times that of the joint of this name, radians or metres for each radian or metre, within ±1e6. Either drives the other.
     #[must_use]
     pub fn mimic(mut self, joint: impl Into<String>, ratio: f64) -> Self {
         if let Some(last) = self.joints.last_mut() {
@@ -425,6 +442,8 @@ impl Joined {
         });
         let joint = Joint {
             mimic: mimic.transpose()?,
+            friction: self.friction,
+            armature: self.armature,
             anchor_a_m: local(a),
             anchor_b_m: b.map_or(self.at_m, |(_, spec)| local(spec)),
             ..Joint::new(id, b.map(|(id, _)| id), kind)

@@ -67,9 +67,13 @@ impl Jointed {
 }
 
 impl Placed {
-    /// The sides that the joint leaves free along its axis, spins of a hinge, points of a slide: a force between them does not hold it together.
+    /// The sides that the joint leaves free, spins of a hinge or a ball, points of a slide: a force between them does not hold it together.
     pub(super) fn free(&self, joint: &Joint) -> Together {
-        let of = if matches!(joint.kind, JointKind::Revolute { .. }) { &self.turns } else { &self.points };
+        let of = if matches!(joint.kind, JointKind::Revolute { .. } | JointKind::Spherical) {
+            &self.turns
+        } else {
+            &self.points
+        };
         Together { sides: of.sides, owner: self.turns.owner }
     }
 }
