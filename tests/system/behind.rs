@@ -389,14 +389,18 @@ fn tumbling(k: u32, seed: u32) -> String {
 }
 
 #[test]
-fn strands_that_a_load_makes_late_and_coarse_gain_no_energy_when_it_has_gone() {
-    // for half a second every step costs a hundred times as much; the strands are fine again seconds later
+fn strands_that_a_load_makes_late_gain_no_energy_when_it_has_gone() {
+    // for half a second every step costs a hundred times as much; four strands of the two dozen are late as all are
     let load = "machine.step_load=[{at_s=0.0,factor=1.0},{at_s=0.5,factor=100.0},{at_s=1.0,factor=1.0}]";
-    let energy_j = |seconds: &str| {
-        let report = lockstep("overload", &["--seconds", seconds, "--size", "64x64", "--set", load]);
-        let agents = report["agents"].as_array().unwrap();
-        agents.iter().filter_map(|agent| agent["energy_j"].as_f64()).sum::<f64>()
+    let overload = include_str!("../../scenes/overload.toml");
+    let five: Vec<_> = overload.split("[[object]]").take(5).collect();
+    let scene = Folder::with(&five.join("[[object]]").replace("format = 1\n", ""));
+    let play = |seconds: &str| scene.lockstep(&["--seconds", seconds, "--size", "64x64", "--set", load]);
+    let energy_j = |report: &Value| -> f64 {
+        report["agents"].as_array().unwrap().iter().map(|agent| number(agent, "/energy_j")).sum()
     };
-    let (first_j, last_j) = (energy_j("0.1"), energy_j("4"));
-    assert!(last_j < first_j, "{first_j} J became {last_j} J");
+    let (first, last) = (play("0.1"), play("4"));
+    assert!(energy_j(&last) < energy_j(&first), "{} J became {} J", energy_j(&first), energy_j(&last));
+    let late = last["agents"].as_array().unwrap().iter().filter(|agent| number(agent, "/lengthened") > 0.0);
+    assert_eq!(late.count(), 4);
 }
