@@ -2,7 +2,7 @@
 //! both.
 //!
 //! In: arguments. Out: a served world and what it carries, second by second; the outputs of `run` of a world elsewhere. Never here: messages,
-//! who is let in.
+//! the rights of callers.
 
 pub mod args;
 mod view;
@@ -34,7 +34,7 @@ struct Carried {
     /// Bytes a second that each caller was sent since the last line.
     sent_bytes_s: f64,
     refused: RefusedRow,
-    /// Whether anybody on the network may read and command the world.
+    /// Whether any process of the network may read and command the world.
     insecure_lan: bool,
 }
 
@@ -134,7 +134,7 @@ fn line(carried: &Carried, json: bool) -> anyhow::Result<String> {
 
 /// Said where `--insecure-lan` opens a world, or a view of one, to the network.
 pub(super) const INSECURE: &str =
-    "--insecure-lan: anybody on the network may read and command this world, and nothing is encrypted";
+    "--insecure-lan: any process of the network may read and command this world, and nothing is encrypted";
 
 /// In red on a terminal.
 fn red(text: &str, is_terminal: bool) -> String {
@@ -149,22 +149,24 @@ fn of_peer(peer: &str, refused: Refusals) -> String {
     )
 }
 
-/// Makes a certificate, and the authority that issues it where there is none.
+/// Makes a certificate, and the authority that issues it where one is wanted.
 pub(super) fn identity(command: &IdentityCommand) -> anyhow::Result<Exit> {
     let IdentityCommand::New(args) = command;
     let file = format!("{}.pem", args.name);
-    let authority = if args.authority.exists() {
-        Authority::from_file(&args.authority).map_err(refused)?
-    } else {
-        let authority = Authority::new(&stem(&args.authority.to_string_lossy())).map_err(refused)?;
-        authority.write(&args.authority).map_err(refused)?;
-        message(&format!("{}: a new authority; who has this file can pose as anybody", args.authority.display()));
-        authority
-    };
-    authority
-        .issue(&args.name, &args.address, args.days)
-        .and_then(|identity| identity.write(&file))
-        .map_err(refused)?;
+    let of = &args.authority;
+    if !args.new_authority && !of.exists() {
+        let why = format!("{}: no authority is there; expected its file, or --new-authority to make one", of.display());
+        return Err(BadInput(why).into());
+    }
+    let authority =
+        if args.new_authority { Authority::new(&stem(&of.to_string_lossy())) } else { Authority::from_file(of) };
+    let authority = authority.map_err(refused)?;
+    let identity = authority.issue(&args.name, &args.address, args.days).map_err(refused)?;
+    if args.new_authority {
+        authority.write(of).map_err(refused)?;
+        message(&format!("{}: a new authority; its holder can issue every name", of.display()));
+    }
+    identity.write(&file).map_err(refused)?;
     let addresses: Vec<_> = std::iter::once(&args.name).chain(&args.address).map(String::as_str).collect();
     message(&format!("{file}: {} for {} days, reached as {}", args.name, args.days, addresses.join(", ")));
     Ok(Exit::Ok)
@@ -177,8 +179,9 @@ fn refused(error: HostsError) -> anyhow::Error {
         | HostsError::BadName { .. }
         | HostsError::NeedsCertificates { .. }
         | HostsError::IdentityOrNot { .. }
-        | HostsError::NobodyNamed
+        | HostsError::NoCallers
         | HostsError::BadIdentity { .. }
+        | HostsError::BadAddress { .. }
         | HostsError::LongScene { .. } => BadInput(error.to_string()).into(),
         other => other.into(),
     }

@@ -116,27 +116,32 @@ fn a_host_whose_time_stands_lets_callers_drive_it_and_ends_with_its_signal() {
 #[test]
 fn certificates_that_the_command_makes_let_a_viewer_in_and_an_open_world_says_so() {
     let folder = folder();
-    let issue = |name: &str| {
+    let issue = |name: &str, more: &[&str]| {
         let new = ["identity", "new", name, "--authority", "lab.pem", "--address", "127.0.0.1"];
-        Process::new(cargo_bin("metachron")).args(new).current_dir(&folder).output().unwrap()
+        Process::new(cargo_bin("metachron")).args(new).args(more).current_dir(&folder).output().unwrap()
     };
-    for name in ["bench", "screen", "nobody"] {
-        assert!(issue(name).status.success());
+    let mistyped = issue("bench", &[]);
+    assert!(String::from_utf8_lossy(&mistyped.stderr).contains("lab.pem: no authority is there"), "{mistyped:?}");
+    assert!(issue("bench", &["--new-authority"]).status.success());
+    for name in ["screen", "unnamed"] {
+        assert!(issue(name, &[]).status.success());
     }
-    assert_eq!(issue("bench").status.code(), Some(2), "a file that is there stays");
+    assert_eq!(issue("bench", &[]).status.code(), Some(2), "a file that is there stays");
+    assert_eq!(issue("other", &["--new-authority"]).status.code(), Some(2), "and so does an authority");
+    assert_eq!(issue("other", &["--address", "10.0.0.256"]).status.code(), Some(2));
     let pem = |name: &str| folder.path().join(name).to_string_lossy().into_owned();
-    let (bench, screen, nobody) = (pem("bench.pem"), pem("screen.pem"), pem("nobody.pem"));
+    let (bench, screen, unnamed) = (pem("bench.pem"), pem("screen.pem"), pem("unnamed.pem"));
     let scene = folder.path().join("scene.toml");
     let host = Host::at("tls/127.0.0.1", &scene, &["--identity", &bench, "--viewers", "screen"]);
     let view = |identity: &str| host.view(&["--identity", identity, "--frames", "3", "--report", "-", "-q"]);
     assert!(view(&screen).status.success());
-    assert_eq!(view(&nobody).status.code(), Some(1));
+    assert_eq!(view(&unnamed).status.code(), Some(1));
     drop(host);
     let mut open = Host::at("tcp/0.0.0.0", &scene, &["--insecure-lan"]);
     assert_eq!(open.line()["insecure_lan"], true);
     let seen = open.view(&["--insecure-lan", "--frames", "3", "--report", "-", "-q"]);
     let report: serde_json::Value = serde_json::from_slice(&seen.stdout).unwrap();
-    assert!(report["notes"][0].as_str().unwrap().contains("anybody on the network"), "{report}");
+    assert!(report["notes"][0].as_str().unwrap().contains("any process of the network"), "{report}");
 }
 
 #[test]

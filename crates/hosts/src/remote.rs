@@ -6,7 +6,7 @@ use crate::endpoint::{LEASE, Place, Side, is_open_to_all, open};
 use crate::error::HostsError;
 use crate::identity::{Identity, is_name};
 use crate::mirror::{Mirror, RemoteFrame};
-use crate::rounded::{Sketched, Sketches};
+use crate::rounded::{Change, Sketched, Sketches};
 use crate::serving::{ANYONE, SceneFiles};
 use crate::wire::{Call, Moment, PROGRAM, Reply, Request, Welcome, decode, encode};
 use metachron_core::{AgentId, Body, SimSpan, SimTime, Snapshot};
@@ -111,7 +111,7 @@ impl Calling {
         self
     }
 
-    /// Lets a `tcp/` endpoint be beyond this machine: anybody on the network may read what is said, or say something else.
+    /// Lets a `tcp/` endpoint be beyond this machine: any process of the network may read what is said, or say something else.
     #[must_use]
     pub const fn insecure_lan(mut self) -> Self {
         self.insecure_lan = true;
@@ -141,12 +141,13 @@ pub fn connect(calling: impl Into<Calling>) -> Result<RemoteWorld, HostsError> {
     let session = open(place, Side::Caller)?;
     let failed = |error: zenoh::Error| HostsError::Network { endpoint: endpoint.clone(), reason: error.to_string() };
     let caller = format!("{}/{}", identity.as_ref().map_or(ANYONE, Identity::name), session.zid());
+    // the host gives a place to a caller that lives; declarations overtake calls
+    let token = session.liveliness().declare_token(format!("metachron/caller/{caller}")).wait().map_err(failed)?;
     let welcome =
         greet(&session, &caller, is_looking).ok_or_else(|| HostsError::NoWorld { endpoint: endpoint.clone() })??;
     check_welcome(&welcome, scene.as_ref())?;
     let mirror = Arc::new(Mirror::new(welcome));
     let of_world = |last: &str| format!("metachron/{}/{last}", mirror.world);
-    let token = session.liveliness().declare_token(of_world(&format!("caller/{caller}"))).wait().map_err(failed)?;
     let (to_reader, messages) = sync_channel(WAITING);
     let states = session.declare_subscriber(of_world(if is_looking { "seen" } else { "state" }));
     let states = states.callback(move |sample| drop(to_reader.try_send(sample.payload().to_bytes().into_owned())));
@@ -155,8 +156,9 @@ pub fn connect(calling: impl Into<Calling>) -> Result<RemoteWorld, HostsError> {
     let host = session.liveliness().declare_subscriber(of_world("host")).history(true);
     let host =
         host.callback(move |sample| watched.set_alive(sample.kind() == SampleKind::Put)).wait().map_err(failed)?;
-    // the greeting had the first number
-    let (sequence, ends, is_open) = (Mutex::new(1), AtomicBool::new(false), is_open_to_all(&endpoint));
+    // greetings had the first numbers
+    let (sequence, ends) = (Mutex::new(u64::from(GREETING.0)), AtomicBool::new(false));
+    let is_open = is_open_to_all(&endpoint);
     let sketches = Mutex::new(is_looking.then(Sketches::default));
     let link = Arc::new(Link { session, mirror, caller, is_open, sketches, sequence, ends });
     link.refresh()?;
@@ -166,12 +168,12 @@ pub fn connect(calling: impl Into<Calling>) -> Result<RemoteWorld, HostsError> {
     Ok(RemoteWorld { connection: Arc::new(Connection { link, reader, _subscribers: [states, host], _token: token }) })
 }
 
-/// Introduces a caller; `None` where nobody answers.
+/// Introduces a caller; `None` where no host answers. Each greeting has a number of its own: the answer to one before may be lost.
 fn greet(session: &Session, caller: &str, is_looking: bool) -> Option<Result<Welcome, HostsError>> {
-    let hello = encode(&Request { run: 0, sequence: 1, call: hello(is_looking) }).ok()?;
     let (often, pause) = GREETING;
-    for _ in 0..often {
-        let asked = session.get(format!("metachron/*/call/{caller}")).payload(hello.clone()).timeout(LEASE);
+    for sequence in 1..=u64::from(often) {
+        let hello = encode(&Request { run: 0, sequence, call: hello(is_looking) }).ok()?;
+        let asked = session.get(format!("metachron/*/call/{caller}")).payload(hello).timeout(LEASE);
         let answers = asked.wait().ok()?;
         let answer =
             answers.recv().ok().and_then(|reply| reply.result().ok().map(|it| it.payload().to_bytes().into_owned()));
@@ -241,15 +243,22 @@ impl Link {
 
     /// Takes a message of states.
     fn take(&self, bytes: &[u8]) {
-        let message = match &mut *self.sketches() {
+        let mut sketches = self.sketches();
+        let message = match &*sketches {
             Some(sketches) => sketches.decode(bytes),
             None => match decode(bytes) {
-                Ok(Reply::Moment(moment)) => Ok(Sketched::Next(moment)),
+                Ok(Reply::Moment(moment)) => Ok(Sketched::Next(moment, Change::default())),
                 _ => return self.mirror.refuse(),
             },
         };
         match message {
-            Ok(Sketched::Next(moment)) => self.mirror.take(moment),
+            Ok(Sketched::Next(moment, change)) => {
+                if self.mirror.take(moment)
+                    && let Some(sketches) = &mut *sketches
+                {
+                    sketches.apply(change);
+                }
+            }
             Ok(Sketched::Old) => {}
             Ok(Sketched::Later) => self.mirror.miss(),
             Err(_) => self.mirror.refuse(),
@@ -262,7 +271,9 @@ impl Link {
 
     /// Introduces the caller again, where its host has forgotten it, and takes all states.
     fn refresh(&self) -> Result<(), WorldError> {
-        self.call(hello(self.sketches().is_some()))?;
+        // the lock is free again before the host is asked
+        let is_looking = self.sketches().is_some();
+        self.call(hello(is_looking))?;
         let all = self.call(Call::All)?.into_iter();
         let parts = all.map(|part| if let Reply::Moment(part) = part { Ok(part) } else { Err(unexpected()) });
         let parts = parts.collect::<Result<Vec<Moment>, _>>()?;
@@ -338,7 +349,7 @@ impl RemoteWorld {
         self.link().mirror.next_frame(since, patience)
     }
 
-    /// The scene of the world, for one who draws it; `None` where its host does not say it.
+    /// The scene of the world, for a program that draws it; `None` where its host does not say it.
     ///
     /// # Errors
     /// [`WorldError::Silent`] and [`WorldError::Elsewhere`].
@@ -362,7 +373,7 @@ impl RemoteWorld {
         self.link().mirror.silence().is_some()
     }
 
-    /// Whether anybody on the network may read what is said ([`Calling::insecure_lan`]).
+    /// Whether any process of the network may read what is said ([`Calling::insecure_lan`]).
     #[must_use]
     pub fn is_open(&self) -> bool {
         self.link().is_open

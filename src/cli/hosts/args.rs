@@ -12,7 +12,7 @@ Examples:
   metachron view tcp/127.0.0.1:7500                    a window on it, in another terminal
   metachron host cavity --listen tls/0.0.0.0:7447 --identity bench.pem --operators lab2 --viewers screen
 
-Beyond this machine both ends have certificates (`metachron identity`), and nobody is let in who is not named.";
+Beyond this machine both ends have certificates (`metachron identity`), and only callers are let in that are named.";
 
 /// `host`.
 #[derive(Debug, Args)]
@@ -32,7 +32,7 @@ pub struct HostArgs {
     /// Certificates whose holders may read the world
     #[arg(long, value_name = "NAMES", value_delimiter = ',', requires = "identity")]
     pub viewers: Vec<String>,
-    /// Let tcp/ be beyond this machine: anybody on the network may read and command the world
+    /// Let tcp/ be beyond this machine: any process of the network may read and command the world
     #[arg(long, conflicts_with = "identity")]
     pub insecure_lan: bool,
     /// The name of the world: 1 to 64 letters, digits, _ and -
@@ -68,7 +68,7 @@ pub struct ViewArgs {
     /// The certificate of this viewer, a file of `metachron identity new`, for tls/
     #[arg(long, value_name = "FILE", value_hint = ValueHint::FilePath)]
     pub identity: Option<PathBuf>,
-    /// Let tcp/ be beyond this machine: anybody on the network may read and change what is said
+    /// Let tcp/ be beyond this machine: any process of the network may read and change what is said
     #[arg(long, conflicts_with = "identity")]
     pub insecure_lan: bool,
     /// Open no window: pictures, films and files of what is seen
@@ -100,27 +100,31 @@ pub struct ViewArgs {
 
 pub const IDENTITY_EXAMPLES: &str = "\
 Examples:
-  metachron identity new bench --authority lab.pem     bench.pem, for a host that is reached as tls/bench:7447
-  metachron identity new bench --authority lab.pem --address 10.0.0.5,bench.lab.example
+  metachron identity new bench --authority lab.pem --new-authority
+                                                       bench.pem, for a host that is reached as tls/bench:7447, and lab.pem
   metachron identity new screen --authority lab.pem    screen.pem, for a caller
+  metachron identity new bench2 --authority lab.pem --address 10.0.0.5,bench2.lab.example
 
-The first one makes the authority too. Who has lab.pem can be anybody: keep it apart, and give each machine its own file alone.";
+The first one makes the authority too. Its holder can issue every name: keep lab.pem apart, and give each machine its own file alone.";
 
 /// `identity`.
 #[derive(Debug, Subcommand)]
 pub enum IdentityCommand {
-    /// Make a certificate and its key, in the file NAME.pem that nobody else may read
+    /// Make a certificate and its key, in the file NAME.pem that no other user may read
     New(NewIdentityArgs),
 }
 
 /// `identity new`.
 #[derive(Debug, Args)]
 pub struct NewIdentityArgs {
-    /// Who has it: 1 to 64 letters, digits, _ and -; `--operators` and `--viewers` name it so
+    /// Its holder: 1 to 64 letters, digits, _ and -; `--operators` and `--viewers` name it so
     pub name: String,
-    /// The authority that issues it; made where there is no such file
+    /// The authority that issues it
     #[arg(long, value_name = "FILE", value_hint = ValueHint::FilePath)]
     pub authority: PathBuf,
+    /// Make the authority too, in a file that is not there yet
+    #[arg(long)]
+    pub new_authority: bool,
     /// Addresses of a host besides its name: names of DNS and IP addresses
     #[arg(long, value_name = "ADDRESSES", value_delimiter = ',')]
     pub address: Vec<String>,
