@@ -1,10 +1,11 @@
-//! `host`, `view` and `identity`: a world that is served to other processes, a window on one that another process serves, and certificates for
-//! both.
+//! `host`, `view`, `tool` and `identity`: a world that is served to other processes, a window on one that another process serves, a device that
+//! leads an object of it, and certificates for all.
 //!
 //! In: arguments. Out: a served world and what it carries, second by second; the outputs of `run` of a world elsewhere. Never here: messages,
 //! the rights of callers.
 
 pub mod args;
+mod tool;
 mod view;
 
 use super::run::stem;
@@ -19,8 +20,9 @@ use metachron_world::{SceneText, World};
 use serde::Serialize;
 use std::io::IsTerminal;
 use std::sync::Arc;
-use std::sync::mpsc::{RecvTimeoutError, channel};
+use std::sync::mpsc::{Receiver, RecvTimeoutError, channel};
 use std::time::{Duration, Instant};
+pub(super) use tool::tool;
 pub(super) use view::view;
 
 /// A line of a host.
@@ -66,9 +68,7 @@ pub(super) fn host(args: &HostArgs) -> anyhow::Result<Exit> {
     let identity = args.identity.as_ref().map(Identity::from_file).transpose().map_err(refused)?;
     let serving = identity.into_iter().fold(serving, Serving::identity);
     let host = serve(Arc::new(world.clone()), serving).map_err(refused)?;
-    let (stop, stopped) = channel();
-    // no reader waits for a second Ctrl-C
-    ctrlc::set_handler(move || stop.send(()).unwrap_or(())).context("Ctrl-C cannot be caught")?;
+    let stopped = stopped()?;
     message(&format!("`{}` serves {} at {}, until Ctrl-C", args.name, scene.name, args.listen));
     if host.is_open() {
         message(&red(INSECURE, std::io::stderr().is_terminal()));
@@ -84,6 +84,14 @@ pub(super) fn host(args: &HostArgs) -> anyhow::Result<Exit> {
     drop(host);
     world.stop();
     Ok(Exit::Ok)
+}
+
+/// Told of Ctrl-C, of the first one alone.
+fn stopped() -> anyhow::Result<Receiver<()>> {
+    let (stop, stopped) = channel();
+    // no reader waits for a second Ctrl-C
+    ctrlc::set_handler(move || stop.send(()).unwrap_or(())).context("Ctrl-C cannot be caught")?;
+    Ok(stopped)
 }
 
 /// The sums at a moment of which lines tell the rates.

@@ -16,6 +16,11 @@ const SCENE: &str = "format = 1\nexecutor = 'threads'\n[target]\nframe_hz = 50.0
     [[object]]\nname = 'floor'\nmodel = 'rigid'\nshape = 'plane'\n";
 const WEDGE: &str = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 2 3 4\nf 1 4 3\n";
 
+/// A tray in a hand with a load of 50 g on it.
+const TRAY: &str = "format = 1\nexecutor = 'threads'\n\
+    [[object]]\nname = 'tray'\nmodel = 'rigid'\nshape = 'box'\nhalf_extents_m = [0.1, 0.1, 0.01]\nkinematic = true\nposition_m = [0, 0, 0.5]\n\
+    [[object]]\nname = 'load'\nmodel = 'rigid'\nshape = 'box'\nhalf_extents_m = [0.02, 0.02, 0.02]\nmass_kg = 0.05\nposition_m = [0, 0, 0.531]\n";
+
 /// A host that ends with this.
 struct Host {
     process: Child,
@@ -154,6 +159,38 @@ fn a_view_of_a_world_whose_time_stands_ends_and_says_so() {
     assert!(said.contains("the time of the world has stood at 0 s for 0."), "{said}");
     let report: serde_json::Value = serde_json::from_slice(&seen.stdout).unwrap();
     assert!(report["frames"].as_u64().unwrap() > 1, "{report}");
+}
+
+#[test]
+fn a_device_of_one_process_leads_an_object_of_another_and_feels_what_lies_on_it() {
+    let folder = tempfile::tempdir().unwrap();
+    let scene = folder.path().join("tray.toml");
+    std::fs::write(&scene, TRAY).unwrap();
+    let host = Host::of(&scene, &[]);
+    let tool = |leads: &str| {
+        let mut process = Process::new(cargo_bin("metachron"));
+        process.args(["tool", "--device", "simulated", "--leads", leads, "--connect", &host.endpoint]);
+        process.args(["--seconds", "3", "--json"]).output().unwrap()
+    };
+    let served = tool("tray");
+    let said = String::from_utf8_lossy(&served.stdout).into_owned();
+    assert!(served.status.success(), "{said} {}", String::from_utf8_lossy(&served.stderr));
+    let report: serde_json::Value = serde_json::from_str(said.lines().last().unwrap()).unwrap();
+    let number = |key: &str| report[key].as_f64().unwrap();
+    assert!(number("ticks") > 500.0 && number("failures") == 0.0, "{report}");
+    // the load weighs 0.49 N; a machine that is busy lets some of the force fade
+    assert!(number("force_mean_n") > 0.1 && number("energy_out_j") <= number("tank_j"), "{report}");
+    // the hand's spring of 150 N/m gives way to that
+    let world = host.connect();
+    let tray = world.latest(world.object("tray").unwrap()).unwrap();
+    assert!((-0.02..-1e-4).contains(&(tray.body.probe(0.0).unwrap().0.z - 0.5)), "{:?}", tray.body);
+    for (leads, what) in
+        [("none", "--leads: the world has no moving object"), ("load", "a device leads kinematic bodies and tools")]
+    {
+        let ended = tool(leads);
+        let said = String::from_utf8_lossy(&ended.stderr).into_owned();
+        assert!(ended.status.code() == Some(2) && said.contains(what), "{said}");
+    }
 }
 
 #[test]

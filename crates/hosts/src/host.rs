@@ -31,7 +31,7 @@ use zenoh::sample::SampleKind;
 use zenoh::{Session, Wait};
 
 /// States leave so often.
-const PERIOD: Duration = Duration::from_nanos(16_666_667);
+pub(crate) const PERIOD: Duration = Duration::from_nanos(16_666_667);
 /// The longest span that one call lets pass: other callers wait for it.
 const SPAN_MAX: SimSpan = SimSpan::from_secs(1);
 

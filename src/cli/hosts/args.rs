@@ -1,6 +1,7 @@
-//! The arguments of `host`, `view` and `identity`, and their help texts.
+//! The arguments of `host`, `view`, `tool` and `identity`, and their help texts.
 
 use crate::cli::args::OutputArgs;
+use crate::cli::devices::DeviceKind;
 use clap::{Args, Subcommand, ValueHint};
 use metachron_console::values::{LimitArgs, assignment, seconds, size, target_fps};
 use std::path::PathBuf;
@@ -65,12 +66,9 @@ Frames are drawn here, within a budget of their own. Pause, speed, springs and p
 pub struct ViewArgs {
     /// Where the world is served
     pub endpoint: String,
-    /// The certificate of this viewer, a file of `metachron identity new`, for tls/
-    #[arg(long, value_name = "FILE", value_hint = ValueHint::FilePath)]
-    pub identity: Option<PathBuf>,
-    /// Let tcp/ be beyond this machine: any process of the network may read and change what is said
-    #[arg(long, conflicts_with = "identity")]
-    pub insecure_lan: bool,
+    /// As whom it is called.
+    #[command(flatten)]
+    pub call: CallArgs,
     /// Open no window: pictures, films and files of what is seen
     #[arg(long)]
     pub headless: bool,
@@ -96,6 +94,51 @@ pub struct ViewArgs {
     /// The outputs: files and printed text.
     #[command(flatten)]
     pub output: OutputArgs,
+}
+
+/// How a world elsewhere is called.
+#[derive(Debug, Args)]
+pub struct CallArgs {
+    /// The certificate of this caller, a file of `metachron identity new`, for tls/
+    #[arg(long, value_name = "FILE", value_hint = ValueHint::FilePath)]
+    pub identity: Option<PathBuf>,
+    /// Let tcp/ be beyond this machine: any process of the network may read and change what is said
+    #[arg(long, conflicts_with = "identity")]
+    pub insecure_lan: bool,
+}
+
+pub const TOOL_EXAMPLES: &str = "\
+Examples:
+  metachron tool --device simulated --leads probe --connect tcp/127.0.0.1:7447
+  metachron tool --device simulated --leads probe --connect tls/bench:7447 --identity lab2.pem --seconds 10 --json
+
+The device is read here a thousand times a second; its object is led, and its contacts are solved, where the world runs.
+Between two messages of states the force follows the hand, and a tank bounds the energy that it is given.";
+
+/// `tool`.
+#[derive(Debug, Args)]
+pub struct ToolArgs {
+    /// The device: simulated, a hand that goes along the object's keyframes, or gamepad in builds with the feature `gamepad`
+    #[arg(long, value_name = "KIND", value_parser = crate::cli::devices::kind)]
+    pub device: DeviceKind,
+    /// The tool or kinematic body that it leads
+    #[arg(long, value_name = "OBJECT")]
+    pub leads: String,
+    /// Where the world is served
+    #[arg(long, value_name = "ENDPOINT")]
+    pub connect: String,
+    /// As whom it is called.
+    #[command(flatten)]
+    pub call: CallArgs,
+    /// End after this many seconds; at Ctrl-C where not given
+    #[arg(long, value_name = "S", value_parser = seconds)]
+    pub seconds: Option<f64>,
+    /// Print the device's report as JSON, a line a second
+    #[arg(long)]
+    pub json: bool,
+    /// How far the scene may go.
+    #[command(flatten)]
+    pub limits: LimitArgs,
 }
 
 pub const IDENTITY_EXAMPLES: &str = "\
