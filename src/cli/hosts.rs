@@ -5,23 +5,24 @@
 //! the rights of callers.
 
 pub mod args;
+mod common;
 mod tool;
 mod view;
 
 use super::run::stem;
-use anyhow::Context;
 use args::{HostArgs, IdentityCommand};
+use common::{INSECURE, LINE_EVERY, refused, stopped};
 use metachron_console::exit::Exit;
 use metachron_console::output::{BadInput, data, message, print_overlaps, warn_priority};
-use metachron_hosts::{Authority, Host, HostsError, Identity, Refusals, SceneFiles, Serving, serve};
+use metachron_hosts::{Authority, Host, Identity, Refusals, SceneFiles, Serving, serve};
 use metachron_runtime::{AgentHandle, TimelineCommand};
 use metachron_scene::{Source, load};
 use metachron_world::{SceneText, World};
 use serde::Serialize;
 use std::io::IsTerminal;
 use std::sync::Arc;
-use std::sync::mpsc::{Receiver, RecvTimeoutError, channel};
-use std::time::{Duration, Instant};
+use std::sync::mpsc::RecvTimeoutError;
+use std::time::Instant;
 pub(super) use tool::tool;
 pub(super) use view::view;
 
@@ -48,9 +49,6 @@ struct RefusedRow {
     strangers: u64,
     forbidden: u64,
 }
-
-/// Lines come so often.
-const LINE_EVERY: Duration = Duration::from_secs(1);
 
 /// Serves a scene until Ctrl-C.
 pub(super) fn host(args: &HostArgs) -> anyhow::Result<Exit> {
@@ -84,14 +82,6 @@ pub(super) fn host(args: &HostArgs) -> anyhow::Result<Exit> {
     drop(host);
     world.stop();
     Ok(Exit::Ok)
-}
-
-/// Told of Ctrl-C, of the first one alone.
-fn stopped() -> anyhow::Result<Receiver<()>> {
-    let (stop, stopped) = channel();
-    // no reader waits for a second Ctrl-C
-    ctrlc::set_handler(move || stop.send(()).unwrap_or(())).context("Ctrl-C cannot be caught")?;
-    Ok(stopped)
 }
 
 /// The sums at a moment of which lines tell the rates.
@@ -140,10 +130,6 @@ fn line(carried: &Carried, json: bool) -> anyhow::Result<String> {
     ))
 }
 
-/// Said where `--insecure-lan` opens a world, or a view of one, to the network.
-pub(super) const INSECURE: &str =
-    "--insecure-lan: any process of the network may read and command this world, and nothing is encrypted";
-
 /// In red on a terminal.
 fn red(text: &str, is_terminal: bool) -> String {
     if is_terminal { format!("\x1b[31m{text}\x1b[0m") } else { text.to_owned() }
@@ -178,19 +164,4 @@ pub(super) fn identity(command: &IdentityCommand) -> anyhow::Result<Exit> {
     let addresses: Vec<_> = std::iter::once(&args.name).chain(&args.address).map(String::as_str).collect();
     message(&format!("{file}: {} for {} days, reached as {}", args.name, args.days, addresses.join(", ")));
     Ok(Exit::Ok)
-}
-
-/// An endpoint or a name that cannot be is bad input; a network that fails is a failure.
-fn refused(error: HostsError) -> anyhow::Error {
-    match error {
-        HostsError::BadEndpoint { .. }
-        | HostsError::BadName { .. }
-        | HostsError::NeedsCertificates { .. }
-        | HostsError::IdentityOrNot { .. }
-        | HostsError::NoCallers
-        | HostsError::BadIdentity { .. }
-        | HostsError::BadAddress { .. }
-        | HostsError::LongScene { .. } => BadInput(error.to_string()).into(),
-        other => other.into(),
-    }
 }

@@ -3,8 +3,7 @@
 //! In: a device, an endpoint. Out: the device's report, second by second. Never here: the phases of a tick, steps.
 
 use super::args::ToolArgs;
-use super::view::{reached, scene_of};
-use super::{LINE_EVERY, refused, stopped};
+use super::common::{LINE_EVERY, reached, refused, scene_of, stopped};
 use crate::cli::devices::{self, DeviceWish};
 use anyhow::Context;
 use metachron_console::exit::Exit;

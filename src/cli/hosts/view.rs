@@ -2,17 +2,14 @@
 //!
 //! In: an endpoint. Out: the outputs of `run`, of the frames drawn here. Never here: steps, which are made where the world runs.
 
-use super::args::{CallArgs, ViewArgs};
-use super::{INSECURE, refused};
+use super::args::ViewArgs;
+use super::common::{INSECURE, SaidScene, reached, refused, scene_of};
 use crate::cli::play::{GoOn, headless, in_window};
 use crate::cli::run::{Request, RunLength, check_outputs, check_windowless, finish, stem, style};
 use metachron_console::exit::Exit;
-use metachron_console::output::BadInput;
-use metachron_console::values::LimitArgs;
-use metachron_hosts::{Calling, HostsError, Identity, RemoteWorld, connect};
-use metachron_scene::{Source, load};
+use metachron_hosts::RemoteWorld;
 use metachron_session::Session;
-use metachron_world::{Pace, Scene, WorldCalls};
+use metachron_world::Pace;
 use std::sync::Arc;
 
 /// Shows a world elsewhere until the window is closed.
@@ -33,44 +30,6 @@ pub(in super::super) fn view(args: &ViewArgs) -> anyhow::Result<Exit> {
         }
     };
     finish(&args.output, &play, &request.scene.name)
-}
-
-/// The world at an endpoint, to look at or to act on.
-pub(super) fn reached(endpoint: &str, call: &CallArgs, is_looking: bool) -> Result<RemoteWorld, HostsError> {
-    let identity = call.identity.as_ref().map(Identity::from_file).transpose()?;
-    let calling = identity.into_iter().fold(Calling::at(endpoint), Calling::identity);
-    let calling = if is_looking { calling.looking() } else { calling };
-    connect(if call.insecure_lan { calling.insecure_lan() } else { calling })
-}
-
-/// A scene as a host says it, with what it was read from.
-pub(super) struct SaidScene {
-    pub scene: Scene,
-    source: Source,
-    overrides: Vec<(String, String)>,
-}
-
-/// The scene that the host says, which is checked as a file is, and must be that of its world; another target frame rate where one is given.
-pub(super) fn scene_of(
-    endpoint: &str,
-    world: &RemoteWorld,
-    limits: &LimitArgs,
-    target_fps: Option<f64>,
-) -> anyhow::Result<SaidScene> {
-    let files = world.scene_files()?.ok_or_else(|| {
-        BadInput(format!("{endpoint}: the host does not say its scene, and its shapes are not known"))
-    })?;
-    let source = Source::recorded(&files.scene.name, &files.scene.text, None)?;
-    let source = source.with_files(files.files).within(limits.limits());
-    let of_target = target_fps.map(|hz| ("target.frame_hz".to_owned(), hz.to_string()));
-    let overrides: Vec<_> = files.scene.overrides.into_iter().chain(of_target).collect();
-    let scene = load(&source, &overrides)?;
-    let (here, there) = (scene.mark(), world.scene());
-    if here.hash != there.hash {
-        let why = format!("{endpoint}: the host says another scene than the one that its world is of");
-        return Err(BadInput(why).into());
-    }
-    Ok(SaidScene { scene, source, overrides })
 }
 
 /// The request to draw the scene that the host says.
