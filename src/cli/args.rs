@@ -3,7 +3,9 @@
 use super::devices::DeviceWish;
 use super::exports::ExportPaths;
 #[cfg(feature = "hosts")]
-use super::hosts::args::{HOST_EXAMPLES, HostArgs, IDENTITY_EXAMPLES, IdentityCommand, VIEW_EXAMPLES, ViewArgs};
+use super::hosts::args::{
+    HOST_EXAMPLES, HostArgs, IDENTITY_EXAMPLES, IdentityCommand, TOOL_EXAMPLES, ToolArgs, VIEW_EXAMPLES, ViewArgs,
+};
 use clap::builder::PossibleValuesParser;
 use clap::{Args, Parser, Subcommand, ValueHint};
 use metachron_console::values::{CommonArgs, LimitArgs, assignment, seconds, size, target_fps};
@@ -110,6 +112,10 @@ pub enum Command {
     #[cfg(feature = "hosts")]
     #[command(after_help = VIEW_EXAMPLES)]
     View(Box<ViewArgs>),
+    /// Lead an object of a world that another process serves by a device here, and feel what it touches
+    #[cfg(feature = "hosts")]
+    #[command(after_help = TOOL_EXAMPLES)]
+    Tool(Box<ToolArgs>),
     /// Make certificates by which hosts and callers know each other
     #[cfg(feature = "hosts")]
     #[command(subcommand, after_help = IDENTITY_EXAMPLES)]

@@ -1,6 +1,6 @@
-//! `--device`: devices that lead objects of a run.
+//! Devices of the command: those of `run --device`, which lead objects of a session, and of `tool`, which lead one elsewhere.
 //!
-//! In: the devices to serve, a session. Out: threads that serve, their reports. Never here: the phases of a tick.
+//! In: the devices to serve, a scene, a session. Out: devices, threads that serve them, their reports. Never here: the phases of a tick.
 
 use anyhow::Context;
 use metachron_console::output::BadInput;
@@ -39,15 +39,19 @@ const STICK_M_S: f64 = 0.1;
 
 /// Reads `KIND=OBJECT`.
 pub(super) fn wish(text: &str) -> Result<DeviceWish, String> {
-    let expected = if cfg!(feature = "gamepad") { "simulated or gamepad" } else { "simulated" };
     let (kind, object) = text.split_once('=').ok_or("expected KIND=OBJECT, such as simulated=probe")?;
-    let kind = match kind {
-        "simulated" => DeviceKind::Simulated,
+    Ok(DeviceWish { kind: self::kind(kind)?, object: object.to_owned() })
+}
+
+/// Reads a kind.
+pub(super) fn kind(text: &str) -> Result<DeviceKind, String> {
+    let expected = if cfg!(feature = "gamepad") { "simulated or gamepad" } else { "simulated" };
+    match text {
+        "simulated" => Ok(DeviceKind::Simulated),
         #[cfg(feature = "gamepad")]
-        "gamepad" => DeviceKind::Gamepad,
-        _ => return Err(format!("there is no device `{kind}` here; expected {expected}")),
-    };
-    Ok(DeviceWish { kind, object: object.to_owned() })
+        "gamepad" => Ok(DeviceKind::Gamepad),
+        _ => Err(format!("there is no device `{text}` here; expected {expected}")),
+    }
 }
 
 /// Refuses an object that two devices are to lead: the two would take turns at where it is led, and each hand would feel the other as a contact.
@@ -74,8 +78,18 @@ pub(super) fn serve(session: &Session, scene: &Scene, wishes: &[DeviceWish]) -> 
 }
 
 fn serve_one(session: &Session, scene: &Scene, wish: &DeviceWish) -> anyhow::Result<Served> {
-    let DeviceWish { kind, object } = wish;
     let refused = |error: WorldError| BadInput(format!("--device: {error}"));
+    let device = open(scene, wish)?;
+    let device_loop =
+        DeviceLoop::new(session.world(), &wish.object, device, LoopOptions::default()).map_err(refused)?;
+    Served::start(device_loop).context("a device has no thread")
+}
+
+/// The device of a wish; a simulated one is led as the scene leads its object.
+///
+/// # Errors
+/// Where it cannot be opened.
+pub(super) fn open(scene: &Scene, DeviceWish { kind, object }: &DeviceWish) -> anyhow::Result<Box<dyn Device>> {
     let member = scene.agents.iter().find(|member| member.name == *object);
     let (path, most_n) = match member.map(|member| &member.spec) {
         Some(Spec::Tool(tool)) => (HandPath::along(&tool.keyframes, tool.repeat), tool.max_force_n),
@@ -86,7 +100,7 @@ fn serve_one(session: &Session, scene: &Scene, wish: &DeviceWish) -> anyhow::Res
         _ => (None, MOST_N),
     };
     let path = path.unwrap_or_else(|| HandPath::still(Default::default(), Default::default()));
-    let device: Box<dyn Device> = match kind {
+    Ok(match kind {
         DeviceKind::Simulated => {
             let link = Link { delay_s: LINK_S, ..Link::default() };
             Box::new(SimulatedDevice::new(Hand::default(), path, link, most_n))
@@ -96,9 +110,7 @@ fn serve_one(session: &Session, scene: &Scene, wish: &DeviceWish) -> anyhow::Res
             let (position_m, rotation) = path.at(0.0);
             Box::new(Gamepad::new(position_m, rotation, STICK_M_S)?)
         }
-    };
-    let device_loop = DeviceLoop::new(session.world(), object, device, LoopOptions::default()).map_err(refused)?;
-    Served::start(device_loop).context("a device has no thread")
+    })
 }
 
 /// Ends them.

@@ -1,26 +1,29 @@
-//! `host`, `view` and `identity`: a world that is served to other processes, a window on one that another process serves, and certificates for
-//! both.
+//! `host`, `view`, `tool` and `identity`: a world that is served to other processes, a window on one that another process serves, a device that
+//! leads an object of it, and certificates for all.
 //!
 //! In: arguments. Out: a served world and what it carries, second by second; the outputs of `run` of a world elsewhere. Never here: messages,
-//! who is let in.
+//! the rights of callers.
 
 pub mod args;
+mod common;
+mod tool;
 mod view;
 
 use super::run::stem;
-use anyhow::Context;
 use args::{HostArgs, IdentityCommand};
+use common::{INSECURE, LINE_EVERY, refused, stopped};
 use metachron_console::exit::Exit;
 use metachron_console::output::{BadInput, data, message, print_overlaps, warn_priority};
-use metachron_hosts::{Authority, Host, HostsError, Identity, Refusals, SceneFiles, Serving, serve};
+use metachron_hosts::{Authority, Host, Identity, Refusals, SceneFiles, Serving, serve};
 use metachron_runtime::{AgentHandle, TimelineCommand};
 use metachron_scene::{Source, load};
 use metachron_world::{SceneText, World};
 use serde::Serialize;
 use std::io::IsTerminal;
 use std::sync::Arc;
-use std::sync::mpsc::{RecvTimeoutError, channel};
-use std::time::{Duration, Instant};
+use std::sync::mpsc::RecvTimeoutError;
+use std::time::Instant;
+pub(super) use tool::tool;
 pub(super) use view::view;
 
 /// A line of a host.
@@ -34,7 +37,7 @@ struct Carried {
     /// Bytes a second that each caller was sent since the last line.
     sent_bytes_s: f64,
     refused: RefusedRow,
-    /// Whether anybody on the network may read and command the world.
+    /// Whether any process of the network may read and command the world.
     insecure_lan: bool,
 }
 
@@ -46,9 +49,6 @@ struct RefusedRow {
     strangers: u64,
     forbidden: u64,
 }
-
-/// Lines come so often.
-const LINE_EVERY: Duration = Duration::from_secs(1);
 
 /// Serves a scene until Ctrl-C.
 pub(super) fn host(args: &HostArgs) -> anyhow::Result<Exit> {
@@ -66,9 +66,7 @@ pub(super) fn host(args: &HostArgs) -> anyhow::Result<Exit> {
     let identity = args.identity.as_ref().map(Identity::from_file).transpose().map_err(refused)?;
     let serving = identity.into_iter().fold(serving, Serving::identity);
     let host = serve(Arc::new(world.clone()), serving).map_err(refused)?;
-    let (stop, stopped) = channel();
-    // no reader waits for a second Ctrl-C
-    ctrlc::set_handler(move || stop.send(()).unwrap_or(())).context("Ctrl-C cannot be caught")?;
+    let stopped = stopped()?;
     message(&format!("`{}` serves {} at {}, until Ctrl-C", args.name, scene.name, args.listen));
     if host.is_open() {
         message(&red(INSECURE, std::io::stderr().is_terminal()));
@@ -132,10 +130,6 @@ fn line(carried: &Carried, json: bool) -> anyhow::Result<String> {
     ))
 }
 
-/// Said where `--insecure-lan` opens a world, or a view of one, to the network.
-pub(super) const INSECURE: &str =
-    "--insecure-lan: anybody on the network may read and command this world, and nothing is encrypted";
-
 /// In red on a terminal.
 fn red(text: &str, is_terminal: bool) -> String {
     if is_terminal { format!("\x1b[31m{text}\x1b[0m") } else { text.to_owned() }
@@ -149,37 +143,25 @@ fn of_peer(peer: &str, refused: Refusals) -> String {
     )
 }
 
-/// Makes a certificate, and the authority that issues it where there is none.
+/// Makes a certificate, and the authority that issues it where one is wanted.
 pub(super) fn identity(command: &IdentityCommand) -> anyhow::Result<Exit> {
     let IdentityCommand::New(args) = command;
     let file = format!("{}.pem", args.name);
-    let authority = if args.authority.exists() {
-        Authority::from_file(&args.authority).map_err(refused)?
-    } else {
-        let authority = Authority::new(&stem(&args.authority.to_string_lossy())).map_err(refused)?;
-        authority.write(&args.authority).map_err(refused)?;
-        message(&format!("{}: a new authority; who has this file can pose as anybody", args.authority.display()));
-        authority
-    };
-    authority
-        .issue(&args.name, &args.address, args.days)
-        .and_then(|identity| identity.write(&file))
-        .map_err(refused)?;
+    let of = &args.authority;
+    if !args.new_authority && !of.exists() {
+        let why = format!("{}: no authority is there; expected its file, or --new-authority to make one", of.display());
+        return Err(BadInput(why).into());
+    }
+    let authority =
+        if args.new_authority { Authority::new(&stem(&of.to_string_lossy())) } else { Authority::from_file(of) };
+    let authority = authority.map_err(refused)?;
+    let identity = authority.issue(&args.name, &args.address, args.days).map_err(refused)?;
+    if args.new_authority {
+        authority.write(of).map_err(refused)?;
+        message(&format!("{}: a new authority; its holder can issue every name", of.display()));
+    }
+    identity.write(&file).map_err(refused)?;
     let addresses: Vec<_> = std::iter::once(&args.name).chain(&args.address).map(String::as_str).collect();
     message(&format!("{file}: {} for {} days, reached as {}", args.name, args.days, addresses.join(", ")));
     Ok(Exit::Ok)
-}
-
-/// An endpoint or a name that cannot be is bad input; a network that fails is a failure.
-fn refused(error: HostsError) -> anyhow::Error {
-    match error {
-        HostsError::BadEndpoint { .. }
-        | HostsError::BadName { .. }
-        | HostsError::NeedsCertificates { .. }
-        | HostsError::IdentityOrNot { .. }
-        | HostsError::NobodyNamed
-        | HostsError::BadIdentity { .. }
-        | HostsError::LongScene { .. } => BadInput(error.to_string()).into(),
-        other => other.into(),
-    }
 }

@@ -60,6 +60,8 @@ fn dispatch(cli: Cli, matches: &clap::ArgMatches) -> anyhow::Result<Exit> {
         #[cfg(feature = "hosts")]
         Command::View(args) => hosts::view(&args),
         #[cfg(feature = "hosts")]
+        Command::Tool(args) => hosts::tool(&args),
+        #[cfg(feature = "hosts")]
         Command::Identity(command) => hosts::identity(&command),
         Command::Check(args) => check::command(&args),
         #[cfg(feature = "lab")]

@@ -16,6 +16,11 @@ const SCENE: &str = "format = 1\nexecutor = 'threads'\n[target]\nframe_hz = 50.0
     [[object]]\nname = 'floor'\nmodel = 'rigid'\nshape = 'plane'\n";
 const WEDGE: &str = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 2 3 4\nf 1 4 3\n";
 
+/// A tray in a hand with a load of 50 g on it.
+const TRAY: &str = "format = 1\nexecutor = 'threads'\n\
+    [[object]]\nname = 'tray'\nmodel = 'rigid'\nshape = 'box'\nhalf_extents_m = [0.1, 0.1, 0.01]\nkinematic = true\nposition_m = [0, 0, 0.5]\n\
+    [[object]]\nname = 'load'\nmodel = 'rigid'\nshape = 'box'\nhalf_extents_m = [0.02, 0.02, 0.02]\nmass_kg = 0.05\nposition_m = [0, 0, 0.531]\n";
+
 /// A host that ends with this.
 struct Host {
     process: Child,
@@ -116,27 +121,32 @@ fn a_host_whose_time_stands_lets_callers_drive_it_and_ends_with_its_signal() {
 #[test]
 fn certificates_that_the_command_makes_let_a_viewer_in_and_an_open_world_says_so() {
     let folder = folder();
-    let issue = |name: &str| {
+    let issue = |name: &str, more: &[&str]| {
         let new = ["identity", "new", name, "--authority", "lab.pem", "--address", "127.0.0.1"];
-        Process::new(cargo_bin("metachron")).args(new).current_dir(&folder).output().unwrap()
+        Process::new(cargo_bin("metachron")).args(new).args(more).current_dir(&folder).output().unwrap()
     };
-    for name in ["bench", "screen", "nobody"] {
-        assert!(issue(name).status.success());
+    let mistyped = issue("bench", &[]);
+    assert!(String::from_utf8_lossy(&mistyped.stderr).contains("lab.pem: no authority is there"), "{mistyped:?}");
+    assert!(issue("bench", &["--new-authority"]).status.success());
+    for name in ["screen", "unnamed"] {
+        assert!(issue(name, &[]).status.success());
     }
-    assert_eq!(issue("bench").status.code(), Some(2), "a file that is there stays");
+    assert_eq!(issue("bench", &[]).status.code(), Some(2), "a file that is there stays");
+    assert_eq!(issue("other", &["--new-authority"]).status.code(), Some(2), "and so does an authority");
+    assert_eq!(issue("other", &["--address", "10.0.0.256"]).status.code(), Some(2));
     let pem = |name: &str| folder.path().join(name).to_string_lossy().into_owned();
-    let (bench, screen, nobody) = (pem("bench.pem"), pem("screen.pem"), pem("nobody.pem"));
+    let (bench, screen, unnamed) = (pem("bench.pem"), pem("screen.pem"), pem("unnamed.pem"));
     let scene = folder.path().join("scene.toml");
     let host = Host::at("tls/127.0.0.1", &scene, &["--identity", &bench, "--viewers", "screen"]);
     let view = |identity: &str| host.view(&["--identity", identity, "--frames", "3", "--report", "-", "-q"]);
     assert!(view(&screen).status.success());
-    assert_eq!(view(&nobody).status.code(), Some(1));
+    assert_eq!(view(&unnamed).status.code(), Some(1));
     drop(host);
     let mut open = Host::at("tcp/0.0.0.0", &scene, &["--insecure-lan"]);
     assert_eq!(open.line()["insecure_lan"], true);
     let seen = open.view(&["--insecure-lan", "--frames", "3", "--report", "-", "-q"]);
     let report: serde_json::Value = serde_json::from_slice(&seen.stdout).unwrap();
-    assert!(report["notes"][0].as_str().unwrap().contains("anybody on the network"), "{report}");
+    assert!(report["notes"][0].as_str().unwrap().contains("any process of the network"), "{report}");
 }
 
 #[test]
@@ -149,6 +159,38 @@ fn a_view_of_a_world_whose_time_stands_ends_and_says_so() {
     assert!(said.contains("the time of the world has stood at 0 s for 0."), "{said}");
     let report: serde_json::Value = serde_json::from_slice(&seen.stdout).unwrap();
     assert!(report["frames"].as_u64().unwrap() > 1, "{report}");
+}
+
+#[test]
+fn a_device_of_one_process_leads_an_object_of_another_and_feels_what_lies_on_it() {
+    let folder = tempfile::tempdir().unwrap();
+    let scene = folder.path().join("tray.toml");
+    std::fs::write(&scene, TRAY).unwrap();
+    let host = Host::of(&scene, &[]);
+    let tool = |leads: &str| {
+        let mut process = Process::new(cargo_bin("metachron"));
+        process.args(["tool", "--device", "simulated", "--leads", leads, "--connect", &host.endpoint]);
+        process.args(["--seconds", "3", "--json"]).output().unwrap()
+    };
+    let served = tool("tray");
+    let said = String::from_utf8_lossy(&served.stdout).into_owned();
+    assert!(served.status.success(), "{said} {}", String::from_utf8_lossy(&served.stderr));
+    let report: serde_json::Value = serde_json::from_str(said.lines().last().unwrap()).unwrap();
+    let number = |key: &str| report[key].as_f64().unwrap();
+    assert!(number("ticks") > 500.0 && number("failures") == 0.0, "{report}");
+    // the load weighs 0.49 N; a machine that is busy lets some of the force fade
+    assert!(number("force_mean_n") > 0.1 && number("energy_out_j") <= number("tank_j"), "{report}");
+    // the hand's spring of 150 N/m gives way to that
+    let world = host.connect();
+    let tray = world.latest(world.object("tray").unwrap()).unwrap();
+    assert!((-0.02..-1e-4).contains(&(tray.body.probe(0.0).unwrap().0.z - 0.5)), "{:?}", tray.body);
+    for (leads, what) in
+        [("none", "--leads: the world has no moving object"), ("load", "a device leads kinematic bodies and tools")]
+    {
+        let ended = tool(leads);
+        let said = String::from_utf8_lossy(&ended.stderr).into_owned();
+        assert!(ended.status.code() == Some(2) && said.contains(what), "{said}");
+    }
 }
 
 #[test]

@@ -259,8 +259,8 @@ fn another_scene_is_refused_in_one_sentence() {
     let other = Scene::builder().add("box", Rigid::ball(0.1)).build().unwrap();
     let refused = connect(Calling::at(&endpoint).scene(other.mark())).unwrap_err();
     assert!(matches!(refused, HostsError::OtherScene { .. }), "{refused}");
-    let nobody = connect(&free_endpoint()).unwrap_err();
-    assert!(matches!(nobody, HostsError::Network { .. } | HostsError::NoWorld { .. }), "{nobody}");
+    let absent = connect(&free_endpoint()).unwrap_err();
+    assert!(matches!(absent, HostsError::Network { .. } | HostsError::NoWorld { .. }), "{absent}");
     assert!(matches!(connect("tcp/10.0.0.1:7447"), Err(HostsError::NeedsCertificates { .. })));
 }
 

@@ -75,6 +75,13 @@ impl ContactModel {
         }
     }
 
+    /// Lets contacts answer a way that was gone within `within_s` seconds, where that is more than the step of the state (eq. 7v): what stiffness is
+    /// of mass grows with the square of the step's inverse.
+    pub fn answer_within(&mut self, within_s: f64) {
+        let share = (self.step_s / within_s).min(1.0).powi(2);
+        self.contacts.iter_mut().for_each(|contact| contact.stiffness_n_m *= share);
+    }
+
     /// Its rotation in the state.
     #[must_use]
     pub const fn rotation(&self) -> DQuat {

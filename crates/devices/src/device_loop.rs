@@ -17,7 +17,8 @@ use glam::DVec3;
 use metachron_contact::{AnchorSpring, Input};
 use metachron_core::{Anchor, Body, SimSpan, SimTime, Wrench};
 use metachron_runtime::Keyed;
-use metachron_world::{Command, Object, World, WorldError};
+use metachron_world::{Command, Object, StateLink, World, WorldCalls, WorldError};
+use std::sync::Arc;
 use std::time::Duration;
 
 /// Up to an age of so many of its steps a state's force is whole: the next one was due by then.
@@ -46,6 +47,7 @@ impl Default for LoopOptions {
 pub struct DeviceLoop {
     world: World,
     object: Object,
+    elsewhere: Option<Elsewhere>,
     device: Box<dyn Device>,
     is_tool: bool,
     period_s: f64,
@@ -58,6 +60,12 @@ pub struct DeviceLoop {
     late_ms: Histogram,
     age_steps: Histogram,
     force_sum_n: f64,
+}
+
+/// The object where its steps are made.
+struct Elsewhere {
+    calls: Arc<dyn WorldCalls>,
+    object: Object,
 }
 
 impl std::fmt::Debug for DeviceLoop {
@@ -96,6 +104,7 @@ impl DeviceLoop {
         Ok(Self {
             world: world.clone(),
             object,
+            elsewhere: None,
             device,
             is_tool,
             period_s: rate_hz.recip(),
@@ -108,6 +117,17 @@ impl DeviceLoop {
             age_steps: Histogram::new(0.005),
             force_sum_n: 0.0,
         })
+    }
+
+    /// Leads the object where it runs, in a world of which the loop's own shows the newest states ([`GhostWorld`]).
+    ///
+    /// # Errors
+    /// [`WorldError::NoObject`].
+    ///
+    /// [`GhostWorld`]: metachron_world::GhostWorld
+    pub fn elsewhere(self, calls: Arc<dyn WorldCalls>) -> Result<Self, WorldError> {
+        let object = calls.object(&self.report.object)?;
+        Ok(Self { elsewhere: Some(Elsewhere { calls, object }), ..self })
     }
 
     /// The time from a tick to the next.
@@ -175,22 +195,33 @@ impl DeviceLoop {
         } else {
             Command::pose(position_m, rotation).moving(velocity_m_s, spin_rad_s)
         };
-        self.world.command(self.object, command.expires_after(LEADS))
+        let command = command.expires_after(LEADS);
+        match &self.elsewhere {
+            Some(Elsewhere { calls, object }) => calls.post(*object, command),
+            None => self.world.command(self.object, command),
+        }
     }
 
     /// The wrench on the object where the handle is, by the newest state; it fades where no other state comes.
     fn feel(&mut self, state: &DeviceState) -> Result<Wrench, WorldError> {
         let now = self.world.time();
+        // a link's states are due with its messages, also those of what rests, and answer what was commanded a round trip ago
+        let link = self.elsewhere.as_ref().and_then(|there| there.calls.link());
+        let seconds = |of: fn(&StateLink) -> Duration| link.as_ref().map_or(0.0, |link| of(link).as_secs_f64());
+        let (silent_s, period_s) = (seconds(|link| link.age), seconds(|link| link.period));
         if self.model.refresh(&self.world, self.object)? {
             self.received_at = now;
+            self.model.answer_within(period_s + seconds(|link| link.round_trip));
         }
         // where a machine is loaded an object's clock is behind the scene's, and its state answers the newest pose all the same: the age is by arrival
-        let age_s = now.secs_after(self.received_at).max(0.0);
-        // before the first step nothing has been felt, and a resting object is as it was
-        let age_steps = if self.model.step_s > 0.0 && !self.model.at_rest { age_s / self.model.step_s } else { 0.0 };
+        let age_s = if self.model.at_rest { 0.0 } else { now.secs_after(self.received_at).max(0.0) };
+        // where a link is silent the scene's time stands
+        let due_s = self.model.step_s.max(period_s);
+        // before the first step nothing has been felt
+        let age_steps = if self.model.step_s > 0.0 { age_s.max(silent_s) / due_s } else { 0.0 };
         self.age_steps.record(age_steps);
         self.report.stale += u64::from(age_steps > WHOLE_STEPS);
-        let late_s = (age_steps - WHOLE_STEPS).max(0.0) * self.model.step_s;
+        let late_s = (age_steps - WHOLE_STEPS).max(0.0) * due_s;
         let share = (1.0 - late_s / LEADS.as_secs_f64()).max(0.0);
         let rotation = if self.is_tool { self.model.rotation() } else { state.rotation };
         Ok(self.model.wrench(state.position_m, rotation) * share)

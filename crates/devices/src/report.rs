@@ -16,7 +16,8 @@ pub struct DeviceReport {
     pub realtime: bool,
     /// By how much ticks were late, milliseconds.
     pub late_ms: Quantiles,
-    /// How long ago the newest state came, when the force followed from it, in steps of that state: the force is whole up to two.
+    /// How long ago the newest state came, when the force followed from it, in steps of that state, or messages of a link where they are longer: the force is
+    /// whole up to two.
     pub age_steps: Quantiles,
     /// Ticks with less force or none, because the newest state came more than two of its steps ago: the force fades within 0.1 s.
     pub stale: u64,

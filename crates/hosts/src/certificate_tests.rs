@@ -1,6 +1,7 @@
-//! Certificates: who has a good one and is named gets in, in its role and under its own name; nobody else does.
+//! Certificates: a caller with a good one that the host names gets in, in its role and under its own name; no other does.
 
 use crate::endpoint::{Place, Side, open};
+use crate::gate::SESSIONS_MAX;
 use crate::hostile_tests::{hello, scene};
 use crate::wire::{Call, PROGRAM, Request, encode};
 use crate::{Authority, Calling, Host, HostsError, Identity, RemoteWorld, Serving, connect, serve};
@@ -58,7 +59,7 @@ fn foreign_expired_and_unnamed_certificates_and_none_are_let_in_nowhere() {
     for stranger in [
         foreign.issue("op", &[], 1).unwrap(),
         authority.issue("op", &[], -2).unwrap(),
-        authority.issue("nobody", &[], 1).unwrap(),
+        authority.issue("unnamed", &[], 1).unwrap(),
     ] {
         let refused = called(&endpoint, stranger).unwrap_err();
         assert!(matches!(refused, HostsError::Network { .. } | HostsError::NoWorld { .. }), "{refused}");
@@ -69,8 +70,8 @@ fn foreign_expired_and_unnamed_certificates_and_none_are_let_in_nowhere() {
     let serving = |at: &str| Serving::new("bench", at);
     let without = serve(Arc::new(world.clone()), serving("tcp/127.0.0.1:0").viewers(["eye"]));
     assert!(matches!(without, Err(HostsError::IdentityOrNot { .. })), "names without certificates");
-    let nobody = serving("tls/127.0.0.1:0").identity(authority.issue("bench", &[], 1).unwrap());
-    assert!(matches!(serve(Arc::new(world.clone()), nobody), Err(HostsError::NobodyNamed)));
+    let unnamed = serving("tls/127.0.0.1:0").identity(authority.issue("bench", &[], 1).unwrap());
+    assert!(matches!(serve(Arc::new(world.clone()), unnamed), Err(HostsError::NoCallers)));
     assert_eq!((host.callers(), host.refused().total(), world.time().as_nanos()), (0, 0, 0));
     called(&endpoint, authority.issue("op", &[], 1).unwrap()).unwrap();
 }
@@ -83,7 +84,21 @@ fn a_host_whose_certificate_names_another_address_is_not_believed() {
 }
 
 #[test]
-fn a_call_under_the_name_of_another_certificate_reaches_nobody() {
+fn viewers_that_take_every_place_keep_no_operator_out() {
+    let (_world, host, endpoint, authority) = served(&here());
+    let eye = authority.issue("eye", &[], 1).unwrap();
+    let spy = open(Place { endpoint: &endpoint, identity: Some(&eye), insecure_lan: false }, Side::Caller).unwrap();
+    let lives = (0..2 * SESSIONS_MAX).map(|session| format!("metachron/caller/eye/{session}"));
+    let _lives: Vec<_> = lives.map(|life| spy.liveliness().declare_token(life).wait().unwrap()).collect();
+    let full = called(&endpoint, eye).unwrap_err().to_string();
+    assert!(full.contains("32 callers of \"eye\" already"), "{full}");
+    let op = called(&endpoint, authority.issue("op", &[], 1).unwrap()).unwrap();
+    op.advance(SimSpan::from_millis(20)).unwrap();
+    assert_eq!(host.callers(), 1);
+}
+
+#[test]
+fn a_call_under_the_name_of_another_certificate_reaches_no_other() {
     let (world, host, endpoint, authority) = served(&here());
     let op = called(&endpoint, authority.issue("op", &[], 1).unwrap()).unwrap();
     let eye = authority.issue("eye", &[], 1).unwrap();
@@ -94,6 +109,7 @@ fn a_call_under_the_name_of_another_certificate_reaches_nobody() {
         let get = spy.get(key).payload(bytes).timeout(Duration::from_secs(2)).wait().unwrap();
         get.into_iter().filter(|answer| answer.result().is_ok()).count()
     };
+    let _life = spy.liveliness().declare_token("metachron/caller/eye/1").wait().unwrap();
     assert_eq!(answers("metachron/bench/call/eye/1", hello(PROGRAM)), 1);
     for spoofed in
         ["metachron/bench/call/op/1", "metachron/bench/call/*/1", "metachron/**", "metachron/bench/call/eye/x/1"]
@@ -102,7 +118,7 @@ fn a_call_under_the_name_of_another_certificate_reaches_nobody() {
     }
     // a state, and another caller's or the host's end of life
     spy.put("metachron/bench/state", vec![1, 2, 3]).wait().unwrap();
-    for sign in ["metachron/bench/caller/op/1", "metachron/bench/host"] {
+    for sign in ["metachron/caller/op/1", "metachron/bench/host"] {
         spy.liveliness().declare_token(sign).wait().unwrap().undeclare().wait().unwrap();
     }
     op.advance(SimSpan::from_millis(20)).unwrap();
@@ -110,7 +126,7 @@ fn a_call_under_the_name_of_another_certificate_reaches_nobody() {
 }
 
 #[test]
-fn an_identity_is_read_back_from_its_file_which_nobody_else_may_read() {
+fn an_identity_is_read_back_from_its_file_which_no_other_user_may_read() {
     let folder = tempfile::tempdir().unwrap();
     let [file, of_authority] = ["bench.pem", "lab.pem"].map(|name| folder.path().join(name));
     let authority = Authority::new("lab").unwrap();
@@ -133,6 +149,15 @@ fn an_identity_is_read_back_from_its_file_which_nobody_else_may_read() {
         authority.issue("a", &["ä".to_owned()], 1).map(drop),
     ];
     bad.into_iter().for_each(|bad| assert!(bad.is_err()));
+    for address in ["", "10.0.0.256", "10.0.0.5:7447", "a b", "lab..example", "-lab", "tls/bench", "[::1]"] {
+        let bad = authority.issue("a", &[address.to_owned()], 1).unwrap_err();
+        assert!(matches!(bad, HostsError::BadAddress { .. }), "{bad}");
+    }
+    let good = ["10.0.0.5", "::1", "lab_2", "bench.lab.example", "2.lab"].map(str::to_owned);
+    assert!(authority.issue("a", &good, 1).is_ok());
+    for days in [i64::MAX, i64::MIN, 3_000_000, -5_000_000] {
+        assert!(authority.issue("a", &[], days).unwrap_err().to_string().contains("days from now"), "{days}");
+    }
     let over = folder.path().join("over.pem");
     authority.issue("bench", &[], -2).unwrap().write(&over).unwrap();
     assert!(Identity::from_file(&over).unwrap_err().to_string().contains("ended on"));

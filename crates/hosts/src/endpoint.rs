@@ -13,11 +13,13 @@ use zenoh::{Config, Session, Wait};
 
 /// An end that sends nothing for so long is silent.
 pub(crate) const LEASE: Duration = Duration::from_secs(1);
+/// The most links of a host: more than there are places, so that links of callers without one keep no other out.
+const LINKS_MAX: usize = 4 * SESSIONS_MAX;
 
 /// The side of a session.
 #[derive(Clone, Copy)]
 pub(crate) enum Side<'a> {
-    /// With the names of those who may call.
+    /// With the names of its callers.
     Host(&'a [&'a str]),
     Caller,
 }
@@ -30,7 +32,7 @@ pub(crate) struct Place<'a> {
     pub insecure_lan: bool,
 }
 
-/// Opens a session that listens on the endpoint, or is connected to it, and finds nobody by itself.
+/// Opens a session that listens on the endpoint, or is connected to it, and finds no other by itself.
 ///
 /// # Errors
 /// [`HostsError::BadEndpoint`], [`HostsError::NeedsCertificates`], [`HostsError::IdentityOrNot`] and [`HostsError::Network`].
@@ -47,7 +49,7 @@ pub(crate) fn open(place: Place<'_>, side: Side<'_>) -> Result<Session, HostsErr
         (key, format!("[\"{endpoint}\"]")),
         ("scouting/multicast/enabled", "false".to_owned()),
         ("scouting/gossip/enabled", "false".to_owned()),
-        ("transport/unicast/max_sessions", SESSIONS_MAX.to_string()),
+        ("transport/unicast/max_sessions", LINKS_MAX.to_string()),
         ("transport/link/tx/lease", LEASE.as_millis().to_string()),
         ("access_control", rights),
         ("transport/link/rx/max_message_size", (MESSAGE_MAX + OVERHEAD).to_string()),
@@ -84,7 +86,7 @@ fn tls(identity: &Identity, side: Side<'_>) -> Vec<(&'static str, String)> {
 }
 
 /// The rights of callers: they ask and live under their own names, and listen. A state, an answer or a host's sign of life from one of them
-/// reaches nobody, and neither does a call under the name of another certificate.
+/// reaches no other process, and neither does a call under the name of another certificate.
 fn rights(callers: &[&str], is_certified: bool) -> String {
     let (mut rules, mut subjects, mut policies) = (RULES.to_owned(), String::new(), String::new());
     for name in callers {
@@ -93,7 +95,7 @@ fn rights(callers: &[&str], is_certified: bool) -> String {
         let _ = write!(
             rules,
             r#"{{ id: "asks {name}", messages: ["query"], flows: ["ingress"], permission: "allow", key_exprs: ["metachron/*/call/{name}/*"] }},
-            {{ id: "lives {name}", messages: ["liveliness_token"], flows: ["ingress"], permission: "allow", key_exprs: ["metachron/*/caller/{name}/*"] }},"#
+            {{ id: "lives {name}", messages: ["liveliness_token"], flows: ["ingress"], permission: "allow", key_exprs: ["metachron/caller/{name}/*"] }},"#
         );
         let _ = write!(subjects, r#"{{ id: "{name}"{certificate} }},"#);
         let _ = write!(
@@ -116,7 +118,7 @@ const RULES: &str = r#"
 /// Bytes of keys and heads around a message.
 const OVERHEAD: usize = 4096;
 
-/// Whether the endpoint is one, and who could listen there is known or meant.
+/// Whether the endpoint is one, and the processes that could listen there are known or meant.
 fn check(Place { endpoint, identity, insecure_lan }: Place<'_>) -> Result<(), HostsError> {
     let bad = || HostsError::BadEndpoint { endpoint: endpoint.to_owned() };
     let (protocol, address) = endpoint.split_once('/').ok_or_else(bad)?;
@@ -147,7 +149,7 @@ fn is_loopback(host: &str) -> bool {
     host == "localhost" || host.parse::<IpAddr>().is_ok_and(|address| address.is_loopback())
 }
 
-/// Whether anybody on a network may listen at an endpoint that was opened.
+/// Whether any process of a network may listen at an endpoint that was opened.
 pub(crate) fn is_open_to_all(endpoint: &str) -> bool {
     let host = endpoint.strip_prefix("tcp/").and_then(|address| address.rsplit_once(':'));
     host.is_some_and(|(host, _)| !is_loopback(host))

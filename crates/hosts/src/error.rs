@@ -12,9 +12,9 @@ pub enum HostsError {
         /// As given.
         endpoint: String,
     },
-    /// The endpoint is not on this machine, and anybody could listen.
+    /// The endpoint is not on this machine, and any process of the network could listen.
     #[error(
-        "\"{endpoint}\" is beyond this machine, where anybody could read and command the world: expected tls/ with an identity, or --insecure-lan"
+        "\"{endpoint}\" is beyond this machine, where any process of the network could read and command the world: expected tls/ with an identity, or --insecure-lan"
     )]
     NeedsCertificates {
         /// As given.
@@ -28,9 +28,9 @@ pub enum HostsError {
         /// What is missing.
         has: &'static str,
     },
-    /// With certificates nobody is let in who is not named.
-    #[error("nobody may call the world: with an identity callers are named as operators or viewers")]
-    NobodyNamed,
+    /// With certificates only callers are let in that are named.
+    #[error("no caller is let in: with an identity they are named as operators or viewers")]
+    NoCallers,
     /// A certificate or its file cannot be used.
     #[error("{file}: {reason}")]
     BadIdentity {
@@ -38,6 +38,12 @@ pub enum HostsError {
         file: String,
         /// Why.
         reason: String,
+    },
+    /// A host cannot be reached at such an address.
+    #[error("\"{address}\" is no address of a host; expected a name of DNS or an IP address, without a port")]
+    BadAddress {
+        /// As given.
+        address: String,
     },
     /// The name of a world, or of the holder of a certificate, cannot be part of a key.
     #[error("\"{name}\" cannot name a world or a caller; expected 1 to 64 of a to z, A to Z, 0 to 9, _ and -")]

@@ -6,7 +6,8 @@
 use std::collections::{BTreeMap, HashMap};
 use std::time::{Duration, Instant};
 
-/// The most callers at a time.
+/// The places for callers, which the holders of certificates whom a host names share evenly, each having one at least; callers without certificates
+/// are one holder.
 pub const SESSIONS_MAX: usize = 64;
 /// The most calls of a peer in a second: the holder of a certificate with all its sessions; a caller where there are no certificates, and all
 /// strangers together.
@@ -21,7 +22,7 @@ pub struct Refusals {
     pub flooded: u64,
     /// Calls that were not newer than the one before, or for another run of the host.
     pub repeated: u64,
-    /// Of callers that have not introduced themselves, whose program is another, or beyond [`SESSIONS_MAX`].
+    /// Of callers that have not introduced themselves, whose program is another, or that have no place ([`SESSIONS_MAX`]).
     pub strangers: u64,
     /// Commands of callers that may only read.
     pub forbidden: u64,
@@ -55,19 +56,21 @@ pub(crate) enum Fault {
     Forbidden,
 }
 
-/// The callers that are let in, each by its name and its session: `name/session`.
+/// The callers that have a place, each by its name and its session: `name/session`. A caller has its place for as long as its sign of life lasts.
 #[derive(Debug)]
 pub(crate) struct Gate {
     /// Whether names are those of certificates.
     is_certified: bool,
+    /// The places of each name.
+    share: usize,
     callers: HashMap<String, Caller>,
     peers: BTreeMap<String, Peer>,
     pub refused: Refusals,
 }
 
-#[derive(Debug)]
+#[derive(Debug, Default)]
 struct Caller {
-    /// The number of its newest call.
+    /// The number of its newest call; 0 until it has introduced itself.
     newest: u64,
     is_looking: bool,
 }
@@ -103,19 +106,24 @@ impl Peer {
 const STRANGERS: &str = "strangers";
 
 impl Gate {
-    pub fn new(is_certified: bool) -> Self {
-        let (callers, peers) = (HashMap::new(), BTreeMap::new());
-        Self { is_certified, callers, peers, refused: Refusals::default() }
+    /// For callers of so many names, which are those of certificates, or one for all.
+    pub fn new(is_certified: bool, names: usize) -> Self {
+        let (callers, peers, share) = (HashMap::new(), BTreeMap::new(), (SESSIONS_MAX / names.max(1)).max(1));
+        Self { is_certified, share, callers, peers, refused: Refusals::default() }
     }
 
-    /// The peer that a caller is of: there are no more of them than names of certificates, or callers.
-    fn peer(&mut self, caller: &str) -> &mut Peer {
-        let peer = match caller.split_once('/') {
+    /// The name of the peer that a caller is of: there are no more of them than names of certificates, or callers.
+    pub fn peer_of<'a>(&self, caller: &'a str) -> &'a str {
+        match caller.split_once('/') {
             Some((name, _)) if self.is_certified => name,
             _ if self.callers.contains_key(caller) => caller,
             _ => STRANGERS,
-        };
-        self.peers.entry(peer.to_owned()).or_default()
+        }
+    }
+
+    fn peer(&mut self, caller: &str) -> &mut Peer {
+        let peer = self.peer_of(caller).to_owned();
+        self.peers.entry(peer).or_default()
     }
 
     /// Counts a message of a caller that was refused.
@@ -139,19 +147,36 @@ impl Gate {
         admitted
     }
 
-    /// Lets a caller in, whose first call has the number `sequence`.
+    /// A caller shows a sign of life, and has a place if one of its name is left.
+    pub fn arrive(&mut self, caller: &str) {
+        if self.taken(caller) < self.share {
+            self.callers.entry(caller.to_owned()).or_default();
+        }
+    }
+
+    /// How many places the holder of a caller's name has.
+    fn taken(&self, caller: &str) -> usize {
+        let holder = holder(caller);
+        self.callers.keys().filter(|other| self::holder(other) == holder).count()
+    }
+
+    /// Lets a caller in that has a place, whose first call has the number `sequence`.
     ///
     /// # Errors
     /// Why not.
     pub fn greet(&mut self, caller: &str, sequence: u64, is_looking: bool) -> Result<(), String> {
-        if !self.callers.contains_key(caller) && self.callers.len() >= SESSIONS_MAX {
+        let Some(known) = self.callers.get_mut(caller) else {
             self.refuse(caller, Fault::Stranger);
-            return Err(format!("the host has {SESSIONS_MAX} callers already, and takes no more"));
-        }
-        if self.callers.get(caller).is_some_and(|known| sequence <= known.newest) || sequence == 0 {
+            return Err(if self.taken(caller) < self.share {
+                "a caller shows a sign of life before it introduces itself".to_owned()
+            } else {
+                format!("the host has {} callers of \"{}\" already, and takes no more", self.share, holder(caller))
+            });
+        };
+        if sequence <= known.newest {
             return Err(self.repeat(caller));
         }
-        self.callers.insert(caller.to_owned(), Caller { newest: sequence, is_looking });
+        *known = Caller { newest: sequence, is_looking };
         Ok(())
     }
 
@@ -160,7 +185,7 @@ impl Gate {
     /// # Errors
     /// Why not.
     pub fn pass(&mut self, caller: &str, sequence: u64, is_of_run: bool) -> Result<(), String> {
-        let Some(known) = self.callers.get_mut(caller) else {
+        let Some(known) = self.callers.get_mut(caller).filter(|known| known.newest > 0) else {
             self.refuse(caller, Fault::Stranger);
             return Err("a caller introduces itself first".to_owned());
         };
@@ -186,10 +211,17 @@ impl Gate {
         }
     }
 
+    /// The callers that have introduced themselves.
     pub fn callers(&self) -> Callers {
-        let looking = self.callers.values().filter(|caller| caller.is_looking).count();
-        Callers { whole: self.callers.len() - looking, looking }
+        let known = self.callers.values().filter(|caller| caller.newest > 0);
+        let looking = known.clone().filter(|caller| caller.is_looking).count();
+        Callers { whole: known.count() - looking, looking }
     }
+}
+
+/// The holder of the certificate by which a caller is known.
+fn holder(caller: &str) -> &str {
+    caller.split_once('/').map_or(caller, |(name, _)| name)
 }
 
 #[cfg(test)]
@@ -198,8 +230,9 @@ mod tests {
 
     #[test]
     fn a_caller_is_let_in_once_for_each_number_and_so_often_a_second() {
-        let (mut gate, now) = (Gate::new(false), Instant::now());
+        let (mut gate, now) = (Gate::new(false, 1), Instant::now());
         assert!(gate.pass("any/a", 1, true).is_err());
+        gate.arrive("any/a");
         gate.greet("any/a", 1, false).unwrap();
         assert!(gate.pass("any/a", 1, true).is_err() && gate.pass("any/a", 2, false).is_err());
         gate.pass("any/a", 2, true).unwrap();
@@ -213,9 +246,9 @@ mod tests {
 
     #[test]
     fn the_sessions_of_a_certificate_share_its_calls() {
-        let (mut gate, now) = (Gate::new(true), Instant::now());
+        let (mut gate, now) = (Gate::new(true, 2), Instant::now());
         let sessions: Vec<_> = (0..5).map(|session| format!("bob/{session}")).collect();
-        sessions.iter().for_each(|session| gate.greet(session, 1, false).unwrap());
+        sessions.iter().for_each(|session| gate.arrive(session));
         let calls = sessions.iter().cycle().take(2 * CALLS_MAX as usize);
         assert_eq!(calls.filter(|session| gate.admits(session, now)).count() as u32, CALLS_MAX);
         assert!(gate.admits("eve/0", now), "another holder has its own");
@@ -223,11 +256,26 @@ mod tests {
     }
 
     #[test]
-    fn the_sixty_fifth_caller_waits_for_one_to_leave() {
-        let mut gate = Gate::new(false);
-        (0..SESSIONS_MAX).for_each(|caller| gate.greet(&caller.to_string(), 1, false).unwrap());
-        assert!(gate.greet("one more", 1, false).is_err());
-        gate.leave("7");
-        gate.greet("one more", 1, false).unwrap();
+    fn a_caller_beyond_the_share_of_its_name_waits_for_one_of_it_to_leave() {
+        let mut gate = Gate::new(true, 2);
+        (0..100).for_each(|session| gate.arrive(&format!("eye/{session}")));
+        let full = gate.greet("eye/99", 1, true).unwrap_err();
+        assert!(full.contains("32 callers of \"eye\""), "{full}");
+        let unseen = gate.greet("op/0", 1, false).unwrap_err();
+        assert!(unseen.contains("sign of life"), "{unseen}");
+        gate.arrive("op/0");
+        gate.greet("op/0", 1, false).unwrap();
+        gate.leave("eye/7");
+        gate.arrive("eye/99");
+        gate.greet("eye/99", 1, true).unwrap();
+        assert_eq!((gate.callers(), gate.refused.strangers), (Callers { whole: 1, looking: 1 }, 2));
+    }
+
+    #[test]
+    fn a_caller_that_never_introduces_itself_is_none() {
+        let mut gate = Gate::new(false, 1);
+        gate.arrive("any/a");
+        assert!(gate.pass("any/a", 1, true).is_err());
+        assert_eq!(gate.callers(), Callers { whole: 0, looking: 0 });
     }
 }

@@ -11,6 +11,7 @@ use crate::identity::is_name;
 use crate::refusal::Refusal;
 use crate::rounded;
 use crate::serving::{ANYONE, Role, SceneFiles, Serving};
+use crate::waiting::{CALLS_WAITING, Waiting};
 use crate::wire::{
     BadMessage, Call, Encoded, MESSAGE_MAX, Moment, ObjectState, PROGRAM, Reply, Request, Welcome, decode, encode,
 };
@@ -18,8 +19,7 @@ use metachron_core::{AgentId, LocalModel, SimSpan, Snapshot};
 use metachron_world::{Checkpoint, EventFilter, EventReader, Part, Touched, WorldCalls, WorldError};
 use std::collections::{BTreeMap, BTreeSet, HashMap};
 use std::panic::{AssertUnwindSafe, catch_unwind};
-use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering::Relaxed};
-use std::sync::mpsc::{Receiver, RecvTimeoutError, SyncSender, TrySendError, sync_channel};
+use std::sync::atomic::{AtomicBool, Ordering::Relaxed};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
@@ -31,10 +31,7 @@ use zenoh::sample::SampleKind;
 use zenoh::{Session, Wait};
 
 /// States leave so often.
-const PERIOD: Duration = Duration::from_nanos(16_666_667);
-/// So many calls wait for the ones before them, of so many bytes together; more are refused.
-const WAITING: usize = 256;
-const WAITING_BYTES: usize = 2 * MESSAGE_MAX;
+pub(crate) const PERIOD: Duration = Duration::from_nanos(16_666_667);
 /// The longest span that one call lets pass: other callers wait for it.
 const SPAN_MAX: SimSpan = SimSpan::from_secs(1);
 
@@ -57,8 +54,8 @@ struct Shared {
     session: Session,
     gate: Mutex<Gate>,
     shown: Mutex<Shown>,
-    /// The bytes of the calls that wait.
-    waiting: AtomicUsize,
+    /// Callers and their calls.
+    waiting: Waiting<(String, Query)>,
     ends: AtomicBool,
 }
 
@@ -104,28 +101,31 @@ pub fn serve(world: Arc<dyn WorldCalls>, serving: Serving) -> Result<Host, Hosts
     let events = world.listen(EventFilter::all());
     let shown =
         Mutex::new(Shown { sequence: 1, objects: BTreeMap::new(), events, is_followed: false, too_long: 0, sent: 0 });
-    let gate = Mutex::new(Gate::new(identity.is_some()));
-    let (ends, scene, waiting) = (AtomicBool::new(false), scene.map(Box::new), AtomicUsize::new(0));
+    let gate = Mutex::new(Gate::new(identity.is_some(), roles.len()));
+    let (ends, scene, waiting) = (AtomicBool::new(false), scene.map(Box::new), Waiting::new());
     let is_open = is_open_to_all(&endpoint);
     let shared = Arc::new(Shared { world, name, scene, roles, is_open, run, session, gate, shown, waiting, ends });
-    let (to_calls, calls) = sync_channel(WAITING);
     let (publishing, answering) = (Arc::clone(&shared), Arc::clone(&shared));
     let threads = vec![
         spawn("hosts-publish", move || publishing.publish_on()).map_err(failed)?,
-        spawn("hosts-answer", move || answering.answer_on(&calls)).map_err(failed)?,
+        spawn("hosts-answer", move || answering.answer_on()).map_err(failed)?,
     ];
     let mut host = Host { shared: Arc::clone(&shared), threads, served: None };
     let (session, key) = (&shared.session, |last: &str| format!("metachron/{}/{last}", shared.name));
-    let taking = Arc::clone(&shared);
-    let queryable = session.declare_queryable(key("call/*/*")).callback(move |query| taking.take(query, &to_calls));
-    let queryable = queryable.wait().map_err(failed)?;
-    let leaving = Arc::clone(&shared);
-    let callers = session.liveliness().declare_subscriber(key("caller/*/*")).callback(move |sample| {
-        if sample.kind() == SampleKind::Delete {
-            leaving.gate().leave(&caller_of(sample.key_expr().as_str()));
-        }
-    });
+    let living = Arc::clone(&shared);
+    let callers =
+        session.liveliness().declare_subscriber("metachron/caller/*/*").history(true).callback(move |sample| {
+            let caller = caller_of(sample.key_expr().as_str());
+            match sample.kind() {
+                SampleKind::Put if caller.split('/').all(is_name) => living.gate().arrive(&caller),
+                SampleKind::Put => living.gate().refuse(&caller, Fault::Stranger),
+                SampleKind::Delete => living.gate().leave(&caller),
+            }
+        });
     let callers = callers.wait().map_err(failed)?;
+    let taking = Arc::clone(&shared);
+    let queryable = session.declare_queryable(key("call/*/*")).callback(move |query| taking.take(query));
+    let queryable = queryable.wait().map_err(failed)?;
     let token = session.liveliness().declare_token(key("host")).wait().map_err(failed)?;
     host.served = Some((queryable, callers, token));
     Ok(host)
@@ -148,10 +148,10 @@ fn roles(Serving { name, endpoint, identity, roles, .. }: &Serving) -> Result<BT
         return Err(HostsError::BadName { name: name.clone() });
     }
     match (identity, roles.is_empty()) {
-        (Some(_), true) => Err(HostsError::NobodyNamed),
+        (Some(_), true) => Err(HostsError::NoCallers),
         (Some(_), false) => Ok(roles.clone()),
         (None, false) => {
-            let has = "callers are named, and nobody could know them";
+            let has = "callers are named, and without certificates their names are unknown";
             Err(HostsError::IdentityOrNot { endpoint: endpoint.clone(), has })
         }
         (None, true) => Ok([(ANYONE.to_owned(), Role::Operator)].into()),
@@ -190,7 +190,7 @@ impl Host {
         self.shared.gate().take_refused()
     }
 
-    /// Whether anybody on the network may read and command the world ([`Serving::insecure_lan`]).
+    /// Whether any process of the network may read and command the world ([`Serving::insecure_lan`]).
     #[must_use]
     pub fn is_open(&self) -> bool {
         self.shared.is_open
@@ -247,7 +247,7 @@ impl Shared {
             return shown.sequence - 1;
         }
         if !was_followed {
-            // nobody has listened
+            // events from before there was a caller
             shown.events.take();
         }
         let Changes { moment, before } = shown.changes(&*self.world, self.run);
@@ -269,41 +269,38 @@ impl Shared {
     }
 
     /// Lets a call wait for its turn, or refuses it.
-    fn take(&self, query: Query, calls: &SyncSender<(String, Query)>) {
+    fn take(&self, query: Query) {
         let caller = caller_of(query.key_expr().as_str());
         if !caller.split('/').all(is_name) {
             self.gate().refuse(&caller, Fault::Stranger);
             return;
         }
-        let is_welcome = self.gate().admits(&caller, Instant::now());
-        let bytes = query.payload().map_or(0, ZBytes::len);
-        let has_room = self.waiting.load(Relaxed) + bytes <= WAITING_BYTES;
-        self.waiting.fetch_add(bytes, Relaxed);
-        let unsent = if is_welcome && has_room {
-            calls.try_send((caller, query)).err()
-        } else {
-            Some(TrySendError::Full((caller, query)))
+        let (is_welcome, peer) = {
+            let mut gate = self.gate();
+            (gate.admits(&caller, Instant::now()), gate.peer_of(&caller).to_owned())
         };
-        if let Some(TrySendError::Full((caller, query)) | TrySendError::Disconnected((caller, query))) = unsent {
-            self.waiting.fetch_sub(bytes, Relaxed);
-            if is_welcome {
-                self.gate().refuse(&caller, Fault::Flooded);
-            }
-            let reason = format!("a caller makes at most {CALLS_MAX} calls a second, of which {WAITING} wait");
-            self.reply(&caller, &query, refused(Refusal::Other(reason)));
+        if !is_welcome {
+            return self.refuse_flood(&caller, &query);
+        }
+        let bytes = query.payload().map_or(0, ZBytes::len);
+        for (caller, query) in self.waiting.push(&peer, (caller, query), bytes) {
+            self.gate().refuse(&caller, Fault::Flooded);
+            self.refuse_flood(&caller, &query);
         }
     }
 
+    fn refuse_flood(&self, caller: &str, query: &Query) {
+        let reason = format!(
+            "a peer makes at most {CALLS_MAX} calls a second, of which at most {CALLS_WAITING} of all peers wait"
+        );
+        self.reply(caller, query, refused(Refusal::Other(reason)));
+    }
+
     /// Answers calls, one after the other, until the host ends.
-    fn answer_on(&self, calls: &Receiver<(String, Query)>) {
+    fn answer_on(&self) {
         while !self.ends.load(Relaxed) {
-            match calls.recv_timeout(PERIOD) {
-                Ok((caller, query)) => {
-                    self.waiting.fetch_sub(query.payload().map_or(0, ZBytes::len), Relaxed);
-                    self.answer(&caller, &query);
-                }
-                Err(RecvTimeoutError::Timeout) => {}
-                Err(RecvTimeoutError::Disconnected) => return,
+            if let Some((caller, query)) = self.waiting.pop(PERIOD) {
+                self.answer(&caller, &query);
             }
         }
     }
@@ -397,7 +394,7 @@ impl Shared {
             Call::Hash => Reply::Hash(world.hash()?),
             Call::Part(id) => {
                 let part = world.part(world.object_of(id)?)?;
-                // a model of somebody's own stays in its process
+                // a model that a program brought stays in its process
                 Reply::Part(part.filter(|part| !matches!(part, Part::Custom(_))).map(Box::new))
             }
             Call::Scene => Reply::Scene(self.scene.clone()),

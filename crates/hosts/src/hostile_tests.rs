@@ -1,7 +1,7 @@
-//! Bytes and numbers that nobody meant, at both ends: each is refused and counted, and what is good goes on.
+//! Bytes and numbers that no program of ours sends, at both ends: each is refused and counted, and what is good goes on.
 
 use crate::endpoint::{Place, Side, open};
-use crate::gate::CALLS_MAX;
+use crate::gate::{CALLS_MAX, SESSIONS_MAX};
 use crate::mirror::Mirror;
 use crate::wire::{Call, MESSAGE_MAX, Moment, ObjectState, PROGRAM, Reply, Request, VERSION, Welcome, decode, encode};
 use crate::{Host, Serving, connect, serve};
@@ -13,6 +13,7 @@ use metachron_world::{Rigid, Scene, World, WorldCalls};
 use std::net::TcpListener;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
+use zenoh::liveliness::LivelinessToken;
 use zenoh::{Session, Wait};
 
 pub(crate) fn scene() -> Scene {
@@ -24,6 +25,11 @@ fn serve_one() -> (World, Host, String) {
     let (world, endpoint) = (World::start(&scene(), ExecutorKind::Lockstep).unwrap(), format!("tcp/127.0.0.1:{port}"));
     let host = serve(Arc::new(world.clone()), Serving::new("bench", &endpoint)).unwrap();
     (world, host, endpoint)
+}
+
+/// A sign of life, as callers show it.
+fn life(session: &Session, caller: &str) -> LivelinessToken {
+    session.liveliness().declare_token(format!("metachron/caller/anyone/{caller}")).wait().unwrap()
 }
 
 /// A session that is connected with a host.
@@ -162,6 +168,9 @@ fn a_host_refuses_what_it_cannot_read_and_goes_on() {
     }
     assert_eq!((host.refused().total(), host.callers()), (refused, 0));
     let request = |run, sequence, call| encode(&Request { run, sequence, call }).unwrap();
+    let unseen = ask(&stranger, "stranger", request(0, 1, hello(PROGRAM)));
+    assert!(matches!(unseen, Some(Reply::Refused(_))), "no sign of life came: {unseen:?}");
+    let _life = life(&stranger, "stranger");
     let Some(Reply::Hello(welcome)) = ask(&stranger, "stranger", request(0, 1, hello(PROGRAM))) else {
         panic!("it introduces itself")
     };
@@ -173,13 +182,13 @@ fn a_host_refuses_what_it_cannot_read_and_goes_on() {
     let long = ask(&stranger, "stranger", request(welcome.run, 2, Call::Advance(SimSpan::from_secs(2))));
     let push = Command::force(Anchor::Local(DVec3::ZERO), DVec3::splat(f64::NAN));
     let push = ask(&stranger, "stranger", request(welcome.run, 3, Call::Command(AgentId(0), push)));
-    let nobody = ask(&stranger, "stranger", request(welcome.run, 4, Call::Remove(AgentId(9))));
+    let absent = ask(&stranger, "stranger", request(welcome.run, 4, Call::Remove(AgentId(9))));
     let file = ask(&stranger, "stranger", request(welcome.run, 5, Call::Restore(vec![1; 99])));
-    for answer in [unlike, old, elsewhere, unknown, long, push, nobody, file] {
+    for answer in [unlike, old, elsewhere, unknown, long, push, absent, file] {
         assert!(matches!(answer, Some(Reply::Refused(_))), "{answer:?}");
     }
     let counted = host.refused();
-    assert_eq!((counted.repeated, counted.total()), (2, refused + 4));
+    assert_eq!((counted.repeated, counted.total()), (2, refused + 5));
     assert!(matches!(ask(&stranger, "stranger", request(welcome.run, 6, pause())), Some(Reply::Done(_))));
     assert_eq!(world.hash(), before);
 }
@@ -204,7 +213,7 @@ fn a_flood_is_refused_while_another_caller_is_served() {
 }
 
 #[test]
-fn what_another_caller_says_in_the_place_of_the_host_reaches_nobody() {
+fn what_another_caller_says_in_the_place_of_the_host_reaches_no_other() {
     let (world, _host, endpoint) = serve_one();
     let elsewhere = connect(&endpoint).unwrap();
     let bad = stranger(&endpoint);
@@ -216,4 +225,54 @@ fn what_another_caller_says_in_the_place_of_the_host_reaches_nobody() {
     elsewhere.advance(SimSpan::from_millis(20)).unwrap();
     let (seen, is) = (elsewhere.latest(elsewhere.object("ball").unwrap()), world.latest(world.object("ball").unwrap()));
     assert_eq!((seen.unwrap().steps, elsewhere.refused(), elsewhere.is_silent()), (is.unwrap().steps, 0, false));
+}
+
+#[test]
+fn callers_that_go_after_their_greeting_leave_their_places_to_others() {
+    let (_world, host, endpoint) = serve_one();
+    let aborted = stranger(&endpoint);
+    for caller in 0..4 * SESSIONS_MAX {
+        let greeting = encode(&Request { run: 0, sequence: 1, call: hello(PROGRAM) }).unwrap();
+        let life = (caller % 2 == 0).then(|| life(&aborted, &caller.to_string()));
+        let answer = ask(&aborted, &caller.to_string(), greeting);
+        assert_eq!(matches!(answer, Some(Reply::Hello(_))), life.is_some(), "{answer:?}");
+    }
+    drop(aborted);
+    let there: Vec<_> = (0..SESSIONS_MAX / 8).map(|_| connect(&endpoint).unwrap()).collect();
+    assert_eq!(host.callers(), there.len());
+}
+
+#[test]
+fn an_answer_that_was_lost_is_asked_for_again() {
+    let (_world, host, endpoint) = serve_one();
+    let session = stranger(&endpoint);
+    let _life = life(&session, "again");
+    for sequence in 1..4 {
+        let greeting = encode(&Request { run: 0, sequence, call: hello(PROGRAM) }).unwrap();
+        assert!(matches!(ask(&session, "again", greeting), Some(Reply::Hello(_))));
+    }
+    assert_eq!((host.callers(), host.refused().total()), (1, 0));
+}
+
+#[test]
+fn calls_of_others_are_answered_while_one_peer_has_all_waiting_places() {
+    let (_world, host, endpoint) = serve_one();
+    let calm = connect(&endpoint).unwrap();
+    let flood = stranger(&endpoint);
+    let _life = life(&flood, "flood");
+    let call = |sequence, call| encode(&Request { run: 0, sequence, call }).unwrap();
+    let Some(Reply::Hello(Welcome { run, .. })) = ask(&flood, "flood", call(1, hello(PROGRAM))) else {
+        panic!("it introduces itself")
+    };
+    for sequence in 2..2_000 {
+        // a call that takes its time, and so leaves the others waiting
+        let advance = Request { run, sequence, call: Call::Advance(SimSpan::from_millis(100)) };
+        let get = flood.get("metachron/bench/call/anyone/flood").payload(encode(&advance).unwrap()).callback(|_| {});
+        get.wait().unwrap();
+        if sequence % 100 == 0 {
+            calm.drive(TimelineCommand::Pause).unwrap();
+        }
+    }
+    assert!(host.refused().flooded > 0, "the test floods: {:?}", host.refused());
+    assert!(host.take_refused().iter().all(|(peer, _)| peer == "anyone/flood"));
 }

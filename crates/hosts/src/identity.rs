@@ -1,6 +1,6 @@
 //! Identities: certificates by which hosts and callers know each other, and the authorities that issue them.
 //!
-//! In: a name, an authority. Out: a certificate with its key, in PEM files that only their owner reads. Never here: who may do what
+//! In: a name, an authority. Out: a certificate with its key, in PEM files that only their owner reads. Never here: the rights of callers
 //! ([`crate::serving`]), a connection.
 
 use crate::error::HostsError;
@@ -10,12 +10,13 @@ use rcgen::{
     KeyUsagePurpose,
 };
 use std::io::Write;
+use std::net::IpAddr;
 use std::path::Path;
 use time::{Duration, OffsetDateTime};
 use x509_parser::prelude::{FromDer, X509Certificate};
 
-/// For so many days an authority is valid.
-const AUTHORITY_DAYS: i64 = 3650;
+/// For so long an authority is valid.
+const AUTHORITY_LASTS: Duration = Duration::days(3650);
 /// A certificate is valid from so long ago on: clocks of a laboratory differ.
 const BEFORE: Duration = Duration::days(1);
 
@@ -57,14 +58,15 @@ impl Identity {
                 "expected its certificate, its key and its authority's certificate, as of `metachron identity new`";
             return Err(bad(format!("it has {certificates} certificates and {keys} keys; {wanted}")));
         };
-        let (name, ends) = holder(own).ok_or_else(|| bad("its certificate names nobody".to_owned()))?;
+        let (name, ends) =
+            holder(own).ok_or_else(|| bad("its certificate has no name that a caller can have".to_owned()))?;
         if ends < OffsetDateTime::now_utc() {
             return Err(bad(format!("its certificate ended on {}", ends.date())));
         }
         Ok(Self { name, certificate: own.clone(), key: key.clone(), authority: authority.clone() })
     }
 
-    /// Writes it to a file that nobody else may read.
+    /// Writes it to a file that no other user may read.
     ///
     /// # Errors
     /// [`HostsError::BadIdentity`], also where there is such a file.
@@ -91,7 +93,7 @@ impl Authority {
     /// [`HostsError::BadIdentity`] where the system gives no random numbers.
     pub fn new(name: &str) -> Result<Self, HostsError> {
         let made = || -> Result<Self, rcgen::Error> {
-            let mut params = params(name, AUTHORITY_DAYS);
+            let mut params = params(name, OffsetDateTime::now_utc() + AUTHORITY_LASTS);
             params.is_ca = IsCa::Ca(BasicConstraints::Constrained(0));
             params.key_usages = vec![KeyUsagePurpose::KeyCertSign, KeyUsagePurpose::CrlSign];
             let key = KeyPair::generate()?;
@@ -119,7 +121,7 @@ impl Authority {
         }
     }
 
-    /// Writes it to a file that nobody else may read.
+    /// Writes it to a file that no other user may read.
     ///
     /// # Errors
     /// [`HostsError::BadIdentity`], also where there is such a file.
@@ -131,16 +133,23 @@ impl Authority {
     /// at `addresses`: names of DNS and IP addresses.
     ///
     /// # Errors
-    /// [`HostsError::BadName`], and [`HostsError::BadIdentity`] for an address that is none, or an authority that can issue nothing.
+    /// [`HostsError::BadName`], [`HostsError::BadAddress`], and [`HostsError::BadIdentity`] for an end beyond the year 9999, or an authority that
+    /// can issue nothing.
     pub fn issue(&self, name: &str, addresses: &[String], days: i64) -> Result<Identity, HostsError> {
         if !is_name(name) {
             return Err(HostsError::BadName { name: name.to_owned() });
         }
+        if let Some(address) = addresses.iter().find(|address| !is_address(address)) {
+            return Err(HostsError::BadAddress { address: address.clone() });
+        }
+        let bad = |reason: String| HostsError::BadIdentity { file: name.to_owned(), reason };
+        let ends =
+            end_after(days).ok_or_else(|| bad(format!("{days} days from now is no day of the years to 9999")))?;
         let made = || -> Result<Identity, rcgen::Error> {
             let issuer = Issuer::from_ca_cert_pem(&self.certificate, KeyPair::from_pem(&self.key)?)?;
             let reached: Vec<_> = std::iter::once(name.to_owned()).chain(addresses.iter().cloned()).collect();
             let subject_alt_names = CertificateParams::new(reached)?.subject_alt_names;
-            let mut params = params(name, days);
+            let mut params = params(name, ends);
             params.subject_alt_names = subject_alt_names;
             params.key_usages = vec![KeyUsagePurpose::DigitalSignature];
             params.extended_key_usages = vec![ExtendedKeyUsagePurpose::ServerAuth, ExtendedKeyUsagePurpose::ClientAuth];
@@ -150,23 +159,37 @@ impl Authority {
             let (name, authority) = (name.to_owned(), self.certificate.clone());
             Ok(Identity { name, certificate, key: key.serialize_pem(), authority })
         };
-        made().map_err(|error| HostsError::BadIdentity { file: name.to_owned(), reason: error.to_string() })
+        made().map_err(|error| bad(error.to_string()))
     }
 }
 
+/// The moment so many days from now; `None` beyond the year 9999.
+fn end_after(days: i64) -> Option<OffsetDateTime> {
+    OffsetDateTime::now_utc().checked_add(Duration::seconds(days.checked_mul(86_400)?))
+}
+
 /// The part that all certificates of a name share.
-fn params(name: &str, days: i64) -> CertificateParams {
+fn params(name: &str, ends: OffsetDateTime) -> CertificateParams {
     let mut params = CertificateParams::default();
     params.distinguished_name = DistinguishedName::new();
     params.distinguished_name.push(DnType::CommonName, name);
     params.not_before = OffsetDateTime::now_utc() - BEFORE;
-    params.not_after = (OffsetDateTime::now_utc() + Duration::days(days)).max(params.not_before);
+    params.not_after = ends.max(params.not_before);
     params
 }
 
 /// Whether this names a world, a session or the holder of a certificate: a part of keys.
 pub(crate) fn is_name(name: &str) -> bool {
     (1..=64).contains(&name.len()) && name.bytes().all(|byte| byte.is_ascii_alphanumeric() || b"_-".contains(&byte))
+}
+
+/// Whether this is an IP address, or a name of DNS: labels of letters, digits, - and _, the last one no number.
+fn is_address(address: &str) -> bool {
+    let is_label = |label: &str| is_name(label) && label.len() < 64 && !label.starts_with('-') && !label.ends_with('-');
+    let is_dns = address.len() < 254
+        && address.split('.').all(is_label)
+        && !address.rsplit('.').next().is_some_and(|last| last.bytes().all(|byte| byte.is_ascii_digit()));
+    is_dns || address.parse::<IpAddr>().is_ok()
 }
 
 /// The blocks of that label in the text of a PEM file.

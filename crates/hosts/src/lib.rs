@@ -34,6 +34,7 @@ mod refusal;
 mod remote;
 mod rounded;
 mod serving;
+mod waiting;
 mod wire;
 
 pub use error::HostsError;

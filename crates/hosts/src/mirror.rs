@@ -126,25 +126,25 @@ impl Mirror {
         self.seen.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// Takes a message of changes.
-    pub fn take(&self, moment: Moment) {
+    /// Takes a message of changes; returns whether its numbers can be.
+    pub fn take(&self, moment: Moment) -> bool {
         let mut seen = self.seen();
         if moment.run != self.run || check::moment(&moment).is_err() {
             seen.refused += 1;
-            return;
+            return false;
         }
         seen.came = Instant::now();
         if moment.sequence > seen.events_sequence {
             seen.events_sequence = moment.sequence;
             seen.give(moment.events.iter().map(|event| event.clone().event(self.tag)));
         }
-        if moment.sequence <= seen.sequence {
-            return;
+        if moment.sequence > seen.sequence {
+            seen.is_stale |= moment.sequence > seen.sequence + 1;
+            (seen.sequence, seen.time) = (moment.sequence, moment.time);
+            seen.apply(moment);
+            self.changed.notify_all();
         }
-        seen.is_stale |= moment.sequence > seen.sequence + 1;
-        (seen.sequence, seen.time) = (moment.sequence, moment.time);
-        seen.apply(moment);
-        self.changed.notify_all();
+        true
     }
 
     /// Takes all states, in messages of one answer.

@@ -4,25 +4,30 @@
 
 use crate::endpoint::{LEASE, Place, Side, is_open_to_all, open};
 use crate::error::HostsError;
+use crate::host::PERIOD;
 use crate::identity::{Identity, is_name};
 use crate::mirror::{Mirror, RemoteFrame};
-use crate::rounded::{Sketched, Sketches};
+use crate::rounded::{Change, Sketched, Sketches};
 use crate::serving::{ANYONE, SceneFiles};
 use crate::wire::{Call, Moment, PROGRAM, Reply, Request, Welcome, decode, encode};
 use metachron_core::{AgentId, Body, SimSpan, SimTime, Snapshot};
 use metachron_runtime::{Command, TimelineCommand};
 use metachron_world::{
-    Checkpoint, CheckpointError, EventFilter, EventReader, Object, Part, SceneMark, Touched, WorldCalls, WorldError,
+    Checkpoint, CheckpointError, EventFilter, EventReader, Object, Part, SceneMark, StateLink, Touched, WorldCalls,
+    WorldError,
 };
 use std::sync::atomic::{AtomicBool, Ordering::Relaxed};
 use std::sync::mpsc::{Receiver, RecvTimeoutError, sync_channel};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
+use zenoh::handlers::DefaultHandler;
 use zenoh::liveliness::LivelinessToken;
 use zenoh::pubsub::Subscriber;
+use zenoh::qos::CongestionControl;
 use zenoh::query::ConsolidationMode;
 use zenoh::sample::SampleKind;
+use zenoh::session::SessionGetBuilder;
 use zenoh::{Session, Wait};
 
 /// The most that an answer is waited for: a step of the world may take five seconds.
@@ -64,12 +69,16 @@ struct Link {
     sketches: Mutex<Option<Sketches>>,
     /// The number of the newest call.
     sequence: Mutex<u64>,
+    /// How long the newest call that was posted and answered took.
+    round_trip: Arc<Mutex<Duration>>,
+    /// The newest refusal of a call that was posted.
+    refused: Arc<Mutex<Option<WorldError>>>,
     ends: AtomicBool,
 }
 
 impl std::fmt::Debug for RemoteWorld {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        f.debug_struct("RemoteWorld").field("world", &self.link().mirror.world).finish_non_exhaustive()
+        f.debug_struct("RemoteWorld").field("world", &self.calls().mirror.world).finish_non_exhaustive()
     }
 }
 
@@ -111,7 +120,7 @@ impl Calling {
         self
     }
 
-    /// Lets a `tcp/` endpoint be beyond this machine: anybody on the network may read what is said, or say something else.
+    /// Lets a `tcp/` endpoint be beyond this machine: any process of the network may read what is said, or say something else.
     #[must_use]
     pub const fn insecure_lan(mut self) -> Self {
         self.insecure_lan = true;
@@ -141,12 +150,13 @@ pub fn connect(calling: impl Into<Calling>) -> Result<RemoteWorld, HostsError> {
     let session = open(place, Side::Caller)?;
     let failed = |error: zenoh::Error| HostsError::Network { endpoint: endpoint.clone(), reason: error.to_string() };
     let caller = format!("{}/{}", identity.as_ref().map_or(ANYONE, Identity::name), session.zid());
+    // the host gives a place to a caller that lives; declarations overtake calls
+    let token = session.liveliness().declare_token(format!("metachron/caller/{caller}")).wait().map_err(failed)?;
     let welcome =
         greet(&session, &caller, is_looking).ok_or_else(|| HostsError::NoWorld { endpoint: endpoint.clone() })??;
     check_welcome(&welcome, scene.as_ref())?;
     let mirror = Arc::new(Mirror::new(welcome));
     let of_world = |last: &str| format!("metachron/{}/{last}", mirror.world);
-    let token = session.liveliness().declare_token(of_world(&format!("caller/{caller}"))).wait().map_err(failed)?;
     let (to_reader, messages) = sync_channel(WAITING);
     let states = session.declare_subscriber(of_world(if is_looking { "seen" } else { "state" }));
     let states = states.callback(move |sample| drop(to_reader.try_send(sample.payload().to_bytes().into_owned())));
@@ -155,10 +165,12 @@ pub fn connect(calling: impl Into<Calling>) -> Result<RemoteWorld, HostsError> {
     let host = session.liveliness().declare_subscriber(of_world("host")).history(true);
     let host =
         host.callback(move |sample| watched.set_alive(sample.kind() == SampleKind::Put)).wait().map_err(failed)?;
-    // the greeting had the first number
-    let (sequence, ends, is_open) = (Mutex::new(1), AtomicBool::new(false), is_open_to_all(&endpoint));
+    // greetings had the first numbers
+    let (sequence, ends) = (Mutex::new(u64::from(GREETING.0)), AtomicBool::new(false));
+    let is_open = is_open_to_all(&endpoint);
     let sketches = Mutex::new(is_looking.then(Sketches::default));
-    let link = Arc::new(Link { session, mirror, caller, is_open, sketches, sequence, ends });
+    let (round_trip, refused) = (Arc::default(), Arc::default());
+    let link = Arc::new(Link { session, mirror, caller, is_open, sketches, sequence, round_trip, refused, ends });
     link.refresh()?;
     let reading = Arc::clone(&link);
     let reader = std::thread::Builder::new().name("hosts-states".to_owned()).spawn(move || reading.read(&messages));
@@ -166,12 +178,12 @@ pub fn connect(calling: impl Into<Calling>) -> Result<RemoteWorld, HostsError> {
     Ok(RemoteWorld { connection: Arc::new(Connection { link, reader, _subscribers: [states, host], _token: token }) })
 }
 
-/// Introduces a caller; `None` where nobody answers.
+/// Introduces a caller; `None` where no host answers. Each greeting has a number of its own: the answer to one before may be lost.
 fn greet(session: &Session, caller: &str, is_looking: bool) -> Option<Result<Welcome, HostsError>> {
-    let hello = encode(&Request { run: 0, sequence: 1, call: hello(is_looking) }).ok()?;
     let (often, pause) = GREETING;
-    for _ in 0..often {
-        let asked = session.get(format!("metachron/*/call/{caller}")).payload(hello.clone()).timeout(LEASE);
+    for sequence in 1..=u64::from(often) {
+        let hello = encode(&Request { run: 0, sequence, call: hello(is_looking) }).ok()?;
+        let asked = session.get(format!("metachron/*/call/{caller}")).payload(hello).timeout(LEASE);
         let answers = asked.wait().ok()?;
         let answer =
             answers.recv().ok().and_then(|reply| reply.result().ok().map(|it| it.payload().to_bytes().into_owned()));
@@ -241,15 +253,22 @@ impl Link {
 
     /// Takes a message of states.
     fn take(&self, bytes: &[u8]) {
-        let message = match &mut *self.sketches() {
+        let mut sketches = self.sketches();
+        let message = match &*sketches {
             Some(sketches) => sketches.decode(bytes),
             None => match decode(bytes) {
-                Ok(Reply::Moment(moment)) => Ok(Sketched::Next(moment)),
+                Ok(Reply::Moment(moment)) => Ok(Sketched::Next(moment, Change::default())),
                 _ => return self.mirror.refuse(),
             },
         };
         match message {
-            Ok(Sketched::Next(moment)) => self.mirror.take(moment),
+            Ok(Sketched::Next(moment, change)) => {
+                if self.mirror.take(moment)
+                    && let Some(sketches) = &mut *sketches
+                {
+                    sketches.apply(change);
+                }
+            }
             Ok(Sketched::Old) => {}
             Ok(Sketched::Later) => self.mirror.miss(),
             Err(_) => self.mirror.refuse(),
@@ -262,7 +281,9 @@ impl Link {
 
     /// Introduces the caller again, where its host has forgotten it, and takes all states.
     fn refresh(&self) -> Result<(), WorldError> {
-        self.call(hello(self.sketches().is_some()))?;
+        // the lock is free again before the host is asked
+        let is_looking = self.sketches().is_some();
+        self.call(hello(is_looking))?;
         let all = self.call(Call::All)?.into_iter();
         let parts = all.map(|part| if let Reply::Moment(part) = part { Ok(part) } else { Err(unexpected()) });
         let parts = parts.collect::<Result<Vec<Moment>, _>>()?;
@@ -276,17 +297,9 @@ impl Link {
         if let Some(silent) = self.mirror.silence() {
             return Err(silent);
         }
-        let (key, asked) = (format!("metachron/{}/call/{}", self.mirror.world, self.caller), Instant::now());
-        let answers = {
-            let mut sequence = self.sequence.lock().unwrap_or_else(PoisonError::into_inner);
-            *sequence += 1;
-            let request = encode(&Request { run: self.mirror.run, sequence: *sequence, call });
-            let request = request.map_err(|bad| WorldError::Elsewhere(bad.to_string()))?;
-            let get = self.session.get(key).payload(request).timeout(ANSWER_WITHIN);
-            get.consolidation(ConsolidationMode::None)
-                .wait()
-                .map_err(|error| WorldError::Elsewhere(error.to_string()))?
-        };
+        let asked = Instant::now();
+        let answers =
+            self.send(call, |get| get.timeout(ANSWER_WITHIN).consolidation(ConsolidationMode::None).wait())?;
         let mut replies = Vec::new();
         while let Ok(answer) = answers.recv() {
             let Ok(sample) = answer.result() else { continue };
@@ -300,6 +313,41 @@ impl Link {
             }
         }
         if replies.is_empty() { Err(self.mirror.silent_for(asked.elapsed())) } else { Ok(replies) }
+    }
+
+    /// Sends a call under the next number: calls leave in the order of their numbers.
+    fn send<T>(
+        &self,
+        call: Call,
+        ask: impl FnOnce(SessionGetBuilder<'_, '_, DefaultHandler>) -> zenoh::Result<T>,
+    ) -> Result<T, WorldError> {
+        let elsewhere = |reason: String| WorldError::Elsewhere(reason);
+        let key = format!("metachron/{}/call/{}", self.mirror.world, self.caller);
+        let mut sequence = self.sequence.lock().unwrap_or_else(PoisonError::into_inner);
+        *sequence += 1;
+        let request = encode(&Request { run: self.mirror.run, sequence: *sequence, call });
+        let get = self.session.get(key).payload(request.map_err(|bad| elsewhere(bad.to_string()))?);
+        ask(get).map_err(|error| elsewhere(error.to_string()))
+    }
+
+    /// Calls the host and waits for nothing; a call that it refuses is the error of the next one posted. Where the link is full the call is lost.
+    fn post(&self, call: Call) -> Result<(), WorldError> {
+        if let Some(silent) = self.mirror.silence() {
+            return Err(silent);
+        }
+        let (round_trip, refused, posted) = (Arc::clone(&self.round_trip), Arc::clone(&self.refused), Instant::now());
+        let take = move |answer: zenoh::query::Reply| {
+            let Ok(sample) = answer.result() else { return };
+            *round_trip.lock().unwrap_or_else(PoisonError::into_inner) = posted.elapsed();
+            if let Ok(Reply::Refused(refusal)) = decode(&sample.payload().to_bytes()) {
+                *refused.lock().unwrap_or_else(PoisonError::into_inner) = Some(refusal.into());
+            }
+        };
+        let post = |get: SessionGetBuilder<'_, '_, DefaultHandler>| {
+            get.timeout(LEASE).congestion_control(CongestionControl::Drop).callback(take).wait()
+        };
+        self.send(call, post)?;
+        self.refused.lock().unwrap_or_else(PoisonError::into_inner).take().map_or(Ok(()), Err)
     }
 
     /// Calls the host for one answer.
@@ -320,14 +368,14 @@ impl Link {
 }
 
 impl RemoteWorld {
-    fn link(&self) -> &Link {
+    fn calls(&self) -> &Link {
         &self.connection.link
     }
 
     /// All objects as they were last seen, and the time then.
     #[must_use]
     pub fn frame(&self) -> RemoteFrame {
-        self.link().mirror.frame()
+        self.calls().mirror.frame()
     }
 
     /// The first frame that is later than `since`, once it comes.
@@ -335,15 +383,15 @@ impl RemoteWorld {
     /// # Errors
     /// [`WorldError::Silent`] if none comes within `patience`, or the host is silent.
     pub fn next_frame(&self, since: SimTime, patience: Duration) -> Result<RemoteFrame, WorldError> {
-        self.link().mirror.next_frame(since, patience)
+        self.calls().mirror.next_frame(since, patience)
     }
 
-    /// The scene of the world, for one who draws it; `None` where its host does not say it.
+    /// The scene of the world, for a program that draws it; `None` where its host does not say it.
     ///
     /// # Errors
     /// [`WorldError::Silent`] and [`WorldError::Elsewhere`].
     pub fn scene_files(&self) -> Result<Option<SceneFiles>, WorldError> {
-        if let Reply::Scene(scene) = self.link().ask(Call::Scene)? {
+        if let Reply::Scene(scene) = self.calls().ask(Call::Scene)? {
             Ok(scene.map(|scene| *scene))
         } else {
             Err(unexpected())
@@ -353,119 +401,128 @@ impl RemoteWorld {
     /// How long ago the newest message came.
     #[must_use]
     pub fn age(&self) -> Duration {
-        self.link().mirror.age()
+        self.calls().mirror.age()
     }
 
     /// Whether its host is silent: it has ended, or sent nothing for a second.
     #[must_use]
     pub fn is_silent(&self) -> bool {
-        self.link().mirror.silence().is_some()
+        self.calls().mirror.silence().is_some()
     }
 
-    /// Whether anybody on the network may read what is said ([`Calling::insecure_lan`]).
+    /// Whether any process of the network may read what is said ([`Calling::insecure_lan`]).
     #[must_use]
     pub fn is_open(&self) -> bool {
-        self.link().is_open
+        self.calls().is_open
     }
 
     /// How many messages of the host were refused, because their bytes or numbers cannot be.
     #[must_use]
     pub fn refused(&self) -> u64 {
-        self.link().mirror.refused()
+        self.calls().mirror.refused()
     }
 }
 
 impl WorldCalls for RemoteWorld {
     fn scene(&self) -> SceneMark {
-        self.link().mirror.scene.clone()
+        self.calls().mirror.scene.clone()
     }
 
     fn all_objects(&self) -> Vec<Object> {
-        self.link().mirror.all_objects()
+        self.calls().mirror.all_objects()
     }
 
     fn object(&self, name: &str) -> Result<Object, WorldError> {
-        self.link().mirror.object(name)
+        self.calls().mirror.object(name)
     }
 
     fn object_of(&self, id: AgentId) -> Result<Object, WorldError> {
-        self.link().mirror.object_of(id)
+        self.calls().mirror.object_of(id)
     }
 
     fn name(&self, of: Touched) -> Result<Arc<str>, WorldError> {
-        self.link().mirror.name(of)
+        self.calls().mirror.name(of)
     }
 
     fn latest(&self, object: Object) -> Result<Arc<Snapshot>, WorldError> {
-        self.link().mirror.latest(object)
+        self.calls().mirror.latest(object)
     }
 
     fn part(&self, object: Object) -> Result<Option<Part>, WorldError> {
-        let asked = Call::Part(self.link().own(object)?);
-        if let Reply::Part(part) = self.link().ask(asked)? { Ok(part.map(|part| *part)) } else { Err(unexpected()) }
+        let asked = Call::Part(self.calls().own(object)?);
+        if let Reply::Part(part) = self.calls().ask(asked)? { Ok(part.map(|part| *part)) } else { Err(unexpected()) }
     }
 
     fn time(&self) -> SimTime {
-        self.link().mirror.time()
+        self.calls().mirror.time()
     }
 
     fn hash(&self) -> Result<u64, WorldError> {
-        if let Reply::Hash(hash) = self.link().ask(Call::Hash)? { Ok(hash) } else { Err(unexpected()) }
+        if let Reply::Hash(hash) = self.calls().ask(Call::Hash)? { Ok(hash) } else { Err(unexpected()) }
     }
 
     fn drive(&self, drive: TimelineCommand) -> Result<(), WorldError> {
-        self.link().act(Call::Drive(drive))
+        self.calls().act(Call::Drive(drive))
     }
 
     fn advance(&self, span: SimSpan) -> Result<(), WorldError> {
         let mut left = span;
         while left > SimSpan::ZERO {
             let piece = left.min(PIECE);
-            self.link().act(Call::Advance(piece))?;
+            self.calls().act(Call::Advance(piece))?;
             left = SimSpan::from_nanos(left.as_nanos() - piece.as_nanos());
         }
         Ok(())
     }
 
     fn command(&self, object: Object, command: Command) -> Result<(), WorldError> {
-        self.link().act(Call::Command(self.link().own(object)?, command))
+        self.calls().act(Call::Command(self.calls().own(object)?, command))
+    }
+
+    fn post(&self, object: Object, command: Command) -> Result<(), WorldError> {
+        self.calls().post(Call::Command(self.calls().own(object)?, command))
+    }
+
+    fn link(&self) -> Option<StateLink> {
+        let round_trip = *self.calls().round_trip.lock().unwrap_or_else(PoisonError::into_inner);
+        Some(StateLink { age: self.age(), period: PERIOD, round_trip })
     }
 
     fn set_state(&self, object: Object, state: &Body) -> Result<(), WorldError> {
-        self.link().act(Call::SetState(self.link().own(object)?, Box::new(state.clone())))
+        self.calls().act(Call::SetState(self.calls().own(object)?, Box::new(state.clone())))
     }
 
     fn add(&self, name: &str, part: Part) -> Result<Object, WorldError> {
-        match self.link().ask(Call::Add(name.to_owned(), Box::new(part)))? {
+        match self.calls().ask(Call::Add(name.to_owned(), Box::new(part)))? {
             Reply::Added(id, sequence) => {
-                self.link().mirror.reach(sequence, LEASE);
-                Ok(self.link().mirror.tag.object(id))
+                self.calls().mirror.reach(sequence, LEASE);
+                Ok(self.calls().mirror.tag.object(id))
             }
             _ => Err(unexpected()),
         }
     }
 
     fn remove(&self, object: Object) -> Result<(), WorldError> {
-        self.link().act(Call::Remove(self.link().own(object)?))
+        self.calls().act(Call::Remove(self.calls().own(object)?))
     }
 
     fn checkpoint(&self) -> Result<Checkpoint, CheckpointError> {
-        let Reply::Checkpoint(bytes) = self.link().ask(Call::Checkpoint).map_err(of_checkpoint)? else {
+        let Reply::Checkpoint(bytes) = self.calls().ask(Call::Checkpoint).map_err(of_checkpoint)? else {
             return Err(unexpected().into());
         };
         Checkpoint::from_bytes(&bytes).map_err(|bad| WorldError::Elsewhere(bad.to_string()).into())
     }
 
     fn restore(&self, checkpoint: &Checkpoint) -> Result<(), CheckpointError> {
-        self.link().act(Call::Restore(checkpoint.to_bytes())).map_err(of_checkpoint)
+        self.calls().act(Call::Restore(checkpoint.to_bytes())).map_err(of_checkpoint)
     }
 
     fn answers(&self) -> Result<(), WorldError> {
-        self.link().mirror.silence().map_or(Ok(()), Err)
+        self.calls().mirror.silence().map_or(Ok(()), Err)
     }
 
     fn listen(&self, filter: EventFilter) -> Box<dyn EventReader> {
-        self.link().mirror.listen(filter)
+        self.calls().mirror.listen(filter)
     }
 }
 

@@ -1,7 +1,7 @@
 //! States for callers that only look: rounded far below what is seen, and sent as what changed of them.
 //!
-//! In: a message of states, and the states before. Out: its bytes; at the caller the message again, with rounded states. Never here: who is
-//! sent which.
+//! In: a message of states, and the states before. Out: its bytes; at the caller the message again, with rounded states. Never here: which
+//! caller is sent what.
 //!
 //! Numbers of bodies are multiples of a power of two, so that most of their bits are those of the message before. The bytes of a body are
 //! combined with those before by XOR, and sorted by their place in a number, the first bytes of all before the second ones: long runs of zeros are
@@ -69,11 +69,19 @@ pub(crate) struct Sketches {
     bodies: HashMap<AgentId, Vec<u8>>,
 }
 
+/// What a message changes of the bodies that a caller has.
+#[derive(Debug, Default)]
+pub(crate) struct Change {
+    sequence: u64,
+    bodies: Vec<(AgentId, Vec<u8>)>,
+    gone: Vec<AgentId>,
+}
+
 /// A message that was read.
 #[derive(Debug)]
 pub(crate) enum Sketched {
-    /// The one after the newest.
-    Next(Moment),
+    /// The one after the newest, and its change, which is applied once its numbers are checked.
+    Next(Moment, Change),
     /// One that is known.
     Old,
     /// A later one: what it changes is not there.
@@ -92,7 +100,7 @@ impl Sketches {
     ///
     /// # Errors
     /// [`BadMessage`], also for what changed of a body that is not there.
-    pub fn decode(&mut self, sent: &[u8]) -> Result<Sketched, BadMessage> {
+    pub fn decode(&self, sent: &[u8]) -> Result<Sketched, BadMessage> {
         let malformed = |reason: String| BadMessage::Malformed(reason);
         let (version, compressed) = sent.split_first().ok_or_else(|| malformed("it is empty".to_owned()))?;
         if *version != VERSION {
@@ -112,6 +120,8 @@ impl Sketches {
         if Some(moment.sequence) != self.sequence.checked_add(1) {
             return Ok(if moment.sequence <= self.sequence { Sketched::Old } else { Sketched::Later });
         }
+        let gone = moment.gone.clone();
+        let mut change = Change { sequence: moment.sequence, bodies: Vec::with_capacity(bodies.len()), gone };
         for (object, sent) in moment.states.iter_mut().zip(bodies) {
             let whole = match (sent, self.bodies.get(&object.id)) {
                 (BodyBytes::Whole(bytes), _) => bytes,
@@ -123,11 +133,16 @@ impl Sketches {
             let mut body: Body = postcard::from_bytes(&whole).map_err(|error| malformed(error.to_string()))?;
             turns(&mut body).for_each(|rotation| *rotation = rotation.normalize());
             object.state = Arc::new(Snapshot { body, ..Snapshot::clone(&object.state) });
-            self.bodies.insert(object.id, whole);
+            change.bodies.push((object.id, whole));
         }
-        moment.gone.iter().for_each(|id| drop(self.bodies.remove(id)));
-        self.sequence = moment.sequence;
-        Ok(Sketched::Next(moment))
+        Ok(Sketched::Next(moment, change))
+    }
+
+    /// Goes on from a message that was found sound.
+    pub fn apply(&mut self, Change { sequence, bodies, gone }: Change) {
+        self.bodies.extend(bodies);
+        gone.iter().for_each(|id| drop(self.bodies.remove(id)));
+        self.sequence = sequence;
     }
 }
 
@@ -247,7 +262,10 @@ mod tests {
         let mut sketches = Sketches::default();
         sketches.begin(&[moment(1)]);
         for step in 2..20 {
-            let Ok(Sketched::Next(read)) = sketches.decode(&sent(step, step - 1)) else { panic!("the next one") };
+            let Ok(Sketched::Next(read, change)) = sketches.decode(&sent(step, step - 1)) else {
+                panic!("the next one")
+            };
+            sketches.apply(change);
             let (there, is) = (&read.states[0].state, wave(step));
             let (Body::Curve(there_is), Body::Curve(is_there)) = (&there.body, &is.body) else { panic!("a tube") };
             let place =
@@ -268,11 +286,11 @@ mod tests {
         sketches.begin(&[moment(3)]);
         assert!(matches!(sketches.decode(&sent(3, 2)), Ok(Sketched::Old)));
         assert!(matches!(sketches.decode(&sent(5, 4)), Ok(Sketched::Later)));
-        assert!(matches!(sketches.decode(&sent(4, 3)), Ok(Sketched::Next(_))));
+        assert!(matches!(sketches.decode(&sent(4, 3)), Ok(Sketched::Next(..))));
     }
 
     #[test]
-    fn bytes_that_nobody_meant_are_refused_and_ask_for_no_storage() {
+    fn bytes_of_no_message_are_refused_and_ask_for_no_storage() {
         let mut sketches = Sketches::default();
         sketches.begin(&[moment(1)]);
         // a body that is not there, and a number of bodies that is not that of states
@@ -294,8 +312,7 @@ mod tests {
             let at = (state >> 33) as usize % bytes.len();
             bytes[at] = (state >> 20) as u8;
             let _ = sketches.decode(&bytes);
-            sketches.begin(&[moment(1)]);
         }
-        assert!(matches!(sketches.decode(&good), Ok(Sketched::Next(_))));
+        assert!(matches!(sketches.decode(&good), Ok(Sketched::Next(..))));
     }
 }

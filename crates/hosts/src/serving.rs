@@ -78,7 +78,7 @@ impl Serving {
         self
     }
 
-    /// Lets a `tcp/` endpoint be beyond this machine: anybody on the network may read and command the world then.
+    /// Lets a `tcp/` endpoint be beyond this machine: any process of the network may read and command the world then.
     #[must_use]
     pub const fn insecure_lan(mut self) -> Self {
         self.insecure_lan = true;

@@ -1,4 +1,4 @@
-//! A peer that sends more at once than anybody may: its host's memory does not follow. The only test of its process, whose memory it measures.
+//! A peer that sends more at once than a message may have: its host's memory does not follow. The only test of its process, whose memory it measures.
 #![cfg(target_os = "linux")]
 
 use metachron_hosts::{Serving, connect, serve};

@@ -10,6 +10,7 @@ use crate::{Checkpoint, CheckpointError, Part, Scene, World, WorldError};
 use metachron_core::{AgentId, Body, SimSpan, SimTime, Snapshot};
 use metachron_runtime::{Command, TimelineCommand};
 use std::sync::Arc;
+use std::time::Duration;
 
 impl Scene {
     /// The scene in short.
@@ -17,6 +18,17 @@ impl Scene {
     pub fn mark(&self) -> SceneMark {
         SceneIdentity::of(self).mark()
     }
+}
+
+/// How the states of a world elsewhere come.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct StateLink {
+    /// How long ago the newest message came.
+    pub age: Duration,
+    /// The time from a message to the next.
+    pub period: Duration,
+    /// From the last command that was posted and answered to its answer; zero where none was.
+    pub round_trip: Duration,
 }
 
 /// A reader of events.
@@ -91,6 +103,17 @@ pub trait WorldCalls: Send + Sync {
     /// # Errors
     /// The errors of [`World::command`].
     fn command(&self, object: Object, command: Command) -> Result<(), WorldError>;
+    /// Sends a command to an object, and waits for nothing.
+    ///
+    /// # Errors
+    /// The errors of [`World::command`]; of a world elsewhere, that of a command which was posted before.
+    fn post(&self, object: Object, command: Command) -> Result<(), WorldError> {
+        self.command(object, command)
+    }
+    /// How its states come; `None` where they are read as they are made.
+    fn link(&self) -> Option<StateLink> {
+        None
+    }
     /// Puts an object into another state.
     ///
     /// # Errors

@@ -34,7 +34,7 @@ mod reading;
 mod start;
 mod world;
 
-pub use calls::{EventReader, WorldCalls};
+pub use calls::{EventReader, StateLink, WorldCalls};
 pub use control::pace::Pace;
 pub use description::appearance::Appearance;
 pub use description::builder::{

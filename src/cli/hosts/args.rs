@@ -1,6 +1,7 @@
-//! The arguments of `host`, `view` and `identity`, and their help texts.
+//! The arguments of `host`, `view`, `tool` and `identity`, and their help texts.
 
 use crate::cli::args::OutputArgs;
+use crate::cli::devices::DeviceKind;
 use clap::{Args, Subcommand, ValueHint};
 use metachron_console::values::{LimitArgs, assignment, seconds, size, target_fps};
 use std::path::PathBuf;
@@ -12,7 +13,7 @@ Examples:
   metachron view tcp/127.0.0.1:7500                    a window on it, in another terminal
   metachron host cavity --listen tls/0.0.0.0:7447 --identity bench.pem --operators lab2 --viewers screen
 
-Beyond this machine both ends have certificates (`metachron identity`), and nobody is let in who is not named.";
+Beyond this machine both ends have certificates (`metachron identity`), and only callers are let in that are named.";
 
 /// `host`.
 #[derive(Debug, Args)]
@@ -32,7 +33,7 @@ pub struct HostArgs {
     /// Certificates whose holders may read the world
     #[arg(long, value_name = "NAMES", value_delimiter = ',', requires = "identity")]
     pub viewers: Vec<String>,
-    /// Let tcp/ be beyond this machine: anybody on the network may read and command the world
+    /// Let tcp/ be beyond this machine: any process of the network may read and command the world
     #[arg(long, conflicts_with = "identity")]
     pub insecure_lan: bool,
     /// The name of the world: 1 to 64 letters, digits, _ and -
@@ -65,12 +66,9 @@ Frames are drawn here, within a budget of their own. Pause, speed, springs and p
 pub struct ViewArgs {
     /// Where the world is served
     pub endpoint: String,
-    /// The certificate of this viewer, a file of `metachron identity new`, for tls/
-    #[arg(long, value_name = "FILE", value_hint = ValueHint::FilePath)]
-    pub identity: Option<PathBuf>,
-    /// Let tcp/ be beyond this machine: anybody on the network may read and change what is said
-    #[arg(long, conflicts_with = "identity")]
-    pub insecure_lan: bool,
+    /// As whom it is called.
+    #[command(flatten)]
+    pub call: CallArgs,
     /// Open no window: pictures, films and files of what is seen
     #[arg(long)]
     pub headless: bool,
@@ -98,29 +96,78 @@ pub struct ViewArgs {
     pub output: OutputArgs,
 }
 
+/// How a world elsewhere is called.
+#[derive(Debug, Args)]
+pub struct CallArgs {
+    /// The certificate of this caller, a file of `metachron identity new`, for tls/
+    #[arg(long, value_name = "FILE", value_hint = ValueHint::FilePath)]
+    pub identity: Option<PathBuf>,
+    /// Let tcp/ be beyond this machine: any process of the network may read and change what is said
+    #[arg(long, conflicts_with = "identity")]
+    pub insecure_lan: bool,
+}
+
+pub const TOOL_EXAMPLES: &str = "\
+Examples:
+  metachron tool --device simulated --leads probe --connect tcp/127.0.0.1:7447
+  metachron tool --device simulated --leads probe --connect tls/bench:7447 --identity lab2.pem --seconds 10 --json
+
+The device is read here a thousand times a second; its object is led, and its contacts are solved, where the world runs.
+Between two messages of states the force follows the hand, and a tank bounds the energy that it is given.";
+
+/// `tool`.
+#[derive(Debug, Args)]
+pub struct ToolArgs {
+    /// The device: simulated, a hand that goes along the object's keyframes, or gamepad in builds with the feature `gamepad`
+    #[arg(long, value_name = "KIND", value_parser = crate::cli::devices::kind)]
+    pub device: DeviceKind,
+    /// The tool or kinematic body that it leads
+    #[arg(long, value_name = "OBJECT")]
+    pub leads: String,
+    /// Where the world is served
+    #[arg(long, value_name = "ENDPOINT")]
+    pub connect: String,
+    /// As whom it is called.
+    #[command(flatten)]
+    pub call: CallArgs,
+    /// End after this many seconds; at Ctrl-C where not given
+    #[arg(long, value_name = "S", value_parser = seconds)]
+    pub seconds: Option<f64>,
+    /// Print the device's report as JSON, a line a second
+    #[arg(long)]
+    pub json: bool,
+    /// How far the scene may go.
+    #[command(flatten)]
+    pub limits: LimitArgs,
+}
+
 pub const IDENTITY_EXAMPLES: &str = "\
 Examples:
-  metachron identity new bench --authority lab.pem     bench.pem, for a host that is reached as tls/bench:7447
-  metachron identity new bench --authority lab.pem --address 10.0.0.5,bench.lab.example
+  metachron identity new bench --authority lab.pem --new-authority
+                                                       bench.pem, for a host that is reached as tls/bench:7447, and lab.pem
   metachron identity new screen --authority lab.pem    screen.pem, for a caller
+  metachron identity new bench2 --authority lab.pem --address 10.0.0.5,bench2.lab.example
 
-The first one makes the authority too. Who has lab.pem can be anybody: keep it apart, and give each machine its own file alone.";
+The first one makes the authority too. Its holder can issue every name: keep lab.pem apart, and give each machine its own file alone.";
 
 /// `identity`.
 #[derive(Debug, Subcommand)]
 pub enum IdentityCommand {
-    /// Make a certificate and its key, in the file NAME.pem that nobody else may read
+    /// Make a certificate and its key, in the file NAME.pem that no other user may read
     New(NewIdentityArgs),
 }
 
 /// `identity new`.
 #[derive(Debug, Args)]
 pub struct NewIdentityArgs {
-    /// Who has it: 1 to 64 letters, digits, _ and -; `--operators` and `--viewers` name it so
+    /// Its holder: 1 to 64 letters, digits, _ and -; `--operators` and `--viewers` name it so
     pub name: String,
-    /// The authority that issues it; made where there is no such file
+    /// The authority that issues it
     #[arg(long, value_name = "FILE", value_hint = ValueHint::FilePath)]
     pub authority: PathBuf,
+    /// Make the authority too, in a file that is not there yet
+    #[arg(long)]
+    pub new_authority: bool,
     /// Addresses of a host besides its name: names of DNS and IP addresses
     #[arg(long, value_name = "ADDRESSES", value_delimiter = ',')]
     pub address: Vec<String>,

@@ -3,22 +3,20 @@
 //! In: an endpoint. Out: the outputs of `run`, of the frames drawn here. Never here: steps, which are made where the world runs.
 
 use super::args::ViewArgs;
-use super::{INSECURE, refused};
+use super::common::{INSECURE, SaidScene, reached, refused, scene_of};
 use crate::cli::play::{GoOn, headless, in_window};
 use crate::cli::run::{Request, RunLength, check_outputs, check_windowless, finish, stem, style};
 use metachron_console::exit::Exit;
-use metachron_console::output::BadInput;
-use metachron_hosts::{Calling, HostsError, Identity, RemoteWorld, connect};
-use metachron_scene::{Source, load};
+use metachron_hosts::RemoteWorld;
 use metachron_session::Session;
-use metachron_world::{Pace, WorldCalls};
+use metachron_world::Pace;
 use std::sync::Arc;
 
 /// Shows a world elsewhere until the window is closed.
 pub(in super::super) fn view(args: &ViewArgs) -> anyhow::Result<Exit> {
     check_windowless(&args.output, args.headless)?;
     check_outputs(&args.output, None, None)?;
-    let world = reached(args).map_err(refused)?;
+    let world = reached(&args.endpoint, &args.call, true).map_err(refused)?;
     let request = request(args, &world)?;
     let play = |go_on: GoOn<'_>| {
         let mut session = Session::open_elsewhere(request.scene.clone(), Arc::new(world.clone()))?;
@@ -34,28 +32,9 @@ pub(in super::super) fn view(args: &ViewArgs) -> anyhow::Result<Exit> {
     finish(&args.output, &play, &request.scene.name)
 }
 
-/// The world at the endpoint of the arguments.
-fn reached(args: &ViewArgs) -> Result<RemoteWorld, HostsError> {
-    let identity = args.identity.as_ref().map(Identity::from_file).transpose()?;
-    let calling = identity.into_iter().fold(Calling::at(&args.endpoint).looking(), Calling::identity);
-    connect(if args.insecure_lan { calling.insecure_lan() } else { calling })
-}
-
-/// The request to draw the scene that the host says, which is checked as a file is, and must be that of its world.
+/// The request to draw the scene that the host says.
 fn request(args: &ViewArgs, world: &RemoteWorld) -> anyhow::Result<Request> {
-    let files = world.scene_files()?.ok_or_else(|| {
-        BadInput(format!("{}: the host does not say its scene, and its shapes are not known", args.endpoint))
-    })?;
-    let source = Source::recorded(&files.scene.name, &files.scene.text, None)?;
-    let source = source.with_files(files.files).within(args.limits.limits());
-    let of_target = args.target_fps.map(|hz| ("target.frame_hz".to_owned(), hz.to_string()));
-    let overrides: Vec<_> = files.scene.overrides.into_iter().chain(of_target).collect();
-    let scene = load(&source, &overrides)?;
-    let (here, there) = (scene.mark(), world.scene());
-    if here.hash != there.hash {
-        let why = format!("{}: the host says another scene than the one that its world is of", args.endpoint);
-        return Err(BadInput(why).into());
-    }
+    let SaidScene { scene, source, overrides } = scene_of(&args.endpoint, world, &args.limits, args.target_fps)?;
     Ok(Request {
         quiet: args.output.quiet,
         overrides,
