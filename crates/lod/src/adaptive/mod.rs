@@ -263,6 +263,14 @@ impl Adaptive {
         self.late.interrupt();
     }
 
+    /// Reports that another table has taken the place of a stage's, with the estimator that goes with it. Frames chosen by the table before teach
+    /// nothing.
+    pub fn replace_estimator(&mut self, stage: usize, estimator: SpeedEstimator) {
+        let stage = stage.min(STAGES - 1);
+        (self.estimators[stage], self.slowness[stage]) = (estimator, estimator.slowness());
+        self.predictions = [None; IN_FLIGHT];
+    }
+
     /// The level given to an object; `None` where it is left out, is unknown, or has no levels.
     #[must_use]
     pub fn level(&self, id: u64) -> Level {
@@ -311,7 +319,7 @@ impl Adaptive {
         if !still {
             self.hold = ChoiceHold::default();
         }
-        self.plan.held = still && self.hold.keeps(predicted, goal, self.plan.lambda > 0.0);
+        self.plan.held = still && self.hold.keeps(predicted, goal, self.options.can_rise());
         self.plan.held
     }
 

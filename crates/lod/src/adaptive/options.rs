@@ -108,6 +108,11 @@ impl Options {
         &mut self.objects
     }
 
+    /// Whether any object could be finer.
+    pub(crate) fn can_rise(&self) -> bool {
+        self.objects.iter().any(|object| object.taken < object.steps && object.weight > 0.0)
+    }
+
     /// Number of places that all steps take, unused ones included.
     pub(crate) fn room(&self) -> usize {
         self.steps.len()
