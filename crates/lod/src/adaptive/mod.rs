@@ -313,13 +313,15 @@ impl Adaptive {
             let fixed = (time.fixed - before.fixed).abs() <= ROUNDING * before.target;
             changes == self.options.changes && time.target == before.target && fixed
         };
-        let still = self.chosen_for.is_some_and(is_same) && self.plan.feasible;
+        // where all had to fall at once none may rise at first, and nothing is on offer
+        let fallen = self.plan.lambda == 0.0 && self.options.are_all_fallen();
+        let still = self.chosen_for.is_some_and(is_same) && self.plan.feasible && !fallen;
         let predicted = (self.cost(terms) + fixed) / target;
         let goal = (terms.budget + fixed) / target;
         if !still {
             self.hold = ChoiceHold::default();
         }
-        self.plan.held = still && self.hold.keeps(predicted, goal, self.options.can_rise());
+        self.plan.held = still && self.hold.keeps(predicted, goal, self.plan.lambda > 0.0);
         self.plan.held
     }
 

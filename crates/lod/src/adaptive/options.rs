@@ -108,9 +108,10 @@ impl Options {
         &mut self.objects
     }
 
-    /// Whether any object could be finer.
-    pub(crate) fn can_rise(&self) -> bool {
-        self.objects.iter().any(|object| object.taken < object.steps && object.weight > 0.0)
+    /// Whether every object is at its least, and one of them because it has just fallen.
+    pub(crate) fn are_all_fallen(&self) -> bool {
+        let may_rise = |object: &Object| object.just_fell() && object.steps > 0 && object.weight > 0.0;
+        self.objects.iter().all(|object| object.taken == 0) && self.objects.iter().any(may_rise)
     }
 
     /// Number of places that all steps take, unused ones included.
