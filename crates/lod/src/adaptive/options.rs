@@ -110,7 +110,8 @@ impl Options {
 
     /// Whether every object is at its least, and one of them because it has just fallen.
     pub(crate) fn are_all_fallen(&self) -> bool {
-        let may_rise = |object: &Object| object.just_fell() && object.steps > 0 && object.weight > 0.0;
+        // in the frame after its dwell it is on offer for the first time
+        let may_rise = |object: &Object| object.dwell > 0 && !object.rose && object.steps > 0 && object.weight > 0.0;
         self.objects.iter().all(|object| object.taken == 0) && self.objects.iter().any(may_rise)
     }
 
