@@ -70,7 +70,8 @@ A block is what stands between two comments:
 The command comes first, and names one experiment if it is a chart. Then, after each |, rows (column = values), columns,
 `claims`, or `figure`, which is kept in the folder figures. Other commands stand as words under their prompt.
 A comment that is nearly one of these is refused with its line; code between fences is not read.
-Exit codes: 0 all the same, 1 a document says something else, 2 a document that cannot be read.";
+Columns of times of this machine are left as they stand, under the line with their date; others are compared.
+Exit codes: 0 all the same, 1 a document says something else or a command fails, 2 a document, or a block of one, that cannot be read.";
 
 /// `tune`.
 #[derive(Debug, Args)]
@@ -162,9 +163,10 @@ pub struct DocsArgs {
     /// Also print what is measured on this machine, with date, commit and processor
     #[arg(long, requires = "write")]
     pub live: bool,
-    /// Where the commands write their files; the folder is created where it does not exist
-    #[arg(long, value_name = "FOLDER", default_value = "charts", value_hint = ValueHint::DirPath)]
-    pub out: PathBuf,
+    /// Keep the files that the commands write here; the folder is created where it does not exist. Default: `charts` with --write, else they
+    /// are not kept
+    #[arg(long, value_name = "FOLDER", value_hint = ValueHint::DirPath)]
+    pub out: Option<PathBuf>,
     /// No progress
     #[arg(short, long)]
     pub quiet: bool,

@@ -21,6 +21,7 @@ fn machine() -> Machine {
         setup_ms: 0.0,
         pixel_ns: 0.0,
         enlarge_ns: 0.0,
+        serial: 0.0,
         objects: Default::default(),
         strokes: Default::default(),
     };

@@ -228,7 +228,7 @@ pub fn picture_control(scene: &Scene) -> PictureControl {
     if let Some((lag_s, share)) = target.lag() {
         control.set_lag(lag_s, share);
     }
-    control.set_prices(prices(&machine(scene).draw));
+    control.set_prices(prices(&machine(scene).draw).with_serial(0.0));
     if let Some(margin) = target.margin {
         control.set_margin(margin);
     }
@@ -252,7 +252,7 @@ pub fn prices(draw: &DrawPrice) -> Prices {
         polygon: price.triangle_us * 1e-6,
         vertex: price.vertex_us * 1e-6,
         pixel: price.pixel_ns * 1e-9,
-        serial: 0.0,
+        serial: draw.serial,
     };
     Prices {
         frame_s: draw.setup_ms * 1e-3,

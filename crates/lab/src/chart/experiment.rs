@@ -26,6 +26,9 @@ pub trait Experiment: Sync {
     /// Whether cases are measured one at a time, because they measure the time of this machine.
     const ALONE: bool = false;
 
+    /// The columns of the table whose numbers are times of this machine; all others are the same on every run.
+    const LIVE: LiveColumns = if Self::ALONE { LiveColumns::All } else { LiveColumns::These(&[]) };
+
     /// The cases in the order of the rows; `quick`: a small part of them, or shorter runs.
     fn cases(quick: bool) -> Vec<CaseOf<Self>>;
 
@@ -51,6 +54,30 @@ pub trait Experiment: Sync {
 
     /// The claims and their measured values.
     fn findings(rows: &[Self::Row]) -> Vec<Finding>;
+}
+
+/// Columns of a table that no two runs print alike.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum LiveColumns {
+    /// Every column, the claims and the figure.
+    All,
+    /// These, the claims and the figure, or nothing at all where none is named.
+    These(&'static [&'static str]),
+}
+
+impl LiveColumns {
+    /// Whether a column is one of them.
+    pub(crate) fn has(self, column: &str) -> bool {
+        match self {
+            Self::All => true,
+            Self::These(columns) => columns.contains(&column),
+        }
+    }
+
+    /// Whether there is one, which claims and figure then show too.
+    pub(crate) const fn are_some(self) -> bool {
+        !matches!(self, Self::These([]))
+    }
 }
 
 /// The case that an experiment measures once.

@@ -43,7 +43,8 @@ use std::sync::atomic::{AtomicBool, AtomicU32, Ordering};
 
 pub(super) use blank::blank;
 pub(super) use experiment::{
-    Experiment, Finding, Measured, Named, Record, claims, count_of, distinct, each, number_of, worst, worst_of,
+    Experiment, Finding, LiveColumns, Measured, Named, Record, claims, count_of, distinct, each, number_of, worst,
+    worst_of,
 };
 pub(super) use figure::{Axis, Colour, Figure, Layer, Mark, Panel, lines, span};
 pub(super) use policies::compared::selection::Selection;
@@ -75,13 +76,13 @@ pub(crate) struct Done {
 /// An experiment that can be run by its name.
 struct Entry {
     name: &'static str,
-    /// Whether it measures times of this machine.
-    alone: bool,
+    /// Its columns that measure times of this machine.
+    live: LiveColumns,
     run: fn(&Setting<'_>) -> anyhow::Result<Done>,
 }
 
 const fn entry<E: Experiment>() -> Entry {
-    Entry { name: E::NAME, alone: E::ALONE, run: run::<E> }
+    Entry { name: E::NAME, live: E::LIVE, run: run::<E> }
 }
 
 const STABILITY: &[Entry] = &[
@@ -192,9 +193,12 @@ impl Chart {
         Ok(Self { subject, chosen, folder, quick, quiet, live })
     }
 
-    /// Whether something of it is measured on this machine, so that no two runs print the same.
-    pub(crate) fn is_live(&self) -> bool {
-        self.live || self.chosen.iter().any(|entry| entry.alone)
+    /// The columns of its first experiment that are measured on this machine.
+    pub(crate) fn live_columns(&self) -> LiveColumns {
+        match self.chosen.first() {
+            Some(entry) if !self.live => entry.live,
+            _ => LiveColumns::All,
+        }
     }
 
     /// Runs the experiments until it is stopped; `each` is called after every one.

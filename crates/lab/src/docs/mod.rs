@@ -28,7 +28,14 @@ const LINES_SHOWN: usize = 6;
 /// A document that cannot be read or written, a block that is not closed, a command that fails.
 pub fn command(args: &DocsArgs) -> anyhow::Result<Exit> {
     let stopped = stopper()?;
-    let mut printer = Printer::new(prepared(&args.out)?, args.live, args.quiet, &stopped);
+    // comparing leaves nothing behind
+    let passing = match (&args.out, args.write) {
+        (None, false) => Some(tempfile::tempdir().context("there is no room for what the commands write")?),
+        _ => None,
+    };
+    let given = args.out.as_deref().unwrap_or(Path::new("charts"));
+    let folder = prepared(passing.as_ref().map_or(given, |folder| folder.path()))?;
+    let mut printer = Printer::new(folder, args.live, args.quiet, &stopped);
     let named = if args.files.is_empty() { ALL.map(PathBuf::from).to_vec() } else { args.files.clone() };
     let mut documents = Vec::new();
     for path in &named {
@@ -90,7 +97,7 @@ struct Fresh {
 /// Prints the blocks of a document; `None` where that was stopped.
 fn printed(path: &Path, text: &str, printer: &mut Printer<'_>) -> anyhow::Result<Option<Fresh>> {
     let mut fresh = Fresh { text: String::new(), files: Vec::new(), differences: Vec::new() };
-    for part in parts(text)? {
+    for part in parts(text).map_err(|why| BadInput(format!("{why:#}")))? {
         match part {
             Part::Prose(prose) => fresh.text += prose,
             Part::Block(block) => {

@@ -5,10 +5,11 @@
 
 use super::super::args::ChartArgs;
 use super::super::bench::rig::machine::processor;
-use super::super::chart::{self, Chart, Done};
+use super::super::chart::{self, Chart, Done, LiveColumns};
 use super::blocks::{Block, View};
-use anyhow::{Context, bail, ensure};
+use anyhow::{Context, anyhow, ensure};
 use clap::{Args, Command, FromArgMatches};
+use metachron_console::output::BadInput;
 use std::collections::BTreeMap;
 use std::collections::btree_map::Entry;
 use std::fs;
@@ -21,6 +22,29 @@ use std::time::SystemTime;
 const LIVE: [&str; 2] = ["bench", "fit"];
 /// Begins a block of such numbers.
 const STAMP: &str = "Measured on ";
+
+/// How much of a block is the same on every run.
+#[derive(Debug, Clone, Copy, PartialEq)]
+enum Repeats {
+    All,
+    /// Some of its columns.
+    Columns,
+    Nothing,
+}
+
+impl Repeats {
+    /// Of a block of an experiment with these live columns.
+    fn of(views: &[View<'_>], live: LiveColumns) -> Self {
+        let columns = views.iter().flat_map(|view| if let View::Columns(names) = view { &names[..] } else { &[] });
+        let (shown, of_these) = (columns.clone().count(), columns.filter(|name| live.has(name)).count());
+        let tables_alone = views.iter().all(|view| matches!(view, View::Columns(_)));
+        match live {
+            _ if !live.are_some() || tables_alone && shown > 0 && of_these == 0 => Self::All,
+            LiveColumns::These(_) if tables_alone && (shown == 0 || of_these < shown) => Self::Columns,
+            _ => Self::Nothing,
+        }
+    }
+}
 
 /// Prints blocks.
 pub(super) struct Printer<'a> {
@@ -48,20 +72,32 @@ impl<'a> Printer<'a> {
     /// # Errors
     /// A command that is unknown or fails, a column that it does not print, a live block without its date.
     pub(super) fn print(&mut self, block: &Block<'_>, beside: &Path) -> anyhow::Result<Option<Said>> {
-        let chart = if block.words.first() == Some(&"chart") { Some(self.chart(&block.words)?) } else { None };
-        let live = chart.as_ref().map_or_else(|| block.words.iter().any(|w| LIVE.contains(w)), Chart::is_live);
-        if live && !self.live {
-            ensure!(
-                block.body.starts_with(STAMP),
-                "numbers of a machine begin with `{STAMP}`, date, commit and processor"
-            );
+        let chart = match block.words.first() {
+            Some(&"chart") => Some(self.chart(&block.words).map_err(wrong)?),
+            _ => None,
+        };
+        let spoken_live = block.words.iter().any(|word| LIVE.contains(word));
+        let (live, repeats) = match &chart {
+            Some(chart) => (Some(chart.live_columns()), Repeats::of(&block.views, chart.live_columns())),
+            None => (None, if spoken_live { Repeats::Nothing } else { Repeats::All }),
+        };
+        let dated = self.live || repeats == Repeats::All || block.body.starts_with(STAMP);
+        if !dated {
+            let why = format!("numbers of a machine begin with `{STAMP}`, date, commit and processor");
+            return Err(BadInput(why).into());
+        }
+        if repeats == Repeats::Nothing && !self.live {
             return Ok(Some(Said { body: block.body.to_owned(), files: Vec::new() }));
         }
         let said = match chart {
             Some(chart) => self.charted(&chart, block, beside)?,
             None => Some(Said { body: self.spoken(&block.words)?, files: Vec::new() }),
         };
-        Ok(said.map(|said| if live { Said { body: stamp() + &said.body, ..said } } else { said }))
+        Ok(said.map(|said| match (repeats, live) {
+            (Repeats::All, _) => said,
+            (Repeats::Columns, Some(live)) if !self.live => Said { body: kept(&said.body, block.body, live), ..said },
+            _ => Said { body: stamp() + &said.body, ..said },
+        }))
     }
 
     /// The chart that a block names.
@@ -91,12 +127,12 @@ impl<'a> Printer<'a> {
             ["figures", "../figures", "docs/figures"].map(|f| beside.join(f)).into_iter().find(|f| f.is_dir());
         let mut table = done.table.clone();
         for (column, values) in &block.only {
-            table = table.only(column, values)?;
+            table = table.only(column, values).map_err(wrong)?;
         }
         let (mut shown, mut files) = (Vec::new(), Vec::new());
         for view in &block.views {
             shown.push(match view {
-                View::Columns(columns) => table.columns(columns)?.markdown(),
+                View::Columns(columns) => table.columns(columns).map_err(wrong)?.markdown(),
                 View::Claims => chart::claims(done).markdown(),
                 View::Figure => {
                     let folder = figures.as_ref().context("there is no folder `figures` beside the document")?;
@@ -113,7 +149,10 @@ impl<'a> Printer<'a> {
 
     /// The output of another command, with the command above it.
     fn spoken(&self, words: &[&str]) -> anyhow::Result<String> {
-        ensure!(words.first() != Some(&"docs"), "a document cannot print `metachron docs`, which would begin it again");
+        if words.first() == Some(&"docs") {
+            let why = "a document cannot print `metachron docs`, which would begin it again";
+            return Err(BadInput(why.to_owned()).into());
+        }
         let folder = self.folder.join("spoken");
         if folder.exists() {
             fs::remove_dir_all(&folder).with_context(|| format!("{} cannot be removed", folder.display()))?;
@@ -121,12 +160,45 @@ impl<'a> Printer<'a> {
         fs::create_dir_all(&folder).with_context(|| format!("{} cannot be made", folder.display()))?;
         let output = process::Command::new(std::env::current_exe()?).args(words).current_dir(&folder).output()?;
         if !output.status.success() {
-            bail!("it ended with {}: {}", output.status, String::from_utf8_lossy(&output.stderr).trim());
+            let why = format!("it ended with {}: {}", output.status, String::from_utf8_lossy(&output.stderr).trim());
+            // a command that is no command, or has no such argument
+            return Err(if output.status.code() == Some(2) { BadInput(why).into() } else { anyhow!(why) });
         }
         let said = String::from_utf8(output.stdout).context("it prints no text")?;
         let lines = said.lines().map(|line| format!("{}\n", line.trim_end())).collect::<String>();
         Ok(format!("```\n$ metachron {}\n{lines}```\n", words.join(" ")))
     }
+}
+
+/// A mistake in the document, not of the command.
+fn wrong(why: anyhow::Error) -> anyhow::Error {
+    BadInput(format!("{why:#}")).into()
+}
+
+/// Tables as printed anew, with the stamp and the live columns, row by row, of those that stand in the document; a row that it has not yet has
+/// dashes there.
+fn kept(fresh: &str, old: &str, live: LiveColumns) -> String {
+    let (stamped, old) = old.split_once("\n\n").unwrap_or((old, ""));
+    let (mut header, mut before) = (Vec::new(), old.lines());
+    let lines = fresh.lines().map(|line| {
+        let (new, known) = (cells(line), cells(before.next().unwrap_or_default()));
+        if header.len() != new.len() {
+            header.clone_from(&new);
+        }
+        if new.is_empty() {
+            return line.to_owned();
+        }
+        let is_live = |k: usize| header[k] != new[k] && live.has(header[k]);
+        let cell = |k: usize| if is_live(k) { known.get(k).copied().unwrap_or("–") } else { new[k] };
+        format!("| {} |", (0..new.len()).map(cell).collect::<Vec<_>>().join(" | "))
+    });
+    format!("{stamped}\n\n{}\n", lines.collect::<Vec<_>>().join("\n"))
+}
+
+/// The cells of a line of a table; none of another line.
+fn cells(line: &str) -> Vec<&str> {
+    let inner = line.strip_prefix("| ").and_then(|rest| rest.strip_suffix(" |"));
+    inner.map_or_else(Vec::new, |inner| inner.split(" | ").collect())
 }
 
 /// The drawing of an experiment and its rows, where documents keep them.
@@ -174,6 +246,20 @@ fn date(days: u64) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn live_columns_are_those_of_the_document_and_others_are_printed_anew() {
+        let live = LiveColumns::These(&["ms"]);
+        let old = "Measured on 2026-11-30, here.\n\n| n | ms | error |\n| --: | --: | --: |\n| 8 | 1.5 | 0.02 |\n";
+        let fresh = "| n | ms | error |\n| --: | --: | --: |\n| 8 | 9.9 | 0.03 |\n| 16 | 9.9 | 0.01 |\n";
+        let merged = old.replace("0.02", "0.03") + "| 16 | – | 0.01 |\n";
+        assert_eq!(kept(fresh, old, live), merged);
+        let columns = |names: &[&'static str]| Repeats::of(&[View::Columns(names.to_vec())], live);
+        assert_eq!(columns(&["n", "error"]), Repeats::All);
+        assert_eq!(columns(&["n", "ms"]), Repeats::Columns);
+        assert_eq!((columns(&["ms"]), Repeats::of(&[View::Claims], live)), (Repeats::Nothing, Repeats::Nothing));
+        assert_eq!((Repeats::of(&[], live), Repeats::of(&[], LiveColumns::All)), (Repeats::Columns, Repeats::Nothing));
+    }
 
     #[test]
     fn days_are_dates() {

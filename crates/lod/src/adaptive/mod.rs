@@ -263,6 +263,14 @@ impl Adaptive {
         self.late.interrupt();
     }
 
+    /// Reports that another table has taken the place of a stage's, with the estimator that goes with it. Frames chosen by the table before teach
+    /// nothing.
+    pub fn replace_estimator(&mut self, stage: usize, estimator: SpeedEstimator) {
+        let stage = stage.min(STAGES - 1);
+        (self.estimators[stage], self.slowness[stage]) = (estimator, estimator.slowness());
+        self.predictions = [None; IN_FLIGHT];
+    }
+
     /// The level given to an object; `None` where it is left out, is unknown, or has no levels.
     #[must_use]
     pub fn level(&self, id: u64) -> Level {
@@ -305,7 +313,9 @@ impl Adaptive {
             let fixed = (time.fixed - before.fixed).abs() <= ROUNDING * before.target;
             changes == self.options.changes && time.target == before.target && fixed
         };
-        let still = self.chosen_for.is_some_and(is_same) && self.plan.feasible;
+        // where all had to fall at once none may rise at first, and nothing is on offer
+        let fallen = self.plan.lambda == 0.0 && self.options.are_all_fallen();
+        let still = self.chosen_for.is_some_and(is_same) && self.plan.feasible && !fallen;
         let predicted = (self.cost(terms) + fixed) / target;
         let goal = (terms.budget + fixed) / target;
         if !still {

@@ -108,6 +108,13 @@ impl Options {
         &mut self.objects
     }
 
+    /// Whether every object is at its least, and one of them because it has just fallen.
+    pub(crate) fn are_all_fallen(&self) -> bool {
+        // in the frame after its dwell it is on offer for the first time
+        let may_rise = |object: &Object| object.dwell > 0 && !object.rose && object.steps > 0 && object.weight > 0.0;
+        self.objects.iter().all(|object| object.taken == 0) && self.objects.iter().any(may_rise)
+    }
+
     /// Number of places that all steps take, unused ones included.
     pub(crate) fn room(&self) -> usize {
         self.steps.len()

@@ -83,6 +83,18 @@ impl SpeedEstimator {
         libm::sqrt(self.sigma2)
     }
 
+    /// Variance of the relative error of a prediction of `table`, a fraction of the frame's time, > 0.
+    pub(crate) fn variance_of(&self, table: f64) -> f64 {
+        let predicted = self.slowness * table;
+        (self.sigma2 + (self.variance + self.wander) * table * table) / (predicted * predicted)
+    }
+
+    /// The same for a table that predicts `factor` times less for the same work.
+    pub(crate) fn rescaled(self, factor: f64) -> Self {
+        let slowness = within(factor * self.slowness, SLOWNESS_RANGE.0, SLOWNESS_RANGE.1);
+        Self { slowness, variance: factor * factor * self.variance, ..self }
+    }
+
     /// Updates γ: `took` was measured where the table, without γ, predicted `table`; both as fractions of the frame's time T.
     pub fn observe(&mut self, table: f64, took: f64) -> FilterUpdate {
         if !(table.is_finite() && table > 0.0 && took.is_finite() && took >= 0.0) {

@@ -27,6 +27,7 @@ use super::prices::benefit;
 use super::prices::ladder::{Ladder, Ladders};
 use super::prices::logic::{Logic, LogicBefore};
 use super::prices::price::{Backdrop, Prices};
+use super::prices::serial::SerialPart;
 use super::render_scale::RenderScale;
 use crate::adaptive::DEFAULT_MARGIN;
 use crate::cost::benefit::GivenSliders;
@@ -59,6 +60,9 @@ pub struct PictureControl {
     sliders: GivenSliders,
     value: Value,
     prices: Prices,
+    /// What frames say of z, and the z that they have taught.
+    serial: SerialPart,
+    learned_serial: Option<f64>,
     backdrop: Backdrop,
     frozen: bool,
     /// The rule for raising quality beyond the objects' requested ranges, if that is allowed.
@@ -107,6 +111,8 @@ impl PictureControl {
             sliders: GivenSliders::default(),
             value: Value::Plain,
             prices: Prices::default(),
+            serial: SerialPart::default(),
+            learned_serial: None,
             backdrop: Backdrop::default(),
             frozen: false,
             raise: None,
@@ -164,10 +170,24 @@ impl PictureControl {
             Policy::Threshold => self.select.observe(work_s, target_s),
             Policy::Adaptive if self.is_as_chosen() => {
                 let drawn_s = (drawn_s - backdrop_s).max(0.0);
-                self.adaptive.observe(self.chosen_part * drawn_s, work_s, self.others_s, target_s);
+                if self.adaptive.observe(self.chosen_part * drawn_s, work_s, self.others_s, target_s) {
+                    self.learn_serial(drawn_s, target_s);
+                }
             }
             _ => {}
         }
+    }
+
+    /// Learns from a frame whose objects took `drawn_s` how much of the faster stage of drawing the slower hides.
+    fn learn_serial(&mut self, drawn_s: f64, target_s: f64) {
+        let prices = self.picture_prices();
+        let Some(held) = prices.serial() else { return };
+        let objects_s = |prices: Prices| prices.objects_s(self.views.iter().map(|seen| &seen.view), &self.plan.levels);
+        let ends = [0.0, 1.0].map(|serial| objects_s(prices.with_serial(serial)) / target_s);
+        let Some(learned) = self.serial.observe(ends, drawn_s / target_s, held) else { return };
+        self.adaptive.replace_prices(learned.estimator, self.chosen_part * objects_s(prices));
+        self.learned_serial = Some(learned.serial);
+        self.ladders.clear();
     }
 
     /// Chooses the level of every object for the next frame.

@@ -55,13 +55,16 @@ pub struct DrawPrice {
     pub pixel_ns: f64,
     /// Nanoseconds per pixel that a picture of fewer pixels is enlarged to, ≥ 0.
     pub enlarge_ns: f64,
+    /// Part of the faster of an object's triangles and pixels that the slower does not hide, `0..=1`; policies are not told.
+    pub serial: f64,
     /// Price of objects by their shading: flat, Gouraud, light at every pixel, textured.
     pub objects: [ObjectPrice; 4],
     /// Price of objects drawn as strokes: points, lines.
     pub strokes: [ObjectPrice; 2],
 }
 
-/// Price of an object: setup + max(triangle · triangles + vertex · vertices, pixel · pixels that it covers).
+/// Price of an object: setup + the greater of triangle · triangles + vertex · vertices and pixel · pixels that it covers, and of the less the
+/// part [`DrawPrice::serial`].
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct ObjectPrice {
     /// Microseconds per object, ≥ 0.
@@ -114,6 +117,7 @@ impl Machine {
                 setup_ms: 1.4,
                 pixel_ns: 6.0,
                 enlarge_ns: 2.0,
+                serial: 0.0,
                 objects: SOFTWARE,
                 strokes: SOFTWARE_STROKES,
             },
@@ -132,13 +136,14 @@ impl Machine {
     #[must_use]
     pub fn workstation() -> Self {
         let base = Self::two_cores_software();
-        let DrawPrice { setup_ms, pixel_ns, enlarge_ns, .. } = base.draw;
+        let DrawPrice { setup_ms, pixel_ns, enlarge_ns, serial, .. } = base.draw;
         Self {
             cores: 8,
             draw: DrawPrice {
                 setup_ms: setup_ms / 20.0,
                 pixel_ns: pixel_ns / 20.0,
                 enlarge_ns: enlarge_ns / 20.0,
+                serial,
                 objects: SOFTWARE.map(|price| price.faster(20.0)),
                 strokes: SOFTWARE_STROKES.map(|price| price.faster(20.0)),
             },
@@ -159,7 +164,7 @@ impl Machine {
         ];
         let strokes = [price_of_objects(0.20, 0.7), price_of_objects(0.22, 1.2)];
         Self {
-            draw: DrawPrice { setup_ms: 0.24, pixel_ns: 4.8, enlarge_ns: 4.4, objects, strokes },
+            draw: DrawPrice { setup_ms: 0.24, pixel_ns: 4.8, enlarge_ns: 4.4, serial: 0.0, objects, strokes },
             ..Self::two_cores_software()
         }
     }

@@ -163,6 +163,7 @@ const KEYS: Ranges = Ranges(&[
     ("draw_triangle_us", NumberRange::new(0.0, 1e4, "µs")),
     ("draw_pixel_ns", PER_PIECE),
     ("draw_enlarge_ns", PER_PIECE),
+    ("draw_serial", SHARE),
     ("cull_object_ns", PER_PIECE),
     ("choose_object_ns", PER_PIECE),
     ("noise", SHARE),

@@ -157,6 +157,9 @@ pub struct Machine {
     pub draw_pixel_ns: Option<f64>,
     /// Nanoseconds per pixel that a picture of fewer pixels is enlarged to.
     pub draw_enlarge_ns: Option<f64>,
+    /// Part of the faster of an object's triangles and pixels that the slower does not hide: 0 where two stages work beside each other, 1 where one
+    /// does after the other. Policies are not told and begin with 0. Default 0.
+    pub draw_serial: Option<f64>,
     /// Whether a graphics card draws, and not the cores that agents step on. Default: as the preset has it, a card in `workstation`.
     pub graphics_card: Option<bool>,
     /// Nanoseconds per object for culling. Default 0.

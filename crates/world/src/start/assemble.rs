@@ -154,6 +154,7 @@ pub fn machine(scene: &Scene) -> Machine {
     let draw = &mut machine.draw;
     draw.setup_ms = wish.draw_setup_ms.unwrap_or(draw.setup_ms);
     draw.pixel_ns = wish.draw_pixel_ns.unwrap_or(draw.pixel_ns);
+    draw.serial = wish.draw_serial.unwrap_or(draw.serial);
     draw.enlarge_ns = wish.draw_enlarge_ns.unwrap_or(draw.enlarge_ns);
     let ShadingCosts { flat, gouraud, per_pixel, textured, points, lines } = wish.shading;
     let strokes = draw.strokes.iter_mut().zip([points, lines]);

@@ -9,7 +9,8 @@ use super::stage::Stage;
 use super::{Case as BenchCase, Row as BenchRow, cases, peer_row, row};
 use crate::bench::rig::peers::Peers;
 use crate::chart::{
-    Axis, Experiment, Figure, Finding, Mark, Measured, Panel, Table, claims, distinct, lines, span, table, worst_of,
+    Axis, Experiment, Figure, Finding, LiveColumns, Mark, Measured, Panel, Table, claims, distinct, lines, span, table,
+    worst_of,
 };
 use anyhow::Context;
 use metachron_console::output::message;
@@ -158,6 +159,7 @@ impl Experiment for SolveLevels {
     const NAME: &'static str = "levels";
     const TITLE: &'static str = "Error of contacts over their cost, by levels of the solve";
     const ALONE: bool = true;
+    const LIVE: LiveColumns = LiveColumns::These(&["ms_per_s", "p50_ms", "p99_ms"]);
     const TABLE: fn(&[Row]) -> Table = table!(|r| test: r.case.test, engine: r.case.engine, level: r.case.level,
         ms_per_s(1): r.cpu_ms_per_s, p50_ms(3): r.ms_p50, p99_ms(3): r.ms_p99, landing_mm(3): r.landing_mm,
         rest_mm(3): r.rest_mm, drift_mm(4): r.drift_mm, sank_mm(2): r.sank_mm, made_j(5): r.made_j);

@@ -6,8 +6,8 @@ use super::front::front;
 use super::peers;
 use super::play::Play;
 use crate::chart::{
-    Axis, Cell, Colour, Experiment, Figure, Finding, Layer, Measured, Named, Panel, Shown, Table, calibration_us,
-    distinct, each, exponent, lines, pace_for_goals, span, table,
+    Axis, Cell, Colour, Experiment, Figure, Finding, Layer, LiveColumns, Measured, Named, Panel, Shown, Table,
+    calibration_us, distinct, each, exponent, lines, pace_for_goals, span, table,
 };
 use metachron_models::rod::Integrator;
 use serde::{Deserialize, Serialize};
@@ -106,6 +106,7 @@ impl<B: Benchmark> Experiment for Diagram<B> {
     const NAME: &'static str = B::NAME;
     const TITLE: &'static str = B::TITLE;
     const ALONE: bool = true;
+    const LIVE: LiveColumns = LiveColumns::These(&["ms/s to 1e-3", "ms/s to 1e-4"]);
     const TABLE: fn(&[Row]) -> Table = |rows| {
         let of = |case, method| -> Vec<&Row> {
             rows.iter().filter(|r| r.case.case == case && r.case.method.0 == method).collect()

@@ -3,8 +3,8 @@
 //! In: a [`Growth`]. Out: an experiment whose cases are measured one at a time. Never here: what is counted.
 
 use crate::chart::{
-    Axis, Colour, Experiment, Figure, Finding, Layer, Measured, Panel, Table, calibration_us, distinct, each, exponent,
-    lines, pace_for_goals, table,
+    Axis, Colour, Experiment, Figure, Finding, Layer, LiveColumns, Measured, Panel, Table, calibration_us, distinct,
+    each, exponent, lines, pace_for_goals, table,
 };
 use serde::{Deserialize, Serialize};
 use std::marker::PhantomData;
@@ -114,6 +114,7 @@ impl<G: Growth> Experiment for Scaling<G> {
     const NAME: &'static str = G::NAME;
     const TITLE: &'static str = G::TITLE;
     const ALONE: bool = true;
+    const LIVE: LiveColumns = LiveColumns::These(&["us", "ns each", "floor ns each", "times the floor", "exponent"]);
     const TABLE: fn(&[Row]) -> Table = |rows| {
         let mut table = table!(rows, |row| case: row.case.case, size: row.case.size, count: row.count, us(2): row.us,
             "ns each"(1): row.ns_each(), "floor ns each"(1): row.floor().1 * 1e3 / row.floor().0,

@@ -9,7 +9,7 @@ use super::groups::{Groups, Impostors};
 use super::hierarchy::{leave_out_members, upper};
 use super::impostors::ImpostorChoice;
 use crate::Bound;
-use crate::adaptive::{Adaptive, Offer, Plan, Settings, Time};
+use crate::adaptive::{Adaptive, FilterUpdate, Offer, Plan, Settings, SpeedEstimator, Time};
 use crate::control::demand::plan::LevelDemand;
 use crate::control::demand::query::{FrameQuery, Promise, TICKS, demand};
 use crate::control::demand::status::Status;
@@ -43,6 +43,7 @@ struct DrawnChoice {
     plan: Plan,
     fixed_s: f64,
     reserve_s: f64,
+    slowness: f64,
 }
 
 /// The law and the objects given to it.
@@ -107,14 +108,14 @@ impl AdaptiveChoice {
     /// Marks the last choice as the one being drawn.
     pub fn take_up(&mut self) {
         let Self { frame, plan, fixed_s, reserve_s, .. } = *self;
-        self.drawn = DrawnChoice { frame, plan, fixed_s, reserve_s };
+        self.drawn = DrawnChoice { frame, plan, fixed_s, reserve_s, slowness: self.slowness() };
     }
 
     /// Reports times of the frame that was drawn, seconds: `drawn_s` for drawing the choice, `work_s` in all, `others_s` reserved for
-    /// others.
-    pub fn observe(&mut self, drawn_s: f64, work_s: f64, others_s: f64, target_s: f64) {
-        let DrawnChoice { frame, plan, fixed_s, reserve_s } = self.drawn;
-        self.law.observe(frame, DRAWING, TICKS * drawn_s);
+    /// others. Whether γ may learn from it.
+    pub fn observe(&mut self, drawn_s: f64, work_s: f64, others_s: f64, target_s: f64) -> bool {
+        let DrawnChoice { frame, plan, fixed_s, reserve_s, .. } = self.drawn;
+        let update = self.law.observe(frame, DRAWING, TICKS * drawn_s);
         self.law.finished(frame, TICKS * (work_s + (others_s - reserve_s).max(0.0)));
         let missing = (work_s + others_s) / target_s - plan.predicted / (TICKS * target_s);
         let spent_s = plan.predicted / TICKS - fixed_s;
@@ -127,6 +128,16 @@ impl AdaptiveChoice {
             () if plan.budget / (TICKS * target_s) - spent_s / target_s > ON_TARGET => Status::BetweenLevels,
             () => Status::Settled,
         };
+        update != FilterUpdate::Rejected
+    }
+
+    /// Takes the γ of other prices; by those before, the frame that was drawn cost `priced_s`. A ladder's sizes are rounded and its prices with them.
+    pub fn replace_prices(&mut self, estimator: SpeedEstimator, priced_s: f64) {
+        let DrawnChoice { plan, fixed_s, slowness, .. } = self.drawn;
+        let table_s = (plan.predicted / TICKS - fixed_s) / slowness;
+        let rounding = priced_s / table_s;
+        let known = rounding.is_finite() && rounding > 0.0;
+        self.law.replace_estimator(DRAWING, estimator.rescaled(if known { rounding } else { 1.0 }));
     }
 
     /// Reports an outside disturbance: measurements of the next few frames are ignored.

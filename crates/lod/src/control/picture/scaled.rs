@@ -6,7 +6,7 @@
 use super::super::render_scale::{PictureRung, ScaledFrame};
 use super::PictureControl;
 use crate::control::demand::plan::{LevelDemand, SizedView, steers};
-use crate::control::demand::policy::{Policy, prices};
+use crate::control::demand::policy::Policy;
 use crate::control::demand::view::{Pieces, Shading};
 use crate::control::prices::ladder::Rung;
 use crate::control::prices::price::{Backdrop, Prices};
@@ -34,7 +34,7 @@ impl PictureControl {
             // the frozen picture says nothing of later ones
             return self.scale.disturb();
         }
-        let prices = prices(self.policy, &self.prices);
+        let prices = self.policy_prices();
         let here = self.scale.rung();
         let coarsest: Vec<_> = self.drawn().map(|(at, seen, level)| self.coarsest(at, seen, level)).collect();
         let backdrop = self.backdrop;

@@ -8,10 +8,14 @@ use crate::control::choice::quality_boost::QualityBoost;
 use crate::control::demand::policy::{Law, Policy, prices, usual_sliders};
 use crate::control::flicker::Changes;
 use crate::control::prices::price::{Backdrop, Prices};
+use crate::control::prices::serial::SerialPart;
 use crate::cost::benefit::{GivenSliders, Sliders};
 use crate::cost::pipeline::Pipeline;
 use crate::cost::value::Value;
 use std::time::Duration;
+
+/// Least part of the faster stage that is taken to show.
+const SERIAL_LEAST: f64 = 1.0 / 64.0;
 
 impl PictureControl {
     /// Changes the policy. The loop continues from the present picture.
@@ -83,6 +87,7 @@ impl PictureControl {
         let prices = prices.sound();
         if prices != self.prices {
             self.prices = prices;
+            (self.serial, self.learned_serial) = (SerialPart::default(), None);
             self.forget_ladders();
         }
     }
@@ -149,7 +154,19 @@ impl PictureControl {
 
     /// Prices of the next picture, as the policy reckons with them.
     pub(super) fn picture_prices(&self) -> Prices {
-        prices(self.policy, &self.prices.with_shadows(self.shadows()))
+        self.policy_prices().with_shadows(self.shadows())
+    }
+
+    /// Prices of a picture with shadows, as the policy reckons with them: the default knows that no triangle is quite hidden, so that of levels
+    /// that cost the same the coarsest is the cheapest, and learns how much is.
+    pub(super) fn policy_prices(&self) -> Prices {
+        let known = prices(self.policy, &self.prices);
+        match (self.policy, known.serial()) {
+            (Policy::Adaptive, Some(serial)) => {
+                known.with_serial(self.learned_serial.unwrap_or(serial).max(SERIAL_LEAST))
+            }
+            _ => known,
+        }
     }
 
     fn rung(&self) -> PictureRung {

@@ -7,3 +7,4 @@ pub mod benefit;
 pub mod ladder;
 pub mod logic;
 pub mod price;
+pub mod serial;

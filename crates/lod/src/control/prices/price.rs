@@ -112,6 +112,21 @@ impl Prices {
         }
     }
 
+    /// The part of the faster stage of drawing that the slower does not hide; `None` where pixels of objects have no price, so that nothing is
+    /// hidden.
+    #[must_use]
+    pub fn serial(&self) -> Option<f64> {
+        let mut stages = self.shading.iter().chain(&self.strokes);
+        stages.any(|stages| stages.pixel > 0.0).then(|| self.shading[0].serial)
+    }
+
+    /// The same prices where the slower stage of drawing does not hide this part of the faster, 0 … 1.
+    #[must_use]
+    pub fn with_serial(self, serial: f64) -> Self {
+        let part = |stages: Stages| Stages { serial: crate::within(serial, 0.0, 1.0), ..stages };
+        Self { shading: self.shading.map(part), strokes: self.strokes.map(part), ..self }
+    }
+
     /// The same prices without prices by area: for policies that use two stages only (FS93, MB97, GB99).
     #[must_use]
     pub fn by_lines(self) -> Self {

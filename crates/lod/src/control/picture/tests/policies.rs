@@ -451,3 +451,62 @@ fn where_no_time_is_left_raising_changes_nothing() {
         assert_eq!(with.last_plan().levels, without.last_plan().levels);
     }
 }
+
+/// Eight meshes whose pixels take as long as 500 triangles each, by prices with this z, at 80 Hz.
+fn pixel_bound(serial: f64) -> (PictureControl, Vec<ObjectView>) {
+    let stages = crate::cost::stages::Stages { setup: 5e-6, polygon: 2.2e-6, vertex: 0.0, pixel: 11e-9, serial };
+    let mut control = control(Policy::Adaptive, 80.0);
+    control.set_prices(Prices { frame_s: 0.0, pixel_s: 0.0, shading: [stages; 4], ..prices() });
+    (control, (0..8).map(|i| mesh(i, 1e5, 480)).collect())
+}
+
+/// 200 frames, before a camera at rest or one that swings, of a control that is given the prices with z = `assumed` on a machine with z = `truth` that trembles by
+/// 1 %: triangles of the last frame, frames past 1.05 T after the tenth, levels that came and went, of how many.
+fn frames_with(assumed: f64, truth: f64, swing: f64) -> (f64, u32, u32, usize) {
+    let (mut control, still) = pixel_bound(assumed);
+    let machine = control.prices().with_serial(truth);
+    let (mut late, mut reversals, mut views) = (0, 0, still.clone());
+    for k in 0..200 {
+        for (i, (view, still)) in (0..).zip(views.iter_mut().zip(&still)) {
+            view.pixels = still.pixels * (swing * (0.05 * f64::from(k) + f64::from(i)).sin()).exp();
+        }
+        let plan = control.plan(&views).clone();
+        let tremble = 1.0 + 0.02 * f64::from(k * 7919 % 101) / 100.0;
+        let work_s = tremble * machine.objects_s(views.iter(), &plan.levels);
+        control.observe(frame_work(Duration::from_secs_f64(work_s), false));
+        late += u32::from(k >= 10 && work_s * 80.0 > 1.05);
+        reversals += plan.reversals;
+    }
+    (control.last_plan().polygons, late, reversals, 200 * views.len())
+}
+
+#[test]
+fn a_z_that_the_prices_have_wrong_is_learned_and_levels_come_to_where_the_right_prices_have_them() {
+    for (assumed, truth) in [(0.0, 1.0), (0.0, 0.5), (1.0, 0.0), (0.25, 0.75)] {
+        let (told, ..) = frames_with(truth, truth, 0.0);
+        let (learned, late, reversals, _) = frames_with(assumed, truth, 0.0);
+        assert!(
+            (learned / told - 1.0).abs() < 0.1,
+            "{assumed} for {truth}: {learned} triangles, {told} where it is told"
+        );
+        assert_eq!((late, reversals), (0, 0), "{assumed} for {truth}");
+        let (_, late, reversals, levels) = frames_with(assumed, truth, 0.2);
+        assert!(
+            late <= 4 && f64::from(reversals) <= 0.005 * levels as f64,
+            "{assumed} for {truth}: {late}, {reversals}"
+        );
+    }
+}
+
+#[test]
+fn a_slower_machine_is_not_taken_for_another_z_for_long() {
+    let (mut control, views) = pixel_bound(0.0);
+    control.set_target_hz(60.0);
+    let machine = *control.prices();
+    for _ in 0..60 {
+        let work_s = 1.6 * machine.objects_s(views.iter(), &control.plan(&views).levels);
+        control.observe(frame_work(Duration::from_secs_f64(work_s), false));
+    }
+    // all levels cost the same, and the finest fit
+    assert_eq!(control.last_plan().polygons, control.last_plan().full_polygons);
+}
