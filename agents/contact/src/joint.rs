@@ -31,8 +31,8 @@ pub struct Joint {
     pub yields_above_n: f64,
     /// Dry friction of a hinge or a ball in its socket, N·m, or a slide, N, ≥ 0, beside its motor; 0 of other kinds.
     pub friction: f64,
-    /// Inertia about the axis of a hinge, kg·m², or along that of a slide, kg, ≥ 0: of a rotor behind a gear, which resists changes of the
-    /// rate at which b moves against a and is nowhere else. 0 of other kinds.
+    /// Inertia about the axis of a hinge or every axis of a ball in its socket, kg·m², or along that of a slide, kg, ≥ 0: of a rotor behind a gear,
+    /// which resists changes of the rate at which b moves against a and is nowhere else. 0 of other kinds.
     pub armature: f64,
     /// The joint that a hinge or slide follows; none of other kinds.
     pub mimic: Option<Mimic>,

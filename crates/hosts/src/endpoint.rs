@@ -13,7 +13,7 @@ use zenoh::{Config, Session, Wait};
 
 /// An end that sends nothing for so long is silent.
 pub(crate) const LEASE: Duration = Duration::from_secs(1);
-/// The most links of a host: more than there are places, so that links of callers without one keep no other out.
+/// The most links of a host: more than there are places, so that a few links of callers without one keep no other out.
 const LINKS_MAX: usize = 4 * SESSIONS_MAX;
 
 /// The side of a session.

@@ -100,7 +100,7 @@ impl<'a> Meshes<'a> {
         }
     }
 
-    /// Ground that stays, as its surface is.
+    /// The closed surface of ground, which is no hull.
     pub(crate) fn ground(&mut self, name: &str, surface: Triangles) -> Result<Shape, String> {
         let key = format!("ground {name}");
         let file = match self.made.get(&key) {
@@ -193,7 +193,7 @@ impl<'a> Meshes<'a> {
         Ok(Shape::Hull { file, scale: 1.0 })
     }
 
-    /// A new OBJ file.
+    /// Adds an OBJ file, and returns its path.
     fn write(&mut self, key: String, stem: &str, surface: &Triangles) -> String {
         let mut text = String::new();
         for point in &surface.points {

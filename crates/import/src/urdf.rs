@@ -70,7 +70,7 @@ pub(crate) fn read(root: &Element, mut meshes: Meshes<'_>, notes: &mut Vec<LeftO
     }
     let mut drafts = root.children("joint").map(draft).collect::<Result<Vec<_>, _>>()?;
     let leaders = drop_mimics(&mut drafts, notes);
-    find_starts(&mut drafts, &leaders);
+    find_starts(&mut drafts, &leaders)?;
     for draft in &drafts {
         for (key, name) in [("parent", draft.parent), ("child", draft.child)] {
             if !links.contains_key(name) {
@@ -226,7 +226,7 @@ fn drop_mimics(drafts: &mut [Draft<'_>], notes: &mut Vec<LeftOut>) -> Vec<Option
 }
 
 /// Finds the positions at which joints start: each after the one that it follows.
-fn find_starts(drafts: &mut [Draft<'_>], leaders: &[Option<usize>]) {
+fn find_starts(drafts: &mut [Draft<'_>], leaders: &[Option<usize>]) -> Result<(), ImportError> {
     let mut is_found = vec![false; drafts.len()];
     for at in 0..drafts.len() {
         let mut chain: Vec<usize> =
@@ -235,11 +235,18 @@ fn find_starts(drafts: &mut [Draft<'_>], leaders: &[Option<usize>]) {
             let led = drafts[at].mimic.zip(leaders[at]);
             let wanted = led.map_or(0.0, |(mimic, leads)| mimic.multiplier * drafts[leads].start + mimic.offset);
             let draft = &mut drafts[at];
+            if wanted.abs() > RATIO_MAX {
+                let what = format!(
+                    "would start at {wanted:e}, where the joint that it follows leads it; expected {RATIO_MAX} at most"
+                );
+                return Err(draft.element.wrong(what));
+            }
             draft.wanted = wanted;
             draft.start = draft.limits.map_or(wanted, |[lower, upper]| wanted.clamp(lower, upper));
             is_found[at] = true;
         }
     }
+    Ok(())
 }
 
 /// Lists a joint that starts elsewhere than it wants to.

@@ -19,7 +19,7 @@ pub(crate) struct Weight {
 }
 
 impl Weight {
-    /// That of a surface that stays.
+    /// The weight of ground that stays: none.
     pub(crate) const NONE: Self = Self { mass_kg: 0.0, com_m: DVec3::ZERO, inertia_kg_m2: DMat3::ZERO };
 
     /// That of a body whose moments are given, in its axes.

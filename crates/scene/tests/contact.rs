@@ -123,7 +123,7 @@ fn a_mimic_that_cannot_be_is_told_with_what_was_expected() {
     mimic("joint = \"ball\"", &["is neither revolute nor prismatic"]);
     let ring = wheels("mimic = { joint = \"wheel\" }")
         .replace("motor = { velocity_rad_s = -0.5 }", "mimic = { joint = \"cart\" }");
-    refused("", "", &ring, &["follows this joint in turn", "expected a joint that moves by itself"]);
+    refused("", "", &ring, &["is a joint that follows this one in turn", "expected a joint that moves by itself"]);
     mimic("joint = \"wheel\", ratio = 1e7", &["`ratio`", "is 10000000", "-1000000 to 1000000"]);
     let ball = "[[joint]]\nkind = \"spherical\"\na = \"ball\"\nb = \"world\"\nmimic = { joint = \"x\" }";
     refused("", "", ball, &["`mimic`", "does not belong to a spherical joint"]);

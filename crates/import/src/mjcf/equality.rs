@@ -8,6 +8,7 @@ use crate::imported::ImportError;
 use crate::model::{Joint, Kind, Mimic};
 use crate::xml::{Element, RATIO_MAX};
 use glam::DVec3;
+use std::collections::BTreeMap;
 
 /// Coordinates that differ by less are equal, rad or m.
 const ROUNDING: f64 = 1e-9;
@@ -92,10 +93,8 @@ fn follow(element: &Element, reader: &mut BodyReader<'_>) -> Result<(), ImportEr
     }
     let before = reader.model.joints[follows].mimic.is_some();
     let joints = &reader.model.joints;
-    let above = |joint: &usize| {
-        let mimic = joints[*joint].mimic.as_ref()?;
-        joints.iter().position(|joint| joint.name == mimic.joint)
-    };
+    let named: BTreeMap<&str, usize> = joints.iter().enumerate().map(|(at, joint)| (&*joint.name, at)).collect();
+    let above = |joint: &usize| named.get(&*joints[*joint].mimic.as_ref()?.joint).copied();
     let is_ring = std::iter::successors(Some(leads), above).any(|joint| joint == follows);
     let mut note = |what: String| reader.notes.push(element.note(what));
     if before {
@@ -103,7 +102,8 @@ fn follow(element: &Element, reader: &mut BodyReader<'_>) -> Result<(), ImportEr
         return Ok(());
     }
     if is_ring {
-        note(format!("is left out: `{}` follows this joint already", joints[leads].name));
+        let [joint, other] = [follows, leads].map(|at| &joints[at].name);
+        note(format!("is left out: `{other}` follows `{joint}` already"));
         return Ok(());
     }
     if (2..5).any(|at| power(at) != 0.0) {

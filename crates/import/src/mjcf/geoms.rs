@@ -102,6 +102,7 @@ impl BodyReader<'_> {
             return Err(element.wrong("has a mass or density below zero"));
         }
         let density_kg_m3 = match (mass_kg, &shape) {
+            _ if element.has("hfield") => Some(0.0),
             (_, Shape::Solid(Solid::Plane)) | (Some(0.0), _) => Some(0.0),
             (None, _) => Some(given),
             (Some(mass), Shape::Solid(solid)) => {
@@ -168,6 +169,7 @@ impl BodyReader<'_> {
         let Some(field) = self.height_fields.get(name).copied() else {
             return Err(element.wrong(format!("names the height field `{name}`, and there is none of that name")));
         };
+        field.needed("size")?;
         let size = field.numbers::<4>("size")?.unwrap_or_default();
         if size.iter().any(|value| *value <= 0.0) {
             return Err(field.wrong(format!("`size` is {size:?}; expected four lengths of more than zero")));

@@ -7,14 +7,15 @@ use crate::xml::Element;
 use glam::DVec3;
 use metachron_geometry::{Solid, Triangles};
 
-/// The most points of a grid.
-const POINTS_MAX: usize = 1_000_000;
+/// The most rows or columns of a grid, and the most triangles of its surface: those of a mesh.
+const SIDE_MAX: usize = 400_000;
+const TRIANGLES_MAX: usize = 1_000_000;
 
 /// The heights of a grid over its base, row by row from its lowest y, each row from its lowest x.
 pub(super) struct Heights {
     rows: usize,
     columns: usize,
-    /// From 0 to 1; none where all are zero.
+    /// From 0 to 1; none where all are equal.
     of_points: Vec<f64>,
 }
 
@@ -33,8 +34,8 @@ impl Heights {
     pub(super) fn here(element: &Element) -> Result<Self, ImportError> {
         let count = |name: &str| {
             let count = element.needed_number(name)?;
-            let is_count = count.fract() == 0.0 && (2.0..=POINTS_MAX as f64).contains(&count);
-            let expected = || element.wrong(format!("`{name}` is {count}; expected a whole number from 2"));
+            let is_count = count.fract() == 0.0 && (2.0..=SIDE_MAX as f64).contains(&count);
+            let expected = || element.wrong(format!("`{name}` is {count}; expected a whole number, 2 to {SIDE_MAX}"));
             if is_count { Ok(count as usize) } else { Err(expected()) }
         };
         let [rows, columns] = [count("nrow")?, count("ncol")?];
@@ -52,25 +53,31 @@ impl Heights {
         let words = bytes.as_chunks::<4>().0;
         let count = |at: usize| words.get(at).and_then(|word| usize::try_from(i32::from_le_bytes(*word)).ok());
         let (Some(rows), Some(columns)) = (count(0), count(1)) else {
-            return Err("it has no counts of rows and columns".to_owned());
+            return Err("expected the counts of its rows and columns first, whole numbers of 32 bits".to_owned());
         };
         let wanted = rows.checked_mul(columns).and_then(|points| points.checked_add(2)?.checked_mul(4));
         if wanted != Some(bytes.len()) || rows < 2 || columns < 2 {
-            return Err(format!("it has {rows} rows and {columns} columns in {} bytes", bytes.len()));
+            let found = format!("it has {rows} rows and {columns} columns in {} bytes", bytes.len());
+            return Err(format!(
+                "{found}; expected two of each or more, and 4 bytes for each height after the first 8"
+            ));
         }
         let of_points = words[2..].iter().map(|word| f64::from(f32::from_le_bytes(*word))).collect();
         Self::new(rows, columns, of_points)
     }
 
     fn new(rows: usize, columns: usize, mut of_points: Vec<f64>) -> Result<Self, String> {
-        if rows.saturating_mul(columns) > POINTS_MAX {
-            return Err(format!("it has {rows} rows and {columns} columns; expected at most {POINTS_MAX} points"));
-        }
-        if of_points.iter().any(|height| !height.is_finite()) {
-            return Err("a height is not finite".to_owned());
+        // two for each cell of the grid, and three for each side of its rim
+        let triangles = rows.saturating_mul(columns).saturating_mul(2) + 6 * (rows + columns);
+        if triangles > TRIANGLES_MAX {
+            let what = format!("it has {rows} rows and {columns} columns, {triangles} triangles");
+            return Err(format!("{what}; expected at most {TRIANGLES_MAX}"));
         }
         let low = of_points.iter().copied().fold(f64::INFINITY, f64::min);
         let high = of_points.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+        if !of_points.is_empty() && !(high - low).is_finite() {
+            return Err(format!("its heights are from {low:e} to {high:e}; expected finite ones"));
+        }
         of_points.iter_mut().for_each(|height| *height = (*height - low) / (high - low));
         if high <= low {
             of_points.clear();

@@ -48,11 +48,18 @@ fn heights_of_a_file_go_from_the_smallest_y_and_bad_ones_are_told() {
     let found = rests(&read(r#"file="hill.bin""#).unwrap());
     assert!((found[0] - 1.1).abs() < 1e-3 && (found[1] - 1.6).abs() < 1e-3, "{found:?}");
     let short = left_out(&read(r#"file="short.bin""#).unwrap());
-    assert!(short[0].ends_with("is left out: `short.bin`: it has 4 rows and 2 columns in 20 bytes"), "{short:?}");
+    assert!(short[0].ends_with("is left out: `short.bin`: it has 4 rows and 2 columns in 20 bytes; expected two of each or more, and 4 bytes for each height after the first 8"), "{short:?}");
     for (field, why) in [
-        (r#"nrow="1" ncol="3""#, "`nrow` is 1; expected a whole number from 2"),
+        (r#"nrow="1" ncol="3""#, "`nrow` is 1; expected a whole number, 2 to 400000"),
         (r#"nrow="2" ncol="2" elevation="1 2 3""#, "`elevation` has 3 numbers; expected 4"),
-        (r#"nrow="9999" ncol="9999""#, "it has 9999 rows and 9999 columns; expected at most 1000000 points"),
+        (
+            r#"nrow="9999" ncol="9999""#,
+            "it has 9999 rows and 9999 columns, 200079990 triangles; expected at most 1000000",
+        ),
+        (
+            r#"nrow="2" ncol="2" elevation="0 1e308 -1e308 3""#,
+            "its heights are from -1e308 to 1e308; expected finite ones",
+        ),
         (r#"file="none.bin""#, "names `none.bin`, and there is no such file; expected it beside the model"),
     ] {
         let refused = read(field).unwrap_err().to_string();

@@ -516,7 +516,7 @@ fn an_equality_that_no_joint_of_a_scene_can_keep_is_listed_or_refused() {
     let twice = r#"<joint joint1="first" joint2="second"/><joint joint1="first" joint2="second"/>"#;
     assert!(listed(twice)[0].ends_with("a joint of a scene follows one other, and this one does already"));
     let ring = r#"<joint joint1="first" joint2="second"/><joint joint1="second" joint2="first"/>"#;
-    assert_eq!(listed(ring), ["line 6: equality, joint: is left out: `first` follows this joint already"]);
+    assert_eq!(listed(ring), ["line 6: equality, joint: is left out: `first` follows `second` already"]);
     for (equality, why) in [
         (r#"<joint joint1="first" joint2="third"/>"#, "names `third`, and there is no hinge or slide of that name"),
         (r#"<joint joint1="first" joint2="ball"/>"#, "names `ball`, and there is no hinge or slide of that name"),

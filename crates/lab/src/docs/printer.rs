@@ -175,24 +175,47 @@ fn wrong(why: anyhow::Error) -> anyhow::Error {
     BadInput(format!("{why:#}")).into()
 }
 
-/// Tables as printed anew, with the stamp and the live columns, row by row, of those that stand in the document; a row that it has not yet has
-/// dashes there.
+/// Tables as printed anew, with the stamp of those that stand in the document, and with the live columns of their rows whose other cells are the
+/// same; a row that is new, or says something else now, has dashes there.
 fn kept(fresh: &str, old: &str, live: LiveColumns) -> String {
     let (stamped, old) = old.split_once("\n\n").unwrap_or((old, ""));
-    let (mut header, mut before) = (Vec::new(), old.lines());
-    let lines = fresh.lines().map(|line| {
-        let (new, known) = (cells(line), cells(before.next().unwrap_or_default()));
-        if header.len() != new.len() {
-            header.clone_from(&new);
-        }
-        if new.is_empty() {
+    let mut known = rows(old);
+    let lines = fresh.lines().zip(rows(fresh)).map(|(line, row)| {
+        if row.is_empty() {
             return line.to_owned();
         }
-        let is_live = |k: usize| header[k] != new[k] && live.has(header[k]);
-        let cell = |k: usize| if is_live(k) { known.get(k).copied().unwrap_or("–") } else { new[k] };
-        format!("| {} |", (0..new.len()).map(cell).collect::<Vec<_>>().join(" | "))
+        let is_live = |name: &str, cell: &str| name != cell && live.has(name);
+        let has = |old: &Vec<NamedCell<'_>>, cell: &NamedCell<'_>| is_live(cell.name, cell.text) || old.contains(cell);
+        let same = known.iter_mut().find(|old| row.iter().all(|cell| has(old, cell)));
+        // each row is the time of one
+        let same = same.map(std::mem::take).unwrap_or_default();
+        let cell = |cell: &NamedCell<'_>| {
+            let before = same.iter().find(|old| old.name == cell.name).map_or("–", |old| old.text);
+            if is_live(cell.name, cell.text) { before.to_owned() } else { cell.text.to_owned() }
+        };
+        format!("| {} |", row.iter().map(cell).collect::<Vec<_>>().join(" | "))
     });
     format!("{stamped}\n\n{}\n", lines.collect::<Vec<_>>().join("\n"))
+}
+
+/// A cell of a table with the name of its column.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct NamedCell<'a> {
+    name: &'a str,
+    text: &'a str,
+}
+
+/// The cells of each line of tables, headers among them; none of another line.
+fn rows(text: &str) -> Vec<Vec<NamedCell<'_>>> {
+    let mut header = Vec::new();
+    let row = |line| {
+        let all = cells(line);
+        if header.len() != all.len() {
+            header.clone_from(&all);
+        }
+        header.iter().zip(all).map(|(name, text)| NamedCell { name, text }).collect()
+    };
+    text.lines().map(row).collect()
 }
 
 /// The cells of a line of a table; none of another line.
@@ -251,9 +274,12 @@ mod tests {
     fn live_columns_are_those_of_the_document_and_others_are_printed_anew() {
         let live = LiveColumns::These(&["ms"]);
         let old = "Measured on 2026-11-30, here.\n\n| n | ms | error |\n| --: | --: | --: |\n| 8 | 1.5 | 0.02 |\n";
-        let fresh = "| n | ms | error |\n| --: | --: | --: |\n| 8 | 9.9 | 0.03 |\n| 16 | 9.9 | 0.01 |\n";
-        let merged = old.replace("0.02", "0.03") + "| 16 | – | 0.01 |\n";
-        assert_eq!(kept(fresh, old, live), merged);
+        let fresh = "| n | ms | error |\n| --: | --: | --: |\n| 8 | 9.9 | 0.02 |\n| 16 | 9.9 | 0.01 |\n";
+        assert_eq!(kept(fresh, old, live), old.to_owned() + "| 16 | – | 0.01 |\n");
+        // times go with their rows, wherever these and their columns stand, and with no others
+        let moved = "| ms | n | error |\n| --: | --: | --: |\n| 9.9 | 16 | 0.01 |\n| 9.9 | 8 | 0.02 |\n";
+        assert!(kept(moved, old, live).ends_with("| – | 16 | 0.01 |\n| 1.5 | 8 | 0.02 |\n"));
+        assert!(kept(&fresh.replace("0.02", "0.03"), old, live).contains("| 8 | – | 0.03 |"));
         let columns = |names: &[&'static str]| Repeats::of(&[View::Columns(names.to_vec())], live);
         assert_eq!(columns(&["n", "error"]), Repeats::All);
         assert_eq!(columns(&["n", "ms"]), Repeats::Columns);

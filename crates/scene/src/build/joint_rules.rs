@@ -8,6 +8,8 @@ use metachron_core::AgentId;
 use metachron_models::rigid::{JOINT_GAP_MAX_M as GAP_MAX_M, JointKind, Mimic};
 use std::collections::BTreeMap;
 
+/// The farthest that a joint is from the travel of the joint that it follows times their ratio, where both start, rad or m.
+const OFFSET_MAX: f64 = 1e9;
 /// Directions that differ by less than this are one direction: sine of the angle.
 const SAME_DIRECTION: f64 = 1e-3;
 
@@ -68,7 +70,7 @@ pub(super) fn tie_mimics(c: &mut Checker<'_, '_>, all: &mut [PlacedJoint]) {
         let above = |number: &usize| Some(all[*number].mimic?.joint as usize);
         let mut leaders = std::iter::successors(above(&own), above).take(all.len());
         if leaders.any(|number| number == own) {
-            let what = "follows this joint in turn";
+            let what = "is a joint that follows this one in turn";
             c.wrong(
                 &joint.place.table("mimic"),
                 "joint",
@@ -81,6 +83,10 @@ pub(super) fn tie_mimics(c: &mut Checker<'_, '_>, all: &mut [PlacedJoint]) {
     for (joint, travel) in all.iter_mut().zip(&travels) {
         if let Some(mimic) = &mut joint.mimic {
             mimic.offset = travel - mimic.ratio * travels[mimic.joint as usize];
+            if mimic.offset.abs() > OFFSET_MAX {
+                let what = format!("puts the two {:e} apart where they start", mimic.offset);
+                c.wrong(&joint.place.table("mimic"), "ratio", what, format!("expected {OFFSET_MAX:e} at most"));
+            }
         }
     }
 }

@@ -48,8 +48,8 @@ impl Joints {
     }
 }
 
-/// The travels of two joints, each as near as whole turns let it be to where it was before the last step. Where somebody has put a body of
-/// theirs somewhere else since, nothing is known of turns but that the two are together.
+/// The travels of two joints, each as near as whole turns let it be to where it was before the last step. Where a command has put one of
+/// their bodies somewhere else since, nothing is known of turns but that the two are together.
 fn travels(step: &FineStep<'_, '_>, both: [&Held; 2], mimic: Mimic, owner: &RowOwner) -> [f64; 2] {
     let now = both.map(|held| held.now.travel);
     let mut bodies = both.into_iter().flat_map(|held| [Some(held.of.a), held.of.b]).flatten();
@@ -95,10 +95,10 @@ impl Mimic {
             let round = if follower_turns { (self.gap([follows, leads]) / TAU).round() } else { 0.0 };
             [follows - TAU * round, leads]
         };
-        // the turns of a screw are those that its nut says
-        let of_nut = (self.gap(travels) / (TAU * self.ratio)).round();
+        // a nut says how often its screw has turned
+        let of_nut = (!follower_turns).then(|| (self.gap(travels) / (TAU * self.ratio)).round());
         let some = (1..=TURNS_MAX).flat_map(|turns| [turns, -turns]).map(f64::from);
-        let turns = [0.0, of_nut].into_iter().chain(some).take(if leader_turns { usize::MAX } else { 1 });
+        let turns = std::iter::once(0.0).chain(of_nut).chain(some).take(if leader_turns { usize::MAX } else { 1 });
         let mut together = turns.map(turned).filter(|travels| self.gap(*travels).abs() <= JOINT_GAP_MAX_M);
         together.next().unwrap_or_else(|| turned(0.0))
     }
