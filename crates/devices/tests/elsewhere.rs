@@ -29,7 +29,7 @@ struct Distant {
     line: Mutex<Line>,
 }
 
-/// What is on its way, and what has come, at a time in milliseconds.
+/// Messages that are on their way, and those that have come, at a time in milliseconds.
 #[derive(Default)]
 struct Line {
     now_ms: u64,

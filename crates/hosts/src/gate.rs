@@ -6,7 +6,7 @@
 use std::collections::{BTreeMap, HashMap};
 use std::time::{Duration, Instant};
 
-/// The places for callers, which the holders of certificates whom a host names share evenly, each having one at least; callers without certificates
+/// The places for callers, which the names of certificates that a host lets in share evenly, each having one at least; callers without certificates
 /// are one holder.
 pub const SESSIONS_MAX: usize = 64;
 /// The most calls of a peer in a second: the holder of a certificate with all its sessions; a caller where there are no certificates, and all

@@ -69,7 +69,7 @@ pub(crate) struct Sketches {
     bodies: HashMap<AgentId, Vec<u8>>,
 }
 
-/// What a message changes of the bodies that a caller has.
+/// The changes that a message brings to the bodies that a caller has.
 #[derive(Debug, Default)]
 pub(crate) struct Change {
     sequence: u64,

@@ -118,12 +118,11 @@ impl<'a> Meshes<'a> {
     /// # Errors
     /// Where there is no such file.
     pub(crate) fn bytes(&self, element: &Element, name: &str) -> Result<Result<Vec<u8>, String>, ImportError> {
-        let path = self.folders.find(element, name)?;
-        Ok(self
-            .folders
-            .read
-            .ok_or("no file is read here".to_owned())
-            .and_then(|read| read(&path).map_err(|why| why.to_string())))
+        Ok(self.bytes_at(&self.folders.find(element, name)?))
+    }
+
+    fn bytes_at(&self, path: &Path) -> Result<Vec<u8>, String> {
+        self.folders.read.ok_or("no file is read here")?(path).map_err(|why| why.to_string())
     }
 
     /// The surface that a hull was made of, in metres; `None` where it cannot be read.
@@ -140,8 +139,7 @@ impl<'a> Meshes<'a> {
     }
 
     fn read_anew(&self, path: &Path) -> Result<Triangles, String> {
-        let read = self.folders.read.ok_or("no file is read here")?;
-        let bytes = read(path).map_err(|why| why.to_string())?;
+        let bytes = self.bytes_at(path)?;
         let surface = match extension(&path.to_string_lossy()).as_str() {
             "dae" => {
                 let text = std::str::from_utf8(&bytes).map_err(|why| why.to_string())?;
@@ -171,7 +169,7 @@ impl<'a> Meshes<'a> {
         if let Some(file) = self.made.get(&key) {
             return Ok(file.clone());
         }
-        let bytes = self.folders.read.ok_or("no file is read here")?(path).map_err(|why| why.to_string())?;
+        let bytes = self.bytes_at(path)?;
         let name = path.file_name().and_then(|name| name.to_str()).ok_or("its name is no text")?;
         let (stem, kind) = name.rsplit_once('.').unwrap_or((name, "obj"));
         let file = self.unused(stem, kind);

@@ -66,7 +66,7 @@ Frames are drawn here, within a budget of their own. Pause, speed, springs and p
 pub struct ViewArgs {
     /// Where the world is served
     pub endpoint: String,
-    /// As whom it is called.
+    /// The caller by its certificate, or without one.
     #[command(flatten)]
     pub call: CallArgs,
     /// Open no window: pictures, films and files of what is seen
@@ -127,7 +127,7 @@ pub struct ToolArgs {
     /// Where the world is served
     #[arg(long, value_name = "ENDPOINT")]
     pub connect: String,
-    /// As whom it is called.
+    /// The caller by its certificate, or without one.
     #[command(flatten)]
     pub call: CallArgs,
     /// End after this many seconds; at Ctrl-C where not given

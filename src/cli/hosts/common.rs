@@ -1,4 +1,4 @@
-//! What the commands of worlds elsewhere share: a world is reached, its scene read, Ctrl-C noticed, an error told.
+//! The common part of the commands of worlds elsewhere: reaching a world, reading its scene, Ctrl-C, errors.
 //!
 //! In: an endpoint, how it is called. Out: the world there and its scene. Never here: what a command does with them.
 

@@ -23,7 +23,7 @@ pub(in super::super) fn tool(args: &ToolArgs) -> anyhow::Result<Exit> {
     let world = Arc::new(reached(&args.connect, &args.call, false).map_err(refused)?);
     let scene = scene_of(&args.connect, &world, &args.limits, None)?.scene;
     let bad = |error: WorldError| BadInput(format!("--leads: {error}"));
-    // a caller that may only look is told so before its device is opened
+    // the error of a caller that may only look comes before its device is opened
     world.command(world.object(&args.leads).map_err(bad)?, Command::wake()).map_err(bad)?;
     let mut ghosts = GhostWorld::of(&scene)?;
     ghosts.follow(&*world)?;

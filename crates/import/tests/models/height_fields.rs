@@ -37,7 +37,7 @@ fn balls_rest_on_the_heights_of_a_field_as_they_do_in_mujoco() {
 }
 
 #[test]
-fn heights_of_a_file_go_from_the_smallest_y_and_bad_ones_are_told() {
+fn heights_of_a_file_go_from_the_smallest_y_and_bad_ones_are_errors_at_their_element() {
     let folder = tempfile::tempdir().unwrap();
     let heights = [3.0_f32, 3.0, 3.0, 3.0, 7.0, 7.0, 7.0, 7.0];
     let counts = [4_i32, 2].map(i32::to_le_bytes);

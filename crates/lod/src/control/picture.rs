@@ -60,7 +60,7 @@ pub struct PictureControl {
     sliders: GivenSliders,
     value: Value,
     prices: Prices,
-    /// What frames say of z, and the z that they have taught.
+    /// The evidence of frames about z, and the z that they have taught.
     serial: SerialPart,
     learned_serial: Option<f64>,
     backdrop: Backdrop,
