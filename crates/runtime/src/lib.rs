@@ -50,6 +50,7 @@ pub use executors::pool::Pool;
 pub use executors::priority::{Priority, PriorityRefused, ask_priority, take_priority};
 pub use executors::threads::{AUTO_THREADS_MAX, THREADS_MAX, Threads};
 pub use lock_free::slot::{LatestSlot, SlotWriter};
+pub use neighbours::broad_phase::Reach;
 pub use records::events::{AgentEvent, ContactEvent, EVENTS_KEPT, EventKind};
 pub use records::governor::{Demand, Governor, TurnMeasure};
 pub use records::histogram::Percentiles;
@@ -144,6 +145,11 @@ pub trait Run: Send {
     fn record(&mut self, order: Arc<TurnOrder>, begun: Option<&mut Archive<'_>>) -> Result<(), ArchiveError> {
         drop(order);
         begun.map_or(Ok(()), |archive| self.save(archive))
+    }
+
+    /// The run in lockstep, which several processes can make together ([`Lockstep::release`]); `None` of a run in real time.
+    fn as_lockstep(&mut self) -> Option<&mut Lockstep> {
+        None
     }
 
     /// Simulated time now.

@@ -4,6 +4,7 @@
 //! connection, threads.
 
 use crate::history::checkpoint::{SceneIdentity, SceneMark};
+use crate::placing::divided::DividedCalls;
 use crate::reading::events::{Event, EventFilter, Events};
 use crate::reading::object::{Object, Touched};
 use crate::{Checkpoint, CheckpointError, Part, Scene, World, WorldError};
@@ -146,6 +147,10 @@ pub trait WorldCalls: Send + Sync {
     fn answers(&self) -> Result<(), WorldError>;
     /// Events from now on.
     fn listen(&self, filter: EventFilter) -> Box<dyn EventReader>;
+    /// The world as one that is stepped by several hosts ([`crate::PlacedWorld`]); `None` of one that cannot be.
+    fn divided(&self) -> Option<&dyn DividedCalls> {
+        None
+    }
 }
 
 impl WorldCalls for World {
@@ -227,5 +232,9 @@ impl WorldCalls for World {
 
     fn listen(&self, filter: EventFilter) -> Box<dyn EventReader> {
         Box::new(self.events(filter))
+    }
+
+    fn divided(&self) -> Option<&dyn DividedCalls> {
+        Some(self)
     }
 }

@@ -64,6 +64,12 @@ pub enum WorldError {
     /// The host of a world that runs elsewhere refused something, for a reason that has no other form there.
     #[error("{0}")]
     Elsewhere(String),
+    /// Several processes cannot step the world together.
+    #[error("the world's steps cannot be shared among hosts: {reason}")]
+    Undivided {
+        /// Why.
+        reason: String,
+    },
     /// A world that was stopped takes nothing any more.
     #[error("the world has been stopped")]
     Stopped,

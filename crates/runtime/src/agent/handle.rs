@@ -54,6 +54,8 @@ pub(crate) struct Identity {
     pub name: Arc<str>,
     pub model: &'static str,
     pub wanted_hz: f64,
+    /// No step of it is longer.
+    pub dt_max: SimSpan,
     /// Where its joints are, if there is one whose first body it is and that can have a motor.
     pub motored: Option<Arc<ClusterScene>>,
     /// The kinds of users' inputs that it takes ([`metachron_contact::Agent::inputs`]).

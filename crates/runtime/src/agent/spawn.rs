@@ -264,6 +264,7 @@ impl Identity {
             name: std::mem::take(&mut spawn.name).into(),
             model: traits.model,
             wanted_hz: spawn.rate_hz,
+            dt_max: spawn.dt_range.1,
             motored: is_motored.then(|| Arc::clone(&spawn.scene)),
             inputs: inputs.with(Input::Resolution, inputs.has(Input::Resolution) && spawn.range.is_some()),
             is_first,

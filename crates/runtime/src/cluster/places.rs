@@ -29,6 +29,16 @@ pub(in super::super) enum Place {
     Returning,
 }
 
+impl Place {
+    /// The agent that leads it, or that it waits for.
+    pub const fn leader(self) -> Option<AgentId> {
+        match self {
+            Self::Led { leader, .. } | Self::Waiting { leader, .. } => Some(leader),
+            Self::Home | Self::Returning => None,
+        }
+    }
+}
+
 /// Takes all runners from their places, for each number its own; `None` of an agent that has left and is not kept.
 /// `home` are the runners that make turns of their own.
 pub(in super::super) fn take_apart(
@@ -62,7 +72,7 @@ fn take(mut runner: Box<AgentRunner>, place: Place, all: &mut [Option<Placed>]) 
 ///
 /// # Errors
 /// [`ArchiveError::Mismatch`].
-pub(in super::super) fn check_places(places: &[Place], all: &[Option<&mut AgentRunner>]) -> Result<(), ArchiveError> {
+pub(in super::super) fn check_places(places: &[Place], all: &[Option<&AgentRunner>]) -> Result<(), ArchiveError> {
     let has_handover =
         |at: usize| all.get(at).and_then(Option::as_ref).is_some_and(|runner| runner.shared.handover().is_some());
     let leads = |leader: AgentId| has_handover(leader.0 as usize);

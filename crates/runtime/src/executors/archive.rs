@@ -4,6 +4,7 @@
 //! the run as it was. Never here: files, what models save of themselves ([`metachron_contact::Agent::archive`]). Not saved: CPU times,
 //! percentiles, samples of watched points, storage.
 
+mod migration;
 mod state;
 
 use crate::agent::agent_spawn::AgentSpawn;
@@ -16,6 +17,7 @@ use crate::time::virtual_events::VirtualEvents;
 use crate::turn::agent_runner::AgentRunner;
 use crate::turn::turn_order::{PartKind, TurnOrder};
 use metachron_core::{AgentId, Archive, ArchiveError};
+pub(super) use migration::Migration;
 use state::{OwnState, RunState, caught};
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -289,6 +291,11 @@ impl Cut {
     }
 }
 
+/// The error of a state that is not one of this run.
+fn refuse_other(what: &'static str, found: &str, expected: &str) -> ArchiveError {
+    ArchiveError::Mismatch { what, found: found.to_owned(), expected: expected.to_owned() }
+}
+
 /// Says that no agent is absent: for writing, and for runs of the same agents.
 ///
 /// # Errors
@@ -329,7 +336,7 @@ impl Placed {
         self.runner.shared.gauges.has_left()
     }
 
-    fn kept(self) -> Option<Self> {
+    pub fn kept(self) -> Option<Self> {
         self.runner.kept().map(|runner| Self { runner, ..self })
     }
 }

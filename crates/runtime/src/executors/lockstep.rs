@@ -6,6 +6,7 @@
 //! not end ([`crate::turn::watchdog`]).
 
 mod cores;
+mod divided;
 
 use super::archive::{Absent, Cut};
 use crate::Run;
@@ -26,6 +27,7 @@ use crate::turn::agent_runner::{AgentRunner, Effort, Next};
 use crate::turn::helpers::Helpers;
 use crate::turn::watchdog::UnwatchedTurns;
 use cores::Cores;
+use divided::Division;
 use metachron_core::{AgentId, Archive, ArchiveError};
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
@@ -49,6 +51,7 @@ pub struct Lockstep {
     jobs: Vec<Duration>,
     unwatched: Arc<UnwatchedTurns>,
     turns: u64,
+    division: Division,
 }
 
 /// An agent and the phase of its turns.
@@ -76,8 +79,22 @@ impl Lockstep {
         let (due, batch, unsettled) = (BinaryHeap::with_capacity(all.handles.len()), CpuBatch::default(), Vec::new());
         let now = Duration::ZERO;
         let (jobs, turns, unwatched) = (Vec::new(), 0, UnwatchedTurns::new(&all.handles));
-        let mut run =
-            Self { machine, timeline, now, entries, due, cores, all, batch, unsettled, jobs, unwatched, turns };
+        let division = Division::default();
+        let mut run = Self {
+            machine,
+            timeline,
+            now,
+            entries,
+            due,
+            cores,
+            all,
+            batch,
+            unsettled,
+            jobs,
+            unwatched,
+            turns,
+            division,
+        };
         run.schedule_all();
         Ok(run)
     }
@@ -99,6 +116,7 @@ impl Lockstep {
     fn schedule(&mut self, agent: usize) {
         let entry = &self.entries[agent];
         if entry.phase == Phase::Waiting
+            && !self.division.is_away(agent)
             && let Some(due) = entry.actor.as_ref().and_then(|actor| actor.pace.due(&self.timeline))
         {
             self.due.push(Reverse((due.max(self.now), agent as u32)));
@@ -111,6 +129,9 @@ impl Lockstep {
             return;
         }
         for agent in 0..self.entries.len() {
+            if self.division.is_away(agent) {
+                continue;
+            }
             let entry = &mut self.entries[agent];
             match (entry.phase, &mut entry.actor) {
                 (Phase::Resting, Some(actor)) => {
@@ -151,9 +172,11 @@ impl Lockstep {
         }
     }
 
-    /// Processes events until `limit`, or until the frame's own job has ended, or another thread has ended the run ([`Agents::end_stalled`]).
+    /// Processes events until `limit`, or until the frame's own job has ended, an agent of a divided run has left its box, or another thread has
+    /// ended the run ([`Agents::end_stalled`]).
     fn run(&mut self, limit: Duration) {
         while !self.all.sleep.stopping()
+            && !(self.division.has_escaped() && self.cores.until_end().is_none())
             && let Some(event) = self.next_event(limit)
         {
             match event {
@@ -199,9 +222,10 @@ impl Lockstep {
             }
             None => entry.phase = Phase::Parked,
         }
+        self.check_fences(agent);
         self.count_cpu(agent, started.elapsed());
         if self.entries[agent].phase == Phase::Parked {
-            self.release(agent);
+            self.free(agent);
         }
     }
 
@@ -239,7 +263,7 @@ impl Lockstep {
     }
 
     /// Frees the runner of an agent that has left, where it is not kept.
-    fn release(&mut self, agent: usize) {
+    fn free(&mut self, agent: usize) {
         self.settle();
         let entry = &mut self.entries[agent];
         entry.actor = entry.actor.take().and_then(AgentRunner::kept);
@@ -364,7 +388,7 @@ impl Run for Lockstep {
             return;
         }
         self.run(until);
-        if self.all.sleep.stopping() {
+        if self.all.sleep.stopping() || self.division.has_escaped() {
             return;
         }
         self.cores.pass(until - self.now);
@@ -403,6 +427,9 @@ impl Run for Lockstep {
     }
 
     fn archive(&mut self, archive: &mut Archive<'_>, absent: Absent<'_>) -> Result<(), ArchiveError> {
+        if !archive.is_reading() && self.division.is_divided() {
+            return Err(ArchiveError::Refused { what: "a world that others make a part of".to_owned() });
+        }
         self.settle();
         let all = take_apart(self.entries.iter_mut().map(|entry| entry.actor.take()), &self.all.handles);
         let mut cut = Cut::new(all, self.all.clone(), self.timeline, self.now);
@@ -414,6 +441,9 @@ impl Run for Lockstep {
                 entry.phase = Phase::Parked;
             }
         }
+        if archive.is_reading() && outcome.is_ok() {
+            self.division.end();
+        }
         if archive.is_reading() && self.due.is_empty() {
             self.schedule_all();
         }
@@ -421,8 +451,15 @@ impl Run for Lockstep {
     }
 
     fn remove(&mut self, id: AgentId) -> Result<(), SendError> {
+        if self.division.is_away(id.0 as usize) {
+            return self.take_out(id);
+        }
         let home = self.entries.get_mut(id.0 as usize).map(|entry| &mut entry.actor);
         self.all.leave(id, home.unwrap_or(&mut None))
+    }
+
+    fn as_lockstep(&mut self) -> Option<&mut Self> {
+        Some(self)
     }
 
     /// No turn is in progress between two calls.

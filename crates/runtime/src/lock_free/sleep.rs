@@ -113,6 +113,11 @@ pub(crate) struct SignalState {
     touched: u64,
 }
 
+impl SignalState {
+    /// That of an agent that has left.
+    const LEFT: Self = Self { resting: false, woken: false, leader: NO_AGENT, closed: true, touched: 0 };
+}
+
 impl SleepRegistry {
     pub fn new(agents: usize) -> Self {
         let registry = Self {
@@ -317,6 +322,16 @@ impl SleepRegistry {
         noted > 0 && SimTime::from_nanos(noted - 1) + FAR_BEHIND_HOLD > now
     }
 
+    /// The flags of one agent, which is there.
+    pub fn signal_state(&self, id: AgentId) -> SignalState {
+        self.signal(id).map_or(SignalState::LEFT, Signal::state)
+    }
+
+    /// Takes over the flags of one agent.
+    pub fn set_signal_state(&self, id: AgentId, state: SignalState) {
+        self.signal(id).into_iter().for_each(|signal| signal.set_state(state));
+    }
+
     /// The agents that rest, are woken or were touched, and their leaders.
     pub fn state(&self) -> SleepState {
         let (notified, far_behind) = (self.notified.load(Acquire), self.far_behind.load(Acquire));
@@ -326,8 +341,7 @@ impl SleepRegistry {
     /// Takes over a state of the first agents: the others have left. All of them have new states then.
     pub fn set_state(&self, state: &SleepState) {
         let SleepState { signals, notified, far_behind } = state;
-        let left = SignalState { resting: false, woken: false, leader: NO_AGENT, closed: true, touched: 0 };
-        let states = signals.iter().copied().chain(std::iter::repeat(left));
+        let states = signals.iter().copied().chain(std::iter::repeat(SignalState::LEFT));
         self.signals.iter().zip(states).for_each(|(signal, state)| signal.set_state(state));
         self.notified.store(*notified, Release);
         self.far_behind.store(*far_behind, Release);

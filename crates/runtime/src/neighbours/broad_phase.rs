@@ -49,6 +49,46 @@ pub(crate) struct BroadPhaseState {
     callers: Vec<Vec<AgentId>>,
 }
 
+/// What one agent has published, and the agents that have called it.
+#[derive(Debug, Clone, serde::Serialize, serde::Deserialize)]
+pub(crate) struct PublishedState {
+    bounds: Option<BoxWords>,
+    pub callers: Vec<AgentId>,
+}
+
+/// A box that an agent is in, with all places at which it may be found near another one that is in such a box too.
+#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
+pub struct Reach {
+    /// The agent.
+    pub id: AgentId,
+    /// Least coordinates, metres.
+    pub low_m: DVec3,
+    /// Greatest coordinates, metres.
+    pub high_m: DVec3,
+    /// A bound of the speed of all its points, m/s.
+    pub speed_m_s: f64,
+}
+
+impl Reach {
+    /// Whether `other` lies in this one, whole.
+    #[must_use]
+    pub fn holds(&self, other: &Self) -> bool {
+        self.low_m.cmple(other.low_m).all() && self.high_m.cmpge(other.high_m).all()
+    }
+
+    /// Whether the two have a place in common.
+    #[must_use]
+    pub fn meets(&self, other: &Self) -> bool {
+        self.low_m.cmple(other.high_m).all() && self.high_m.cmpge(other.low_m).all()
+    }
+
+    /// The same, wider by `by_m` on every side.
+    #[must_use]
+    pub fn wider(self, by_m: f64) -> Self {
+        Self { low_m: self.low_m - by_m, high_m: self.high_m + by_m, ..self }
+    }
+}
+
 impl BroadPhaseState {
     /// Whether it is of so many agents.
     pub fn is_of(&self, count: usize) -> bool {
@@ -188,18 +228,46 @@ impl BroadPhase {
 
     /// The bounds that agents have published, and their calls of each other; called between turns.
     pub fn state(&self) -> BroadPhaseState {
-        let callers = |to: u32| {
-            let mut callers = Vec::new();
-            self.take_callers(AgentId(to), |from| callers.push(from));
-            callers.iter().for_each(|from| self.call(AgentId(to), *from));
-            callers
-        };
         BroadPhaseState {
             bounds: self.bounds.iter().map(PublishedBounds::words).collect(),
             log: self.log.iter().map(|word| word.load(SeqCst)).collect(),
             noted: self.noted.load(SeqCst),
-            callers: (0..self.calls.len() as u32).map(callers).collect(),
+            callers: (0..self.calls.len() as u32).map(|to| self.callers_of(AgentId(to))).collect(),
         }
+    }
+
+    /// The agents that have called `to` since its last query; called between turns.
+    fn callers_of(&self, to: AgentId) -> Vec<AgentId> {
+        let mut callers = Vec::new();
+        self.take_callers(to, |from| callers.push(from));
+        callers.iter().for_each(|from| self.call(to, *from));
+        callers
+    }
+
+    fn set_callers_of(&self, to: AgentId, callers: &[AgentId]) {
+        self.take_callers(to, |_| {});
+        callers.iter().for_each(|from| self.call(to, *from));
+    }
+
+    /// What `id` has published; called between turns.
+    pub fn state_of(&self, id: AgentId) -> PublishedState {
+        let bounds = self.bounds.get(id.0 as usize).and_then(PublishedBounds::words);
+        PublishedState { bounds, callers: self.callers_of(id) }
+    }
+
+    /// Puts that in the place of what `id` has published, and lets all others look at it; called between turns.
+    pub fn set_state_of(&self, id: AgentId, state: &PublishedState) {
+        self.bounds.get(id.0 as usize).into_iter().for_each(|bounds| bounds.set_words(state.bounds));
+        self.set_callers_of(id, &state.callers);
+        self.log_speed(id);
+    }
+
+    /// The reach of `id` where no step of any agent is longer than `dt`; `None` of one that has published no box.
+    pub fn reach_of(&self, id: AgentId, dt: SimSpan) -> Option<Reach> {
+        let published = self.bounds.get(id.0 as usize)?.mine().filter(|published| published.low.x < NOWHERE_M / 2.0)?;
+        let MovingBox { low: low_m, high: high_m, .. } = published;
+        let speed_m_s = published.speed_m_s.max(SPEED_LEAST_M_S);
+        Some(Reach { id, low_m, high_m, speed_m_s }.wider(neighbour_list::reach_m(speed_m_s, dt)))
     }
 
     /// Puts that of the first agents into it; nobody has called the others then. Called between turns.
@@ -208,10 +276,10 @@ impl BroadPhase {
         self.log.iter().zip(&state.log).for_each(|(word, value)| word.store(*value, SeqCst));
         self.noted.store(state.noted, SeqCst);
         let callers = state.callers.iter().map(Vec::as_slice).chain(std::iter::repeat(&[][..]));
-        for (to, callers) in (0..self.calls.len() as u32).map(AgentId).zip(callers) {
-            self.take_callers(to, |_| {});
-            callers.iter().for_each(|from| self.call(to, *from));
-        }
+        (0..self.calls.len() as u32)
+            .map(AgentId)
+            .zip(callers)
+            .for_each(|(to, callers)| self.set_callers_of(to, callers));
     }
 
     fn log_speed(&self, id: AgentId) {

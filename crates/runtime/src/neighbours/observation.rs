@@ -218,6 +218,11 @@ impl Observer {
         &mut self.neighbour_list
     }
 
+    /// Looks at all agents of a run that it comes into from another process.
+    pub fn arrive(&mut self, broad_phase: &BroadPhase) {
+        self.neighbour_list.iter_mut().for_each(|list| list.arrive(broad_phase));
+    }
+
     /// The agents that it sees, each as it was seen last: its linked peers, and of the others those `present`. An agent
     /// that has left is seen until the next turn.
     pub fn seen(&self, present: &[bool]) -> Vec<Seen> {

@@ -84,6 +84,22 @@ impl Happening {
     }
 }
 
+impl Event {
+    /// The same in the world of `tag`, whose objects have the same numbers.
+    pub(crate) fn of(self, tag: WorldTag) -> Self {
+        let with = |touched: Touched| match touched {
+            Touched::Object(object) => tag.object(object.id()).into(),
+            fixed @ Touched::Fixed(_) => fixed,
+        };
+        let what = match self.what {
+            Happening::Contact(contact) => Happening::Contact(Contact { with: with(contact.with), ..contact }),
+            Happening::Joined(leader) => Happening::Joined(tag.object(leader.id())),
+            other => other,
+        };
+        Self { object: tag.object(self.object.id()), what, ..self }
+    }
+}
+
 impl fmt::Display for Event {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(f, "{} s: \"{}\" ", self.at.as_secs_f64(), self.name)?;

@@ -137,12 +137,13 @@ impl RunState {
         for (runner, shown) in runners.iter().flatten().zip(&self.shown) {
             runner.observer.check_seen(&shown.seen, &self.present)?;
         }
-        check_places(&self.places, runners)
+        let runners: Vec<_> = runners.iter().map(Option::as_deref).collect();
+        check_places(&self.places, &runners)
     }
 }
 
 impl ShownState {
-    fn of(runner: &AgentRunner, present: &[bool]) -> Self {
+    pub fn of(runner: &AgentRunner, present: &[bool]) -> Self {
         Self {
             newest: runner.shared.slot.latest(),
             metrics: runner.shared.gauges.values(),
@@ -151,7 +152,7 @@ impl ShownState {
         }
     }
 
-    fn archive(&mut self, archive: &mut Archive<'_>) -> Result<(), ArchiveError> {
+    pub fn archive(&mut self, archive: &mut Archive<'_>) -> Result<(), ArchiveError> {
         archive.snapshot(&mut self.newest)?;
         archive_values!(archive, self.metrics, self.commands)?;
         archive.list(&mut self.seen, Seen::default, Seen::archive)

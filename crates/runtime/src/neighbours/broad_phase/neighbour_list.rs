@@ -9,6 +9,7 @@ use super::published_bounds::{MovingBox, ReadBounds};
 use super::{BroadPhase, PlannedStep, SPEED_LEAST_M_S};
 use crate::cluster::{Epoch, Membership};
 use metachron_core::{AgentId, Archive, ArchiveError, Bounds, SimSpan, SimTime, archive_values};
+use std::sync::atomic::Ordering::SeqCst;
 
 /// Knowledge of one agent about the boxes of the others.
 #[derive(Debug)]
@@ -83,6 +84,11 @@ impl NeighbourList {
         let Self { me: _, mine, speed_before_m_s, listed, soonest, common_check, dt, unread, near, epoch } = self;
         archive_values!(archive, *mine, *speed_before_m_s, *listed, *soonest, *common_check)?;
         archive_values!(archive, *dt, *unread, *near, *epoch)
+    }
+
+    /// Looks at all agents before its next step: it comes from another process, whose log has other numbers.
+    pub fn arrive(&mut self, broad_phase: &BroadPhase) {
+        (self.common_check, self.unread) = (SimTime::ZERO, broad_phase.noted.load(SeqCst));
     }
 
     /// The near peers at the last check, by rising numbers.
@@ -231,6 +237,13 @@ impl NeighbourList {
             self.common_check = SimTime::ZERO;
         }
     }
+}
+
+/// By how much the box of an agent is widened to its reach, metres: two that are apart with it are not near, in steps of at most `dt`, even where
+/// they were ([`next_check`] of both).
+pub(super) fn reach_m(speed_m_s: f64, dt: SimSpan) -> f64 {
+    let dt_s = dt.as_secs_f64();
+    SKIN_M + FAR_ROOM * ((FAR_STEPS + 1.0) * dt_s * speed_m_s + ACCELERATION_M_S2 * dt_s * dt_s)
 }
 
 /// Whether a peer that is `seen` is certainly not near and its next check not before `common_check`: without a square root or a division, as

@@ -1,0 +1,407 @@
+//! A world whose objects are placed on several hosts, called as one.
+//!
+//! In: the scene, a world of it on each host. Out: the calls of a world ([`WorldCalls`]); objects go from host to host before they meet. A window
+//! of time passes on all hosts at once, each object inside a box that meets no box of another host's: then no turn sees a difference, and
+//! states are those of one process, to the bit. Where an object leaves its box, or a host falls silent, all hosts go back to states that were
+//! kept, and do again what was done since (Jefferson 1985). Never here: a connection, a turn.
+
+use super::divided::DividedCalls;
+use super::windows::{Act, Placing};
+use crate::calls::{EventReader, WorldCalls};
+use crate::description::couplings::CouplingKind;
+use crate::error::WorldError;
+use crate::history::checkpoint::{Checkpoint, CheckpointError, SceneMark};
+use crate::reading::events::{Event, EventFilter};
+use crate::reading::object::{Object, Touched, WorldTag};
+use crate::{Part, Scene};
+use metachron_core::{AgentId, Body, HASH_START, SimSpan, SimTime, Snapshot};
+use metachron_runtime::{Command, TimelineCommand};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+
+/// A host, and the world of the scene that it steps a part of.
+#[derive(Clone)]
+pub struct PlacedHost {
+    /// Its name.
+    pub name: String,
+    /// Its world, in lockstep.
+    pub world: Arc<dyn WorldCalls>,
+}
+
+/// What a host carries.
+#[derive(Debug, Clone, PartialEq)]
+pub struct HostLoad {
+    /// Its name.
+    pub name: String,
+    /// Whether it answers.
+    pub lives: bool,
+    /// How many objects it steps.
+    pub objects: usize,
+}
+
+/// How a placed world went.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct PlacingCounts {
+    /// Objects that went from one host to another.
+    pub moved: u64,
+    /// Objects that another host goes on with, as theirs fell silent.
+    pub reborn: u64,
+    /// How often an object has left its box.
+    pub escaped: u64,
+}
+
+/// A world whose objects are stepped by several hosts.
+pub struct PlacedWorld {
+    pub(super) hosts: Vec<PlacedHost>,
+    tag: WorldTag,
+    scene: SceneMark,
+    /// Objects that one host steps, however far apart they are.
+    pub(super) ties: Vec<[AgentId; 2]>,
+    /// The wanted rates of the objects of the scene.
+    pub(super) rates_hz: Vec<f64>,
+    placing: Mutex<Placing>,
+}
+
+impl std::fmt::Debug for PlacedHost {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.debug_struct("PlacedHost").field("name", &self.name).finish_non_exhaustive()
+    }
+}
+
+impl PlacedHost {
+    /// Its world, as one that it steps a part of.
+    pub(super) fn divided(&self) -> Result<&dyn DividedCalls, WorldError> {
+        let reason = || format!("the world on host \"{}\" takes no part in one on several", self.name);
+        self.world.divided().ok_or_else(|| WorldError::Undivided { reason: reason() })
+    }
+}
+
+impl std::fmt::Debug for PlacedWorld {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.debug_struct("PlacedWorld").field("hosts", &self.hosts).finish_non_exhaustive()
+    }
+}
+
+impl PlacedWorld {
+    /// Places the objects of `scene` on hosts, whose worlds are of that scene and in the same state, in lockstep.
+    ///
+    /// # Errors
+    /// [`WorldError::Undivided`] without hosts, and for a world of another scene or in another state; the errors of its calls.
+    pub fn start(scene: &Scene, hosts: Vec<PlacedHost>) -> Result<Self, WorldError> {
+        let undivided = |reason: String| WorldError::Undivided { reason };
+        let first = hosts.first().ok_or_else(|| undivided("there is no host".to_owned()))?;
+        let (mark, time, hash) = (scene.mark(), first.world.time(), first.world.hash()?);
+        for PlacedHost { name, world } in &hosts {
+            if world.scene().hash != mark.hash || world.time() != time || world.hash()? != hash {
+                return Err(undivided(format!(
+                    "the world on host \"{name}\" is of another scene, or in another state"
+                )));
+            }
+        }
+        let couplings = scene.couplings.iter().filter(|coupling| coupling.kind != CouplingKind::Contact);
+        let of_joints = scene.joints.iter().flat_map(|joint| {
+            let followed = joint.mimic.and_then(|mimic| scene.joints.get(mimic.joint as usize)).map(|joint| joint.a);
+            [joint.b, followed].into_iter().flatten().map(|other| [joint.a, other])
+        });
+        let ties = couplings.map(|coupling| [coupling.a, coupling.b]).chain(of_joints).collect();
+        let rates_hz: Vec<f64> = scene.agents.iter().map(|member| member.pace.rate_hz).collect();
+        let placing = Mutex::new(Placing::of(&hosts, time, &rates_hz)?);
+        let placed = Self { hosts, tag: WorldTag::new(), scene: mark, ties, rates_hz, placing };
+        placed.begin(&mut placed.placing())?;
+        Ok(placed)
+    }
+
+    pub(super) fn placing(&self) -> MutexGuard<'_, Placing> {
+        self.placing.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// What each host carries.
+    #[must_use]
+    pub fn loads(&self) -> Vec<HostLoad> {
+        let placing = self.placing();
+        let load = |(number, host): (usize, &PlacedHost)| {
+            let objects = placing.owners.values().filter(|owner| owner.host == number).count();
+            HostLoad { name: host.name.clone(), lives: placing.lives[number], objects }
+        };
+        self.hosts.iter().enumerate().map(load).collect()
+    }
+
+    /// How it went so far.
+    #[must_use]
+    pub fn counts(&self) -> PlacingCounts {
+        self.placing().counts
+    }
+
+    /// A host that answers.
+    fn any(&self) -> Result<&dyn WorldCalls, WorldError> {
+        let lives = self.placing().lives.clone();
+        let mut living = self.hosts.iter().zip(lives).filter(|(_, lives)| *lives);
+        let (host, _) = living.next().ok_or_else(|| self.silent())?;
+        Ok(&*host.world)
+    }
+
+    /// The error of a world none of whose hosts answers.
+    pub(super) fn silent(&self) -> WorldError {
+        self.hosts.iter().find_map(|host| host.world.answers().err()).unwrap_or(WorldError::Stopped)
+    }
+
+    /// The world that steps an object, and the object there.
+    fn owner(&self, object: Object) -> Result<OwnedObject<'_>, WorldError> {
+        if !object.is_of(self.tag) {
+            return Err(WorldError::Foreign);
+        }
+        let host = self.placing().owners.get(&object.id()).map(|owner| owner.host);
+        let world = match host {
+            Some(host) => &*self.hosts[host].world,
+            // it has left: its name is known everywhere
+            None => self.any()?,
+        };
+        Ok(OwnedObject { world, object: world.object_of(object.id())? })
+    }
+
+    fn id(&self, object: Object) -> Result<AgentId, WorldError> {
+        self.owner(object).map(|owned| owned.object.id())
+    }
+}
+
+/// An object, as the world that steps it names it.
+struct OwnedObject<'a> {
+    world: &'a dyn WorldCalls,
+    object: Object,
+}
+
+/// Events of all hosts' worlds.
+struct PlacedEvents {
+    tag: WorldTag,
+    readers: Vec<Box<dyn EventReader>>,
+}
+
+impl EventReader for PlacedEvents {
+    fn take(&mut self) -> Vec<Event> {
+        let tag = self.tag;
+        let mut events: Vec<_> =
+            self.readers.iter_mut().flat_map(|reader| reader.take()).map(|event| event.of(tag)).collect();
+        events.sort_by_key(|event| event.at);
+        events
+    }
+
+    fn lost(&self) -> u64 {
+        self.readers.iter().map(|reader| reader.lost()).sum()
+    }
+}
+
+impl WorldCalls for PlacedWorld {
+    fn scene(&self) -> SceneMark {
+        self.scene.clone()
+    }
+
+    fn all_objects(&self) -> Vec<Object> {
+        self.placing().owners.keys().map(|id| self.tag.object(*id)).collect()
+    }
+
+    fn object(&self, name: &str) -> Result<Object, WorldError> {
+        Ok(self.tag.object(self.any()?.object(name)?.id()))
+    }
+
+    fn object_of(&self, id: AgentId) -> Result<Object, WorldError> {
+        Ok(self.tag.object(self.any()?.object_of(id)?.id()))
+    }
+
+    fn name(&self, of: Touched) -> Result<Arc<str>, WorldError> {
+        match of {
+            Touched::Object(object) => {
+                let OwnedObject { world, object } = self.owner(object)?;
+                world.name(object.into())
+            }
+            Touched::Fixed(_) => self.any()?.name(of),
+        }
+    }
+
+    fn latest(&self, object: Object) -> Result<Arc<Snapshot>, WorldError> {
+        let OwnedObject { world, object } = self.owner(object)?;
+        world.latest(object)
+    }
+
+    fn part(&self, object: Object) -> Result<Option<Part>, WorldError> {
+        let OwnedObject { world, object } = self.owner(object)?;
+        world.part(object)
+    }
+
+    fn time(&self) -> SimTime {
+        self.placing().time
+    }
+
+    fn hash(&self) -> Result<u64, WorldError> {
+        self.all_objects().into_iter().try_fold(HASH_START, |hash, object| Ok(self.latest(object)?.fold_hash(hash)))
+    }
+
+    /// Time passes in [`WorldCalls::advance`] alone.
+    fn drive(&self, drive: TimelineCommand) -> Result<(), WorldError> {
+        match drive {
+            TimelineCommand::Step(span) => self.advance(span),
+            TimelineCommand::Pause => Ok(()),
+            _ => Err(WorldError::Undivided { reason: "its time passes in steps of its callers".to_owned() }),
+        }
+    }
+
+    fn advance(&self, span: SimSpan) -> Result<(), WorldError> {
+        self.pass(&mut self.placing(), span)
+    }
+
+    fn command(&self, object: Object, command: Command) -> Result<(), WorldError> {
+        let act = Act::Command(self.id(object)?, Box::new(command));
+        self.act(&mut self.placing(), act)
+    }
+
+    fn set_state(&self, object: Object, state: &Body) -> Result<(), WorldError> {
+        let act = Act::SetState(self.id(object)?, Box::new(state.clone()));
+        self.act(&mut self.placing(), act)
+    }
+
+    fn add(&self, name: &str, part: Part) -> Result<Object, WorldError> {
+        Ok(self.tag.object(self.join(&mut self.placing(), name, &part)?))
+    }
+
+    fn remove(&self, object: Object) -> Result<(), WorldError> {
+        let act = Act::Remove(self.id(object)?);
+        self.act(&mut self.placing(), act)
+    }
+
+    fn checkpoint(&self) -> Result<Checkpoint, CheckpointError> {
+        self.gather(&mut self.placing())
+    }
+
+    fn restore(&self, checkpoint: &Checkpoint) -> Result<(), CheckpointError> {
+        self.put_all_back(&mut self.placing(), checkpoint)
+    }
+
+    fn answers(&self) -> Result<(), WorldError> {
+        self.any().map(drop)
+    }
+
+    fn listen(&self, filter: EventFilter) -> Box<dyn EventReader> {
+        let readers = self.hosts.iter().map(|host| host.world.listen(filter)).collect();
+        Box::new(PlacedEvents { tag: self.tag, readers })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::description::kinds::ExecutorKind;
+    use crate::{Pace, Rigid, Tube, World};
+    use glam::DVec3;
+    use metachron_core::Anchor;
+    use metachron_geometry::Solid;
+
+    /// Balls that roll through each other's ways on a floor, and two tubes of which one is hit.
+    fn scene() -> Scene {
+        let mut scene = Scene::builder().fixed("floor", Solid::Plane);
+        for number in 0..12_u32 {
+            let (along, side) = (f64::from(number % 4), f64::from(number / 4));
+            let ball = Rigid::ball(0.05).mass_kg(0.2).at([along, 0.6 * side, 0.06 + 0.1 * side]);
+            let towards = if number % 2 == 0 { 1.5 } else { -1.0 };
+            scene = scene.add(format!("ball {number}"), ball.velocity_m_s([towards, 0.1 * side, 0.0]));
+        }
+        for number in 0..2_u32 {
+            let y = -1.0 - f64::from(number);
+            let tube = Tube::along(&[[-0.2, y, 0.3], [0.2, y, 0.3]]).radius_m(0.01).segments(4).clamp([true, false]);
+            scene = scene.add(format!("tube {number}"), tube);
+        }
+        scene.build().unwrap()
+    }
+
+    fn world() -> World {
+        let world = World::start(&scene(), ExecutorKind::Lockstep).unwrap();
+        world.set_pace(Pace::Free).unwrap();
+        world
+    }
+
+    struct Placed {
+        worlds: Vec<World>,
+        placed: PlacedWorld,
+    }
+
+    fn placed(hosts: usize) -> Placed {
+        let worlds: Vec<_> = (0..hosts).map(|_| world()).collect();
+        let host = |(number, world): (usize, &World)| PlacedHost {
+            name: format!("host{number}"),
+            world: Arc::new(world.clone()),
+        };
+        let placed = PlacedWorld::start(&scene(), worlds.iter().enumerate().map(host).collect()).unwrap();
+        Placed { worlds, placed }
+    }
+
+    const QUARTER: SimSpan = SimSpan::from_millis(250);
+
+    #[test]
+    fn states_on_one_two_and_four_hosts_are_those_of_one_process() {
+        let whole = world();
+        let all: Vec<_> = [1, 2, 4].map(placed).into();
+        for quarter in 0..12 {
+            whole.advance(QUARTER);
+            for Placed { placed, worlds } in &all {
+                placed.advance(QUARTER).unwrap();
+                let hosts = worlds.len();
+                assert_eq!(
+                    placed.hash().unwrap(),
+                    whole.hash(),
+                    "{hosts} hosts, quarter {quarter}: {:?}",
+                    placed.loads()
+                );
+            }
+        }
+        for Placed { placed, worlds } in all.iter().skip(1) {
+            assert!(placed.loads().iter().all(|load| load.objects > 0), "{:?}", placed.loads());
+            assert!(placed.counts().moved > worlds.len() as u64, "{:?}", placed.counts());
+        }
+    }
+
+    #[test]
+    fn a_host_that_falls_silent_changes_no_bit() {
+        let (whole, Placed { worlds, placed }) = (world(), placed(3));
+        for quarter in 0..8 {
+            whole.advance(QUARTER);
+            if let 2 | 5 = quarter {
+                drop(worlds[quarter % 3].stop());
+            }
+            placed.advance(QUARTER).unwrap();
+            assert_eq!(placed.hash().unwrap(), whole.hash(), "quarter {quarter}: {:?}", placed.loads());
+        }
+        assert!(placed.counts().reborn > 0);
+        assert_eq!(placed.loads().iter().filter(|load| load.lives).count(), 2);
+        worlds.iter().for_each(|world| drop(world.stop()));
+        assert!(placed.advance(QUARTER).is_err());
+    }
+
+    #[test]
+    fn commands_and_objects_that_join_and_leave_act_as_in_one_process() {
+        let (whole, Placed { placed, .. }) = (world(), placed(2));
+        let calls: [&dyn WorldCalls; 2] = [&whole, &placed];
+        let same = |what: &str| assert_eq!(placed.hash().unwrap(), whole.hash(), "{what}");
+        let hit = Command::impulse(Anchor::Local(DVec3::ZERO), DVec3::new(0.0, 8.0, 2.0));
+        let pass = |calls: [&dyn WorldCalls; 2]| calls.map(|world| world.advance(QUARTER).unwrap());
+        let act = |act: &dyn Fn(&dyn WorldCalls)| calls.into_iter().for_each(act);
+        pass(calls);
+        act(&|world| world.command(world.object("ball 3").unwrap(), hit.clone()).unwrap());
+        pass(calls);
+        same("an impulse that throws a ball out of its box");
+        act(&|world| _ = world.add("late", Rigid::ball(0.08).mass_kg(1.0).at([0.1, 0.1, 0.5]).into()).unwrap());
+        pass(calls);
+        same("a ball that joins");
+        let marks = calls.map(|world| world.checkpoint().unwrap());
+        act(&|world| world.remove(world.object("ball 0").unwrap()).unwrap());
+        pass(calls);
+        same("a ball that leaves");
+        calls.into_iter().zip(&marks).for_each(|(world, mark)| world.restore(mark).unwrap());
+        same("a checkpoint");
+        pass(calls);
+        same("the time after it");
+        whole.restore(&marks[1]).unwrap();
+        pass([&whole, &whole]);
+        assert_eq!(
+            whole.time(),
+            SimTime::from_nanos(4 * 250_000_000 + 250_000_000),
+            "a placed world's checkpoint is a world's"
+        );
+    }
+}

@@ -1,0 +1,459 @@
+//! How time passes on several hosts: windows, objects that change hosts, states that are kept and gone back to.
+//!
+//! In: the hosts of a placed world, an act. Out: the same act done once, whatever was done again for it. Never here: the calls of a world.
+
+use super::divided::PartAdvanced;
+use super::groups::{PlacedGroup, fences, groups, place};
+use super::placed_world::{PlacedHost, PlacedWorld, PlacingCounts};
+use crate::Part;
+use crate::error::WorldError;
+use crate::history::checkpoint::{Checkpoint, CheckpointError};
+use metachron_core::{AgentId, Body, SimSpan, SimTime};
+use metachron_runtime::{Command, Reach};
+use std::collections::{BTreeMap, VecDeque};
+use std::thread;
+
+/// So much time passes at once on all hosts.
+const WINDOW: SimSpan = SimSpan::from_nanos(16_666_667);
+
+/// States are kept so often: that much is done again where a host falls silent, or an object leaves its box.
+const KEEP_EVERY: SimSpan = SimSpan::from_millis(500);
+
+/// So many objects are packed at once, and the rest of their group: a message has its bound.
+const PACKED_AT_ONCE: usize = 256;
+
+/// How much room for more speed objects have at first; twice as much each time that one has left its box, and from window to window less again.
+const ROOM: f64 = 2.0;
+const ROOM_RISES: f64 = 2.0;
+const ROOM_FALLS: f64 = 0.98;
+
+/// By this rate the cost of an object that joined is reckoned.
+const RATE_JOINED_HZ: f64 = 60.0;
+
+/// Who steps what.
+pub(super) struct Placing {
+    pub time: SimTime,
+    /// Of each object that is there.
+    pub owners: BTreeMap<AgentId, Owner>,
+    /// Whether each host answers.
+    pub lives: Vec<bool>,
+    pub counts: PlacingCounts,
+    /// Where objects may be found, by hosts.
+    reaches: Vec<Vec<Reach>>,
+    room: f64,
+    kept: Kept,
+    /// What was done since states were kept.
+    since: Vec<Act>,
+    /// Objects that leave at their next steps.
+    leaving: Vec<AgentId>,
+}
+
+/// The host that steps an object.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Owner {
+    /// Its number.
+    pub host: usize,
+    /// The cost of the object: its places times its rate.
+    cost: f64,
+}
+
+/// States of all objects at one moment.
+#[derive(Default)]
+struct Kept {
+    time: SimTime,
+    /// The moment, without objects.
+    moment: Vec<u8>,
+    packs: Vec<Pack>,
+}
+
+/// Objects that one host has packed.
+struct Pack {
+    host: usize,
+    objects: Vec<AgentId>,
+    bytes: Vec<u8>,
+}
+
+/// A thing that is done to the world.
+#[derive(Clone)]
+pub(super) enum Act {
+    Pass(SimSpan),
+    Command(AgentId, Box<Command>),
+    SetState(AgentId, Box<Body>),
+    Remove(AgentId),
+}
+
+/// Why an act was not done.
+enum Fault {
+    /// An object has left its box.
+    Escaped,
+    /// The host of this number does not answer.
+    Silent(usize),
+    Refused(WorldError),
+}
+
+/// The outcome of a call of the host of this number.
+fn told<T>(host: usize, outcome: Result<T, WorldError>) -> Result<T, Fault> {
+    outcome.map_err(|error| match error {
+        WorldError::Silent { .. } | WorldError::Stopped => Fault::Silent(host),
+        other => Fault::Refused(other),
+    })
+}
+
+impl Placing {
+    /// All objects on the first of `hosts`, at `time`; `rates_hz` are those of the first numbers.
+    pub fn of(hosts: &[PlacedHost], time: SimTime, rates_hz: &[f64]) -> Result<Self, WorldError> {
+        let mut owners = BTreeMap::new();
+        let objects = hosts.first().map(|host| (host, host.world.all_objects()));
+        for (host, object) in
+            objects.iter().flat_map(|(host, objects)| objects.iter().map(move |object| (host, object)))
+        {
+            let places = match &host.world.latest(*object)?.body {
+                Body::Curve(curve) => curve.positions.len(),
+                Body::Soft(soft) => soft.positions.len(),
+                Body::Nothing | Body::Rigid(_) | Body::Tool(_) => 1,
+            };
+            let rate_hz = rates_hz.get(object.id().0 as usize).copied().unwrap_or(RATE_JOINED_HZ);
+            owners.insert(object.id(), Owner { host: 0, cost: places as f64 * rate_hz });
+        }
+        let (lives, reaches) = (vec![true; hosts.len()], vec![Vec::new(); hosts.len()]);
+        let (counts, kept, since, leaving) = (PlacingCounts::default(), Kept::default(), Vec::new(), Vec::new());
+        Ok(Self { time, owners, lives, counts, reaches, room: ROOM, kept, since, leaving })
+    }
+
+    fn objects(&self) -> Vec<AgentId> {
+        self.owners.keys().copied().collect()
+    }
+
+    fn living(&self) -> Vec<usize> {
+        (0..self.lives.len()).filter(|host| self.lives[*host]).collect()
+    }
+}
+
+impl PlacedWorld {
+    /// Goes on from a state that all hosts have: each object has its host, and all states are kept.
+    pub(super) fn begin(&self, placing: &mut Placing) -> Result<(), WorldError> {
+        for host in placing.living() {
+            let is_elsewhere = |(_, owner): &(&AgentId, &Owner)| owner.host != host;
+            let elsewhere: Vec<_> = placing.owners.iter().filter(is_elsewhere).map(|(id, _)| *id).collect();
+            self.hosts[host].divided()?.release(&elsewhere)?;
+        }
+        placing.since.clear();
+        placing.leaving.clear();
+        match self.look(placing) {
+            Err(Fault::Refused(error)) => return Err(error),
+            Err(_) => return Err(self.silent()),
+            Ok(()) => {}
+        }
+        self.act(placing, Act::Pass(SimSpan::ZERO))?;
+        self.keep_or_go_back(placing)
+    }
+
+    /// Looks where objects may be found.
+    fn look(&self, placing: &mut Placing) -> Result<(), Fault> {
+        placing.reaches.iter_mut().for_each(Vec::clear);
+        for host in placing.living() {
+            let looked = self.hosts[host].divided().and_then(|divided| divided.advance_within(SimSpan::ZERO, &[]));
+            placing.reaches[host] = told(host, looked)?.reaches;
+        }
+        Ok(())
+    }
+
+    /// Lets `span` pass, window by window.
+    pub(super) fn pass(&self, placing: &mut Placing, span: SimSpan) -> Result<(), WorldError> {
+        let mut left = span;
+        while left > SimSpan::ZERO {
+            let window = left.min(WINDOW);
+            self.act(placing, Act::Pass(window))?;
+            if placing.time >= placing.kept.time + KEEP_EVERY {
+                self.keep_or_go_back(placing)?;
+            }
+            left = SimSpan::from_nanos(left.as_nanos() - window.as_nanos());
+        }
+        Ok(())
+    }
+
+    /// Does `act`, and again all that was done since states were kept where it takes that.
+    pub(super) fn act(&self, placing: &mut Placing, act: Act) -> Result<(), WorldError> {
+        let mut to_do = VecDeque::from([act]);
+        while let Some(act) = to_do.pop_front() {
+            match self.try_act(placing, &act) {
+                Ok(()) => placing.since.push(act),
+                Err(Fault::Refused(error)) => return Err(error),
+                Err(fault) => {
+                    self.go_back(placing, fault)?;
+                    let mut again = std::mem::take(&mut placing.since);
+                    again.push(act);
+                    again.extend(to_do);
+                    to_do = again.into();
+                }
+            }
+        }
+        Ok(())
+    }
+
+    fn try_act(&self, placing: &mut Placing, act: &Act) -> Result<(), Fault> {
+        let gone = |id: AgentId| Fault::Refused(WorldError::NoAgent(id));
+        let owner = |id: AgentId| placing.owners.get(&id).map(|owner| owner.host).ok_or_else(|| gone(id));
+        match act {
+            Act::Pass(span) => self.pass_window(placing, *span),
+            Act::Command(id, command) => {
+                let (host, world) = (owner(*id)?, &self.hosts[owner(*id)?].world);
+                told(host, world.object_of(*id).and_then(|object| world.command(object, Command::clone(command))))
+            }
+            Act::SetState(id, state) => {
+                let (host, world) = (owner(*id)?, &self.hosts[owner(*id)?].world);
+                told(host, world.object_of(*id).and_then(|object| world.set_state(object, state)))
+            }
+            Act::Remove(id) => {
+                placing.leaving.push(*id);
+                placing.living().into_iter().try_for_each(|host| {
+                    let world = &self.hosts[host].world;
+                    match world.object_of(*id).and_then(|object| world.remove(object)) {
+                        // it has left there before all went back
+                        Err(WorldError::Gone { .. }) => Ok(()),
+                        outcome => told(host, outcome),
+                    }
+                })
+            }
+        }
+    }
+
+    /// Lets a window pass on all hosts at once.
+    fn pass_window(&self, placing: &mut Placing, window: SimSpan) -> Result<(), Fault> {
+        let fences = self.place_for(placing, window)?;
+        let advance = |host: usize| {
+            let own: Vec<Reach> = fences
+                .iter()
+                .filter(|fence| placing.owners.get(&fence.id).is_some_and(|owner| owner.host == host))
+                .copied()
+                .collect();
+            told(host, self.hosts[host].divided().and_then(|divided| divided.advance_within(window, &own)))
+        };
+        let living = placing.living();
+        let outcomes: Vec<Result<PartAdvanced, Fault>> = if let [host] = living[..] {
+            vec![advance(host)]
+        } else {
+            let advance = &advance;
+            thread::scope(|scope| {
+                let calls: Vec<_> = living.iter().map(|host| scope.spawn(move || advance(*host))).collect();
+                calls
+                    .into_iter()
+                    .zip(&living)
+                    .map(|(call, host)| call.join().unwrap_or(Err(Fault::Silent(*host))))
+                    .collect()
+            })
+        };
+        let mut escaped = false;
+        for (host, outcome) in living.into_iter().zip(outcomes) {
+            let PartAdvanced { escaped: one, reaches } = outcome?;
+            escaped |= one.is_some();
+            placing.reaches[host] = reaches;
+        }
+        if escaped {
+            return Err(Fault::Escaped);
+        }
+        placing.time += window;
+        let has_left = |id: &AgentId| {
+            let world = placing.owners.get(id).map(|owner| &self.hosts[owner.host].world);
+            let latest = world.map(|world| world.object_of(*id).and_then(|object| world.latest(object)));
+            latest.is_none_or(|latest| matches!(latest, Err(WorldError::Gone { .. })))
+        };
+        for id in placing.leaving.extract_if(.., |id| has_left(id)).collect::<Vec<_>>() {
+            placing.owners.remove(&id);
+        }
+        placing.room = (placing.room * ROOM_FALLS).max(ROOM);
+        Ok(())
+    }
+
+    /// Brings objects that may meet within a window to one host; the boxes that they may not leave in it, none where one host steps all.
+    fn place_for(&self, placing: &mut Placing, window: SimSpan) -> Result<Vec<Reach>, Fault> {
+        let living = placing.living();
+        if living.is_empty() {
+            return Err(Fault::Refused(self.silent()));
+        }
+        let reaches: Vec<Reach> = placing.reaches.iter().flatten().copied().collect();
+        let fences = fences(&reaches, window, placing.room);
+        let mut placed: Vec<PlacedGroup> =
+            groups(&placing.objects(), &fences, &self.ties).into_iter().map(|objects| placing.group(objects)).collect();
+        place(&mut placed, &placing.lives, placing.since.is_empty());
+        let mut moves: BTreeMap<(usize, usize), Vec<Vec<AgentId>>> = BTreeMap::new();
+        for PlacedGroup { objects, host, .. } in &placed {
+            let mut from: BTreeMap<usize, Vec<AgentId>> = BTreeMap::new();
+            for id in objects {
+                from.entry(placing.owners[id].host).or_default().push(*id);
+            }
+            let Some(to) = *host else { continue };
+            for (from, objects) in from.into_iter().filter(|(from, _)| *from != to) {
+                moves.entry((from, to)).or_default().push(objects);
+            }
+        }
+        for ((from, to), groups) in moves {
+            for Pack { objects, bytes, .. } in self.pack(from, &groups)? {
+                told(to, self.hosts[to].divided().and_then(|divided| divided.adopt(&bytes)))?;
+                told(from, self.hosts[from].divided().and_then(|divided| divided.release(&objects)))?;
+                placing.counts.moved += objects.len() as u64;
+                placing.give(&objects, to);
+            }
+        }
+        let mut hosts = placing.owners.values().map(|owner| owner.host);
+        let first = hosts.next();
+        let is_one = hosts.all(|host| Some(host) == first);
+        Ok(if is_one { Vec::new() } else { fences })
+    }
+
+    /// Groups of objects as a host packs them.
+    fn pack(&self, host: usize, groups: &[Vec<AgentId>]) -> Result<Vec<Pack>, Fault> {
+        let mut packs: Vec<Pack> = Vec::new();
+        for group in groups {
+            match packs.last_mut().filter(|pack| pack.objects.len() < PACKED_AT_ONCE) {
+                Some(pack) => pack.objects.extend(group),
+                None => packs.push(Pack { host, objects: group.clone(), bytes: Vec::new() }),
+            }
+        }
+        for Pack { objects, bytes, .. } in &mut packs {
+            objects.sort_unstable();
+            *bytes = told(host, self.hosts[host].divided().and_then(|divided| divided.pack(objects)))?;
+        }
+        Ok(packs)
+    }
+
+    /// Keeps the states of all objects, or does again what was done since the last ones and keeps those then.
+    fn keep_or_go_back(&self, placing: &mut Placing) -> Result<(), WorldError> {
+        loop {
+            match self.keep(placing) {
+                Ok(()) => return Ok(()),
+                Err(Fault::Refused(error)) => return Err(error),
+                Err(fault) => {
+                    self.go_back(placing, fault)?;
+                    for act in std::mem::take(&mut placing.since) {
+                        self.act(placing, act)?;
+                    }
+                }
+            }
+        }
+    }
+
+    fn keep(&self, placing: &mut Placing) -> Result<(), Fault> {
+        let living = placing.living();
+        let first = *living.first().ok_or_else(|| Fault::Refused(self.silent()))?;
+        let moment = told(first, self.hosts[first].divided().and_then(|divided| divided.pack(&[])))?;
+        let mut kept = Kept { time: placing.time, moment, packs: Vec::new() };
+        // without another host nobody could go on with them
+        if living.len() > 1 {
+            let reaches: Vec<Reach> = placing.reaches.iter().flatten().copied().collect();
+            let groups = groups(&placing.objects(), &reaches, &self.ties);
+            for host in living {
+                let is_own = |group: &&Vec<AgentId>| group.iter().all(|id| placing.owners[id].host == host);
+                let own: Vec<_> = groups.iter().filter(is_own).cloned().collect();
+                kept.packs.extend(self.pack(host, &own)?);
+            }
+        }
+        (placing.kept, placing.since) = (kept, Vec::new());
+        Ok(())
+    }
+
+    /// Puts all hosts that live back to the states that were kept; a host that has fallen silent is none of them any more.
+    fn go_back(&self, placing: &mut Placing, fault: Fault) -> Result<(), WorldError> {
+        let mut fault = Some(fault);
+        while let Some(why) = fault.take() {
+            match why {
+                Fault::Refused(error) => return Err(error),
+                Fault::Escaped => {
+                    placing.counts.escaped += 1;
+                    placing.room *= ROOM_RISES;
+                }
+                Fault::Silent(host) => placing.lives[host] = false,
+            }
+            if placing.living().is_empty() || (placing.kept.packs.is_empty() && !placing.owners.is_empty()) {
+                return Err(self.silent());
+            }
+            fault = self.try_back(placing).err();
+        }
+        Ok(())
+    }
+
+    fn try_back(&self, placing: &mut Placing) -> Result<(), Fault> {
+        let (objects, living) = (placing.objects(), placing.living());
+        for &host in &living {
+            let begun = self.hosts[host].divided().and_then(|divided| {
+                divided.release(&objects)?;
+                divided.adopt(&placing.kept.moment)
+            });
+            told(host, begun)?;
+        }
+        let mut packs = std::mem::take(&mut placing.kept.packs);
+        let put = packs.iter_mut().try_for_each(|pack| {
+            if !placing.lives[pack.host] {
+                let count = |host: &usize| placing.owners.values().filter(|owner| owner.host == *host).count();
+                pack.host = living.iter().copied().min_by_key(count).unwrap_or_default();
+                placing.counts.reborn += pack.objects.len() as u64;
+            }
+            placing.give(&pack.objects, pack.host);
+            told(pack.host, self.hosts[pack.host].divided().and_then(|divided| divided.adopt(&pack.bytes)))
+        });
+        placing.kept.packs = packs;
+        put?;
+        placing.time = placing.kept.time;
+        placing.leaving.clear();
+        self.look(placing)
+    }
+}
+
+impl Placing {
+    /// A group with the host that steps most of it.
+    fn group(&self, objects: Vec<AgentId>) -> PlacedGroup {
+        let mut shares = vec![0.0; self.lives.len()];
+        objects.iter().filter_map(|id| self.owners.get(id)).for_each(|owner| shares[owner.host] += owner.cost);
+        let cost = shares.iter().sum();
+        let host = (0..shares.len()).rev().max_by(|one, other| shares[*one].total_cmp(&shares[*other]));
+        PlacedGroup { objects, host, cost }
+    }
+
+    fn give(&mut self, objects: &[AgentId], to: usize) {
+        for id in objects {
+            self.owners.entry(*id).and_modify(|owner| owner.host = to);
+        }
+    }
+}
+
+impl PlacedWorld {
+    /// Takes up an object on all hosts; one of them steps it.
+    pub(super) fn join(&self, placing: &mut Placing, name: &str, part: &Part) -> Result<AgentId, WorldError> {
+        let mut joined: Option<AgentId> = None;
+        for host in placing.living() {
+            let id = self.hosts[host].world.add(name, part.clone())?.id();
+            if joined.is_some_and(|joined| joined != id) {
+                return Err(WorldError::Undivided { reason: format!("\"{name}\" has another number on each host") });
+            }
+            joined = Some(id);
+        }
+        let id = joined.ok_or_else(|| self.silent())?;
+        placing.owners.insert(id, Owner { host: placing.living()[0], cost: RATE_JOINED_HZ });
+        self.begin(placing)?;
+        Ok(id)
+    }
+
+    /// The state of all, on one host for as long as it is written.
+    pub(super) fn gather(&self, placing: &mut Placing) -> Result<Checkpoint, CheckpointError> {
+        self.keep_or_go_back(placing)?;
+        let first = *placing.living().first().ok_or_else(|| self.silent())?;
+        let (host, divided) = (&self.hosts[first], self.hosts[first].divided()?);
+        let elsewhere: Vec<&Pack> = placing.kept.packs.iter().filter(|pack| pack.host != first).collect();
+        elsewhere.iter().try_for_each(|pack| divided.adopt(&pack.bytes))?;
+        let checkpoint = host.world.checkpoint();
+        elsewhere.iter().try_for_each(|pack| divided.release(&pack.objects))?;
+        checkpoint
+    }
+
+    /// Puts all hosts back into one state, and places its objects anew.
+    pub(super) fn put_all_back(&self, placing: &mut Placing, checkpoint: &Checkpoint) -> Result<(), CheckpointError> {
+        let living = placing.living();
+        living.iter().try_for_each(|host| self.hosts[*host].world.restore(checkpoint))?;
+        let first = *living.first().ok_or_else(|| self.silent())?;
+        placing.owners = Placing::of(&self.hosts[first..=first], checkpoint.time(), &self.rates_hz)?.owners;
+        placing.time = checkpoint.time();
+        let objects = placing.objects();
+        placing.give(&objects, first);
+        Ok(self.begin(placing)?)
+    }
+}
