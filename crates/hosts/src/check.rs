@@ -6,7 +6,7 @@
 use crate::wire::{Moment, ObjectState};
 use glam::DQuat;
 use metachron_core::{AgentId, Body, CurveState, Snapshot, SoftState};
-use metachron_runtime::check_state;
+use metachron_runtime::{Reach, check_state};
 
 /// The most objects, and the longest name in bytes, of a world that is mirrored.
 pub(crate) const OBJECTS_MAX: u32 = 1 << 20;
@@ -22,6 +22,18 @@ pub(crate) fn moment(moment: &Moment) -> Result<(), String> {
     moment.states.iter().try_for_each(object)?;
     moment.gone.iter().try_for_each(|id| number(*id))?;
     if moment.events.iter().all(|event| event.is_finite()) { Ok(()) } else { Err("an event is not finite".to_owned()) }
+}
+
+/// Checks where objects may be found.
+///
+/// # Errors
+/// The first fault.
+pub(crate) fn reaches(all: &[Reach]) -> Result<(), String> {
+    let is_sound = |reach: &Reach| reach.low_m.is_finite() && reach.high_m.is_finite() && reach.speed_m_s.is_finite();
+    all.iter().try_for_each(|reach| {
+        number(reach.id)?;
+        if is_sound(reach) { Ok(()) } else { Err(format!("the reach of object {} is not finite", reach.id.0)) }
+    })
 }
 
 fn object(ObjectState { id, name, state }: &ObjectState) -> Result<(), String> {

@@ -10,13 +10,13 @@ use crate::gate::{CALLS_MAX, Callers, Fault, Gate, Refusals};
 use crate::identity::is_name;
 use crate::refusal::Refusal;
 use crate::rounded;
-use crate::serving::{ANYONE, Role, SceneFiles, Serving};
+use crate::serving::{ANYONE, Begins, Role, SceneFiles, Serving};
 use crate::waiting::{CALLS_WAITING, Waiting};
 use crate::wire::{
     BadMessage, Call, Encoded, MESSAGE_MAX, Moment, ObjectState, PROGRAM, Reply, Request, Welcome, decode, encode,
 };
 use metachron_core::{AgentId, LocalModel, SimSpan, Snapshot};
-use metachron_world::{Checkpoint, EventFilter, EventReader, Part, Touched, WorldCalls, WorldError};
+use metachron_world::{Checkpoint, DividedCalls, EventFilter, EventReader, Part, Touched, WorldCalls, WorldError};
 use std::collections::{BTreeMap, BTreeSet, HashMap};
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::atomic::{AtomicBool, Ordering::Relaxed};
@@ -47,6 +47,7 @@ struct Shared {
     world: Arc<dyn WorldCalls>,
     name: String,
     scene: Option<Box<SceneFiles>>,
+    begins: Option<Begins>,
     roles: BTreeMap<String, Role>,
     is_open: bool,
     /// A number that no run of a host had before.
@@ -92,7 +93,7 @@ impl std::fmt::Debug for Host {
 pub fn serve(world: Arc<dyn WorldCalls>, serving: Serving) -> Result<Host, HostsError> {
     check_scene(serving.scene.as_ref())?;
     let roles = roles(&serving)?;
-    let Serving { name, endpoint, scene, identity, insecure_lan, .. } = serving;
+    let Serving { name, endpoint, scene, begins, identity, insecure_lan, .. } = serving;
     let place = Place { endpoint: &endpoint, identity: identity.as_ref(), insecure_lan };
     let session = open(place, Side::Host(&roles.keys().map(|name| &**name).collect::<Vec<_>>()))?;
     let failed = |error: zenoh::Error| HostsError::Network { endpoint: endpoint.clone(), reason: error.to_string() };
@@ -104,7 +105,8 @@ pub fn serve(world: Arc<dyn WorldCalls>, serving: Serving) -> Result<Host, Hosts
     let gate = Mutex::new(Gate::new(identity.is_some(), roles.len()));
     let (ends, scene, waiting) = (AtomicBool::new(false), scene.map(Box::new), Waiting::new());
     let is_open = is_open_to_all(&endpoint);
-    let shared = Arc::new(Shared { world, name, scene, roles, is_open, run, session, gate, shown, waiting, ends });
+    let shared =
+        Arc::new(Shared { world, name, scene, begins, roles, is_open, run, session, gate, shown, waiting, ends });
     let (publishing, answering) = (Arc::clone(&shared), Arc::clone(&shared));
     let threads = vec![
         spawn("hosts-publish", move || publishing.publish_on()).map_err(failed)?,
@@ -372,10 +374,7 @@ impl Shared {
             Call::Command(id, command) => done(0, world.command(world.object_of(id)?, command))?,
             Call::SetState(id, state) => done(0, world.set_state(world.object_of(id)?, &state))?,
             Call::Drive(drive) => done(0, world.drive(drive))?,
-            Call::Advance(span) if span > SPAN_MAX => {
-                let found = span.as_secs_f64();
-                return Err(Refusal::Other(format!("a call lets {found} s pass; expected at most 1 s")));
-            }
+            Call::Advance(span) if span > SPAN_MAX => return Err(too_long_a_span(span)),
             Call::Advance(span) => {
                 world.advance(span)?;
                 Reply::Done(self.publish())
@@ -398,9 +397,38 @@ impl Shared {
                 Reply::Part(part.filter(|part| !matches!(part, Part::Custom(_))).map(Box::new))
             }
             Call::Scene => Reply::Scene(self.scene.clone()),
+            Call::Begin(files) => {
+                self.begin(*files)?;
+                Reply::Done(0)
+            }
+            Call::Release(objects) => done(0, self.divided()?.release(&objects))?,
+            Call::Pack(objects) => Reply::Packed(self.divided()?.pack(&objects)?),
+            Call::Adopt(packed) => {
+                self.divided()?.adopt(&packed)?;
+                Reply::Done(self.publish())
+            }
+            Call::AdvanceWithin(span, _) if span > SPAN_MAX => return Err(too_long_a_span(span)),
+            Call::AdvanceWithin(span, boxes) => {
+                let advanced = self.divided()?.advance_within(span, &boxes)?;
+                Reply::Advanced(advanced, self.publish())
+            }
         };
         let too_long = |bad: BadMessage| Refusal::Other(format!("{bad}: the answer is too long"));
         Ok(vec![encode(&reply).map_err(too_long)?])
+    }
+
+    fn divided(&self) -> Result<&dyn DividedCalls, Refusal> {
+        self.world.divided().ok_or_else(|| Refusal::Other("this world is stepped by one process alone".to_owned()))
+    }
+
+    /// Takes a scene to step, where the host waits for one and nobody else is connected with it.
+    fn begin(&self, files: SceneFiles) -> Result<(), Refusal> {
+        let begin =
+            self.begins.as_ref().ok_or_else(|| Refusal::Other("this host steps a scene of its own".to_owned()))?;
+        if self.gate().callers().whole > 1 {
+            return Err(Refusal::Other("this host works for another caller".to_owned()));
+        }
+        begin(files).map_err(Refusal::Other)
     }
 
     fn welcome(&self) -> Welcome {
@@ -409,6 +437,10 @@ impl Shared {
         let (world, program) = (self.name.clone(), PROGRAM.to_owned());
         Welcome { run: self.run, world, program, scene: scene.name, scene_hash: scene.hash, fixed }
     }
+}
+
+fn too_long_a_span(span: SimSpan) -> Refusal {
+    Refusal::Other(format!("a call lets {} s pass; expected at most 1 s", span.as_secs_f64()))
 }
 
 fn done(sequence: u64, outcome: Result<(), WorldError>) -> Result<Reply, Refusal> {

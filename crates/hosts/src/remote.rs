@@ -2,6 +2,7 @@
 //!
 //! In: an endpoint. Out: [`RemoteWorld`]. Never here: what was seen of it ([`crate::mirror`]), the bytes of messages.
 
+use crate::check;
 use crate::endpoint::{LEASE, Place, Side, is_open_to_all, open};
 use crate::error::HostsError;
 use crate::host::PERIOD;
@@ -11,10 +12,10 @@ use crate::rounded::{Change, Sketched, Sketches};
 use crate::serving::{ANYONE, SceneFiles};
 use crate::wire::{Call, Moment, PROGRAM, Reply, Request, Welcome, decode, encode};
 use metachron_core::{AgentId, Body, SimSpan, SimTime, Snapshot};
-use metachron_runtime::{Command, TimelineCommand};
+use metachron_runtime::{Command, Reach, TimelineCommand};
 use metachron_world::{
-    Checkpoint, CheckpointError, EventFilter, EventReader, Object, Part, SceneMark, StateLink, Touched, WorldCalls,
-    WorldError,
+    Checkpoint, CheckpointError, DividedCalls, EventFilter, EventReader, Object, Part, PartAdvanced, SceneMark,
+    StateLink, Touched, WorldCalls, WorldError,
 };
 use std::sync::atomic::{AtomicBool, Ordering::Relaxed};
 use std::sync::mpsc::{Receiver, RecvTimeoutError, sync_channel};
@@ -398,6 +399,15 @@ impl RemoteWorld {
         }
     }
 
+    /// Gives a scene to a host that waits for work ([`crate::Serving::begins`]): it ends this world and serves one of the scene in its place, which
+    /// is connected with anew.
+    ///
+    /// # Errors
+    /// [`WorldError::Silent`] and [`WorldError::Elsewhere`].
+    pub fn begin(&self, scene: SceneFiles) -> Result<(), WorldError> {
+        self.calls().act(Call::Begin(Box::new(scene)))
+    }
+
     /// How long ago the newest message came.
     #[must_use]
     pub fn age(&self) -> Duration {
@@ -523,6 +533,37 @@ impl WorldCalls for RemoteWorld {
 
     fn listen(&self, filter: EventFilter) -> Box<dyn EventReader> {
         self.calls().mirror.listen(filter)
+    }
+
+    fn divided(&self) -> Option<&dyn DividedCalls> {
+        Some(self)
+    }
+}
+
+impl DividedCalls for RemoteWorld {
+    fn release(&self, objects: &[AgentId]) -> Result<(), WorldError> {
+        self.calls().act(Call::Release(objects.to_vec()))
+    }
+
+    fn pack(&self, objects: &[AgentId]) -> Result<Vec<u8>, WorldError> {
+        if let Reply::Packed(packed) = self.calls().ask(Call::Pack(objects.to_vec()))? {
+            Ok(packed)
+        } else {
+            Err(unexpected())
+        }
+    }
+
+    fn adopt(&self, packed: &[u8]) -> Result<(), WorldError> {
+        self.calls().act(Call::Adopt(packed.to_vec()))
+    }
+
+    fn advance_within(&self, span: SimSpan, boxes: &[Reach]) -> Result<PartAdvanced, WorldError> {
+        let Reply::Advanced(advanced, sequence) = self.calls().ask(Call::AdvanceWithin(span, boxes.to_vec()))? else {
+            return Err(unexpected());
+        };
+        check::reaches(&advanced.reaches).map_err(WorldError::Elsewhere)?;
+        self.calls().mirror.reach(sequence, LEASE);
+        Ok(advanced)
     }
 }
 

@@ -6,6 +6,8 @@
 use crate::identity::Identity;
 use metachron_world::SceneText;
 use std::collections::BTreeMap;
+use std::fmt;
+use std::sync::Arc;
 
 /// A scene as a viewer elsewhere needs it to draw a world: its text, and the files that it names.
 #[derive(Debug, Clone, PartialEq, Eq, Default, serde::Serialize, serde::Deserialize)]
@@ -28,15 +30,25 @@ pub(crate) enum Role {
 /// The name of all callers where none has a certificate.
 pub(crate) const ANYONE: &str = "anyone";
 
+/// Takes a scene that a host is to step a part of, or says why it does not.
+pub(crate) type Begins = Arc<dyn Fn(SceneFiles) -> Result<(), String> + Send + Sync>;
+
 /// How a world is served.
-#[derive(Debug, Clone)]
+#[derive(Clone)]
 pub struct Serving {
     pub(crate) name: String,
     pub(crate) endpoint: String,
     pub(crate) scene: Option<SceneFiles>,
+    pub(crate) begins: Option<Begins>,
     pub(crate) identity: Option<Identity>,
     pub(crate) roles: BTreeMap<String, Role>,
     pub(crate) insecure_lan: bool,
+}
+
+impl fmt::Debug for Serving {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("Serving").field("name", &self.name).field("endpoint", &self.endpoint).finish_non_exhaustive()
+    }
 }
 
 impl Serving {
@@ -45,13 +57,21 @@ impl Serving {
     #[must_use]
     pub fn new(name: impl Into<String>, endpoint: impl Into<String>) -> Self {
         let (name, endpoint, roles) = (name.into(), endpoint.into(), BTreeMap::new());
-        Self { name, endpoint, scene: None, identity: None, roles, insecure_lan: false }
+        Self { name, endpoint, scene: None, begins: None, identity: None, roles, insecure_lan: false }
     }
 
     /// With its scene, for callers that draw it. The path of a folder stays here.
     #[must_use]
     pub fn scene(mut self, scene: SceneFiles) -> Self {
         self.scene = Some(SceneFiles { scene: SceneText { folder: None, ..scene.scene }, ..scene });
+        self
+    }
+
+    /// Waits for work: operators give it scenes, of which `begin` makes a world, at time zero and in lockstep, to be served in the place of this
+    /// one; its error is the caller's.
+    #[must_use]
+    pub fn begins(mut self, begin: impl Fn(SceneFiles) -> Result<(), String> + Send + Sync + 'static) -> Self {
+        self.begins = Some(Arc::new(begin));
         self
     }
 

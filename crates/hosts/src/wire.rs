@@ -9,14 +9,14 @@ use crate::event_wire::WireEvent;
 use crate::refusal::Refusal;
 use crate::serving::{Role, SceneFiles};
 use metachron_core::{AgentId, Body, SimSpan, SimTime, Snapshot};
-use metachron_runtime::{Command, TimelineCommand};
-use metachron_world::Part;
+use metachron_runtime::{Command, Reach, TimelineCommand};
+use metachron_world::{Part, PartAdvanced};
 use serde::Serialize;
 use serde::de::DeserializeOwned;
 use std::sync::Arc;
 
 /// The version of all messages: it changes with the meaning of their bytes.
-pub(crate) const VERSION: u8 = 3;
+pub(crate) const VERSION: u8 = 4;
 /// The version of the program, whose parts and states each version has its own of.
 pub(crate) const PROGRAM: &str = env!("CARGO_PKG_VERSION");
 /// The most bytes of one message.
@@ -54,6 +54,13 @@ pub(crate) enum Call {
     /// The part as which an object joined.
     Part(AgentId),
     Scene,
+    /// A scene to step a part of, of a host that waits for work.
+    Begin(Box<SceneFiles>),
+    /// The calls of a part of a world ([`metachron_world::DividedCalls`]).
+    Release(Vec<AgentId>),
+    Pack(Vec<AgentId>),
+    Adopt(Vec<u8>),
+    AdvanceWithin(SimSpan, Vec<Reach>),
 }
 
 impl Call {
@@ -68,7 +75,12 @@ impl Call {
             | Self::Add(..)
             | Self::Remove(_)
             | Self::Checkpoint
-            | Self::Restore(_) => Role::Operator,
+            | Self::Restore(_)
+            | Self::Begin(_)
+            | Self::Release(_)
+            | Self::Pack(_)
+            | Self::Adopt(_)
+            | Self::AdvanceWithin(..) => Role::Operator,
         }
     }
 }
@@ -85,6 +97,9 @@ pub(crate) enum Reply {
     Hash(u64),
     Part(Option<Box<Part>>),
     Scene(Option<Box<SceneFiles>>),
+    Packed(Vec<u8>),
+    /// How far a part has come; its states are in the messages up to this number.
+    Advanced(PartAdvanced, u64),
     Refused(Refusal),
 }
 

@@ -4,6 +4,7 @@
 //! connection, a step.
 
 pub mod divided;
+pub mod flow;
 mod groups;
 pub mod placed_world;
 mod windows;

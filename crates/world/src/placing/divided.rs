@@ -6,7 +6,8 @@ use crate::control::pace::Pace;
 use crate::error::WorldError;
 use crate::world::{State, World};
 use metachron_core::{AgentId, ArchiveError, SimSpan};
-use metachron_runtime::{Lockstep, Reach};
+use metachron_runtime::{AgentHandle, Lockstep, Reach};
+use std::time::{Duration, Instant};
 
 /// A part of a world's steps: how far it has come.
 #[derive(Debug, Clone, PartialEq, Default, serde::Serialize, serde::Deserialize)]
@@ -15,6 +16,10 @@ pub struct PartAdvanced {
     pub escaped: Option<AgentId>,
     /// Where the objects that are stepped here may be found near others.
     pub reaches: Vec<Reach>,
+    /// Wall time that it took.
+    pub took: Duration,
+    /// CPU time of all steps made here so far.
+    pub cpu: Duration,
 }
 
 /// A world in lockstep whose steps several processes share: each has all of its objects, and steps some.
@@ -80,13 +85,14 @@ impl DividedCalls for World {
             lockstep.set_fences(boxes.iter().copied());
             Ok(())
         };
+        let begun = Instant::now();
         self.with_lockstep(fenced)?;
         self.advance(span);
-        let advanced = |lockstep: &mut Lockstep| {
-            let advanced = PartAdvanced { escaped: lockstep.escaped(), reaches: lockstep.reaches() };
+        let cpu = Duration::from_secs_f64(self.agents().iter().map(AgentHandle::cpu_s).sum());
+        self.with_lockstep(|lockstep| {
+            let (escaped, reaches) = (lockstep.escaped(), lockstep.reaches());
             lockstep.set_fences([]);
-            Ok(advanced)
-        };
-        self.with_lockstep(advanced)
+            Ok(PartAdvanced { escaped, reaches, took: begun.elapsed(), cpu })
+        })
     }
 }

@@ -6,7 +6,8 @@
 //! kept, and do again what was done since (Jefferson 1985). Never here: a connection, a turn.
 
 use super::divided::DividedCalls;
-use super::windows::{Act, Placing};
+use super::flow::Flow;
+use super::windows::{Act, HostSpent, Placing, PlacingSeen};
 use crate::calls::{EventReader, WorldCalls};
 use crate::description::couplings::CouplingKind;
 use crate::error::WorldError;
@@ -17,6 +18,7 @@ use crate::{Part, Scene};
 use metachron_core::{AgentId, Body, HASH_START, SimSpan, SimTime, Snapshot};
 use metachron_runtime::{Command, TimelineCommand};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::time::Duration;
 
 /// A host, and the world of the scene that it steps a part of.
 #[derive(Clone)]
@@ -32,10 +34,14 @@ pub struct PlacedHost {
 pub struct HostLoad {
     /// Its name.
     pub name: String,
-    /// Whether it answers.
-    pub lives: bool,
+    /// Why it steps nothing any more; `None` of one that does.
+    pub lost: Option<String>,
     /// How many objects it steps.
     pub objects: usize,
+    /// CPU time of its steps so far.
+    pub cpu: Duration,
+    /// The time of the newest window beside its steps: the link there and back.
+    pub waited: Duration,
 }
 
 /// How a placed world went.
@@ -59,6 +65,8 @@ pub struct PlacedWorld {
     /// The wanted rates of the objects of the scene.
     pub(super) rates_hz: Vec<f64>,
     placing: Mutex<Placing>,
+    seen: Mutex<PlacingSeen>,
+    pub(super) flow: Mutex<Flow>,
 }
 
 impl std::fmt::Debug for PlacedHost {
@@ -104,23 +112,34 @@ impl PlacedWorld {
         });
         let ties = couplings.map(|coupling| [coupling.a, coupling.b]).chain(of_joints).collect();
         let rates_hz: Vec<f64> = scene.agents.iter().map(|member| member.pace.rate_hz).collect();
-        let placing = Mutex::new(Placing::of(&hosts, time, &rates_hz)?);
-        let placed = Self { hosts, tag: WorldTag::new(), scene: mark, ties, rates_hz, placing };
+        let placing = Placing::of(&hosts, time, &rates_hz)?;
+        let (tag, seen, flow) = (WorldTag::new(), Mutex::new(placing.seen.clone()), Mutex::default());
+        let placed = Self { hosts, tag, scene: mark, ties, rates_hz, placing: Mutex::new(placing), seen, flow };
         placed.begin(&mut placed.placing())?;
         Ok(placed)
     }
 
-    pub(super) fn placing(&self) -> MutexGuard<'_, Placing> {
+    /// Lets others see how far time has come, and who steps what.
+    pub(super) fn show(&self, seen: &PlacingSeen) {
+        seen.clone_into(&mut self.seen.lock().unwrap_or_else(PoisonError::into_inner));
+    }
+
+    fn seen(&self) -> PlacingSeen {
+        self.seen.lock().unwrap_or_else(PoisonError::into_inner).clone()
+    }
+
+    fn placing(&self) -> MutexGuard<'_, Placing> {
         self.placing.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
     /// What each host carries.
     #[must_use]
     pub fn loads(&self) -> Vec<HostLoad> {
-        let placing = self.placing();
+        let placing = self.seen();
         let load = |(number, host): (usize, &PlacedHost)| {
             let objects = placing.owners.values().filter(|owner| owner.host == number).count();
-            HostLoad { name: host.name.clone(), lives: placing.lives[number], objects }
+            let HostSpent { cpu, waited } = placing.spent[number];
+            HostLoad { name: host.name.clone(), lost: placing.lost[number].clone(), objects, cpu, waited }
         };
         self.hosts.iter().enumerate().map(load).collect()
     }
@@ -128,15 +147,13 @@ impl PlacedWorld {
     /// How it went so far.
     #[must_use]
     pub fn counts(&self) -> PlacingCounts {
-        self.placing().counts
+        self.seen().counts
     }
 
     /// A host that answers.
     fn any(&self) -> Result<&dyn WorldCalls, WorldError> {
-        let lives = self.placing().lives.clone();
-        let mut living = self.hosts.iter().zip(lives).filter(|(_, lives)| *lives);
-        let (host, _) = living.next().ok_or_else(|| self.silent())?;
-        Ok(&*host.world)
+        let first = self.seen().living().first().copied();
+        first.map(|host| &*self.hosts[host].world).ok_or_else(|| self.silent())
     }
 
     /// The error of a world none of whose hosts answers.
@@ -149,7 +166,7 @@ impl PlacedWorld {
         if !object.is_of(self.tag) {
             return Err(WorldError::Foreign);
         }
-        let host = self.placing().owners.get(&object.id()).map(|owner| owner.host);
+        let host = self.seen().owners.get(&object.id()).map(|owner| owner.host);
         let world = match host {
             Some(host) => &*self.hosts[host].world,
             // it has left: its name is known everywhere
@@ -195,7 +212,7 @@ impl WorldCalls for PlacedWorld {
     }
 
     fn all_objects(&self) -> Vec<Object> {
-        self.placing().owners.keys().map(|id| self.tag.object(*id)).collect()
+        self.seen().owners.keys().map(|id| self.tag.object(*id)).collect()
     }
 
     fn object(&self, name: &str) -> Result<Object, WorldError> {
@@ -227,20 +244,15 @@ impl WorldCalls for PlacedWorld {
     }
 
     fn time(&self) -> SimTime {
-        self.placing().time
+        self.seen().time
     }
 
     fn hash(&self) -> Result<u64, WorldError> {
         self.all_objects().into_iter().try_fold(HASH_START, |hash, object| Ok(self.latest(object)?.fold_hash(hash)))
     }
 
-    /// Time passes in [`WorldCalls::advance`] alone.
     fn drive(&self, drive: TimelineCommand) -> Result<(), WorldError> {
-        match drive {
-            TimelineCommand::Step(span) => self.advance(span),
-            TimelineCommand::Pause => Ok(()),
-            _ => Err(WorldError::Undivided { reason: "its time passes in steps of its callers".to_owned() }),
-        }
+        self.change_flow(drive)
     }
 
     fn advance(&self, span: SimSpan) -> Result<(), WorldError> {
@@ -275,7 +287,8 @@ impl WorldCalls for PlacedWorld {
     }
 
     fn answers(&self) -> Result<(), WorldError> {
-        self.any().map(drop)
+        self.any()?;
+        self.flows()
     }
 
     fn listen(&self, filter: EventFilter) -> Box<dyn EventReader> {
@@ -368,7 +381,7 @@ mod tests {
             assert_eq!(placed.hash().unwrap(), whole.hash(), "quarter {quarter}: {:?}", placed.loads());
         }
         assert!(placed.counts().reborn > 0);
-        assert_eq!(placed.loads().iter().filter(|load| load.lives).count(), 2);
+        assert_eq!(placed.loads().iter().filter(|load| load.lost.is_none()).count(), 2);
         worlds.iter().for_each(|world| drop(world.stop()));
         assert!(placed.advance(QUARTER).is_err());
     }

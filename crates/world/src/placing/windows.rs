@@ -2,7 +2,7 @@
 //!
 //! In: the hosts of a placed world, an act. Out: the same act done once, whatever was done again for it. Never here: the calls of a world.
 
-use super::divided::PartAdvanced;
+use super::divided::{DividedCalls, PartAdvanced};
 use super::groups::{PlacedGroup, fences, groups, place};
 use super::placed_world::{PlacedHost, PlacedWorld, PlacingCounts};
 use crate::Part;
@@ -11,10 +11,9 @@ use crate::history::checkpoint::{Checkpoint, CheckpointError};
 use metachron_core::{AgentId, Body, SimSpan, SimTime};
 use metachron_runtime::{Command, Reach};
 use std::collections::{BTreeMap, VecDeque};
+use std::sync::Arc;
 use std::thread;
-
-/// So much time passes at once on all hosts.
-const WINDOW: SimSpan = SimSpan::from_nanos(16_666_667);
+use std::time::{Duration, Instant};
 
 /// States are kept so often: that much is done again where a host falls silent, or an object leaves its box.
 const KEEP_EVERY: SimSpan = SimSpan::from_millis(500);
@@ -32,12 +31,7 @@ const RATE_JOINED_HZ: f64 = 60.0;
 
 /// Who steps what.
 pub(super) struct Placing {
-    pub time: SimTime,
-    /// Of each object that is there.
-    pub owners: BTreeMap<AgentId, Owner>,
-    /// Whether each host answers.
-    pub lives: Vec<bool>,
-    pub counts: PlacingCounts,
+    pub seen: PlacingSeen,
     /// Where objects may be found, by hosts.
     reaches: Vec<Vec<Reach>>,
     room: f64,
@@ -46,6 +40,18 @@ pub(super) struct Placing {
     since: Vec<Act>,
     /// Objects that leave at their next steps.
     leaving: Vec<AgentId>,
+}
+
+/// The part of it that others look at while time passes: copies share the owners until these change.
+#[derive(Clone)]
+pub(super) struct PlacingSeen {
+    pub time: SimTime,
+    /// Of each object that is there.
+    pub owners: Arc<BTreeMap<AgentId, Owner>>,
+    /// Why each host steps nothing any more.
+    pub lost: Vec<Option<String>>,
+    pub counts: PlacingCounts,
+    pub spent: Vec<HostSpent>,
 }
 
 /// The host that steps an object.
@@ -64,6 +70,21 @@ struct Kept {
     /// The moment, without objects.
     moment: Vec<u8>,
     packs: Vec<Pack>,
+}
+
+/// The outcome of a window on one host.
+struct HostWindow {
+    advanced: PartAdvanced,
+    waited: Duration,
+}
+
+/// Time that a host has spent.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub(super) struct HostSpent {
+    /// CPU time of all steps so far.
+    pub cpu: Duration,
+    /// The newest window's wall time beside its steps: the link there and back.
+    pub waited: Duration,
 }
 
 /// Objects that one host has packed.
@@ -86,15 +107,15 @@ pub(super) enum Act {
 enum Fault {
     /// An object has left its box.
     Escaped,
-    /// The host of this number does not answer.
-    Silent(usize),
+    /// The host of this number does not step its part any more.
+    Lost(usize, WorldError),
     Refused(WorldError),
 }
 
-/// The outcome of a call of the host of this number.
+/// The outcome of a command to the host of this number, which may refuse it.
 fn told<T>(host: usize, outcome: Result<T, WorldError>) -> Result<T, Fault> {
     outcome.map_err(|error| match error {
-        WorldError::Silent { .. } | WorldError::Stopped => Fault::Silent(host),
+        error @ (WorldError::Silent { .. } | WorldError::Stopped) => Fault::Lost(host, error),
         other => Fault::Refused(other),
     })
 }
@@ -115,45 +136,60 @@ impl Placing {
             let rate_hz = rates_hz.get(object.id().0 as usize).copied().unwrap_or(RATE_JOINED_HZ);
             owners.insert(object.id(), Owner { host: 0, cost: places as f64 * rate_hz });
         }
-        let (lives, reaches) = (vec![true; hosts.len()], vec![Vec::new(); hosts.len()]);
+        let (lost, reaches) = (vec![None; hosts.len()], vec![Vec::new(); hosts.len()]);
+        let spent = vec![HostSpent::default(); hosts.len()];
         let (counts, kept, since, leaving) = (PlacingCounts::default(), Kept::default(), Vec::new(), Vec::new());
-        Ok(Self { time, owners, lives, counts, reaches, room: ROOM, kept, since, leaving })
+        let seen = PlacingSeen { time, owners: Arc::new(owners), lost, counts, spent };
+        Ok(Self { seen, reaches, room: ROOM, kept, since, leaving })
     }
 
     fn objects(&self) -> Vec<AgentId> {
-        self.owners.keys().copied().collect()
+        self.seen.owners.keys().copied().collect()
     }
 
     fn living(&self) -> Vec<usize> {
-        (0..self.lives.len()).filter(|host| self.lives[*host]).collect()
+        self.seen.living()
+    }
+}
+
+impl PlacingSeen {
+    /// The hosts that step their parts.
+    pub fn living(&self) -> Vec<usize> {
+        (0..self.lost.len()).filter(|host| self.lost[*host].is_none()).collect()
     }
 }
 
 impl PlacedWorld {
+    /// So much time passes at once on all hosts.
+    pub(super) const WINDOW: SimSpan = SimSpan::from_nanos(16_666_667);
+
     /// Goes on from a state that all hosts have: each object has its host, and all states are kept.
     pub(super) fn begin(&self, placing: &mut Placing) -> Result<(), WorldError> {
         for host in placing.living() {
             let is_elsewhere = |(_, owner): &(&AgentId, &Owner)| owner.host != host;
-            let elsewhere: Vec<_> = placing.owners.iter().filter(is_elsewhere).map(|(id, _)| *id).collect();
+            let elsewhere: Vec<_> = placing.seen.owners.iter().filter(is_elsewhere).map(|(id, _)| *id).collect();
             self.hosts[host].divided()?.release(&elsewhere)?;
         }
         placing.since.clear();
         placing.leaving.clear();
         match self.look(placing) {
-            Err(Fault::Refused(error)) => return Err(error),
-            Err(_) => return Err(self.silent()),
-            Ok(()) => {}
+            Err(Fault::Refused(error) | Fault::Lost(_, error)) => return Err(error),
+            Ok(()) | Err(Fault::Escaped) => {}
         }
         self.act(placing, Act::Pass(SimSpan::ZERO))?;
         self.keep_or_go_back(placing)
+    }
+
+    /// Calls a host for its part; one that refuses is lost.
+    fn part<T>(&self, host: usize, call: impl FnOnce(&dyn DividedCalls) -> Result<T, WorldError>) -> Result<T, Fault> {
+        self.hosts[host].divided().and_then(call).map_err(|error| Fault::Lost(host, error))
     }
 
     /// Looks where objects may be found.
     fn look(&self, placing: &mut Placing) -> Result<(), Fault> {
         placing.reaches.iter_mut().for_each(Vec::clear);
         for host in placing.living() {
-            let looked = self.hosts[host].divided().and_then(|divided| divided.advance_within(SimSpan::ZERO, &[]));
-            placing.reaches[host] = told(host, looked)?.reaches;
+            placing.reaches[host] = self.part(host, |divided| divided.advance_within(SimSpan::ZERO, &[]))?.reaches;
         }
         Ok(())
     }
@@ -162,9 +198,9 @@ impl PlacedWorld {
     pub(super) fn pass(&self, placing: &mut Placing, span: SimSpan) -> Result<(), WorldError> {
         let mut left = span;
         while left > SimSpan::ZERO {
-            let window = left.min(WINDOW);
+            let window = left.min(Self::WINDOW);
             self.act(placing, Act::Pass(window))?;
-            if placing.time >= placing.kept.time + KEEP_EVERY {
+            if placing.seen.time >= placing.kept.time + KEEP_EVERY {
                 self.keep_or_go_back(placing)?;
             }
             left = SimSpan::from_nanos(left.as_nanos() - window.as_nanos());
@@ -188,12 +224,13 @@ impl PlacedWorld {
                 }
             }
         }
+        self.show(&placing.seen);
         Ok(())
     }
 
     fn try_act(&self, placing: &mut Placing, act: &Act) -> Result<(), Fault> {
         let gone = |id: AgentId| Fault::Refused(WorldError::NoAgent(id));
-        let owner = |id: AgentId| placing.owners.get(&id).map(|owner| owner.host).ok_or_else(|| gone(id));
+        let owner = |id: AgentId| placing.seen.owners.get(&id).map(|owner| owner.host).ok_or_else(|| gone(id));
         match act {
             Act::Pass(span) => self.pass_window(placing, *span),
             Act::Command(id, command) => {
@@ -224,13 +261,18 @@ impl PlacedWorld {
         let advance = |host: usize| {
             let own: Vec<Reach> = fences
                 .iter()
-                .filter(|fence| placing.owners.get(&fence.id).is_some_and(|owner| owner.host == host))
+                .filter(|fence| placing.seen.owners.get(&fence.id).is_some_and(|owner| owner.host == host))
                 .copied()
                 .collect();
-            told(host, self.hosts[host].divided().and_then(|divided| divided.advance_within(window, &own)))
+            {
+                let asked = Instant::now();
+                let advanced = self.part(host, |divided| divided.advance_within(window, &own))?;
+                let waited = asked.elapsed().saturating_sub(advanced.took);
+                Ok(HostWindow { advanced, waited })
+            }
         };
         let living = placing.living();
-        let outcomes: Vec<Result<PartAdvanced, Fault>> = if let [host] = living[..] {
+        let outcomes: Vec<Result<HostWindow, Fault>> = if let [host] = living[..] {
             vec![advance(host)]
         } else {
             let advance = &advance;
@@ -239,27 +281,28 @@ impl PlacedWorld {
                 calls
                     .into_iter()
                     .zip(&living)
-                    .map(|(call, host)| call.join().unwrap_or(Err(Fault::Silent(*host))))
+                    .map(|(call, host)| call.join().unwrap_or_else(|_| Err(Fault::Lost(*host, WorldError::Stopped))))
                     .collect()
             })
         };
         let mut escaped = false;
         for (host, outcome) in living.into_iter().zip(outcomes) {
-            let PartAdvanced { escaped: one, reaches } = outcome?;
-            escaped |= one.is_some();
-            placing.reaches[host] = reaches;
+            let HostWindow { advanced, waited } = outcome?;
+            escaped |= advanced.escaped.is_some();
+            placing.reaches[host] = advanced.reaches;
+            placing.seen.spent[host] = HostSpent { cpu: advanced.cpu, waited };
         }
         if escaped {
             return Err(Fault::Escaped);
         }
-        placing.time += window;
+        placing.seen.time += window;
         let has_left = |id: &AgentId| {
-            let world = placing.owners.get(id).map(|owner| &self.hosts[owner.host].world);
+            let world = placing.seen.owners.get(id).map(|owner| &self.hosts[owner.host].world);
             let latest = world.map(|world| world.object_of(*id).and_then(|object| world.latest(object)));
             latest.is_none_or(|latest| matches!(latest, Err(WorldError::Gone { .. })))
         };
         for id in placing.leaving.extract_if(.., |id| has_left(id)).collect::<Vec<_>>() {
-            placing.owners.remove(&id);
+            Arc::make_mut(&mut placing.seen.owners).remove(&id);
         }
         placing.room = (placing.room * ROOM_FALLS).max(ROOM);
         Ok(())
@@ -275,12 +318,13 @@ impl PlacedWorld {
         let fences = fences(&reaches, window, placing.room);
         let mut placed: Vec<PlacedGroup> =
             groups(&placing.objects(), &fences, &self.ties).into_iter().map(|objects| placing.group(objects)).collect();
-        place(&mut placed, &placing.lives, placing.since.is_empty());
+        let lives: Vec<bool> = placing.seen.lost.iter().map(Option::is_none).collect();
+        place(&mut placed, &lives, placing.since.is_empty());
         let mut moves: BTreeMap<(usize, usize), Vec<Vec<AgentId>>> = BTreeMap::new();
         for PlacedGroup { objects, host, .. } in &placed {
             let mut from: BTreeMap<usize, Vec<AgentId>> = BTreeMap::new();
             for id in objects {
-                from.entry(placing.owners[id].host).or_default().push(*id);
+                from.entry(placing.seen.owners[id].host).or_default().push(*id);
             }
             let Some(to) = *host else { continue };
             for (from, objects) in from.into_iter().filter(|(from, _)| *from != to) {
@@ -289,13 +333,13 @@ impl PlacedWorld {
         }
         for ((from, to), groups) in moves {
             for Pack { objects, bytes, .. } in self.pack(from, &groups)? {
-                told(to, self.hosts[to].divided().and_then(|divided| divided.adopt(&bytes)))?;
-                told(from, self.hosts[from].divided().and_then(|divided| divided.release(&objects)))?;
-                placing.counts.moved += objects.len() as u64;
+                self.part(to, |divided| divided.adopt(&bytes))?;
+                self.part(from, |divided| divided.release(&objects))?;
+                placing.seen.counts.moved += objects.len() as u64;
                 placing.give(&objects, to);
             }
         }
-        let mut hosts = placing.owners.values().map(|owner| owner.host);
+        let mut hosts = placing.seen.owners.values().map(|owner| owner.host);
         let first = hosts.next();
         let is_one = hosts.all(|host| Some(host) == first);
         Ok(if is_one { Vec::new() } else { fences })
@@ -312,7 +356,7 @@ impl PlacedWorld {
         }
         for Pack { objects, bytes, .. } in &mut packs {
             objects.sort_unstable();
-            *bytes = told(host, self.hosts[host].divided().and_then(|divided| divided.pack(objects)))?;
+            *bytes = self.part(host, |divided| divided.pack(objects))?;
         }
         Ok(packs)
     }
@@ -336,14 +380,14 @@ impl PlacedWorld {
     fn keep(&self, placing: &mut Placing) -> Result<(), Fault> {
         let living = placing.living();
         let first = *living.first().ok_or_else(|| Fault::Refused(self.silent()))?;
-        let moment = told(first, self.hosts[first].divided().and_then(|divided| divided.pack(&[])))?;
-        let mut kept = Kept { time: placing.time, moment, packs: Vec::new() };
+        let moment = self.part(first, |divided| divided.pack(&[]))?;
+        let mut kept = Kept { time: placing.seen.time, moment, packs: Vec::new() };
         // without another host nobody could go on with them
         if living.len() > 1 {
             let reaches: Vec<Reach> = placing.reaches.iter().flatten().copied().collect();
             let groups = groups(&placing.objects(), &reaches, &self.ties);
             for host in living {
-                let is_own = |group: &&Vec<AgentId>| group.iter().all(|id| placing.owners[id].host == host);
+                let is_own = |group: &&Vec<AgentId>| group.iter().all(|id| placing.seen.owners[id].host == host);
                 let own: Vec<_> = groups.iter().filter(is_own).cloned().collect();
                 kept.packs.extend(self.pack(host, &own)?);
             }
@@ -354,18 +398,21 @@ impl PlacedWorld {
 
     /// Puts all hosts that live back to the states that were kept; a host that has fallen silent is none of them any more.
     fn go_back(&self, placing: &mut Placing, fault: Fault) -> Result<(), WorldError> {
-        let mut fault = Some(fault);
+        let (mut fault, mut lost) = (Some(fault), None);
         while let Some(why) = fault.take() {
             match why {
                 Fault::Refused(error) => return Err(error),
                 Fault::Escaped => {
-                    placing.counts.escaped += 1;
+                    placing.seen.counts.escaped += 1;
                     placing.room *= ROOM_RISES;
                 }
-                Fault::Silent(host) => placing.lives[host] = false,
+                Fault::Lost(host, error) => {
+                    placing.seen.lost[host] = Some(error.to_string());
+                    lost = Some(error);
+                }
             }
-            if placing.living().is_empty() || (placing.kept.packs.is_empty() && !placing.owners.is_empty()) {
-                return Err(self.silent());
+            if placing.living().is_empty() || (placing.kept.packs.is_empty() && !placing.seen.owners.is_empty()) {
+                return Err(lost.unwrap_or_else(|| self.silent()));
             }
             fault = self.try_back(placing).err();
         }
@@ -375,25 +422,24 @@ impl PlacedWorld {
     fn try_back(&self, placing: &mut Placing) -> Result<(), Fault> {
         let (objects, living) = (placing.objects(), placing.living());
         for &host in &living {
-            let begun = self.hosts[host].divided().and_then(|divided| {
+            self.part(host, |divided| {
                 divided.release(&objects)?;
                 divided.adopt(&placing.kept.moment)
-            });
-            told(host, begun)?;
+            })?;
         }
         let mut packs = std::mem::take(&mut placing.kept.packs);
         let put = packs.iter_mut().try_for_each(|pack| {
-            if !placing.lives[pack.host] {
-                let count = |host: &usize| placing.owners.values().filter(|owner| owner.host == *host).count();
+            if placing.seen.lost[pack.host].is_some() {
+                let count = |host: &usize| placing.seen.owners.values().filter(|owner| owner.host == *host).count();
                 pack.host = living.iter().copied().min_by_key(count).unwrap_or_default();
-                placing.counts.reborn += pack.objects.len() as u64;
+                placing.seen.counts.reborn += pack.objects.len() as u64;
             }
             placing.give(&pack.objects, pack.host);
-            told(pack.host, self.hosts[pack.host].divided().and_then(|divided| divided.adopt(&pack.bytes)))
+            self.part(pack.host, |divided| divided.adopt(&pack.bytes))
         });
         placing.kept.packs = packs;
         put?;
-        placing.time = placing.kept.time;
+        placing.seen.time = placing.kept.time;
         placing.leaving.clear();
         self.look(placing)
     }
@@ -402,8 +448,8 @@ impl PlacedWorld {
 impl Placing {
     /// A group with the host that steps most of it.
     fn group(&self, objects: Vec<AgentId>) -> PlacedGroup {
-        let mut shares = vec![0.0; self.lives.len()];
-        objects.iter().filter_map(|id| self.owners.get(id)).for_each(|owner| shares[owner.host] += owner.cost);
+        let mut shares = vec![0.0; self.seen.lost.len()];
+        objects.iter().filter_map(|id| self.seen.owners.get(id)).for_each(|owner| shares[owner.host] += owner.cost);
         let cost = shares.iter().sum();
         let host = (0..shares.len()).rev().max_by(|one, other| shares[*one].total_cmp(&shares[*other]));
         PlacedGroup { objects, host, cost }
@@ -411,7 +457,7 @@ impl Placing {
 
     fn give(&mut self, objects: &[AgentId], to: usize) {
         for id in objects {
-            self.owners.entry(*id).and_modify(|owner| owner.host = to);
+            Arc::make_mut(&mut self.seen.owners).entry(*id).and_modify(|owner| owner.host = to);
         }
     }
 }
@@ -428,7 +474,8 @@ impl PlacedWorld {
             joined = Some(id);
         }
         let id = joined.ok_or_else(|| self.silent())?;
-        placing.owners.insert(id, Owner { host: placing.living()[0], cost: RATE_JOINED_HZ });
+        let host = *placing.living().first().ok_or_else(|| self.silent())?;
+        Arc::make_mut(&mut placing.seen.owners).insert(id, Owner { host, cost: RATE_JOINED_HZ });
         self.begin(placing)?;
         Ok(id)
     }
@@ -450,8 +497,8 @@ impl PlacedWorld {
         let living = placing.living();
         living.iter().try_for_each(|host| self.hosts[*host].world.restore(checkpoint))?;
         let first = *living.first().ok_or_else(|| self.silent())?;
-        placing.owners = Placing::of(&self.hosts[first..=first], checkpoint.time(), &self.rates_hz)?.owners;
-        placing.time = checkpoint.time();
+        placing.seen.owners = Placing::of(&self.hosts[first..=first], checkpoint.time(), &self.rates_hz)?.seen.owners;
+        placing.seen.time = checkpoint.time();
         let objects = placing.objects();
         placing.give(&objects, first);
         Ok(self.begin(placing)?)
