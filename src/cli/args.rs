@@ -4,7 +4,8 @@ use super::devices::DeviceWish;
 use super::exports::ExportPaths;
 #[cfg(feature = "hosts")]
 use super::hosts::args::{
-    HOST_EXAMPLES, HostArgs, IDENTITY_EXAMPLES, IdentityCommand, TOOL_EXAMPLES, ToolArgs, VIEW_EXAMPLES, ViewArgs,
+    CallArgs, HOST_EXAMPLES, HostArgs, IDENTITY_EXAMPLES, IdentityCommand, TOOL_EXAMPLES, ToolArgs, VIEW_EXAMPLES,
+    ViewArgs,
 };
 use clap::builder::PossibleValuesParser;
 use clap::{Args, Parser, Subcommand, ValueHint};
@@ -347,6 +348,15 @@ pub struct RunArgs {
     /// Write down what is done to the run, so that `metachron replay` repeats it to the bit; the file grows with the run
     #[arg(long, value_name = "FILE", value_hint = ValueHint::FilePath)]
     pub record: Option<PathBuf>,
+    /// Let these hosts step it together, each a part, and draw it here; each waits for work (`metachron host` without a scene): NAME=ENDPOINT, or a
+    /// name of DNS for NAME=tls/NAME:7447. States are those of one process in lockstep at --pace free, to the bit
+    #[cfg(feature = "hosts")]
+    #[arg(long, value_name = "HOSTS", value_delimiter = ',', conflicts_with_all = ["oracle", "device", "record", "executor"])]
+    pub hosts: Vec<String>,
+    /// The caller of hosts by its certificate, or without one.
+    #[cfg(feature = "hosts")]
+    #[command(flatten)]
+    pub call: CallArgs,
     /// How far the scene may go.
     #[command(flatten)]
     pub limits: LimitArgs,

@@ -6,6 +6,7 @@
 
 pub mod args;
 mod common;
+mod placed;
 mod tool;
 mod view;
 
@@ -16,15 +17,20 @@ use metachron_console::exit::Exit;
 use metachron_console::output::{BadInput, data, message, print_overlaps, warn_priority};
 use metachron_hosts::{Authority, Host, Identity, Refusals, SceneFiles, Serving, serve};
 use metachron_runtime::{AgentHandle, TimelineCommand};
-use metachron_scene::{Source, load};
-use metachron_world::{SceneText, World};
+use metachron_scene::{Limits, Source, load};
+use metachron_world::kinds::ExecutorKind;
+use metachron_world::{Scene, SceneText, World};
+pub(super) use placed::place;
 use serde::Serialize;
 use std::io::IsTerminal;
 use std::sync::Arc;
-use std::sync::mpsc::RecvTimeoutError;
-use std::time::Instant;
+use std::sync::mpsc::{Receiver, RecvTimeoutError, channel};
+use std::time::{Duration, Instant};
 pub(super) use tool::tool;
 pub(super) use view::view;
+
+/// Whether a scene was given is looked at so often.
+const GIVEN_EVERY: Duration = Duration::from_millis(20);
 
 /// A line of a host.
 #[derive(Debug, Serialize)]
@@ -50,38 +56,103 @@ struct RefusedRow {
     forbidden: u64,
 }
 
-/// Serves a scene until Ctrl-C.
+/// A scene with its text and files, as a host serves it.
+struct Work {
+    scene: Scene,
+    files: SceneFiles,
+}
+
+/// Serves a scene until Ctrl-C; without one, parts of the scenes that callers give, one after the other.
 pub(super) fn host(args: &HostArgs) -> anyhow::Result<Exit> {
-    let source = Source::open(&args.scene)?.within(args.limits.limits());
+    let identity = args.identity.as_ref().map(Identity::from_file).transpose().map_err(refused)?;
+    let stopped = stopped()?;
+    let (give, given) = channel();
+    let mut work = args.scene.as_deref().map(|scene| own_scene(scene, args)).transpose()?;
+    loop {
+        let world = match &work {
+            Some(Work { scene, .. }) => {
+                let executor = if args.scene.is_some() { scene.executor } else { ExecutorKind::Lockstep };
+                World::start(scene, executor)?
+            }
+            None => World::start(&Scene::builder().build()?, ExecutorKind::Lockstep)?,
+        };
+        let mut serving = Serving::new(&args.name, &args.listen).operators(&args.operators).viewers(&args.viewers);
+        if args.scene.is_none() {
+            let (give, limits) = (give.clone(), args.limits.limits());
+            serving = serving.begins(move |files| {
+                let work = given_scene(files, limits).map_err(|error| format!("{error:#}"))?;
+                give.send(work).map_err(|_| "the host ends".to_owned())
+            });
+        }
+        let serving = work.iter().fold(serving, |serving, work| serving.scene(work.files.clone()));
+        let serving = if args.insecure_lan { serving.insecure_lan() } else { serving };
+        let host = serve(Arc::new(world.clone()), identity.clone().into_iter().fold(serving, Serving::identity));
+        let host = host.map_err(refused)?;
+        let serves = work.as_ref().map_or("waits for work", |work| &*work.scene.name);
+        message(&format!("`{}` at {}: {serves}, until Ctrl-C", args.name, args.listen));
+        if host.is_open() {
+            message(&red(INSECURE, std::io::stderr().is_terminal()));
+        }
+        if args.scene.is_some() && !args.paused {
+            world.drive(TimelineCommand::Run);
+        }
+        let next = carry(&world, &host, &Waits { stopped: &stopped, given: &given }, args.json)?;
+        // the answer to the caller that gave it has left
+        drop(host);
+        drop(world.stop());
+        if next.is_none() {
+            return Ok(Exit::Ok);
+        }
+        work = next;
+    }
+}
+
+/// What ends the service of a world.
+struct Waits<'a> {
+    stopped: &'a Receiver<()>,
+    given: &'a Receiver<Work>,
+}
+
+/// Says each second what a world carries, until Ctrl-C, or until another scene is given.
+fn carry(world: &World, host: &Host, waits: &Waits<'_>, json: bool) -> anyhow::Result<Option<Work>> {
+    let mut counted = Counted { at: Instant::now(), cpu_s: 0.0, sent: 0 };
+    loop {
+        match waits.stopped.recv_timeout(GIVEN_EVERY) {
+            Err(RecvTimeoutError::Timeout) => {}
+            _ => return Ok(None),
+        }
+        if let Ok(work) = waits.given.try_recv() {
+            return Ok(Some(work));
+        }
+        if counted.at.elapsed() >= LINE_EVERY {
+            data(&line(&carried(world, host, &mut counted), json)?)?;
+            host.take_refused().iter().for_each(|(peer, refused)| message(&of_peer(peer, *refused)));
+        }
+    }
+}
+
+/// The scene that a host was started with.
+fn own_scene(name: &str, args: &HostArgs) -> anyhow::Result<Work> {
+    let source = Source::open(name)?.within(args.limits.limits());
     let scene = load(&source, &args.set)?;
     print_overlaps(&scene);
     warn_priority(&scene);
-    let world = World::start(&scene, scene.executor)?;
+    let files = scene_files(&source, &args.set)?;
+    Ok(Work { scene, files })
+}
+
+/// The scene that a caller gives, which is checked as a file is.
+fn given_scene(files: SceneFiles, limits: Limits) -> anyhow::Result<Work> {
+    let source = Source::recorded(&files.scene.name, &files.scene.text, None)?;
+    let scene = load(&source.with_files(files.files.clone()).within(limits), &files.scene.overrides)?;
+    Ok(Work { scene, files })
+}
+
+/// The text of a scene, and the files that it names.
+fn scene_files(source: &Source, overrides: &[(String, String)]) -> anyhow::Result<SceneFiles> {
     let (name, text) = (source.name().to_owned(), source.text().to_owned());
-    let text = SceneText { name, text, folder: None, overrides: args.set.clone() };
-    let files = source.files_beside().map_err(BadInput)?;
-    let serving = Serving::new(&args.name, &args.listen).scene(SceneFiles { scene: text, files });
-    let serving = serving.operators(&args.operators).viewers(&args.viewers);
-    let serving = if args.insecure_lan { serving.insecure_lan() } else { serving };
-    let identity = args.identity.as_ref().map(Identity::from_file).transpose().map_err(refused)?;
-    let serving = identity.into_iter().fold(serving, Serving::identity);
-    let host = serve(Arc::new(world.clone()), serving).map_err(refused)?;
-    let stopped = stopped()?;
-    message(&format!("`{}` serves {} at {}, until Ctrl-C", args.name, scene.name, args.listen));
-    if host.is_open() {
-        message(&red(INSECURE, std::io::stderr().is_terminal()));
-    }
-    if !args.paused {
-        world.drive(TimelineCommand::Run);
-    }
-    let mut counted = Counted { at: Instant::now(), cpu_s: 0.0, sent: 0 };
-    while matches!(stopped.recv_timeout(LINE_EVERY), Err(RecvTimeoutError::Timeout)) {
-        data(&line(&carried(&world, &host, &mut counted), args.json)?)?;
-        host.take_refused().iter().for_each(|(peer, refused)| message(&of_peer(peer, *refused)));
-    }
-    drop(host);
-    world.stop();
-    Ok(Exit::Ok)
+    let scene = SceneText { name, text, folder: None, overrides: overrides.to_vec() };
+    Ok(SceneFiles { scene, files: source.files_beside().map_err(BadInput)? })
 }
 
 /// The sums at a moment of which lines tell the rates.

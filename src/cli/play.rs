@@ -7,16 +7,16 @@ use super::exports::Exports;
 use super::run::{Played, Request, RunLength, Step};
 use anyhow::Context;
 use metachron_console::output::BadInput;
-use metachron_core::{AgentId, AttachmentEvent, ClusterState, ContactPartner, SensorTouch};
+use metachron_core::{AgentId, AttachmentEvent, ClusterState, ContactPartner, SensorTouch, SimSpan};
 use metachron_lod::Bound;
 use metachron_render::Size;
 #[cfg(feature = "render")]
 use metachron_render::{Gpu, GpuError, Offscreen, RendererOptions};
-use metachron_runtime::{AgentState, Percentiles};
+use metachron_runtime::{AgentState, Percentiles, TimelineCommand};
 use metachron_session::report::{
-    AgentReport, BudgetReport, ClusterRow, CouplingError, CouplingReport, EventReport, MovedReport, OverlapReport,
-    ProbeReport, Quantiles, ReadingReport, ReferenceReport, Report, SensorReport, summarise, summarise_choices,
-    summarise_undrawn,
+    AgentReport, BudgetReport, ClusterRow, CouplingError, CouplingReport, EventReport, HostReport, MovedReport,
+    OverlapReport, ProbeReport, Quantiles, ReadingReport, ReferenceReport, Report, SensorReport, summarise,
+    summarise_choices, summarise_undrawn,
 };
 use metachron_session::{
     AgentOutcome, Coupling, Drawing, End, Event, FrameRecord, Headless, Outcome, PairError, ProbeOutcome,
@@ -27,8 +27,9 @@ use metachron_viewer::ui::WindowError;
 #[cfg(feature = "viewer")]
 use metachron_viewer::{WindowFailure, WindowPlan, play_in_window};
 use metachron_world::kinds::ExecutorKind;
-use metachron_world::{Reading, RecordingFile, Scene, SceneText, Sensor};
+use metachron_world::{HostLoad, Pace, PlacedWorld, Reading, RecordingFile, Scene, SceneText, Sensor, WorldCalls};
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 /// Begins to write down the commands to the run.
 fn record(session: &Session, path: &Path, request: &Request) -> anyhow::Result<()> {
@@ -53,7 +54,14 @@ const PICTURE_SIZE: [u32; 2] = [1280, 720];
 /// # Errors
 /// Errors of the models, the executor or the adapter.
 pub(super) fn play(request: &Request, go_on: GoOn<'_>) -> anyhow::Result<Played> {
-    let mut session = Session::open(request.scene.clone(), request.pace)?;
+    let placed = match &*request.hosts {
+        [] => None,
+        hosts => Some(Arc::new(PlacedWorld::start(&request.scene, hosts.to_vec())?)),
+    };
+    let mut session = match &placed {
+        Some(placed) => Session::open_elsewhere(request.scene.clone(), Arc::clone(placed) as Arc<dyn WorldCalls>)?,
+        None => Session::open(request.scene.clone(), request.pace)?,
+    };
     if !request.quiet {
         session.report_start_up(metachron_console::output::message);
     }
@@ -64,13 +72,25 @@ pub(super) fn play(request: &Request, go_on: GoOn<'_>) -> anyhow::Result<Played>
         record(&session, path, request)?;
     }
     let served = devices::serve(&session, &request.scene, &request.devices)?;
+    if let Some(placed) = &placed {
+        let end = if let Some(RunLength::Seconds(seconds)) = request.end { Some(seconds) } else { None };
+        let end = end.and_then(SimSpan::from_secs_f64).map(|span| placed.time() + span);
+        placed.let_flow(request.pace == Pace::Free, end)?;
+        placed.drive(TimelineCommand::Run)?;
+    }
     let mut played = if request.window {
         in_window(session, request, go_on)?
     } else {
         headless(session, request, request.png.clone(), go_on)?
     };
     played.report.devices = devices::reports(served);
+    played.report.hosts = placed.iter().flat_map(|placed| placed.loads()).map(host_report).collect();
     Ok(played)
+}
+
+fn host_report(HostLoad { name, lost, objects, cpu, waited, moved, reborn }: HostLoad) -> HostReport {
+    let (cpu_s, link_ms) = (cpu.as_secs_f64(), waited.as_secs_f64() * 1e3);
+    HostReport { name, agents: objects, cpu_s, link_ms, moved, reborn, lost }
 }
 
 #[cfg(not(feature = "viewer"))]
@@ -259,6 +279,7 @@ fn played(scene: &Scene, outcome: Outcome, picture: Option<PathBuf>) -> Played {
             .map(|(sensor, read)| reading(sensor, read.as_ref()))
             .collect(),
         devices: Vec::new(),
+        hosts: Vec::new(),
         parked: outcome.agents.iter().filter(|one| matches!(one.stats.state, AgentState::Parked(_))).count() as u32,
         clusters,
         notes: outcome.notes,

@@ -56,6 +56,7 @@ pub(super) fn command(args: &ReplayArgs) -> anyhow::Result<Exit> {
         exports: args.output.exports(),
         devices: Vec::new(),
         record: None,
+        hosts: Vec::new(),
         png_without_window: format!("metachron-{}.png", stem(source.name())).into(),
         source,
     };

@@ -19,7 +19,7 @@ use metachron_render::{Colouring, Style};
 use metachron_scene::{Source, load};
 use metachron_session::FrameRecord;
 use metachron_session::report::{Report, Verdict};
-use metachron_world::{Pace, Scene, is_same_file};
+use metachron_world::{Pace, PlacedHost, Scene, is_same_file};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -68,6 +68,8 @@ pub struct Request {
     pub devices: Vec<DeviceWish>,
     /// Where to write down the commands to the run.
     pub record: Option<PathBuf>,
+    /// The hosts that step it together; none for this process.
+    pub hosts: Vec<PlacedHost>,
     /// Where to write it when the requested window could not be opened.
     pub png_without_window: PathBuf,
 }
@@ -131,7 +133,10 @@ impl Request {
 /// Runs a scene.
 pub(super) fn command(args: &RunArgs, matches: Option<&ArgMatches>) -> anyhow::Result<Exit> {
     check_inputs(args)?;
-    let request = request(args, matches)?;
+    #[cfg_attr(not(feature = "hosts"), expect(unused_mut, reason = "only a build with hosts places objects on them"))]
+    let mut request = request(args, matches)?;
+    #[cfg(feature = "hosts")]
+    super::hosts::place(args, &mut request)?;
     if !args.output.quiet {
         print_overlaps(&request.scene);
         warn_priority(&request.scene);
@@ -208,6 +213,7 @@ fn request(args: &RunArgs, matches: Option<&ArgMatches>) -> anyhow::Result<Reque
         exports: args.output.exports(),
         devices: args.device.clone(),
         record: args.record.clone(),
+        hosts: Vec::new(),
         png_without_window,
     })
 }

@@ -58,7 +58,7 @@ pub use history::recording::{BadRecording, RecordError, Recording, SceneText};
 pub use metachron_contact::detect::SolveBudget;
 pub use metachron_runtime::{Command, FACTOR, PRESETS};
 pub use placing::divided::{DividedCalls, PartAdvanced};
-pub use placing::placed_world::{HostLoad, PlacedHost, PlacedWorld, PlacingCounts};
+pub use placing::placed_world::{HostLoad, PlacedHost, PlacedWorld};
 pub use reading::events::{Contact, Event, EventFilter, EventSieve, Events, Happening};
 pub use reading::frames::{Frame, Frames};
 pub use reading::joint_states::JointState;

@@ -11,6 +11,8 @@ Examples:
   metachron host cavity                                serves the scene to this machine until Ctrl-C
   metachron host swarm.toml --listen tcp/127.0.0.1:7500 --name swarm --json
   metachron view tcp/127.0.0.1:7500                    a window on it, in another terminal
+  metachron host --name bench                          waits for work; then, in another terminal:
+  metachron run pile --hosts bench=tcp/127.0.0.1:7447
   metachron host cavity --listen tls/0.0.0.0:7447 --identity bench.pem --operators lab2 --viewers screen
 
 Beyond this machine both ends have certificates (`metachron identity`), and only callers are let in that are named.";
@@ -18,9 +20,9 @@ Beyond this machine both ends have certificates (`metachron identity`), and only
 /// `host`.
 #[derive(Debug, Args)]
 pub struct HostArgs {
-    /// A built-in scene or the path of a scene file
+    /// A built-in scene or the path of a scene file; without one the host waits for parts of scenes that `metachron run --hosts` gives it
     #[arg(value_hint = ValueHint::FilePath)]
-    pub scene: String,
+    pub scene: Option<String>,
     /// Where callers reach the world: tcp/, a loopback address and a port; or tls/, an address and a port, with --identity
     #[arg(long, value_name = "ENDPOINT", default_value = "tcp/127.0.0.1:7447")]
     pub listen: String,

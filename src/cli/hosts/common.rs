@@ -29,10 +29,15 @@ pub(super) fn stopped() -> anyhow::Result<Receiver<()>> {
 
 /// The world at an endpoint, to look at or to act on.
 pub(super) fn reached(endpoint: &str, call: &CallArgs, is_looking: bool) -> Result<RemoteWorld, HostsError> {
+    let calling = calling(endpoint, call)?;
+    connect(if is_looking { calling.looking() } else { calling })
+}
+
+/// How the world at an endpoint is called.
+pub(super) fn calling(endpoint: &str, call: &CallArgs) -> Result<Calling, HostsError> {
     let identity = call.identity.as_ref().map(Identity::from_file).transpose()?;
     let calling = identity.into_iter().fold(Calling::at(endpoint), Calling::identity);
-    let calling = if is_looking { calling.looking() } else { calling };
-    connect(if call.insecure_lan { calling.insecure_lan() } else { calling })
+    Ok(if call.insecure_lan { calling.insecure_lan() } else { calling })
 }
 
 /// A scene as a host says it, with what it was read from.

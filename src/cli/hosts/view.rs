@@ -53,6 +53,7 @@ fn request(args: &ViewArgs, world: &RemoteWorld) -> anyhow::Result<Request> {
         exports: args.output.exports(),
         devices: Vec::new(),
         record: None,
+        hosts: Vec::new(),
         png_without_window: format!("metachron-{}.png", stem(&scene.name)).into(),
         scene,
         source,

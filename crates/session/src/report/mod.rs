@@ -65,6 +65,9 @@ pub struct Report {
     /// Devices that led objects, and the forces that they felt; left out where there were none.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub devices: Vec<DeviceReport>,
+    /// The hosts that stepped the world together; left out where there were none.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub hosts: Vec<HostReport>,
     /// Warnings about its figures, of a world elsewhere: a link that anybody may listen to, objects that were not shown; left out where
     /// there is nothing.
     #[serde(skip_serializing_if = "Vec::is_empty")]
@@ -84,6 +87,25 @@ pub struct Report {
     pub budget: BudgetReport,
     /// The scene's probes.
     pub probes: Vec<ProbeReport>,
+}
+
+/// One of the hosts that stepped a world together.
+#[derive(Debug, Clone, Default, Serialize)]
+pub struct HostReport {
+    /// Its name.
+    pub name: String,
+    /// Objects that it stepped at the end.
+    pub agents: usize,
+    /// CPU seconds of its steps.
+    pub cpu_s: f64,
+    /// The newest window's time beside its steps, milliseconds: the link there and back, and what was said on it.
+    pub link_ms: f64,
+    /// Objects that came to it from other hosts.
+    pub moved: u64,
+    /// Of these those whose host was lost.
+    pub reborn: u64,
+    /// Why it was lost; `None` of one that stepped to the end.
+    pub lost: Option<String>,
 }
 
 /// One agent of a run.
@@ -409,6 +431,7 @@ impl Report {
             sensors: vec![SensorReport::default()],
             readings: vec![ReadingReport { values: vec![0.0], ..ReadingReport::default() }],
             devices: vec![DeviceReport::default()],
+            hosts: vec![HostReport::default()],
             notes: vec![name()],
             parked: 0,
             clusters: vec![ClusterRow { members: vec![name()], steps: vec![1], ..ClusterRow::default() }],

@@ -1,8 +1,8 @@
 //! The report as a table for people.
 
 use super::{
-    AgentReport, ChoiceSummary, CouplingReport, EventReport, FrameSummary, ReferenceReport, Report, ScaleSummary,
-    SensorReport, Statistics,
+    AgentReport, ChoiceSummary, CouplingReport, EventReport, FrameSummary, HostReport, ReferenceReport, Report,
+    ScaleSummary, SensorReport, Statistics,
 };
 use metachron_devices::DeviceReport;
 use std::fmt::Write;
@@ -38,6 +38,7 @@ impl Report {
         event_lines(&mut out, &self.events);
         sensor_lines(&mut out, &self.sensors);
         self.devices.iter().for_each(|device| device_line(&mut out, device));
+        self.hosts.iter().for_each(|host| host_line(&mut out, host));
         if let Some(oracle) = &self.oracle {
             reference_table(&mut out, oracle);
         }
@@ -154,6 +155,16 @@ fn device_line(out: &mut String, report: &DeviceReport) {
     }
     if let Some(why) = &report.first_failure {
         let _ = writeln!(out, "note  the device failed {} times, first: {why}", report.failures);
+    }
+}
+
+fn host_line(out: &mut String, HostReport { name, agents, cpu_s, link_ms, moved, reborn, lost }: &HostReport) {
+    let _ = writeln!(
+        out,
+        "host {name}: {agents} agents at the end, {cpu_s:.2} CPU s, link {link_ms:.2} ms; {moved} came to it, {reborn} of them from hosts that were lost"
+    );
+    if let Some(why) = lost {
+        let _ = writeln!(out, "note  host {name} was lost: {why}");
     }
 }
 

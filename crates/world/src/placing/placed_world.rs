@@ -7,7 +7,7 @@
 
 use super::divided::DividedCalls;
 use super::flow::Flow;
-use super::windows::{Act, HostSpent, Placing, PlacingSeen};
+use super::windows::{Act, HostRecord, Placing, PlacingSeen};
 use crate::calls::{EventReader, WorldCalls};
 use crate::description::couplings::CouplingKind;
 use crate::error::WorldError;
@@ -42,17 +42,10 @@ pub struct HostLoad {
     pub cpu: Duration,
     /// The time of the newest window beside its steps: the link there and back.
     pub waited: Duration,
-}
-
-/// How a placed world went.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub struct PlacingCounts {
-    /// Objects that went from one host to another.
+    /// Objects that came to it from other hosts.
     pub moved: u64,
-    /// Objects that another host goes on with, as theirs fell silent.
+    /// Of these those whose host was lost.
     pub reborn: u64,
-    /// How often an object has left its box.
-    pub escaped: u64,
 }
 
 /// A world whose objects are stepped by several hosts.
@@ -138,16 +131,24 @@ impl PlacedWorld {
         let placing = self.seen();
         let load = |(number, host): (usize, &PlacedHost)| {
             let objects = placing.owners.values().filter(|owner| owner.host == number).count();
-            let HostSpent { cpu, waited } = placing.spent[number];
-            HostLoad { name: host.name.clone(), lost: placing.lost[number].clone(), objects, cpu, waited }
+            let HostRecord { cpu, waited, moved, reborn } = placing.records[number];
+            HostLoad {
+                name: host.name.clone(),
+                lost: placing.lost[number].clone(),
+                objects,
+                cpu,
+                waited,
+                moved,
+                reborn,
+            }
         };
         self.hosts.iter().enumerate().map(load).collect()
     }
 
-    /// How it went so far.
+    /// How often an object has left its box, so that time went back to the states that were kept.
     #[must_use]
-    pub fn counts(&self) -> PlacingCounts {
-        self.seen().counts
+    pub fn escapes(&self) -> u64 {
+        self.seen().escapes
     }
 
     /// A host that answers.
@@ -365,7 +366,8 @@ mod tests {
         }
         for Placed { placed, worlds } in all.iter().skip(1) {
             assert!(placed.loads().iter().all(|load| load.objects > 0), "{:?}", placed.loads());
-            assert!(placed.counts().moved > worlds.len() as u64, "{:?}", placed.counts());
+            let moved: u64 = placed.loads().iter().map(|load| load.moved).sum();
+            assert!(moved > worlds.len() as u64, "{:?}", placed.loads());
         }
     }
 
@@ -380,7 +382,7 @@ mod tests {
             placed.advance(QUARTER).unwrap();
             assert_eq!(placed.hash().unwrap(), whole.hash(), "quarter {quarter}: {:?}", placed.loads());
         }
-        assert!(placed.counts().reborn > 0);
+        assert!(placed.loads().iter().any(|load| load.reborn > 0));
         assert_eq!(placed.loads().iter().filter(|load| load.lost.is_none()).count(), 2);
         worlds.iter().for_each(|world| drop(world.stop()));
         assert!(placed.advance(QUARTER).is_err());

@@ -4,7 +4,7 @@
 
 use super::divided::{DividedCalls, PartAdvanced};
 use super::groups::{PlacedGroup, fences, groups, place};
-use super::placed_world::{PlacedHost, PlacedWorld, PlacingCounts};
+use super::placed_world::{PlacedHost, PlacedWorld};
 use crate::Part;
 use crate::error::WorldError;
 use crate::history::checkpoint::{Checkpoint, CheckpointError};
@@ -50,8 +50,9 @@ pub(super) struct PlacingSeen {
     pub owners: Arc<BTreeMap<AgentId, Owner>>,
     /// Why each host steps nothing any more.
     pub lost: Vec<Option<String>>,
-    pub counts: PlacingCounts,
-    pub spent: Vec<HostSpent>,
+    /// How often an object has left its box.
+    pub escapes: u64,
+    pub records: Vec<HostRecord>,
 }
 
 /// The host that steps an object.
@@ -78,13 +79,16 @@ struct HostWindow {
     waited: Duration,
 }
 
-/// Time that a host has spent.
+/// How a host went.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub(super) struct HostSpent {
+pub(super) struct HostRecord {
     /// CPU time of all steps so far.
     pub cpu: Duration,
     /// The newest window's wall time beside its steps: the link there and back.
     pub waited: Duration,
+    /// Objects that came to it, and of these those whose host was lost.
+    pub moved: u64,
+    pub reborn: u64,
 }
 
 /// Objects that one host has packed.
@@ -137,9 +141,9 @@ impl Placing {
             owners.insert(object.id(), Owner { host: 0, cost: places as f64 * rate_hz });
         }
         let (lost, reaches) = (vec![None; hosts.len()], vec![Vec::new(); hosts.len()]);
-        let spent = vec![HostSpent::default(); hosts.len()];
-        let (counts, kept, since, leaving) = (PlacingCounts::default(), Kept::default(), Vec::new(), Vec::new());
-        let seen = PlacingSeen { time, owners: Arc::new(owners), lost, counts, spent };
+        let records = vec![HostRecord::default(); hosts.len()];
+        let (kept, since, leaving) = (Kept::default(), Vec::new(), Vec::new());
+        let seen = PlacingSeen { time, owners: Arc::new(owners), lost, escapes: 0, records };
         Ok(Self { seen, reaches, room: ROOM, kept, since, leaving })
     }
 
@@ -290,7 +294,8 @@ impl PlacedWorld {
             let HostWindow { advanced, waited } = outcome?;
             escaped |= advanced.escaped.is_some();
             placing.reaches[host] = advanced.reaches;
-            placing.seen.spent[host] = HostSpent { cpu: advanced.cpu, waited };
+            let record = &mut placing.seen.records[host];
+            (record.cpu, record.waited) = (advanced.cpu, waited);
         }
         if escaped {
             return Err(Fault::Escaped);
@@ -335,7 +340,7 @@ impl PlacedWorld {
             for Pack { objects, bytes, .. } in self.pack(from, &groups)? {
                 self.part(to, |divided| divided.adopt(&bytes))?;
                 self.part(from, |divided| divided.release(&objects))?;
-                placing.seen.counts.moved += objects.len() as u64;
+                placing.seen.records[to].moved += objects.len() as u64;
                 placing.give(&objects, to);
             }
         }
@@ -403,7 +408,7 @@ impl PlacedWorld {
             match why {
                 Fault::Refused(error) => return Err(error),
                 Fault::Escaped => {
-                    placing.seen.counts.escaped += 1;
+                    placing.seen.escapes += 1;
                     placing.room *= ROOM_RISES;
                 }
                 Fault::Lost(host, error) => {
@@ -432,7 +437,9 @@ impl PlacedWorld {
             if placing.seen.lost[pack.host].is_some() {
                 let count = |host: &usize| placing.seen.owners.values().filter(|owner| owner.host == *host).count();
                 pack.host = living.iter().copied().min_by_key(count).unwrap_or_default();
-                placing.seen.counts.reborn += pack.objects.len() as u64;
+                let record = &mut placing.seen.records[pack.host];
+                (record.moved, record.reborn) =
+                    (record.moved + pack.objects.len() as u64, record.reborn + pack.objects.len() as u64);
             }
             placing.give(&pack.objects, pack.host);
             self.part(pack.host, |divided| divided.adopt(&pack.bytes))

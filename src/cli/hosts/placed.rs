@@ -1,0 +1,58 @@
+//! `run --hosts`: a scene that several hosts step together.
+//!
+//! In: names of hosts, a request. Out: the same request with a world of its scene on each host. Never here: who steps what.
+
+use super::args::CallArgs;
+use super::common::{calling, refused};
+use super::scene_files;
+use crate::cli::args::RunArgs;
+use crate::cli::run::Request;
+use metachron_console::output::BadInput;
+use metachron_hosts::{RemoteWorld, SceneFiles, connect};
+use metachron_world::{PlacedHost, SceneMark, WorldCalls};
+use std::sync::Arc;
+use std::thread;
+use std::time::{Duration, Instant};
+
+/// A host has so long to make a world of a scene and to serve it.
+const BEGINS_WITHIN: Duration = Duration::from_secs(30);
+/// It is asked so often.
+const ASKED_EVERY: Duration = Duration::from_millis(50);
+
+/// Gives the scene of `request` to the hosts that `args` names, if any.
+pub(in super::super) fn place(args: &RunArgs, request: &mut Request) -> anyhow::Result<()> {
+    if args.hosts.is_empty() {
+        return Ok(());
+    }
+    let files = scene_files(&request.source, &request.overrides)?;
+    for host in &args.hosts {
+        let (name, endpoint) = match host.split_once('=') {
+            Some((name, endpoint)) => (name, endpoint.to_owned()),
+            None => (&**host, format!("tls/{host}:7447")),
+        };
+        if request.hosts.iter().any(|known| known.name == name) {
+            return Err(BadInput(format!("--hosts: \"{name}\" is there twice")).into());
+        }
+        let world = Arc::new(begun(&endpoint, &args.call, &files, request.scene.mark())?);
+        request.hosts.push(PlacedHost { name: name.to_owned(), world });
+    }
+    Ok(())
+}
+
+/// The world of a scene that a host has begun.
+fn begun(endpoint: &str, call: &CallArgs, files: &SceneFiles, scene: SceneMark) -> anyhow::Result<RemoteWorld> {
+    let waiting = connect(calling(endpoint, call)?).map_err(refused)?;
+    waiting.begin(files.clone()).map_err(|error| BadInput(format!("{endpoint}: {error}")))?;
+    // it is another world from now on
+    drop(waiting);
+    let asked = Instant::now();
+    loop {
+        match connect(calling(endpoint, call)?.scene(scene.clone())) {
+            Ok(world) if world.answers().is_ok() => return Ok(world),
+            Ok(_) => {}
+            Err(error) if asked.elapsed() > BEGINS_WITHIN => return Err(refused(error)),
+            Err(_) => {}
+        }
+        thread::sleep(ASKED_EVERY);
+    }
+}
