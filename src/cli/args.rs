@@ -349,7 +349,7 @@ pub struct RunArgs {
     #[arg(long, value_name = "FILE", value_hint = ValueHint::FilePath)]
     pub record: Option<PathBuf>,
     /// Let these hosts step it together, each a part, and draw it here; each waits for work (`metachron host` without a scene): NAME=ENDPOINT, or a
-    /// name of DNS for NAME=tls/NAME:7447. States are those of one process in lockstep at --pace free, to the bit
+    /// name of DNS for NAME=tls/NAME:7447. Objects keep the steps and resolutions of the scene, and states are those of one process in lockstep, to the bit
     #[cfg(feature = "hosts")]
     #[arg(long, value_name = "HOSTS", value_delimiter = ',', conflicts_with_all = ["oracle", "device", "record", "executor"])]
     pub hosts: Vec<String>,

@@ -76,8 +76,13 @@ pub(super) fn play(request: &Request, go_on: GoOn<'_>) -> anyhow::Result<Played>
         let end = if let Some(RunLength::Seconds(seconds)) = request.end { Some(seconds) } else { None };
         let end = end.and_then(SimSpan::from_secs_f64).map(|span| placed.time() + span);
         placed.let_flow(request.pace == Pace::Free, end)?;
-        placed.drive(TimelineCommand::Run)?;
     }
+    // from the first frame on: before it an adapter is opened
+    let mut flows = placed.clone();
+    let go_on: GoOn<'_> = &mut |step| {
+        let begun = flows.take().map_or(Ok(()), |placed| placed.drive(TimelineCommand::Run));
+        go_on(step) && begun.is_ok()
+    };
     let mut played = if request.window {
         in_window(session, request, go_on)?
     } else {

@@ -12,6 +12,7 @@ mod golden;
 mod groups;
 mod guide;
 mod idle;
+mod placed;
 mod play;
 mod run;
 mod scene;

@@ -13,7 +13,7 @@ const ACCELERATION_M_S2: f64 = 20.0;
 /// So much room is left in a box for objects that are hit within the window, m/s.
 const SPEED_LEAST_M_S: f64 = 1.0;
 
-/// Loads that are apart by no more than this are even: HOSTS balance to it.
+/// A host with no more than this times the mean load keeps what it has.
 const EVEN: f64 = 1.15;
 
 /// The boxes that objects at these `reaches` may not leave within `window`, with `room` for more speed than they have.
@@ -64,7 +64,7 @@ pub(super) struct PlacedGroup {
 }
 
 /// Gives each group to a host that `lives`: to the one that has it, unless it has none or `evens` loads that are too unlike. The dearest first,
-/// each to the host with the least load (Graham 1969).
+/// each to the host with the least load (Gra69).
 pub(super) fn place(groups: &mut [PlacedGroup], lives: &[bool], evens: bool) {
     let mut loads: Vec<Option<f64>> = lives.iter().map(|lives| lives.then_some(0.0)).collect();
     let hosts = lives.iter().filter(|lives| **lives).count() as f64;

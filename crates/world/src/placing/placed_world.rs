@@ -3,7 +3,7 @@
 //! In: the scene, a world of it on each host. Out: the calls of a world ([`WorldCalls`]); objects go from host to host before they meet. A window
 //! of time passes on all hosts at once, each object inside a box that meets no box of another host's: then no turn sees a difference, and
 //! states are those of one process, to the bit. Where an object leaves its box, or a host falls silent, all hosts go back to states that were
-//! kept, and do again what was done since (Jefferson 1985). Never here: a connection, a turn.
+//! kept, and do again what was done since (Jef85). Never here: a connection, a turn.
 
 use super::divided::DividedCalls;
 use super::flow::Flow;
@@ -58,7 +58,7 @@ pub struct PlacedWorld {
     /// The wanted rates of the objects of the scene.
     pub(super) rates_hz: Vec<f64>,
     placing: Mutex<Placing>,
-    seen: Mutex<PlacingSeen>,
+    seen: Mutex<Arc<PlacingSeen>>,
     pub(super) flow: Mutex<Flow>,
 }
 
@@ -106,7 +106,7 @@ impl PlacedWorld {
         let ties = couplings.map(|coupling| [coupling.a, coupling.b]).chain(of_joints).collect();
         let rates_hz: Vec<f64> = scene.agents.iter().map(|member| member.pace.rate_hz).collect();
         let placing = Placing::of(&hosts, time, &rates_hz)?;
-        let (tag, seen, flow) = (WorldTag::new(), Mutex::new(placing.seen.clone()), Mutex::default());
+        let (tag, seen, flow) = (WorldTag::new(), Mutex::new(Arc::new(placing.seen.clone())), Mutex::default());
         let placed = Self { hosts, tag, scene: mark, ties, rates_hz, placing: Mutex::new(placing), seen, flow };
         placed.begin(&mut placed.placing())?;
         Ok(placed)
@@ -114,11 +114,11 @@ impl PlacedWorld {
 
     /// Lets others see how far time has come, and who steps what.
     pub(super) fn show(&self, seen: &PlacingSeen) {
-        seen.clone_into(&mut self.seen.lock().unwrap_or_else(PoisonError::into_inner));
+        *self.seen.lock().unwrap_or_else(PoisonError::into_inner) = Arc::new(seen.clone());
     }
 
-    fn seen(&self) -> PlacingSeen {
-        self.seen.lock().unwrap_or_else(PoisonError::into_inner).clone()
+    fn seen(&self) -> Arc<PlacingSeen> {
+        Arc::clone(&self.seen.lock().unwrap_or_else(PoisonError::into_inner))
     }
 
     fn placing(&self) -> MutexGuard<'_, Placing> {
@@ -217,7 +217,11 @@ impl WorldCalls for PlacedWorld {
     }
 
     fn object(&self, name: &str) -> Result<Object, WorldError> {
-        Ok(self.tag.object(self.any()?.object(name)?.id()))
+        let id = self.any()?.object(name)?.id();
+        if self.seen().owners.contains_key(&id) {
+            return Ok(self.tag.object(id));
+        }
+        Err(WorldError::Gone { name: name.to_owned() })
     }
 
     fn object_of(&self, id: AgentId) -> Result<Object, WorldError> {

@@ -128,11 +128,12 @@ impl Placing {
     /// All objects on the first of `hosts`, at `time`; `rates_hz` are those of the first numbers.
     pub fn of(hosts: &[PlacedHost], time: SimTime, rates_hz: &[f64]) -> Result<Self, WorldError> {
         let mut owners = BTreeMap::new();
-        let objects = hosts.first().map(|host| (host, host.world.all_objects()));
-        for (host, object) in
-            objects.iter().flat_map(|(host, objects)| objects.iter().map(move |object| (host, object)))
-        {
-            let places = match &host.world.latest(*object)?.body {
+        let of_first = hosts
+            .iter()
+            .take(1)
+            .flat_map(|host| host.world.all_objects().into_iter().map(move |object| (host, object)));
+        for (host, object) in of_first {
+            let places = match &host.world.latest(object)?.body {
                 Body::Curve(curve) => curve.positions.len(),
                 Body::Soft(soft) => soft.positions.len(),
                 Body::Nothing | Body::Rigid(_) | Body::Tool(_) => 1,
@@ -262,33 +263,24 @@ impl PlacedWorld {
     /// Lets a window pass on all hosts at once.
     fn pass_window(&self, placing: &mut Placing, window: SimSpan) -> Result<(), Fault> {
         let fences = self.place_for(placing, window)?;
+        let owners = &placing.seen.owners;
         let advance = |host: usize| {
-            let own: Vec<Reach> = fences
-                .iter()
-                .filter(|fence| placing.seen.owners.get(&fence.id).is_some_and(|owner| owner.host == host))
-                .copied()
-                .collect();
-            {
-                let asked = Instant::now();
-                let advanced = self.part(host, |divided| divided.advance_within(window, &own))?;
-                let waited = asked.elapsed().saturating_sub(advanced.took);
-                Ok(HostWindow { advanced, waited })
-            }
+            let is_own = |fence: &&Reach| owners.get(&fence.id).is_some_and(|owner| owner.host == host);
+            let own: Vec<Reach> = fences.iter().filter(is_own).copied().collect();
+            let asked = Instant::now();
+            let advanced = self.part(host, |divided| divided.advance_within(window, &own))?;
+            let waited = asked.elapsed().saturating_sub(advanced.took);
+            Ok(HostWindow { advanced, waited })
         };
         let living = placing.living();
-        let outcomes: Vec<Result<HostWindow, Fault>> = if let [host] = living[..] {
-            vec![advance(host)]
-        } else {
+        let outcomes: Vec<Result<HostWindow, Fault>> = thread::scope(|scope| {
             let advance = &advance;
-            thread::scope(|scope| {
-                let calls: Vec<_> = living.iter().map(|host| scope.spawn(move || advance(*host))).collect();
-                calls
-                    .into_iter()
-                    .zip(&living)
-                    .map(|(call, host)| call.join().unwrap_or_else(|_| Err(Fault::Lost(*host, WorldError::Stopped))))
-                    .collect()
-            })
-        };
+            let calls: Vec<_> = living.iter().skip(1).map(|host| scope.spawn(move || advance(*host))).collect();
+            let ended = calls.into_iter().zip(living.iter().skip(1));
+            let first = living.first().map(|host| advance(*host));
+            let panicked = |host: usize| Err(Fault::Lost(host, WorldError::Stopped));
+            first.into_iter().chain(ended.map(|(call, host)| call.join().unwrap_or_else(|_| panicked(*host)))).collect()
+        });
         let mut escaped = false;
         for (host, outcome) in living.into_iter().zip(outcomes) {
             let HostWindow { advanced, waited } = outcome?;
@@ -301,16 +293,23 @@ impl PlacedWorld {
             return Err(Fault::Escaped);
         }
         placing.seen.time += window;
-        let has_left = |id: &AgentId| {
-            let world = placing.seen.owners.get(id).map(|owner| &self.hosts[owner.host].world);
-            let latest = world.map(|world| world.object_of(*id).and_then(|object| world.latest(object)));
-            latest.is_none_or(|latest| matches!(latest, Err(WorldError::Gone { .. })))
-        };
-        for id in placing.leaving.extract_if(.., |id| has_left(id)).collect::<Vec<_>>() {
-            Arc::make_mut(&mut placing.seen.owners).remove(&id);
-        }
+        self.forget_left(placing);
         placing.room = (placing.room * ROOM_FALLS).max(ROOM);
         Ok(())
+    }
+
+    /// Forgets objects that were to leave, and have.
+    fn forget_left(&self, placing: &mut Placing) {
+        let PlacingSeen { owners, .. } = &mut placing.seen;
+        placing.leaving.retain(|id| {
+            let world = owners.get(id).map(|owner| &self.hosts[owner.host].world);
+            let latest = world.map(|world| world.object_of(*id).and_then(|object| world.latest(object)));
+            let is_there = latest.is_some_and(|latest| !matches!(latest, Err(WorldError::Gone { .. })));
+            if !is_there {
+                Arc::make_mut(owners).remove(id);
+            }
+            is_there
+        });
     }
 
     /// Brings objects that may meet within a window to one host; the boxes that they may not leave in it, none where one host steps all.

@@ -2,8 +2,8 @@
 //!
 //! In: the numbers of agents that others make turns of, agents that come from there, boxes that agents may not leave. Out: agents that go
 //! there, and those that left their boxes. As long as agents of two processes stay in boxes that have no place in common, none of them is
-//! near one of the others, and all turns are those of a run in one process, to the bit (a conservative parallel simulation; Chandy and
-//! Misra 1979, with space in the place of channels). Never here: who makes whose turns, which boxes.
+//! near one of the others, and all turns are those of a run in one process, to the bit (docs/theory/clusters.md,
+//! section 11; CM79). Never here: who makes whose turns, which boxes.
 
 use super::super::archive::Migration;
 use super::{Absent, Cut, Lockstep, Phase, phase_of, put_back, take_apart};

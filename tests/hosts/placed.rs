@@ -1,0 +1,113 @@
+//! `run --hosts`: scenes that several processes step together, and processes that die meanwhile.
+
+use assert_cmd::cargo::cargo_bin;
+use std::io::{BufRead, BufReader};
+use std::net::TcpListener;
+use std::path::Path;
+use std::process::{Child, Command, Output, Stdio};
+use std::thread;
+use std::time::Duration;
+
+/// A host that waits for work, and ends with this.
+struct Waiting {
+    process: Child,
+    wish: String,
+}
+
+impl Waiting {
+    fn named(name: &str) -> Self {
+        let port = TcpListener::bind("127.0.0.1:0").unwrap().local_addr().unwrap().port();
+        let endpoint = format!("tcp/127.0.0.1:{port}");
+        let mut process = Command::new(cargo_bin("metachron"));
+        process.args(["host", "--name", name, "--listen", &endpoint, "--json"]);
+        let mut process = process.stdout(Stdio::piped()).stderr(Stdio::null()).spawn().unwrap();
+        let mut lines = BufReader::new(process.stdout.take().unwrap());
+        lines.read_line(&mut String::new()).unwrap();
+        // it goes on writing
+        thread::spawn(move || lines.lines().for_each(drop));
+        Self { process, wish: format!("{name}={endpoint}") }
+    }
+}
+
+impl Drop for Waiting {
+    fn drop(&mut self) {
+        let _ = self.process.kill();
+        let _ = self.process.wait();
+    }
+}
+
+/// Twelve balls in each other's ways on a floor.
+fn balls(folder: &Path) -> String {
+    let ball = |number: i32| {
+        let (x, y, towards) = (f64::from(number % 4), 0.6 * f64::from(number / 4), 1.5 - 2.5 * f64::from(number % 2));
+        format!(
+            "[[object]]\nname = 'ball{number}'\nmodel = 'rigid'\nshape = 'ball'\nradius_m = 0.05\nmass_kg = 0.2\n\
+             position_m = [{x}, {y}, 0.06]\nvelocity_m_s = [{towards}, 0.1, 0]\n"
+        )
+    };
+    let floor = "[[object]]\nname = 'floor'\nmodel = 'rigid'\nshape = 'plane'\n";
+    let path = folder.join("balls.toml");
+    std::fs::write(&path, format!("format = 1\n{floor}{}", (0..12).map(ball).collect::<String>())).unwrap();
+    path.to_string_lossy().into_owned()
+}
+
+const FREE: [&str; 6] = ["--headless", "--pace", "free", "--report", "-", "-q"];
+
+fn run(scene: &str, seconds: &str, more: &[&str]) -> Output {
+    let mut process = Command::new(cargo_bin("metachron"));
+    process.args(["run", scene, "--seconds", seconds]).args(FREE).args(more).output().unwrap()
+}
+
+fn report(output: &Output) -> serde_json::Value {
+    serde_json::from_slice(&output.stdout)
+        .unwrap_or_else(|_| panic!("no report: {}", String::from_utf8_lossy(&output.stderr)))
+}
+
+#[test]
+fn a_scene_has_the_same_bits_on_one_and_two_hosts_and_in_one_process() {
+    let folder = tempfile::tempdir().unwrap();
+    let scene = balls(folder.path());
+    let whole = report(&run(&scene, "2", &["--executor", "lockstep"]));
+    let hosts = ["bench", "lab2"].map(Waiting::named);
+    let both = format!("{},{}", hosts[0].wish, hosts[1].wish);
+    // the hosts wait for work again each time
+    for wish in [&hosts[0].wish, &both, &both] {
+        let placed = report(&run(&scene, "2", &["--hosts", wish]));
+        assert_eq!(placed["state_hash"], whole["state_hash"], "{wish}: {}", placed["hosts"]);
+        let agents: u64 = placed["hosts"].as_array().unwrap().iter().map(|host| host["agents"].as_u64().unwrap()).sum();
+        assert_eq!(agents, 12);
+    }
+}
+
+#[test]
+fn a_host_that_is_killed_loses_nothing() {
+    let folder = tempfile::tempdir().unwrap();
+    let scene = balls(folder.path());
+    let whole = report(&run(&scene, "4", &["--executor", "lockstep"]));
+    let (stays, mut dies) = (Waiting::named("bench"), Waiting::named("lab2"));
+    let both = format!("{},{}", stays.wish, dies.wish);
+    // beside the clock it lasts four seconds
+    let mut process = Command::new(cargo_bin("metachron"));
+    process.args(["run", &scene, "--seconds", "4", "--headless", "--report", "-", "-q", "--hosts", &both]);
+    let process = process.stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap();
+    thread::sleep(Duration::from_millis(3000));
+    dies.process.kill().unwrap();
+    let placed = report(&process.wait_with_output().unwrap());
+    assert_eq!(placed["state_hash"], whole["state_hash"], "{}", placed["hosts"]);
+    let [first, second] = [0, 1].map(|host| &placed["hosts"][host]);
+    assert!(first["agents"] == 12 && first["reborn"].as_u64().unwrap() > 0, "{first}");
+    assert!(second["agents"] == 0 && second["lost"].is_string(), "{second}");
+}
+
+#[test]
+fn hosts_that_cannot_be_are_told_in_a_sentence() {
+    let serves = Waiting::named("bench");
+    let twice = format!("{},{}", serves.wish, serves.wish);
+    for (wish, what) in
+        [(&*twice, "\"bench\" is there twice"), ("bench=tcp/127.0.0.1:9", "no world"), ("a=b", "is no endpoint")]
+    {
+        let ended = run("pendulum", "1", &["--hosts", wish]);
+        let said = String::from_utf8_lossy(&ended.stderr).into_owned();
+        assert!(!ended.status.success() && said.contains(what), "{wish}: {said}");
+    }
+}
