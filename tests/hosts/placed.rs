@@ -103,11 +103,37 @@ fn a_host_that_is_killed_loses_nothing() {
 fn hosts_that_cannot_be_are_told_in_a_sentence() {
     let serves = Waiting::named("bench");
     let twice = format!("{},{}", serves.wish, serves.wish);
-    for (wish, what) in
-        [(&*twice, "\"bench\" is there twice"), ("bench=tcp/127.0.0.1:9", "no world"), ("a=b", "is no endpoint")]
-    {
+    for (wish, what) in [
+        (&*twice, "\"bench\" is there twice"),
+        ("bench=tcp/127.0.0.1:9", "Unable to connect"),
+        ("a=b", "is no endpoint"),
+    ] {
         let ended = run("pendulum", "1", &["--hosts", wish]);
         let said = String::from_utf8_lossy(&ended.stderr).into_owned();
         assert!(!ended.status.success() && said.contains(what), "{wish}: {said}");
     }
+}
+
+#[test]
+#[cfg(unix)]
+fn a_host_that_comes_back_late_is_told_and_steps_again() {
+    use nix::sys::signal::{Signal, kill};
+    let folder = tempfile::tempdir().unwrap();
+    let scene = balls(folder.path());
+    let whole = report(&run(&scene, "8", &["--executor", "lockstep"]));
+    let (stays, sleeps) = (Waiting::named("bench"), Waiting::named("lab2"));
+    let both = format!("{},{}", stays.wish, sleeps.wish);
+    let mut process = Command::new(cargo_bin("metachron"));
+    process.args(["run", &scene, "--seconds", "8", "--headless", "--report", "-", "-q", "--hosts", &both]);
+    let process = process.stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap();
+    let send = |signal: Signal| kill(nix::unistd::Pid::from_raw(sleeps.process.id() as i32), signal).unwrap();
+    thread::sleep(Duration::from_millis(3000));
+    send(Signal::SIGSTOP);
+    thread::sleep(Duration::from_millis(3500));
+    send(Signal::SIGCONT);
+    let placed = report(&process.wait_with_output().unwrap());
+    assert_eq!(placed["state_hash"], whole["state_hash"], "{}", placed["hosts"]);
+    let [first, second] = [0, 1].map(|host| &placed["hosts"][host]);
+    assert!(first["reborn"].as_u64().unwrap() > 0, "{first}");
+    assert!(second["lost"].is_null() && second["agents"].as_u64().unwrap() > 0, "{second}");
 }

@@ -39,7 +39,7 @@ pub(crate) struct Place<'a> {
 pub(crate) fn open(place: Place<'_>, side: Side<'_>) -> Result<Session, HostsError> {
     check(place)?;
     let endpoint = place.endpoint;
-    let failed = |reason: String| HostsError::Network { endpoint: endpoint.to_owned(), reason };
+    let failed = |error: zenoh::Error| HostsError::network(endpoint, &error);
     let (mode, key, rights) = match side {
         Side::Host(callers) => ("\"peer\"", "listen/endpoints", rights(callers, place.identity.is_some())),
         Side::Caller => ("\"client\"", "connect/endpoints", "{}".to_owned()),
@@ -59,9 +59,9 @@ pub(crate) fn open(place: Place<'_>, side: Side<'_>) -> Result<Session, HostsErr
     }
     let mut config = Config::default();
     for (key, value) in settings {
-        config.insert_json5(key, &value).map_err(|error| failed(error.to_string()))?;
+        config.insert_json5(key, &value).map_err(|error| failed(error))?;
     }
-    zenoh::open(config).wait().map_err(|error| failed(error.to_string()))
+    zenoh::open(config).wait().map_err(failed)
 }
 
 /// Both ends show a certificate of the same authority, and a link ends with the certificate.

@@ -103,3 +103,13 @@ pub enum HostsError {
     #[error(transparent)]
     World(#[from] WorldError),
 }
+
+impl HostsError {
+    /// The network's error, without the place in its source that it adds.
+    pub(crate) fn network(endpoint: &str, error: &zenoh::Error) -> Self {
+        let said = error.to_string();
+        let end = said.rfind(" at ").filter(|at| said[*at..].contains(".rs:")).unwrap_or(said.len());
+        let reason = said[..end].trim_end_matches(['!', '.', ' ']).to_owned();
+        Self::Network { endpoint: endpoint.to_owned(), reason }
+    }
+}

@@ -96,7 +96,7 @@ pub fn serve(world: Arc<dyn WorldCalls>, serving: Serving) -> Result<Host, Hosts
     let Serving { name, endpoint, scene, begins, identity, insecure_lan, .. } = serving;
     let place = Place { endpoint: &endpoint, identity: identity.as_ref(), insecure_lan };
     let session = open(place, Side::Host(&roles.keys().map(|name| &**name).collect::<Vec<_>>()))?;
-    let failed = |error: zenoh::Error| HostsError::Network { endpoint: endpoint.clone(), reason: error.to_string() };
+    let failed = |error: zenoh::Error| HostsError::network(&endpoint, &error);
     let since_1970 = SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default();
     let run = (since_1970.as_nanos() as u64 ^ u64::from(std::process::id())).max(1);
     let events = world.listen(EventFilter::all());

@@ -149,7 +149,7 @@ pub fn connect(calling: impl Into<Calling>) -> Result<RemoteWorld, HostsError> {
     let Calling { endpoint, scene, identity, insecure_lan, is_looking } = calling.into();
     let place = Place { endpoint: &endpoint, identity: identity.as_ref(), insecure_lan };
     let session = open(place, Side::Caller)?;
-    let failed = |error: zenoh::Error| HostsError::Network { endpoint: endpoint.clone(), reason: error.to_string() };
+    let failed = |error: zenoh::Error| HostsError::network(&endpoint, &error);
     let caller = format!("{}/{}", identity.as_ref().map_or(ANYONE, Identity::name), session.zid());
     // the host gives a place to a caller that lives; declarations overtake calls
     let token = session.liveliness().declare_token(format!("metachron/caller/{caller}")).wait().map_err(failed)?;

@@ -381,10 +381,25 @@ impl PlacedWorld {
         }
     }
 
+    /// Takes hosts into service again that were lost and answer, at the `moment` now: their objects live elsewhere. One that has missed an object
+    /// that joined stays lost.
+    fn take_back(&self, placing: &mut Placing, moment: &[u8]) {
+        let objects = placing.objects();
+        for (host, placed) in self.hosts.iter().enumerate() {
+            let is_back = placing.seen.lost[host].is_some() && placed.world.answers().is_ok();
+            let knows_all = || objects.iter().all(|id| placed.world.object_of(*id).is_ok());
+            let told = |divided: &dyn DividedCalls| divided.release(&objects).and_then(|()| divided.adopt(moment));
+            if is_back && knows_all() && self.part(host, told).is_ok() {
+                placing.seen.lost[host] = None;
+            }
+        }
+    }
+
     fn keep(&self, placing: &mut Placing) -> Result<(), Fault> {
-        let living = placing.living();
-        let first = *living.first().ok_or_else(|| Fault::Refused(self.silent()))?;
+        let first = *placing.living().first().ok_or_else(|| Fault::Refused(self.silent()))?;
         let moment = self.part(first, |divided| divided.pack(&[]))?;
+        self.take_back(placing, &moment);
+        let living = placing.living();
         let mut kept = Kept { time: placing.seen.time, moment, packs: Vec::new() };
         // without another host nobody could go on with them
         if living.len() > 1 {
