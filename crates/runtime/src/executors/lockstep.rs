@@ -175,8 +175,7 @@ impl Lockstep {
     /// Processes events until `limit`, or until the frame's own job has ended, an agent of a divided run has left its box, or another thread has
     /// ended the run ([`Agents::end_stalled`]).
     fn run(&mut self, limit: Duration) {
-        while !self.all.sleep.stopping()
-            && !(self.division.has_escaped() && self.cores.until_end().is_none())
+        while !self.has_ended()
             && let Some(event) = self.next_event(limit)
         {
             match event {
@@ -186,6 +185,11 @@ impl Lockstep {
             }
         }
         self.settle();
+    }
+
+    /// Whether no further turn is to begin; one that has begun ends first where an agent has left its box.
+    fn has_ended(&self) -> bool {
+        self.all.sleep.stopping() || (self.division.has_escaped() && self.cores.until_end().is_none())
     }
 
     fn begin(&mut self, agent: usize) {

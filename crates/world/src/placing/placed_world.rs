@@ -401,7 +401,7 @@ mod tests {
         let pass = |calls: [&dyn WorldCalls; 2]| calls.map(|world| world.advance(QUARTER).unwrap());
         let act = |act: &dyn Fn(&dyn WorldCalls)| calls.into_iter().for_each(act);
         pass(calls);
-        act(&|world| world.command(world.object("ball 3").unwrap(), hit.clone()).unwrap());
+        act(&|world| world.command(world.object("ball 3").unwrap(), hit).unwrap());
         pass(calls);
         same("an impulse that throws a ball out of its box");
         act(&|world| _ = world.add("late", Rigid::ball(0.08).mass_kg(1.0).at([0.1, 0.1, 0.5]).into()).unwrap());

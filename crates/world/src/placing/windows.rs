@@ -240,7 +240,7 @@ impl PlacedWorld {
             Act::Pass(span) => self.pass_window(placing, *span),
             Act::Command(id, command) => {
                 let (host, world) = (owner(*id)?, &self.hosts[owner(*id)?].world);
-                told(host, world.object_of(*id).and_then(|object| world.command(object, Command::clone(command))))
+                told(host, world.object_of(*id).and_then(|object| world.command(object, **command)))
             }
             Act::SetState(id, state) => {
                 let (host, world) = (owner(*id)?, &self.hosts[owner(*id)?].world);
