@@ -6,7 +6,7 @@
 use crate::chart::accuracy::{Benchmark, Case, Play, slender_tube};
 use crate::chart::stability::common::dead_load;
 use glam::DVec3;
-use metachron_contact::AnchorSpring;
+use metachron_contact::AnchorForce;
 use metachron_models::rod::TubeSpec;
 use std::f64::consts::TAU;
 
@@ -41,8 +41,8 @@ impl Benchmark for EndMoment {
         let [rises, stays] = SECONDS;
         let mut sound = true;
         while sound && play.time_s() < rises + stays {
-            let user_springs = couple(&play, moment * (play.time_s() / rises).min(1.0));
-            sound = play.run(case.dt_ms * 1e-3, &user_springs);
+            let loads = couple(&play, moment * (play.time_s() / rises).min(1.0));
+            sound = play.run(case.dt_ms * 1e-3, &loads);
         }
         let error = LOOKS.map(|s| at(&play, s).distance(circle_m(angle, s))).into_iter().fold(0.0, f64::max);
         sound.then_some((play, error))
@@ -55,7 +55,7 @@ fn at(play: &Play, arc_m: f64) -> DVec3 {
 }
 
 /// Two opposite pulls across the lever piece whose moment about y bends the tube upwards.
-fn couple(play: &Play, moment: f64) -> [AnchorSpring; 2] {
+fn couple(play: &Play, moment: f64) -> [AnchorForce; 2] {
     let lever = at(play, 1.0 + LEVER) - at(play, 1.0);
     let force = DVec3::NEG_Y.cross(lever) * (moment / lever.length_squared());
     [dead_load(1.0, -force), dead_load(1.0 + LEVER, force)]
