@@ -28,11 +28,11 @@ pub(crate) struct Member {
     /// The length of a step that it wants, seconds.
     pub(crate) step_s: f64,
     /// Springs from fixed points.
-    user_springs: Vec<AnchorSpring>,
+    pub(crate) user_springs: Vec<AnchorSpring>,
     /// Forces on it.
-    forces: Vec<AnchorForce>,
+    pub(crate) forces: Vec<AnchorForce>,
     /// Its neighbours outside the cluster.
-    neighbours: Vec<Neighbour>,
+    pub(crate) neighbours: Vec<Neighbour>,
     memory: ContactMemory,
     grips: Vec<Grip>,
 }
@@ -120,26 +120,9 @@ impl StepHarness {
         Some(id)
     }
 
-    /// Attaches fixed springs to an agent, instead of the springs it had.
-    pub(super) fn attach_springs(&mut self, id: AgentId, user_springs: impl IntoIterator<Item = AnchorSpring>) {
-        let own = &mut self.cluster.members[id.0 as usize].user_springs;
-        own.clear();
-        own.extend(user_springs);
-    }
-
-    /// Lets forces act on an agent, instead of those that did.
-    pub(super) fn set_forces(&mut self, id: AgentId, forces: impl Into<Vec<AnchorForce>>) {
-        self.cluster.members[id.0 as usize].forces = forces.into();
-    }
-
-    /// Sets the neighbours of an agent that are not in the harness.
-    pub(super) fn set_neighbours(&mut self, id: AgentId, neighbours: Vec<Neighbour>) {
-        self.cluster.members[id.0 as usize].neighbours = neighbours;
-    }
-
-    /// Changes the step that an agent wants, seconds.
-    pub(super) fn set_step(&mut self, id: AgentId, step_s: f64) {
-        self.cluster.members[id.0 as usize].step_s = step_s;
+    /// An agent, and what acts on it.
+    pub(super) fn member(&mut self, id: AgentId) -> &mut Member {
+        &mut self.cluster.members[id.0 as usize]
     }
 
     /// An agent's newest state.
