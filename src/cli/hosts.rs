@@ -12,7 +12,7 @@ mod view;
 
 use super::run::stem;
 use args::{HostArgs, IdentityCommand};
-use common::{INSECURE, LINE_EVERY, refused, stopped};
+use common::{LINE_EVERY, red, refused, stopped, warn_open};
 use metachron_console::exit::Exit;
 use metachron_console::output::{BadInput, data, message, print_overlaps, warn_priority};
 use metachron_hosts::{Authority, Host, Identity, Refusals, SceneFiles, Serving, serve};
@@ -42,18 +42,9 @@ struct Carried {
     callers: usize,
     /// Bytes a second that each caller was sent since the last line.
     sent_bytes_s: f64,
-    refused: RefusedRow,
+    refused: Refusals,
     /// Whether any process of the network may read and command the world.
     insecure_lan: bool,
-}
-
-#[derive(Debug, Serialize)]
-struct RefusedRow {
-    malformed: u64,
-    flooded: u64,
-    repeated: u64,
-    strangers: u64,
-    forbidden: u64,
 }
 
 /// A scene with its text and files, as a host serves it.
@@ -90,9 +81,7 @@ pub(super) fn host(args: &HostArgs) -> anyhow::Result<Exit> {
         let host = host.map_err(refused)?;
         let serves = work.as_ref().map_or("waits for work", |work| &*work.scene.name);
         message(&format!("`{}` at {}: {serves}, until Ctrl-C", args.name, args.listen));
-        if host.is_open() {
-            message(&red(INSECURE, std::io::stderr().is_terminal()));
-        }
+        warn_open(host.is_open());
         if args.scene.is_some() && !args.paused {
             world.drive(TimelineCommand::Run);
         }
@@ -168,20 +157,14 @@ fn carried(world: &World, host: &Host, counted: &mut Counted) -> Carried {
     let cpu_s = world.agents().iter().map(AgentHandle::cpu_s).sum();
     let now = Counted { at: Instant::now(), cpu_s, sent: host.sent() };
     let before = std::mem::replace(counted, now);
-    let (span_s, refused) = ((now.at - before.at).as_secs_f64(), host.refused());
+    let span_s = (now.at - before.at).as_secs_f64();
     Carried {
         sim_s: world.time().as_secs_f64(),
         agents: world.all_objects().count(),
         cpu: (now.cpu_s - before.cpu_s).max(0.0) / span_s,
         callers: host.callers(),
         sent_bytes_s: (now.sent - before.sent) as f64 / span_s,
-        refused: RefusedRow {
-            malformed: refused.malformed,
-            flooded: refused.flooded,
-            repeated: refused.repeated,
-            strangers: refused.strangers,
-            forbidden: refused.forbidden,
-        },
+        refused: host.refused(),
         insecure_lan: host.is_open(),
     }
 }
@@ -192,18 +175,12 @@ fn line(carried: &Carried, json: bool) -> anyhow::Result<String> {
     }
     let Carried { sim_s, agents, cpu, callers, sent_bytes_s, refused, insecure_lan } = carried;
     let sent_kb_s = sent_bytes_s / 1e3;
-    let RefusedRow { malformed, flooded, repeated, strangers, forbidden } = refused;
-    let refused = malformed + flooded + repeated + strangers + forbidden;
+    let refused = refused.total();
     let open =
         if *insecure_lan { red("  open to the network", std::io::stdout().is_terminal()) } else { String::new() };
     Ok(format!(
         "{sim_s:>9.1} s  {agents} agents  {cpu:.2} cores  {callers} callers, {sent_kb_s:.0} kB/s each  {refused} messages refused{open}\n"
     ))
-}
-
-/// In red on a terminal.
-fn red(text: &str, is_terminal: bool) -> String {
-    if is_terminal { format!("\x1b[31m{text}\x1b[0m") } else { text.to_owned() }
 }
 
 /// The line that says which messages of a peer were refused in the last second.

@@ -5,13 +5,13 @@
 
 use super::args::ReplayArgs;
 use super::play::{GoOn, headless};
-use super::run::{Request, RunLength, check_outputs, check_read, finish, stem, style};
+use super::run::{Request, RunLength, check_outputs, check_read, finish};
 use metachron_console::exit::Exit;
 use metachron_console::output::{BadInput, message};
 use metachron_core::{SimSpan, SimTime};
 use metachron_scene::{Source, load};
 use metachron_session::Session;
-use metachron_world::{Pace, RecordError, Recording};
+use metachron_world::{RecordError, Recording};
 use std::path::Path;
 
 /// Repeats a recording.
@@ -36,30 +36,9 @@ pub(super) fn command(args: &ReplayArgs) -> anyhow::Result<Exit> {
     }
     let scene = load(&source, &overrides)?;
     check_read(&args.output, None, &source)?;
-    let request = Request {
-        scene,
-        quiet: args.output.quiet,
-        overrides,
-        // the recording says how time passed
-        pace: Pace::RealTime,
-        window: false,
-        #[cfg(feature = "viewer")]
-        reset_window: false,
-        end: Some(RunLength::Recording),
-        size: args.size,
-        style: style(&args.output.style),
-        oracle: false,
-        png: args.output.png.clone(),
-        depth: args.output.depth.clone(),
-        camera: args.output.camera.clone(),
-        video: args.output.video.clone(),
-        exports: args.output.exports(),
-        devices: Vec::new(),
-        record: None,
-        hosts: Vec::new(),
-        png_without_window: format!("metachron-{}.png", stem(source.name())).into(),
-        source,
-    };
+    // the recording says how time passed
+    let request =
+        Request { end: Some(RunLength::Recording), ..Request::of(scene, source, overrides, &args.output, args.size) };
     let until = args.until.and_then(SimSpan::from_secs_f64).map(|span| SimTime::ZERO + span);
     let play = |go_on: GoOn<'_>| {
         let session = Session::replay(request.scene.clone(), recording.clone(), until)?;

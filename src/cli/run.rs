@@ -189,12 +189,7 @@ fn request(args: &RunArgs, matches: Option<&ArgMatches>) -> anyhow::Result<Reque
     let scene = load(&source, &overrides)?;
     check_read(&args.output, args.record.as_deref(), &source)?;
     let end = args.frames.map(RunLength::Frames).or(args.seconds.map(RunLength::Seconds));
-    let png_without_window = format!("metachron-{}.png", stem(&scene.name)).into();
     Ok(Request {
-        scene,
-        source,
-        quiet: args.output.quiet,
-        overrides,
         pace: match args.pace {
             PaceWord::RealTime => Pace::RealTime,
             PaceWord::Free => Pace::Free,
@@ -203,23 +198,50 @@ fn request(args: &RunArgs, matches: Option<&ArgMatches>) -> anyhow::Result<Reque
         #[cfg(feature = "viewer")]
         reset_window: args.reset_window,
         end,
-        size: args.size,
-        style: style(&args.output.style),
         oracle: args.oracle,
-        png: args.output.png.clone(),
-        depth: args.output.depth.clone(),
-        camera: args.output.camera.clone(),
-        video: args.output.video.clone(),
-        exports: args.output.exports(),
         devices: args.device.clone(),
         record: args.record.clone(),
-        hosts: Vec::new(),
-        png_without_window,
+        ..Request::of(scene, source, overrides, &args.output, args.size)
     })
 }
 
+impl Request {
+    /// The request for outputs of a scene that was read: without a window, an end of its own, devices and a recording.
+    pub(super) fn of(
+        scene: Scene,
+        source: Source,
+        overrides: Vec<(String, String)>,
+        output: &OutputArgs,
+        size: Option<[u32; 2]>,
+    ) -> Self {
+        Self {
+            png_without_window: format!("metachron-{}.png", stem(&scene.name)).into(),
+            scene,
+            source,
+            quiet: output.quiet,
+            overrides,
+            pace: Pace::RealTime,
+            window: false,
+            #[cfg(feature = "viewer")]
+            reset_window: false,
+            end: None,
+            size,
+            style: style(&output.style),
+            oracle: false,
+            png: output.png.clone(),
+            depth: output.depth.clone(),
+            camera: output.camera.clone(),
+            video: output.video.clone(),
+            exports: output.exports(),
+            devices: Vec::new(),
+            record: None,
+            hosts: Vec::new(),
+        }
+    }
+}
+
 /// The style given by words; of two colourings the last counts.
-pub(super) fn style(words: &[StyleWord]) -> Style {
+fn style(words: &[StyleWord]) -> Style {
     words.iter().fold(Style::default(), |style, word| match word {
         StyleWord::Wireframe => Style { wireframe: true, ..style },
         StyleWord::Forces => Style { forces: true, ..style },

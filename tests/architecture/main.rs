@@ -22,7 +22,7 @@ const ARROWS: [(&str, &[&str]); 19] = [
     ("crates/export", &["core", "geometry", "runtime", "world"]),
     ("crates/bevy", &["core", "runtime", "world", "export"]),
     ("crates/hosts", &["core", "contact", "runtime", "world"]),
-    ("crates/import", &["geometry"]),
+    ("crates/import", &["core", "geometry"]),
     ("crates/lod", &["core"]),
     ("crates/render", &["core", "geometry", "drawable"]),
     (

@@ -167,12 +167,13 @@ fn a_device_of_one_process_leads_an_object_of_another_and_feels_what_lies_on_it(
     let scene = folder.path().join("tray.toml");
     std::fs::write(&scene, TRAY).unwrap();
     let host = Host::of(&scene, &[]);
-    let tool = |leads: &str| {
+    let tool = |leads: &str, seconds: &str| {
         let mut process = Process::new(cargo_bin("metachron"));
         process.args(["tool", "--device", "simulated", "--leads", leads, "--connect", &host.endpoint]);
-        process.args(["--seconds", "3", "--json"]).output().unwrap()
+        process.args(["--seconds", seconds, "--json"]);
+        process
     };
-    let served = tool("tray");
+    let served = tool("tray", "3").output().unwrap();
     let said = String::from_utf8_lossy(&served.stdout).into_owned();
     assert!(served.status.success(), "{said} {}", String::from_utf8_lossy(&served.stderr));
     let report: serde_json::Value = serde_json::from_str(said.lines().last().unwrap()).unwrap();
@@ -187,10 +188,21 @@ fn a_device_of_one_process_leads_an_object_of_another_and_feels_what_lies_on_it(
     for (leads, what) in
         [("none", "--leads: the world has no moving object"), ("load", "a device leads kinematic bodies and tools")]
     {
-        let ended = tool(leads);
+        let ended = tool(leads, "3").output().unwrap();
         let said = String::from_utf8_lossy(&ended.stderr).into_owned();
         assert!(ended.status.code() == Some(2) && said.contains(what), "{said}");
     }
+    // a host that falls silent ends it with an error, behind the device's last line
+    let mut longer = tool("tray", "60").stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap();
+    let mut lines = BufReader::new(longer.stdout.take().unwrap()).lines();
+    assert!(lines.next().is_some());
+    drop(host);
+    let last = lines.last().unwrap().unwrap();
+    let report: serde_json::Value = serde_json::from_str(&last).unwrap();
+    assert!(report["ticks"].as_u64().unwrap() > 0, "{last}");
+    let ended = longer.wait_with_output().unwrap();
+    let said = String::from_utf8_lossy(&ended.stderr).into_owned();
+    assert!(ended.status.code() == Some(1) && said.contains("silent"), "{said}");
 }
 
 #[test]

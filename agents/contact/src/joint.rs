@@ -4,7 +4,7 @@
 
 use crate::motion_bounds::is_within_motion;
 use glam::{DQuat, DVec3};
-use metachron_core::{AgentId, NumberRange, OutOfRange};
+use metachron_core::{AgentId, DisjointSets, NumberRange, OutOfRange};
 
 /// A joint between two rigid bodies, or between one and the world. Jointed bodies are always members of one cluster.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -44,10 +44,17 @@ pub struct Joint {
 pub struct Mimic {
     /// The number of the joint that it follows, a hinge or slide too.
     pub joint: u32,
-    /// Its travel for each radian or metre of the other: within ±1e6.
+    /// Its travel for each radian or metre of the other, within [`Self::RATIO`].
     pub ratio: f64,
-    /// Its travel where the other joint is at its zero, rad or m: within ±1e9.
+    /// Its travel where the other joint is at its zero, rad or m, within [`Self::OFFSET`].
     pub offset: f64,
+}
+
+impl Mimic {
+    /// The ratios that there are.
+    pub const RATIO: NumberRange = NumberRange::new(-1e6, 1e6, "");
+    /// The offsets that there are, rad or m.
+    pub const OFFSET: NumberRange = GOAL;
 }
 
 /// The degrees of freedom that a joint locks and leaves free. Axes of a [`Joint`] are in a's shape, of any length above zero.
@@ -255,8 +262,8 @@ impl Joint {
             if !self.takes_motor() {
                 return Err(JointError::BadMimic { joint });
             }
-            RATIO.check("ratio to the joint that it follows", ratio)?;
-            GOAL.check("offset from the joint that it follows", offset)?;
+            Mimic::RATIO.check("ratio to the joint that it follows", ratio)?;
+            Mimic::OFFSET.check("offset from the joint that it follows", offset)?;
         }
         match self.kind {
             JointKind::Fixed | JointKind::Spherical => Ok(()),
@@ -280,16 +287,14 @@ impl Joint {
     }
 
     /// Whether the joint that it follows, one of `all` of which it is number `own`, can lead it: joints that followed each other in a ring would
-    /// lock, but where their ratios multiply to one.
+    /// lock, but where their ratios multiply to one. `tied` are sets of those of the joints before it that follow each other; the last joint of
+    /// a ring is its error.
     ///
     /// # Errors
     /// [`JointError::BadMimic`].
-    pub fn check_mimic(&self, own: u32, all: &[Self]) -> Result<(), JointError> {
+    pub fn check_mimic(&self, own: u32, all: &[Self], tied: &mut DisjointSets) -> Result<(), JointError> {
         let Some(Mimic { joint, .. }) = self.mimic else { return Ok(()) };
-        let above = |number: &u32| Some(all.get(*number as usize)?.mimic?.joint);
-        // a ring further up is the error of its own joints
-        let leads = std::iter::successors(Some(joint), above).take(all.len()).all(|number| number != own);
-        let leads = leads && all.get(joint as usize).is_some_and(Self::takes_motor);
+        let leads = all.get(joint as usize).is_some_and(Self::takes_motor) && tied.join(own as usize, joint as usize);
         if leads { Ok(()) } else { Err(JointError::BadMimic { joint }) }
     }
 
@@ -320,13 +325,12 @@ impl Joint {
     }
 }
 
-/// Stiffness, damping and lengths at rest; [`ABOVE_ZERO`] is that of lengths of ropes, [`GOAL`] that of goals of motors and of followed joints.
+/// Stiffness, damping and lengths at rest; [`ABOVE_ZERO`] is that of lengths of ropes, [`GOAL`] that of goals of motors.
 const NUMBER: NumberRange = NumberRange::new(0.0, 1e9, "");
 /// The friction and armature of a joint that is neither hinge, slide nor ball.
 const NONE: NumberRange = NumberRange::new(0.0, 0.0, "");
 const ABOVE_ZERO: NumberRange = NumberRange { least: 1e-9, ..NUMBER };
 const GOAL: NumberRange = NumberRange { least: -1e9, ..NUMBER };
-const RATIO: NumberRange = NumberRange::new(-1e6, 1e6, "");
 const ANGLE: NumberRange = NumberRange::new(-std::f64::consts::PI, std::f64::consts::PI, "rad");
 
 fn range(what: &'static str, [low, high]: [f64; 2], within: NumberRange) -> Result<(), JointError> {

@@ -10,6 +10,12 @@ pub struct DisjointSets {
 }
 
 impl DisjointSets {
+    /// Sets of `count` places, each by itself.
+    #[must_use]
+    pub fn of(count: usize) -> Self {
+        Self { above: (0..count).collect() }
+    }
+
     /// Makes every one of `count` places a set of its own, in the storage that is there.
     pub fn reset(&mut self, count: usize) {
         self.above.clear();
@@ -28,13 +34,14 @@ impl DisjointSets {
         self.above.is_empty()
     }
 
-    /// Merges the sets of two places.
+    /// Merges the sets of two places; whether they were two. A pair of one set closes a ring of the pairs so far.
     ///
     /// # Panics
     /// Where one of them is no place.
-    pub fn join(&mut self, a: usize, b: usize) {
+    pub fn join(&mut self, a: usize, b: usize) -> bool {
         let (a, b) = (self.lowest(a), self.lowest(b));
         self.above[a.max(b)] = a.min(b);
+        a != b
     }
 
     /// The lowest place of the set of `at`.
@@ -59,7 +66,8 @@ mod tests {
         let mut sets = DisjointSets::default();
         for pairs in [[(5, 3), (3, 1), (4, 2)], [(1, 3), (4, 2), (3, 5)], [(1, 5), (2, 4), (5, 3)]] {
             sets.reset(6);
-            pairs.into_iter().for_each(|(a, b)| sets.join(a, b));
+            assert!(pairs.into_iter().all(|(a, b)| sets.join(a, b)), "no ring so far");
+            assert!(!sets.join(5, 1), "a ring");
             assert_eq!([0, 1, 2, 3, 4, 5].map(|at| sets.lowest(at)), [0, 1, 2, 1, 2, 1]);
         }
     }

@@ -3,7 +3,7 @@
 //! In: the name of a caller, the number of its call. Out: whether the call is let in, and counts of the refused. Never here:
 //! bytes, the effect of a call.
 
-use std::collections::{BTreeMap, HashMap};
+use std::collections::BTreeMap;
 use std::time::{Duration, Instant};
 
 /// The places for callers, which the names of certificates that a host lets in share evenly, each having one at least; callers without certificates
@@ -14,7 +14,7 @@ pub const SESSIONS_MAX: usize = 64;
 pub const CALLS_MAX: u32 = 10_000;
 
 /// How many messages were refused, by their faults.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, serde::Serialize)]
 pub struct Refusals {
     /// Bytes that mean nothing, of another version or too many, and numbers that cannot be.
     pub malformed: u64,
@@ -56,20 +56,22 @@ pub(crate) enum Fault {
     Forbidden,
 }
 
-/// The callers that have a place, each by its name and its session: `name/session`. A caller has its place for as long as its sign of life lasts.
+/// The callers that live, each by its name and its session: `name/session`, first those that came first. Of each name the first have a place, and as
+/// many more wait for one. A caller has its place for as long as its sign of life lasts.
 #[derive(Debug)]
 pub(crate) struct Gate {
     /// Whether names are those of certificates.
     is_certified: bool,
     /// The places of each name.
     share: usize,
-    callers: HashMap<String, Caller>,
+    callers: Vec<Caller>,
     peers: BTreeMap<String, Peer>,
     pub refused: Refusals,
 }
 
-#[derive(Debug, Default)]
+#[derive(Debug)]
 struct Caller {
+    name: String,
     /// The number of its newest call; 0 until it has introduced itself.
     newest: u64,
     is_looking: bool,
@@ -108,7 +110,7 @@ const STRANGERS: &str = "strangers";
 impl Gate {
     /// For callers of so many names, which are those of certificates, or one for all.
     pub fn new(is_certified: bool, names: usize) -> Self {
-        let (callers, peers, share) = (HashMap::new(), BTreeMap::new(), (SESSIONS_MAX / names.max(1)).max(1));
+        let (callers, peers, share) = (Vec::new(), BTreeMap::new(), (SESSIONS_MAX / names.max(1)).max(1));
         Self { is_certified, share, callers, peers, refused: Refusals::default() }
     }
 
@@ -116,7 +118,7 @@ impl Gate {
     pub fn peer_of<'a>(&self, caller: &'a str) -> &'a str {
         match caller.split_once('/') {
             Some((name, _)) if self.is_certified => name,
-            _ if self.callers.contains_key(caller) => caller,
+            _ if self.callers.iter().any(|one| one.name == caller) => caller,
             _ => STRANGERS,
         }
     }
@@ -147,17 +149,22 @@ impl Gate {
         admitted
     }
 
-    /// A caller shows a sign of life, and has a place if one of its name is left.
+    /// A caller shows a sign of life, and has a place if one of its name is left, or waits for one.
     pub fn arrive(&mut self, caller: &str) {
-        if self.taken(caller) < self.share {
-            self.callers.entry(caller.to_owned()).or_default();
+        if self.living(caller) < 2 * self.share && self.callers.iter().all(|one| one.name != caller) {
+            self.callers.push(Caller { name: caller.to_owned(), newest: 0, is_looking: false });
         }
     }
 
-    /// How many places the holder of a caller's name has.
-    fn taken(&self, caller: &str) -> usize {
-        let holder = holder(caller);
-        self.callers.keys().filter(|other| self::holder(other) == holder).count()
+    /// How many callers of the holder of a caller's name have a place or wait for one.
+    fn living(&self, caller: &str) -> usize {
+        self.callers.iter().filter(|one| holder(&one.name) == holder(caller)).count()
+    }
+
+    /// A caller that has a place.
+    fn placed(&mut self, caller: &str) -> Option<&mut Caller> {
+        let of_name = self.callers.iter_mut().filter(|one| holder(&one.name) == holder(caller));
+        of_name.take(self.share).find(|one| one.name == caller)
     }
 
     /// Lets a caller in that has a place, whose first call has the number `sequence`.
@@ -165,9 +172,9 @@ impl Gate {
     /// # Errors
     /// Why not.
     pub fn greet(&mut self, caller: &str, sequence: u64, is_looking: bool) -> Result<(), String> {
-        let Some(known) = self.callers.get_mut(caller) else {
+        let Some(known) = self.placed(caller) else {
             self.refuse(caller, Fault::Stranger);
-            return Err(if self.taken(caller) < self.share {
+            return Err(if self.living(caller) < self.share {
                 "a caller shows a sign of life before it introduces itself".to_owned()
             } else {
                 format!("the host has {} callers of \"{}\" already, and takes no more", self.share, holder(caller))
@@ -176,7 +183,7 @@ impl Gate {
         if sequence <= known.newest {
             return Err(self.repeat(caller));
         }
-        *known = Caller { newest: sequence, is_looking };
+        (known.newest, known.is_looking) = (sequence, is_looking);
         Ok(())
     }
 
@@ -185,7 +192,7 @@ impl Gate {
     /// # Errors
     /// Why not.
     pub fn pass(&mut self, caller: &str, sequence: u64, is_of_run: bool) -> Result<(), String> {
-        let Some(known) = self.callers.get_mut(caller).filter(|known| known.newest > 0) else {
+        let Some(known) = self.placed(caller).filter(|known| known.newest > 0) else {
             self.refuse(caller, Fault::Stranger);
             return Err("a caller introduces itself first".to_owned());
         };
@@ -201,9 +208,9 @@ impl Gate {
         "the call is an old one, or for another run of the host".to_owned()
     }
 
-    /// A caller has gone. What was refused of it and not yet said is said of strangers.
+    /// A caller has gone, and the first of its name that waits has its place. What was refused of it and not yet said is said of strangers.
     pub fn leave(&mut self, caller: &str) {
-        self.callers.remove(caller);
+        self.callers.retain(|one| one.name != caller);
         let Some(mut left) = self.peers.remove(caller) else { return };
         let strangers = &mut self.peers.entry(STRANGERS.to_owned()).or_default().refused;
         for fault in [Fault::Malformed, Fault::Flooded, Fault::Repeated, Fault::Stranger, Fault::Forbidden] {
@@ -213,7 +220,7 @@ impl Gate {
 
     /// The callers that have introduced themselves.
     pub fn callers(&self) -> Callers {
-        let known = self.callers.values().filter(|caller| caller.newest > 0);
+        let known = self.callers.iter().filter(|caller| caller.newest > 0);
         let looking = known.clone().filter(|caller| caller.is_looking).count();
         Callers { whole: known.count() - looking, looking }
     }
@@ -266,9 +273,23 @@ mod tests {
         gate.arrive("op/0");
         gate.greet("op/0", 1, false).unwrap();
         gate.leave("eye/7");
-        gate.arrive("eye/99");
-        gate.greet("eye/99", 1, true).unwrap();
-        assert_eq!((gate.callers(), gate.refused.strangers), (Callers { whole: 1, looking: 1 }, 2));
+        assert!(gate.greet("eye/33", 1, true).is_err(), "another one came before it");
+        gate.greet("eye/32", 1, true).unwrap();
+        assert_eq!((gate.callers(), gate.refused.strangers), (Callers { whole: 1, looking: 1 }, 3));
+        // those that have gone wait no more, and a place of another name is none of theirs
+        gate.leave("eye/33");
+        gate.leave("op/0");
+        assert!(gate.greet("eye/34", 1, true).is_err());
+        gate.leave("eye/32");
+        gate.greet("eye/34", 1, true).unwrap();
+    }
+
+    #[test]
+    fn a_caller_that_shows_its_sign_of_life_again_takes_no_more_than_its_place() {
+        let mut gate = Gate::new(true, SESSIONS_MAX);
+        (0..3).for_each(|_| gate.arrive("eye/0"));
+        gate.leave("eye/0");
+        assert!(gate.callers.is_empty());
     }
 
     #[test]

@@ -1,6 +1,6 @@
 //! Bytes and numbers that no program of ours sends, at both ends: each is refused and counted, and what is good goes on.
 
-use crate::endpoint::{Place, Side, open};
+use crate::endpoint::{LEASE, Place, Side, open};
 use crate::gate::{CALLS_MAX, SESSIONS_MAX};
 use crate::mirror::Mirror;
 use crate::wire::{Call, MESSAGE_MAX, Moment, ObjectState, PROGRAM, Reply, Request, VERSION, Welcome, decode, encode};
@@ -275,4 +275,33 @@ fn calls_of_others_are_answered_while_one_peer_has_all_waiting_places() {
     }
     assert!(host.refused().flooded > 0, "the test floods: {:?}", host.refused());
     assert!(host.take_refused().iter().all(|(peer, _)| peer == "anyone/flood"));
+}
+
+#[test]
+fn a_posted_call_that_is_answered_too_late_is_counted_and_is_the_newest_round_trip() {
+    let port = TcpListener::bind("127.0.0.1:0").unwrap().local_addr().unwrap().port();
+    let (world, endpoint) = (World::start(&scene(), ExecutorKind::Threads).unwrap(), format!("tcp/127.0.0.1:{port}"));
+    let _host = serve(Arc::new(world), Serving::new("bench", &endpoint)).unwrap();
+    let (calm, slow) = (connect(&endpoint).unwrap(), stranger(&endpoint));
+    // names behind that of the other caller, which is a number in base 16
+    let callers = ["x", "y", "z"];
+    let _lives = callers.map(|caller| life(&slow, caller));
+    let runs = callers.map(|caller| {
+        let greeting = encode(&Request { run: 0, sequence: 1, call: hello(PROGRAM) }).unwrap();
+        let Some(Reply::Hello(Welcome { run, .. })) = ask(&slow, caller, greeting) else { panic!("it greets") };
+        run
+    });
+    for (caller, run) in callers.into_iter().zip(runs) {
+        let advance = Request { run, sequence: 2, call: Call::Advance(SimSpan::from_millis(1000)) };
+        let get = slow.get(format!("metachron/bench/call/anyone/{caller}")).payload(encode(&advance).unwrap());
+        get.callback(|_| {}).wait().unwrap();
+    }
+    // each of the three lets a second pass before the turn of the next comes
+    calm.post(calm.object("ball").unwrap(), Command::wake()).unwrap();
+    assert_eq!(calm.lost(), 0);
+    let begun = Instant::now();
+    while calm.lost() == 0 && begun.elapsed() < 5 * LEASE {
+        std::thread::yield_now();
+    }
+    assert!(calm.lost() == 1 && calm.link().unwrap().round_trip >= LEASE, "{:?}", calm.link());
 }

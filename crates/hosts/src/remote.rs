@@ -70,11 +70,19 @@ struct Link {
     sketches: Mutex<Option<Sketches>>,
     /// The number of the newest call.
     sequence: Mutex<u64>,
-    /// How long the newest call that was posted and answered took.
-    round_trip: Arc<Mutex<Duration>>,
-    /// The newest refusal of a call that was posted.
-    refused: Arc<Mutex<Option<WorldError>>>,
+    posted: Arc<Mutex<Posted>>,
     ends: AtomicBool,
+}
+
+/// The outcome of the calls that were posted.
+#[derive(Default)]
+struct Posted {
+    /// How long the newest that ended has taken: until its answer, or until none was waited for any more.
+    round_trip: Duration,
+    /// The newest refusal.
+    refused: Option<WorldError>,
+    /// How many had no answer in time.
+    lost: u64,
 }
 
 impl std::fmt::Debug for RemoteWorld {
@@ -170,8 +178,8 @@ pub fn connect(calling: impl Into<Calling>) -> Result<RemoteWorld, HostsError> {
     let (sequence, ends) = (Mutex::new(u64::from(GREETING.0)), AtomicBool::new(false));
     let is_open = is_open_to_all(&endpoint);
     let sketches = Mutex::new(is_looking.then(Sketches::default));
-    let (round_trip, refused) = (Arc::default(), Arc::default());
-    let link = Arc::new(Link { session, mirror, caller, is_open, sketches, sequence, round_trip, refused, ends });
+    let posted = Arc::default();
+    let link = Arc::new(Link { session, mirror, caller, is_open, sketches, sequence, posted, ends });
     link.refresh()?;
     let reading = Arc::clone(&link);
     let reader = std::thread::Builder::new().name("hosts-states".to_owned()).spawn(move || reading.read(&messages));
@@ -331,24 +339,31 @@ impl Link {
         ask(get).map_err(|error| elsewhere(error.to_string()))
     }
 
-    /// Calls the host and waits for nothing; a call that it refuses is the error of the next one posted. Where the link is full the call is lost.
+    /// Calls the host and waits for nothing; a call that it refuses is the error of the next one posted. Where the link is full the call is lost,
+    /// which counts as no answer.
     fn post(&self, call: Call) -> Result<(), WorldError> {
         if let Some(silent) = self.mirror.silence() {
             return Err(silent);
         }
-        let (round_trip, refused, posted) = (Arc::clone(&self.round_trip), Arc::clone(&self.refused), Instant::now());
+        let (all, begun) = (Arc::clone(&self.posted), Instant::now());
         let take = move |answer: zenoh::query::Reply| {
-            let Ok(sample) = answer.result() else { return };
-            *round_trip.lock().unwrap_or_else(PoisonError::into_inner) = posted.elapsed();
-            if let Ok(Reply::Refused(refusal)) = decode(&sample.payload().to_bytes()) {
-                *refused.lock().unwrap_or_else(PoisonError::into_inner) = Some(refusal.into());
+            let mut posted = all.lock().unwrap_or_else(PoisonError::into_inner);
+            posted.round_trip = begun.elapsed();
+            match answer.result().map(|sample| decode(&sample.payload().to_bytes())) {
+                Ok(Ok(Reply::Refused(refusal))) => posted.refused = Some(refusal.into()),
+                Ok(_) => {}
+                Err(_) => posted.lost += 1,
             }
         };
         let post = |get: SessionGetBuilder<'_, '_, DefaultHandler>| {
             get.timeout(LEASE).congestion_control(CongestionControl::Drop).callback(take).wait()
         };
         self.send(call, post)?;
-        self.refused.lock().unwrap_or_else(PoisonError::into_inner).take().map_or(Ok(()), Err)
+        self.posted().refused.take().map_or(Ok(()), Err)
+    }
+
+    fn posted(&self) -> MutexGuard<'_, Posted> {
+        self.posted.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
     /// Calls the host for one answer.
@@ -426,6 +441,12 @@ impl RemoteWorld {
         self.calls().is_open
     }
 
+    /// How many calls that were posted had no answer within a second.
+    #[must_use]
+    pub fn lost(&self) -> u64 {
+        self.calls().posted().lost
+    }
+
     /// How many messages of the host were refused, because their bytes or numbers cannot be.
     #[must_use]
     pub fn refused(&self) -> u64 {
@@ -494,8 +515,7 @@ impl WorldCalls for RemoteWorld {
     }
 
     fn link(&self) -> Option<StateLink> {
-        let round_trip = *self.calls().round_trip.lock().unwrap_or_else(PoisonError::into_inner);
-        Some(StateLink { age: self.age(), period: PERIOD, round_trip })
+        Some(StateLink { age: self.age(), period: PERIOD, round_trip: self.calls().posted().round_trip })
     }
 
     fn set_state(&self, object: Object, state: &Body) -> Result<(), WorldError> {

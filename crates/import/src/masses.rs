@@ -189,21 +189,13 @@ fn is_positive(m: DMat3) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::model::Look;
     use crate::place::Place;
 
     fn repaired(moments: [f64; 3]) -> (DVec3, usize) {
         let inertia_kg_m2 = Some(DMat3::from_diagonal(DVec3::from_array(moments)));
         let mut link = Link {
-            name: String::new(),
-            root: 0,
-            is_free: false,
-            place: Place { file: None, line: 1, label: String::new() },
-            pose: Pose::IDENTITY,
             mass: Mass::Given { mass_kg: 2.0, com_m: DVec3::ZERO, inertia_kg_m2 },
-            parts: Vec::new(),
-            look: Look::default(),
-            is_lent: false,
+            ..Link::at(String::new(), Place { file: None, line: 1, label: String::new() }, Pose::IDENTITY)
         };
         let mut notes = Vec::new();
         repair(&mut link, &mut notes).unwrap();

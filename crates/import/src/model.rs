@@ -299,6 +299,14 @@ impl Kind {
     }
 }
 
+impl Link {
+    /// A body without mass, solids and look, which hangs on nothing.
+    pub(crate) fn at(name: String, place: Place, pose: Pose) -> Self {
+        let (mass, parts, look) = (Mass::None, Vec::new(), Look::default());
+        Self { name, root: 0, is_free: false, place, pose, mass, parts, look, is_lent: false }
+    }
+}
+
 impl Joint {
     /// A joint that lets nothing move.
     pub(crate) fn weld(place: Place, parent: Option<usize>, child: usize) -> Self {

@@ -9,6 +9,7 @@ use crate::model::{Joint, Kind, Link, Look, Mass, Mimic, Model, Motor, Part, Sha
 use crate::pose::{Pose, fixed_angles};
 use crate::xml::{DAMPING_MAX, Element, Harmless, RATIO_MAX, STRENGTH_MAX};
 use glam::{DMat3, DVec3};
+use metachron_core::DisjointSets;
 use metachron_geometry::Solid;
 use std::collections::BTreeMap;
 
@@ -208,19 +209,21 @@ fn drop_mimics(drafts: &mut [Draft<'_>], notes: &mut Vec<LeftOut>) -> Vec<Option
     // of joints of one name the first
     let named = drafts.iter().enumerate().rev().filter_map(|(at, draft)| Some((draft.element.text("name")?, at)));
     let named: BTreeMap<&str, usize> = named.collect();
-    let leader = |draft: &Draft<'_>| draft.mimic.and_then(|mimic| named.get(mimic.joint).copied());
-    let mut leaders: Vec<_> = drafts.iter().map(leader).collect();
+    let mut leaders = vec![None; drafts.len()];
+    let mut tied = DisjointSets::of(drafts.len());
     for at in 0..drafts.len() {
         let Some(mimic) = drafts[at].mimic else { continue };
-        let mut above = std::iter::successors(leaders[at], |joint| leaders[*joint]).take(drafts.len());
-        let why = match leaders[at] {
+        let why = match named.get(mimic.joint).copied() {
             None => "there is no joint of that name",
             Some(leads) if !drafts[leads].kind.travels() => "that joint does not move",
-            Some(_) if above.any(|joint| joint == at) => "it follows itself",
-            Some(_) => continue,
+            Some(leads) if !tied.join(at, leads) => "it follows itself",
+            found => {
+                leaders[at] = found;
+                continue;
+            }
         };
         notes.push(mimic.element.note(format!("is left out: it names `{}`, and {why}", mimic.joint)));
-        (drafts[at].mimic, leaders[at]) = (None, None);
+        drafts[at].mimic = None;
     }
     leaders
 }
@@ -308,8 +311,7 @@ fn link(
     }
     let look = Look { colour: colour(element, touches, colours)?, surface: None };
     let name = element.needed("name")?.to_owned();
-    let (place, mass) = (element.place.clone(), mass(element)?);
-    Ok(Link { name, root: 0, is_free: false, place, pose, mass, parts, look, is_lent: false })
+    Ok(Link { mass: mass(element)?, parts, look, ..Link::at(name, element.place.clone(), pose) })
 }
 
 fn mass(element: &Element) -> Result<Mass, ImportError> {

@@ -145,6 +145,16 @@ impl Element {
         all.try_into().map(Some).map_err(wrong)
     }
 
+    /// The numbers of an attribute that has `N` of them at most; for those that are missing the `usual` ones.
+    pub(crate) fn numbers_or<const N: usize>(&self, name: &str, usual: [f64; N]) -> Result<[f64; N], ImportError> {
+        let mut all = self.list(name)?.unwrap_or_default();
+        if all.len() > N {
+            return Err(self.wrong(format!("`{name}` has {} numbers; expected {N} at most", all.len())));
+        }
+        all.extend_from_slice(&usual[all.len()..]);
+        Ok(all.try_into().unwrap_or(usual))
+    }
+
     pub(crate) fn number(&self, name: &str) -> Result<Option<f64>, ImportError> {
         Ok(self.numbers::<1>(name)?.map(|[value]| value))
     }
@@ -264,5 +274,16 @@ impl Element {
         for child in &self.children {
             child.list_unread(harmless, into);
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::RATIO_MAX;
+    use metachron_models::rigid::Mimic;
+
+    #[test]
+    fn the_ratios_that_are_read_are_those_of_scenes() {
+        assert_eq!([Mimic::RATIO.least, Mimic::RATIO.greatest], [-RATIO_MAX, RATIO_MAX]);
     }
 }

@@ -175,8 +175,8 @@ impl<'d, 't> Checker<'d, 't> {
         let (list, number) = path.split_once('.').unwrap_or((path, ""));
         let owner = match (text("a").zip(text("b")), text("name")) {
             (_, Some(name)) if list == "object" => format!("of `{name}`"),
-            (Some((a, b)), _) => format!("of the {list} of `{a}` and `{b}`"),
             (_, Some(name)) => format!("of {list} `{name}`"),
+            (Some((a, b)), None) => format!("of the {list} of `{a}` and `{b}`"),
             _ if number.parse::<usize>().is_ok() => format!("of `[[{list}]]`"),
             _ => format!("of `[{path}]`"),
         };

@@ -4,11 +4,12 @@
 
 use super::args::CallArgs;
 use anyhow::Context;
-use metachron_console::output::BadInput;
+use metachron_console::output::{BadInput, message};
 use metachron_console::values::LimitArgs;
 use metachron_hosts::{Calling, HostsError, Identity, RemoteWorld, connect};
 use metachron_scene::{Source, load};
 use metachron_world::{Scene, WorldCalls};
+use std::io::IsTerminal;
 use std::sync::mpsc::{Receiver, channel};
 use std::time::Duration;
 
@@ -18,6 +19,18 @@ pub(super) const LINE_EVERY: Duration = Duration::from_secs(1);
 /// Said where `--insecure-lan` opens a world, or a view of one, to the network.
 pub(super) const INSECURE: &str =
     "--insecure-lan: any process of the network may read and command this world, and nothing is encrypted";
+
+/// Says that a world is open to the network, where it is.
+pub(super) fn warn_open(is_open: bool) {
+    if is_open {
+        message(&red(INSECURE, std::io::stderr().is_terminal()));
+    }
+}
+
+/// In red on a terminal.
+pub(super) fn red(text: &str, is_terminal: bool) -> String {
+    if is_terminal { format!("\x1b[31m{text}\x1b[0m") } else { text.to_owned() }
+}
 
 /// Told of Ctrl-C, of the first one alone.
 pub(super) fn stopped() -> anyhow::Result<Receiver<()>> {

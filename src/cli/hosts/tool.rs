@@ -3,7 +3,7 @@
 //! In: a device, an endpoint. Out: the device's report, second by second. Never here: the phases of a tick, steps.
 
 use super::args::ToolArgs;
-use super::common::{LINE_EVERY, reached, refused, scene_of, stopped};
+use super::common::{LINE_EVERY, reached, refused, scene_of, stopped, warn_open};
 use crate::cli::devices::{self, DeviceWish};
 use anyhow::Context;
 use metachron_console::exit::Exit;
@@ -21,10 +21,11 @@ const PATIENCE: Duration = Duration::from_millis(100);
 /// Serves a device until Ctrl-C, or for as long as was asked.
 pub(in super::super) fn tool(args: &ToolArgs) -> anyhow::Result<Exit> {
     let world = Arc::new(reached(&args.connect, &args.call, false).map_err(refused)?);
+    warn_open(world.is_open());
     let scene = scene_of(&args.connect, &world, &args.limits, None)?.scene;
     let bad = |error: WorldError| BadInput(format!("--leads: {error}"));
     // the error of a caller that may only look comes before its device is opened
-    world.command(world.object(&args.leads).map_err(bad)?, Command::wake()).map_err(bad)?;
+    world.command(world.object(&args.leads).map_err(bad)?, Command::wake())?;
     let mut ghosts = GhostWorld::of(&scene)?;
     ghosts.follow(&*world)?;
     let device = devices::open(&scene, &DeviceWish { kind: args.device, object: args.leads.clone() })?;
@@ -34,20 +35,24 @@ pub(in super::super) fn tool(args: &ToolArgs) -> anyhow::Result<Exit> {
     let served = Served::start(device_loop).context("a device has no thread")?;
     message(&format!("`{}` at {} is led by a device here, until Ctrl-C", args.leads, args.connect));
     let (begun, mut said) = (Instant::now(), Instant::now());
-    while stopped.try_recv() == Err(TryRecvError::Empty)
+    let mut follows = Ok(());
+    while follows.is_ok()
+        && stopped.try_recv() == Err(TryRecvError::Empty)
         && args.seconds.is_none_or(|seconds| begun.elapsed().as_secs_f64() < seconds)
     {
         // time that stands brings no later frame, and a host that is silent no answer
         let _ = world.next_frame(world.time(), PATIENCE);
-        world.answers()?;
-        ghosts.follow(&*world)?;
+        follows = world.answers().and_then(|()| ghosts.follow(&*world));
         if said.elapsed() >= LINE_EVERY {
             said = Instant::now();
             data(&line(&served.report(), args.json)?)?;
         }
     }
     data(&line(&served.stop(), args.json)?)?;
-    Ok(Exit::Ok)
+    if world.lost() > 0 {
+        message(&format!("{} poses had no answer within a second", world.lost()));
+    }
+    Ok(follows.map(|()| Exit::Ok)?)
 }
 
 fn line(report: &DeviceReport, json: bool) -> anyhow::Result<String> {

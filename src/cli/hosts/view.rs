@@ -5,11 +5,10 @@
 use super::args::ViewArgs;
 use super::common::{INSECURE, SaidScene, reached, refused, scene_of};
 use crate::cli::play::{GoOn, headless, in_window};
-use crate::cli::run::{Request, RunLength, check_outputs, check_windowless, finish, stem, style};
+use crate::cli::run::{Request, RunLength, check_outputs, check_windowless, finish};
 use metachron_console::exit::Exit;
 use metachron_hosts::RemoteWorld;
 use metachron_session::Session;
-use metachron_world::Pace;
 use std::sync::Arc;
 
 /// Shows a world elsewhere until the window is closed.
@@ -36,26 +35,10 @@ pub(in super::super) fn view(args: &ViewArgs) -> anyhow::Result<Exit> {
 fn request(args: &ViewArgs, world: &RemoteWorld) -> anyhow::Result<Request> {
     let SaidScene { scene, source, overrides } = scene_of(&args.endpoint, world, &args.limits, args.target_fps)?;
     Ok(Request {
-        quiet: args.output.quiet,
-        overrides,
-        pace: Pace::RealTime,
         window: !args.headless,
         #[cfg(feature = "viewer")]
         reset_window: args.reset_window,
         end: args.frames.map(RunLength::Frames).or(args.seconds.map(RunLength::Seconds)),
-        size: args.size,
-        style: style(&args.output.style),
-        oracle: false,
-        png: args.output.png.clone(),
-        depth: args.output.depth.clone(),
-        camera: args.output.camera.clone(),
-        video: args.output.video.clone(),
-        exports: args.output.exports(),
-        devices: Vec::new(),
-        record: None,
-        hosts: Vec::new(),
-        png_without_window: format!("metachron-{}.png", stem(&scene.name)).into(),
-        scene,
-        source,
+        ..Request::of(scene, source, overrides, &args.output, args.size)
     })
 }

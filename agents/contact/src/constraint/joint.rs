@@ -48,6 +48,8 @@ pub(crate) struct Joints {
     /// Their miss when they last did not hold in this macro step, metres or radians.
     pub missed_m: f64,
     held: Vec<Held>,
+    /// Their places by the numbers of the joints, where one of them follows another.
+    by_number: Vec<usize>,
     parts: Vec<Part>,
     mimicking: Vec<Mimicking>,
     /// Where members that joints hold will be by the velocities that rows were aimed with last.

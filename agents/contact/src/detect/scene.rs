@@ -6,7 +6,7 @@
 use crate::joint::{Joint, JointError};
 use crate::lists::refill;
 use crate::solve::DEPTH_DEFAULT_M;
-use metachron_core::AgentId;
+use metachron_core::{AgentId, DisjointSets};
 use metachron_geometry::narrow_phase::{StaticSolid, StaticSolidError};
 use metachron_geometry::{Aabb, Obstacle};
 use rapier3d::parry;
@@ -157,7 +157,8 @@ impl ClusterScene {
     /// [`JointError`] for a number outside its range.
     pub fn jointed(self, joints: Arc<[Joint]>) -> Result<Self, JointError> {
         joints.iter().try_for_each(Joint::check)?;
-        (0..).zip(joints.iter()).try_for_each(|(number, joint)| joint.check_mimic(number, &joints))?;
+        let mut tied = DisjointSets::of(joints.len());
+        (0..).zip(joints.iter()).try_for_each(|(number, joint)| joint.check_mimic(number, &joints, &mut tied))?;
         let mut by_body: Vec<u32> = (0..).zip(joints.iter()).map(|(number, _)| number).collect();
         by_body.sort_by_key(|&number| joints[number as usize].a);
         let passing = joints.iter().filter(|joint| !joint.collide);

@@ -252,7 +252,9 @@ impl Impacts {
         for sides in holding.map(|contact| &contact.sides).chain(joined.map(|row| &row.sides)) {
             let mut all = movers(sides);
             let Some(first) = all.next() else { continue };
-            all.for_each(|other| touching.join(first, other));
+            all.for_each(|other| {
+                touching.join(first, other);
+            });
         }
         self.touching = touching;
         reset(&mut self.works, progress.len(), None);

@@ -5,7 +5,7 @@
 
 use super::bodies::BodyReader;
 use crate::imported::ImportError;
-use crate::model::{Joint, Kind, Motor};
+use crate::model::Motor;
 use crate::xml::{DAMPING_MAX, Element, STRENGTH_MAX};
 
 /// Reads the actuators. Actuators of forces give none without a command, and programs command joints themselves.
@@ -31,8 +31,7 @@ pub(super) fn read(root: &Element, reader: &mut BodyReader<'_>) -> Result<(), Im
             continue;
         };
         let name = element.needed("joint")?;
-        let drives = |joint: &Joint| joint.name == name && matches!(joint.kind, Kind::Revolute | Kind::Prismatic);
-        let Some(at) = reader.model.joints.iter().position(drives) else {
+        let Some(at) = reader.travelling.get(name).copied() else {
             return Err(element.wrong(format!("drives `{name}`, and there is no hinge or slide of that name")));
         };
         let own = match reader.model.joints[at].motor {

@@ -25,6 +25,8 @@ pub(super) struct BodyReader<'a> {
     pub(super) files: Meshes<'a>,
     pub(super) notes: &'a mut Vec<LeftOut>,
     pub(super) model: Model,
+    /// The hinges and slides of the model by name; of one name the first.
+    pub(super) travelling: BTreeMap<String, usize>,
     /// For each joint of the model, where the zero of its file is: from its start, radians or metres.
     pub(super) zeros: Vec<f64>,
     /// And where it starts: from the pose of the file, likewise.
@@ -119,6 +121,7 @@ impl<'a> BodyReader<'a> {
             files,
             notes,
             model: Model::default(),
+            travelling: BTreeMap::new(),
             zeros: Vec::new(),
             starts: Vec::new(),
             sites: BTreeMap::new(),
@@ -168,7 +171,7 @@ impl<'a> BodyReader<'a> {
         }
         let above = joint.as_ref().map_or(above, |joint| above.moved(joint));
         let pose = above.pose;
-        let geoms = self.geoms(&contents)?;
+        let geoms = self.geoms(&contents, is_fixed)?;
         let mass =
             if is_fixed { self.static_mass(contents.inertial, &geoms)? } else { self.mass(contents.inertial, &geoms)? };
         let look = look(&geoms);
@@ -181,17 +184,7 @@ impl<'a> BodyReader<'a> {
         }
         let parts: Vec<Part> = geoms.iter().map(|geom| density(geom, &mass)).collect();
         let is_free = joint.as_ref().is_some_and(|joint| joint.between.is_none());
-        self.model.links.push(Link {
-            name,
-            root: 0,
-            is_free,
-            place: place.clone(),
-            pose,
-            mass,
-            parts,
-            look,
-            is_lent: false,
-        });
+        self.model.links.push(Link { is_free, mass, parts, look, ..Link::at(name, place.clone(), pose) });
         match joint {
             None => self.push_joint(StartedJoint::still(Some(Joint::weld(place, host.link, index)))),
             Some(joint) => self.push_joint(joint),
@@ -221,18 +214,7 @@ impl<'a> BodyReader<'a> {
                 return Err(free_with_others(*placed));
             }
             let name = self.unused(None, &format!("{body}-{}", placed.element.text("name").unwrap_or("joint")));
-            let (mass, parts, look) = (Mass::None, Vec::new(), Look::default());
-            self.model.links.push(Link {
-                name,
-                root: 0,
-                is_free: false,
-                place: place.clone(),
-                pose: at.pose,
-                mass,
-                parts,
-                look,
-                is_lent: false,
-            });
+            self.model.links.push(Link::at(name, place.clone(), at.pose));
             self.push_joint(joint);
         }
         Ok(at)
@@ -241,6 +223,9 @@ impl<'a> BodyReader<'a> {
     /// Keeps a joint, unless its body is free.
     fn push_joint(&mut self, StartedJoint { between, zero, start, .. }: StartedJoint) {
         let Some(joint) = between else { return };
+        if joint.kind.travels() {
+            self.travelling.entry(joint.name.clone()).or_insert(self.model.joints.len());
+        }
         self.model.joints.push(joint);
         self.zeros.push(zero);
         self.starts.push(start);
@@ -257,11 +242,16 @@ impl<'a> BodyReader<'a> {
         Ok(())
     }
 
-    fn geoms(&mut self, contents: &Contents<'_>) -> Result<Vec<Geom>, ImportError> {
+    /// The geoms of a body; ground on one that moves is noted.
+    fn geoms(&mut self, contents: &Contents<'_>, is_fixed: bool) -> Result<Vec<Geom>, ImportError> {
         let mut geoms = Vec::new();
         for placed in &contents.geoms {
             geoms.extend(self.geom(*placed)?);
         }
+        let moved = geoms.extract_if(.., |geom| geom.stays && !is_fixed);
+        self.notes.extend(
+            moved.map(|geom| geom.part.place.note("is left out: its body moves, and ground of a scene never does")),
+        );
         Ok(geoms)
     }
 

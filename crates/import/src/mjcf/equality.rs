@@ -8,7 +8,7 @@ use crate::imported::ImportError;
 use crate::model::{Joint, Kind, Mimic};
 use crate::xml::{Element, RATIO_MAX};
 use glam::DVec3;
-use std::collections::BTreeMap;
+use metachron_core::DisjointSets;
 
 /// Coordinates that differ by less are equal, rad or m.
 const ROUNDING: f64 = 1e-9;
@@ -18,6 +18,7 @@ const ROUNDING: f64 = 1e-9;
 /// # Errors
 /// For one of a body that there is none of.
 pub(super) fn read(root: &Element, reader: &mut BodyReader<'_>) -> Result<(), ImportError> {
+    let mut tied = DisjointSets::of(reader.model.joints.len());
     for element in root.children("equality").flat_map(Element::all) {
         if element.text("active") == Some("false") {
             element.read_all_within();
@@ -27,7 +28,7 @@ pub(super) fn read(root: &Element, reader: &mut BodyReader<'_>) -> Result<(), Im
             "connect" if element.has("body1") && element.has("anchor") => Kind::Spherical,
             "weld" if element.has("body1") => Kind::Fixed,
             "joint" => {
-                follow(element.read(), reader)?;
+                follow(element.read(), reader, &mut tied)?;
                 continue;
             }
             tag => {
@@ -70,7 +71,8 @@ pub(super) fn read(root: &Element, reader: &mut BodyReader<'_>) -> Result<(), Im
 }
 
 /// Lets a joint follow another: its way from the file's pose is a polynomial of that of the other, of which scenes have the first power.
-fn follow(element: &Element, reader: &mut BodyReader<'_>) -> Result<(), ImportError> {
+/// `tied` are sets of joints that follow each other.
+fn follow(element: &Element, reader: &mut BodyReader<'_>, tied: &mut DisjointSets) -> Result<(), ImportError> {
     if !element.has("joint2") {
         element.read_all_within();
         reader.notes.push(element.note("is left out: it holds one joint; expected `joint2`, which that one follows"));
@@ -78,43 +80,37 @@ fn follow(element: &Element, reader: &mut BodyReader<'_>) -> Result<(), ImportEr
     }
     let joint = |key: &'static str| {
         let name = element.needed(key)?;
-        let found = reader.model.joints.iter().position(|joint| joint.name == name && joint.kind.travels());
+        let found = reader.travelling.get(name).copied();
         found.ok_or_else(|| element.wrong(format!("names `{name}`, and there is no hinge or slide of that name")))
     };
     let [follows, leads] = [joint("joint1")?, joint("joint2")?];
-    let given = element.list("polycoef")?.unwrap_or_default();
-    let power = |at: usize| given.get(at).copied().unwrap_or(f64::from(u8::from(at == 1)));
+    let [offset, ratio, higher @ ..] = element.numbers_or("polycoef", [0.0, 1.0, 0.0, 0.0, 0.0])?;
     if follows == leads {
         return Err(element.wrong("ties a joint to itself; expected two joints"));
     }
-    if power(1).abs() > RATIO_MAX {
-        let what = format!("`polycoef` has the ratio {}; expected -{RATIO_MAX} to {RATIO_MAX}", power(1));
-        return Err(element.wrong(what));
+    if ratio.abs() > RATIO_MAX {
+        return Err(element.wrong(format!("`polycoef` has the ratio {ratio}; expected -{RATIO_MAX} to {RATIO_MAX}")));
     }
-    let before = reader.model.joints[follows].mimic.is_some();
-    let joints = &reader.model.joints;
-    let named: BTreeMap<&str, usize> = joints.iter().enumerate().map(|(at, joint)| (&*joint.name, at)).collect();
-    let above = |joint: &usize| named.get(&*joints[*joint].mimic.as_ref()?.joint).copied();
-    let is_ring = std::iter::successors(Some(leads), above).any(|joint| joint == follows);
+    let joints = &mut reader.model.joints;
     let mut note = |what: String| reader.notes.push(element.note(what));
-    if before {
+    if joints[follows].mimic.is_some() {
         note("is left out: a joint of a scene follows one other, and this one does already".to_owned());
         return Ok(());
     }
-    if is_ring {
+    if !tied.join(follows, leads) {
         let [joint, other] = [follows, leads].map(|at| &joints[at].name);
         note(format!("is left out: `{other}` follows `{joint}` already"));
         return Ok(());
     }
-    if (2..5).any(|at| power(at) != 0.0) {
+    if higher != [0.0; 3] {
         note("has no powers above the first: a joint of a scene follows another by a ratio".to_owned());
     }
-    let off = reader.starts[follows] - power(0) - power(1) * reader.starts[leads];
+    let off = reader.starts[follows] - offset - ratio * reader.starts[leads];
     if off.abs() > ROUNDING {
         note(format!("holds its joints as they start, {off} from where the file does"));
     }
-    let joint = reader.model.joints[leads].name.clone();
-    reader.model.joints[follows].mimic = Some(Mimic { joint, ratio: power(1) });
+    let joint = joints[leads].name.clone();
+    joints[follows].mimic = Some(Mimic { joint, ratio });
     Ok(())
 }
 

@@ -5,7 +5,6 @@
 use super::bodies::{BodyReader, Placed, z_to};
 use super::compiler::Compiler;
 use super::height_fields::{Ground, Heights};
-use crate::folders::extension;
 use crate::imported::ImportError;
 use crate::model::{Masks, Part, Shape, Surface};
 use crate::pose::Pose;
@@ -24,6 +23,8 @@ const FRICTION_DEFAULT: f64 = 1.0;
 #[derive(Debug)]
 pub(super) struct Geom {
     pub(super) part: Part,
+    /// Whether it is ground, which never moves and weighs nothing.
+    pub(super) stays: bool,
     /// `None` of a mesh or ellipsoid that says a mass.
     pub(super) density_kg_m3: Option<f64>,
     pub(super) mass_kg: Option<f64>,
@@ -46,33 +47,44 @@ enum MeshPoints {
     Here(Vec<DVec3>),
 }
 
-/// The meshes of a file by name: that of the file where they have none.
+/// The meshes of a file by name.
 pub(super) fn meshes<'a>(root: &'a Element, compiler: &Compiler) -> Result<BTreeMap<String, Mesh<'a>>, ImportError> {
     let mut found = BTreeMap::new();
-    for element in root.children("asset").flat_map(|asset| asset.children("mesh")) {
+    for (name, element) in assets(root, "mesh")? {
         let scale = element.numbers("scale")?.unwrap_or([1.0; 3]);
-        let (stem, points) = if let Some(file) = element.text("file") {
-            let stem = std::path::Path::new(file).file_stem().and_then(|stem| stem.to_str()).unwrap_or(file);
-            (stem, MeshPoints::File(compiler.in_mesh_folder(file)))
+        let points = if let Some(file) = element.text("file") {
+            MeshPoints::File(compiler.in_mesh_folder(file))
         } else if let Some(all) = element.list("vertex")? {
             let scaled = |point: &[f64]| DVec3::from_slice(point) * DVec3::from_array(scale);
-            ("mesh", MeshPoints::Here(all.chunks_exact(3).map(scaled).collect()))
+            MeshPoints::Here(all.chunks_exact(3).map(scaled).collect())
         } else {
             continue;
         };
-        let name = element.text("name").unwrap_or(stem).to_owned();
         found.insert(name, Mesh { element, points, scale });
     }
     Ok(found)
 }
 
-/// The height fields of a file by name: that of the file where they have none.
-pub(super) fn height_fields(root: &Element) -> BTreeMap<String, &Element> {
-    let all = root.children("asset").flat_map(|asset| asset.children("hfield"));
-    let stem = |file: &str| Some(std::path::Path::new(file).file_stem()?.to_str()?.to_owned());
-    let name = |field: &Element| field.text("name").map(str::to_owned).or_else(|| stem(field.text("file")?));
-    all.filter_map(|field| Some((name(field)?, field))).collect()
+/// The assets of a kind by name: that of their file where they have none.
+///
+/// # Errors
+/// For two of one name.
+pub(super) fn assets<'a>(root: &'a Element, tag: &'static str) -> Result<BTreeMap<String, &'a Element>, ImportError> {
+    let mut found = BTreeMap::new();
+    for element in root.children("asset").flat_map(|asset| asset.children(tag)) {
+        let stem = |file| Some(std::path::Path::new(file).file_stem()?.to_str()?);
+        let name = element.text("name").or_else(|| element.text("file").and_then(stem)).unwrap_or(tag);
+        if found.insert(name.to_owned(), element).is_some() {
+            return Err(
+                element.wrong(format!("is the second {tag} that is called `{name}`; expected names of one each"))
+            );
+        }
+    }
+    Ok(found)
 }
+
+/// The part of a scene that an element is, or why there is none.
+type Found<T> = Result<Result<T, String>, ImportError>;
 
 impl BodyReader<'_> {
     /// A geom; nothing for one that scenes cannot have, which is noted.
@@ -86,14 +98,16 @@ impl BodyReader<'_> {
         if !touches {
             element.read_all(&["condim", "solref", "solimp", "solmix", "margin", "gap", "priority"]);
         }
-        let (shape, pose) = match self.shape(element, own)? {
+        let kind = element.text("type").unwrap_or("sphere");
+        let stays = ["plane", "hfield"].contains(&kind);
+        let (shape, pose) = match self.shape(element, kind, own)? {
             Ok(found) => found,
             Err(why) => {
                 self.notes.push(element.note(format!("is left out: {why}")));
                 return Ok(None);
             }
         };
-        let friction = element.list("friction")?.and_then(|all| all.first().copied()).unwrap_or(FRICTION_DEFAULT);
+        let [friction, ..] = element.numbers_or("friction", [FRICTION_DEFAULT, 0.0, 0.0])?;
         if !(0.0..=10.0).contains(&friction) {
             return Err(element.wrong(format!("`friction` is {friction}; expected 0 to 10")));
         }
@@ -102,8 +116,7 @@ impl BodyReader<'_> {
             return Err(element.wrong("has a mass or density below zero"));
         }
         let density_kg_m3 = match (mass_kg, &shape) {
-            _ if element.has("hfield") => Some(0.0),
-            (_, Shape::Solid(Solid::Plane)) | (Some(0.0), _) => Some(0.0),
+            _ if stays || mass_kg == Some(0.0) => Some(0.0),
             (None, _) => Some(given),
             (Some(mass), Shape::Solid(solid)) => {
                 Some(mass / solid.volume_m3().map_err(|why| element.wrong(why.to_string()))?)
@@ -114,22 +127,22 @@ impl BodyReader<'_> {
         let colour = colour.map(|[r, g, b, _]| [r, g, b].map(|c| (c.clamp(0.0, 1.0) * 255.0).round() as u8));
         let place = element.place.clone();
         let part = Part { place, shape, pose: placed.frame.then(pose), density_kg_m3: None, touches };
-        Ok(Some(Geom { part, density_kg_m3, mass_kg, colour, surface: Surface { friction, masks } }))
+        Ok(Some(Geom { part, stays, density_kg_m3, mass_kg, colour, surface: Surface { friction, masks } }))
     }
 
-    /// The shape of a geom and where it is, which `fromto` says otherwise than `own`.
+    /// The shape of a geom of a `kind` and where it is, which `fromto` says otherwise than `own`.
     /// Or why scenes have none such.
-    fn shape(&mut self, element: &Element, own: Pose) -> Result<Result<(Shape, Pose), String>, ImportError> {
-        let size = element.list("size")?.unwrap_or_default();
+    fn shape(&mut self, element: &Element, kind: &str, own: Pose) -> Found<(Shape, Pose)> {
+        let size = element.numbers_or("size", [0.0; 3])?;
         let edge = |i: usize| {
-            let value = size.get(i).copied().unwrap_or(0.0);
+            let value = size[i];
             let least = format!("`size` has {value} at place {}; expected more than zero", i + 1);
             if value > 0.0 { Ok(value) } else { Err(element.wrong(least)) }
         };
         let line = Line::of(element)?;
         let pose = line.map_or(own, |line| line.pose);
         let half = |at: usize| line.map_or_else(|| edge(at), |line| Ok(line.half_m));
-        let solid = match element.text("type").unwrap_or("sphere") {
+        let solid = match kind {
             "sphere" => Solid::Ball { radius_m: edge(0)? },
             "capsule" => Solid::Capsule { radius_m: edge(0)?, half_height_m: half(1)? },
             "cylinder" => Solid::Cylinder { radius_m: edge(0)?, half_height_m: half(1)? },
@@ -151,7 +164,7 @@ impl BodyReader<'_> {
     }
 
     /// The hull of a mesh, or why there is none.
-    fn mesh(&mut self, element: &Element) -> Result<Result<Shape, String>, ImportError> {
+    fn mesh(&mut self, element: &Element) -> Found<Shape> {
         let name = element.needed("mesh")?;
         let Some(Mesh { element: mesh, points, scale }) = self.meshes.get(name) else {
             return Err(element.wrong(format!("names the mesh `{name}`, and there is none of that name with points")));
@@ -164,7 +177,7 @@ impl BodyReader<'_> {
     }
 
     /// The ground of a height field and where that is, or why there is none.
-    fn height_field(&mut self, element: &Element) -> Result<Result<(Shape, Pose), String>, ImportError> {
+    fn height_field(&mut self, element: &Element) -> Found<(Shape, Pose)> {
         let name = element.needed("hfield")?;
         let Some(field) = self.height_fields.get(name).copied() else {
             return Err(element.wrong(format!("names the height field `{name}`, and there is none of that name")));
@@ -176,10 +189,9 @@ impl BodyReader<'_> {
         }
         let heights = match field.text("file") {
             None => Heights::here(field)?,
-            Some(file) if extension(file) == "png" => {
-                return Ok(Err(format!("`{file}`: expected `elevation`, or MuJoCo's binary file")));
-            }
             Some(file) => {
+                // its first bytes say what it is
+                field.read_all(&["content_type"]);
                 let bytes = self.files.bytes(field, &self.compiler.in_mesh_folder(file))?;
                 match bytes.and_then(|bytes| Heights::read(&bytes)) {
                     Ok(heights) => heights,

@@ -5,7 +5,10 @@
 use crate::imported::ImportError;
 use crate::xml::Element;
 use glam::DVec3;
+use image::codecs::png::PngDecoder;
+use image::{DynamicImage, ImageDecoder, ImageError, ImageFormat};
 use metachron_geometry::{Solid, Triangles};
+use std::io::Cursor;
 
 /// The most rows or columns of a grid, and the most triangles of its surface: those of a mesh.
 const SIDE_MAX: usize = 400_000;
@@ -48,15 +51,21 @@ impl Heights {
         Self::new(rows, columns, of_points).map_err(|why| element.wrong(why))
     }
 
-    /// The heights of MuJoCo's binary file: rows and columns as whole numbers of 32 bits, then single-precision heights.
+    /// The heights of a file: a PNG, or MuJoCo's binary file, which has rows and columns as whole numbers of 32 bits, then single-precision
+    /// heights.
     pub(super) fn read(bytes: &[u8]) -> Result<Self, String> {
+        if matches!(image::guess_format(bytes), Ok(ImageFormat::Png)) {
+            return Self::of_png(bytes);
+        }
         let words = bytes.as_chunks::<4>().0;
         let count = |at: usize| words.get(at).and_then(|word| usize::try_from(i32::from_le_bytes(*word)).ok());
         let (Some(rows), Some(columns)) = (count(0), count(1)) else {
-            return Err("expected the counts of its rows and columns first, whole numbers of 32 bits".to_owned());
+            return Err(
+                "expected a PNG, or the counts of its rows and columns first, whole numbers of 32 bits".to_owned()
+            );
         };
         let wanted = rows.checked_mul(columns).and_then(|points| points.checked_add(2)?.checked_mul(4));
-        if wanted != Some(bytes.len()) || rows < 2 || columns < 2 {
+        if wanted != Some(bytes.len()) {
             let found = format!("it has {rows} rows and {columns} columns in {} bytes", bytes.len());
             return Err(format!(
                 "{found}; expected two of each or more, and 4 bytes for each height after the first 8"
@@ -66,13 +75,21 @@ impl Heights {
         Self::new(rows, columns, of_points)
     }
 
+    /// The heights of a picture, from its highest y to its lowest: of its grey values, or of one in colours the red ones,
+    /// the highest 8 bits, as in MuJoCo.
+    fn of_png(bytes: &[u8]) -> Result<Self, String> {
+        let why = |error: ImageError| error.to_string();
+        let picture = PngDecoder::new(Cursor::new(bytes)).map_err(why)?;
+        let (columns, rows) = picture.dimensions();
+        let (rows, columns) = (rows as usize, columns as usize);
+        check_size(rows, columns)?;
+        let points = DynamicImage::from_decoder(picture).map_err(why)?.into_rgb16();
+        let of_points = points.rows().rev().flatten().map(|point| f64::from(point.0[0] >> 8)).collect();
+        Self::new(rows, columns, of_points)
+    }
+
     fn new(rows: usize, columns: usize, mut of_points: Vec<f64>) -> Result<Self, String> {
-        // two for each cell of the grid, and three for each side of its rim
-        let triangles = rows.saturating_mul(columns).saturating_mul(2) + 6 * (rows + columns);
-        if triangles > TRIANGLES_MAX {
-            let what = format!("it has {rows} rows and {columns} columns, {triangles} triangles");
-            return Err(format!("{what}; expected at most {TRIANGLES_MAX}"));
-        }
+        check_size(rows, columns)?;
         let low = of_points.iter().copied().fold(f64::INFINITY, f64::min);
         let high = of_points.iter().copied().fold(f64::NEG_INFINITY, f64::max);
         if !of_points.is_empty() && !(high - low).is_finite() {
@@ -128,5 +145,17 @@ impl Heights {
             triangles.push([middle, below + next, below + side].map(|corner| corner as u32));
         }
         Ground::Uneven(Triangles { points, triangles })
+    }
+}
+
+/// Checks that a grid has a cell, and that its surface is no larger than meshes are.
+fn check_size(rows: usize, columns: usize) -> Result<(), String> {
+    // two for each cell of the grid, and three for each side of its rim
+    let triangles = rows.saturating_mul(columns).saturating_mul(2) + 6 * (rows + columns);
+    let has = format!("it has {rows} rows and {columns} columns");
+    match triangles {
+        _ if rows < 2 || columns < 2 => Err(format!("{has}; expected two of each or more")),
+        ..=TRIANGLES_MAX => Ok(()),
+        _ => Err(format!("{has}, {triangles} triangles; expected at most {TRIANGLES_MAX}")),
     }
 }

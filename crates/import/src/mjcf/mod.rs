@@ -57,7 +57,7 @@ pub(crate) fn read(
     compiler.has_limits = !is_off(root, "limit");
     let mut reader = BodyReader::new(&compiler, meshes, notes);
     reader.meshes = geoms::meshes(root, &compiler)?;
-    reader.height_fields = geoms::height_fields(root);
+    reader.height_fields = geoms::assets(root, "hfield")?;
     reader.keyframe = key.map(|name| Keyframe::find(root, name)).transpose()?;
     for body in root.children("worldbody") {
         reader.world(body)?;

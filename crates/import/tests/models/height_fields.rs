@@ -1,6 +1,7 @@
 //! Height fields of MJCF models.
 
 use crate::play::{advance, centre, left_out, read_from, start};
+use image::{DynamicImage, GrayImage, ImageBuffer, ImageFormat, Luma, Rgb, RgbImage};
 use metachron_import::{Imported, mjcf};
 use std::path::Path;
 
@@ -37,6 +38,39 @@ fn balls_rest_on_the_heights_of_a_field_as_they_do_in_mujoco() {
 }
 
 #[test]
+fn heights_of_a_png_are_its_grey_values_from_the_largest_y_as_in_mujoco() {
+    // as `hfield_data` of 4.0.0: of colours the red counts, of 16 bits the highest 8, whatever the name of the file
+    let folder = tempfile::tempdir().unwrap();
+    let grey = |row: u32| if row < 2 { 200 } else { 40 };
+    let wide = |row: u32| if row < 2 { 0x2800_u16 } else { 0x28ff };
+    let pictures = [
+        DynamicImage::from(GrayImage::from_fn(2, 4, |_, row| Luma([grey(row)]))),
+        DynamicImage::from(RgbImage::from_fn(2, 4, |_, row| Rgb([grey(row), 255 - grey(row), 0]))),
+        DynamicImage::from(ImageBuffer::from_fn(2, 4, |_, row| Luma([wide(row)]))),
+    ];
+    for (picture, wanted) in pictures.into_iter().zip([[1.1, 1.6], [1.1, 1.6], [1.1, 1.1]]) {
+        picture.save_with_format(folder.path().join("hill"), ImageFormat::Png).unwrap();
+        let found =
+            rests(&mjcf(&on_ground(r#"file="hill" content_type="image/png""#), read_from(folder.path())).unwrap());
+        assert!(found.iter().zip(wanted).all(|(found, wanted)| (found - wanted).abs() < 1e-3), "{found:?}, {wanted:?}");
+    }
+}
+
+#[test]
+fn ground_on_a_body_that_moves_is_listed_at_its_element() {
+    let geoms = r#"<geom type="hfield" hfield="hill"/><geom type="plane" size="1 1 1"/>"#;
+    let text = |body: &str| {
+        on_ground(r#"nrow="2" ncol="2" elevation="1 2 3 4""#).replace("</worldbody>", &format!("{body}</worldbody>"))
+    };
+    let moving = text(&format!(r#"<body name="sled"><freejoint/><geom size="0.1"/>{geoms}</body>"#));
+    let listed = left_out(&mjcf(&moving, Path::new(".")).unwrap());
+    let why = "line 2: body `sled`, geom: is left out: its body moves, and ground of a scene never does";
+    assert_eq!(listed, [why; 2]);
+    let still = text(&format!(r#"<body name="rock" pos="0 0 -5">{geoms}</body>"#));
+    assert_eq!(left_out(&mjcf(&still, Path::new(".")).unwrap()), [""; 0]);
+}
+
+#[test]
 fn heights_of_a_file_go_from_the_smallest_y_and_bad_ones_are_errors_at_their_element() {
     let folder = tempfile::tempdir().unwrap();
     let heights = [3.0_f32, 3.0, 3.0, 3.0, 7.0, 7.0, 7.0, 7.0];
@@ -60,7 +94,11 @@ fn heights_of_a_file_go_from_the_smallest_y_and_bad_ones_are_errors_at_their_ele
             r#"nrow="2" ncol="2" elevation="0 1e308 -1e308 3""#,
             "its heights are from -1e308 to 1e308; expected finite ones",
         ),
-        (r#"file="none.bin""#, "names `none.bin`, and there is no such file; expected it beside the model"),
+        (r#"file="none.png""#, "names `none.png`, and there is no such file; expected it beside the model"),
+        (
+            r#"nrow="2" ncol="2" size="1 1 1 1"/><hfield nrow="2" ncol="2" name="hill""#,
+            "is the second hfield that is called `hill`; expected names of one each",
+        ),
     ] {
         let refused = read(field).unwrap_err().to_string();
         assert!(refused.ends_with(why), "{refused}");

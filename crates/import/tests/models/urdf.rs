@@ -347,6 +347,11 @@ fn a_joint_that_can_follow_nothing_moves_by_itself_and_is_listed() {
         let listed = left_out(&import(&mimicking([0.0; 2], keys)).unwrap());
         assert_eq!(listed, [format!("line 3: joint `elbow`, mimic: is left out: it {why}")]);
     }
+    let ring = mimicking([0.0; 2], r#"joint="shoulder""#)
+        .replace(r#"<child link="upper"/>"#, r#"<child link="upper"/><mimic joint="elbow"/>"#);
+    let listed = left_out(&import(&ring).unwrap());
+    assert_eq!(listed.len(), 1, "{listed:?}");
+    assert!(listed[0].ends_with("joint `elbow`, mimic: is left out: it names `shoulder`, and it follows itself"));
     let refused = import(&mimicking([0.0; 2], r#"joint="shoulder" multiplier="1e9""#)).unwrap_err().to_string();
     assert!(refused.contains("joint `elbow`, mimic: `multiplier` is 1000000000; expected"), "{refused}");
 }

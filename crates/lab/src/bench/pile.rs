@@ -8,16 +8,15 @@
 
 use super::super::args::BenchArgs;
 use super::rig::machine::{others_cpu, own_cpu};
-use super::rig::plain_world::{Frame, Settings, world_of};
+use super::rig::plain_world::{Frame, Settings, rigid_specs, world_of};
 use super::subject::{Progress, Subject};
 use crate::chart::{Axis, Colour, Figure, Layer, Table, table};
-use anyhow::bail;
 use metachron_render::{Size, Style};
 use metachron_runtime::AgentStats;
 use metachron_scene::{Source, load};
 use metachron_session::{Drawing, End, Headless, Session, play_headless};
 use metachron_world::kinds::ExecutorKind;
-use metachron_world::{Pace, Scene, Spec};
+use metachron_world::{Pace, Scene};
 use serde::{Deserialize, Serialize};
 
 /// The subject.
@@ -140,11 +139,7 @@ const BOX_RADIUS_M: f64 = 0.034_64;
 
 /// Measures the same boxes in one world; `spent` receives the CPU time used after each step.
 fn plain(scene: &Scene, seconds: f64, settings: Settings, spent: &mut Spent) -> anyhow::Result<Row> {
-    let mut bodies = Vec::with_capacity(scene.agents.len());
-    for member in &scene.agents {
-        let Spec::Rigid(spec) = &member.spec else { bail!("`{}` is not a rigid body", member.name) };
-        bodies.push(spec);
-    }
+    let bodies = rigid_specs(scene)?;
     let boxes = bodies.len();
     let frame = Frame { settings, step_s: 1.0 / STEP_HZ, radius_m: BOX_RADIUS_M, gravity: scene.gravity };
     let mut world = world_of(bodies, &scene.obstacles, frame)?;

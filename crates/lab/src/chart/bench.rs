@@ -1,13 +1,13 @@
 //! Agents stepped as one cluster without a runtime: contact and steps are measured alone, without clocks and threads.
 //!
-//! In: agents, their rates and springs, static solids. Out: the state of each after every macro step, and the impulses of pairs.
+//! In: agents, their rates, springs and forces, static solids. Out: the state of each after every macro step, and the impulses of pairs.
 //! Never here: measurements.
 
 use glam::DVec3;
 use metachron_contact::detect::ClusterScene;
 use metachron_contact::member::{ContactMemory, Participant, Partner};
 use metachron_contact::step::{ClusterReport, ClusterStepper, Plan};
-use metachron_contact::{Agent, AnchorSpring, Neighbour, StepContext};
+use metachron_contact::{Agent, AnchorForce, AnchorSpring, Neighbour, StepContext};
 use metachron_core::{AgentId, Grip, PlainLoop, SimSpan, SimTime, Snapshot, StepError, recycled};
 use metachron_geometry::Obstacle;
 
@@ -28,9 +28,11 @@ pub(crate) struct Member {
     /// The length of a step that it wants, seconds.
     pub(crate) step_s: f64,
     /// Springs from fixed points.
-    user_springs: Vec<AnchorSpring>,
+    pub(crate) user_springs: Vec<AnchorSpring>,
+    /// Forces on it.
+    pub(crate) forces: Vec<AnchorForce>,
     /// Its neighbours outside the cluster.
-    neighbours: Vec<Neighbour>,
+    pub(crate) neighbours: Vec<Neighbour>,
     memory: ContactMemory,
     grips: Vec<Grip>,
 }
@@ -44,8 +46,8 @@ impl Cluster {
     /// Adds an agent that wants steps of `step_s` seconds; `None` for one that is no member of clusters.
     pub(crate) fn add(&mut self, mut agent: Box<dyn Agent>, step_s: f64) -> Option<AgentId> {
         agent.member()?;
-        let (user_springs, neighbours, memory, grips) = Default::default();
-        self.members.push(Member { agent, step_s, user_springs, neighbours, memory, grips });
+        let (user_springs, forces, neighbours, memory, grips) = Default::default();
+        self.members.push(Member { agent, step_s, user_springs, forces, neighbours, memory, grips });
         Some(AgentId(self.members.len() as u32 - 1))
     }
 
@@ -63,8 +65,8 @@ impl Cluster {
         let dt = SimSpan::from_secs_f64(plan.macro_s).map_or(most, |dt| dt.min(most));
         let mut all = recycled(std::mem::take(participants));
         for ((id, one), (role, step_s)) in (0..).map(AgentId).zip(members.iter_mut()).zip(roles) {
-            let Member { agent, user_springs, neighbours, memory, grips, .. } = one;
-            let context = StepContext { neighbours, user_springs, ..StepContext::alone(id, *time) };
+            let Member { agent, user_springs, forces, neighbours, memory, grips, .. } = one;
+            let context = StepContext { neighbours, user_springs, forces, ..StepContext::alone(id, *time) };
             let parts = plan.parts_in(role, step_s);
             all.extend(agent.member().map(|member| Participant {
                 id,
@@ -118,21 +120,9 @@ impl StepHarness {
         Some(id)
     }
 
-    /// Attaches fixed springs to an agent, instead of the springs it had.
-    pub(super) fn attach_springs(&mut self, id: AgentId, user_springs: impl IntoIterator<Item = AnchorSpring>) {
-        let own = &mut self.cluster.members[id.0 as usize].user_springs;
-        own.clear();
-        own.extend(user_springs);
-    }
-
-    /// Sets the neighbours of an agent that are not in the harness.
-    pub(super) fn set_neighbours(&mut self, id: AgentId, neighbours: Vec<Neighbour>) {
-        self.cluster.members[id.0 as usize].neighbours = neighbours;
-    }
-
-    /// Changes the step that an agent wants, seconds.
-    pub(super) fn set_step(&mut self, id: AgentId, step_s: f64) {
-        self.cluster.members[id.0 as usize].step_s = step_s;
+    /// An agent, and what acts on it.
+    pub(super) fn member(&mut self, id: AgentId) -> &mut Member {
+        &mut self.cluster.members[id.0 as usize]
     }
 
     /// An agent's newest state.

@@ -26,7 +26,7 @@ impl Play {
     /// Adds a rigid body that fixed springs pull; `None` where the body cannot be built.
     pub(super) fn add_body(&mut self, spec: RigidSpec, rate_hz: f64, springs: Vec<AnchorSpring>) -> Option<AgentId> {
         let id = self.stage.add(Box::new(RigidBody::new(spec).ok()?), rate_hz)?;
-        self.stage.attach_springs(id, springs.iter().copied());
+        self.stage.member(id).user_springs.clone_from(&springs);
         self.springs.push(springs);
         Some(id)
     }

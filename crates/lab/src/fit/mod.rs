@@ -12,7 +12,7 @@ mod to_rope;
 mod write_back;
 
 use super::args::FitArgs;
-use anyhow::Context;
+use super::chart::stopper;
 use metachron_console::exit::Exit;
 use metachron_console::output::{BadInput, data, message};
 use metachron_console::progress::Bar;
@@ -21,8 +21,7 @@ use metachron_session::fit::{Converged, Found, Search, Setting, Trial, converge}
 use objects::Object;
 use simpler::Simpler;
 use std::path::Path;
-use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::atomic::Ordering;
 use task::Task;
 
 /// Greatest number of halvings of step and spacing for the converged answer.
@@ -61,9 +60,7 @@ pub fn command(args: &FitArgs) -> anyhow::Result<Exit> {
     let source = Source::open(&args.scene)?.within(args.common.limits.limits());
     let scene = load(&source, &args.common.set)?;
     let objects = objects::of(&scene, source.text());
-    let stopped = Arc::new(AtomicBool::new(false));
-    let flag = Arc::clone(&stopped);
-    ctrlc::set_handler(move || flag.store(true, Ordering::Relaxed)).context("Ctrl-C cannot be caught")?;
+    let stopped = stopper()?;
     let bar = Bar::new("fit", args.common.quiet || args.common.json);
     let mut task = Task::new(args, scene, objects, &stopped, bar)?;
     let fitted = fit(&mut task, args)?;

@@ -10,6 +10,7 @@ mod report;
 mod trials;
 
 use super::args::TuneArgs;
+use super::chart::stopper;
 use anyhow::Context;
 use metachron_console::exit::Exit;
 use metachron_console::files::{check_output_path, check_unread, write_file};
@@ -25,7 +26,6 @@ use metachron_session::{Drawing, Experiment, Session, experiment};
 use metachron_world::kinds::ExecutorKind;
 use metachron_world::{Pace, Scene};
 use std::path::{Path, PathBuf};
-use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use trials::Trials;
 
@@ -58,9 +58,7 @@ pub fn command(args: &TuneArgs) -> anyhow::Result<Exit> {
         let read = source.files();
         check_unread("--gains", &fragment, "the scene", read.iter().map(|file| &*file.path))?;
     }
-    let stopped = Arc::new(AtomicBool::new(false));
-    let flag = Arc::clone(&stopped);
-    ctrlc::set_handler(move || flag.store(true, Ordering::Relaxed)).context("Ctrl-C cannot be caught")?;
+    let stopped = stopper()?;
     let Some(identified) = identify(args, scene, &stopped)? else { return Ok(Exit::Interrupted) };
     match given {
         Some(candidate) => analyse(args, &identified, candidate),

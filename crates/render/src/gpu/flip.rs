@@ -119,17 +119,20 @@ fn blurred_by_eye(channel: &[f64], width: usize, terms: [(f64, f64); 2]) -> Vec<
 /// Convolved along rows, then along columns; beyond an edge its pixels go on.
 fn convolved(of: &[f64], width: usize, along: &[f64], across: &[f64]) -> Vec<f64> {
     let (half, height) = (along.len() / 2, of.len() / width);
-    let near = |at: usize, k: usize, count: usize| (at + k).saturating_sub(half).min(count - 1);
-    let mut rows = vec![0.0; of.len()];
+    let (mut rows, mut wide) = (vec![0.0; of.len()], Vec::with_capacity(width + 2 * half));
     for (row, from) in rows.chunks_exact_mut(width).zip(of.chunks_exact(width)) {
-        for (x, to) in row.iter_mut().enumerate() {
-            *to = along.iter().enumerate().map(|(k, w)| w * from[near(x, k, width)]).sum();
+        wide.clear();
+        wide.resize(half, from[0]);
+        wide.extend_from_slice(from);
+        wide.resize(width + 2 * half, from[width - 1]);
+        for (to, from) in row.iter_mut().zip(wide.windows(along.len())) {
+            *to = along.iter().zip(from).map(|(w, x)| w * x).sum();
         }
     }
     let mut all = vec![0.0; of.len()];
     for (y, row) in all.chunks_exact_mut(width).enumerate() {
         for (k, w) in across.iter().enumerate() {
-            let from = near(y, k, height) * width;
+            let from = (y + k).saturating_sub(half).min(height - 1) * width;
             row.iter_mut().zip(&rows[from..from + width]).for_each(|(to, x)| *to += w * x);
         }
     }

@@ -301,10 +301,11 @@ pub(in super::super) fn hand_over(actor: Box<AgentRunner>, leader: AgentId) -> R
 /// Seats agents that belong together before the first step: agents that may touch in it, and agents that links or
 /// joints connect. For each place in the list, the agent that makes turns of its own.
 pub(in super::super) fn assign_leaders(mut actors: Vec<AgentRunner>) -> Vec<Option<Box<AgentRunner>>> {
-    let mut sets = DisjointSets::default();
-    sets.reset(actors.len());
+    let mut sets = DisjointSets::of(actors.len());
     for (at, actor) in actors.iter_mut().enumerate().filter(|(_, actor)| actor.shared.handover().is_some()) {
-        actor.look_first().iter().for_each(|other| sets.join(at, other.0 as usize));
+        for other in actor.look_first() {
+            sets.join(at, other.0 as usize);
+        }
     }
     let mut places: Vec<_> = actors.into_iter().map(|actor| Some(Box::new(actor))).collect();
     for at in 0..places.len() {

@@ -4,12 +4,10 @@ use super::force_limits::ForceLimits;
 use super::joint::End;
 use crate::check::{Checker, Place};
 use glam::DVec3;
-use metachron_core::AgentId;
+use metachron_core::{AgentId, DisjointSets};
 use metachron_models::rigid::{JOINT_GAP_MAX_M as GAP_MAX_M, JointKind, Mimic};
 use std::collections::BTreeMap;
 
-/// The farthest that a joint is from the travel of the joint that it follows times their ratio, where both start, rad or m.
-const OFFSET_MAX: f64 = 1e9;
 /// Directions that differ by less than this are one direction: sine of the angle.
 const SAME_DIRECTION: f64 = 1e-3;
 
@@ -63,13 +61,12 @@ impl PlacedJoint {
     }
 }
 
-/// Ties joints to those that they follow, where both are at the start, and reports joints that follow themselves: `all` are all joints of the
-/// scene.
+/// Ties joints to those that they follow, where both are at the start, and reports the last joint of each ring of joints that follow each
+/// other: `all` are all joints of the scene.
 pub(super) fn tie_mimics(c: &mut Checker<'_, '_>, all: &mut [PlacedJoint]) {
+    let mut tied = DisjointSets::of(all.len());
     for (own, joint) in all.iter().enumerate() {
-        let above = |number: &usize| Some(all[*number].mimic?.joint as usize);
-        let mut leaders = std::iter::successors(above(&own), above).take(all.len());
-        if leaders.any(|number| number == own) {
+        if joint.mimic.is_some_and(|mimic| !tied.join(own, mimic.joint as usize)) {
             let what = "is a joint that follows this one in turn";
             c.wrong(
                 &joint.place.table("mimic"),
@@ -83,9 +80,10 @@ pub(super) fn tie_mimics(c: &mut Checker<'_, '_>, all: &mut [PlacedJoint]) {
     for (joint, travel) in all.iter_mut().zip(&travels) {
         if let Some(mimic) = &mut joint.mimic {
             mimic.offset = travel - mimic.ratio * travels[mimic.joint as usize];
-            if mimic.offset.abs() > OFFSET_MAX {
+            if !Mimic::OFFSET.contains(mimic.offset) {
                 let what = format!("puts the two {:e} apart where they start", mimic.offset);
-                c.wrong(&joint.place.table("mimic"), "ratio", what, format!("expected {OFFSET_MAX:e} at most"));
+                let expected = format!("expected {:e} at most", Mimic::OFFSET.greatest);
+                c.wrong(&joint.place.table("mimic"), "ratio", what, expected);
             }
         }
     }

@@ -29,7 +29,7 @@ use glam::{DQuat, DVec3};
 use metachron_contact::Agent;
 use metachron_contact::detect::{ClusterScene, SolveBudget};
 use metachron_contact::solve::DEPTH_DEFAULT_M;
-use metachron_core::{AgentId, N_MAX, Resolution, ResolutionRange, SimSpan, unit_rotation};
+use metachron_core::{AgentId, DisjointSets, N_MAX, Resolution, ResolutionRange, SimSpan, unit_rotation};
 use metachron_geometry::{Cells, Obstacle, Solid, StaticSolid};
 use metachron_models::rigid::{Joint, JointError, JointKind, Mimic, RigidSpec};
 pub use rigid::Rigid;
@@ -354,10 +354,11 @@ impl SceneBuilder {
         let joint_names: Vec<_> = joints.iter().map(|joined| joined.name.clone()).collect();
         let joints =
             joints.iter().map(|joined| joined.between(&agents, &joint_names)).collect::<Result<Vec<_>, _>>()?;
+        let mut tied = DisjointSets::of(joints.len());
         for (number, joint) in (0..).zip(&joints) {
             let name = || agents[joint.a.0 as usize].name.clone();
             let bad = |error: JointError| SceneBuildError::BadJoint { name: name(), reason: error.to_string() };
-            joint.check_mimic(number, &joints).map_err(bad)?;
+            joint.check_mimic(number, &joints, &mut tied).map_err(bad)?;
         }
         let mounts = Mounts { agents: &agents, fixed: &obstacles, joints: &joint_names };
         let sensors: Result<Vec<_>, _> = sensors.into_iter().map(|mounted| mounts.sensor(mounted)).collect();

@@ -6,6 +6,7 @@
 use super::{Held, Joints, MIMIC};
 use crate::constraint::{ConstraintRows, FineStep, RowOwner, place_key};
 use crate::joint::{JOINT_GAP_MAX_M, Joint, JointKind, Mimic};
+use crate::lists::refill;
 use crate::member::Pose;
 use crate::member::memory::Partner;
 use crate::push_out::PUSH_OUT_MAX_M_S;
@@ -30,9 +31,16 @@ pub(super) struct Mimicking {
 impl Joints {
     /// Lays out the rows of joints that follow others, where both are held: the velocity of such a row is that of the gap between them.
     pub(super) fn lay_mimics(&mut self, step: &FineStep<'_, '_>, constraints: &mut ConstraintRows) {
+        let Self { held, by_number, .. } = self;
+        if held.iter().all(|held| held.of.joint.mimic.is_none()) {
+            return;
+        }
+        refill(by_number, 0..held.len());
+        by_number.sort_unstable_by_key(|at| held[*at].of.number);
         for (at, follower) in self.held.iter().enumerate() {
             let Some(mimic) = follower.of.joint.mimic else { continue };
-            let Some(leading) = self.held.iter().position(|held| held.of.number == mimic.joint) else { continue };
+            let leading = self.by_number.binary_search_by_key(&mimic.joint, |at| self.held[*at].of.number);
+            let Ok(leading) = leading.map(|leading| self.by_number[leading]) else { continue };
             let both = [at, leading].map(|at| &self.held[at]);
             let sides = [both[0].travel_side(step, 1.0), both[1].travel_side(step, mimic.ratio)];
             let [Some(follows), Some(leads)] = sides else { continue };

@@ -2,15 +2,15 @@
 //!
 //! In: sizes, a coefficient of restitution. Out: stages. Never here: soft bodies, measurements.
 
+use super::super::rig::plain_world::rigid_specs;
 use super::stage::{Body, Stage, block, drawn, rigid, walls};
-use anyhow::{Context, bail};
+use anyhow::Context;
 use glam::{DQuat, DVec3};
 use metachron_contact::joint::{Joint, JointKind};
 use metachron_core::AgentId;
 use metachron_geometry::Solid;
 use metachron_models::rigid::RigidSpec;
 use metachron_scene::{Source, load};
-use metachron_world::Spec;
 
 /// The step of scenes that say nothing else, seconds.
 pub(super) const STEP_S: f64 = 1.0 / 60.0;
@@ -49,11 +49,7 @@ fn hinge_about(axis: DVec3) -> JointKind {
 /// The scene `pile`.
 pub(super) fn pile() -> anyhow::Result<Stage> {
     let scene = load(&Source::open("pile")?, &[])?;
-    let mut bodies = Vec::with_capacity(scene.agents.len());
-    for member in &scene.agents {
-        let Spec::Rigid(spec) = &member.spec else { bail!("`{}` is not a rigid body", member.name) };
-        bodies.push(Body::Rigid(spec.clone()));
-    }
+    let bodies = rigid_specs(&scene)?.into_iter().cloned().map(Body::Rigid).collect();
     let mut obstacles = scene.obstacles.to_vec();
     obstacles.iter_mut().for_each(|solid| solid.restitution = 0.0);
     Ok(Stage { obstacles, ..Stage::apart(bodies, STEP_S) })

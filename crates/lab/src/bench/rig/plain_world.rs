@@ -2,10 +2,11 @@
 //!
 //! In: bodies and solids as a scene gives them, settings. Out: a world to step. Never here: agents, measurements.
 
-use anyhow::Context;
+use anyhow::{Context, bail};
 use glam::{DQuat, DVec3};
 use metachron_geometry::{Obstacle, Solid};
 use metachron_models::rigid::RigidSpec;
+use metachron_world::{Scene, Spec};
 use rapier3d::dynamics::{FrictionModel, IntegrationParameters, RigidBodyBuilder, SpringCoefficients};
 use rapier3d::geometry::{ColliderBuilder, SharedShape};
 use rapier3d::parry::math::{Pose, Rotation, Vec3};
@@ -50,6 +51,15 @@ impl Settings {
             ..IntegrationParameters::default()
         }
     }
+}
+
+/// The rigid bodies of a scene of nothing else.
+pub(crate) fn rigid_specs(scene: &Scene) -> anyhow::Result<Vec<&RigidSpec>> {
+    let specs = scene.agents.iter().map(|member| match &member.spec {
+        Spec::Rigid(spec) => Ok(spec),
+        _ => bail!("`{}` is not a rigid body", member.name),
+    });
+    specs.collect()
 }
 
 /// A world of bodies of primitive shapes.

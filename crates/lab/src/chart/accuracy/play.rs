@@ -8,7 +8,7 @@ use super::diagram::Case;
 use cpu_time::ThreadTime;
 use glam::DVec3;
 use metachron_contact::step::LoneStepper;
-use metachron_contact::{Agent, AnchorSpring, StepContext};
+use metachron_contact::{Agent, AnchorForce, StepContext};
 use metachron_core::{AgentId, Body, CurveState, SimSpan, SimTime, Snapshot};
 use metachron_models::rod::{Material, Section, Tube, TubeSpec};
 use metachron_models::soft::{SoftBody, SoftSpec};
@@ -73,13 +73,13 @@ impl Play {
         Some(Self { agent, stepper, dt, time: SimTime::ZERO, cpu_s: 0.0, substeps_each, substeps: 0, steps: 0 })
     }
 
-    /// Steps on for `seconds` under `hands`; whether every step succeeded.
-    pub(super) fn run(&mut self, seconds: f64, user_springs: &[AnchorSpring]) -> bool {
+    /// Steps on for `seconds` under `forces`; whether every step succeeded.
+    pub(super) fn run(&mut self, seconds: f64, forces: &[AnchorForce]) -> bool {
         let until = self.time.as_secs_f64() + seconds - 0.5 * self.dt.as_secs_f64();
         let start = ThreadTime::now();
         let mut sound = true;
         while sound && self.time.as_secs_f64() < until {
-            let context = StepContext { user_springs, ..StepContext::alone(AgentId(0), self.time) };
+            let context = StepContext { forces, ..StepContext::alone(AgentId(0), self.time) };
             match self.stepper.step(&mut *self.agent, self.dt, context) {
                 Ok(report) => self.substeps += u64::from(report.substeps * self.substeps_each),
                 Err(_) => sound = false,

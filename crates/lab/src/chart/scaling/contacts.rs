@@ -40,7 +40,7 @@ impl Growth for Contacts {
         }
         if case.case == HELD {
             grasp(&mut stage, length_m)?;
-            stage.set_step(TUBE, HELD_DT_S);
+            stage.member(TUBE).step_s = HELD_DT_S;
             for _ in 0..HOLDS {
                 stage.step().ok()?;
             }

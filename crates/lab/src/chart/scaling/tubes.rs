@@ -93,6 +93,6 @@ pub(super) fn grasp(stage: &mut StepHarness, length_m: f64) -> Option<()> {
         is_idle: false,
     };
     let tool = Arc::new(Snapshot { body: Body::Tool(pose), ..Snapshot::default() });
-    stage.set_neighbours(TUBE, vec![Neighbour::observed(AgentId(1), tool)]);
+    stage.member(TUBE).neighbours = vec![Neighbour::observed(AgentId(1), tool)];
     Some(())
 }

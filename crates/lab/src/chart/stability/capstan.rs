@@ -154,8 +154,8 @@ fn slip_ratio(case: &Case) -> Option<f64> {
             return None;
         }
         let on = (t / (0.5 * SETTLE_S)).min(1.0);
-        let user_springs = [dead_load(0.0, first * (LOAD_N * on)), dead_load(length, last * (LOAD_N * on * ratio))];
-        stage.attach_springs(id, user_springs);
+        let loads = [dead_load(0.0, first * (LOAD_N * on)), dead_load(length, last * (LOAD_N * on * ratio))];
+        stage.member(id).forces = loads.into();
         stage.step().ok()?;
         let (start, _) = stage.own(id).body.probe(0.0)?;
         if t < SETTLE_S {

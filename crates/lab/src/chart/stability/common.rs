@@ -1,7 +1,7 @@
 //! Shared parts of the stability experiments: plain bodies and tubes, and loads.
 
 use glam::{DQuat, DVec3};
-use metachron_contact::AnchorSpring;
+use metachron_contact::AnchorForce;
 use metachron_core::Anchor;
 use metachron_geometry::{ContactTraits, Solid};
 use metachron_models::rigid::RigidSpec;
@@ -46,15 +46,7 @@ pub(crate) fn plain_soft(shape: SoftShape, material: SoftMaterial) -> SoftSpec {
     }
 }
 
-/// A constant force on the point of a tube at a rest arc length: a spring so soft and long that motion does not change its force.
-pub(in super::super) fn dead_load(arc_m: f64, force_n: DVec3) -> AnchorSpring {
-    const STIFFNESS_N_M: f64 = 1e-9;
-    AnchorSpring {
-        by: None,
-        anchor: Anchor::Arc(arc_m),
-        target: force_n / STIFFNESS_N_M,
-        target_velocity: DVec3::ZERO,
-        stiffness_n_m: STIFFNESS_N_M,
-        damping_n_s_m: 0.0,
-    }
+/// A constant force on the point of a tube at a rest arc length.
+pub(in super::super) fn dead_load(arc_m: f64, force_n: DVec3) -> AnchorForce {
+    AnchorForce { anchor: Anchor::Arc(arc_m), force_n, torque_n_m: DVec3::ZERO }
 }

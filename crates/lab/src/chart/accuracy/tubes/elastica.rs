@@ -28,9 +28,9 @@ impl Benchmark for Elastica {
     fn play(case: &Case) -> Option<(Play, f64)> {
         let (_, load, [side, down]) = LOADS.into_iter().find(|(name, ..)| *name == case.case)?;
         let spec = TubeSpec { damping_per_s: 6.0, clamp: [true, false], ..slender_tube(1e7, metre()) };
-        let hand = dead_load(1.0, DVec3::NEG_Z * (load * spec.section.ei_n_m2));
+        let load_at_tip = dead_load(1.0, DVec3::NEG_Z * (load * spec.section.ei_n_m2));
         let mut play = Play::new(spec, case)?;
-        let sound = play.run(SECONDS, &[hand]);
+        let sound = play.run(SECONDS, &[load_at_tip]);
         let error = play.point(1.0).distance(DVec3::new(side, 0.0, -down));
         sound.then_some((play, error))
     }

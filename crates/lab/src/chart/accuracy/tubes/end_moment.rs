@@ -1,12 +1,9 @@
 //! A moment at the end of a straight tube: M = 2π EI/L bends it to a circle.
-//!
-//! A tube takes pulls but no moments from outside, so the moment is a pair of pulls on a piece beyond the measured length; the
-//! pair stays perpendicular to the piece however that turns, so the measured length feels the moment and no force.
 
-use crate::chart::accuracy::{Benchmark, Case, Play, slender_tube};
+use crate::chart::accuracy::{Benchmark, Case, Play, metre, slender_tube};
 use crate::chart::stability::common::dead_load;
 use glam::DVec3;
-use metachron_contact::AnchorSpring;
+use metachron_contact::AnchorForce;
 use metachron_models::rod::TubeSpec;
 use std::f64::consts::TAU;
 
@@ -15,8 +12,6 @@ pub(crate) struct EndMoment;
 
 /// Names, and the angle M L/EI by which the end is turned.
 const ANGLES: [(&str, f64); 3] = [("a quarter circle", 0.25 * TAU), ("half a circle", 0.5 * TAU), ("a circle", TAU)];
-/// Length of the pulled piece, as a share of the measured length.
-const LEVER: f64 = 0.25;
 /// How long the moment rises, and how long it is then constant, seconds.
 const SECONDS: [f64; 2] = [3.0, 7.0];
 /// Points at which the tube is compared with the circle, shares of the length.
@@ -33,32 +28,18 @@ impl Benchmark for EndMoment {
 
     fn play(case: &Case) -> Option<(Play, f64)> {
         let (_, angle) = ANGLES.into_iter().find(|(name, _)| *name == case.case)?;
-        let path_m = vec![DVec3::ZERO, DVec3::X * (1.0 + LEVER)];
-        let spec = TubeSpec { damping_per_s: 12.0, clamp: [true, false], ..slender_tube(1e8, path_m) };
+        let spec = TubeSpec { damping_per_s: 12.0, clamp: [true, false], ..slender_tube(1e8, metre()) };
         let moment = angle * spec.section.ei_n_m2;
-        let segments = (f64::from(case.segments) * (1.0 + LEVER)).round() as u32;
-        let mut play = Play::new(spec, &Case { segments, ..case.clone() })?;
+        let mut play = Play::new(spec, case)?;
         let [rises, stays] = SECONDS;
         let mut sound = true;
         while sound && play.time_s() < rises + stays {
-            let user_springs = couple(&play, moment * (play.time_s() / rises).min(1.0));
-            sound = play.run(case.dt_ms * 1e-3, &user_springs);
+            let torque_n_m = DVec3::NEG_Y * (moment * (play.time_s() / rises).min(1.0));
+            sound = play.run(case.dt_ms * 1e-3, &[AnchorForce { torque_n_m, ..dead_load(1.0, DVec3::ZERO) }]);
         }
-        let error = LOOKS.map(|s| at(&play, s).distance(circle_m(angle, s))).into_iter().fold(0.0, f64::max);
+        let error = LOOKS.map(|s| play.point(s).distance(circle_m(angle, s))).into_iter().fold(0.0, f64::max);
         sound.then_some((play, error))
     }
-}
-
-/// The point at an arc length of the measured part.
-fn at(play: &Play, arc_m: f64) -> DVec3 {
-    play.point(arc_m / (1.0 + LEVER))
-}
-
-/// Two opposite pulls across the lever piece whose moment about y bends the tube upwards.
-fn couple(play: &Play, moment: f64) -> [AnchorSpring; 2] {
-    let lever = at(play, 1.0 + LEVER) - at(play, 1.0);
-    let force = DVec3::NEG_Y.cross(lever) * (moment / lever.length_squared());
-    [dead_load(1.0, -force), dead_load(1.0 + LEVER, force)]
 }
 
 /// A point of a circle that leaves the origin along x and turns upwards by `angle` over one metre.

@@ -29,9 +29,9 @@ impl Benchmark for FourPoint {
         // P a (3 L² − 4 a²)/24 EI, and P a/GA of shear
         let softness = a * (3.0 - 4.0 * a * a) / (24.0 * spec.section.ei_n_m2) + a / spec.section.ga_n;
         let load = DVec3::NEG_Z * (DEFLECTION_M / softness);
-        let user_springs = [dead_load(a, load), dead_load(1.0 - a, load)];
+        let loads = [dead_load(a, load), dead_load(1.0 - a, load)];
         let mut play = Play::new(spec, case)?;
-        let sound = play.run(SECONDS, &user_springs);
+        let sound = play.run(SECONDS, &loads);
         let error = (-play.point(0.5).z / DEFLECTION_M - 1.0).abs();
         sound.then_some((play, error))
     }

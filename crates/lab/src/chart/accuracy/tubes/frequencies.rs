@@ -6,7 +6,7 @@
 use crate::chart::accuracy::{Benchmark, Case, Play, metre, reference_tube, slender_tube};
 use crate::chart::stability::common::dead_load;
 use glam::{DQuat, DVec3};
-use metachron_contact::AnchorSpring;
+use metachron_contact::AnchorForce;
 use metachron_core::CurveState;
 use metachron_models::rod::{Integrator, TubeSpec};
 use std::f64::consts::{FRAC_PI_2, TAU};
@@ -91,7 +91,7 @@ impl Mode {
     }
 
     /// Pulls at every node that excite the mode.
-    fn user_springs(&self, spec: &TubeSpec, nodes: u32) -> Vec<AnchorSpring> {
+    fn loads(&self, spec: &TubeSpec, nodes: u32) -> Vec<AnchorForce> {
         let axis = if self.kind == Kind::Axial { DVec3::X } else { DVec3::Z };
         let force = PULLED_M * spec.section.mass_per_length_kg_m * (TAU * self.hz(spec)).powi(2) / f64::from(nodes);
         let at = |k: u32| f64::from(k) / f64::from(nodes);
@@ -138,10 +138,10 @@ impl Benchmark for Frequencies {
         let mode = Mode::named(&case.case)?;
         let spec = mode.spec();
         let hz = mode.hz(&spec);
-        let user_springs = mode.user_springs(&spec, case.segments);
+        let loads = mode.loads(&spec, case.segments);
         let mut play = Play::new(spec, case)?;
         // a pull of a quarter period excites the mode
-        let mut sound = mode.kind == Kind::Torsion || play.run(0.25 / hz, &user_springs);
+        let mut sound = mode.kind == Kind::Torsion || play.run(0.25 / hz, &loads);
         let mut crossings = Vec::new();
         let (mut before, mut then_s) = (mode.seen(&play.curve()), play.time_s());
         while sound && crossings.len() < 2 * PERIODS + 3 && play.time_s() * hz < 2.0 * PERIODS as f64 {

@@ -6,7 +6,7 @@
 use crate::chart::accuracy::{Benchmark, Case, Play, slender_tube};
 use crate::chart::stability::common::dead_load;
 use glam::DVec3;
-use metachron_contact::AnchorSpring;
+use metachron_contact::AnchorForce;
 use metachron_models::rod::{Integrator, TubeSpec};
 use std::f64::consts::TAU;
 
@@ -49,13 +49,13 @@ impl Benchmark for Helix {
         let mut play = Play::new(spec, case)?;
         let length_m = play.curve().arc_m.last().copied()?;
         let share = length_m / f64::from(TURNS);
-        let user_springs: Vec<AnchorSpring> = (0..HANDS)
+        let loads: Vec<AnchorForce> = (0..HANDS)
             .map(|k| length_m - share * (f64::from(k) + 0.5) / f64::from(HANDS))
             .map(|arc_m| dead_load(arc_m, DVec3::Z * (load_n / f64::from(HANDS))))
             .collect();
         let seen = f64::from(TURNS - 1) / f64::from(TURNS);
         let before = play.point(seen).z;
-        let sound = play.run(SECONDS, &user_springs);
+        let sound = play.run(SECONDS, &loads);
         let error = ((play.point(seen).z - before) / (load_n * softness * f64::from(TURNS - 1)) - 1.0).abs();
         sound.then_some((play, error))
     }

@@ -78,16 +78,12 @@ fn objects(trees: usize, side_m: f64, forms: Forms) -> Vec<SceneObject> {
 /// The forms of a thing of so many triangles, coarsest first; `simpler` is the algorithm that draws lines or points.
 fn list(forms: Forms, triangles: f64, simpler: usize) -> Vec<ObjectLevel> {
     let whole = ObjectLevel { polygons: triangles, algorithm: 0, worth: BenefitModel::Part(1.0) };
-    let prefix = |k: i32| {
-        let part = libm::exp2(-0.5 * f64::from(k));
-        ObjectLevel { polygons: part * triangles, algorithm: 0, worth: BenefitModel::Part(part.sqrt()) }
-    };
     // as many as cover the same pixels at their width; the benefit falls with the width
     let wide =
         |w: f64| ObjectLevel { polygons: triangles / w, algorithm: simpler, worth: BenefitModel::Part(0.9 / w.sqrt()) };
     match forms {
         Forms::Whole => vec![whole],
-        Forms::Prefixes => (0..=16).rev().map(prefix).collect(),
+        Forms::Prefixes => (0..=16).rev().map(|k| ObjectLevel::prefix(triangles, k)).collect(),
         Forms::Levels => WIDTHS.into_iter().map(wide).chain([whole]).collect(),
     }
 }

@@ -30,6 +30,14 @@ pub(crate) struct ObjectLevel {
     pub(crate) worth: BenefitModel,
 }
 
+impl ObjectLevel {
+    /// A half to the power of k/2 of so many triangles: the first of a progressive mesh.
+    pub(crate) fn prefix(triangles: f64, k: i32) -> Self {
+        let part = libm::exp2(-0.5 * f64::from(k));
+        Self { polygons: part * triangles, algorithm: 0, worth: BenefitModel::Part(part.sqrt()) }
+    }
+}
+
 /// A thing that can be drawn at several levels.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct SceneObject {

@@ -1,8 +1,7 @@
 //! A walk among 200 meshes of any resolution with a sudden turn (GB99): accuracy of the prediction, and proof of the choice.
 
 use crate::chart::policies::numeric::{
-    BenefitModel, Case, Fault, ObjectLevel, Path, Policy, RandomSource, Row, Scene, SceneObject, Show, common, curves,
-    key, number,
+    Case, Fault, ObjectLevel, Path, Policy, RandomSource, Row, Scene, SceneObject, Show, common, curves, key, number,
 };
 use crate::chart::{Experiment, Figure, Finding, Table, claims};
 use glam::DVec3;
@@ -40,11 +39,7 @@ fn objects() -> Vec<SceneObject> {
         let x = if ahead { -4.0 - 26.0 * along } else { 4.0 + 56.0 * along };
         let centre_m = DVec3::new(x, (noise.uniform() - 0.5) * 0.8 * x.abs(), 1.0);
         let triangles = (scale * count).round();
-        let prefix = |k: i32| {
-            let part = libm::exp2(-0.5 * f64::from(k));
-            ObjectLevel { polygons: part * triangles, algorithm: 0, worth: BenefitModel::Part(part.sqrt()) }
-        };
-        let forms = (0..=STEPS).rev().map(prefix).collect();
+        let forms = (0..=STEPS).rev().map(|k| ObjectLevel::prefix(triangles, k)).collect();
         SceneObject { centre_m, radius_m: 1.0, fill: 0.7, importance: 1.0, complexity: triangles, forms }
     };
     counts.iter().enumerate().map(&mut object).collect()

@@ -158,6 +158,6 @@ fn tissue_map(device: &Device, queue: &wgpu::Queue) -> wgpu::TextureView {
         view_formats: &[],
     };
     let order = wgpu::util::TextureDataOrder::MipMajor;
-    let texture = device.create_texture_with_data(queue, &descriptor, order, &tissue::levels());
+    let texture = device.create_texture_with_data(queue, &descriptor, order, &tissue::LEVELS);
     texture.create_view(&wgpu::TextureViewDescriptor::default())
 }

@@ -1,14 +1,17 @@
-//! The texture of wet tissue: mottling, veins and folds, generated from noise when a renderer starts.
+//! The texture of wet tissue: mottling, veins and folds, generated from noise when the first renderer starts.
 //!
 //! In: nothing. Out: one repeating texture with its mipmaps: red = mottling, green = veins, blue and alpha = slopes of the folds along and
 //! around. Never here: colours, which are the object's own.
+
+use std::sync::LazyLock;
 
 /// Texels across.
 pub const TEXELS: u32 = 512;
 
 /// Every mipmap level, from the finest to 1 × 1, RGBA of 8 bits, one after another.
-#[must_use]
-pub fn levels() -> Vec<u8> {
+pub static LEVELS: LazyLock<Vec<u8>> = LazyLock::new(levels);
+
+fn levels() -> Vec<u8> {
     let mut level = finest();
     let mut all = level.clone();
     let mut size = TEXELS as usize;
