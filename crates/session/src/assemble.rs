@@ -12,8 +12,8 @@ use metachron_core::{AgentId, N_MAX, ResolutionRange};
 use metachron_drawable::{Model, PieceKind};
 use metachron_lod::control;
 use metachron_lod::control::{
-    ErrorControl, ErrorLimits, GivenSliders, Kind, Law, LevelDemand, ObjectView, PRIMITIVE_LEVELS, PictureControl,
-    Pieces, Prices, RateControl, RateDemand, RateGains, RateLimits, Stages, Stroke, Value,
+    ErrorControl, ErrorLimits, GivenSliders, Kind, Law, LevelDemand, Losses, ObjectView, PRIMITIVE_LEVELS,
+    PictureControl, Pieces, Prices, RateControl, RateDemand, RateGains, RateLimits, Stages, Stroke, Value,
 };
 use metachron_render::{Actor, Appearance, Camera, EnvironmentLight, Form, Level, SceneView, StaticObject, Visibility};
 use metachron_runtime::{DrawPrice, Governor, ObjectPrice};
@@ -324,7 +324,9 @@ fn view_and_appearance<'a>(
     if let Some(it) = scene.scenery.get(at - agents) {
         let (least, most) = it.model.range();
         let kind = Kind::Counted { radius_m: seen.radius_m, least, most };
-        let view = ObjectView { pieces: pieces(&it.model), ..still_view(seen, it, kind) };
+        let texture = it.texture.as_ref().map_or(0.0, |texture| texture.loss());
+        let losses = Some(Losses { forms: it.model.losses(), texture });
+        let view = ObjectView { pieces: pieces(&it.model), losses, ..still_view(seen, it, kind) };
         return (view, &it.appearance);
     }
     let group = &scene.groups[at - agents - members];
@@ -399,6 +401,7 @@ fn view_of(
         visible: seen.visible,
         may_vanish: false,
         pieces: None,
+        losses: None,
     }
 }
 

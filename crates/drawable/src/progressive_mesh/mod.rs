@@ -21,7 +21,9 @@ mod weld;
 #[cfg(test)]
 mod tests;
 
+use crate::likeness::FORMS;
 use metachron_geometry::{PrimitiveMesh, PrimitiveVertex};
+use std::sync::OnceLock;
 pub use weld::ProgressiveMeshError;
 use weld::SAME_PLACE;
 
@@ -40,6 +42,8 @@ pub struct ProgressiveMesh {
     least: u32,
     /// (triangles, error in metres), from coarse to fine.
     errors: Vec<(u32, f32)>,
+    /// [`crate::Model::losses`], once they are asked for.
+    pub(crate) losses: OnceLock<[f32; FORMS]>,
 }
 
 /// One of the meshes of a [`ProgressiveMesh`].
@@ -90,6 +94,7 @@ impl ProgressiveMesh {
         self.vertices.truncate(cut.vertices as usize);
         self.substitutes.truncate(cut.vertices as usize);
         self.errors = error::table(&self);
+        self.losses = OnceLock::new();
         self
     }
 
@@ -98,6 +103,7 @@ impl ProgressiveMesh {
     pub fn no_coarser(mut self, triangles: u32) -> Self {
         self.coarsest = self.cut(triangles);
         self.least = self.least.max(self.coarsest.triangles);
+        self.losses = OnceLock::new();
         self
     }
 
