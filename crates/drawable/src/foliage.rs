@@ -3,7 +3,7 @@
 //! In: a seed and sizes. Out: pieces in their order, each as a stroke (a line or a point) and as triangles, and for a number of triangles
 //! which pieces are drawn as which. Never here: the choice of the number, the GPU. The most important pieces come first.
 
-use crate::likeness::FORMS;
+use crate::progressive_mesh::FORMS;
 use glam::{DVec3, Vec3};
 use metachron_geometry::{PrimitiveMesh, PrimitiveVertex};
 use std::f64::consts::{FRAC_PI_2, PI, TAU};

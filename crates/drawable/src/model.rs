@@ -3,14 +3,10 @@
 //! In: meshes and foliage with their placements. Out: counts, a bounding ball of each, a coarse mesh of all. Never here: appearance, the
 //! GPU.
 
-use crate::likeness::{FORMS, TurnedStroke, losses};
-use crate::{Foliage, PieceKind, ProgressiveMesh, ProgressiveMeshError, Stroke};
-use glam::{DQuat, DVec3, Vec3};
+use crate::{Foliage, ProgressiveMesh, ProgressiveMeshError};
+use glam::{DQuat, DVec3};
 use metachron_geometry::{PrimitiveMesh, PrimitiveVertex, hull_mesh};
 use std::sync::Arc;
-
-/// Half the side of a square over the radius of a disc of its area: √π/2.
-const SQUARE: f32 = 0.886_226_9;
 
 /// Geometry drawn with any number of triangles; copies share it.
 #[derive(Debug, Clone)]
@@ -87,41 +83,8 @@ impl Model {
         Extent { centre, radius: places().map(|p| p.distance(centre)).fold(0.0, f64::max), area: area.sum() }
     }
 
-    /// The part of its pixels that it draws wrong with fewer triangles: from the fewest to all in equal ratios. Measured once; above 1 where
-    /// more is covered wrongly than the model covers.
-    #[must_use]
-    pub fn losses(&self) -> [f32; FORMS] {
-        match self {
-            Self::Mesh(tom) => *tom.losses.get_or_init(|| losses(self)),
-            Self::Foliage(foliage) => *foliage.losses.get_or_init(|| losses(self)),
-        }
-    }
-
-    /// Its triangles as they are drawn with at most `triangles` for an eye that looks `forward`, strokes among them.
-    pub(crate) fn drawn(&self, triangles: u32, forward: Vec3) -> PrimitiveMesh {
-        let Self::Foliage(foliage) = self else { return self.mesh(triangles) };
-        let cut = foliage.cut(triangles, 0.0);
-        let mut mesh = self.mesh(cut.triangles);
-        for stroke in &foliage.strokes()[cut.strokes.start as usize..cut.strokes.end as usize] {
-            let Stroke { from, way, radius_m } = *stroke;
-            let turned = match foliage.kind() {
-                PieceKind::Bough => {
-                    TurnedStroke { ends: [from, from + way], half: radius_m, normal: -forward, forward }
-                }
-                PieceKind::Leaf => {
-                    // a square of the area of the point's disc
-                    let half = SQUARE * radius_m * cut.growth;
-                    let up = forward.any_orthonormal_vector() * half;
-                    TurnedStroke { ends: [from - up, from + up], half, normal: way, forward }
-                }
-            };
-            turned.add_to(&mut mesh);
-        }
-        mesh
-    }
-
     /// Its mesh of at most `triangles` (its fewest where that is more); foliage as a prefix of its mesh.
-    fn mesh(&self, triangles: u32) -> PrimitiveMesh {
+    pub(crate) fn mesh(&self, triangles: u32) -> PrimitiveMesh {
         match self {
             Self::Mesh(tom) => {
                 let cut = tom.cut(triangles);

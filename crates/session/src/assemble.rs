@@ -193,6 +193,10 @@ pub struct FixedPart {
 
 /// That of every actor: agents, then scenery, then groups.
 pub fn fixed_parts(scene: &Scene) -> Vec<FixedPart> {
+    // measured now, not in the first frame
+    scene.scenery.iter().for_each(|it| {
+        it.model.losses();
+    });
     let first = scene.agents.len() + scene.scenery.len();
     let agents = scene.agents.iter().map(|member| FixedPart { group: None, triangles: triangles(&member.spec) });
     let mut all: Vec<FixedPart> = agents.collect();

@@ -21,11 +21,13 @@ mod weld;
 #[cfg(test)]
 mod tests;
 
-use crate::likeness::FORMS;
 use metachron_geometry::{PrimitiveMesh, PrimitiveVertex};
 use std::sync::OnceLock;
 pub use weld::ProgressiveMeshError;
 use weld::SAME_PLACE;
+
+/// Forms of which the loss is measured (`likeness.rs`): from the fewest triangles to all in equal ratios.
+pub const FORMS: usize = 9;
 
 /// A mesh of any number of triangles.
 #[derive(Debug, Clone, PartialEq)]
