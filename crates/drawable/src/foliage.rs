@@ -3,10 +3,12 @@
 //! In: a seed and sizes. Out: pieces in their order, each as a stroke (a line or a point) and as triangles, and for a number of triangles
 //! which pieces are drawn as which. Never here: the choice of the number, the GPU. The most important pieces come first.
 
+use crate::progressive_mesh::FORMS;
 use glam::{DVec3, Vec3};
 use metachron_geometry::{PrimitiveMesh, PrimitiveVertex};
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
 use std::ops::Range;
+use std::sync::OnceLock;
 
 /// The cheap form of a piece: the line of a bough, or the point of a leaf.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -38,6 +40,8 @@ pub struct Foliage {
     full_only: bool,
     /// The same number of triangles for each piece, piece by piece.
     mesh: PrimitiveMesh,
+    /// [`crate::Model::losses`], once they are asked for.
+    pub(crate) losses: OnceLock<[f32; FORMS]>,
 }
 
 /// The pieces that are drawn for a number of triangles.
@@ -171,6 +175,7 @@ pub fn tree(spec: &TreeSpec) -> [Foliage; 2] {
         strokes: grown.boughs.iter().map(line).collect(),
         full_only: spec.prefix,
         mesh: bough_mesh(&grown.boughs),
+        losses: OnceLock::new(),
     };
     let leaves = outside_in(leaves(spec, &grown, &mut chance), &grown);
     let side_m = LEAF_SIDE * spec.height_m / libm::sqrt(f64::from(spec.leaves.max(1)));
@@ -182,6 +187,7 @@ pub fn tree(spec: &TreeSpec) -> [Foliage; 2] {
         strokes: leaves.iter().map(point).collect(),
         full_only: spec.prefix,
         mesh: leaf_mesh(&leaves, radius_m),
+        losses: OnceLock::new(),
     };
     [trunk, crown]
 }

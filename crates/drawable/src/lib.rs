@@ -17,6 +17,7 @@ pub mod foliage;
 pub mod furniture;
 pub mod generate;
 pub mod geodesic;
+mod likeness;
 pub mod model;
 pub mod motion;
 pub mod progressive_mesh;

@@ -84,7 +84,7 @@ impl Model {
     }
 
     /// Its mesh of at most `triangles` (its fewest where that is more); foliage as a prefix of its mesh.
-    fn mesh(&self, triangles: u32) -> PrimitiveMesh {
+    pub(crate) fn mesh(&self, triangles: u32) -> PrimitiveMesh {
         match self {
             Self::Mesh(tom) => {
                 let cut = tom.cut(triangles);

@@ -21,6 +21,8 @@ pub struct Texture {
     /// Row by row from the top: red, green, blue (sRGB), and an unused byte.
     texels: Vec<[u8; 4]>,
     wrap: Wrap,
+    /// [`Texture::loss`].
+    loss: f32,
 }
 
 /// Width and height of a pattern, pixels.
@@ -53,7 +55,7 @@ impl Pattern {
             [r, g, b, 255]
         };
         let texels = (0..PATTERN * PATTERN).map(texel).collect();
-        Texture { width: PATTERN, height: PATTERN, texels, wrap: Wrap::Sides(metres) }
+        Texture::made(PATTERN, PATTERN, texels, Wrap::Sides(metres))
     }
 }
 
@@ -62,7 +64,24 @@ impl Texture {
     #[must_use]
     pub fn new(width: u32, height: u32, texels: Vec<[u8; 4]>, wrap: Wrap) -> Option<Self> {
         let count = u64::from(width) * u64::from(height);
-        (count > 0 && count == texels.len() as u64).then_some(Self { width, height, texels, wrap })
+        (count > 0 && count == texels.len() as u64).then(|| Self::made(width, height, texels, wrap))
+    }
+
+    fn made(width: u32, height: u32, texels: Vec<[u8; 4]>, wrap: Wrap) -> Self {
+        let mean = |of: &dyn Fn(f64) -> f64, channel: usize| {
+            texels.iter().map(|texel| of(f64::from(texel[channel]) / 255.0)).sum::<f64>() / texels.len() as f64
+        };
+        let variance = |channel| mean(&|x| x * x, channel) - mean(&|x| x, channel) * mean(&|x| x, channel);
+        // two colours by chance differ by a sixth in the mean square of a channel
+        let loss = (0..3).map(variance).sum::<f64>() / 3.0 / (1.0 / 6.0);
+        Self { width, height, texels, wrap, loss: loss as f32 }
+    }
+
+    /// What a surface loses that is drawn in the mean colour instead, as a part of its pixels: their mean square difference over that of two
+    /// colours by chance.
+    #[must_use]
+    pub fn loss(&self) -> f32 {
+        self.loss
     }
 
     /// Pixels across and down.
@@ -107,7 +126,7 @@ impl Texture {
             let of = |channel: usize| value(0.25 * four.iter().map(|t| light(t[channel])).sum::<f64>());
             [of(0), of(1), of(2), 255]
         };
-        Self { width, height, texels: (0..width * height).map(mean).collect(), wrap: self.wrap }
+        Self::made(width, height, (0..width * height).map(mean).collect(), self.wrap)
     }
 }
 

@@ -12,8 +12,8 @@ use metachron_core::{AgentId, N_MAX, ResolutionRange};
 use metachron_drawable::{Model, PieceKind};
 use metachron_lod::control;
 use metachron_lod::control::{
-    ErrorControl, ErrorLimits, GivenSliders, Kind, Law, LevelDemand, ObjectView, PRIMITIVE_LEVELS, PictureControl,
-    Pieces, Prices, RateControl, RateDemand, RateGains, RateLimits, Stages, Stroke, Value,
+    ErrorControl, ErrorLimits, GivenSliders, Kind, Law, LevelDemand, Losses, ObjectView, PRIMITIVE_LEVELS,
+    PictureControl, Pieces, Prices, RateControl, RateDemand, RateGains, RateLimits, Stages, Stroke, Value,
 };
 use metachron_render::{Actor, Appearance, Camera, EnvironmentLight, Form, Level, SceneView, StaticObject, Visibility};
 use metachron_runtime::{DrawPrice, Governor, ObjectPrice};
@@ -193,6 +193,10 @@ pub struct FixedPart {
 
 /// That of every actor: agents, then scenery, then groups.
 pub fn fixed_parts(scene: &Scene) -> Vec<FixedPart> {
+    // measured now, not in the first frame
+    scene.scenery.iter().for_each(|it| {
+        it.model.losses();
+    });
     let first = scene.agents.len() + scene.scenery.len();
     let agents = scene.agents.iter().map(|member| FixedPart { group: None, triangles: triangles(&member.spec) });
     let mut all: Vec<FixedPart> = agents.collect();
@@ -324,7 +328,9 @@ fn view_and_appearance<'a>(
     if let Some(it) = scene.scenery.get(at - agents) {
         let (least, most) = it.model.range();
         let kind = Kind::Counted { radius_m: seen.radius_m, least, most };
-        let view = ObjectView { pieces: pieces(&it.model), ..still_view(seen, it, kind) };
+        let texture = it.texture.as_ref().map_or(0.0, |texture| texture.loss());
+        let losses = Some(Losses { forms: it.model.losses(), texture });
+        let view = ObjectView { pieces: pieces(&it.model), losses, ..still_view(seen, it, kind) };
         return (view, &it.appearance);
     }
     let group = &scene.groups[at - agents - members];
@@ -399,6 +405,7 @@ fn view_of(
         visible: seen.visible,
         may_vanish: false,
         pieces: None,
+        losses: None,
     }
 }
 

@@ -229,6 +229,7 @@ impl Builder {
             coarsest: Cut { vertices: 0, triangles: 0 },
             least: 0,
             errors: Vec::new(),
+            losses: Default::default(),
         }
     }
 }

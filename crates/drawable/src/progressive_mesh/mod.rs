@@ -22,8 +22,12 @@ mod weld;
 mod tests;
 
 use metachron_geometry::{PrimitiveMesh, PrimitiveVertex};
+use std::sync::OnceLock;
 pub use weld::ProgressiveMeshError;
 use weld::SAME_PLACE;
+
+/// Forms of which the loss is measured (`likeness.rs`): from the fewest triangles to all in equal ratios.
+pub const FORMS: usize = 9;
 
 /// A mesh of any number of triangles.
 #[derive(Debug, Clone, PartialEq)]
@@ -40,6 +44,8 @@ pub struct ProgressiveMesh {
     least: u32,
     /// (triangles, error in metres), from coarse to fine.
     errors: Vec<(u32, f32)>,
+    /// [`crate::Model::losses`], once they are asked for.
+    pub(crate) losses: OnceLock<[f32; FORMS]>,
 }
 
 /// One of the meshes of a [`ProgressiveMesh`].
@@ -90,6 +96,7 @@ impl ProgressiveMesh {
         self.vertices.truncate(cut.vertices as usize);
         self.substitutes.truncate(cut.vertices as usize);
         self.errors = error::table(&self);
+        self.losses = OnceLock::new();
         self
     }
 
@@ -98,6 +105,7 @@ impl ProgressiveMesh {
     pub fn no_coarser(mut self, triangles: u32) -> Self {
         self.coarsest = self.cut(triangles);
         self.least = self.least.max(self.coarsest.triangles);
+        self.losses = OnceLock::new();
         self
     }
 

@@ -71,7 +71,7 @@ pub struct Settings {
 
 impl Default for Settings {
     fn default() -> Self {
-        Self { margin: DEFAULT_MARGIN, late: LATE_SHARE, hysteresis: 0.25, dwell: 8, trim: false }
+        Self { margin: DEFAULT_MARGIN, late: LATE_SHARE, hysteresis: 0.25, dwell: 4, trim: false }
     }
 }
 

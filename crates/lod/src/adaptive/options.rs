@@ -144,7 +144,8 @@ impl Options {
         self.objects.binary_search_by_key(&id, |o| o.id).ok().map(|at| &self.objects[at])
     }
 
-    /// Adds an object, or replaces its levels. The number of steps taken stays, limited to the new hull's.
+    /// Adds an object, or replaces its levels. Taken are the steps of the new hull that come nearest to the gain of those taken before, so that
+    /// what has just changed is still known by what it changed to.
     pub(crate) fn set(&mut self, id: u64, stage: usize, droppable: bool, levels: &[Offer]) {
         let (base, kept) = self.hull(droppable, levels);
         let (first, steps) = (self.steps.len() as u32, kept.min(usize::from(u16::MAX)) as u16);
@@ -178,8 +179,11 @@ impl Options {
                     return;
                 }
                 self.forget(&old);
+                let gain = self.gain(&old, old.taken);
+                let off = |taken: &u16| (self.gain(&new, *taken) - gain).abs();
+                let taken = (0..=steps).min_by(|a, b| off(a).total_cmp(&off(b))).unwrap_or(0);
                 let Object { weight, dwell, rose, .. } = old;
-                self.objects[at] = Object { weight, taken: old.taken.min(steps), dwell, rose, ..new };
+                self.objects[at] = Object { weight, taken, dwell, rose, ..new };
             }
             Err(at) => self.objects.insert(at, new),
         }
@@ -277,4 +281,22 @@ fn range(object: &Object) -> Range<usize> {
 
 fn slope(from: Vertex, to: Vertex) -> f64 {
     (to.gain - from.gain) / (to.cost - from.cost) as f64
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_object_whose_hull_loses_a_vertex_keeps_the_level_that_it_had() {
+        let offers = |gains: &[(f64, f64)]| gains.iter().map(|&(cost, gain)| Offer { cost, gain }).collect::<Vec<_>>();
+        let mut options = Options::default();
+        options.set(1, 0, false, &offers(&[(1.0, 0.5), (2.0, 0.7), (3.0, 0.8), (4.0, 0.85), (6.0, 0.9)]));
+        options.objects_mut()[0].settle(3, 4);
+        // the second and the fourth level are on the hull no longer: three steps would be the finest
+        options.set(1, 0, false, &offers(&[(1.0, 0.5), (2.0, 0.55), (3.0, 0.8), (4.0, 0.81), (6.0, 0.9)]));
+        let object = options.objects()[0];
+        assert_eq!((object.steps, object.taken, options.vertex(&object, object.taken).gain), (2, 1, 0.8));
+        assert_eq!((object.dwell, object.rose), (4, true));
+    }
 }

@@ -79,6 +79,7 @@ mod tests {
             group: None,
             may_vanish: false,
             pieces: None,
+            losses: None,
         };
         let mut changes = Changes::default();
         let mut frame = |n, visible| {

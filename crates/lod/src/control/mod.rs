@@ -23,7 +23,7 @@ pub use demand::plan::{FrameWork, LevelDemand, Plan, Tally, detail};
 pub use demand::policy::{Law, Policy};
 pub use demand::query::Promise;
 pub use demand::status::Status;
-pub use demand::view::{Kind, ObjectView, Pieces, Shading, Stroke};
+pub use demand::view::{FORMS, Kind, Losses, ObjectView, Pieces, Shading, Stroke};
 pub use picture::PictureControl;
 pub use prices::area::{AREAS_PX, Areas};
 pub use prices::price::{Backdrop, Measured, Misses, Prices};

@@ -14,7 +14,7 @@ use crate::control::demand::plan::LevelDemand;
 use crate::control::demand::query::{FrameQuery, Promise};
 use crate::control::flicker::Changes;
 
-/// Frames after which a change costs nothing, as those of [`crate::adaptive::Settings::dwell`].
+/// Frames after which a change costs nothing.
 const DWELL: f64 = 8.0;
 
 /// Cost and benefit of levels that are drawn.

@@ -53,6 +53,30 @@ impl Pieces {
     }
 }
 
+/// Forms of a mesh of which the loss is measured.
+pub const FORMS: usize = 9;
+
+/// What is measured to be lost of a mesh, as parts of its pixels (budget.md, eq. 47a).
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Losses {
+    /// Where it is drawn with fewer triangles: from the fewest to all in equal ratios; ≥ 0.
+    pub forms: [f32; FORMS],
+    /// Where it is drawn without its texture, 0 … 1.
+    pub texture: f32,
+}
+
+impl Losses {
+    /// That of a form of so many triangles, of `least` to `most`: on the line between the forms beside it.
+    pub(crate) fn of_form(&self, polygons: f64, least: f64, most: f64) -> f64 {
+        let last = FORMS - 1;
+        let place = libm::log(polygons / least) / libm::log(most / least) * last as f64;
+        let place = if place >= 0.0 { place.min(last as f64) } else { 0.0 };
+        let before = (place as usize).min(last - 1);
+        let [coarser, finer] = [before, before + 1].map(|form| f64::from(self.forms[form]));
+        coarser + (finer - coarser) * (place - before as f64)
+    }
+}
+
 /// The kind of an object.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Kind {
@@ -99,6 +123,8 @@ pub struct ObjectView {
     pub group: Option<usize>,
     /// Its pieces, if it is drawn by strokes; `None` for an object that is drawn by triangles alone.
     pub pieces: Option<Pieces>,
+    /// What its coarser forms lose, where that was measured.
+    pub losses: Option<Losses>,
     /// The pairs (ε, n) allowed for the picture. For a primitive only n counts; for a mesh with a free triangle count or a group, neither.
     pub range: ResolutionRange,
     /// The cheapest and the best shading allowed, equal if it is fixed.
@@ -166,6 +192,7 @@ impl ObjectView {
             kind,
             group: None,
             pieces: None,
+            losses: None,
             range: ResolutionRange::fixed(metachron_core::Resolution { eps_m: 1.0, n: 0 }),
             shading: Default::default(),
             pixels: 100.0,

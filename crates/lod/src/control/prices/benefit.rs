@@ -4,15 +4,19 @@
 //! is the benefit, in pixels. Never here: costs. Theory: `docs/theory/control.md`, eq. 20 … 22.
 
 use super::ladder::Rung;
-use crate::control::demand::view::{Kind, ObjectView, Shading};
+use crate::control::demand::view::{Kind, Losses, ObjectView, Shading};
 use crate::cost::benefit;
 use crate::cost::benefit::{BASE_ERROR, Picture, Sliders, size_worth};
 
 /// Triangles of the coarsest closed surface, a tetrahedron: half of the covered pixels are drawn wrong.
 const COARSEST: f64 = 4.0;
 
-/// Loss of a textured object drawn without its texture: a quarter of its pixels are assumed to be wrong.
+/// Loss of a textured object drawn without its texture where none was measured: a quarter of its pixels are assumed to be wrong.
 const UNPAINTED: f64 = 0.25;
+
+/// Every third object is assumed to have the edge of a shadow across it. Flat shading has one light for a polygon, so that those on the edge,
+/// the root of all, are half wrong; the others are lit at every pixel.
+const SHADOWED: f64 = 1.0 / 3.0;
 
 /// Upper limit of covered pixels: no picture has more.
 const PIXELS_MAX: f64 = 1e9;
@@ -66,31 +70,54 @@ fn printed_accuracy(rung: &Rung, best: Shading, pixels: f64) -> f64 {
     };
     let samples = samples.min(pixels).max(1.0);
     let power = if rung.shading == Shading::Flat { samples } else { samples * samples };
-    (1.0 - error / power) * painted(rung.shading, best)
+    (1.0 - error / power) * painted(rung.shading, best, UNPAINTED)
 }
 
 /// The fraction of an object's pixels that a level draws correctly, 0 … 1: its shape by the triangles, its light by the shading
-/// (control.md, eq. 21 and 22), relative to the best shading allowed.
-pub(crate) fn accuracy(kind: &Kind, polygons: f64, shading: Shading, best: Shading, pixels: f64) -> f64 {
+/// (control.md, eq. 21 and 22), relative to the best shading allowed; by what was measured to be lost, where it was.
+pub(crate) fn accuracy(seen: &Seen, polygons: f64, shading: Shading) -> f64 {
+    let Seen { kind, losses, best, pixels } = *seen;
+    let shape = match (losses, kind) {
+        (Some(losses), Kind::Counted { least, most, .. }) => {
+            1.0 - BASE_ERROR * losses.of_form(polygons, f64::from(least.max(1)), f64::from(most))
+        }
+        _ => 1.0 - BASE_ERROR / samples(&kind, polygons, pixels),
+    };
+    let light = match shading {
+        Shading::Flat => 1.0 - SHADOWED * BASE_ERROR / libm::sqrt(polygons.min(pixels).max(1.0)),
+        Shading::Gouraud => {
+            let vertices = 0.5 * polygons + 2.0;
+            let picture = Picture { level: 0, polygons, vertices, shading: benefit::Shading::Gouraud };
+            benefit::accuracy(pixels, &picture)
+        }
+        Shading::PerPixel | Shading::Textured | Shading::Shadowed => 1.0,
+    };
+    let unpainted = losses.map_or(UNPAINTED, |losses| f64::from(losses.texture));
+    shape.max(0.0) * light * painted(shading, best, unpainted)
+}
+
+/// What the accuracy of a level depends on beside it.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Seen {
+    pub kind: Kind,
+    pub losses: Option<Losses>,
+    /// The best shading allowed.
+    pub best: Shading,
+    pub pixels: f64,
+}
+
+/// Triangles in units of the coarsest shape, ≥ 1 and never more than pixels.
+fn samples(kind: &Kind, polygons: f64, pixels: f64) -> f64 {
     let (pieces, coarsest) = match *kind {
         // a tube counts as a row of balls of its length
         Kind::Tube { length_m, radius_m } => ((0.5 * length_m / radius_m).max(1.0), COARSEST),
         Kind::Primitive { .. } => (1.0, COARSEST),
         Kind::Counted { least, .. } | Kind::Group { impostors: [least, ..], .. } => (1.0, f64::from(least.max(1))),
     };
-    let most = (pixels / pieces).max(1.0);
-    let samples = (polygons / pieces / coarsest).min(most).max(1.0);
-    let shape = 1.0 - BASE_ERROR / samples;
-    let picture = |shading| Picture { level: 0, polygons, vertices: 0.5 * polygons + 2.0, shading };
-    let light = match shading {
-        Shading::Flat => benefit::accuracy(pixels, &picture(benefit::Shading::Flat)),
-        Shading::Gouraud => benefit::accuracy(pixels, &picture(benefit::Shading::Gouraud)),
-        Shading::PerPixel | Shading::Textured | Shading::Shadowed => 1.0,
-    };
-    shape * light * painted(shading, best)
+    (polygons / pieces / coarsest).min((pixels / pieces).max(1.0)).max(1.0)
 }
 
-/// The part of its benefit that a shading leaves to an object that has a texture.
-fn painted(shading: Shading, best: Shading) -> f64 {
-    if best == Shading::Textured && shading < best { 1.0 - UNPAINTED } else { 1.0 }
+/// The part of its benefit that a shading leaves to an object that has a texture, of which it loses `unpainted` without.
+fn painted(shading: Shading, best: Shading, unpainted: f64) -> f64 {
+    if best == Shading::Textured && shading < best { 1.0 - unpainted } else { 1.0 }
 }

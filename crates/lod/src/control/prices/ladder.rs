@@ -4,10 +4,11 @@
 //! choice, or the present benefit of an object ([`crate::control::prices::benefit`]). Theory: `docs/theory/control.md`, eq. 23.
 
 use super::benefit;
+use super::benefit::Seen;
 use super::price::Prices;
 use crate::control::demand::level::{Cut, LastCut, Span, open, polygons};
 use crate::control::demand::plan::{LevelDemand, SizedView};
-use crate::control::demand::view::{Kind, ObjectView, Pieces, Shading};
+use crate::control::demand::view::{Kind, Losses, ObjectView, Pieces, Shading};
 use crate::cost::benefit::Sliders;
 use crate::hysteresis;
 use metachron_core::{AgentId, N_MAX, Resolution, ResolutionRange};
@@ -45,6 +46,7 @@ struct Key {
     id: AgentId,
     kind: Kind,
     pieces: Option<Pieces>,
+    losses: Option<Losses>,
     range: ResolutionRange,
     shading: (Shading, Shading),
     /// Pixels covered, in half octaves.
@@ -168,8 +170,8 @@ impl Key {
     fn of(view: &ObjectView, steps: usize, raise: bool, before: Option<Self>) -> Self {
         let held = before.filter(|before| before.id == view.id).map(|before| before.size);
         let size = hysteresis::floor(held, 2.0 * libm::log2(benefit::pixels(view).max(1.0)));
-        let ObjectView { id, kind, pieces, range, shading, .. } = *view;
-        Self { id, kind, pieces, range, shading, size, steps, raise }
+        let ObjectView { id, kind, pieces, losses, range, shading, .. } = *view;
+        Self { id, kind, pieces, losses, range, shading, size, steps, raise }
     }
 
     fn is_same(&self, other: &Self) -> bool {
@@ -184,6 +186,7 @@ impl Key {
         };
         kinds
             && self.pieces == other.pieces
+            && self.losses == other.losses
             && (self.range, self.shading, self.size, self.steps, self.raise)
                 == (other.range, other.shading, other.size, other.steps, other.raise)
     }
@@ -296,7 +299,8 @@ impl Key {
     fn rung(&self, cut: Cut, shading: Shading, prices: &Prices, sliders: &Sliders) -> Rung {
         let Cut { resolution, polygons } = cut;
         let pixels = self.pixels();
-        let accuracy = benefit::accuracy(&self.kind, polygons, shading, self.shading.1, pixels);
+        let seen = Seen { kind: self.kind, losses: self.losses, best: self.shading.1, pixels };
+        let accuracy = benefit::accuracy(&seen, polygons, shading);
         let slid = 1.0 - sliders.accuracy.clamp(0.0, 1.0) * (1.0 - accuracy);
         let cost_s = prices.pieces_s(self.pieces, shading, polygons, pixels);
         Rung { resolution, polygons, shading, cost_s, accuracy: slid }
@@ -338,6 +342,32 @@ mod tests {
         assert_eq!(one.rungs.iter().map(|rung| rung.accuracy).collect::<Vec<_>>(), [1.0]);
         assert!(ladder([0; 8]).rungs.is_empty());
         assert_eq!(ladder([1, 2, 3, 4, 5, 6, 7, 8]).rungs.len(), 8);
+    }
+
+    #[test]
+    fn a_rung_loses_what_was_measured_of_the_forms_beside_it_and_of_the_texture() {
+        let rungs = |losses: Option<Losses>| {
+            let kind = Kind::Counted { radius_m: 1.0, least: 2, most: 512 };
+            let shading = (Shading::PerPixel, Shading::Textured);
+            let view = ObjectView { losses, shading, pixels: 1e6, ..ObjectView::plain(0, kind) };
+            let mut ladders = Ladders::default();
+            ladders.update(&[SizedView::of(view)], false, &Prices::default(), &Sliders::default());
+            let of = |polygons: f64, shading| {
+                let found =
+                    ladders.of(0).rungs.iter().find(|rung| (rung.polygons, rung.shading) == (polygons, shading));
+                found.unwrap().accuracy
+            };
+            [of(2.0, Shading::Textured), of(32.0, Shading::Textured), of(512.0, Shading::PerPixel)]
+        };
+        // of 2, 4 … 512 triangles; the coarsest covers more wrongly than the object has pixels
+        let forms = [1.6, 0.9, 0.8, 0.7, 0.6, 0.3, 0.2, 0.1, 0.0];
+        let measured = rungs(Some(Losses { forms, texture: 0.02 }));
+        assert!(measured.iter().zip([0.2, 0.7, 0.98]).all(|(a, b)| (a - b).abs() < 1e-6), "{measured:?}");
+        assert_eq!(rungs(None), [0.5, 1.0 - 0.5 / 16.0, (1.0 - 0.5 / 256.0) * 0.75]);
+        let between = Losses { forms, texture: 0.0 }.of_form(32.0 * libm::sqrt(2.0), 2.0, 512.0);
+        assert!((between - 0.45).abs() < 1e-6, "{between}");
+        // a mesh of one form only loses nothing
+        assert_eq!(Losses { forms: [0.0; 9], texture: 0.0 }.of_form(7.0, 7.0, 7.0), 0.0);
     }
 
     #[test]

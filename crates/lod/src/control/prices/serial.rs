@@ -10,8 +10,8 @@ use crate::cost::fit::SERIAL;
 const MEMORY: f64 = 0.97;
 /// Twice the logarithm of the odds at which another z is taken: 400 to 1.
 const SURE: f64 = 12.0;
-/// Most that one frame may count, seven deviations: a stall says nothing of z.
-const MOST: f64 = 50.0;
+/// Most that one frame may count, three deviations: less than [`SURE`], so that no single frame, such as a stall, takes another z.
+const MOST: f64 = 9.0;
 
 /// Competing values of z, each with a γ of its own.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
@@ -54,4 +54,34 @@ impl SerialPart {
 fn nearest(held: f64) -> usize {
     let off = |at: &usize| (SERIAL[*at] - held).abs();
     (0..SERIAL.len()).min_by(|a, b| off(a).total_cmp(&off(b))).unwrap_or(0)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Frames that z = 0 and z = 1 price at these times, each drawn in `drawn`; the z taken last, if any.
+    fn taken(part: &mut SerialPart, frames: impl IntoIterator<Item = ([f64; 2], f64)>) -> Option<f64> {
+        let taken = frames.into_iter().filter_map(|(table, drawn)| part.observe(table, drawn, 0.0));
+        taken.map(|learned| learned.serial).last()
+    }
+
+    #[test]
+    fn one_stall_takes_no_other_z_however_much_further_it_is_off_by_the_held_one() {
+        let mut part = SerialPart::default();
+        let at_rest = || (0..100).map(|_| ([0.8, 1.0], 0.8));
+        assert_eq!(taken(&mut part, at_rest()), None);
+        // every γ fits the frames at rest; then triangles come, which z = 0 hides and z = 1 does not, and the frame stalls: six deviations
+        // by z = 0, four by z = 1
+        let deviation = part.estimators[0].variance_of(0.8).sqrt();
+        let stalled = 0.8 * (6.0 * deviation).exp();
+        let shown = 1.0 * (2.0 * deviation).exp();
+        let before = part.misfit;
+        assert_eq!(taken(&mut part, [([0.8, shown], stalled)]), None, "{before:?} to {:?}", part.misfit);
+        assert_eq!(taken(&mut part, at_rest()), None);
+        // two such frames are no stall any more
+        let mut twice = SerialPart::default();
+        taken(&mut twice, at_rest());
+        assert!(taken(&mut twice, [([0.8, 1.4], 1.12); 3]).is_some());
+    }
 }
