@@ -47,9 +47,10 @@ struct Carried {
     insecure_lan: bool,
 }
 
-/// A scene with its text and files, as a host serves it.
+/// A world that a host serves, with the text and files of its scene.
 struct Work {
-    scene: Scene,
+    world: World,
+    name: String,
     files: SceneFiles,
 }
 
@@ -61,10 +62,7 @@ pub(super) fn host(args: &HostArgs) -> anyhow::Result<Exit> {
     let mut work = args.scene.as_deref().map(|scene| own_scene(scene, args)).transpose()?;
     loop {
         let world = match &work {
-            Some(Work { scene, .. }) => {
-                let executor = if args.scene.is_some() { scene.executor } else { ExecutorKind::Lockstep };
-                World::start(scene, executor)?
-            }
+            Some(work) => work.world.clone(),
             None => World::start(&Scene::builder().build()?, ExecutorKind::Lockstep)?,
         };
         let mut serving = Serving::new(&args.name, &args.listen).operators(&args.operators).viewers(&args.viewers);
@@ -79,7 +77,7 @@ pub(super) fn host(args: &HostArgs) -> anyhow::Result<Exit> {
         let serving = if args.insecure_lan { serving.insecure_lan() } else { serving };
         let host = serve(Arc::new(world.clone()), identity.clone().into_iter().fold(serving, Serving::identity));
         let host = host.map_err(refused)?;
-        let serves = work.as_ref().map_or("waits for work", |work| &*work.scene.name);
+        let serves = work.as_ref().map_or("waits for work", |work| &*work.name);
         message(&format!("`{}` at {}: {serves}, until Ctrl-C", args.name, args.listen));
         warn_open(host.is_open());
         if args.scene.is_some() && !args.paused {
@@ -126,15 +124,15 @@ fn own_scene(name: &str, args: &HostArgs) -> anyhow::Result<Work> {
     let scene = load(&source, &args.set)?;
     print_overlaps(&scene);
     warn_priority(&scene);
-    let files = scene_files(&source, &args.set)?;
-    Ok(Work { scene, files })
+    let (files, world) = (scene_files(&source, &args.set)?, World::start(&scene, scene.executor)?);
+    Ok(Work { world, name: scene.name, files })
 }
 
 /// The scene that a caller gives, which is checked as a file is.
 fn given_scene(files: SceneFiles, limits: Limits) -> anyhow::Result<Work> {
     let source = Source::recorded(&files.scene.name, &files.scene.text, None)?;
     let scene = load(&source.with_files(files.files.clone()).within(limits), &files.scene.overrides)?;
-    Ok(Work { scene, files })
+    Ok(Work { world: World::start(&scene, ExecutorKind::Lockstep)?, name: scene.name, files })
 }
 
 /// The text of a scene, and the files that it names.

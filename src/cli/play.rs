@@ -46,6 +46,9 @@ fn record(session: &Session, path: &Path, request: &Request) -> anyhow::Result<(
 /// Called for every frame; returns whether to go on.
 pub(super) type GoOn<'a> = &'a mut dyn FnMut(Step) -> bool;
 
+/// A run may end by so much of a frame early.
+const FRAME_SHARE: f64 = 1e-6;
+
 /// Width and height of a headless picture where no size is given, pixels.
 const PICTURE_SIZE: [u32; 2] = [1280, 720];
 
@@ -73,8 +76,14 @@ pub(super) fn play(request: &Request, go_on: GoOn<'_>) -> anyhow::Result<Played>
     }
     let served = devices::serve(&session, &request.scene, &request.devices)?;
     if let Some(placed) = &placed {
-        let end = if let Some(RunLength::Seconds(seconds)) = request.end { Some(seconds) } else { None };
-        let end = end.and_then(SimSpan::from_secs_f64).map(|span| placed.time() + span);
+        // as in one process the run ends with a whole frame
+        let period = SimSpan::from_nanos(session.period().as_nanos() as u64);
+        let frames = match request.end {
+            Some(RunLength::Seconds(seconds)) => Some((seconds / period.as_secs_f64() - FRAME_SHARE).ceil() as u64),
+            Some(RunLength::Frames(frames)) => Some(frames),
+            Some(RunLength::Recording) | None => None,
+        };
+        let end = frames.map(|frames| placed.time() + SimSpan::from_nanos(period.as_nanos().saturating_mul(frames)));
         placed.let_flow(request.pace == Pace::Free, end)?;
     }
     // from the first frame on: before it an adapter is opened
@@ -89,7 +98,11 @@ pub(super) fn play(request: &Request, go_on: GoOn<'_>) -> anyhow::Result<Played>
         headless(session, request, request.png.clone(), go_on)?
     };
     played.report.devices = devices::reports(served);
-    played.report.hosts = placed.iter().flat_map(|placed| placed.loads()).map(host_report).collect();
+    if let Some(placed) = placed {
+        played.report.hosts = placed.loads().into_iter().map(host_report).collect();
+        played.report.executor = ExecutorKind::Lockstep.name().to_owned();
+        played.report.escapes = Some(placed.escapes());
+    }
     Ok(played)
 }
 
@@ -285,6 +298,7 @@ fn played(scene: &Scene, outcome: Outcome, picture: Option<PathBuf>) -> Played {
             .collect(),
         devices: Vec::new(),
         hosts: Vec::new(),
+        escapes: None,
         parked: outcome.agents.iter().filter(|one| matches!(one.stats.state, AgentState::Parked(_))).count() as u32,
         clusters,
         notes: outcome.notes,

@@ -104,7 +104,7 @@ fn hosts_that_cannot_be_are_told_in_a_sentence() {
     let serves = Waiting::named("bench");
     let twice = format!("{},{}", serves.wish, serves.wish);
     for (wish, what) in [
-        (&*twice, "\"bench\" is there twice"),
+        (&*twice, "\"bench\" is empty or there twice"),
         ("bench=tcp/127.0.0.1:9", "Unable to connect"),
         ("a=b", "is no endpoint"),
     ] {

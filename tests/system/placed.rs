@@ -7,7 +7,7 @@ use metachron_core::SimSpan;
 use std::sync::Arc;
 
 /// Scenes in which objects meet, are tied, rest or are governed.
-const SCENES: [&str; 6] = ["crossing", "gripper", "yard", "chain", "domes", "library"];
+const SCENES: [&str; 6] = ["crossing", "gripper", "yard", "chain", "mesentery", "stack"];
 
 const TENTH: SimSpan = SimSpan::from_millis(100);
 
@@ -23,7 +23,7 @@ fn built_in_scenes_on_two_and_four_hosts_have_the_bits_of_one_process() {
         let host = |number: usize| PlacedHost { name: number.to_string(), world: Arc::new(start()) };
         let placed = [2, 4].map(|hosts| PlacedWorld::start(&scene, (0..hosts).map(host).collect()).unwrap());
         let whole = start();
-        for tenth in 1..=4 {
+        for tenth in 1..=7 {
             whole.advance(TENTH);
             for placed in &placed {
                 placed.advance(TENTH).unwrap();

@@ -45,6 +45,7 @@ pub(crate) enum Refusal {
         name: String,
         known: String,
     },
+    Undivided(String),
     /// Another error of a world, or one of the host.
     Other(String),
 }
@@ -66,6 +67,7 @@ impl From<WorldError> for Refusal {
             WorldError::NoMotor { name, joint, drives } => Self::NoMotor { name, joint, drives },
             WorldError::Refused { name, reason } => Self::Refused { name, reason },
             WorldError::NoObject { name, known } => Self::NoObject { name, known },
+            WorldError::Undivided { reason } => Self::Undivided(reason),
             other => Self::Other(other.to_string()),
         }
     }
@@ -98,6 +100,7 @@ impl From<Refusal> for WorldError {
             Refusal::NoMotor { name, joint, drives } => Self::NoMotor { name, joint, drives },
             Refusal::Refused { name, reason } => Self::Refused { name, reason },
             Refusal::NoObject { name, known } => Self::NoObject { name, known },
+            Refusal::Undivided(reason) => Self::Undivided { reason },
             Refusal::Other(sentence) => Self::Elsewhere(sentence),
         }
     }

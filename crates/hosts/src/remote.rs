@@ -423,6 +423,12 @@ impl RemoteWorld {
         self.calls().act(Call::Begin(Box::new(scene)))
     }
 
+    /// The run of its host: each world that is served has a number that no other had.
+    #[must_use]
+    pub fn run(&self) -> u64 {
+        self.calls().mirror.run
+    }
+
     /// How long ago the newest message came.
     #[must_use]
     pub fn age(&self) -> Duration {

@@ -8,8 +8,8 @@ use super::scene_files;
 use crate::cli::args::RunArgs;
 use crate::cli::run::Request;
 use metachron_console::output::BadInput;
-use metachron_hosts::{RemoteWorld, SceneFiles, connect};
-use metachron_world::{PlacedHost, SceneMark, WorldCalls};
+use metachron_hosts::{HostsError, RemoteWorld, SceneFiles, connect};
+use metachron_world::{PlacedHost, SceneMark};
 use std::sync::Arc;
 use std::thread;
 use std::time::{Duration, Instant};
@@ -30,8 +30,8 @@ pub(in super::super) fn place(args: &RunArgs, request: &mut Request) -> anyhow::
             Some((name, endpoint)) => (name, endpoint.to_owned()),
             None => (&**host, format!("tls/{host}:7447")),
         };
-        if request.hosts.iter().any(|known| known.name == name) {
-            return Err(BadInput(format!("--hosts: \"{name}\" is there twice")).into());
+        if name.is_empty() || request.hosts.iter().any(|known| known.name == name) {
+            return Err(BadInput(format!("--hosts: \"{name}\" is empty or there twice")).into());
         }
         let world = Arc::new(begun(&endpoint, &args.call, &files, request.scene.mark())?);
         request.hosts.push(PlacedHost { name: name.to_owned(), world });
@@ -43,16 +43,17 @@ pub(in super::super) fn place(args: &RunArgs, request: &mut Request) -> anyhow::
 fn begun(endpoint: &str, call: &CallArgs, files: &SceneFiles, scene: SceneMark) -> anyhow::Result<RemoteWorld> {
     let waiting = connect(calling(endpoint, call)?).map_err(refused)?;
     waiting.begin(files.clone()).map_err(|error| BadInput(format!("{endpoint}: {error}")))?;
-    // it is another world from now on
+    let (before, asked) = (waiting.run(), Instant::now());
     drop(waiting);
-    let asked = Instant::now();
-    loop {
+    while asked.elapsed() < BEGINS_WITHIN {
         match connect(calling(endpoint, call)?.scene(scene.clone())) {
-            Ok(world) if world.answers().is_ok() => return Ok(world),
-            Ok(_) => {}
-            Err(error) if asked.elapsed() > BEGINS_WITHIN => return Err(refused(error)),
-            Err(_) => {}
+            Ok(world) if world.run() != before => return Ok(world),
+            // the world before is still served, or nothing yet
+            Ok(_) | Err(HostsError::NoWorld { .. } | HostsError::Network { .. } | HostsError::OtherScene { .. }) => {}
+            Err(HostsError::World(_)) => {}
+            Err(error) => return Err(refused(error)),
         }
         thread::sleep(ASKED_EVERY);
     }
+    Err(BadInput(format!("{endpoint}: the host has not begun the scene in {} s", BEGINS_WITHIN.as_secs())).into())
 }

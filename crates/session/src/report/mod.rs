@@ -68,6 +68,9 @@ pub struct Report {
     /// The hosts that stepped the world together; left out where there were none.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub hosts: Vec<HostReport>,
+    /// How often these went back to states that they had kept, as an object moved farther than was reckoned with.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub escapes: Option<u64>,
     /// Warnings about its figures, of a world elsewhere: a link that anybody may listen to, objects that were not shown; left out where
     /// there is nothing.
     #[serde(skip_serializing_if = "Vec::is_empty")]
@@ -432,6 +435,7 @@ impl Report {
             readings: vec![ReadingReport { values: vec![0.0], ..ReadingReport::default() }],
             devices: vec![DeviceReport::default()],
             hosts: vec![HostReport::default()],
+            escapes: Some(0),
             notes: vec![name()],
             parked: 0,
             clusters: vec![ClusterRow { members: vec![name()], steps: vec![1], ..ClusterRow::default() }],

@@ -63,7 +63,9 @@ impl Session {
         if let Some(silent) = self.unanswered() {
             return Some(silent.into());
         }
-        let stood = self.elsewhere.as_ref()?.stood();
+        // time that passes in this process stands for as long as its steps last
+        let elsewhere = self.elsewhere.as_ref().filter(|elsewhere| elsewhere.calls.link().is_some())?;
+        let stood = elsewhere.stood();
         let (at_s, stood_s) = (self.sim_now().as_secs_f64(), stood.as_secs_f64());
         (stood > patience).then_some(SessionError::Stands { at_s, stood_s })
     }

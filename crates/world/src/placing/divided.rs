@@ -16,6 +16,8 @@ pub struct PartAdvanced {
     pub escaped: Option<AgentId>,
     /// Where the objects that are stepped here may be found near others.
     pub reaches: Vec<Reach>,
+    /// Which of them belong together, however far apart they are.
+    pub bonds: Vec<[AgentId; 2]>,
     /// Wall time that it took.
     pub took: Duration,
     /// CPU time of all steps made here so far.
@@ -63,10 +65,7 @@ impl World {
 
 impl DividedCalls for World {
     fn release(&self, objects: &[AgentId]) -> Result<(), WorldError> {
-        self.with_lockstep(|lockstep| {
-            lockstep.release(objects.iter().copied());
-            Ok(())
-        })?;
+        self.with_lockstep(|lockstep| lockstep.release(objects.iter().copied()))?;
         self.set_pace(Pace::Free)
     }
 
@@ -90,9 +89,9 @@ impl DividedCalls for World {
         self.advance(span);
         let cpu = Duration::from_secs_f64(self.agents().iter().map(AgentHandle::cpu_s).sum());
         self.with_lockstep(|lockstep| {
-            let (escaped, reaches) = (lockstep.escaped(), lockstep.reaches());
+            let (escaped, reaches, bonds) = (lockstep.escaped(), lockstep.reaches(), lockstep.bonds());
             lockstep.set_fences([]);
-            Ok(PartAdvanced { escaped, reaches, took: begun.elapsed(), cpu })
+            Ok(PartAdvanced { escaped, reaches, bonds, took: begun.elapsed(), cpu })
         })
     }
 }

@@ -20,6 +20,8 @@ const LATE_MAX: Duration = Duration::from_millis(100);
 /// How time passes by itself.
 #[derive(Debug, Default)]
 pub(super) struct Flow {
+    /// Whether it has its thread.
+    is_begun: bool,
     runs: bool,
     /// Seconds a second; `None` for as fast as hosts step.
     speed: Option<f64>,
@@ -35,7 +37,12 @@ impl PlacedWorld {
     /// # Errors
     /// [`WorldError::Undivided`] where the system gives no thread.
     pub fn let_flow(self: &Arc<Self>, is_free: bool, until: Option<SimTime>) -> Result<(), WorldError> {
-        *self.flow() = Flow { runs: false, speed: (!is_free).then_some(1.0), until, ended: None };
+        let speed = (!is_free).then_some(1.0);
+        let before =
+            std::mem::replace(&mut *self.flow(), Flow { is_begun: true, runs: false, speed, until, ended: None });
+        if before.is_begun {
+            return Ok(());
+        }
         let placed = Arc::downgrade(self);
         let thread = thread::Builder::new().name("placed-flow".to_owned()).spawn(move || flow(&placed));
         thread.map(drop).map_err(|error| WorldError::Undivided { reason: format!("no thread: {error}") })
@@ -49,7 +56,7 @@ impl PlacedWorld {
     pub(super) fn change_flow(&self, drive: TimelineCommand) -> Result<(), WorldError> {
         let mut flow = self.flow();
         match drive {
-            TimelineCommand::Run => flow.runs = true,
+            TimelineCommand::Run => (flow.runs, flow.ended) = (true, None),
             TimelineCommand::Pause => flow.runs = false,
             TimelineCommand::Speed(speed) if speed.is_nan() => {}
             TimelineCommand::Speed(speed) => flow.speed = Some(speed.clamp(SPEED_RANGE.0, SPEED_RANGE.1)),

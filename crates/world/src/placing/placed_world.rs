@@ -349,6 +349,43 @@ mod tests {
         Placed { worlds, placed }
     }
 
+    /// Boxes and balls that fall on each other, part and roll apart.
+    fn crowd() -> Scene {
+        let mut seed = 12_u64;
+        let mut random = || {
+            seed = seed.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+            (seed >> 33) as f64 / f64::from(1_u32 << 31)
+        };
+        let mut scene = Scene::builder().fixed("floor", Solid::Plane);
+        for number in 0..40_u32 {
+            let place = [2.0 * random(), 2.0 * random(), 0.1 + 1.5 * random()];
+            let body = if number % 2 == 0 { Rigid::ball(0.06) } else { Rigid::cuboid([0.05, 0.04, 0.06]) };
+            let velocity = [3.0 * random() - 1.5, 3.0 * random() - 1.5, 0.0];
+            scene = scene.add(format!("body {number}"), body.mass_kg(0.1 + random()).at(place).velocity_m_s(velocity));
+        }
+        scene.build().unwrap()
+    }
+
+    #[test]
+    fn a_crowd_that_meets_and_parts_has_the_bits_of_one_process() {
+        let scene = crowd();
+        let start = || {
+            let world = World::start(&scene, ExecutorKind::Lockstep).unwrap();
+            world.set_pace(Pace::Free).unwrap();
+            world
+        };
+        let host = |number: usize| PlacedHost { name: number.to_string(), world: Arc::new(start()) };
+        let placed = [2, 3].map(|hosts| PlacedWorld::start(&scene, (0..hosts).map(host).collect()).unwrap());
+        let whole = start();
+        for quarter in 0..12 {
+            whole.advance(QUARTER);
+            for placed in &placed {
+                placed.advance(QUARTER).unwrap();
+                assert_eq!(placed.hash().unwrap(), whole.hash(), "quarter {quarter}: {:?}", placed.loads());
+            }
+        }
+    }
+
     const QUARTER: SimSpan = SimSpan::from_millis(250);
 
     #[test]

@@ -8,6 +8,7 @@ use super::placed_world::{PlacedHost, PlacedWorld};
 use crate::Part;
 use crate::error::WorldError;
 use crate::history::checkpoint::{Checkpoint, CheckpointError};
+use crate::reading::object::Object;
 use metachron_core::{AgentId, Body, SimSpan, SimTime};
 use metachron_runtime::{Command, Reach};
 use std::collections::{BTreeMap, VecDeque};
@@ -32,8 +33,9 @@ const RATE_JOINED_HZ: f64 = 60.0;
 /// Who steps what.
 pub(super) struct Placing {
     pub seen: PlacingSeen,
-    /// Where objects may be found, by hosts.
+    /// Where objects may be found, and which belong together, by hosts.
     reaches: Vec<Vec<Reach>>,
+    bonds: Vec<Vec<[AgentId; 2]>>,
     room: f64,
     kept: Kept,
     /// What was done since states were kept.
@@ -91,6 +93,13 @@ pub(super) struct HostRecord {
     pub reborn: u64,
 }
 
+/// From which host to which one objects go.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+struct Route {
+    from: usize,
+    to: usize,
+}
+
 /// Objects that one host has packed.
 struct Pack {
     host: usize,
@@ -141,11 +150,12 @@ impl Placing {
             let rate_hz = rates_hz.get(object.id().0 as usize).copied().unwrap_or(RATE_JOINED_HZ);
             owners.insert(object.id(), Owner { host: 0, cost: places as f64 * rate_hz });
         }
-        let (lost, reaches) = (vec![None; hosts.len()], vec![Vec::new(); hosts.len()]);
+        let (lost, reaches, bonds) =
+            (vec![None; hosts.len()], vec![Vec::new(); hosts.len()], vec![Vec::new(); hosts.len()]);
         let records = vec![HostRecord::default(); hosts.len()];
         let (kept, since, leaving) = (Kept::default(), Vec::new(), Vec::new());
         let seen = PlacingSeen { time, owners: Arc::new(owners), lost, escapes: 0, records };
-        Ok(Self { seen, reaches, room: ROOM, kept, since, leaving })
+        Ok(Self { seen, reaches, bonds, room: ROOM, kept, since, leaving })
     }
 
     fn objects(&self) -> Vec<AgentId> {
@@ -185,16 +195,21 @@ impl PlacedWorld {
         self.keep_or_go_back(placing)
     }
 
-    /// Calls a host for its part; one that refuses is lost.
+    /// Calls a host for its part; one that does not answer is lost.
     fn part<T>(&self, host: usize, call: impl FnOnce(&dyn DividedCalls) -> Result<T, WorldError>) -> Result<T, Fault> {
-        self.hosts[host].divided().and_then(call).map_err(|error| Fault::Lost(host, error))
+        self.hosts[host].divided().and_then(call).map_err(|error| match error {
+            error @ WorldError::Undivided { .. } => Fault::Refused(error),
+            other => Fault::Lost(host, other),
+        })
     }
 
     /// Looks where objects may be found.
     fn look(&self, placing: &mut Placing) -> Result<(), Fault> {
         placing.reaches.iter_mut().for_each(Vec::clear);
+        placing.bonds.iter_mut().for_each(Vec::clear);
         for host in placing.living() {
-            placing.reaches[host] = self.part(host, |divided| divided.advance_within(SimSpan::ZERO, &[]))?.reaches;
+            let looked = self.part(host, |divided| divided.advance_within(SimSpan::ZERO, &[]))?;
+            (placing.reaches[host], placing.bonds[host]) = (looked.reaches, looked.bonds);
         }
         Ok(())
     }
@@ -285,7 +300,7 @@ impl PlacedWorld {
         for (host, outcome) in living.into_iter().zip(outcomes) {
             let HostWindow { advanced, waited } = outcome?;
             escaped |= advanced.escaped.is_some();
-            placing.reaches[host] = advanced.reaches;
+            (placing.reaches[host], placing.bonds[host]) = (advanced.reaches, advanced.bonds);
             let record = &mut placing.seen.records[host];
             (record.cpu, record.waited) = (advanced.cpu, waited);
         }
@@ -320,11 +335,13 @@ impl PlacedWorld {
         }
         let reaches: Vec<Reach> = placing.reaches.iter().flatten().copied().collect();
         let fences = fences(&reaches, window, placing.room);
-        let mut placed: Vec<PlacedGroup> =
-            groups(&placing.objects(), &fences, &self.ties).into_iter().map(|objects| placing.group(objects)).collect();
+        let mut placed: Vec<PlacedGroup> = groups(&placing.objects(), &fences, &self.ties_of(placing))
+            .into_iter()
+            .map(|objects| placing.group(objects))
+            .collect();
         let lives: Vec<bool> = placing.seen.lost.iter().map(Option::is_none).collect();
         place(&mut placed, &lives, placing.since.is_empty());
-        let mut moves: BTreeMap<(usize, usize), Vec<Vec<AgentId>>> = BTreeMap::new();
+        let mut moves: BTreeMap<Route, Vec<Vec<AgentId>>> = BTreeMap::new();
         for PlacedGroup { objects, host, .. } in &placed {
             let mut from: BTreeMap<usize, Vec<AgentId>> = BTreeMap::new();
             for id in objects {
@@ -332,10 +349,10 @@ impl PlacedWorld {
             }
             let Some(to) = *host else { continue };
             for (from, objects) in from.into_iter().filter(|(from, _)| *from != to) {
-                moves.entry((from, to)).or_default().push(objects);
+                moves.entry(Route { from, to }).or_default().push(objects);
             }
         }
-        for ((from, to), groups) in moves {
+        for (Route { from, to }, groups) in moves {
             for Pack { objects, bytes, .. } in self.pack(from, &groups)? {
                 self.part(to, |divided| divided.adopt(&bytes))?;
                 self.part(from, |divided| divided.release(&objects))?;
@@ -347,6 +364,11 @@ impl PlacedWorld {
         let first = hosts.next();
         let is_one = hosts.all(|host| Some(host) == first);
         Ok(if is_one { Vec::new() } else { fences })
+    }
+
+    /// Objects that one host steps, however far apart they are.
+    fn ties_of(&self, placing: &Placing) -> Vec<[AgentId; 2]> {
+        self.ties.iter().chain(placing.bonds.iter().flatten()).copied().collect()
     }
 
     /// Groups of objects as a host packs them.
@@ -404,7 +426,7 @@ impl PlacedWorld {
         // without another host nobody could go on with them
         if living.len() > 1 {
             let reaches: Vec<Reach> = placing.reaches.iter().flatten().copied().collect();
-            let groups = groups(&placing.objects(), &reaches, &self.ties);
+            let groups = groups(&placing.objects(), &reaches, &self.ties_of(placing));
             for host in living {
                 let is_own = |group: &&Vec<AgentId>| group.iter().all(|id| placing.seen.owners[id].host == host);
                 let own: Vec<_> = groups.iter().filter(is_own).cloned().collect();
@@ -484,15 +506,25 @@ impl Placing {
 }
 
 impl PlacedWorld {
-    /// Takes up an object on all hosts; one of them steps it.
+    /// Takes up an object on all hosts; one of them steps it. A host that does not is lost, unless it is the first to be asked.
     pub(super) fn join(&self, placing: &mut Placing, name: &str, part: &Part) -> Result<AgentId, WorldError> {
+        // from these states all goes on where a host is lost meanwhile
+        self.keep_or_go_back(placing)?;
         let mut joined: Option<AgentId> = None;
         for host in placing.living() {
-            let id = self.hosts[host].world.add(name, part.clone())?.id();
-            if joined.is_some_and(|joined| joined != id) {
-                return Err(WorldError::Undivided { reason: format!("\"{name}\" has another number on each host") });
-            }
-            joined = Some(id);
+            let added = self.hosts[host].world.add(name, part.clone()).map(Object::id);
+            let other = || WorldError::Undivided { reason: format!("\"{name}\" has another number on each host") };
+            let lost = match added {
+                Ok(id) if joined.is_none_or(|joined| joined == id) => {
+                    joined = Some(id);
+                    continue;
+                }
+                Ok(_) => other(),
+                Err(error @ (WorldError::Silent { .. } | WorldError::Stopped)) => error,
+                Err(error) if joined.is_none() => return Err(error),
+                Err(error) => error,
+            };
+            self.go_back(placing, Fault::Lost(host, lost))?;
         }
         let id = joined.ok_or_else(|| self.silent())?;
         let host = *placing.living().first().ok_or_else(|| self.silent())?;
@@ -507,17 +539,23 @@ impl PlacedWorld {
         let first = *placing.living().first().ok_or_else(|| self.silent())?;
         let (host, divided) = (&self.hosts[first], self.hosts[first].divided()?);
         let elsewhere: Vec<&Pack> = placing.kept.packs.iter().filter(|pack| pack.host != first).collect();
-        elsewhere.iter().try_for_each(|pack| divided.adopt(&pack.bytes))?;
-        let checkpoint = host.world.checkpoint();
+        let adopted = elsewhere.iter().try_for_each(|pack| divided.adopt(&pack.bytes));
+        let checkpoint = adopted.map_err(CheckpointError::from).and_then(|()| host.world.checkpoint());
         elsewhere.iter().try_for_each(|pack| divided.release(&pack.objects))?;
         checkpoint
     }
 
     /// Puts all hosts back into one state, and places its objects anew.
     pub(super) fn put_all_back(&self, placing: &mut Placing, checkpoint: &Checkpoint) -> Result<(), CheckpointError> {
-        let living = placing.living();
-        living.iter().try_for_each(|host| self.hosts[*host].world.restore(checkpoint))?;
-        let first = *living.first().ok_or_else(|| self.silent())?;
+        for host in placing.living() {
+            match self.hosts[host].world.restore(checkpoint) {
+                Err(CheckpointError::Start(error @ WorldError::Silent { .. })) => {
+                    placing.seen.lost[host] = Some(error.to_string());
+                }
+                restored => restored?,
+            }
+        }
+        let first = *placing.living().first().ok_or_else(|| self.silent())?;
         placing.seen.owners = Placing::of(&self.hosts[first..=first], checkpoint.time(), &self.rates_hz)?.seen.owners;
         placing.seen.time = checkpoint.time();
         let objects = placing.objects();

@@ -18,7 +18,14 @@ use std::time::Duration;
 pub(crate) struct Migration {
     /// By rising numbers.
     pub agents: Vec<MigratingAgent>,
-    moment: Option<(Timeline, Duration)>,
+    moment: Moment,
+}
+
+/// When agents migrate.
+#[derive(Debug, Clone, Copy, Default, serde::Serialize, serde::Deserialize)]
+struct Moment {
+    timeline: Timeline,
+    now: Duration,
 }
 
 /// An agent among the others: all of it that it does not keep to itself and does not show.
@@ -53,7 +60,7 @@ impl Cut {
             Ok(MigratingAgent { id: *id, turns: turns(*id), place, signal, published })
         };
         let agents = of.iter().map(agent).collect::<Result<Vec<_>, ArchiveError>>()?;
-        let mut migration = Migration { agents, moment: Some((self.timeline, self.now)) };
+        let mut migration = Migration { agents, moment: Moment { timeline: self.timeline, now: self.now } };
         self.archive_migration(&mut migration, archive, &mut refuse_absent).map(drop)
     }
 
@@ -81,9 +88,7 @@ impl Cut {
             runner.shared.mail.replace(shown.commands.take());
             runner.notify_reader();
         }
-        if let Some((timeline, now)) = migration.moment {
-            (self.timeline, self.now) = (timeline, now);
-        }
+        (self.timeline, self.now) = (migration.moment.timeline, migration.moment.now);
         Ok(migration)
     }
 
@@ -152,7 +157,7 @@ impl Cut {
             }
             (migrates[at], next) = (true, at + 1);
         }
-        if !moment.is_some_and(|(timeline, _)| timeline.is_sound()) {
+        if !moment.timeline.is_sound() {
             return Err(refuse_other("the timeline", "none", "one that can be in force"));
         }
         let is_there = |id: AgentId| migrates.get(id.0 as usize) == Some(&true);

@@ -6,7 +6,8 @@
 //! section 11; CM79). Never here: who makes whose turns, which boxes.
 
 use super::super::archive::Migration;
-use super::{Absent, Cut, Lockstep, Phase, phase_of, put_back, take_apart};
+use super::{Absent, Cut, Lockstep, Phase, Place, phase_of, put_back, take_apart};
+use crate::agent::handle::AgentHandle;
 use crate::commands::mailbox::SendError;
 use crate::neighbours::broad_phase::Reach;
 use metachron_core::{AgentId, Archive, ArchiveError, SimSpan};
@@ -52,16 +53,30 @@ impl Division {
 }
 
 impl Lockstep {
-    /// Makes no more turns of these agents: another process does. None here meets them.
-    pub fn release(&mut self, agents: impl IntoIterator<Item = AgentId>) {
+    /// Makes no more turns of these agents: another process does, and of all that are bonded with them. None here meets them.
+    ///
+    /// # Errors
+    /// [`ArchiveError::Refused`] in the middle of a turn.
+    pub fn release(&mut self, agents: impl IntoIterator<Item = AgentId>) -> Result<(), ArchiveError> {
         self.division.dt_max = self.dt_max();
-        for id in agents {
+        let (count, mut away) = (self.entries.len(), Vec::new());
+        for id in agents.into_iter().filter(|id| (id.0 as usize) < count) {
             self.division.set(id, true);
+            away.push(id);
             if let Some(broad_phase) = self.all.peers.broad_phase.get() {
                 broad_phase.publish_nowhere(id, self.timeline.sim_at(self.now));
             }
         }
+        // whoever leads it does so elsewhere
+        self.cut(|cut| {
+            for id in away {
+                cut.run_agents.sleep.follow(id, None);
+                cut.all[id.0 as usize].iter_mut().for_each(|placed| placed.place = Place::Home);
+            }
+            Ok(())
+        })?;
         self.schedule_all();
+        Ok(())
     }
 
     /// The state of these agents, whose numbers rise, by which [`Lockstep::adopt`] goes on in another process.
@@ -85,6 +100,8 @@ impl Lockstep {
         for agent in agents {
             self.entries[agent.id.0 as usize].turns = agent.turns;
             self.division.set(agent.id, false);
+            // one on its way home, or woken, is served
+            self.all.sleep.notify(agent.id);
         }
         self.schedule_all();
         Ok(())
@@ -99,11 +116,24 @@ impl Lockstep {
         own.filter_map(|agent| broad_phase.reach_of(AgentId(agent as u32), dt_max)).collect()
     }
 
+    /// Which agents whose turns are made here belong together: each with the one that leads it, and with those that it is bonded with. They step
+    /// as one, or are about to, for a while after nothing is near.
+    #[must_use]
+    pub fn bonds(&self) -> Vec<[AgentId; 2]> {
+        let own = self.all.handles.iter().filter(|agent| !self.division.is_away(agent.id().0 as usize));
+        let of = |agent: &AgentHandle| {
+            let (id, newest) = (agent.id(), agent.latest());
+            let leader = self.all.sleep.led_by(id);
+            leader.into_iter().chain(newest.bonds.iter().copied()).map(|other| [id, other]).collect::<Vec<_>>()
+        };
+        own.flat_map(of).collect()
+    }
+
     /// From now on the run stops where one of these agents is no longer inside its box, with all of its reach.
     pub fn set_fences(&mut self, fences: impl IntoIterator<Item = Reach>) {
         let division = &mut self.division;
         (division.escaped, division.fences) = (None, Vec::new());
-        for fence in fences {
+        for fence in fences.into_iter().filter(|fence| (fence.id.0 as usize) < self.entries.len()) {
             let at = fence.id.0 as usize;
             division.fences.resize(division.fences.len().max(at + 1), None);
             division.fences[at] = Some(fence);
