@@ -59,7 +59,7 @@ pub(crate) fn open(place: Place<'_>, side: Side<'_>) -> Result<Session, HostsErr
     }
     let mut config = Config::default();
     for (key, value) in settings {
-        config.insert_json5(key, &value).map_err(|error| failed(error))?;
+        config.insert_json5(key, &value).map_err(&failed)?;
     }
     zenoh::open(config).wait().map_err(failed)
 }

@@ -227,10 +227,12 @@ impl Mirror {
         }
     }
 
-    /// Waits for the message of this number, or all states after it, but not for long: it may be lost.
-    pub fn reach(&self, sequence: u64, patience: Duration) {
+    /// Waits for the message of this number, or all states after it, but not for long: it may be lost. Whether it came.
+    pub fn reach(&self, sequence: u64, patience: Duration) -> bool {
         let waits = |seen: &mut Seen| seen.sequence < sequence && seen.silent.is_none();
-        drop(self.changed.wait_timeout_while(self.seen(), patience, waits));
+        let waited = self.changed.wait_timeout_while(self.seen(), patience, waits);
+        let (seen, _) = waited.unwrap_or_else(PoisonError::into_inner);
+        seen.sequence >= sequence
     }
 
     pub fn all_objects(&self) -> Vec<Object> {

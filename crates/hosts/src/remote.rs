@@ -588,7 +588,10 @@ impl DividedCalls for RemoteWorld {
             return Err(unexpected());
         };
         check::reaches(&advanced.reaches).map_err(WorldError::Elsewhere)?;
-        self.calls().mirror.reach(sequence, LEASE);
+        // who reads them next sees the states of this moment, and none before it
+        if !self.calls().mirror.reach(sequence, LEASE) {
+            self.calls().refresh()?;
+        }
         Ok(advanced)
     }
 }
