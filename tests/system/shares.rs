@@ -60,8 +60,13 @@ fn came_to(outcome: &Outcome) -> (f64, f64) {
 
 #[test]
 fn steps_that_get_four_times_as_dear_are_paid_for_by_steps_and_by_the_picture() {
-    // next to nothing; two cores; eight: of two that draw as well
-    let [light, dear, dearest] = [0.05, 50.0, 200.0].map(|unit_us| came_to(&play(&strands(2, 2, unit_us, ""), 480)));
+    // next to nothing; two cores; eight: of two that draw as well. After 8 s steps and picture still give way to each other, 16 s are at rest
+    let [light, dear, dearest] = [0.05, 50.0, 200.0].map(|unit_us| {
+        let outcome = play(&strands(2, 2, unit_us, ""), 960);
+        let triangles = || outcome.frames[900..].iter().map(|row| row.triangles);
+        assert_eq!(triangles().min(), triangles().max(), "{unit_us} µs: at rest");
+        came_to(&outcome)
+    });
     let told = format!("{light:?} {dear:?} {dearest:?}");
     assert!((light.0 / 0.005 - 1.0).abs() < 0.01, "{told}");
     assert!(dearest.0 > 1.3 * dear.0 && dear.0 > 1.05 * light.0, "steps: {told}");
