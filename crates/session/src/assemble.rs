@@ -189,18 +189,17 @@ pub struct FixedPart {
     pub group: Option<usize>,
     /// Triangles at every level, of an agent that is one mesh per level.
     pub triangles: [u32; PRIMITIVE_LEVELS],
+    /// What coarser forms lose, of scenery and of what stands for a group.
+    pub losses: Option<Losses>,
 }
 
 /// That of every actor: agents, then scenery, then groups.
 pub fn fixed_parts(scene: &Scene) -> Vec<FixedPart> {
-    // measured now, not in the first frame
-    scene.scenery.iter().for_each(|it| {
-        it.model.losses();
-    });
     let first = scene.agents.len() + scene.scenery.len();
-    let agents = scene.agents.iter().map(|member| FixedPart { group: None, triangles: triangles(&member.spec) });
-    let mut all: Vec<FixedPart> = agents.collect();
-    all.resize(first + scene.groups.len(), FixedPart::default());
+    let agents = scene.agents.iter();
+    let agents = agents.map(|member| FixedPart { triangles: triangles(&member.spec), ..FixedPart::default() });
+    let still = scenery(scene).map(|it| FixedPart { losses: Some(losses(it)), ..FixedPart::default() });
+    let mut all: Vec<FixedPart> = agents.chain(still).collect();
     // inner groups come first
     for (at, (group, members)) in scene.groups.iter().zip(members(scene)).enumerate() {
         for member in members.into_iter().chain(group.groups.clone().map(|inner| first + inner)) {
@@ -208,6 +207,11 @@ pub fn fixed_parts(scene: &Scene) -> Vec<FixedPart> {
         }
     }
     all
+}
+
+fn losses(it: &Scenery) -> Losses {
+    let texture = it.texture.as_ref().map_or(0.0, |texture| texture.loss());
+    Losses { forms: it.model.losses(), range: it.model.range(), texture }
 }
 
 /// All scenery in the order of its actors.
@@ -297,7 +301,7 @@ pub struct Actors<'a> {
 pub fn update_views(views: &mut Vec<ObjectView>, seen: &[Visibility], updated: &[usize], of: Actors<'_>) {
     let view = |at: usize| {
         let fixed = of.fixed_parts.get(at).copied().unwrap_or_default();
-        ObjectView { group: fixed.group, ..view_at(at, &seen[at], of.scene, fixed.triangles) }
+        ObjectView { group: fixed.group, losses: fixed.losses, ..view_at(at, &seen[at], of.scene, fixed.triangles) }
     };
     if views.len() != seen.len() {
         views.clear();
@@ -328,9 +332,7 @@ fn view_and_appearance<'a>(
     if let Some(it) = scene.scenery.get(at - agents) {
         let (least, most) = it.model.range();
         let kind = Kind::Counted { radius_m: seen.radius_m, least, most };
-        let texture = it.texture.as_ref().map_or(0.0, |texture| texture.loss());
-        let losses = Some(Losses { forms: it.model.losses(), texture });
-        let view = ObjectView { pieces: pieces(&it.model), losses, ..still_view(seen, it, kind) };
+        let view = ObjectView { pieces: pieces(&it.model), ..still_view(seen, it, kind) };
         return (view, &it.appearance);
     }
     let group = &scene.groups[at - agents - members];

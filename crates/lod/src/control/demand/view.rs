@@ -56,18 +56,22 @@ impl Pieces {
 /// Forms of a mesh of which the loss is measured.
 pub const FORMS: usize = 9;
 
-/// What is measured to be lost of a mesh, as parts of its pixels (budget.md, eq. 47a).
+/// What is measured to be lost of a mesh, or of the mesh that the impostors of a group are cut from, as parts of its pixels (budget.md,
+/// eq. 47a).
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Losses {
     /// Where it is drawn with fewer triangles: from the fewest to all in equal ratios; ≥ 0.
     pub forms: [f32; FORMS],
+    /// The fewest triangles and all, ≥ 1.
+    pub range: (u32, u32),
     /// Where it is drawn without its texture, 0 … 1.
     pub texture: f32,
 }
 
 impl Losses {
-    /// That of a form of so many triangles, of `least` to `most`: on the line between the forms beside it.
-    pub(crate) fn of_form(&self, polygons: f64, least: f64, most: f64) -> f64 {
+    /// That of a form of so many triangles: on the line between the forms beside it.
+    pub(crate) fn of_form(&self, polygons: f64) -> f64 {
+        let (least, most) = (f64::from(self.range.0.max(1)), f64::from(self.range.1));
         let last = FORMS - 1;
         let place = libm::log(polygons / least) / libm::log(most / least) * last as f64;
         let place = if place >= 0.0 { place.min(last as f64) } else { 0.0 };

@@ -77,12 +77,8 @@ fn printed_accuracy(rung: &Rung, best: Shading, pixels: f64) -> f64 {
 /// (control.md, eq. 21 and 22), relative to the best shading allowed; by what was measured to be lost, where it was.
 pub(crate) fn accuracy(seen: &Seen, polygons: f64, shading: Shading) -> f64 {
     let Seen { kind, losses, best, pixels } = *seen;
-    let shape = match (losses, kind) {
-        (Some(losses), Kind::Counted { least, most, .. }) => {
-            1.0 - BASE_ERROR * losses.of_form(polygons, f64::from(least.max(1)), f64::from(most))
-        }
-        _ => 1.0 - BASE_ERROR / samples(&kind, polygons, pixels),
-    };
+    let lost = losses.map_or_else(|| 1.0 / samples(&kind, polygons, pixels), |losses| losses.of_form(polygons));
+    let shape = 1.0 - BASE_ERROR * lost;
     let light = match shading {
         Shading::Flat => 1.0 - SHADOWED * BASE_ERROR / libm::sqrt(polygons.min(pixels).max(1.0)),
         Shading::Gouraud => {

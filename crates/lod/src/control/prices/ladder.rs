@@ -266,7 +266,9 @@ impl Key {
         let one = |n| rung(Cut { resolution: at(n), polygons: polygons(view, at(n)) }, self.shading.1);
         let mut rungs: Vec<_> = (0..open(view)).map(one).collect();
         let finest = rungs.last().map_or(1.0, |finest| finest.accuracy);
-        rungs.iter_mut().for_each(|rung| rung.accuracy /= finest);
+        // where the finest is all wrong none is better than another
+        let part = |accuracy: f64| if finest > 0.0 { accuracy / finest } else { 1.0 };
+        rungs.iter_mut().for_each(|rung| rung.accuracy = part(rung.accuracy));
         rungs
     }
 
@@ -312,9 +314,13 @@ mod tests {
     use super::*;
 
     fn ladder(impostors: [u32; 8]) -> Ladder {
+        measured(impostors, None)
+    }
+
+    fn measured(impostors: [u32; 8], losses: Option<Losses>) -> Ladder {
         let range = ResolutionRange { eps_m: (1.0, 1.0), n: (0, N_MAX) };
         let kind = Kind::Group { radius_m: 1.0, impostors };
-        let view = ObjectView { range, pixels: 1e4, ..ObjectView::plain(0, kind) };
+        let view = ObjectView { range, losses, pixels: 1e4, ..ObjectView::plain(0, kind) };
         let mut ladders = Ladders::default();
         ladders.update(&[SizedView::of(view)], true, &Prices::default(), &Sliders::default());
         ladders.of(0).clone()
@@ -345,6 +351,18 @@ mod tests {
     }
 
     #[test]
+    fn impostors_lose_what_was_measured_of_the_mesh_that_they_are_cut_from() {
+        let forms = [1.0, 1.0, 1.0, 0.9, 0.8, 0.6, 0.4, 0.2, 0.0];
+        let losses = Losses { forms, range: (2, 512), texture: 0.0 };
+        let Ladder { rungs, .. } = measured([32, 128, 256, 0, 0, 0, 0, 0], Some(losses));
+        // 0.6, 0.8 and 0.9 of the pixels of the whole mesh, over those of the finest impostor
+        let parts = rungs.iter().map(|rung| rung.accuracy);
+        assert!(parts.zip([0.6 / 0.9, 0.8 / 0.9, 1.0]).all(|(a, b)| (a - b).abs() < 1e-6), "{rungs:?}");
+        let worse_than_nothing = measured([2, 8, 0, 0, 0, 0, 0, 0], Some(Losses { forms: [2.5; 9], ..losses }));
+        assert!(worse_than_nothing.rungs.iter().all(|rung| rung.accuracy == 1.0), "{worse_than_nothing:?}");
+    }
+
+    #[test]
     fn a_rung_loses_what_was_measured_of_the_forms_beside_it_and_of_the_texture() {
         let rungs = |losses: Option<Losses>| {
             let kind = Kind::Counted { radius_m: 1.0, least: 2, most: 512 };
@@ -361,13 +379,13 @@ mod tests {
         };
         // of 2, 4 … 512 triangles; the coarsest covers more wrongly than the object has pixels
         let forms = [1.6, 0.9, 0.8, 0.7, 0.6, 0.3, 0.2, 0.1, 0.0];
-        let measured = rungs(Some(Losses { forms, texture: 0.02 }));
+        let measured = rungs(Some(Losses { forms, range: (2, 512), texture: 0.02 }));
         assert!(measured.iter().zip([0.2, 0.7, 0.98]).all(|(a, b)| (a - b).abs() < 1e-6), "{measured:?}");
         assert_eq!(rungs(None), [0.5, 1.0 - 0.5 / 16.0, (1.0 - 0.5 / 256.0) * 0.75]);
-        let between = Losses { forms, texture: 0.0 }.of_form(32.0 * libm::sqrt(2.0), 2.0, 512.0);
+        let between = Losses { forms, range: (2, 512), texture: 0.0 }.of_form(32.0 * libm::sqrt(2.0));
         assert!((between - 0.45).abs() < 1e-6, "{between}");
         // a mesh of one form only loses nothing
-        assert_eq!(Losses { forms: [0.0; 9], texture: 0.0 }.of_form(7.0, 7.0, 7.0), 0.0);
+        assert_eq!(Losses { forms: [0.0; 9], range: (7, 7), texture: 0.0 }.of_form(7.0), 0.0);
     }
 
     #[test]
