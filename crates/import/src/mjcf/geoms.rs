@@ -72,7 +72,7 @@ pub(super) fn meshes<'a>(root: &'a Element, compiler: &Compiler) -> Result<BTree
 pub(super) fn assets<'a>(root: &'a Element, tag: &'static str) -> Result<BTreeMap<String, &'a Element>, ImportError> {
     let mut found = BTreeMap::new();
     for element in root.children("asset").flat_map(|asset| asset.children(tag)) {
-        let stem = |file| Some(std::path::Path::new(file).file_stem()?.to_str()?);
+        let stem = |file| std::path::Path::new(file).file_stem()?.to_str();
         let name = element.text("name").or_else(|| element.text("file").and_then(stem)).unwrap_or(tag);
         if found.insert(name.to_owned(), element).is_some() {
             return Err(
