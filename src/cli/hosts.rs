@@ -12,14 +12,14 @@ mod view;
 
 use super::run::stem;
 use args::{HostArgs, IdentityCommand};
-use common::{LINE_EVERY, red, refused, stopped, warn_open};
+use common::{LINE_EVERY, red, refused, scene_files, stopped, warn_open};
 use metachron_console::exit::Exit;
 use metachron_console::output::{BadInput, data, message, print_overlaps, warn_priority};
 use metachron_hosts::{Authority, Host, Identity, Refusals, SceneFiles, Serving, serve};
 use metachron_runtime::{AgentHandle, TimelineCommand};
 use metachron_scene::{Limits, Source, load};
 use metachron_world::kinds::ExecutorKind;
-use metachron_world::{Scene, SceneText, World};
+use metachron_world::{Scene, World};
 pub(super) use placed::place;
 use serde::Serialize;
 use std::io::IsTerminal;
@@ -133,13 +133,6 @@ fn given_scene(files: SceneFiles, limits: Limits) -> anyhow::Result<Work> {
     let source = Source::recorded(&files.scene.name, &files.scene.text, None)?;
     let scene = load(&source.with_files(files.files.clone()).within(limits), &files.scene.overrides)?;
     Ok(Work { world: World::start(&scene, ExecutorKind::Lockstep)?, name: scene.name, files })
-}
-
-/// The text of a scene, and the files that it names.
-fn scene_files(source: &Source, overrides: &[(String, String)]) -> anyhow::Result<SceneFiles> {
-    let (name, text) = (source.name().to_owned(), source.text().to_owned());
-    let scene = SceneText { name, text, folder: None, overrides: overrides.to_vec() };
-    Ok(SceneFiles { scene, files: source.files_beside().map_err(BadInput)? })
 }
 
 /// The sums at a moment of which lines tell the rates.

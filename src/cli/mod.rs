@@ -53,7 +53,12 @@ fn block_file_size_signal() {
 
 fn dispatch(cli: Cli, matches: &clap::ArgMatches) -> anyhow::Result<Exit> {
     match cli.command {
-        Command::Run(args) => run::command(&args, matches.subcommand_matches("run")),
+        #[cfg(feature = "hosts")]
+        Command::Run(args) => {
+            run::command(&args, matches.subcommand_matches("run"), |request| hosts::place(&args, request))
+        }
+        #[cfg(not(feature = "hosts"))]
+        Command::Run(args) => run::command(&args, matches.subcommand_matches("run"), |_| Ok(())),
         Command::Replay(args) => replay::command(&args),
         #[cfg(feature = "hosts")]
         Command::Host(args) => hosts::host(&args),

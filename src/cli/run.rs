@@ -130,13 +130,15 @@ impl Request {
     }
 }
 
-/// Runs a scene.
-pub(super) fn command(args: &RunArgs, matches: Option<&ArgMatches>) -> anyhow::Result<Exit> {
+/// Runs a scene, on the hosts that `place` gives it to, if any.
+pub(super) fn command(
+    args: &RunArgs,
+    matches: Option<&ArgMatches>,
+    place: impl FnOnce(&mut Request) -> anyhow::Result<()>,
+) -> anyhow::Result<Exit> {
     check_inputs(args)?;
-    #[cfg_attr(not(feature = "hosts"), expect(unused_mut, reason = "only a build with hosts places objects on them"))]
     let mut request = request(args, matches)?;
-    #[cfg(feature = "hosts")]
-    super::hosts::place(args, &mut request)?;
+    place(&mut request)?;
     if !args.output.quiet {
         print_overlaps(&request.scene);
         warn_priority(&request.scene);

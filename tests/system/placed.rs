@@ -9,12 +9,16 @@ use std::sync::Arc;
 /// Scenes in which objects meet, are tied, rest or are governed.
 const SCENES: [&str; 6] = ["crossing", "gripper", "yard", "chain", "mesentery", "stack"];
 
+fn path(name: &str) -> String {
+    format!("{}/scenes/{name}.toml", env!("CARGO_MANIFEST_DIR"))
+}
+
 const TENTH: SimSpan = SimSpan::from_millis(100);
 
 #[test]
 fn built_in_scenes_on_two_and_four_hosts_have_the_bits_of_one_process() {
     for name in SCENES {
-        let scene = load(&Source::open(name).unwrap(), &[]).unwrap();
+        let scene = load(&Source::open(&path(name)).unwrap(), &[]).unwrap();
         let start = || {
             let world = World::start(&scene, ExecutorKind::Lockstep).unwrap();
             world.set_pace(Pace::Free).unwrap();

@@ -12,6 +12,7 @@ mod live_tests;
 pub mod lockstep;
 pub mod pool;
 pub mod priority;
+pub mod side_by_side;
 #[cfg(test)]
 pub mod testing;
 pub mod threads;

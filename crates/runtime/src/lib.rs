@@ -48,6 +48,7 @@ pub use executors::ghosts::Ghosts;
 pub use executors::lockstep::Lockstep;
 pub use executors::pool::Pool;
 pub use executors::priority::{Priority, PriorityRefused, ask_priority, take_priority};
+pub use executors::side_by_side::{on_a_thread, side_by_side};
 pub use executors::threads::{AUTO_THREADS_MAX, THREADS_MAX, Threads};
 pub use lock_free::slot::{LatestSlot, SlotWriter};
 pub use neighbours::broad_phase::Reach;

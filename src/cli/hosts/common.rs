@@ -6,9 +6,9 @@ use super::args::CallArgs;
 use anyhow::Context;
 use metachron_console::output::{BadInput, message};
 use metachron_console::values::LimitArgs;
-use metachron_hosts::{Calling, HostsError, Identity, RemoteWorld, connect};
+use metachron_hosts::{Calling, HostsError, Identity, RemoteWorld, SceneFiles, connect};
 use metachron_scene::{Source, load};
-use metachron_world::{Scene, WorldCalls};
+use metachron_world::{Scene, SceneText, WorldCalls};
 use std::io::IsTerminal;
 use std::sync::mpsc::{Receiver, channel};
 use std::time::Duration;
@@ -51,6 +51,13 @@ pub(super) fn calling(endpoint: &str, call: &CallArgs) -> Result<Calling, HostsE
     let identity = call.identity.as_ref().map(Identity::from_file).transpose()?;
     let calling = identity.into_iter().fold(Calling::at(endpoint), Calling::identity);
     Ok(if call.insecure_lan { calling.insecure_lan() } else { calling })
+}
+
+/// The text of a scene, and the files that it names.
+pub(super) fn scene_files(source: &Source, overrides: &[(String, String)]) -> anyhow::Result<SceneFiles> {
+    let (name, text) = (source.name().to_owned(), source.text().to_owned());
+    let scene = SceneText { name, text, folder: None, overrides: overrides.to_vec() };
+    Ok(SceneFiles { scene, files: source.files_beside().map_err(BadInput)? })
 }
 
 /// A scene as a host says it, with what it was read from.

@@ -3,8 +3,7 @@
 //! In: names of hosts, a request. Out: the same request with a world of its scene on each host. Never here: who steps what.
 
 use super::args::CallArgs;
-use super::common::{calling, refused};
-use super::scene_files;
+use super::common::{calling, refused, scene_files};
 use crate::cli::args::RunArgs;
 use crate::cli::run::Request;
 use metachron_console::output::BadInput;

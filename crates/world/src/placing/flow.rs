@@ -6,9 +6,8 @@ use super::placed_world::PlacedWorld;
 use crate::calls::WorldCalls;
 use crate::error::WorldError;
 use metachron_core::{SimSpan, SimTime};
-use metachron_runtime::{SPEED_RANGE, TimelineCommand};
+use metachron_runtime::{SPEED_RANGE, SystemClock, TimelineCommand, on_a_thread, wait_until};
 use std::sync::{Arc, MutexGuard, PoisonError, Weak};
-use std::thread;
 use std::time::{Duration, Instant};
 
 /// Windows follow each other at least so often, wall time, where time stands or the clock is awaited.
@@ -44,8 +43,8 @@ impl PlacedWorld {
             return Ok(());
         }
         let placed = Arc::downgrade(self);
-        let thread = thread::Builder::new().name("placed-flow".to_owned()).spawn(move || flow(&placed));
-        thread.map(drop).map_err(|error| WorldError::Undivided { reason: format!("no thread: {error}") })
+        on_a_thread("placed-flow", move || flow(&placed))
+            .map_err(|error| WorldError::Undivided { reason: format!("no thread: {error}") })
     }
 
     fn flow(&self) -> MutexGuard<'_, Flow> {
@@ -100,7 +99,7 @@ fn flow(placed: &Weak<PlacedWorld>) {
                 since = Instant::now();
             }
             drop(world);
-            thread::sleep(LOOKS_EVERY);
+            wait_until(&SystemClock::new(), LOOKS_EVERY);
             continue;
         };
         let speed = world.flow().speed.unwrap_or(1.0);

@@ -10,10 +10,9 @@ use crate::error::WorldError;
 use crate::history::checkpoint::{Checkpoint, CheckpointError};
 use crate::reading::object::Object;
 use metachron_core::{AgentId, Body, SimSpan, SimTime};
-use metachron_runtime::{Command, Reach};
+use metachron_runtime::{Command, Reach, side_by_side};
 use std::collections::{BTreeMap, VecDeque};
 use std::sync::Arc;
-use std::thread;
 use std::time::{Duration, Instant};
 
 /// States are kept so often: that much is done again where a host falls silent, or an object leaves its box.
@@ -126,7 +125,7 @@ enum Fault {
 }
 
 /// The outcome of a command to the host of this number, which may refuse it.
-fn told<T>(host: usize, outcome: Result<T, WorldError>) -> Result<T, Fault> {
+fn outcome_of<T>(host: usize, outcome: Result<T, WorldError>) -> Result<T, Fault> {
     outcome.map_err(|error| match error {
         error @ (WorldError::Silent { .. } | WorldError::Stopped) => Fault::Lost(host, error),
         other => Fault::Refused(other),
@@ -255,11 +254,11 @@ impl PlacedWorld {
             Act::Pass(span) => self.pass_window(placing, *span),
             Act::Command(id, command) => {
                 let (host, world) = (owner(*id)?, &self.hosts[owner(*id)?].world);
-                told(host, world.object_of(*id).and_then(|object| world.command(object, **command)))
+                outcome_of(host, world.object_of(*id).and_then(|object| world.command(object, **command)))
             }
             Act::SetState(id, state) => {
                 let (host, world) = (owner(*id)?, &self.hosts[owner(*id)?].world);
-                told(host, world.object_of(*id).and_then(|object| world.set_state(object, state)))
+                outcome_of(host, world.object_of(*id).and_then(|object| world.set_state(object, state)))
             }
             Act::Remove(id) => {
                 placing.leaving.push(*id);
@@ -268,7 +267,7 @@ impl PlacedWorld {
                     match world.object_of(*id).and_then(|object| world.remove(object)) {
                         // it has left there before all went back
                         Err(WorldError::Gone { .. }) => Ok(()),
-                        outcome => told(host, outcome),
+                        outcome => outcome_of(host, outcome),
                     }
                 })
             }
@@ -288,17 +287,10 @@ impl PlacedWorld {
             Ok(HostWindow { advanced, waited })
         };
         let living = placing.living();
-        let outcomes: Vec<Result<HostWindow, Fault>> = thread::scope(|scope| {
-            let advance = &advance;
-            let calls: Vec<_> = living.iter().skip(1).map(|host| scope.spawn(move || advance(*host))).collect();
-            let ended = calls.into_iter().zip(living.iter().skip(1));
-            let first = living.first().map(|host| advance(*host));
-            let panicked = |host: usize| Err(Fault::Lost(host, WorldError::Stopped));
-            first.into_iter().chain(ended.map(|(call, host)| call.join().unwrap_or_else(|_| panicked(*host)))).collect()
-        });
+        let outcomes = side_by_side(&living, |host| advance(*host));
         let mut escaped = false;
         for (host, outcome) in living.into_iter().zip(outcomes) {
-            let HostWindow { advanced, waited } = outcome?;
+            let HostWindow { advanced, waited } = outcome.unwrap_or(Err(Fault::Lost(host, WorldError::Stopped)))?;
             escaped |= advanced.escaped.is_some();
             (placing.reaches[host], placing.bonds[host]) = (advanced.reaches, advanced.bonds);
             let record = &mut placing.seen.records[host];
@@ -410,8 +402,8 @@ impl PlacedWorld {
         for (host, placed) in self.hosts.iter().enumerate() {
             let is_back = placing.seen.lost[host].is_some() && placed.world.answers().is_ok();
             let knows_all = || objects.iter().all(|id| placed.world.object_of(*id).is_ok());
-            let told = |divided: &dyn DividedCalls| divided.release(&objects).and_then(|()| divided.adopt(moment));
-            if is_back && knows_all() && self.part(host, told).is_ok() {
+            let rejoin = |divided: &dyn DividedCalls| divided.release(&objects).and_then(|()| divided.adopt(moment));
+            if is_back && knows_all() && self.part(host, rejoin).is_ok() {
                 placing.seen.lost[host] = None;
             }
         }
