@@ -94,7 +94,7 @@ pub(super) fn host(args: &HostArgs) -> anyhow::Result<Exit> {
     }
 }
 
-/// What ends the service of a world.
+/// Signals that end the service of a world.
 struct Waits<'a> {
     stopped: &'a Receiver<()>,
     given: &'a Receiver<Work>,

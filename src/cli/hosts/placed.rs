@@ -15,7 +15,7 @@ use std::time::{Duration, Instant};
 
 /// A host has so long to make a world of a scene and to serve it.
 const BEGINS_WITHIN: Duration = Duration::from_secs(30);
-/// It is asked so often.
+/// The host is asked so often.
 const ASKED_EVERY: Duration = Duration::from_millis(50);
 
 /// Gives the scene of `request` to the hosts that `args` names, if any.

@@ -49,7 +49,7 @@ pub(crate) struct BroadPhaseState {
     callers: Vec<Vec<AgentId>>,
 }
 
-/// What one agent has published, and the agents that have called it.
+/// The bounds that one agent has published, and the agents that have called it.
 #[derive(Debug, Clone, serde::Serialize, serde::Deserialize)]
 pub(crate) struct PublishedState {
     bounds: Option<BoxWords>,
@@ -249,7 +249,7 @@ impl BroadPhase {
         callers.iter().for_each(|from| self.call(to, *from));
     }
 
-    /// What `id` has published; called between turns.
+    /// The bounds of `id` and its callers; called between turns.
     pub fn state_of(&self, id: AgentId) -> PublishedState {
         let bounds = self.bounds.get(id.0 as usize).and_then(PublishedBounds::words);
         PublishedState { bounds, callers: self.callers_of(id) }

@@ -90,7 +90,7 @@ impl PlacedWorld {
     }
 }
 
-/// Lets time pass until nobody else holds the world.
+/// Lets time pass for as long as another holds the world.
 fn flow(placed: &Weak<PlacedWorld>) {
     let mut since = Instant::now();
     while let Some(world) = placed.upgrade() {

@@ -1,6 +1,6 @@
 //! Which objects have to be stepped by one host, and by which.
 //!
-//! In: where objects are, who is tied to whom, what each costs. Out: groups of objects that cannot meet each other within a window of
+//! In: where objects are, pairs of objects that are tied, what each costs. Out: groups of objects that cannot meet each other within a window of
 //! time, a host for each. Never here: calls of hosts.
 
 use glam::DVec3;

@@ -29,7 +29,7 @@ pub struct PlacedHost {
     pub world: Arc<dyn WorldCalls>,
 }
 
-/// What a host carries.
+/// The load of a host.
 #[derive(Debug, Clone, PartialEq)]
 pub struct HostLoad {
     /// Its name.
@@ -125,7 +125,7 @@ impl PlacedWorld {
         self.placing.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// What each host carries.
+    /// The load of each host.
     #[must_use]
     pub fn loads(&self) -> Vec<HostLoad> {
         let placing = self.seen();
@@ -328,8 +328,8 @@ mod tests {
         scene.build().unwrap()
     }
 
-    fn world() -> World {
-        let world = World::start(&scene(), ExecutorKind::Lockstep).unwrap();
+    fn world(scene: &Scene) -> World {
+        let world = World::start(scene, ExecutorKind::Lockstep).unwrap();
         world.set_pace(Pace::Free).unwrap();
         world
     }
@@ -339,13 +339,13 @@ mod tests {
         placed: PlacedWorld,
     }
 
-    fn placed(hosts: usize) -> Placed {
-        let worlds: Vec<_> = (0..hosts).map(|_| world()).collect();
+    fn placed(scene: &Scene, hosts: usize) -> Placed {
+        let worlds: Vec<_> = (0..hosts).map(|_| world(scene)).collect();
         let host = |(number, world): (usize, &World)| PlacedHost {
             name: format!("host{number}"),
             world: Arc::new(world.clone()),
         };
-        let placed = PlacedWorld::start(&scene(), worlds.iter().enumerate().map(host).collect()).unwrap();
+        let placed = PlacedWorld::start(scene, worlds.iter().enumerate().map(host).collect()).unwrap();
         Placed { worlds, placed }
     }
 
@@ -369,17 +369,11 @@ mod tests {
     #[test]
     fn a_crowd_that_meets_and_parts_has_the_bits_of_one_process() {
         let scene = crowd();
-        let start = || {
-            let world = World::start(&scene, ExecutorKind::Lockstep).unwrap();
-            world.set_pace(Pace::Free).unwrap();
-            world
-        };
-        let host = |number: usize| PlacedHost { name: number.to_string(), world: Arc::new(start()) };
-        let placed = [2, 3].map(|hosts| PlacedWorld::start(&scene, (0..hosts).map(host).collect()).unwrap());
-        let whole = start();
+        let all = [2, 3].map(|hosts| placed(&scene, hosts));
+        let whole = world(&scene);
         for quarter in 0..12 {
             whole.advance(QUARTER);
-            for placed in &placed {
+            for Placed { placed, .. } in &all {
                 placed.advance(QUARTER).unwrap();
                 assert_eq!(placed.hash().unwrap(), whole.hash(), "quarter {quarter}: {:?}", placed.loads());
             }
@@ -390,8 +384,8 @@ mod tests {
 
     #[test]
     fn states_on_one_two_and_four_hosts_are_those_of_one_process() {
-        let whole = world();
-        let all: Vec<_> = [1, 2, 4].map(placed).into();
+        let whole = world(&scene());
+        let all: Vec<_> = [1, 2, 4].map(|hosts| placed(&scene(), hosts)).into();
         for quarter in 0..12 {
             whole.advance(QUARTER);
             for Placed { placed, worlds } in &all {
@@ -414,7 +408,7 @@ mod tests {
 
     #[test]
     fn a_host_that_falls_silent_changes_no_bit() {
-        let (whole, Placed { worlds, placed }) = (world(), placed(3));
+        let (whole, Placed { worlds, placed }) = (world(&scene()), placed(&scene(), 3));
         for quarter in 0..8 {
             whole.advance(QUARTER);
             if let 2 | 5 = quarter {
@@ -431,7 +425,7 @@ mod tests {
 
     #[test]
     fn commands_and_objects_that_join_and_leave_act_as_in_one_process() {
-        let (whole, Placed { placed, .. }) = (world(), placed(2));
+        let (whole, Placed { placed, .. }) = (world(&scene()), placed(&scene(), 2));
         let calls: [&dyn WorldCalls; 2] = [&whole, &placed];
         let same = |what: &str| assert_eq!(placed.hash().unwrap(), whole.hash(), "{what}");
         let hit = Command::impulse(Anchor::Local(DVec3::ZERO), DVec3::new(0.0, 8.0, 2.0));

@@ -29,7 +29,7 @@ const ROOM_FALLS: f64 = 0.98;
 /// By this rate the cost of an object that joined is reckoned.
 const RATE_JOINED_HZ: f64 = 60.0;
 
-/// Who steps what.
+/// The hosts' parts, and how far time has come.
 pub(super) struct Placing {
     pub seen: PlacingSeen,
     /// Where objects may be found, and which belong together, by hosts.
@@ -37,7 +37,7 @@ pub(super) struct Placing {
     bonds: Vec<Vec<[AgentId; 2]>>,
     room: f64,
     kept: Kept,
-    /// What was done since states were kept.
+    /// Acts since states were kept.
     since: Vec<Act>,
     /// Objects that leave at their next steps.
     leaving: Vec<AgentId>,
@@ -415,7 +415,7 @@ impl PlacedWorld {
         self.take_back(placing, &moment);
         let living = placing.living();
         let mut kept = Kept { time: placing.seen.time, moment, packs: Vec::new() };
-        // without another host nobody could go on with them
+        // without another host they could not go on
         if living.len() > 1 {
             let reaches: Vec<Reach> = placing.reaches.iter().flatten().copied().collect();
             let groups = groups(&placing.objects(), &reaches, &self.ties_of(placing));

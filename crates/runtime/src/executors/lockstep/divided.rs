@@ -67,7 +67,7 @@ impl Lockstep {
                 broad_phase.publish_nowhere(id, self.timeline.sim_at(self.now));
             }
         }
-        // whoever leads it does so elsewhere
+        // its leader leads it elsewhere
         self.cut(|cut| {
             for id in away {
                 cut.run_agents.sleep.follow(id, None);
