@@ -142,17 +142,21 @@ impl BroadPhase {
         self.calls.grow();
     }
 
-    /// Publishes that `id` is inside `bounds` at its time `time`; called by the thread that makes its turns. Returns the published speed.
-    pub fn publish(&self, id: AgentId, bounds: &Bounds, time: SimTime) -> f64 {
-        let Some(published) = self.bounds.get(id.0 as usize) else { return 0.0 };
-        let before = published.mine();
-        let speed_before_m_s = before.map_or(0.0, |reach| reach.speed_m_s);
-        let speed_m_s = published_speed(bounds.speed_m_s, speed_before_m_s);
-        published.write(&MovingBox::new(bounds, speed_m_s, time));
-        if speed_m_s > speed_before_m_s || before.is_none() {
+    /// Publishes that `id` is inside `bounds` before a `step`; called by the thread that makes its turns. Returns what is published.
+    pub fn publish(&self, id: AgentId, bounds: &Bounds, step: PlannedStep) -> MovingBox {
+        let PlannedStep { start: time, dt } = step;
+        let Bounds { low, high, speed_m_s } = *bounds;
+        let written = self.bounds.get(id.0 as usize);
+        let before = written.and_then(PublishedBounds::mine);
+        let [speed_before_m_s, step_before_s] = before.map_or([0.0; 2], |reach| [reach.speed_m_s, reach.step_s]);
+        let speed_m_s = published_speed(speed_m_s, speed_before_m_s);
+        let step_s = seldom_changed(dt.as_secs_f64(), dt.as_secs_f64(), step_before_s);
+        let published = MovingBox { low, high, speed_m_s, step_s, time };
+        written.into_iter().for_each(|written| written.write(&published));
+        if speed_m_s > speed_before_m_s || step_s > step_before_s || before.is_none() {
             self.log_speed(id);
         }
-        speed_m_s
+        published
     }
 
     /// The last published box of `id`.
@@ -172,7 +176,7 @@ impl BroadPhase {
     pub fn publish_nowhere(&self, id: AgentId, time: SimTime) {
         let Some(published) = self.bounds.get(id.0 as usize) else { return };
         let nowhere = DVec3::splat(NOWHERE_M);
-        published.write(&MovingBox { low: nowhere, high: nowhere, speed_m_s: 0.0, time });
+        published.write(&MovingBox { low: nowhere, high: nowhere, speed_m_s: 0.0, step_s: 0.0, time });
         self.calls.get(id.0 as usize).into_iter().for_each(|calls| calls.pages.store(None));
     }
 
@@ -315,12 +319,17 @@ fn zeros(count: usize) -> Vec<AtomicU64> {
     std::iter::repeat_with(AtomicU64::default).take(count).collect()
 }
 
-/// The speed to publish for an agent of `speed_m_s` that published `published` before: a power of two above it, so that it seldom changes,
-/// lowered only if it is far too high.
+/// The speed to publish for an agent of `speed_m_s` that published `published` before.
 fn published_speed(speed_m_s: f64, published: f64) -> f64 {
-    let wanted = (speed_m_s * SPEED_ROOM).max(SPEED_LEAST_M_S);
+    let least = speed_m_s.max(SPEED_LEAST_M_S);
+    seldom_changed(least, (speed_m_s * SPEED_ROOM).max(least), published)
+}
+
+/// A bound to publish that is not below `least`, and was `published` before: a power of two above what is `wanted`, so that it seldom changes,
+/// lowered only if it is far too high.
+fn seldom_changed(least: f64, wanted: f64, published: f64) -> f64 {
     let raised = libm::exp2(libm::ceil(libm::log2(wanted)));
-    if published >= speed_m_s && published >= SPEED_LEAST_M_S && published <= 4.0 * raised { published } else { raised }
+    if published >= least && published <= 4.0 * raised { published } else { raised }
 }
 
 #[cfg(test)]

@@ -13,7 +13,7 @@ use crate::lock_free::slot::SlotWriter;
 use crate::turn::helpers::Helpers;
 use metachron_contact::remote::{PairClock, computes};
 use metachron_contact::{Input, Law, Neighbour, acknowledged};
-use metachron_core::{AgentId, Archive, ArchiveError, Snapshot, archive_values};
+use metachron_core::{AgentId, Archive, ArchiveError, SimSpan, Snapshot, archive_values};
 use metachron_geometry::{CollisionShape, ShapeKind};
 use std::sync::atomic::{
     AtomicBool,
@@ -174,7 +174,8 @@ impl Peers {
         for agent in &self.all {
             let state = agent.latest();
             state.bounds.iter().for_each(|bounds| {
-                broad_phase.publish(agent.id(), bounds, state.moment());
+                // how long steps are is published with the next states
+                broad_phase.publish(agent.id(), bounds, PlannedStep { start: state.moment(), dt: SimSpan::ZERO });
             });
         }
     }
@@ -289,12 +290,12 @@ impl Observer {
         &self.neighbours
     }
 
-    /// Publishes the bounds of the state that this agent has just written to the broad phase.
-    pub fn publish(&mut self, peers: &Peers, state: &Snapshot) {
+    /// Publishes the bounds of the state that this agent has just written to the broad phase; its next step takes `dt`.
+    pub fn publish(&mut self, peers: &Peers, state: &Snapshot, dt: SimSpan) {
         if let Some(broad_phase) = peers.broad_phase.get() {
             let me = self.me;
             let neighbour_list = self.neighbour_list.get_or_insert_with(|| Box::new(NeighbourList::new(me)));
-            neighbour_list.publish(broad_phase, state.bounds.as_ref(), state.moment());
+            neighbour_list.publish(broad_phase, state.bounds.as_ref(), PlannedStep { start: state.moment(), dt });
         }
     }
 

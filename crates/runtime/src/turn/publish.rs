@@ -58,7 +58,7 @@ impl AgentRunner {
         })?;
         let model = self.shared.model();
         if let (true, Some(state)) = (finite, self.writer.filled()) {
-            self.observer.publish(&self.peers, state);
+            self.observer.publish(&self.peers, state, self.pace.wanted());
             self.shared.traces.iter().for_each(|trace| locked(trace).record(state));
             Ok(())
         } else {

@@ -349,7 +349,7 @@ mod tests {
         Placed { worlds, placed }
     }
 
-    /// Boxes and balls that fall on each other, part and roll apart.
+    /// Boxes and balls of three rates that fall on each other, part and roll apart.
     fn crowd() -> Scene {
         let mut seed = 12_u64;
         let mut random = || {
@@ -361,6 +361,7 @@ mod tests {
             let place = [2.0 * random(), 2.0 * random(), 0.1 + 1.5 * random()];
             let body = if number % 2 == 0 { Rigid::ball(0.06) } else { Rigid::cuboid([0.05, 0.04, 0.06]) };
             let velocity = [3.0 * random() - 1.5, 3.0 * random() - 1.5, 0.0];
+            let body = body.rate_hz([60.0, 120.0, 240.0][number as usize % 3]);
             scene = scene.add(format!("body {number}"), body.mass_kg(0.1 + random()).at(place).velocity_m_s(velocity));
         }
         scene.build().unwrap()

@@ -2,7 +2,8 @@
 //!
 //! In: the agent's own box and time, the broad phase. Out: the peers near enough, by rising numbers.
 //! Every peer has a next check: the time before which the two cannot be near, from their distance and their published speeds (the kinetic
-//! form of a Verlet list). It is not checked earlier. The few earliest checks are stored one by one; all other peers share one, the
+//! form of a Verlet list). It need not be checked earlier, and where it is, it is not near: which peers are near does not depend on when
+//! others are checked. The few earliest checks are stored one by one; all other peers share one, the
 //! earliest of theirs, at which all agents are checked: memory per agent does not grow with the number of agents. Never here: the purpose of the list.
 
 use super::published_bounds::{MovingBox, ReadBounds};
@@ -24,8 +25,8 @@ pub(crate) struct NeighbourList {
     soonest: SimTime,
     /// The common next check of all peers that are not listed.
     common_check: SimTime,
-    /// The step length for which checks were made.
-    dt: SimSpan,
+    /// Next checks are early enough for steps of up to this length.
+    longest: SimSpan,
     /// The first log entry that has not been read.
     unread: u64,
     near: Vec<AgentId>,
@@ -72,7 +73,7 @@ impl NeighbourList {
             listed: Vec::new(),
             soonest: SimTime::ZERO,
             common_check: SimTime::ZERO,
-            dt: SimSpan::ZERO,
+            longest: SimSpan::ZERO,
             unread: 0,
             near: Vec::new(),
             epoch: Epoch::default(),
@@ -81,9 +82,9 @@ impl NeighbourList {
 
     /// Writes or reads the agents near, and when others are looked at again.
     pub fn archive(&mut self, archive: &mut Archive<'_>) -> Result<(), ArchiveError> {
-        let Self { me: _, mine, speed_before_m_s, listed, soonest, common_check, dt, unread, near, epoch } = self;
+        let Self { me: _, mine, speed_before_m_s, listed, soonest, common_check, longest, unread, near, epoch } = self;
         archive_values!(archive, *mine, *speed_before_m_s, *listed, *soonest, *common_check)?;
-        archive_values!(archive, *dt, *unread, *near, *epoch)
+        archive_values!(archive, *longest, *unread, *near, *epoch)
     }
 
     /// Looks at all agents before its next step: it comes from another process, whose log has other numbers.
@@ -96,14 +97,13 @@ impl NeighbourList {
         &self.near
     }
 
-    /// Publishes to the broad phase that this agent is inside `bounds` at its time `time` (`None`: without bounds).
-    pub fn publish(&mut self, broad_phase: &BroadPhase, bounds: Option<&Bounds>, time: SimTime) {
+    /// Publishes to the broad phase that this agent is inside `bounds` before a `step` (`None`: without bounds).
+    pub fn publish(&mut self, broad_phase: &BroadPhase, bounds: Option<&Bounds>, step: PlannedStep) {
         let published = self.mine.map_or(0.0, |mine| mine.speed_m_s);
         self.mine = bounds.filter(|b| is_sound(b)).map(|bounds| {
             let speed_m_s = bounds.speed_m_s.max(self.speed_before_m_s);
-            let published_m_s =
-                broad_phase.publish(self.me, &Bounds { speed_m_s, ..*bounds }, time).max(SPEED_LEAST_M_S);
-            MovingBox::new(bounds, published_m_s, time)
+            let published = broad_phase.publish(self.me, &Bounds { speed_m_s, ..*bounds }, step);
+            MovingBox { speed_m_s: published.speed_m_s.max(SPEED_LEAST_M_S), ..published }
         });
         self.speed_before_m_s = bounds.map_or(0.0, |b| b.speed_m_s);
         if self.mine.is_some_and(|mine| mine.speed_m_s > published) {
@@ -125,8 +125,7 @@ impl NeighbourList {
             (self.epoch, self.common_check) = (members.epoch(), SimTime::ZERO);
         }
         self.read_log(broad_phase, members);
-        // checks leave time for two steps
-        if dt.as_nanos() > 2 * self.dt.as_nanos() {
+        if dt > self.longest {
             self.common_check = SimTime::ZERO;
         }
         if self.soonest.min(self.common_check) > now {
@@ -134,11 +133,11 @@ impl NeighbourList {
         }
         let Some(mine) = self.mine else { return 0 };
         let checked = if self.common_check <= now {
-            self.dt = dt;
-            self.check_all(broad_phase, now, members, may_touch)
+            self.longest = SimSpan::from_nanos(dt.as_nanos().saturating_mul(2));
+            self.check_all(broad_phase, step, members, may_touch)
         } else {
             self.listed.retain(|other| !members.has(other.id));
-            self.check_due(broad_phase, &mine, now, may_touch)
+            self.check_due(broad_phase, &mine, step, may_touch)
         };
         self.soonest = self.listed.iter().map(|other| other.at).min().unwrap_or(NEVER);
         self.near.clear();
@@ -151,16 +150,15 @@ impl NeighbourList {
         &mut self,
         broad_phase: &BroadPhase,
         mine: &MovingBox,
-        now: SimTime,
+        step: PlannedStep,
         may_touch: impl Fn(AgentId) -> bool,
     ) -> usize {
-        let (mut checked, common_check) = (0, self.common_check);
-        let step = PlannedStep { start: now, dt: self.dt };
+        let (mut checked, common_check, longest) = (0, self.common_check, self.longest);
         self.listed.retain_mut(|other| {
             let is_new = other.at == SimTime::ZERO;
-            if other.at <= now {
+            if other.at <= step.start {
                 checked += 1;
-                (other.at, other.near) = next_check(mine, broad_phase.bounds_of(other.id), other.near, step);
+                (other.at, other.near) = next_check(mine, broad_phase.bounds_of(other.id), other.near, step, longest);
             }
             (other.near || other.at < common_check) && (!is_new || may_touch(other.id))
         });
@@ -171,12 +169,12 @@ impl NeighbourList {
     fn check_all(
         &mut self,
         broad_phase: &BroadPhase,
-        now: SimTime,
+        step: PlannedStep,
         members: &Membership,
         may_touch: impl Fn(AgentId) -> bool,
     ) -> usize {
         let Some(mine) = self.mine else { return 0 };
-        let step = PlannedStep { start: now, dt: self.dt };
+        let longest = self.longest;
         let (mut limit, mut checked) = (2 * LISTED, 0);
         self.common_check = NEVER;
         self.listed.clear();
@@ -186,11 +184,11 @@ impl NeighbourList {
         {
             let seen = published.read();
             checked += 1;
-            if is_far(&mine, &seen, self.common_check, step) {
+            if is_far(&mine, &seen, self.common_check, step.start, longest) {
                 continue;
             }
             let was_near = self.near.binary_search(&id).is_ok();
-            let (at, near) = next_check(&mine, seen, was_near, step);
+            let (at, near) = next_check(&mine, seen, was_near, step, longest);
             if (!near && at >= self.common_check) || !may_touch(id) {
                 continue;
             }
@@ -243,27 +241,32 @@ impl NeighbourList {
 /// they were ([`next_check`] of both).
 pub(super) fn reach_m(speed_m_s: f64, dt: SimSpan) -> f64 {
     let dt_s = dt.as_secs_f64();
-    SKIN_M + FAR_ROOM * ((FAR_STEPS + 1.0) * dt_s * speed_m_s + ACCELERATION_M_S2 * dt_s * dt_s)
+    SKIN_M + FAR_ROOM * ((FAR_STEPS + 1.0) * dt_s * speed_m_s + surplus_m(dt))
 }
 
 /// Whether a peer that is `seen` is certainly not near and its next check not before `common_check`: without a square root or a division, as
 /// most peers in a large scene are distant. If in doubt it returns `false`.
-fn is_far(mine: &MovingBox, seen: &ReadBounds, common_check: SimTime, step: PlannedStep) -> bool {
-    let PlannedStep { start: now, dt } = step;
+fn is_far(mine: &MovingBox, seen: &ReadBounds, common_check: SimTime, now: SimTime, longest: SimSpan) -> bool {
     let ReadBounds::Known(theirs) = seen else { return false };
     if common_check == NEVER {
         return false;
     }
-    let dt_s = dt.as_secs_f64();
-    // the common next check, plus the steps ahead of contact at which a peer already counts as near
-    let until_s = (common_check.secs_after(now) + NEAR_STEPS * dt_s).max(FAR_STEPS * dt_s);
-    let way_m = until_s * (mine.speed_m_s + theirs.speed_m_s);
-    let least_m = FAR_ROOM * (way_m + SKIN_M + drift_m(theirs, now) + 0.5 * ACCELERATION_M_S2 * dt_s * dt_s);
+    // as many of the longest steps ahead as a near one stays near for of its own, which are half as long
+    let until_s = common_check.secs_after(now) + NEAR_STEPS * longest.as_secs_f64();
+    let way_m = until_s * (mine.speed_m_s + theirs.speed_m_s) + leap_m(theirs);
+    let least_m = FAR_ROOM * (way_m + SKIN_M + drift_m(theirs, now) + surplus_m(longest));
     mine.gap_vector(theirs).length_squared() > least_m * least_m
 }
 
-/// When a peer that is `seen` is checked again, and whether it is near now, before a `step`.
-fn next_check(mine: &MovingBox, seen: ReadBounds, was_near: bool, step: PlannedStep) -> (SimTime, bool) {
+/// When a peer that is `seen` is checked again, before a step that is longer than `longest`, and whether it is near now, before a `step`.
+/// Until then it is not near at any check (`docs/theory/clusters.md`, section 11).
+fn next_check(
+    mine: &MovingBox,
+    seen: ReadBounds,
+    was_near: bool,
+    step: PlannedStep,
+    longest: SimSpan,
+) -> (SimTime, bool) {
     let PlannedStep { start: now, dt } = step;
     let next_turn = now + SimSpan::from_nanos(1);
     let theirs = match seen {
@@ -272,22 +275,29 @@ fn next_check(mine: &MovingBox, seen: ReadBounds, was_near: bool, step: PlannedS
         ReadBounds::Changing => return (next_turn, true),
         ReadBounds::Known(reach) => reach,
     };
-    let dt_s = dt.as_secs_f64();
+    let (dt_s, longest_s) = (dt.as_secs_f64(), longest.as_secs_f64());
+    let speed_m_s = mine.speed_m_s + theirs.speed_m_s;
     // own matter is where its box was last published, however long ago: time dropped or slept moves nothing
-    let slack_m = mine.gap_m(&theirs) - SKIN_M - drift_m(&theirs, now) - 0.5 * ACCELERATION_M_S2 * dt_s * dt_s;
-    let until_s = slack_m / (mine.speed_m_s + theirs.speed_m_s);
-    let near = until_s <= dt_s * if was_near { FAR_STEPS } else { NEAR_STEPS };
-    let at = SimSpan::from_secs_f64(until_s - NEAR_STEPS * dt_s).map_or(NEVER, |span| now + span);
+    let slack_m = mine.gap_m(&theirs) - SKIN_M - drift_m(&theirs, now);
+    let near = slack_m - surplus_m(dt) <= speed_m_s * dt_s * if was_near { FAR_STEPS } else { NEAR_STEPS };
+    let until_s = (slack_m - surplus_m(longest) - leap_m(&theirs)) / speed_m_s - NEAR_STEPS * longest_s;
+    let at = SimSpan::from_secs_f64((until_s / FAR_ROOM).max(0.0)).map_or(NEVER, |span| now + span);
     (if near { next_turn } else { at.max(next_turn) }, near)
+}
+
+/// How far an unpublished change of speed leads within a step, metres.
+fn surplus_m(dt: SimSpan) -> f64 {
+    0.5 * ACCELERATION_M_S2 * dt.as_secs_f64() * dt.as_secs_f64()
 }
 
 /// How far matter may have moved out of its box by `now`, metres; zero for a box at rest.
 fn drift_m(reach: &MovingBox, now: SimTime) -> f64 {
-    if reach.speed_m_s == 0.0 {
-        return 0.0;
-    }
-    let age_s = now.secs_after(reach.time).abs();
-    reach.speed_m_s * age_s + 0.5 * ACCELERATION_M_S2 * age_s * age_s
+    reach.speed_m_s * now.secs_after(reach.time).abs()
+}
+
+/// How much nearer a box that is published before its time comes may be than it is then, metres: a step ahead, and led a step back.
+fn leap_m(reach: &MovingBox) -> f64 {
+    2.0 * reach.speed_m_s * reach.step_s
 }
 
 fn is_sound(bounds: &Bounds) -> bool {

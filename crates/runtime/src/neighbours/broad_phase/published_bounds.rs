@@ -6,26 +6,24 @@
 
 use crate::lock_free::seqlock::{ReadOutcome, Seqlock};
 use glam::DVec3;
-use metachron_core::{Bounds, SimTime};
+use metachron_core::SimTime;
 
 /// A box around an agent's matter at one moment, and how fast it may grow in every direction after and before it.
 #[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
-pub(super) struct MovingBox {
+pub(crate) struct MovingBox {
     /// Least coordinates, metres.
     pub low: DVec3,
     /// Greatest coordinates, metres.
     pub high: DVec3,
     /// An upper bound of the speed of all its points, m/s; zero at rest.
     pub speed_m_s: f64,
+    /// No step from there is longer, s.
+    pub step_s: f64,
     /// The moment, in the agent's own time.
     pub time: SimTime,
 }
 
 impl MovingBox {
-    pub fn new(bounds: &Bounds, speed_m_s: f64, time: SimTime) -> Self {
-        Self { low: bounds.low, high: bounds.high, speed_m_s, time }
-    }
-
     /// The distance between two boxes, metres; zero where they overlap.
     pub fn gap_m(&self, other: &Self) -> f64 {
         self.gap_vector(other).length()
@@ -104,18 +102,19 @@ fn words(reach: &MovingBox) -> BoxWords {
         pair(down(low.x), down(low.y)),
         pair(down(low.z), up(high.x)),
         pair(up(high.y), up(high.z)),
-        u64::from(up(reach.speed_m_s).to_bits()),
+        pair(up(reach.step_s), up(reach.speed_m_s)),
         reach.time.as_nanos(),
     ]
 }
 
-fn reach([a, b, c, speed, time]: BoxWords) -> MovingBox {
+fn reach([a, b, c, rates, time]: BoxWords) -> MovingBox {
     let first = |word: u64| f64::from(f32::from_bits((word >> 32) as u32));
     let second = |word: u64| f64::from(f32::from_bits(word as u32));
     MovingBox {
         low: DVec3::new(first(a), second(a), first(b)),
         high: DVec3::new(second(b), first(c), second(c)),
-        speed_m_s: second(speed),
+        speed_m_s: second(rates),
+        step_s: first(rates),
         time: SimTime::from_nanos(time),
     }
 }
@@ -147,11 +146,11 @@ mod tests {
         assert_eq!(published.read(), ReadBounds::Unpublished);
         let third = DVec3::new(1.0 / 3.0, -1.0 / 3.0, 1e-9);
         let time = SimTime::from_nanos(u64::MAX - 1);
-        let written = MovingBox { low: -third, high: third * 2.0, speed_m_s: 0.1, time };
+        let written = MovingBox { low: -third, high: third * 2.0, speed_m_s: 0.1, step_s: 0.3, time };
         published.write(&written);
         let read = published.mine().unwrap();
         assert!(read.low.cmple(written.low).all() && read.high.cmpge(written.high).all());
-        assert!(read.speed_m_s >= 0.1 && read.time == time);
+        assert!(read.speed_m_s >= 0.1 && read.step_s >= 0.3 && read.time == time);
         // 24 bits: half a unit in the last place of 1/3 and of 0.1
         assert!((read.low - written.low).length() < 1e-7 && read.speed_m_s < 0.1 + 1e-8);
     }
@@ -176,7 +175,7 @@ mod tests {
             for k in 1..=200_000_u32 {
                 let at = DVec3::splat(f64::from(k));
                 let time = SimTime::from_nanos(u64::from(k));
-                published.write(&MovingBox { low: at, high: at, speed_m_s: f64::from(k), time });
+                published.write(&MovingBox { low: at, high: at, speed_m_s: f64::from(k), step_s: 1.0, time });
             }
             done.store(true, Ordering::Release);
             reader.join().unwrap();
