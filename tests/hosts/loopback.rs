@@ -8,7 +8,7 @@ use metachron::runtime::{Command, TimelineCommand};
 use metachron::scene::{Source, load};
 use metachron::world::kinds::ExecutorKind;
 use metachron::world::{
-    EventFilter, GhostWorld, Happening, Rigid, Scene, SceneText, Tube, World, WorldCalls, WorldError,
+    EventFilter, GhostWorld, Happening, Pace, PlacedHost, PlacedWorld, Rigid, Scene, SceneText, Tube, World, WorldCalls, WorldError,
 };
 use std::io::{Read, Write};
 use std::net::{TcpListener, TcpStream};
@@ -264,39 +264,112 @@ fn another_scene_is_refused_in_one_sentence() {
     assert!(matches!(connect("tcp/10.0.0.1:7447"), Err(HostsError::NeedsCertificates { .. })));
 }
 
-/// Carries bytes between a caller and `host` until it is to be silent: its connections stay open then.
-fn relay(host: &str, is_silent: &Arc<AtomicBool>) -> String {
-    let listener = TcpListener::bind("127.0.0.1:0").unwrap();
-    let (host, port) = (host.trim_start_matches("tcp/").to_owned(), listener.local_addr().unwrap().port());
-    let is_silent = Arc::clone(is_silent);
-    std::thread::spawn(move || {
-        for caller in listener.incoming().map_while(Result::ok) {
-            let Ok(served) = TcpStream::connect(&host) else { return };
-            for (mut from, mut to) in [(caller.try_clone().unwrap(), served.try_clone().unwrap()), (served, caller)] {
-                let is_silent = Arc::clone(&is_silent);
-                std::thread::spawn(move || {
-                    let mut bytes = [0; 65536];
-                    while let Ok(count @ 1..) = from.read(&mut bytes) {
-                        if !is_silent.load(Relaxed) && to.write_all(&bytes[..count]).is_err() {
-                            return;
-                        }
-                    }
-                });
+/// A link between a caller and a host.
+#[derive(Default)]
+struct BadLink {
+    /// It carries nothing: its connections stay open.
+    is_silent: AtomicBool,
+    /// From the one to the other.
+    delay: Duration,
+}
+
+impl BadLink {
+    /// Carries what comes out of one end into the other.
+    fn carry(self: Arc<Self>, mut from: TcpStream, mut to: TcpStream) {
+        let (sends, comes) = std::sync::mpsc::channel::<(Instant, Vec<u8>)>();
+        let delay = self.delay;
+        std::thread::spawn(move || {
+            for (sent, bytes) in comes {
+                std::thread::sleep((sent + delay).saturating_duration_since(Instant::now()));
+                if to.write_all(&bytes).is_err() {
+                    return;
+                }
+            }
+        });
+        let mut bytes = [0; 65536];
+        while let Ok(count @ 1..) = from.read(&mut bytes) {
+            if !self.is_silent.load(Relaxed) && sends.send((Instant::now(), bytes[..count].to_vec())).is_err() {
+                return;
             }
         }
-    });
-    format!("tcp/127.0.0.1:{port}")
+    }
+
+    /// The endpoint of `host` over it.
+    fn to(self: &Arc<Self>, host: &str) -> String {
+        let listener = TcpListener::bind("127.0.0.1:0").unwrap();
+        let (host, port) = (host.trim_start_matches("tcp/").to_owned(), listener.local_addr().unwrap().port());
+        let link = Arc::clone(self);
+        std::thread::spawn(move || {
+            for caller in listener.incoming().map_while(Result::ok) {
+                let Ok(served) = TcpStream::connect(&host) else { return };
+                for (from, to) in [(caller.try_clone().unwrap(), served.try_clone().unwrap()), (served, caller)] {
+                    let link = Arc::clone(&link);
+                    std::thread::spawn(move || link.carry(from, to));
+                }
+            }
+        });
+        format!("tcp/127.0.0.1:{port}")
+    }
+}
+
+#[test]
+fn two_hosts_over_links_of_20_ms_have_the_bits_of_one_process() {
+    let ball = |scene: metachron::world::SceneBuilder, number: i32| {
+        let (x, towards) = (0.5 * f64::from(number), 1.0 - 2.0 * f64::from(number % 2));
+        let ball = Rigid::ball(0.05).mass_kg(0.2).at([x, 0.0, 0.06]).velocity_m_s([towards, 0.0, 0.0]);
+        scene.add(format!("ball {number}"), ball)
+    };
+    let scene = (0..6).fold(Scene::builder().fixed("floor", Solid::Plane), ball).build().unwrap();
+    let world = || {
+        let world = World::start(&scene, ExecutorKind::Lockstep).unwrap();
+        world.set_pace(Pace::Free).unwrap();
+        world
+    };
+    let link = Arc::new(BadLink { delay: Duration::from_millis(20), ..BadLink::default() });
+    let served = [free_endpoint(), free_endpoint()]
+        .map(|endpoint| (serve(Arc::new(world()), Serving::new("bench", &endpoint)).unwrap(), endpoint));
+    let host = |(_, endpoint): &(Host, String)| {
+        let world = Arc::new(connect(&link.to(endpoint)).unwrap());
+        PlacedHost { name: endpoint.clone(), world }
+    };
+    let placed = PlacedWorld::start(&scene, served.iter().map(host).collect()).unwrap();
+    let (whole, half) = (world(), SimSpan::from_millis(500));
+    for _ in 0..2 {
+        let begun = Instant::now();
+        placed.advance(half).unwrap();
+        whole.advance(half);
+        assert_eq!(placed.hash().unwrap(), whole.hash(), "{:?}", placed.loads());
+        // a call and its answer are 40 ms: no window takes less
+        assert!(begun.elapsed() >= 30 * 2 * link.delay, "{:?}", begun.elapsed());
+    }
+    assert!(placed.loads().iter().all(|load| load.objects > 0), "{:?}", placed.loads());
+}
+
+#[test]
+fn a_caller_that_joins_late_sees_no_state_from_before_its_call() {
+    let (here, endpoint) = (World::start(&scene(), ExecutorKind::Threads).unwrap(), free_endpoint());
+    let _host = serve(Arc::new(here.clone()), Serving::new("bench", &endpoint)).unwrap();
+    WorldCalls::drive(&here, TimelineCommand::Run).unwrap();
+    let runs = std::env::var("METACHRON_RUNS").map_or(20, |runs| runs.parse().unwrap());
+    let mut longest = Duration::ZERO;
+    for _ in 0..runs {
+        let (begun, before) = (Instant::now(), here.time());
+        let late = connect(&endpoint).unwrap();
+        assert!(late.time() >= before, "{:?} {before:?}", late.time());
+        longest = longest.max(begun.elapsed());
+    }
+    println!("{runs} late callers: each sees all within {longest:?}");
 }
 
 #[test]
 fn a_host_that_goes_silent_is_noticed_and_may_come_back() {
     let (here, endpoint) = (World::start(&scene(), ExecutorKind::Threads).unwrap(), free_endpoint());
     let host = serve(Arc::new(here), Serving::new("bench", &endpoint)).unwrap();
-    let is_silent = Arc::new(AtomicBool::new(false));
-    let elsewhere = connect(&relay(&endpoint, &is_silent)).unwrap();
+    let link = Arc::new(BadLink::default());
+    let elsewhere = connect(&link.to(&endpoint)).unwrap();
     let ball = elsewhere.object("ball").unwrap();
     until(|| elsewhere.command(ball, Command::wake()).is_ok(), "a host that answers");
-    is_silent.store(true, Relaxed);
+    link.is_silent.store(true, Relaxed);
     let begun = Instant::now();
     until(|| elsewhere.is_silent(), "a silent host that is noticed");
     // the lease is 1 s
@@ -304,7 +377,7 @@ fn a_host_that_goes_silent_is_noticed_and_may_come_back() {
     let refused = elsewhere.command(ball, Command::wake());
     assert!(matches!(refused, Err(WorldError::Silent { world, .. }) if world == "bench"));
     assert!(elsewhere.latest(ball).is_ok(), "it stays as it was last seen");
-    is_silent.store(false, Relaxed);
+    link.is_silent.store(false, Relaxed);
     let begun = Instant::now();
     while elsewhere.command(ball, Command::wake()).is_err() {
         assert!(begun.elapsed() < Duration::from_secs(15), "a host that lives again");

@@ -58,6 +58,8 @@ struct Shared {
     /// Callers and their calls.
     waiting: Waiting<(String, Query)>,
     ends: AtomicBool,
+    /// A part of the world is stepped here: its states are sent when the caller who lets its time pass shows them.
+    is_part: AtomicBool,
 }
 
 /// States that have changed, and as they were shown before.
@@ -103,10 +105,24 @@ pub fn serve(world: Arc<dyn WorldCalls>, serving: Serving) -> Result<Host, Hosts
     let shown =
         Mutex::new(Shown { sequence: 1, objects: BTreeMap::new(), events, is_followed: false, too_long: 0, sent: 0 });
     let gate = Mutex::new(Gate::new(identity.is_some(), roles.len()));
-    let (ends, scene, waiting) = (AtomicBool::new(false), scene.map(Box::new), Waiting::new());
+    let (ends, is_part) = (AtomicBool::new(false), AtomicBool::new(false));
+    let (scene, waiting) = (scene.map(Box::new), Waiting::new());
     let is_open = is_open_to_all(&endpoint);
-    let shared =
-        Arc::new(Shared { world, name, scene, begins, roles, is_open, run, session, gate, shown, waiting, ends });
+    let shared = Arc::new(Shared {
+        world,
+        name,
+        scene,
+        begins,
+        roles,
+        is_open,
+        run,
+        session,
+        gate,
+        shown,
+        waiting,
+        ends,
+        is_part,
+    });
     let (publishing, answering) = (Arc::clone(&shared), Arc::clone(&shared));
     let threads = vec![
         spawn("hosts-publish", move || publishing.publish_on()).map_err(failed)?,
@@ -234,7 +250,9 @@ impl Shared {
     fn publish_on(&self) {
         let mut next = Instant::now();
         while !self.ends.load(Relaxed) {
-            self.publish();
+            if !self.is_part.load(Relaxed) {
+                self.publish();
+            }
             next = (next + PERIOD).max(Instant::now());
             std::thread::sleep(next.saturating_duration_since(Instant::now()).min(PERIOD));
         }
@@ -372,10 +390,17 @@ impl Shared {
                 return Ok(messages.into_iter().map(|encoded| encoded.bytes).collect());
             }
             Call::Command(id, command) => done(0, world.command(world.object_of(id)?, command))?,
-            Call::SetState(id, state) => done(0, world.set_state(world.object_of(id)?, &state))?,
-            Call::Drive(drive) => done(0, world.drive(drive))?,
+            Call::SetState(id, state) => {
+                world.set_state(world.object_of(id)?, &state)?;
+                Reply::Done(self.publish())
+            }
+            Call::Drive(drive) => {
+                self.is_part.store(false, Relaxed);
+                done(0, world.drive(drive))?
+            }
             Call::Advance(span) if span > SPAN_MAX => return Err(too_long_a_span(span)),
             Call::Advance(span) => {
+                self.is_part.store(false, Relaxed);
                 world.advance(span)?;
                 Reply::Done(self.publish())
             }
@@ -403,14 +428,11 @@ impl Shared {
             }
             Call::Release(objects) => done(0, self.divided()?.release(&objects))?,
             Call::Pack(objects) => Reply::Packed(self.divided()?.pack(&objects)?),
-            Call::Adopt(packed) => {
-                self.divided()?.adopt(&packed)?;
-                Reply::Done(self.publish())
-            }
-            Call::AdvanceWithin(span, _) if span > SPAN_MAX => return Err(too_long_a_span(span)),
-            Call::AdvanceWithin(span, boxes) => {
-                let advanced = self.divided()?.advance_within(span, &boxes)?;
-                Reply::Advanced(advanced, self.publish())
+            Call::Adopt(packed) => done(0, self.divided()?.adopt(&packed))?,
+            Call::AdvanceWithin { span, .. } if span > SPAN_MAX => return Err(too_long_a_span(span)),
+            Call::AdvanceWithin { span, boxes, shows } => {
+                let advanced = self.divided()?.advance_within(span, &boxes, shows)?;
+                Reply::Advanced(advanced, shows.then(|| self.publish()))
             }
         };
         let too_long = |bad: BadMessage| Refusal::Other(format!("{bad}: the answer is too long"));
@@ -418,6 +440,7 @@ impl Shared {
     }
 
     fn divided(&self) -> Result<&dyn DividedCalls, Refusal> {
+        self.is_part.store(true, Relaxed);
         self.world.divided().ok_or_else(|| Refusal::Other("this world is stepped by one process alone".to_owned()))
     }
 

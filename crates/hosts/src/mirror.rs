@@ -227,12 +227,13 @@ impl Mirror {
         }
     }
 
-    /// Waits for the message of this number, or all states after it, but not for long: it may be lost. Whether it came.
+    /// Waits for the messages up to this number, or all states after them, but not for long: one may be lost. Whether they came.
     pub fn reach(&self, sequence: u64, patience: Duration) -> bool {
-        let waits = |seen: &mut Seen| seen.sequence < sequence && seen.silent.is_none();
+        let has_all = |seen: &Seen| seen.sequence >= sequence && !seen.is_stale;
+        let waits = |seen: &mut Seen| !has_all(seen) && seen.silent.is_none();
         let waited = self.changed.wait_timeout_while(self.seen(), patience, waits);
         let (seen, _) = waited.unwrap_or_else(PoisonError::into_inner);
-        seen.sequence >= sequence
+        has_all(&seen)
     }
 
     pub fn all_objects(&self) -> Vec<Object> {

@@ -31,8 +31,9 @@ use zenoh::sample::SampleKind;
 use zenoh::session::SessionGetBuilder;
 use zenoh::{Session, Wait};
 
-/// The most that an answer is waited for: a step of the world may take five seconds.
-const ANSWER_WITHIN: Duration = Duration::from_secs(10);
+/// The most that an answer is waited for. It is as long as any work of a host: one that ends or falls silent meanwhile is noticed within a
+/// [`LEASE`] or two, by its link.
+const ANSWER_WITHIN: Duration = Duration::from_hours(24);
 /// Whether a host is there at all is asked for so long, so often.
 const GREETING: (u32, Duration) = (20, Duration::from_millis(50));
 /// All states are asked for at most so often.
@@ -374,7 +375,14 @@ impl Link {
     /// Calls the host for nothing but that it is done; what it changed is seen then.
     fn act(&self, call: Call) -> Result<(), WorldError> {
         let Reply::Done(sequence) = self.ask(call)? else { return Err(unexpected()) };
-        self.mirror.reach(sequence, LEASE);
+        self.see(sequence)
+    }
+
+    /// Who reads states next sees all that is in the messages up to this number.
+    fn see(&self, sequence: u64) -> Result<(), WorldError> {
+        if sequence > 0 && !self.mirror.reach(sequence, LEASE) {
+            self.refresh()?;
+        }
         Ok(())
     }
 
@@ -531,7 +539,7 @@ impl WorldCalls for RemoteWorld {
     fn add(&self, name: &str, part: Part) -> Result<Object, WorldError> {
         match self.calls().ask(Call::Add(name.to_owned(), Box::new(part)))? {
             Reply::Added(id, sequence) => {
-                self.calls().mirror.reach(sequence, LEASE);
+                self.calls().see(sequence)?;
                 Ok(self.calls().mirror.tag.object(id))
             }
             _ => Err(unexpected()),
@@ -583,15 +591,11 @@ impl DividedCalls for RemoteWorld {
         self.calls().act(Call::Adopt(packed.to_vec()))
     }
 
-    fn advance_within(&self, span: SimSpan, boxes: &[Reach]) -> Result<PartAdvanced, WorldError> {
-        let Reply::Advanced(advanced, sequence) = self.calls().ask(Call::AdvanceWithin(span, boxes.to_vec()))? else {
-            return Err(unexpected());
-        };
+    fn advance_within(&self, span: SimSpan, boxes: &[Reach], shows: bool) -> Result<PartAdvanced, WorldError> {
+        let call = Call::AdvanceWithin { span, boxes: boxes.to_vec(), shows };
+        let Reply::Advanced(advanced, sequence) = self.calls().ask(call)? else { return Err(unexpected()) };
         check::reaches(&advanced.reaches).map_err(WorldError::Elsewhere)?;
-        // who reads them next sees the states of this moment, and none before it
-        if !self.calls().mirror.reach(sequence, LEASE) {
-            self.calls().refresh()?;
-        }
+        sequence.map_or(Ok(()), |sequence| self.calls().see(sequence))?;
         Ok(advanced)
     }
 }

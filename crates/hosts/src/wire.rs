@@ -16,7 +16,7 @@ use serde::de::DeserializeOwned;
 use std::sync::Arc;
 
 /// The version of all messages: it changes with the meaning of their bytes.
-pub(crate) const VERSION: u8 = 4;
+pub(crate) const VERSION: u8 = 5;
 /// The version of the program, whose parts and states each version has its own of.
 pub(crate) const PROGRAM: &str = env!("CARGO_PKG_VERSION");
 /// The most bytes of one message.
@@ -60,7 +60,12 @@ pub(crate) enum Call {
     Release(Vec<AgentId>),
     Pack(Vec<AgentId>),
     Adopt(Vec<u8>),
-    AdvanceWithin(SimSpan, Vec<Reach>),
+    AdvanceWithin {
+        span: SimSpan,
+        boxes: Vec<Reach>,
+        /// Whether its states are sent then.
+        shows: bool,
+    },
 }
 
 impl Call {
@@ -80,7 +85,7 @@ impl Call {
             | Self::Release(_)
             | Self::Pack(_)
             | Self::Adopt(_)
-            | Self::AdvanceWithin(..) => Role::Operator,
+            | Self::AdvanceWithin { .. } => Role::Operator,
         }
     }
 }
@@ -98,8 +103,8 @@ pub(crate) enum Reply {
     Part(Option<Box<Part>>),
     Scene(Option<Box<SceneFiles>>),
     Packed(Vec<u8>),
-    /// How far a part has come; its states are in the messages up to this number.
-    Advanced(PartAdvanced, u64),
+    /// How far a part has come; its states are in the messages up to this number, if they are sent.
+    Advanced(PartAdvanced, Option<u64>),
     Refused(Refusal),
 }
 

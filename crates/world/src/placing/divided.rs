@@ -20,8 +20,8 @@ pub struct PartAdvanced {
     pub bonds: Vec<[AgentId; 2]>,
     /// Wall time that it took.
     pub took: Duration,
-    /// CPU time of all steps made here so far.
-    pub cpu: Duration,
+    /// CPU time of all steps made here so far; none where states are not shown.
+    pub cpu: Option<Duration>,
 }
 
 /// A world in lockstep whose steps several processes share: each has all of its objects, and steps some.
@@ -41,11 +41,12 @@ pub trait DividedCalls: Send + Sync {
     /// # Errors
     /// [`WorldError::Undivided`]: nothing has changed then.
     fn adopt(&self, packed: &[u8]) -> Result<(), WorldError>;
-    /// Lets `span` pass for the objects that are stepped here, each inside its box, or until one of them leaves it.
+    /// Lets `span` pass for the objects that are stepped here, each inside its box, or until one of them leaves it. Who reads states of a world
+    /// elsewhere sees those of then only where it `shows` them.
     ///
     /// # Errors
     /// [`WorldError::Undivided`].
-    fn advance_within(&self, span: SimSpan, boxes: &[Reach]) -> Result<PartAdvanced, WorldError>;
+    fn advance_within(&self, span: SimSpan, boxes: &[Reach], shows: bool) -> Result<PartAdvanced, WorldError>;
 }
 
 impl World {
@@ -79,7 +80,7 @@ impl DividedCalls for World {
         self.with_lockstep(|lockstep| lockstep.adopt(packed, &mut |id| joining.absent(id, &parts(id))))
     }
 
-    fn advance_within(&self, span: SimSpan, boxes: &[Reach]) -> Result<PartAdvanced, WorldError> {
+    fn advance_within(&self, span: SimSpan, boxes: &[Reach], shows: bool) -> Result<PartAdvanced, WorldError> {
         let fenced = |lockstep: &mut Lockstep| {
             lockstep.set_fences(boxes.iter().copied());
             Ok(())
@@ -87,7 +88,7 @@ impl DividedCalls for World {
         let begun = Instant::now();
         self.with_lockstep(fenced)?;
         self.advance(span);
-        let cpu = Duration::from_secs_f64(self.agents().iter().map(AgentHandle::cpu_s).sum());
+        let cpu = shows.then(|| Duration::from_secs_f64(self.agents().iter().map(AgentHandle::cpu_s).sum()));
         self.with_lockstep(|lockstep| {
             let (escaped, reaches, bonds) = (lockstep.escaped(), lockstep.reaches(), lockstep.bonds());
             lockstep.set_fences([]);

@@ -13,7 +13,7 @@ const ACCELERATION_M_S2: f64 = 20.0;
 /// So much room is left in a box for objects that are hit within the window, m/s.
 const SPEED_LEAST_M_S: f64 = 1.0;
 
-/// A host with no more than this times the mean load keeps what it has.
+/// A host with no more than this times the mean load keeps what it has; one with more keeps the mean.
 const EVEN: f64 = 1.15;
 
 /// The boxes that objects at these `reaches` may not leave within `window`, with `room` for more speed than they have.
@@ -69,12 +69,15 @@ pub(super) fn place(groups: &mut [PlacedGroup], lives: &[bool], evens: bool) {
     let mut loads: Vec<Option<f64>> = lives.iter().map(|lives| lives.then_some(0.0)).collect();
     let hosts = lives.iter().filter(|lives| **lives).count() as f64;
     let mean = groups.iter().map(|group| group.cost).sum::<f64>() / hosts;
+    let mut held = vec![0.0; lives.len()];
+    groups.iter().filter_map(|group| Some((group.host?, group.cost))).for_each(|(host, cost)| held[host] += cost);
     let mut dearest: Vec<&mut PlacedGroup> = groups.iter_mut().collect();
     dearest.sort_by(|one, other| other.cost.total_cmp(&one.cost));
     for group in &mut dearest {
         group.host = group.host.filter(|host| {
             let load = loads[*host].get_or_insert(0.0);
-            let stays = lives[*host] && (!evens || *load + group.cost <= EVEN * mean || *load == 0.0);
+            let has_more = evens && held[*host] > EVEN * mean;
+            let stays = lives[*host] && (!has_more || *load + group.cost <= mean || *load == 0.0);
             if stays {
                 *load += group.cost;
             }

@@ -11,15 +11,18 @@ use crate::history::checkpoint::{Checkpoint, CheckpointError};
 use crate::reading::object::Object;
 use metachron_core::{AgentId, Body, SimSpan, SimTime};
 use metachron_runtime::{Command, Reach, side_by_side};
-use std::collections::{BTreeMap, VecDeque};
+use std::collections::{BTreeMap, BTreeSet, VecDeque};
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
-/// States are kept so often: that much is done again where a host falls silent, or an object leaves its box.
+/// States are kept so often: that much is done again where a host falls silent, or an object leaves its box. More seldom where it takes more than
+/// one part in so many of the time.
 const KEEP_EVERY: SimSpan = SimSpan::from_millis(500);
+const KEEP_SHARE: u32 = 20;
 
-/// So many objects are packed at once, and the rest of their group: a message has its bound.
-const PACKED_AT_ONCE: usize = 256;
+/// So many objects are packed at first, and the rest of their group; then as many as take about so many bytes: a message has its bound.
+const PACKED_AT_FIRST: usize = 256;
+const PACKED_BYTES: usize = 2 << 20;
 
 /// How much room for more speed objects have at first; twice as much each time that one has left its box, and from window to window less again.
 const ROOM: f64 = 2.0;
@@ -41,6 +44,8 @@ pub(super) struct Placing {
     since: Vec<Act>,
     /// Objects that leave at their next steps.
     leaving: Vec<AgentId>,
+    /// Whether others see how far time has come, and the states then, after this window.
+    shows: bool,
 }
 
 /// The part of it that others look at while time passes: copies share the owners until these change.
@@ -72,6 +77,16 @@ struct Kept {
     /// The moment, without objects.
     moment: Vec<u8>,
     packs: Vec<Pack>,
+    /// When they were kept, and how long that took.
+    at: Option<Instant>,
+    took: Duration,
+}
+
+impl Kept {
+    /// Whether states of `time` are to be kept in their place.
+    fn is_old(&self, time: SimTime) -> bool {
+        time >= self.time + KEEP_EVERY && self.at.is_none_or(|at| at.elapsed() >= KEEP_SHARE * self.took)
+    }
 }
 
 /// The outcome of a window on one host.
@@ -154,11 +169,18 @@ impl Placing {
         let records = vec![HostRecord::default(); hosts.len()];
         let (kept, since, leaving) = (Kept::default(), Vec::new(), Vec::new());
         let seen = PlacingSeen { time, owners: Arc::new(owners), lost, escapes: 0, records };
-        Ok(Self { seen, reaches, bonds, room: ROOM, kept, since, leaving })
+        Ok(Self { seen, reaches, bonds, room: ROOM, kept, since, leaving, shows: true })
     }
 
     fn objects(&self) -> Vec<AgentId> {
         self.seen.owners.keys().copied().collect()
+    }
+
+    /// The objects of boxes and ties.
+    fn objects_of(&self, boxes: &[Reach], ties: &[[AgentId; 2]]) -> Vec<AgentId> {
+        let all = boxes.iter().map(|reach| reach.id).chain(ties.iter().flatten().copied());
+        let there: BTreeSet<_> = all.filter(|id| self.seen.owners.contains_key(id)).collect();
+        there.into_iter().collect()
     }
 
     fn living(&self) -> Vec<usize> {
@@ -207,7 +229,7 @@ impl PlacedWorld {
         placing.reaches.iter_mut().for_each(Vec::clear);
         placing.bonds.iter_mut().for_each(Vec::clear);
         for host in placing.living() {
-            let looked = self.part(host, |divided| divided.advance_within(SimSpan::ZERO, &[]))?;
+            let looked = self.part(host, |divided| divided.advance_within(SimSpan::ZERO, &[], true))?;
             (placing.reaches[host], placing.bonds[host]) = (looked.reaches, looked.bonds);
         }
         Ok(())
@@ -218,8 +240,10 @@ impl PlacedWorld {
         let mut left = span;
         while left > SimSpan::ZERO {
             let window = left.min(Self::WINDOW);
+            // objects that leave are seen to
+            placing.shows = window == left || !placing.leaving.is_empty();
             self.act(placing, Act::Pass(window))?;
-            if placing.seen.time >= placing.kept.time + KEEP_EVERY {
+            if placing.kept.is_old(placing.seen.time) {
                 self.keep_or_go_back(placing)?;
             }
             left = SimSpan::from_nanos(left.as_nanos() - window.as_nanos());
@@ -243,7 +267,9 @@ impl PlacedWorld {
                 }
             }
         }
-        self.show(&placing.seen);
+        if placing.shows {
+            self.show(&placing.seen);
+        }
         Ok(())
     }
 
@@ -277,12 +303,12 @@ impl PlacedWorld {
     /// Lets a window pass on all hosts at once.
     fn pass_window(&self, placing: &mut Placing, window: SimSpan) -> Result<(), Fault> {
         let fences = self.place_for(placing, window)?;
-        let owners = &placing.seen.owners;
+        let (owners, shows) = (&placing.seen.owners, placing.shows);
         let advance = |host: usize| {
             let is_own = |fence: &&Reach| owners.get(&fence.id).is_some_and(|owner| owner.host == host);
             let own: Vec<Reach> = fences.iter().filter(is_own).copied().collect();
             let asked = Instant::now();
-            let advanced = self.part(host, |divided| divided.advance_within(window, &own))?;
+            let advanced = self.part(host, |divided| divided.advance_within(window, &own, shows))?;
             let waited = asked.elapsed().saturating_sub(advanced.took);
             Ok(HostWindow { advanced, waited })
         };
@@ -294,7 +320,7 @@ impl PlacedWorld {
             escaped |= advanced.escaped.is_some();
             (placing.reaches[host], placing.bonds[host]) = (advanced.reaches, advanced.bonds);
             let record = &mut placing.seen.records[host];
-            (record.cpu, record.waited) = (advanced.cpu, waited);
+            (record.cpu, record.waited) = (advanced.cpu.unwrap_or(record.cpu), waited);
         }
         if escaped {
             return Err(Fault::Escaped);
@@ -327,12 +353,13 @@ impl PlacedWorld {
         }
         let reaches: Vec<Reach> = placing.reaches.iter().flatten().copied().collect();
         let fences = fences(&reaches, window, placing.room);
-        let mut placed: Vec<PlacedGroup> = groups(&placing.objects(), &fences, &self.ties_of(placing))
-            .into_iter()
-            .map(|objects| placing.group(objects))
-            .collect();
+        let (ties, evens) = (self.ties_of(placing), placing.since.is_empty());
+        // those that can meet nothing stay where they are until loads are evened
+        let objects = if evens { placing.objects() } else { placing.objects_of(&fences, &ties) };
+        let mut placed: Vec<PlacedGroup> =
+            groups(&objects, &fences, &ties).into_iter().map(|objects| placing.group(objects)).collect();
         let lives: Vec<bool> = placing.seen.lost.iter().map(Option::is_none).collect();
-        place(&mut placed, &lives, placing.since.is_empty());
+        place(&mut placed, &lives, evens);
         let mut moves: BTreeMap<Route, Vec<Vec<AgentId>>> = BTreeMap::new();
         for PlacedGroup { objects, host, .. } in &placed {
             let mut from: BTreeMap<usize, Vec<AgentId>> = BTreeMap::new();
@@ -365,16 +392,16 @@ impl PlacedWorld {
 
     /// Groups of objects as a host packs them.
     fn pack(&self, host: usize, groups: &[Vec<AgentId>]) -> Result<Vec<Pack>, Fault> {
-        let mut packs: Vec<Pack> = Vec::new();
-        for group in groups {
-            match packs.last_mut().filter(|pack| pack.objects.len() < PACKED_AT_ONCE) {
-                Some(pack) => pack.objects.extend(group),
-                None => packs.push(Pack { host, objects: group.clone(), bytes: Vec::new() }),
+        let (mut packs, mut at_once, mut groups) = (Vec::new(), PACKED_AT_FIRST, groups.iter().peekable());
+        while groups.peek().is_some() {
+            let mut objects: Vec<AgentId> = Vec::new();
+            while let Some(group) = groups.next_if(|_| objects.len() < at_once) {
+                objects.extend(group);
             }
-        }
-        for Pack { objects, bytes, .. } in &mut packs {
             objects.sort_unstable();
-            *bytes = self.part(host, |divided| divided.pack(objects))?;
+            let bytes = self.part(host, |divided| divided.pack(&objects))?;
+            at_once = (PACKED_BYTES * objects.len() / bytes.len().max(1)).max(1);
+            packs.push(Pack { host, objects, bytes });
         }
         Ok(packs)
     }
@@ -410,11 +437,11 @@ impl PlacedWorld {
     }
 
     fn keep(&self, placing: &mut Placing) -> Result<(), Fault> {
-        let first = *placing.living().first().ok_or_else(|| Fault::Refused(self.silent()))?;
+        let (first, begun) = (*placing.living().first().ok_or_else(|| Fault::Refused(self.silent()))?, Instant::now());
         let moment = self.part(first, |divided| divided.pack(&[]))?;
         self.take_back(placing, &moment);
         let living = placing.living();
-        let mut kept = Kept { time: placing.seen.time, moment, packs: Vec::new() };
+        let mut kept = Kept { time: placing.seen.time, moment, ..Kept::default() };
         // without another host they could not go on
         if living.len() > 1 {
             let reaches: Vec<Reach> = placing.reaches.iter().flatten().copied().collect();
@@ -425,6 +452,7 @@ impl PlacedWorld {
                 kept.packs.extend(self.pack(host, &own)?);
             }
         }
+        (kept.at, kept.took) = (Some(Instant::now()), begun.elapsed());
         (placing.kept, placing.since) = (kept, Vec::new());
         Ok(())
     }

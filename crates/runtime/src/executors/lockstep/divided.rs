@@ -120,6 +120,9 @@ impl Lockstep {
     /// as one, or are about to, for a while after nothing is near.
     #[must_use]
     pub fn bonds(&self) -> Vec<[AgentId; 2]> {
+        if self.all.peers.broad_phase.get().is_none() {
+            return Vec::new();
+        }
         let own = self.all.handles.iter().filter(|agent| !self.division.is_away(agent.id().0 as usize));
         let of = |agent: &AgentHandle| {
             let (id, newest) = (agent.id(), agent.latest());
