@@ -10,6 +10,8 @@ use super::hosts::args::{
 use clap::builder::PossibleValuesParser;
 use clap::{Args, Parser, Subcommand, ValueHint};
 use metachron_console::values::{CommonArgs, LimitArgs, assignment, seconds, size, target_fps};
+#[cfg(feature = "hosts")]
+use metachron_console::values::{Pin, pin};
 #[cfg(feature = "lab")]
 use metachron_lab::args::{
     BENCH_EXAMPLES, BenchArgs, CHART_EXAMPLES, COMPARE_EXAMPLES, ChartArgs, CompareArgs, DOCS_EXAMPLES, DocsArgs,
@@ -353,6 +355,10 @@ pub struct RunArgs {
     #[cfg(feature = "hosts")]
     #[arg(long, value_name = "HOSTS", value_delimiter = ',', conflicts_with_all = ["oracle", "device", "record", "executor"])]
     pub hosts: Vec<String>,
+    /// Let one of these hosts step an object, and all that is with it; may be repeated
+    #[cfg(feature = "hosts")]
+    #[arg(long = "host-of", value_name = "OBJECT=HOST", value_parser = pin, requires = "hosts")]
+    pub host_of: Vec<Pin>,
     /// The caller of hosts by its certificate, or without one.
     #[cfg(feature = "hosts")]
     #[command(flatten)]

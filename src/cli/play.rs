@@ -7,6 +7,7 @@ use super::exports::Exports;
 use super::run::{Played, Request, RunLength, Step};
 use anyhow::Context;
 use metachron_console::output::BadInput;
+use metachron_console::values::Pin;
 use metachron_core::{AgentId, AttachmentEvent, ClusterState, ContactPartner, SensorTouch, SimSpan};
 use metachron_lod::Bound;
 use metachron_render::Size;
@@ -46,9 +47,6 @@ fn record(session: &Session, path: &Path, request: &Request) -> anyhow::Result<(
 /// Called for every frame; returns whether to go on.
 pub(super) type GoOn<'a> = &'a mut dyn FnMut(Step) -> bool;
 
-/// A run may end by so much of a frame early.
-const FRAME_SHARE: f64 = 1e-6;
-
 /// Width and height of a headless picture where no size is given, pixels.
 const PICTURE_SIZE: [u32; 2] = [1280, 720];
 
@@ -61,6 +59,11 @@ pub(super) fn play(request: &Request, go_on: GoOn<'_>) -> anyhow::Result<Played>
         [] => None,
         hosts => Some(Arc::new(PlacedWorld::start(&request.scene, hosts.to_vec())?)),
     };
+    for (placed, Pin { object, host }) in
+        placed.iter().flat_map(|placed| request.pins.iter().map(move |pin| (placed, pin)))
+    {
+        placed.pin(placed.object(object)?, host)?;
+    }
     let mut session = match &placed {
         Some(placed) => Session::open_elsewhere(request.scene.clone(), Arc::clone(placed) as Arc<dyn WorldCalls>)?,
         None => Session::open(request.scene.clone(), request.pace)?,
@@ -75,17 +78,21 @@ pub(super) fn play(request: &Request, go_on: GoOn<'_>) -> anyhow::Result<Played>
         record(&session, path, request)?;
     }
     let served = devices::serve(&session, &request.scene, &request.devices)?;
+    let mut request = request.clone();
     if let Some(placed) = &placed {
-        // as in one process the run ends with a whole frame
+        // as in one process the run ends with a whole frame, and what is seen of it at the same moment
         let period = SimSpan::from_nanos(session.period().as_nanos() as u64);
-        let frames = match request.end {
-            Some(RunLength::Seconds(seconds)) => Some((seconds / period.as_secs_f64() - FRAME_SHARE).ceil() as u64),
+        let ends = if request.window { request.end } else { Some(request.headless_end()) };
+        let frames = match ends {
+            Some(RunLength::Seconds(seconds)) => Some(((1e9 * seconds).round() as u64).div_ceil(period.as_nanos())),
             Some(RunLength::Frames(frames)) => Some(frames),
             Some(RunLength::Recording) | None => None,
         };
-        let end = frames.map(|frames| placed.time() + SimSpan::from_nanos(period.as_nanos().saturating_mul(frames)));
-        placed.let_flow(request.pace == Pace::Free, end)?;
+        let length = frames.map(|frames| SimSpan::from_nanos(period.as_nanos().saturating_mul(frames)));
+        placed.let_flow(request.pace == Pace::Free, length.map(|length| placed.time() + length))?;
+        request.end = length.map_or(ends, |length| Some(RunLength::Seconds(length.as_secs_f64())));
     }
+    let request = &request;
     // from the first frame on: before it an adapter is opened
     let mut flows = placed.clone();
     let go_on: GoOn<'_> = &mut |step| {
@@ -99,6 +106,10 @@ pub(super) fn play(request: &Request, go_on: GoOn<'_>) -> anyhow::Result<Played>
     };
     played.report.devices = devices::reports(served);
     if let Some(placed) = placed {
+        for agent in &mut played.report.agents {
+            let object = placed.object(&agent.name).ok();
+            agent.host = object.and_then(|object| placed.host_of(object)).map(str::to_owned);
+        }
         played.report.hosts = placed.loads().into_iter().map(host_report).collect();
         played.report.executor = ExecutorKind::Lockstep.name().to_owned();
         played.report.escapes = Some(placed.escapes());
@@ -330,6 +341,7 @@ fn agent(scene: &Scene, agent: &AgentOutcome) -> AgentReport {
     AgentReport {
         name: stats.name.to_string(),
         model: stats.model.to_owned(),
+        host: None,
         state: match &stats.state {
             AgentState::Running => "running",
             AgentState::Stalled => "stalled",

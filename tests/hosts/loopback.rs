@@ -8,7 +8,8 @@ use metachron::runtime::{Command, TimelineCommand};
 use metachron::scene::{Source, load};
 use metachron::world::kinds::ExecutorKind;
 use metachron::world::{
-    EventFilter, GhostWorld, Happening, Pace, PlacedHost, PlacedWorld, Rigid, Scene, SceneText, Tube, World, WorldCalls, WorldError,
+    EventFilter, GhostWorld, Happening, Pace, PlacedHost, PlacedWorld, Rigid, Scene, SceneText, Tube, World,
+    WorldCalls, WorldError,
 };
 use std::io::{Read, Write};
 use std::net::{TcpListener, TcpStream};

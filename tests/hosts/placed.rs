@@ -74,9 +74,42 @@ fn a_scene_has_the_same_bits_on_one_and_two_hosts_and_in_one_process() {
     for wish in [&hosts[0].wish, &both, &both] {
         let placed = report(&run(&scene, "2", &["--hosts", wish]));
         assert_eq!(placed["state_hash"], whole["state_hash"], "{wish}: {}", placed["hosts"]);
+        assert_eq!(placed["sim_s"], whole["sim_s"]);
         let agents: u64 = placed["hosts"].as_array().unwrap().iter().map(|host| host["agents"].as_u64().unwrap()).sum();
         assert_eq!(agents, 12);
     }
+}
+
+#[test]
+fn a_run_ends_with_a_whole_frame_at_any_rate() {
+    let folder = tempfile::tempdir().unwrap();
+    let scene = balls(folder.path());
+    let host = Waiting::named("bench");
+    for fps in ["30", "45.5", "60"] {
+        let ended = |more: [&str; 2]| report(&run(&scene, "0.1", &["--target-fps", fps, more[0], more[1]]));
+        let [placed, whole] = [ended(["--hosts", &host.wish]), ended(["--executor", "lockstep"])];
+        for key in ["sim_s", "state_hash"] {
+            assert_eq!(placed[key], whole[key], "{key} at {fps}");
+        }
+    }
+}
+
+#[test]
+fn a_pinned_object_is_on_its_host() {
+    let folder = tempfile::tempdir().unwrap();
+    let scene = balls(folder.path());
+    let hosts = ["bench", "lab2"].map(Waiting::named);
+    let both = format!("{},{}", hosts[0].wish, hosts[1].wish);
+    // all that a ball in the middle meets is with it: lab2 has the most
+    let placed = report(&run(&scene, "1", &["--hosts", &both, "--host-of", "ball5=lab2"]));
+    let whole = report(&run(&scene, "1", &["--executor", "lockstep"]));
+    assert_eq!(placed["state_hash"], whole["state_hash"], "{}", placed["hosts"]);
+    let agents = placed["agents"].as_array().unwrap();
+    let ball = agents.iter().find(|agent| agent["name"] == "ball5").unwrap();
+    assert_eq!(ball["host"], "lab2", "{}", placed["hosts"]);
+    let wrong = run(&scene, "1", &["--hosts", &both, "--host-of", "ball5=lab3"]);
+    let said = String::from_utf8_lossy(&wrong.stderr).into_owned();
+    assert!(!wrong.status.success() && said.contains("no host \"lab3\"; there are bench, lab2"), "{said}");
 }
 
 #[test]

@@ -54,6 +54,24 @@ pub fn assignment(text: &str) -> Result<(String, String), String> {
     }
 }
 
+/// An object that one of several hosts is to step.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Pin {
+    /// Its name.
+    pub object: String,
+    /// The host's name.
+    pub host: String,
+}
+
+/// Splits OBJECT=HOST.
+///
+/// # Errors
+/// A sentence for text without the `=` sign.
+pub fn pin(text: &str) -> Result<Pin, String> {
+    let (object, host) = text.split_once('=').ok_or("expected OBJECT=HOST, such as probe=lab2")?;
+    Ok(Pin { object: object.to_owned(), host: host.to_owned() })
+}
+
 /// The position of the `=` between key and value; parts of the key in quotes may contain others.
 fn equals_sign(text: &str) -> Option<usize> {
     let (mut open, mut before) = (None, '.');

@@ -130,6 +130,7 @@ pub(super) fn fill(status: &mut Status, session: &mut Session, meter: &mut Meter
         let was_parked = matches!(row.state, AgentState::Parked(_));
         fill_row(row, &stats, &newest);
         row.led_by = stats.led_by.and_then(|leader| Some(session.agents().of(leader)?.name().to_owned()));
+        row.host = session.host_of(agent.id()).map(str::to_owned);
         row.cpu_share = meter.shares[at];
         if let AgentState::Parked(reason) = &row.state
             && !was_parked

@@ -147,6 +147,10 @@ pub trait WorldCalls: Send + Sync {
     fn answers(&self) -> Result<(), WorldError>;
     /// Events from now on.
     fn listen(&self, filter: EventFilter) -> Box<dyn EventReader>;
+    /// The name of the host that steps an object; `None` where all are stepped by one.
+    fn host_of(&self, _object: Object) -> Option<&str> {
+        None
+    }
     /// The world as one that is stepped by several hosts ([`crate::PlacedWorld`]); `None` of one that cannot be.
     fn divided(&self) -> Option<&dyn DividedCalls> {
         None

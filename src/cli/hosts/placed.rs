@@ -23,6 +23,7 @@ pub(in super::super) fn place(args: &RunArgs, request: &mut Request) -> anyhow::
     if args.hosts.is_empty() {
         return Ok(());
     }
+    request.pins.clone_from(&args.host_of);
     let files = scene_files(&request.source, &request.overrides)?;
     for host in &args.hosts {
         let (name, endpoint) = match host.split_once('=') {

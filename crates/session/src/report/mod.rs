@@ -118,6 +118,9 @@ pub struct AgentReport {
     pub name: String,
     /// Its model.
     pub model: String,
+    /// The host that steps it, where several do.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub host: Option<String>,
     /// Its state at the end: `running`, `resting` or `parked`.
     pub state: &'static str,
     /// Steps taken.
@@ -428,7 +431,7 @@ impl Report {
             state_hash: name(),
             target_ms: 0.0,
             summary,
-            agents: vec![AgentReport::default()],
+            agents: vec![AgentReport { host: Some(name()), ..AgentReport::default() }],
             couplings: vec![CouplingReport::default()],
             events: vec![EventReport::default()],
             sensors: vec![SensorReport::default()],

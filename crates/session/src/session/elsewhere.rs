@@ -6,7 +6,7 @@ use super::super::assemble::Governors;
 use super::super::elsewhere::Elsewhere;
 use super::super::error::SessionError;
 use super::Session;
-use metachron_core::SimTime;
+use metachron_core::{AgentId, SimTime};
 use metachron_runtime::TimelineCommand;
 use metachron_world::{Scene, WorldCalls, WorldError};
 use std::sync::Arc;
@@ -86,6 +86,13 @@ impl Session {
         }
     }
 
+    /// The name of the host that steps an object, where several step its world.
+    #[must_use]
+    pub fn host_of(&self, id: AgentId) -> Option<&str> {
+        let calls = &self.elsewhere.as_ref()?.calls;
+        calls.host_of(calls.object_of(id).ok()?)
+    }
+
     /// Changes the flow of time: pause, run, speed, single step.
     pub fn drive(&mut self, drive: TimelineCommand) {
         match &mut self.elsewhere {
@@ -107,7 +114,7 @@ impl Session {
 mod tests {
     use super::*;
     use metachron_contact::AnchorSpring;
-    use metachron_core::{AgentId, Anchor, SimSpan};
+    use metachron_core::{Anchor, SimSpan};
     use metachron_render::{Size, States, Style};
     use metachron_world::kinds::ExecutorKind;
     use metachron_world::{Rigid, World};

@@ -342,6 +342,8 @@ pub struct AgentRow {
     pub residual_m: f64,
     /// The force that acts on a tool, newtons.
     pub force_n: Option<f64>,
+    /// The name of the host that steps it, where several step the world.
+    pub host: Option<String>,
     /// The pressure of its filling; `None` of an agent that has no inside.
     pub filled: Option<Filled>,
     /// The agent that steps it as a member of its cluster.
@@ -417,6 +419,7 @@ impl AgentRow {
             dropped_s: 0.0,
             residual_m: 0.0,
             force_n: None,
+            host: None,
             filled: None,
             contact: None,
             led_by: None,

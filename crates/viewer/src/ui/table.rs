@@ -157,6 +157,7 @@ fn dash() -> String {
 
 fn state_text(row: &AgentRow) -> String {
     match &row.state {
+        AgentState::Running if row.host.is_some() => format!("on {}", row.host.as_deref().unwrap_or_default()),
         AgentState::Running => row.led_by.as_ref().map_or_else(|| "running".to_owned(), |by| format!("with {by}")),
         AgentState::Stalled => "stalled".to_owned(),
         AgentState::Resting => "resting".to_owned(),

@@ -55,16 +55,17 @@ pub(super) fn groups(objects: &[AgentId], fences: &[Reach], ties: &[[AgentId; 2]
     groups
 }
 
-/// A group, the host that steps most of it, and its cost.
+/// A group, the host that steps most of it, or that it is pinned to, and its cost.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct PlacedGroup {
     pub objects: Vec<AgentId>,
     pub host: Option<usize>,
+    pub is_pinned: bool,
     pub cost: f64,
 }
 
-/// Gives each group to a host that `lives`: to the one that has it, unless it has none or `evens` loads that are too unlike. The dearest first,
-/// each to the host with the least load (Gra69).
+/// Gives each group to a host that `lives`: to the one that has it, unless it has none or `evens` loads that are too unlike. Those that are pinned
+/// first, then the dearest, each to the host with the least load (Gra69).
 pub(super) fn place(groups: &mut [PlacedGroup], lives: &[bool], evens: bool) {
     let mut loads: Vec<Option<f64>> = lives.iter().map(|lives| lives.then_some(0.0)).collect();
     let hosts = lives.iter().filter(|lives| **lives).count() as f64;
@@ -72,12 +73,12 @@ pub(super) fn place(groups: &mut [PlacedGroup], lives: &[bool], evens: bool) {
     let mut held = vec![0.0; lives.len()];
     groups.iter().filter_map(|group| Some((group.host?, group.cost))).for_each(|(host, cost)| held[host] += cost);
     let mut dearest: Vec<&mut PlacedGroup> = groups.iter_mut().collect();
-    dearest.sort_by(|one, other| other.cost.total_cmp(&one.cost));
+    dearest.sort_by(|one, other| other.is_pinned.cmp(&one.is_pinned).then(other.cost.total_cmp(&one.cost)));
     for group in &mut dearest {
         group.host = group.host.filter(|host| {
             let load = loads[*host].get_or_insert(0.0);
             let has_more = evens && held[*host] > EVEN * mean;
-            let stays = lives[*host] && (!has_more || *load + group.cost <= mean || *load == 0.0);
+            let stays = lives[*host] && (!has_more || group.is_pinned || *load + group.cost <= mean || *load == 0.0);
             if stays {
                 *load += group.cost;
             }

@@ -145,6 +145,20 @@ impl PlacedWorld {
         self.hosts.iter().enumerate().map(load).collect()
     }
 
+    /// Lets the host of this name step an object, and all that is with it, for as long as the host lives, whatever its load. Of two in one group the
+    /// pin of the one of the lower number holds.
+    ///
+    /// # Errors
+    /// [`WorldError::Undivided`] where there is no such host, [`WorldError::Foreign`].
+    pub fn pin(&self, object: Object, host: &str) -> Result<(), WorldError> {
+        let names = || self.hosts.iter().map(|host| &*host.name).collect::<Vec<_>>().join(", ");
+        let number = self.hosts.iter().position(|known| known.name == host);
+        let reason = || format!("there is no host \"{host}\"; there are {}", names());
+        let number = number.ok_or_else(|| WorldError::Undivided { reason: reason() })?;
+        self.placing().pins.insert(self.id(object)?, number);
+        Ok(())
+    }
+
     /// How often an object has left its box, so that time went back to the states that were kept.
     #[must_use]
     pub fn escapes(&self) -> u64 {
@@ -296,6 +310,12 @@ impl WorldCalls for PlacedWorld {
         self.flows()
     }
 
+    fn host_of(&self, object: Object) -> Option<&str> {
+        let seen = self.seen();
+        let owner = seen.owners.get(&object.id()).filter(|_| object.is_of(self.tag))?;
+        Some(&self.hosts[owner.host].name)
+    }
+
     fn listen(&self, filter: EventFilter) -> Box<dyn EventReader> {
         let readers = self.hosts.iter().map(|host| host.world.listen(filter)).collect();
         Box::new(PlacedEvents { tag: self.tag, readers })
@@ -404,6 +424,24 @@ mod tests {
             assert!(placed.loads().iter().all(|load| load.objects > 0), "{:?}", placed.loads());
             let moved: u64 = placed.loads().iter().map(|load| load.moved).sum();
             assert!(moved > worlds.len() as u64, "{:?}", placed.loads());
+        }
+    }
+
+    #[test]
+    fn a_pinned_object_is_stepped_by_its_host_and_what_it_meets_too() {
+        let (whole, Placed { worlds, placed }) = (world(&scene()), placed(&scene(), 3));
+        let ball = placed.object("ball 5").unwrap();
+        placed.pin(ball, "host2").unwrap();
+        let other = placed.pin(ball, "host9").unwrap_err().to_string();
+        assert!(other.contains("no host \"host9\"; there are host0, host1, host2"), "{other}");
+        for quarter in 0..6 {
+            whole.advance(QUARTER);
+            placed.advance(QUARTER).unwrap();
+            assert_eq!(placed.hash().unwrap(), whole.hash(), "quarter {quarter}");
+            assert_eq!(placed.host_of(ball) == Some("host2"), quarter < 4, "quarter {quarter}");
+            if quarter == 3 {
+                drop(worlds[2].stop());
+            }
         }
     }
 

@@ -44,6 +44,8 @@ pub(super) struct Placing {
     since: Vec<Act>,
     /// Objects that leave at their next steps.
     leaving: Vec<AgentId>,
+    /// The hosts that are to step some objects, and what is with them.
+    pub pins: BTreeMap<AgentId, usize>,
     /// Whether others see how far time has come, and the states then, after this window.
     shows: bool,
 }
@@ -169,16 +171,17 @@ impl Placing {
         let records = vec![HostRecord::default(); hosts.len()];
         let (kept, since, leaving) = (Kept::default(), Vec::new(), Vec::new());
         let seen = PlacingSeen { time, owners: Arc::new(owners), lost, escapes: 0, records };
-        Ok(Self { seen, reaches, bonds, room: ROOM, kept, since, leaving, shows: true })
+        Ok(Self { seen, reaches, bonds, room: ROOM, kept, since, leaving, pins: BTreeMap::new(), shows: true })
     }
 
     fn objects(&self) -> Vec<AgentId> {
         self.seen.owners.keys().copied().collect()
     }
 
-    /// The objects of boxes and ties.
+    /// The objects of boxes and ties, and those that are pinned.
     fn objects_of(&self, boxes: &[Reach], ties: &[[AgentId; 2]]) -> Vec<AgentId> {
-        let all = boxes.iter().map(|reach| reach.id).chain(ties.iter().flatten().copied());
+        let all =
+            boxes.iter().map(|reach| reach.id).chain(ties.iter().flatten().copied()).chain(self.pins.keys().copied());
         let there: BTreeSet<_> = all.filter(|id| self.seen.owners.contains_key(id)).collect();
         there.into_iter().collect()
     }
@@ -509,13 +512,15 @@ impl PlacedWorld {
 }
 
 impl Placing {
-    /// A group with the host that steps most of it.
+    /// A group with the host that it is pinned to, or else that steps most of it.
     fn group(&self, objects: Vec<AgentId>) -> PlacedGroup {
         let mut shares = vec![0.0; self.seen.lost.len()];
         objects.iter().filter_map(|id| self.seen.owners.get(id)).for_each(|owner| shares[owner.host] += owner.cost);
         let cost = shares.iter().sum();
-        let host = (0..shares.len()).rev().max_by(|one, other| shares[*one].total_cmp(&shares[*other]));
-        PlacedGroup { objects, host, cost }
+        let most = (0..shares.len()).rev().max_by(|one, other| shares[*one].total_cmp(&shares[*other]));
+        let lives = |host: &usize| self.seen.lost[*host].is_none();
+        let pinned = objects.iter().find_map(|id| self.pins.get(id).copied().filter(lives));
+        PlacedGroup { objects, host: pinned.or(most), is_pinned: pinned.is_some(), cost }
     }
 
     fn give(&mut self, objects: &[AgentId], to: usize) {
