@@ -90,7 +90,9 @@ pub(super) fn play(request: &Request, go_on: GoOn<'_>) -> anyhow::Result<Played>
         };
         let length = frames.map(|frames| SimSpan::from_nanos(period.as_nanos().saturating_mul(frames)));
         placed.let_flow(request.pace == Pace::Free, length.map(|length| placed.time() + length))?;
-        request.end = length.map_or(ends, |length| Some(RunLength::Seconds(length.as_secs_f64())));
+        if let (Some(RunLength::Seconds(_)), Some(length)) = (ends, length) {
+            request.end = Some(RunLength::Seconds(length.as_secs_f64()));
+        }
     }
     let request = &request;
     // from the first frame on: before it an adapter is opened
@@ -112,6 +114,9 @@ pub(super) fn play(request: &Request, go_on: GoOn<'_>) -> anyhow::Result<Played>
         }
         played.report.hosts = placed.loads().into_iter().map(host_report).collect();
         played.report.executor = ExecutorKind::Lockstep.name().to_owned();
+        if request.pace == Pace::Free {
+            played.report.pace = "free";
+        }
         played.report.escapes = Some(placed.escapes());
     }
     Ok(played)

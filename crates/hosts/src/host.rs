@@ -43,6 +43,9 @@ pub struct Host {
     served: Option<(Queryable<()>, Subscriber<()>, LivelinessToken)>,
 }
 
+/// So many events wait to be shown; of more the oldest are lost.
+const GATHERED_MAX: usize = 4096;
+
 struct Shared {
     world: Arc<dyn WorldCalls>,
     name: String,
@@ -58,8 +61,8 @@ struct Shared {
     /// Callers and their calls.
     waiting: Waiting<(String, Query)>,
     ends: AtomicBool,
-    /// A part of the world is stepped here: its states are sent when the caller who lets its time pass shows them.
-    is_part: AtomicBool,
+    /// The caller for whom a part of the world is stepped here: its states are sent when he shows them.
+    part_of: Mutex<Option<String>>,
 }
 
 /// States that have changed, and as they were shown before.
@@ -74,6 +77,8 @@ struct Shown {
     sequence: u64,
     objects: BTreeMap<AgentId, (Arc<str>, Arc<Snapshot>)>,
     events: Box<dyn EventReader>,
+    /// Events that wait to be shown, the newest of them.
+    gathered: Vec<WireEvent>,
     /// Whether there was a caller at the last message: without one nothing is looked at.
     is_followed: bool,
     /// States that were too long for a message.
@@ -102,10 +107,17 @@ pub fn serve(world: Arc<dyn WorldCalls>, serving: Serving) -> Result<Host, Hosts
     let since_1970 = SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default();
     let run = (since_1970.as_nanos() as u64 ^ u64::from(std::process::id())).max(1);
     let events = world.listen(EventFilter::all());
-    let shown =
-        Mutex::new(Shown { sequence: 1, objects: BTreeMap::new(), events, is_followed: false, too_long: 0, sent: 0 });
+    let shown = Mutex::new(Shown {
+        sequence: 1,
+        objects: BTreeMap::new(),
+        events,
+        gathered: Vec::new(),
+        is_followed: false,
+        too_long: 0,
+        sent: 0,
+    });
     let gate = Mutex::new(Gate::new(identity.is_some(), roles.len()));
-    let (ends, is_part) = (AtomicBool::new(false), AtomicBool::new(false));
+    let (ends, part_of) = (AtomicBool::new(false), Mutex::default());
     let (scene, waiting) = (scene.map(Box::new), Waiting::new());
     let is_open = is_open_to_all(&endpoint);
     let shared = Arc::new(Shared {
@@ -121,7 +133,7 @@ pub fn serve(world: Arc<dyn WorldCalls>, serving: Serving) -> Result<Host, Hosts
         shown,
         waiting,
         ends,
-        is_part,
+        part_of,
     });
     let (publishing, answering) = (Arc::clone(&shared), Arc::clone(&shared));
     let threads = vec![
@@ -137,7 +149,10 @@ pub fn serve(world: Arc<dyn WorldCalls>, serving: Serving) -> Result<Host, Hosts
             match sample.kind() {
                 SampleKind::Put if caller.split('/').all(is_name) => living.gate().arrive(&caller),
                 SampleKind::Put => living.gate().refuse(&caller, Fault::Stranger),
-                SampleKind::Delete => living.gate().leave(&caller),
+                SampleKind::Delete => {
+                    living.gate().leave(&caller);
+                    living.part_of().take_if(|of| *of == caller);
+                }
             }
         });
     let callers = callers.wait().map_err(failed)?;
@@ -242,6 +257,10 @@ impl Shared {
         self.gate.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
+    fn part_of(&self) -> MutexGuard<'_, Option<String>> {
+        self.part_of.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
     fn shown(&self) -> MutexGuard<'_, Shown> {
         self.shown.lock().unwrap_or_else(PoisonError::into_inner)
     }
@@ -250,7 +269,7 @@ impl Shared {
     fn publish_on(&self) {
         let mut next = Instant::now();
         while !self.ends.load(Relaxed) {
-            if !self.is_part.load(Relaxed) {
+            if self.part_of().is_none() {
                 self.publish();
             }
             next = (next + PERIOD).max(Instant::now());
@@ -269,6 +288,7 @@ impl Shared {
         if !was_followed {
             // events from before there was a caller
             shown.events.take();
+            shown.gathered.clear();
         }
         let Changes { moment, before } = shown.changes(&*self.world, self.run);
         let (mut messages, mut sent) = (Vec::new(), 0);
@@ -336,7 +356,11 @@ impl Shared {
                 Err(reason) => refused(Refusal::Other(reason)),
                 Ok(()) => {
                     // what a caller sends is made into objects before all of it is checked: a fault there is its caller's
+                    let (is_part, passes) = (call.is_of_a_part(), call.lets_time_pass());
                     let done = catch_unwind(AssertUnwindSafe(|| self.act(call)));
+                    if matches!(done, Ok(Ok(_))) && (is_part || passes) {
+                        *self.part_of() = is_part.then(|| caller.to_owned());
+                    }
                     let done = done.unwrap_or_else(|_| {
                         self.gate().refuse(caller, Fault::Malformed);
                         Err(Refusal::Other("the call could not be made: its values contradict each other".to_owned()))
@@ -394,13 +418,9 @@ impl Shared {
                 world.set_state(world.object_of(id)?, &state)?;
                 Reply::Done(self.publish())
             }
-            Call::Drive(drive) => {
-                self.is_part.store(false, Relaxed);
-                done(0, world.drive(drive))?
-            }
+            Call::Drive(drive) => done(0, world.drive(drive))?,
             Call::Advance(span) if span > SPAN_MAX => return Err(too_long_a_span(span)),
             Call::Advance(span) => {
-                self.is_part.store(false, Relaxed);
                 world.advance(span)?;
                 Reply::Done(self.publish())
             }
@@ -432,6 +452,10 @@ impl Shared {
             Call::AdvanceWithin { span, .. } if span > SPAN_MAX => return Err(too_long_a_span(span)),
             Call::AdvanceWithin { span, boxes, shows } => {
                 let advanced = self.divided()?.advance_within(span, &boxes, shows)?;
+                if !shows {
+                    // objects keep few of them
+                    self.shown().gather_events();
+                }
                 Reply::Advanced(advanced, shows.then(|| self.publish()))
             }
         };
@@ -440,7 +464,6 @@ impl Shared {
     }
 
     fn divided(&self) -> Result<&dyn DividedCalls, Refusal> {
-        self.is_part.store(true, Relaxed);
         self.world.divided().ok_or_else(|| Refusal::Other("this world is stepped by one process alone".to_owned()))
     }
 
@@ -476,6 +499,11 @@ fn refused(refusal: Refusal) -> Vec<Vec<u8>> {
 }
 
 impl Shown {
+    fn gather_events(&mut self) {
+        self.gathered.extend(self.events.take().into_iter().filter_map(WireEvent::of));
+        self.gathered.drain(..self.gathered.len().saturating_sub(GATHERED_MAX));
+    }
+
     /// Takes up the states that are there now: what has changed since the last time.
     fn changes(&mut self, world: &dyn WorldCalls, run: u64) -> Changes {
         let (time, mut present, mut states) = (world.time(), BTreeSet::new(), Vec::new());
@@ -496,7 +524,8 @@ impl Shown {
         }
         let gone: Vec<_> = self.objects.keys().filter(|id| !present.contains(id)).copied().collect();
         gone.iter().for_each(|id| drop(self.objects.remove(id)));
-        let events = self.events.take().into_iter().filter_map(WireEvent::of).collect();
+        self.gather_events();
+        let events = std::mem::take(&mut self.gathered);
         Changes { moment: Moment { run, sequence: 0, time, states, gone, events }, before }
     }
 

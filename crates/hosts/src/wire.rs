@@ -90,6 +90,18 @@ impl Call {
     }
 }
 
+impl Call {
+    /// Whether it is one of a part of a world.
+    pub const fn is_of_a_part(&self) -> bool {
+        matches!(self, Self::Release(_) | Self::Pack(_) | Self::Adopt(_) | Self::AdvanceWithin { .. })
+    }
+
+    /// Whether it lets the time of a whole world pass.
+    pub const fn lets_time_pass(&self) -> bool {
+        matches!(self, Self::Drive(_) | Self::Advance(_))
+    }
+}
+
 /// An answer to a call.
 #[derive(Debug, Clone, serde::Serialize, serde::Deserialize)]
 pub(crate) enum Reply {

@@ -7,6 +7,7 @@ use super::common::{calling, refused, scene_files};
 use crate::cli::args::RunArgs;
 use crate::cli::run::Request;
 use metachron_console::output::BadInput;
+use metachron_console::values::Pin;
 use metachron_hosts::{HostsError, RemoteWorld, SceneFiles, connect};
 use metachron_world::{PlacedHost, SceneMark};
 use std::sync::Arc;
@@ -21,7 +22,20 @@ const ASKED_EVERY: Duration = Duration::from_millis(50);
 /// Gives the scene of `request` to the hosts that `args` names, if any.
 pub(in super::super) fn place(args: &RunArgs, request: &mut Request) -> anyhow::Result<()> {
     if args.hosts.is_empty() {
-        return Ok(());
+        return match args.host_of.first() {
+            None => Ok(()),
+            Some(_) => Err(BadInput("--host-of: objects have hosts in runs with --hosts".to_owned()).into()),
+        };
+    }
+    let names: Vec<&str> =
+        args.hosts.iter().map(|host| host.split_once('=').map_or(&**host, |(name, _)| name)).collect();
+    for Pin { object, host } in &args.host_of {
+        let expected = match request.scene.agents.iter().any(|agent| agent.name == *object) {
+            false => "an object that moves, by its name in the scene".to_owned(),
+            true if names.contains(&&**host) => continue,
+            true => format!("one of the hosts {}", names.join(", ")),
+        };
+        return Err(BadInput(format!("--host-of {object}={host}: expected {expected}")).into());
     }
     request.pins.clone_from(&args.host_of);
     let files = scene_files(&request.source, &request.overrides)?;

@@ -3,8 +3,8 @@
 //! In: the box that each agent publishes, and a bound of its speed. Out: for every agent a list of the peers near
 //! enough to touch within its next turns, and of the peers that have given impulses to it ([`NeighbourList`]). Agents
 //! exchange atomic words only: no agent waits for another.
-//! A distant peer is not checked before the time at which it could be near (an appointment); an agent that becomes faster than its
-//! published speed enters itself in a common log, and is checked again.
+//! A distant peer is not checked before the time at which it could be near (an appointment); an agent that is faster, makes longer steps or comes
+//! farther than was published enters itself in a common log, and is checked again.
 //! Never here: shapes, contacts, snapshots. A run in which no two agents could touch has no broad phase.
 
 mod neighbour_list;
@@ -33,7 +33,7 @@ pub(crate) struct PlannedStep {
 #[derive(Debug)]
 pub(crate) struct BroadPhase {
     bounds: Table<PublishedBounds>,
-    /// Agents that became faster than their published speed, newest last; a word holds the entry's index and the agent's number.
+    /// Agents that are not where their published boxes led, newest last; a word holds the entry's index and the agent's number.
     log: Vec<AtomicU64>,
     /// Number of entries ever written.
     noted: AtomicU64,
@@ -54,6 +54,13 @@ pub(crate) struct BroadPhaseState {
 pub(crate) struct PublishedState {
     bounds: Option<BoxWords>,
     pub callers: Vec<AgentId>,
+}
+
+/// What an agent has published, and whether it is not what its box before led to.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Published {
+    bounds: MovingBox,
+    is_new: bool,
 }
 
 /// A box that an agent is in, with all places at which it may be found near another one that is in such a box too.
@@ -142,8 +149,8 @@ impl BroadPhase {
         self.calls.grow();
     }
 
-    /// Publishes that `id` is inside `bounds` before a `step`; called by the thread that makes its turns. Returns what is published.
-    pub fn publish(&self, id: AgentId, bounds: &Bounds, step: PlannedStep) -> MovingBox {
+    /// Publishes that `id` is inside `bounds` before a `step`; called by the thread that makes its turns.
+    pub fn publish(&self, id: AgentId, bounds: &Bounds, step: PlannedStep) -> Published {
         let PlannedStep { start: time, dt } = step;
         let Bounds { low, high, speed_m_s } = *bounds;
         let written = self.bounds.get(id.0 as usize);
@@ -153,10 +160,13 @@ impl BroadPhase {
         let step_s = seldom_changed(dt.as_secs_f64(), dt.as_secs_f64(), step_before_s);
         let published = MovingBox { low, high, speed_m_s, step_s, time };
         written.into_iter().for_each(|written| written.write(&published));
-        if speed_m_s > speed_before_m_s || step_s > step_before_s || before.is_none() {
-            self.log_speed(id);
+        let is_as_told =
+            |before: MovingBox| speed_m_s <= before.speed_m_s && step_s <= before.step_s && before.leads_to(&published);
+        let is_new = !before.is_some_and(is_as_told);
+        if is_new {
+            self.log(id);
         }
-        published
+        Published { bounds: published, is_new }
     }
 
     /// The last published box of `id`.
@@ -263,7 +273,7 @@ impl BroadPhase {
     pub fn set_state_of(&self, id: AgentId, state: &PublishedState) {
         self.bounds.get(id.0 as usize).into_iter().for_each(|bounds| bounds.set_words(state.bounds));
         self.set_callers_of(id, &state.callers);
-        self.log_speed(id);
+        self.log(id);
     }
 
     /// The reach of `id` where no step of any agent is longer than `dt`; `None` of one that has published no box.
@@ -286,7 +296,7 @@ impl BroadPhase {
             .for_each(|(to, callers)| self.set_callers_of(to, callers));
     }
 
-    fn log_speed(&self, id: AgentId) {
+    fn log(&self, id: AgentId) {
         let at = self.noted.fetch_add(1, SeqCst);
         self.log[(at % LOG_LENGTH) as usize].store(word(at, id), SeqCst);
     }

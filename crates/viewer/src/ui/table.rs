@@ -156,14 +156,14 @@ fn dash() -> String {
 }
 
 fn state_text(row: &AgentRow) -> String {
-    match &row.state {
-        AgentState::Running if row.host.is_some() => format!("on {}", row.host.as_deref().unwrap_or_default()),
+    let state = match &row.state {
         AgentState::Running => row.led_by.as_ref().map_or_else(|| "running".to_owned(), |by| format!("with {by}")),
         AgentState::Stalled => "stalled".to_owned(),
         AgentState::Resting => "resting".to_owned(),
         AgentState::Parked(reason) => format!("parked: {reason}"),
         AgentState::Gone => "gone".to_owned(),
-    }
+    };
+    row.host.iter().fold(state, |state, host| format!("{state}, on {host}"))
 }
 
 fn accessible_text(row: &AgentRow, texts: &[String; COLUMNS.len()]) -> String {

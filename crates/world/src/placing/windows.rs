@@ -48,6 +48,8 @@ pub(super) struct Placing {
     pub pins: BTreeMap<AgentId, usize>,
     /// Whether others see how far time has come, and the states then, after this window.
     shows: bool,
+    /// Whether loads are evened before the next window.
+    evens: bool,
 }
 
 /// The part of it that others look at while time passes: copies share the owners until these change.
@@ -171,7 +173,18 @@ impl Placing {
         let records = vec![HostRecord::default(); hosts.len()];
         let (kept, since, leaving) = (Kept::default(), Vec::new(), Vec::new());
         let seen = PlacingSeen { time, owners: Arc::new(owners), lost, escapes: 0, records };
-        Ok(Self { seen, reaches, bonds, room: ROOM, kept, since, leaving, pins: BTreeMap::new(), shows: true })
+        Ok(Self {
+            seen,
+            reaches,
+            bonds,
+            room: ROOM,
+            kept,
+            since,
+            leaving,
+            pins: BTreeMap::new(),
+            shows: true,
+            evens: true,
+        })
     }
 
     fn objects(&self) -> Vec<AgentId> {
@@ -227,19 +240,26 @@ impl PlacedWorld {
         })
     }
 
-    /// Looks where objects may be found.
+    /// Looks where objects may be found. States are seen then, unless later ones follow.
     fn look(&self, placing: &mut Placing) -> Result<(), Fault> {
+        let shows = placing.since.is_empty();
         placing.reaches.iter_mut().for_each(Vec::clear);
         placing.bonds.iter_mut().for_each(Vec::clear);
         for host in placing.living() {
-            let looked = self.part(host, |divided| divided.advance_within(SimSpan::ZERO, &[], true))?;
+            let looked = self.part(host, |divided| divided.advance_within(SimSpan::ZERO, &[], shows))?;
             (placing.reaches[host], placing.bonds[host]) = (looked.reaches, looked.bonds);
         }
         Ok(())
     }
 
-    /// Lets `span` pass, window by window.
+    /// Lets `span` pass, window by window, of which others see the last.
     pub(super) fn pass(&self, placing: &mut Placing, span: SimSpan) -> Result<(), WorldError> {
+        let passed = self.pass_windows(placing, span);
+        placing.shows = true;
+        passed
+    }
+
+    fn pass_windows(&self, placing: &mut Placing, span: SimSpan) -> Result<(), WorldError> {
         let mut left = span;
         while left > SimSpan::ZERO {
             let window = left.min(Self::WINDOW);
@@ -356,7 +376,7 @@ impl PlacedWorld {
         }
         let reaches: Vec<Reach> = placing.reaches.iter().flatten().copied().collect();
         let fences = fences(&reaches, window, placing.room);
-        let (ties, evens) = (self.ties_of(placing), placing.since.is_empty());
+        let (ties, evens) = (self.ties_of(placing), std::mem::take(&mut placing.evens));
         // those that can meet nothing stay where they are until loads are evened
         let objects = if evens { placing.objects() } else { placing.objects_of(&fences, &ties) };
         let mut placed: Vec<PlacedGroup> =
@@ -456,7 +476,7 @@ impl PlacedWorld {
             }
         }
         (kept.at, kept.took) = (Some(Instant::now()), begun.elapsed());
-        (placing.kept, placing.since) = (kept, Vec::new());
+        (placing.kept, placing.since, placing.evens) = (kept, Vec::new(), true);
         Ok(())
     }
 

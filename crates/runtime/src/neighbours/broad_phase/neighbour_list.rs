@@ -99,14 +99,15 @@ impl NeighbourList {
 
     /// Publishes to the broad phase that this agent is inside `bounds` before a `step` (`None`: without bounds).
     pub fn publish(&mut self, broad_phase: &BroadPhase, bounds: Option<&Bounds>, step: PlannedStep) {
-        let published = self.mine.map_or(0.0, |mine| mine.speed_m_s);
+        let mut is_new = false;
         self.mine = bounds.filter(|b| is_sound(b)).map(|bounds| {
             let speed_m_s = bounds.speed_m_s.max(self.speed_before_m_s);
             let published = broad_phase.publish(self.me, &Bounds { speed_m_s, ..*bounds }, step);
-            MovingBox { speed_m_s: published.speed_m_s.max(SPEED_LEAST_M_S), ..published }
+            is_new = published.is_new;
+            MovingBox { speed_m_s: published.bounds.speed_m_s.max(SPEED_LEAST_M_S), ..published.bounds }
         });
         self.speed_before_m_s = bounds.map_or(0.0, |b| b.speed_m_s);
-        if self.mine.is_some_and(|mine| mine.speed_m_s > published) {
+        if is_new {
             self.common_check = SimTime::ZERO;
         }
     }
@@ -215,7 +216,7 @@ impl NeighbourList {
         kept + LISTED
     }
 
-    /// Makes the peers that became faster than their published speed due for a check.
+    /// Makes the peers due for a check that are not where their published boxes led.
     fn read_log(&mut self, broad_phase: &BroadPhase, members: &Membership) {
         let Self { me, listed, soonest, common_check, near, .. } = self;
         let most = 2 * (LISTED + near.len());

@@ -10,20 +10,28 @@ use metachron_core::SimTime;
 
 /// A box around an agent's matter at one moment, and how fast it may grow in every direction after and before it.
 #[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
-pub(crate) struct MovingBox {
+pub(super) struct MovingBox {
     /// Least coordinates, metres.
     pub low: DVec3,
     /// Greatest coordinates, metres.
     pub high: DVec3,
     /// An upper bound of the speed of all its points, m/s; zero at rest.
     pub speed_m_s: f64,
-    /// No step from there is longer, s.
+    /// No step to it or from it is longer, s, unless that is told when it is made.
     pub step_s: f64,
     /// The moment, in the agent's own time.
     pub time: SimTime,
 }
 
 impl MovingBox {
+    /// Whether matter in this box may be in the `later` one by its time, as fast as was published and after one step at most.
+    pub fn leads_to(&self, later: &Self) -> bool {
+        let age_s = later.time.secs_after(self.time);
+        let way_m = self.speed_m_s * age_s;
+        let is_inside = (self.low - way_m).cmple(later.low).all() && (self.high + way_m).cmpge(later.high).all();
+        (0.0..=self.step_s).contains(&age_s) && is_inside
+    }
+
     /// The distance between two boxes, metres; zero where they overlap.
     pub fn gap_m(&self, other: &Self) -> f64 {
         self.gap_vector(other).length()

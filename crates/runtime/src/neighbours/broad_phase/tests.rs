@@ -196,6 +196,28 @@ fn a_longer_step_is_checked_ahead_at_once() {
 }
 
 #[test]
+fn an_agent_that_is_put_elsewhere_is_found_there_at_once() {
+    let broad_phase = BroadPhase::new(2);
+    let ball = |x: f64| Bounds { low: DVec3::X * x, high: DVec3::X * (x + 1.0), speed_m_s: 0.5 };
+    let mut lists = [0, 1].map(|id| NeighbourList::new(AgentId(id)));
+    let dt = SimSpan::from_nanos(4_000_000);
+    let step = PlannedStep { start: SimTime::ZERO, dt };
+    for (list, x) in lists.iter_mut().zip([0.0, 50.0]) {
+        list.publish(&broad_phase, Some(&ball(x)), step);
+    }
+    for list in &mut lists {
+        list.update(&broad_phase, step, &Membership::default(), |_| true);
+        assert!(list.near().is_empty());
+    }
+    // between two steps, as fast as before
+    lists[1].publish(&broad_phase, Some(&ball(1.001)), step);
+    for list in &mut lists {
+        list.update(&broad_phase, step, &Membership::default(), |_| true);
+        assert_eq!(list.near().len(), 1);
+    }
+}
+
+#[test]
 fn a_distant_agent_is_never_checked_and_an_approaching_one_is() {
     let lattice = |k: u32| DVec3::new(f64::from(k % 10), f64::from(k / 10 % 10), f64::from(k / 100)) * 10.0;
     let count = 1000;
@@ -251,8 +273,8 @@ fn ten_moving_agents_seldom_check_a_thousand_resting_ones() {
         for (k, list) in lists[..10].iter_mut().enumerate() {
             // a second to and fro, at 2 m/s in the middle
             let phase = std::f64::consts::TAU * now.as_secs_f64() + k as f64;
-            let at = DVec3::new(0.32 * libm::sin(phase) + 2.0 * k as f64, 5.0, 0.0);
-            let speed_m_s = 2.0 * libm::cos(phase).abs();
+            let at = DVec3::new(0.318 * libm::sin(phase) + 2.0 * k as f64, 5.0, 0.0);
+            let speed_m_s = 0.318 * std::f64::consts::TAU * libm::cos(phase).abs();
             list.publish(
                 &broad_phase,
                 Some(&Bounds { low: at - half, high: at + half, speed_m_s }),
