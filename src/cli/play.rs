@@ -78,23 +78,8 @@ pub(super) fn play(request: &Request, go_on: GoOn<'_>) -> anyhow::Result<Played>
         record(&session, path, request)?;
     }
     let served = devices::serve(&session, &request.scene, &request.devices)?;
-    let mut request = request.clone();
-    if let Some(placed) = &placed {
-        // as in one process the run ends with a whole frame, and what is seen of it at the same moment
-        let period = SimSpan::from_nanos(session.period().as_nanos() as u64);
-        let ends = if request.window { request.end } else { Some(request.headless_end()) };
-        let frames = match ends {
-            Some(RunLength::Seconds(seconds)) => Some(((1e9 * seconds).round() as u64).div_ceil(period.as_nanos())),
-            Some(RunLength::Frames(frames)) => Some(frames),
-            Some(RunLength::Recording) | None => None,
-        };
-        let length = frames.map(|frames| SimSpan::from_nanos(period.as_nanos().saturating_mul(frames)));
-        placed.let_flow(request.pace == Pace::Free, length.map(|length| placed.time() + length))?;
-        if let (Some(RunLength::Seconds(_)), Some(length)) = (ends, length) {
-            request.end = Some(RunLength::Seconds(length.as_secs_f64()));
-        }
-    }
-    let request = &request;
+    let timed = placed.as_ref().map(|placed| flowing(placed, &session, request)).transpose()?;
+    let request = timed.as_ref().unwrap_or(request);
     // from the first frame on: before it an adapter is opened
     let mut flows = placed.clone();
     let go_on: GoOn<'_> = &mut |step| {
@@ -108,18 +93,41 @@ pub(super) fn play(request: &Request, go_on: GoOn<'_>) -> anyhow::Result<Played>
     };
     played.report.devices = devices::reports(served);
     if let Some(placed) = placed {
-        for agent in &mut played.report.agents {
-            let object = placed.object(&agent.name).ok();
-            agent.host = object.and_then(|object| placed.host_of(object)).map(str::to_owned);
-        }
-        played.report.hosts = placed.loads().into_iter().map(host_report).collect();
-        played.report.executor = ExecutorKind::Lockstep.name().to_owned();
-        if request.pace == Pace::Free {
-            played.report.pace = "free";
-        }
-        played.report.escapes = Some(placed.escapes());
+        report_hosts(&mut played.report, &placed, request.pace);
     }
     Ok(played)
+}
+
+/// Lets the time of hosts pass, to a whole frame as in one process; the request of what is seen of it, which ends at the same moment.
+fn flowing(placed: &Arc<PlacedWorld>, session: &Session, request: &Request) -> anyhow::Result<Request> {
+    let mut request = request.clone();
+    let period = SimSpan::from_nanos(session.period().as_nanos() as u64);
+    let ends = if request.window { request.end } else { Some(request.headless_end()) };
+    let frames = match ends {
+        Some(RunLength::Seconds(seconds)) => Some(((1e9 * seconds).round() as u64).div_ceil(period.as_nanos())),
+        Some(RunLength::Frames(frames)) => Some(frames),
+        Some(RunLength::Recording) | None => None,
+    };
+    let length = frames.map(|frames| SimSpan::from_nanos(period.as_nanos().saturating_mul(frames)));
+    placed.let_flow(request.pace == Pace::Free, length.map(|length| placed.time() + length))?;
+    if let (Some(RunLength::Seconds(_)), Some(length)) = (ends, length) {
+        request.end = Some(RunLength::Seconds(length.as_secs_f64()));
+    }
+    Ok(request)
+}
+
+/// Says in the report of a run on hosts who stepped what.
+fn report_hosts(report: &mut Report, placed: &PlacedWorld, pace: Pace) {
+    for agent in &mut report.agents {
+        let object = placed.object(&agent.name).ok();
+        agent.host = object.and_then(|object| placed.host_of(object)).map(str::to_owned);
+    }
+    report.hosts = placed.loads().into_iter().map(host_report).collect();
+    report.executor = ExecutorKind::Lockstep.name().to_owned();
+    report.escapes = Some(placed.escapes());
+    if pace == Pace::Free {
+        report.pace = "free";
+    }
 }
 
 fn host_report(HostLoad { name, lost, objects, cpu, waited, moved, reborn }: HostLoad) -> HostReport {

@@ -273,8 +273,8 @@ fn ten_moving_agents_seldom_check_a_thousand_resting_ones() {
         for (k, list) in lists[..10].iter_mut().enumerate() {
             // a second to and fro, at 2 m/s in the middle
             let phase = std::f64::consts::TAU * now.as_secs_f64() + k as f64;
-            let at = DVec3::new(0.318 * libm::sin(phase) + 2.0 * k as f64, 5.0, 0.0);
-            let speed_m_s = 0.318 * std::f64::consts::TAU * libm::cos(phase).abs();
+            let at = DVec3::new(0.315 * libm::sin(phase) + 2.0 * k as f64, 5.0, 0.0);
+            let speed_m_s = 0.315 * std::f64::consts::TAU * libm::cos(phase).abs();
             list.publish(
                 &broad_phase,
                 Some(&Bounds { low: at - half, high: at + half, speed_m_s }),
