@@ -423,7 +423,9 @@ impl PlacedWorld {
             }
             objects.sort_unstable();
             let bytes = self.part(host, |divided| divided.pack(&objects))?;
-            at_once = (PACKED_BYTES * objects.len() / bytes.len().max(1)).max(1);
+            // others may be larger
+            let by_bytes = PACKED_BYTES * objects.len() / bytes.len().max(1);
+            at_once = by_bytes.clamp(1, 4 * objects.len());
             packs.push(Pack { host, objects, bytes });
         }
         Ok(packs)
