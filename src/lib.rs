@@ -70,8 +70,9 @@ pub mod prelude {
     pub use metachron_contact::{Agent, Input, Inputs, OwnSteps, Stepping};
     pub use metachron_core::{AgentId, Anchor, Body, Resolution, ResolutionRange, SimSpan, SimTime, Snapshot};
     pub use metachron_geometry::Solid;
+    pub use metachron_runtime::TimelineCommand;
     pub use metachron_world::{
-        Command, Contact, Custom, Event, EventFilter, Happening, JointState, Object, Pace, Recording, Rigid, Scene,
-        SensorOn, Site, Soft, Touched, Tube, World, WorldError, kinds::ExecutorKind,
+        Checkpoint, Command, Contact, Custom, Event, EventFilter, Happening, JointState, Object, Pace, Recording,
+        Rigid, Scene, SensorOn, Site, Soft, Touched, Tube, World, WorldError, kinds::ExecutorKind,
     };
 }
