@@ -104,7 +104,7 @@ fn flowing(placed: &Arc<PlacedWorld>, session: &Session, request: &Request) -> a
     let period = SimSpan::from_nanos(session.period().as_nanos() as u64);
     let ends = if request.window { request.end } else { Some(request.headless_end()) };
     let frames = match ends {
-        Some(RunLength::Seconds(seconds)) => Some(((1e9 * seconds).round() as u64).div_ceil(period.as_nanos())),
+        Some(RunLength::Seconds(s)) => SimSpan::from_secs_f64(s).map(|s| s.as_nanos().div_ceil(period.as_nanos())),
         Some(RunLength::Frames(frames)) => Some(frames),
         Some(RunLength::Recording) | None => None,
     };

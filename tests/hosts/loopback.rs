@@ -268,7 +268,7 @@ fn another_scene_is_refused_in_one_sentence() {
 /// A link between a caller and a host.
 #[derive(Default)]
 struct BadLink {
-    /// It carries nothing: its connections stay open.
+    /// Whether it carries nothing, while its connections stay open.
     is_silent: AtomicBool,
     /// From the one to the other.
     delay: Duration,

@@ -61,7 +61,7 @@ struct Shared {
     /// Callers and their calls.
     waiting: Waiting<(String, Query)>,
     ends: AtomicBool,
-    /// The caller for whom a part of the world is stepped here: its states are sent when he shows them.
+    /// The caller of the part of a world that is stepped here: states are sent when that caller shows them.
     part_of: Mutex<Option<String>>,
 }
 

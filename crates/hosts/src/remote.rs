@@ -378,7 +378,7 @@ impl Link {
         self.see(sequence)
     }
 
-    /// Who reads states next sees all that is in the messages up to this number.
+    /// Readers of states see from then on all that is in the messages up to this number.
     fn see(&self, sequence: u64) -> Result<(), WorldError> {
         if sequence > 0 && !self.mirror.reach(sequence, LEASE) {
             self.refresh()?;

@@ -88,9 +88,7 @@ impl Call {
             | Self::AdvanceWithin { .. } => Role::Operator,
         }
     }
-}
 
-impl Call {
     /// Whether it is one of a part of a world.
     pub const fn is_of_a_part(&self) -> bool {
         matches!(self, Self::Release(_) | Self::Pack(_) | Self::Adopt(_) | Self::AdvanceWithin { .. })

@@ -19,31 +19,40 @@ const BEGINS_WITHIN: Duration = Duration::from_secs(30);
 /// The host is asked so often.
 const ASKED_EVERY: Duration = Duration::from_millis(50);
 
+/// A host of an argument.
+struct HostWish<'a> {
+    name: &'a str,
+    endpoint: String,
+}
+
+impl<'a> HostWish<'a> {
+    fn of(host: &'a str) -> Self {
+        match host.split_once('=') {
+            Some((name, endpoint)) => Self { name, endpoint: endpoint.to_owned() },
+            None => Self { name: host, endpoint: format!("tls/{host}:7447") },
+        }
+    }
+}
+
 /// Gives the scene of `request` to the hosts that `args` names, if any.
 pub(in super::super) fn place(args: &RunArgs, request: &mut Request) -> anyhow::Result<()> {
-    if args.hosts.is_empty() {
-        return match args.host_of.first() {
-            None => Ok(()),
-            Some(_) => Err(BadInput("--host-of: objects have hosts in runs with --hosts".to_owned()).into()),
-        };
+    if args.hosts.is_empty() && args.host_of.is_empty() {
+        return Ok(());
     }
-    let names: Vec<&str> =
-        args.hosts.iter().map(|host| host.split_once('=').map_or(&**host, |(name, _)| name)).collect();
+    let wishes: Vec<HostWish<'_>> = args.hosts.iter().map(|host| HostWish::of(host)).collect();
+    let names: Vec<&str> = wishes.iter().map(|wish| wish.name).collect();
     for Pin { object, host } in &args.host_of {
         let expected = match request.scene.agents.iter().any(|agent| agent.name == *object) {
             false => "an object that moves, by its name in the scene".to_owned(),
             true if names.contains(&&**host) => continue,
+            true if names.is_empty() => "a run with --hosts".to_owned(),
             true => format!("one of the hosts {}", names.join(", ")),
         };
         return Err(BadInput(format!("--host-of {object}={host}: expected {expected}")).into());
     }
     request.pins.clone_from(&args.host_of);
     let files = scene_files(&request.source, &request.overrides)?;
-    for host in &args.hosts {
-        let (name, endpoint) = match host.split_once('=') {
-            Some((name, endpoint)) => (name, endpoint.to_owned()),
-            None => (&**host, format!("tls/{host}:7447")),
-        };
+    for HostWish { name, endpoint } in wishes {
         if name.is_empty() || request.hosts.iter().any(|known| known.name == name) {
             return Err(BadInput(format!("--hosts: \"{name}\" is empty or there twice")).into());
         }

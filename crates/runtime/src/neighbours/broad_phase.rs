@@ -56,7 +56,7 @@ pub(crate) struct PublishedState {
     pub callers: Vec<AgentId>,
 }
 
-/// What an agent has published, and whether it is not what its box before led to.
+/// The box that an agent has published, and whether its box before did not lead to it.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Published {
     bounds: MovingBox,
@@ -160,9 +160,9 @@ impl BroadPhase {
         let step_s = seldom_changed(dt.as_secs_f64(), dt.as_secs_f64(), step_before_s);
         let published = MovingBox { low, high, speed_m_s, step_s, time };
         written.into_iter().for_each(|written| written.write(&published));
-        let is_as_told =
+        let is_as_published =
             |before: MovingBox| speed_m_s <= before.speed_m_s && step_s <= before.step_s && before.leads_to(&published);
-        let is_new = !before.is_some_and(is_as_told);
+        let is_new = !before.is_some_and(is_as_published);
         if is_new {
             self.log(id);
         }

@@ -7,7 +7,7 @@
 //! earliest of theirs, at which all agents are checked: memory per agent does not grow with the number of agents. Never here: the purpose of the list.
 
 use super::published_bounds::{MovingBox, ReadBounds};
-use super::{BroadPhase, PlannedStep, SPEED_LEAST_M_S};
+use super::{BroadPhase, PlannedStep};
 use crate::cluster::{Epoch, Membership};
 use metachron_core::{AgentId, Archive, ArchiveError, Bounds, SimSpan, SimTime, archive_values};
 use std::sync::atomic::Ordering::SeqCst;
@@ -104,7 +104,7 @@ impl NeighbourList {
             let speed_m_s = bounds.speed_m_s.max(self.speed_before_m_s);
             let published = broad_phase.publish(self.me, &Bounds { speed_m_s, ..*bounds }, step);
             is_new = published.is_new;
-            MovingBox { speed_m_s: published.bounds.speed_m_s.max(SPEED_LEAST_M_S), ..published.bounds }
+            published.bounds
         });
         self.speed_before_m_s = bounds.map_or(0.0, |b| b.speed_m_s);
         if is_new {
@@ -252,7 +252,7 @@ fn is_far(mine: &MovingBox, seen: &ReadBounds, common_check: SimTime, now: SimTi
     if common_check == NEVER {
         return false;
     }
-    // as many of the longest steps ahead as a near one stays near for of its own, which are half as long
+    // two of the longest steps are four of its own at least, for which a near one stays near
     let until_s = common_check.secs_after(now) + NEAR_STEPS * longest.as_secs_f64();
     let way_m = until_s * (mine.speed_m_s + theirs.speed_m_s) + leap_m(theirs);
     let least_m = FAR_ROOM * (way_m + SKIN_M + drift_m(theirs, now) + surplus_m(longest));

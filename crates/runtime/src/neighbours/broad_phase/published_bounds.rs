@@ -17,7 +17,7 @@ pub(super) struct MovingBox {
     pub high: DVec3,
     /// An upper bound of the speed of all its points, m/s; zero at rest.
     pub speed_m_s: f64,
-    /// No step to it or from it is longer, s, unless that is told when it is made.
+    /// No step to it or from it is longer, s; a longer one is logged when it is made.
     pub step_s: f64,
     /// The moment, in the agent's own time.
     pub time: SimTime,
