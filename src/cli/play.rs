@@ -7,7 +7,6 @@ use super::exports::Exports;
 use super::run::{Played, Request, RunLength, Step};
 use anyhow::Context;
 use metachron_console::output::BadInput;
-use metachron_console::values::Pin;
 use metachron_core::{AgentId, AttachmentEvent, ClusterState, ContactPartner, SensorTouch, SimSpan};
 use metachron_lod::Bound;
 use metachron_render::Size;
@@ -59,11 +58,6 @@ pub(super) fn play(request: &Request, go_on: GoOn<'_>) -> anyhow::Result<Played>
         [] => None,
         hosts => Some(Arc::new(PlacedWorld::start(&request.scene, hosts.to_vec())?)),
     };
-    for (placed, Pin { object, host }) in
-        placed.iter().flat_map(|placed| request.pins.iter().map(move |pin| (placed, pin)))
-    {
-        placed.pin(placed.object(object)?, host)?;
-    }
     let mut session = match &placed {
         Some(placed) => Session::open_elsewhere(request.scene.clone(), Arc::clone(placed) as Arc<dyn WorldCalls>)?,
         None => Session::open(request.scene.clone(), request.pace)?,

@@ -14,7 +14,6 @@ use metachron_console::exit::Exit;
 use metachron_console::files::{check_place, check_unread, write_file};
 use metachron_console::output::{BadInput, data, message, print_overlaps, warn_priority};
 use metachron_console::progress::Bar;
-use metachron_console::values::Pin;
 use metachron_export::VtkSeries;
 use metachron_render::{Colouring, Style};
 use metachron_scene::{Source, load};
@@ -71,8 +70,6 @@ pub struct Request {
     pub record: Option<PathBuf>,
     /// The hosts that step it together; none for this process.
     pub hosts: Vec<PlacedHost>,
-    /// Objects that certain ones of them step.
-    pub pins: Vec<Pin>,
     /// Where to write it when the requested window could not be opened.
     pub png_without_window: PathBuf,
 }
@@ -241,7 +238,6 @@ impl Request {
             devices: Vec::new(),
             record: None,
             hosts: Vec::new(),
-            pins: Vec::new(),
         }
     }
 }

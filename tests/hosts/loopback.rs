@@ -1,14 +1,15 @@
 //! Two ends over loopback: a world here and the same world as it is called from elsewhere.
 
 use glam::DVec3;
-use metachron::core::{Anchor, Body, SimSpan, SimTime};
+use metachron::contact::{Agent, OwnSteps, StepContext, Stepping};
+use metachron::core::{Anchor, Archive, ArchiveError, Body, SimSpan, SimTime, Snapshot, StepError, StepReport};
 use metachron::geometry::Solid;
 use metachron::hosts::{Calling, Host, HostsError, RemoteWorld, SceneFiles, Serving, connect, serve};
 use metachron::runtime::{Command, TimelineCommand};
 use metachron::scene::{Source, load};
 use metachron::world::kinds::ExecutorKind;
 use metachron::world::{
-    EventFilter, GhostWorld, Happening, Pace, PlacedHost, PlacedWorld, Rigid, Scene, SceneText, Tube, World,
+    Custom, EventFilter, GhostWorld, Happening, Pace, PlacedHost, PlacedWorld, Rigid, Scene, SceneText, Tube, World,
     WorldCalls, WorldError,
 };
 use std::io::{Read, Write};
@@ -344,6 +345,66 @@ fn two_hosts_over_links_of_20_ms_have_the_bits_of_one_process() {
         assert!(begun.elapsed() >= 30 * 2 * link.delay, "{:?}", begun.elapsed());
     }
     assert!(placed.loads().iter().all(|load| load.objects > 0), "{:?}", placed.loads());
+}
+
+/// An agent that touches nothing, with so many numbers of its own.
+struct Ballast {
+    steps: u64,
+    numbers: Vec<f64>,
+}
+
+impl Agent for Ballast {
+    fn model(&self) -> &'static str {
+        "ballast"
+    }
+
+    fn stepping(&mut self) -> Stepping<'_> {
+        Stepping::Own(self)
+    }
+
+    fn write_snapshot(&self, into: &mut Snapshot) {
+        into.steps = self.steps;
+    }
+
+    fn archive(&mut self, archive: &mut Archive<'_>) -> Result<(), ArchiveError> {
+        archive.value(&mut self.steps)?;
+        archive.value(&mut self.numbers)
+    }
+}
+
+impl OwnSteps for Ballast {
+    fn step(&mut self, _dt: SimSpan, _context: &StepContext<'_>) -> Result<StepReport, StepError> {
+        self.steps += 1;
+        Ok(StepReport { work: 1.0, substeps: 1, at_rest: false })
+    }
+}
+
+#[test]
+fn objects_that_fill_more_than_a_message_change_hosts() {
+    // small ones first: by them the bytes of a pack are reckoned
+    let add = |scene: metachron::world::SceneBuilder, number: usize| {
+        let numbers = if number < 300 { 1 } else { 40_000 };
+        let ballast = Custom::made_by(move |_| Box::new(Ballast { steps: 0, numbers: vec![1.0; numbers] }));
+        scene.add(format!("ballast {number}"), ballast.rate_hz(60.0))
+    };
+    let scene = (0..420).fold(Scene::builder(), add).build().unwrap();
+    let world = || {
+        let world = World::start(&scene, ExecutorKind::Lockstep).unwrap();
+        world.set_pace(Pace::Free).unwrap();
+        world
+    };
+    let served = [free_endpoint(), free_endpoint()]
+        .map(|endpoint| (serve(Arc::new(world()), Serving::new("bench", &endpoint)).unwrap(), endpoint));
+    let host = |(_, endpoint): &(Host, String)| PlacedHost {
+        name: endpoint.clone(),
+        world: Arc::new(connect(endpoint).unwrap()),
+    };
+    let placed = PlacedWorld::start(&scene, served.iter().map(host).collect()).unwrap();
+    let whole = world();
+    placed.advance(SimSpan::from_millis(100)).unwrap();
+    whole.advance(SimSpan::from_millis(100));
+    assert_eq!(placed.hash().unwrap(), whole.hash(), "{:?}", placed.loads());
+    assert!(placed.loads().iter().all(|load| load.lost.is_none() && load.objects > 100), "{:?}", placed.loads());
 }
 
 #[test]

@@ -136,11 +136,33 @@ fn a_host_that_is_killed_loses_nothing() {
 }
 
 #[test]
+#[cfg(unix)]
+fn a_run_that_is_suspended_goes_on_with_its_hosts() {
+    use nix::sys::signal::{Signal, kill};
+    let folder = tempfile::tempdir().unwrap();
+    let scene = balls(folder.path());
+    let whole = report(&run(&scene, "4", &["--executor", "lockstep"]));
+    let hosts = ["bench", "lab2"].map(Waiting::named);
+    let both = format!("{},{}", hosts[0].wish, hosts[1].wish);
+    let mut process = Command::new(cargo_bin("metachron"));
+    process.args(["run", &scene, "--seconds", "4", "--headless", "--report", "-", "-q", "--hosts", &both]);
+    let process = process.stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap();
+    let send = |signal: Signal| kill(nix::unistd::Pid::from_raw(process.id() as i32), signal).unwrap();
+    thread::sleep(Duration::from_millis(3000));
+    send(Signal::SIGSTOP);
+    thread::sleep(Duration::from_millis(3500));
+    send(Signal::SIGCONT);
+    let placed = report(&process.wait_with_output().unwrap());
+    assert_eq!(placed["state_hash"], whole["state_hash"], "{}", placed["hosts"]);
+    assert!(placed["hosts"].as_array().unwrap().iter().any(|host| host["lost"].is_null()), "{}", placed["hosts"]);
+}
+
+#[test]
 fn hosts_that_cannot_be_are_told_in_a_sentence() {
     let serves = Waiting::named("bench");
     let twice = format!("{},{}", serves.wish, serves.wish);
     for (wish, what) in [
-        (&*twice, "\"bench\" is empty or there twice"),
+        (&*twice, "\"bench\" or its endpoint is empty or there twice"),
         ("bench=tcp/127.0.0.1:9", "Unable to connect"),
         ("a=b", "is no endpoint"),
     ] {

@@ -5,19 +5,19 @@
 
 use crate::endpoint::{Place, Side, is_open_to_all, open};
 use crate::error::HostsError;
-use crate::event_wire::WireEvent;
 use crate::gate::{CALLS_MAX, Callers, Fault, Gate, Refusals};
 use crate::identity::is_name;
 use crate::refusal::Refusal;
 use crate::rounded;
 use crate::serving::{ANYONE, Begins, Role, SceneFiles, Serving};
+use crate::shown::{Changes, Shown};
 use crate::waiting::{CALLS_WAITING, Waiting};
 use crate::wire::{
-    BadMessage, Call, Encoded, MESSAGE_MAX, Moment, ObjectState, PROGRAM, Reply, Request, Welcome, decode, encode,
+    BadMessage, Call, Encoded, MESSAGE_MAX, PACKED_MAX, PROGRAM, Reply, Request, Welcome, decode, encode,
 };
-use metachron_core::{AgentId, LocalModel, SimSpan, Snapshot};
-use metachron_world::{Checkpoint, DividedCalls, EventFilter, EventReader, Part, Touched, WorldCalls, WorldError};
-use std::collections::{BTreeMap, BTreeSet, HashMap};
+use metachron_core::SimSpan;
+use metachron_world::{Checkpoint, DividedCalls, EventFilter, Part, Touched, WorldCalls, WorldError};
+use std::collections::BTreeMap;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::atomic::{AtomicBool, Ordering::Relaxed};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
@@ -43,9 +43,6 @@ pub struct Host {
     served: Option<(Queryable<()>, Subscriber<()>, LivelinessToken)>,
 }
 
-/// So many events wait to be shown; of more the oldest are lost.
-const GATHERED_MAX: usize = 4096;
-
 struct Shared {
     world: Arc<dyn WorldCalls>,
     name: String,
@@ -63,28 +60,6 @@ struct Shared {
     ends: AtomicBool,
     /// The caller of the part of a world that is stepped here: states are sent when that caller shows them.
     part_of: Mutex<Option<String>>,
-}
-
-/// States that have changed, and as they were shown before.
-struct Changes {
-    moment: Moment,
-    before: HashMap<AgentId, Arc<Snapshot>>,
-}
-
-/// The states that callers were shown.
-struct Shown {
-    /// The number of the next message.
-    sequence: u64,
-    objects: BTreeMap<AgentId, (Arc<str>, Arc<Snapshot>)>,
-    events: Box<dyn EventReader>,
-    /// Events that wait to be shown, the newest of them.
-    gathered: Vec<WireEvent>,
-    /// Whether there was a caller at the last message: without one nothing is looked at.
-    is_followed: bool,
-    /// States that were too long for a message.
-    too_long: u64,
-    /// Bytes of all messages of states.
-    sent: u64,
 }
 
 impl std::fmt::Debug for Host {
@@ -107,15 +82,7 @@ pub fn serve(world: Arc<dyn WorldCalls>, serving: Serving) -> Result<Host, Hosts
     let since_1970 = SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default();
     let run = (since_1970.as_nanos() as u64 ^ u64::from(std::process::id())).max(1);
     let events = world.listen(EventFilter::all());
-    let shown = Mutex::new(Shown {
-        sequence: 1,
-        objects: BTreeMap::new(),
-        events,
-        gathered: Vec::new(),
-        is_followed: false,
-        too_long: 0,
-        sent: 0,
-    });
+    let shown = Mutex::new(Shown::new(events));
     let gate = Mutex::new(Gate::new(identity.is_some(), roles.len()));
     let (ends, part_of) = (AtomicBool::new(false), Mutex::default());
     let (scene, waiting) = (scene.map(Box::new), Waiting::new());
@@ -447,7 +414,10 @@ impl Shared {
                 Reply::Done(0)
             }
             Call::Release(objects) => done(0, self.divided()?.release(&objects))?,
-            Call::Pack(objects) => Reply::Packed(self.divided()?.pack(&objects)?),
+            Call::Pack(objects) => {
+                let packed = self.divided()?.pack(&objects)?;
+                Reply::Packed(packed.filter(|packed| packed.len() <= PACKED_MAX))
+            }
             Call::Adopt(packed) => done(0, self.divided()?.adopt(&packed))?,
             Call::AdvanceWithin { span, .. } if span > SPAN_MAX => return Err(too_long_a_span(span)),
             Call::AdvanceWithin { span, boxes, shows } => {
@@ -496,56 +466,4 @@ fn done(sequence: u64, outcome: Result<(), WorldError>) -> Result<Reply, Refusal
 /// A refusal as the bytes of an answer.
 fn refused(refusal: Refusal) -> Vec<Vec<u8>> {
     encode(&Reply::Refused(refusal)).into_iter().collect()
-}
-
-impl Shown {
-    fn gather_events(&mut self) {
-        self.gathered.extend(self.events.take().into_iter().filter_map(WireEvent::of));
-        self.gathered.drain(..self.gathered.len().saturating_sub(GATHERED_MAX));
-    }
-
-    /// Takes up the states that are there now: what has changed since the last time.
-    fn changes(&mut self, world: &dyn WorldCalls, run: u64) -> Changes {
-        let (time, mut present, mut states) = (world.time(), BTreeSet::new(), Vec::new());
-        let mut before = HashMap::new();
-        for object in world.all_objects() {
-            // an object may leave meanwhile
-            let Ok(state) = world.latest(object) else { continue };
-            let id = object.id();
-            present.insert(id);
-            let known = self.objects.get(&id);
-            if known.is_some_and(|(_, shown)| Arc::ptr_eq(shown, &state)) {
-                continue;
-            }
-            let name = known.map(|(name, _)| Ok(Arc::clone(name))).unwrap_or_else(|| world.name(object.into()));
-            let Ok(name) = name else { continue };
-            states.push(ObjectState { id, name: Arc::clone(&name), state: travelling(&state) });
-            before.extend(self.objects.insert(id, (name, state)).map(|(_, state)| (id, state)));
-        }
-        let gone: Vec<_> = self.objects.keys().filter(|id| !present.contains(id)).copied().collect();
-        gone.iter().for_each(|id| drop(self.objects.remove(id)));
-        self.gather_events();
-        let events = std::mem::take(&mut self.gathered);
-        Changes { moment: Moment { run, sequence: 0, time, states, gone, events }, before }
-    }
-
-    /// All states as they were last shown.
-    fn all(&self, world: &dyn WorldCalls, run: u64) -> Moment {
-        let state = |(id, (name, state)): (&AgentId, &(Arc<str>, Arc<Snapshot>))| ObjectState {
-            id: *id,
-            name: Arc::clone(name),
-            state: travelling(state),
-        };
-        let states = self.objects.iter().map(state).collect();
-        Moment { run, time: world.time(), states, ..Moment::default() }
-    }
-}
-
-/// A state without what only partners of asynchronous pairs read: ledgers, and the local model with its factor.
-fn travelling(state: &Arc<Snapshot>) -> Arc<Snapshot> {
-    if state.given.is_empty() && state.taken.is_empty() && state.local_model.blocks.is_empty() {
-        return Arc::clone(state);
-    }
-    let (given, taken, local_model) = (Vec::new(), Vec::new(), LocalModel::default());
-    Arc::new(Snapshot { given, taken, local_model, ..Snapshot::clone(state) })
 }

@@ -29,11 +29,13 @@ mod host;
 #[cfg(test)]
 mod hostile_tests;
 mod identity;
+mod link;
 mod mirror;
 mod refusal;
 mod remote;
 mod rounded;
 mod serving;
+mod shown;
 mod waiting;
 mod wire;
 

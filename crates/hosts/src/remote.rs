@@ -7,10 +7,11 @@ use crate::endpoint::{LEASE, Place, Side, is_open_to_all, open};
 use crate::error::HostsError;
 use crate::host::PERIOD;
 use crate::identity::{Identity, is_name};
+use crate::link::{Link, hello, unexpected};
 use crate::mirror::{Mirror, RemoteFrame};
-use crate::rounded::{Change, Sketched, Sketches};
+use crate::rounded::Sketches;
 use crate::serving::{ANYONE, SceneFiles};
-use crate::wire::{Call, Moment, PROGRAM, Reply, Request, Welcome, decode, encode};
+use crate::wire::{Call, PROGRAM, Reply, Request, Welcome, decode, encode};
 use metachron_core::{AgentId, Body, SimSpan, SimTime, Snapshot};
 use metachron_runtime::{Command, Reach, TimelineCommand};
 use metachron_world::{
@@ -18,26 +19,17 @@ use metachron_world::{
     StateLink, Touched, WorldCalls, WorldError,
 };
 use std::sync::atomic::{AtomicBool, Ordering::Relaxed};
-use std::sync::mpsc::{Receiver, RecvTimeoutError, sync_channel};
-use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::sync::mpsc::sync_channel;
+use std::sync::{Arc, Mutex};
 use std::thread::JoinHandle;
-use std::time::{Duration, Instant};
-use zenoh::handlers::DefaultHandler;
+use std::time::Duration;
 use zenoh::liveliness::LivelinessToken;
 use zenoh::pubsub::Subscriber;
-use zenoh::qos::CongestionControl;
-use zenoh::query::ConsolidationMode;
 use zenoh::sample::SampleKind;
-use zenoh::session::SessionGetBuilder;
 use zenoh::{Session, Wait};
 
-/// The most that an answer is waited for. It is as long as any work of a host: one that ends or falls silent meanwhile is noticed within a
-/// [`LEASE`] or two, by its link.
-const ANSWER_WITHIN: Duration = Duration::from_hours(24);
 /// Whether a host is there at all is asked for so long, so often.
 const GREETING: (u32, Duration) = (20, Duration::from_millis(50));
-/// All states are asked for at most so often.
-const REFRESH: Duration = Duration::from_millis(250);
 /// So many messages wait to be read; of more the newest are lost, and all states are asked for.
 const WAITING: usize = 64;
 /// Time passes elsewhere in calls of this length.
@@ -59,31 +51,6 @@ struct Connection {
     reader: Option<JoinHandle<()>>,
     _subscribers: [Subscriber<()>; 2],
     _token: LivelinessToken,
-}
-
-/// Calls of a host and their answers.
-struct Link {
-    session: Session,
-    mirror: Arc<Mirror>,
-    caller: String,
-    is_open: bool,
-    /// Of a caller that only looks.
-    sketches: Mutex<Option<Sketches>>,
-    /// The number of the newest call.
-    sequence: Mutex<u64>,
-    posted: Arc<Mutex<Posted>>,
-    ends: AtomicBool,
-}
-
-/// The outcome of the calls that were posted.
-#[derive(Default)]
-struct Posted {
-    /// How long the newest that ended has taken: until its answer, or until none was waited for any more.
-    round_trip: Duration,
-    /// The newest refusal.
-    refused: Option<WorldError>,
-    /// How many had no answer in time.
-    lost: u64,
 }
 
 impl std::fmt::Debug for RemoteWorld {
@@ -208,10 +175,6 @@ fn greet(session: &Session, caller: &str, is_looking: bool) -> Option<Result<Wel
     None
 }
 
-fn hello(is_looking: bool) -> Call {
-    Call::Hello { program: PROGRAM.to_owned(), is_looking }
-}
-
 /// Checks that a world is one that this program reads, and of the expected scene.
 fn check_welcome(welcome: &Welcome, expected: Option<&SceneMark>) -> Result<(), HostsError> {
     if welcome.program != PROGRAM {
@@ -231,163 +194,11 @@ fn check_welcome(welcome: &Welcome, expected: Option<&SceneMark>) -> Result<(), 
     }
 }
 
-fn unexpected() -> WorldError {
-    WorldError::Elsewhere("the host has answered something else than was asked".to_owned())
-}
-
 impl Drop for Connection {
     fn drop(&mut self) {
         self.link.ends.store(true, Relaxed);
         self.reader.take().into_iter().for_each(|reader| drop(reader.join()));
         let _ = self.link.session.close().wait();
-    }
-}
-
-impl Link {
-    /// Reads states until the connection ends, and asks for all where some are missing.
-    fn read(&self, messages: &Receiver<Vec<u8>>) {
-        let mut refreshed = Instant::now();
-        while !self.ends.load(Relaxed) {
-            match messages.recv_timeout(LEASE / 20) {
-                Ok(bytes) => self.take(&bytes),
-                Err(RecvTimeoutError::Timeout) => {}
-                Err(RecvTimeoutError::Disconnected) => return,
-            }
-            if self.mirror.is_stale() && self.mirror.silence().is_none() && refreshed.elapsed() >= REFRESH {
-                // where it fails it is asked again
-                let _ = self.refresh();
-                refreshed = Instant::now();
-            }
-        }
-    }
-
-    /// Takes a message of states.
-    fn take(&self, bytes: &[u8]) {
-        let mut sketches = self.sketches();
-        let message = match &*sketches {
-            Some(sketches) => sketches.decode(bytes),
-            None => match decode(bytes) {
-                Ok(Reply::Moment(moment)) => Ok(Sketched::Next(moment, Change::default())),
-                _ => return self.mirror.refuse(),
-            },
-        };
-        match message {
-            Ok(Sketched::Next(moment, change)) => {
-                if self.mirror.take(moment)
-                    && let Some(sketches) = &mut *sketches
-                {
-                    sketches.apply(change);
-                }
-            }
-            Ok(Sketched::Old) => {}
-            Ok(Sketched::Later) => self.mirror.miss(),
-            Err(_) => self.mirror.refuse(),
-        }
-    }
-
-    fn sketches(&self) -> MutexGuard<'_, Option<Sketches>> {
-        self.sketches.lock().unwrap_or_else(PoisonError::into_inner)
-    }
-
-    /// Introduces the caller again, where its host has forgotten it, and takes all states.
-    fn refresh(&self) -> Result<(), WorldError> {
-        // the lock is free again before the host is asked
-        let is_looking = self.sketches().is_some();
-        self.call(hello(is_looking))?;
-        let all = self.call(Call::All)?.into_iter();
-        let parts = all.map(|part| if let Reply::Moment(part) = part { Ok(part) } else { Err(unexpected()) });
-        let parts = parts.collect::<Result<Vec<Moment>, _>>()?;
-        self.sketches().iter_mut().for_each(|sketches| sketches.begin(&parts));
-        self.mirror.take_all(parts);
-        Ok(())
-    }
-
-    /// Calls the host, and waits for all that it answers.
-    fn call(&self, call: Call) -> Result<Vec<Reply>, WorldError> {
-        if let Some(silent) = self.mirror.silence() {
-            return Err(silent);
-        }
-        let asked = Instant::now();
-        let answers =
-            self.send(call, |get| get.timeout(ANSWER_WITHIN).consolidation(ConsolidationMode::None).wait())?;
-        let mut replies = Vec::new();
-        while let Ok(answer) = answers.recv() {
-            let Ok(sample) = answer.result() else { continue };
-            match decode(&sample.payload().to_bytes()) {
-                Ok(Reply::Refused(refusal)) => return Err(refusal.into()),
-                Ok(reply) => replies.push(reply),
-                Err(bad) => {
-                    self.mirror.refuse();
-                    return Err(WorldError::Elsewhere(bad.to_string()));
-                }
-            }
-        }
-        if replies.is_empty() { Err(self.mirror.silent_for(asked.elapsed())) } else { Ok(replies) }
-    }
-
-    /// Sends a call under the next number: calls leave in the order of their numbers.
-    fn send<T>(
-        &self,
-        call: Call,
-        ask: impl FnOnce(SessionGetBuilder<'_, '_, DefaultHandler>) -> zenoh::Result<T>,
-    ) -> Result<T, WorldError> {
-        let elsewhere = |reason: String| WorldError::Elsewhere(reason);
-        let key = format!("metachron/{}/call/{}", self.mirror.world, self.caller);
-        let mut sequence = self.sequence.lock().unwrap_or_else(PoisonError::into_inner);
-        *sequence += 1;
-        let request = encode(&Request { run: self.mirror.run, sequence: *sequence, call });
-        let get = self.session.get(key).payload(request.map_err(|bad| elsewhere(bad.to_string()))?);
-        ask(get).map_err(|error| elsewhere(error.to_string()))
-    }
-
-    /// Calls the host and waits for nothing; a call that it refuses is the error of the next one posted. Where the link is full the call is lost,
-    /// which counts as no answer.
-    fn post(&self, call: Call) -> Result<(), WorldError> {
-        if let Some(silent) = self.mirror.silence() {
-            return Err(silent);
-        }
-        let (all, begun) = (Arc::clone(&self.posted), Instant::now());
-        let take = move |answer: zenoh::query::Reply| {
-            let mut posted = all.lock().unwrap_or_else(PoisonError::into_inner);
-            posted.round_trip = begun.elapsed();
-            match answer.result().map(|sample| decode(&sample.payload().to_bytes())) {
-                Ok(Ok(Reply::Refused(refusal))) => posted.refused = Some(refusal.into()),
-                Ok(_) => {}
-                Err(_) => posted.lost += 1,
-            }
-        };
-        let post = |get: SessionGetBuilder<'_, '_, DefaultHandler>| {
-            get.timeout(LEASE).congestion_control(CongestionControl::Drop).callback(take).wait()
-        };
-        self.send(call, post)?;
-        self.posted().refused.take().map_or(Ok(()), Err)
-    }
-
-    fn posted(&self) -> MutexGuard<'_, Posted> {
-        self.posted.lock().unwrap_or_else(PoisonError::into_inner)
-    }
-
-    /// Calls the host for one answer.
-    fn ask(&self, call: Call) -> Result<Reply, WorldError> {
-        self.call(call)?.pop().ok_or_else(unexpected)
-    }
-
-    /// Calls the host for nothing but that it is done; what it changed is seen then.
-    fn act(&self, call: Call) -> Result<(), WorldError> {
-        let Reply::Done(sequence) = self.ask(call)? else { return Err(unexpected()) };
-        self.see(sequence)
-    }
-
-    /// Readers of states see from then on all that is in the messages up to this number.
-    fn see(&self, sequence: u64) -> Result<(), WorldError> {
-        if sequence > 0 && !self.mirror.reach(sequence, LEASE) {
-            self.refresh()?;
-        }
-        Ok(())
-    }
-
-    fn own(&self, object: Object) -> Result<AgentId, WorldError> {
-        if object.is_of(self.mirror.tag) { Ok(object.id()) } else { Err(WorldError::Foreign) }
     }
 }
 
@@ -579,7 +390,7 @@ impl DividedCalls for RemoteWorld {
         self.calls().act(Call::Release(objects.to_vec()))
     }
 
-    fn pack(&self, objects: &[AgentId]) -> Result<Vec<u8>, WorldError> {
+    fn pack(&self, objects: &[AgentId]) -> Result<Option<Vec<u8>>, WorldError> {
         if let Reply::Packed(packed) = self.calls().ask(Call::Pack(objects.to_vec()))? {
             Ok(packed)
         } else {

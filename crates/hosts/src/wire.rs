@@ -16,11 +16,13 @@ use serde::de::DeserializeOwned;
 use std::sync::Arc;
 
 /// The version of all messages: it changes with the meaning of their bytes.
-pub(crate) const VERSION: u8 = 5;
+pub(crate) const VERSION: u8 = 6;
 /// The version of the program, whose parts and states each version has its own of.
 pub(crate) const PROGRAM: &str = env!("CARGO_PKG_VERSION");
 /// The most bytes of one message.
 pub const MESSAGE_MAX: usize = 16 << 20;
+/// The most bytes of packed objects: a call with them has a head.
+pub(crate) const PACKED_MAX: usize = MESSAGE_MAX - 64;
 
 /// A call, with its place among those of its caller.
 #[derive(Debug, Clone, serde::Serialize, serde::Deserialize)]
@@ -112,7 +114,8 @@ pub(crate) enum Reply {
     Hash(u64),
     Part(Option<Box<Part>>),
     Scene(Option<Box<SceneFiles>>),
-    Packed(Vec<u8>),
+    /// Packed objects; `None` where these are more than [`PACKED_MAX`] bytes.
+    Packed(Option<Vec<u8>>),
     /// How far a part has come; its states are in the messages up to this number, if they are sent.
     Advanced(PartAdvanced, Option<u64>),
     Refused(Refusal),

@@ -6,5 +6,6 @@
 pub mod divided;
 pub mod flow;
 mod groups;
+mod kept;
 pub mod placed_world;
 mod windows;

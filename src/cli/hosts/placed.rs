@@ -10,6 +10,7 @@ use metachron_console::output::BadInput;
 use metachron_console::values::Pin;
 use metachron_hosts::{HostsError, RemoteWorld, SceneFiles, connect};
 use metachron_world::{PlacedHost, SceneMark};
+use std::collections::BTreeSet;
 use std::sync::Arc;
 use std::thread;
 use std::time::{Duration, Instant};
@@ -41,20 +42,26 @@ pub(in super::super) fn place(args: &RunArgs, request: &mut Request) -> anyhow::
     }
     let wishes: Vec<HostWish<'_>> = args.hosts.iter().map(|host| HostWish::of(host)).collect();
     let names: Vec<&str> = wishes.iter().map(|wish| wish.name).collect();
+    let refuse = |object: &str, host: &str, expected: &str| BadInput(format!("{object}={host}: expected {expected}"));
     for Pin { object, host } in &args.host_of {
-        let expected = match request.scene.agents.iter().any(|agent| agent.name == *object) {
-            false => "an object that moves, by its name in the scene".to_owned(),
-            true if names.contains(&&**host) => continue,
-            true if names.is_empty() => "a run with --hosts".to_owned(),
-            true => format!("one of the hosts {}", names.join(", ")),
-        };
-        return Err(BadInput(format!("--host-of {object}={host}: expected {expected}")).into());
+        let pinned = request.scene.agents.iter_mut().find(|agent| agent.name == *object);
+        let expected = "an object that moves, by its name in the scene";
+        pinned.ok_or_else(|| refuse(object, host, expected))?.host = Some(host.clone());
     }
-    request.pins.clone_from(&args.host_of);
+    for agent in &request.scene.agents {
+        let Some(host) = agent.host.as_ref().filter(|host| !names.contains(&&***host)) else { continue };
+        let of_names = || format!("one of the hosts {}", names.join(", "));
+        let expected = if names.is_empty() { "a run with --hosts".to_owned() } else { of_names() };
+        return Err(refuse(&agent.name, host, &expected).into());
+    }
     let files = scene_files(&request.source, &request.overrides)?;
+    let mut endpoints = BTreeSet::new();
     for HostWish { name, endpoint } in wishes {
-        if name.is_empty() || request.hosts.iter().any(|known| known.name == name) {
-            return Err(BadInput(format!("--hosts: \"{name}\" is empty or there twice")).into());
+        if name.is_empty()
+            || request.hosts.iter().any(|known| known.name == name)
+            || !endpoints.insert(endpoint.clone())
+        {
+            return Err(BadInput(format!("--hosts: \"{name}\" or its endpoint is empty or there twice")).into());
         }
         let world = Arc::new(begun(&endpoint, &args.call, &files, request.scene.mark())?);
         request.hosts.push(PlacedHost { name: name.to_owned(), world });

@@ -364,10 +364,10 @@ fn member(
         }
         ModelFile::Mesh(_) | ModelFile::Tree(_) => return None,
     };
-    let (name, links) = (common.name.clone(), Vec::new());
+    let (name, host, links) = (common.name.clone(), common.host.clone(), Vec::new());
     let range = (!matches!(spec, Spec::Tool(_))).then_some(simulation);
     let tolerance_m = tolerance(c, place, common, pace, range);
-    Some(Member { id, name, spec, pace, tolerance_m, simulation, start, picture, links, appearance, faults })
+    Some(Member { id, name, spec, pace, tolerance_m, simulation, start, picture, links, appearance, host, faults })
 }
 
 /// Links each tool with the agents that it can grasp, in both directions.

@@ -40,6 +40,8 @@ pub struct CommonFile {
     pub shading: Option<ShadingKind>,
     /// Whether it stops stepping when it is at rest and nothing touches it. Default true.
     pub sleep: Option<bool>,
+    /// Name of the host that steps it, with all that is with it, where several do (`run --hosts`); `--host-of` has precedence. No effect elsewhere.
+    pub host: Option<String>,
     /// Faults injected into its clock and its messages; keys that are left out take the values of the world.
     pub faults: Option<FaultsFile>,
     /// Its contacts: the groups that it collides with, how a pair shares its coefficients, whether it only senses.

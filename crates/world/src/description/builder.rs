@@ -536,6 +536,7 @@ pub(crate) fn member(id: AgentId, name: String, part: Part, gravity: DVec3) -> R
         picture,
         links: Vec::new(),
         appearance: DEFAULT_APPEARANCE,
+        host: None,
         faults: Faults::default(),
     })
 }

@@ -265,6 +265,8 @@ pub struct Member {
     pub links: Vec<AgentId>,
     /// How it looks.
     pub appearance: Appearance,
+    /// The host that is to step it, where several do ([`crate::PlacedWorld::pin`]).
+    pub host: Option<String>,
     /// Faults injected into its clock and messages.
     pub faults: Faults,
 }

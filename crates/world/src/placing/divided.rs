@@ -31,11 +31,12 @@ pub trait DividedCalls: Send + Sync {
     /// # Errors
     /// [`WorldError::Undivided`].
     fn release(&self, objects: &[AgentId]) -> Result<(), WorldError>;
-    /// The whole state of these objects, whose numbers rise: 200 bytes to some hundred kilobytes each.
+    /// The whole state of these objects, whose numbers rise: 200 bytes to some hundred kilobytes each; `None` where they take more than a message
+    /// of a world elsewhere holds.
     ///
     /// # Errors
     /// [`WorldError::Undivided`].
-    fn pack(&self, objects: &[AgentId]) -> Result<Vec<u8>, WorldError>;
+    fn pack(&self, objects: &[AgentId]) -> Result<Option<Vec<u8>>, WorldError>;
     /// Steps objects from now on, as another process has packed them, at the moment at which it did.
     ///
     /// # Errors
@@ -70,8 +71,8 @@ impl DividedCalls for World {
         self.set_pace(Pace::Free)
     }
 
-    fn pack(&self, objects: &[AgentId]) -> Result<Vec<u8>, WorldError> {
-        self.with_lockstep(|lockstep| lockstep.pack(objects))
+    fn pack(&self, objects: &[AgentId]) -> Result<Option<Vec<u8>>, WorldError> {
+        self.with_lockstep(|lockstep| lockstep.pack(objects)).map(Some)
     }
 
     fn adopt(&self, packed: &[u8]) -> Result<(), WorldError> {

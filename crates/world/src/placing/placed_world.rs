@@ -83,10 +83,12 @@ impl std::fmt::Debug for PlacedWorld {
 }
 
 impl PlacedWorld {
-    /// Places the objects of `scene` on hosts, whose worlds are of that scene and in the same state, in lockstep.
+    /// Places the objects of `scene` on hosts, whose worlds are of that scene and in the same state, in lockstep: those that name a host on that one
+    /// ([`Self::pin`]).
     ///
     /// # Errors
-    /// [`WorldError::Undivided`] without hosts, and for a world of another scene or in another state; the errors of its calls.
+    /// [`WorldError::Undivided`] without hosts, for an object that names another host, and for a world of another scene or in another state; the errors
+    /// of its calls.
     pub fn start(scene: &Scene, hosts: Vec<PlacedHost>) -> Result<Self, WorldError> {
         let undivided = |reason: String| WorldError::Undivided { reason };
         let first = hosts.first().ok_or_else(|| undivided("there is no host".to_owned()))?;
@@ -108,6 +110,9 @@ impl PlacedWorld {
         let placing = Placing::of(&hosts, time, &rates_hz)?;
         let (tag, seen, flow) = (WorldTag::new(), Mutex::new(Arc::new(placing.seen.clone())), Mutex::default());
         let placed = Self { hosts, tag, scene: mark, ties, rates_hz, placing: Mutex::new(placing), seen, flow };
+        for (member, host) in scene.agents.iter().filter_map(|member| Some((member, member.host.as_ref()?))) {
+            placed.pin(tag.object(member.id), host)?;
+        }
         placed.begin(&mut placed.placing())?;
         Ok(placed)
     }
@@ -153,9 +158,10 @@ impl PlacedWorld {
     pub fn pin(&self, object: Object, host: &str) -> Result<(), WorldError> {
         let names = || self.hosts.iter().map(|host| &*host.name).collect::<Vec<_>>().join(", ");
         let number = self.hosts.iter().position(|known| known.name == host);
-        let reason = || format!("there is no host \"{host}\"; there are {}", names());
+        let (id, name) = (self.id(object)?, self.name(object.into())?);
+        let reason = || format!("there is no host \"{host}\" for \"{name}\"; there are {}", names());
         let number = number.ok_or_else(|| WorldError::Undivided { reason: reason() })?;
-        self.placing().pins.insert(self.id(object)?, number);
+        self.placing().pins.insert(id, number);
         Ok(())
     }
 
@@ -429,11 +435,16 @@ mod tests {
 
     #[test]
     fn a_pinned_object_is_stepped_by_its_host_and_what_it_meets_too() {
-        let (whole, Placed { worlds, placed }) = (world(&scene()), placed(&scene(), 3));
+        let mut scene = scene();
+        scene
+            .agents
+            .iter_mut()
+            .filter(|agent| agent.name == "ball 5")
+            .for_each(|ball| ball.host = Some("host2".into()));
+        let (whole, Placed { worlds, placed }) = (world(&scene), placed(&scene, 3));
         let ball = placed.object("ball 5").unwrap();
-        placed.pin(ball, "host2").unwrap();
         let other = placed.pin(ball, "host9").unwrap_err().to_string();
-        assert!(other.contains("no host \"host9\"; there are host0, host1, host2"), "{other}");
+        assert!(other.contains("no host \"host9\" for \"ball 5\"; there are host0, host1, host2"), "{other}");
         for quarter in 0..6 {
             whole.advance(QUARTER);
             placed.advance(QUARTER).unwrap();

@@ -4,52 +4,40 @@
 
 use super::divided::{DividedCalls, PartAdvanced};
 use super::groups::{PlacedGroup, fences, groups, place};
+use super::kept::{Kept, Pack};
 use super::placed_world::{PlacedHost, PlacedWorld};
-use crate::Part;
 use crate::error::WorldError;
-use crate::history::checkpoint::{Checkpoint, CheckpointError};
-use crate::reading::object::Object;
 use metachron_core::{AgentId, Body, SimSpan, SimTime};
 use metachron_runtime::{Command, Reach, side_by_side};
 use std::collections::{BTreeMap, BTreeSet, VecDeque};
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
-/// States are kept so often: that much is done again where a host falls silent, or an object leaves its box. More seldom where it takes more than
-/// one part in so many of the time.
-const KEEP_EVERY: SimSpan = SimSpan::from_millis(500);
-const KEEP_SHARE: u32 = 20;
-
-/// So many objects are packed at first, and the rest of their group; then as many as take about so many bytes: a message has its bound.
-const PACKED_AT_FIRST: usize = 256;
-const PACKED_BYTES: usize = 2 << 20;
-
-/// How much room for more speed objects have at first; twice as much each time that one has left its box, and from window to window less again.
+/// How much room for more speed objects have at first; what there is more falls from window to window.
 const ROOM: f64 = 2.0;
-const ROOM_RISES: f64 = 2.0;
 const ROOM_FALLS: f64 = 0.98;
 
 /// By this rate the cost of an object that joined is reckoned.
-const RATE_JOINED_HZ: f64 = 60.0;
+pub(super) const RATE_JOINED_HZ: f64 = 60.0;
 
 /// The hosts' parts, and how far time has come.
 pub(super) struct Placing {
     pub seen: PlacingSeen,
     /// Where objects may be found, and which belong together, by hosts.
-    reaches: Vec<Vec<Reach>>,
+    pub(super) reaches: Vec<Vec<Reach>>,
     bonds: Vec<Vec<[AgentId; 2]>>,
-    room: f64,
-    kept: Kept,
+    pub(super) room: f64,
+    pub(super) kept: Kept,
     /// Acts since states were kept.
-    since: Vec<Act>,
+    pub(super) since: Vec<Act>,
     /// Objects that leave at their next steps.
-    leaving: Vec<AgentId>,
+    pub(super) leaving: Vec<AgentId>,
     /// The hosts that are to step some objects, and what is with them.
     pub pins: BTreeMap<AgentId, usize>,
     /// Whether others see how far time has come, and the states then, after this window.
     shows: bool,
     /// Whether loads are evened before the next window.
-    evens: bool,
+    pub(super) evens: bool,
 }
 
 /// The part of it that others look at while time passes: copies share the owners until these change.
@@ -71,26 +59,7 @@ pub(super) struct Owner {
     /// Its number.
     pub host: usize,
     /// The cost of the object: its places times its rate.
-    cost: f64,
-}
-
-/// States of all objects at one moment.
-#[derive(Default)]
-struct Kept {
-    time: SimTime,
-    /// The moment, without objects.
-    moment: Vec<u8>,
-    packs: Vec<Pack>,
-    /// When they were kept, and how long that took.
-    at: Option<Instant>,
-    took: Duration,
-}
-
-impl Kept {
-    /// Whether states of `time` are to be kept in their place.
-    fn is_old(&self, time: SimTime) -> bool {
-        time >= self.time + KEEP_EVERY && self.at.is_none_or(|at| at.elapsed() >= KEEP_SHARE * self.took)
-    }
+    pub(super) cost: f64,
 }
 
 /// The outcome of a window on one host.
@@ -118,13 +87,6 @@ struct Route {
     to: usize,
 }
 
-/// Objects that one host has packed.
-struct Pack {
-    host: usize,
-    objects: Vec<AgentId>,
-    bytes: Vec<u8>,
-}
-
 /// A thing that is done to the world.
 #[derive(Clone)]
 pub(super) enum Act {
@@ -135,7 +97,7 @@ pub(super) enum Act {
 }
 
 /// Why an act was not done.
-enum Fault {
+pub(super) enum Fault {
     /// An object has left its box.
     Escaped,
     /// The host of this number does not step its part any more.
@@ -187,7 +149,7 @@ impl Placing {
         })
     }
 
-    fn objects(&self) -> Vec<AgentId> {
+    pub(super) fn objects(&self) -> Vec<AgentId> {
         self.seen.owners.keys().copied().collect()
     }
 
@@ -199,7 +161,7 @@ impl Placing {
         there.into_iter().collect()
     }
 
-    fn living(&self) -> Vec<usize> {
+    pub(super) fn living(&self) -> Vec<usize> {
         self.seen.living()
     }
 }
@@ -233,7 +195,11 @@ impl PlacedWorld {
     }
 
     /// Calls a host for its part; one that does not answer is lost.
-    fn part<T>(&self, host: usize, call: impl FnOnce(&dyn DividedCalls) -> Result<T, WorldError>) -> Result<T, Fault> {
+    pub(super) fn part<T>(
+        &self,
+        host: usize,
+        call: impl FnOnce(&dyn DividedCalls) -> Result<T, WorldError>,
+    ) -> Result<T, Fault> {
         self.hosts[host].divided().and_then(call).map_err(|error| match error {
             error @ WorldError::Undivided { .. } => Fault::Refused(error),
             other => Fault::Lost(host, other),
@@ -241,7 +207,7 @@ impl PlacedWorld {
     }
 
     /// Looks where objects may be found. States are seen then, unless later ones follow.
-    fn look(&self, placing: &mut Placing) -> Result<(), Fault> {
+    pub(super) fn look(&self, placing: &mut Placing) -> Result<(), Fault> {
         let shows = placing.since.is_empty();
         placing.reaches.iter_mut().for_each(Vec::clear);
         placing.bonds.iter_mut().for_each(Vec::clear);
@@ -409,127 +375,8 @@ impl PlacedWorld {
     }
 
     /// Objects that one host steps, however far apart they are.
-    fn ties_of(&self, placing: &Placing) -> Vec<[AgentId; 2]> {
+    pub(super) fn ties_of(&self, placing: &Placing) -> Vec<[AgentId; 2]> {
         self.ties.iter().chain(placing.bonds.iter().flatten()).copied().collect()
-    }
-
-    /// Groups of objects as a host packs them.
-    fn pack(&self, host: usize, groups: &[Vec<AgentId>]) -> Result<Vec<Pack>, Fault> {
-        let (mut packs, mut at_once, mut groups) = (Vec::new(), PACKED_AT_FIRST, groups.iter().peekable());
-        while groups.peek().is_some() {
-            let mut objects: Vec<AgentId> = Vec::new();
-            while let Some(group) = groups.next_if(|_| objects.len() < at_once) {
-                objects.extend(group);
-            }
-            objects.sort_unstable();
-            let bytes = self.part(host, |divided| divided.pack(&objects))?;
-            // others may be larger
-            let by_bytes = PACKED_BYTES * objects.len() / bytes.len().max(1);
-            at_once = by_bytes.clamp(1, 4 * objects.len());
-            packs.push(Pack { host, objects, bytes });
-        }
-        Ok(packs)
-    }
-
-    /// Keeps the states of all objects, or does again what was done since the last ones and keeps those then.
-    fn keep_or_go_back(&self, placing: &mut Placing) -> Result<(), WorldError> {
-        loop {
-            match self.keep(placing) {
-                Ok(()) => return Ok(()),
-                Err(Fault::Refused(error)) => return Err(error),
-                Err(fault) => {
-                    self.go_back(placing, fault)?;
-                    for act in std::mem::take(&mut placing.since) {
-                        self.act(placing, act)?;
-                    }
-                }
-            }
-        }
-    }
-
-    /// Takes hosts into service again that were lost and answer, at the `moment` now: their objects live elsewhere. One that has missed an object
-    /// that joined stays lost.
-    fn take_back(&self, placing: &mut Placing, moment: &[u8]) {
-        let objects = placing.objects();
-        for (host, placed) in self.hosts.iter().enumerate() {
-            let is_back = placing.seen.lost[host].is_some() && placed.world.answers().is_ok();
-            let knows_all = || objects.iter().all(|id| placed.world.object_of(*id).is_ok());
-            let rejoin = |divided: &dyn DividedCalls| divided.release(&objects).and_then(|()| divided.adopt(moment));
-            if is_back && knows_all() && self.part(host, rejoin).is_ok() {
-                placing.seen.lost[host] = None;
-            }
-        }
-    }
-
-    fn keep(&self, placing: &mut Placing) -> Result<(), Fault> {
-        let (first, begun) = (*placing.living().first().ok_or_else(|| Fault::Refused(self.silent()))?, Instant::now());
-        let moment = self.part(first, |divided| divided.pack(&[]))?;
-        self.take_back(placing, &moment);
-        let living = placing.living();
-        let mut kept = Kept { time: placing.seen.time, moment, ..Kept::default() };
-        // without another host they could not go on
-        if living.len() > 1 {
-            let reaches: Vec<Reach> = placing.reaches.iter().flatten().copied().collect();
-            let groups = groups(&placing.objects(), &reaches, &self.ties_of(placing));
-            for host in living {
-                let is_own = |group: &&Vec<AgentId>| group.iter().all(|id| placing.seen.owners[id].host == host);
-                let own: Vec<_> = groups.iter().filter(is_own).cloned().collect();
-                kept.packs.extend(self.pack(host, &own)?);
-            }
-        }
-        (kept.at, kept.took) = (Some(Instant::now()), begun.elapsed());
-        (placing.kept, placing.since, placing.evens) = (kept, Vec::new(), true);
-        Ok(())
-    }
-
-    /// Puts all hosts that live back to the states that were kept; a host that has fallen silent is none of them any more.
-    fn go_back(&self, placing: &mut Placing, fault: Fault) -> Result<(), WorldError> {
-        let (mut fault, mut lost) = (Some(fault), None);
-        while let Some(why) = fault.take() {
-            match why {
-                Fault::Refused(error) => return Err(error),
-                Fault::Escaped => {
-                    placing.seen.escapes += 1;
-                    placing.room *= ROOM_RISES;
-                }
-                Fault::Lost(host, error) => {
-                    placing.seen.lost[host] = Some(error.to_string());
-                    lost = Some(error);
-                }
-            }
-            if placing.living().is_empty() || (placing.kept.packs.is_empty() && !placing.seen.owners.is_empty()) {
-                return Err(lost.unwrap_or_else(|| self.silent()));
-            }
-            fault = self.try_back(placing).err();
-        }
-        Ok(())
-    }
-
-    fn try_back(&self, placing: &mut Placing) -> Result<(), Fault> {
-        let (objects, living) = (placing.objects(), placing.living());
-        for &host in &living {
-            self.part(host, |divided| {
-                divided.release(&objects)?;
-                divided.adopt(&placing.kept.moment)
-            })?;
-        }
-        let mut packs = std::mem::take(&mut placing.kept.packs);
-        let put = packs.iter_mut().try_for_each(|pack| {
-            if placing.seen.lost[pack.host].is_some() {
-                let count = |host: &usize| placing.seen.owners.values().filter(|owner| owner.host == *host).count();
-                pack.host = living.iter().copied().min_by_key(count).unwrap_or_default();
-                let record = &mut placing.seen.records[pack.host];
-                (record.moved, record.reborn) =
-                    (record.moved + pack.objects.len() as u64, record.reborn + pack.objects.len() as u64);
-            }
-            placing.give(&pack.objects, pack.host);
-            self.part(pack.host, |divided| divided.adopt(&pack.bytes))
-        });
-        placing.kept.packs = packs;
-        put?;
-        placing.seen.time = placing.kept.time;
-        placing.leaving.clear();
-        self.look(placing)
     }
 }
 
@@ -545,68 +392,9 @@ impl Placing {
         PlacedGroup { objects, host: pinned.or(most), is_pinned: pinned.is_some(), cost }
     }
 
-    fn give(&mut self, objects: &[AgentId], to: usize) {
+    pub(super) fn give(&mut self, objects: &[AgentId], to: usize) {
         for id in objects {
             Arc::make_mut(&mut self.seen.owners).entry(*id).and_modify(|owner| owner.host = to);
         }
-    }
-}
-
-impl PlacedWorld {
-    /// Takes up an object on all hosts; one of them steps it. A host that does not is lost, unless it is the first to be asked.
-    pub(super) fn join(&self, placing: &mut Placing, name: &str, part: &Part) -> Result<AgentId, WorldError> {
-        // from these states all goes on where a host is lost meanwhile
-        self.keep_or_go_back(placing)?;
-        let mut joined: Option<AgentId> = None;
-        for host in placing.living() {
-            let added = self.hosts[host].world.add(name, part.clone()).map(Object::id);
-            let other = || WorldError::Undivided { reason: format!("\"{name}\" has another number on each host") };
-            let lost = match added {
-                Ok(id) if joined.is_none_or(|joined| joined == id) => {
-                    joined = Some(id);
-                    continue;
-                }
-                Ok(_) => other(),
-                Err(error @ (WorldError::Silent { .. } | WorldError::Stopped)) => error,
-                Err(error) if joined.is_none() => return Err(error),
-                Err(error) => error,
-            };
-            self.go_back(placing, Fault::Lost(host, lost))?;
-        }
-        let id = joined.ok_or_else(|| self.silent())?;
-        let host = *placing.living().first().ok_or_else(|| self.silent())?;
-        Arc::make_mut(&mut placing.seen.owners).insert(id, Owner { host, cost: RATE_JOINED_HZ });
-        self.begin(placing)?;
-        Ok(id)
-    }
-
-    /// The state of all, on one host for as long as it is written.
-    pub(super) fn gather(&self, placing: &mut Placing) -> Result<Checkpoint, CheckpointError> {
-        self.keep_or_go_back(placing)?;
-        let first = *placing.living().first().ok_or_else(|| self.silent())?;
-        let (host, divided) = (&self.hosts[first], self.hosts[first].divided()?);
-        let elsewhere: Vec<&Pack> = placing.kept.packs.iter().filter(|pack| pack.host != first).collect();
-        let adopted = elsewhere.iter().try_for_each(|pack| divided.adopt(&pack.bytes));
-        let checkpoint = adopted.map_err(CheckpointError::from).and_then(|()| host.world.checkpoint());
-        elsewhere.iter().try_for_each(|pack| divided.release(&pack.objects))?;
-        checkpoint
-    }
-
-    /// Puts all hosts back into one state, and places its objects anew.
-    pub(super) fn put_all_back(&self, placing: &mut Placing, checkpoint: &Checkpoint) -> Result<(), CheckpointError> {
-        for host in placing.living() {
-            match self.hosts[host].world.restore(checkpoint) {
-                Err(CheckpointError::Start(error @ WorldError::Silent { .. })) => {
-                    placing.seen.lost[host] = Some(error.to_string());
-                }
-                restored => restored?,
-            }
-        }
-        let first = *placing.living().first().ok_or_else(|| self.silent())?;
-        placing.seen.owners = Placing::of(&self.hosts[first..=first], checkpoint.time(), &self.rates_hz)?.seen.owners;
-        placing.seen.time = checkpoint.time();
-        let objects = placing.objects();
-        placing.give(&objects, first);
-        Ok(self.begin(placing)?)
     }
 }
