@@ -118,7 +118,7 @@ fn a_call_under_the_name_of_another_certificate_reaches_no_other() {
     }
     // a state, and another caller's or the host's end of life
     spy.put("metachron/bench/state", vec![1, 2, 3]).wait().unwrap();
-    for sign in ["metachron/caller/op/1", "metachron/bench/host"] {
+    for sign in ["metachron/caller/op/1", &format!("metachron/bench/host/{}", op.run())] {
         spy.liveliness().declare_token(sign).wait().unwrap().undeclare().wait().unwrap();
     }
     op.advance(SimSpan::from_millis(20)).unwrap();

@@ -111,7 +111,7 @@ fn rights(callers: &[&str], is_certified: bool) -> String {
 /// The rights that all callers have.
 const RULES: &str = r#"
     { id: "listens", messages: ["declare_subscriber"], flows: ["ingress"], permission: "allow", key_exprs: ["metachron/*/state", "metachron/*/seen"] },
-    { id: "watches", messages: ["declare_liveliness_subscriber", "liveliness_query"], flows: ["ingress"], permission: "allow", key_exprs: ["metachron/*/host"] },
+    { id: "watches", messages: ["declare_liveliness_subscriber", "liveliness_query"], flows: ["ingress"], permission: "allow", key_exprs: ["metachron/*/host/*"] },
     { id: "says", messages: ["put", "reply", "declare_queryable", "liveliness_token"], flows: ["egress"], permission: "allow", key_exprs: ["metachron/**"] },
 "#;
 

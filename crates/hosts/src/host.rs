@@ -126,7 +126,7 @@ pub fn serve(world: Arc<dyn WorldCalls>, serving: Serving) -> Result<Host, Hosts
     let taking = Arc::clone(&shared);
     let queryable = session.declare_queryable(key("call/*/*")).callback(move |query| taking.take(query));
     let queryable = queryable.wait().map_err(failed)?;
-    let token = session.liveliness().declare_token(key("host")).wait().map_err(failed)?;
+    let token = session.liveliness().declare_token(key(&format!("host/{run}"))).wait().map_err(failed)?;
     host.served = Some((queryable, callers, token));
     Ok(host)
 }

@@ -113,11 +113,18 @@ impl Link {
         if let Some(silent) = self.mirror.silence() {
             return Err(silent);
         }
-        let asked = Instant::now();
+        let (asked, silences) = (Instant::now(), self.mirror.silences());
         let answers =
             self.send(call, |get| get.timeout(ANSWER_WITHIN).consolidation(ConsolidationMode::None).wait())?;
         let mut replies = Vec::new();
-        while let Ok(answer) = answers.recv() {
+        while let Ok(answer) = answers.recv_timeout(LEASE / 20) {
+            let Some(answer) = answer else {
+                if self.mirror.silences() == silences {
+                    continue;
+                }
+                // what was on its way when the link broke does not come
+                return Err(self.mirror.silent_for(asked.elapsed()));
+            };
             let Ok(sample) = answer.result() else { continue };
             match decode(&sample.payload().to_bytes()) {
                 Ok(Reply::Refused(refusal)) => return Err(refusal.into()),

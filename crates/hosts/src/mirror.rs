@@ -58,8 +58,10 @@ struct Seen {
     events_sequence: u64,
     /// When the newest message came.
     came: Instant,
-    /// Since when the host is silent.
+    /// Since when the host is silent: at first until its sign of life comes.
     silent: Option<Instant>,
+    /// How often it has fallen silent.
+    silences: u64,
     /// A message was missed, or the host was silent: all states are to be asked for.
     is_stale: bool,
     refused: u64,
@@ -113,7 +115,8 @@ impl Mirror {
             sequence: 0,
             events_sequence: 0,
             came: Instant::now(),
-            silent: None,
+            silent: Some(Instant::now()),
+            silences: 0,
             is_stale: true,
             refused: 0,
             readers: Vec::new(),
@@ -169,6 +172,7 @@ impl Mirror {
     pub fn set_alive(&self, is_alive: bool) {
         let mut seen = self.seen();
         seen.is_stale |= seen.silent.is_some() && is_alive;
+        seen.silences += u64::from(!is_alive);
         seen.silent = if is_alive { None } else { seen.silent.or_else(|| Some(Instant::now())) };
         self.changed.notify_all();
     }
@@ -177,6 +181,17 @@ impl Mirror {
     pub fn silence(&self) -> Option<WorldError> {
         let silent = self.seen().silent?;
         Some(self.silent_for(silent.elapsed()))
+    }
+
+    /// Waits for the host's sign of life; whether it came.
+    pub fn lives_within(&self, patience: Duration) -> bool {
+        let waited = self.changed.wait_timeout_while(self.seen(), patience, |seen| seen.silent.is_some());
+        waited.unwrap_or_else(PoisonError::into_inner).0.silent.is_none()
+    }
+
+    /// How often the host has fallen silent.
+    pub fn silences(&self) -> u64 {
+        self.seen().silences
     }
 
     pub fn silent_for(&self, lasts: Duration) -> WorldError {

@@ -139,9 +139,13 @@ pub fn connect(calling: impl Into<Calling>) -> Result<RemoteWorld, HostsError> {
     let states = states.callback(move |sample| drop(to_reader.try_send(sample.payload().to_bytes().into_owned())));
     let states = states.wait().map_err(failed)?;
     let watched = Arc::clone(&mirror);
-    let host = session.liveliness().declare_subscriber(of_world("host")).history(true);
+    // of this run: a world that takes its place has not heard its calls
+    let host = session.liveliness().declare_subscriber(of_world(&format!("host/{}", mirror.run))).history(true);
     let host =
         host.callback(move |sample| watched.set_alive(sample.kind() == SampleKind::Put)).wait().map_err(failed)?;
+    if !mirror.lives_within(LEASE) {
+        return Err(HostsError::NoWorld { endpoint });
+    }
     // greetings had the first numbers
     let (sequence, ends) = (Mutex::new(u64::from(GREETING.0)), AtomicBool::new(false));
     let is_open = is_open_to_all(&endpoint);
