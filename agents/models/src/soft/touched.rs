@@ -14,7 +14,7 @@ const HALVED_S: f64 = 1.0;
 const DIVIDED_S: f64 = 0.25;
 
 /// Touches of a solid within the last second.
-#[derive(Debug, PartialEq, Default, serde::Serialize, serde::Deserialize)]
+#[derive(Debug, Clone, Default, serde::Serialize, serde::Deserialize)]
 pub(super) struct Touches {
     /// One for each place of its cage, by their first touch.
     lately: Vec<Touched>,
@@ -24,25 +24,12 @@ pub(super) struct Touches {
     divided_s: f64,
 }
 
-#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
+#[derive(Debug, Clone, Copy, serde::Serialize, serde::Deserialize)]
 struct Touched {
     /// Material coordinates, metres.
     at_m: DVec3,
     /// How long ago, seconds.
     ago_s: f64,
-}
-
-impl Clone for Touches {
-    fn clone(&self) -> Self {
-        Self { lately: self.lately.clone(), halved_m: self.halved_m.clone(), divided_s: self.divided_s }
-    }
-
-    // into storage that is there
-    fn clone_from(&mut self, from: &Self) {
-        self.lately.clone_from(&from.lately);
-        self.halved_m.clone_from(&from.halved_m);
-        self.divided_s = from.divided_s;
-    }
 }
 
 impl Touches {

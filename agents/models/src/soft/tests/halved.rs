@@ -1,6 +1,7 @@
 //! Embedded solids whose cells are halved where something touches them.
 
 use super::*;
+use metachron_contact::AnchorSpring;
 use metachron_contact::member::ClusterMember;
 use metachron_core::{Anchor, Archive, Resolution};
 
@@ -264,4 +265,21 @@ fn an_eps_where_it_is_touched_needs_a_cage_and_a_length() {
     assert!(fails(zero).contains("ε where it is touched is 0"));
     let sheet = SoftSpec { eps_touched_m: Some(0.01), ..spec(SHEET) };
     assert!(fails(sheet).contains("a sheet without a cage"));
+}
+
+#[test]
+fn a_spring_that_pulls_at_a_vertex_counts_as_a_touch() {
+    let mut body = SoftBody::new(solid_of(&BALL, 0.05)).unwrap();
+    let target = body.seen()[7] + DVec3::Z * 0.05;
+    let (stiffness_n_m, damping_n_s_m, anchor) = (50.0, 1.0, Anchor::Vertex(7));
+    let pull = AnchorSpring { by: None, anchor, target, target_velocity: DVec3::ZERO, stiffness_n_m, damping_n_s_m };
+    let context = StepContext { user_springs: &[pull], ..StepContext::alone(AgentId(0), SimTime::ZERO) };
+    let (mut stepper, whole) = (LoneStepper::default(), body.nodes());
+    (0..30).for_each(|_| drop(stepper.step(&mut body, dt(0.01), context).unwrap()));
+    let halves = body.mesh.hexahedra.iter().filter(|cell| cell.kind == 1);
+    let near = |cell: &crate::soft::hexahedron::Hexahedron| {
+        let middle = cell.vertices.iter().map(|node| body.mesh.rest[*node as usize]).sum::<DVec3>() / 8.0;
+        (middle - body.skin.as_ref().unwrap().rest()[7]).abs().max_element() < 0.1
+    };
+    assert!(body.nodes() > whole && halves.clone().count() > 30 && halves.clone().all(near));
 }
