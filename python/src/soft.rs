@@ -45,6 +45,7 @@ fn placed(part: &Bound<'_, PyAny>, soft: Soft) -> PyResult<Soft> {
     let soft = set(soft, part, "rate", Soft::rate_hz)?;
     let soft = set(soft, part, "damping", |soft, (motion, strain)| soft.damping(motion, strain))?;
     let soft = set(soft, part, "self_contact", Soft::self_contact)?;
+    let soft = set(soft, part, "eps_touched", Soft::eps_touched_m)?;
     let soft = law(part)?.into_iter().fold(soft, Soft::law);
     let Names(hold) = field(part, "hold")?;
     Ok(soft.hold(&hold.iter().map(|name| chosen::<Side>("side", name)).collect::<PyResult<Vec<_>>>()?))

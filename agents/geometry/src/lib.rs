@@ -40,7 +40,7 @@ pub use space::cells::{Cell, Cells, CellsError, Exposure, Portal, Region, Side};
 pub use space::closest_points::{near_segments, near_triangle};
 pub use space::spatial_hash::{BoxGrid, Grid};
 pub use space::{aabb, cells, closest_points, spatial_hash};
-pub use surfaces::cage::{Cage, CageCell, Carried, cage_counts};
+pub use surfaces::cage::{Cage, CageCell, Carried, Halving, HangingNode, cage_counts};
 pub use surfaces::hull_corners::hull_corners;
 pub use surfaces::mesh::{compound_mesh, creased_mesh, hull_mesh, painted_mesh};
 pub use surfaces::primitive::{Primitive, PrimitiveMesh, PrimitiveVertex, Rounding};

@@ -42,6 +42,7 @@ fn step(name: &str, shape: SoftShape, material: SoftMaterial, held: Side) {
     let spec = SoftSpec {
         shape,
         nodes: None,
+        eps_touched_m: None,
         material,
         position: DVec3::ZERO,
         rotation: DQuat::IDENTITY,

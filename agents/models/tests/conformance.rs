@@ -94,6 +94,7 @@ fn soft_spec(shape: SoftShape) -> SoftSpec {
     SoftSpec {
         shape,
         nodes: None,
+        eps_touched_m: None,
         material,
         position: DVec3::Z,
         rotation: DQuat::from_rotation_x(0.3),

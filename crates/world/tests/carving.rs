@@ -22,6 +22,7 @@ fn slab(at: DVec3) -> SoftSpec {
     SoftSpec {
         shape: SoftShape::Box { size_m, segments: [7, 7, 2] },
         nodes: None,
+        eps_touched_m: None,
         material: SoftMaterial {
             young_pa: 1e5,
             poisson: 0.3,

@@ -144,6 +144,8 @@ class _Soft:
     """Coulomb friction coefficient, >= 0; default 0.3."""
     self_contact: bool | None = None
     """Whether it touches itself; by default sheets and ropes do."""
+    eps_touched: float | None = None
+    """Where something touches a solid with `eps`, cells longer than this are halved, m."""
     rate: float | None = None
     """Steps a simulated second, 1 ... 100000; default 240."""
 

@@ -224,7 +224,7 @@ impl Search {
             spin_row: None,
             push_n: 0.0,
             push_row: None,
-            place: Place::Point(DVec3::NAN),
+            places: [Place::Point(DVec3::NAN); 2],
             restitution: skin.form.restitution_with(form),
             late_s: pair.other().map_or(0.0, |other| all[other].member.answers_after_s()),
         };
@@ -285,8 +285,10 @@ impl Search {
         let Found { owner, skins, at: Meeting { after_s, ways }, mut clear_m } = found;
         let swept = after_s > 0.0;
         for touch in touches.iter() {
-            let (owner, facing) =
-                (Owner { key: touch.key, place: touch.on_a, ..owner }, pair.facing(round, touch, ways, skins));
+            let (owner, facing) = (
+                Owner { key: touch.key, places: [touch.on_a, touch.on_b], ..owner },
+                pair.facing(round, touch, ways, skins),
+            );
             if facing.sides.iter().all(|side| side.terms().is_empty()) {
                 continue;
             }

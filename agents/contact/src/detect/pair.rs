@@ -35,8 +35,8 @@ pub(crate) struct Owner {
     /// problem.
     pub push_n: f64,
     pub push_row: Option<usize>,
-    /// The point of the participant's skin.
-    pub place: Place,
+    /// The point of the skin of each side.
+    pub places: [Place; 2],
     /// Newton's coefficient of restitution of its pair, 0 to 1.
     pub restitution: f64,
     /// How long side 1 takes to answer, seconds: longer than a step where its body is stepped elsewhere.

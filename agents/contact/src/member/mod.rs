@@ -90,6 +90,9 @@ pub trait ClusterMember: Send {
     /// Stops it: it sleeps until something wakes it.
     fn sleep(&mut self) {}
 
+    /// Divides itself otherwise where it wishes to, after a macro step: the one moment at which the number of its blocks may change by itself.
+    fn adapt(&mut self) {}
+
     /// The cost of the step begun, in the unit of [`metachron_core::StepReport::work`].
     fn work(&self) -> f64 {
         1.0
@@ -229,6 +232,8 @@ pub struct StepEnd<'a> {
     pub touched: bool,
     /// The momentum that `v` leaves unanswered, N·s on each block (eq. 17); empty for none.
     pub unanswered: &'a [DVec3],
+    /// The places of its skin, as a surface, on which contacts gave impulses.
+    pub pressed: &'a [Place],
 }
 
 /// The partner of an asynchronous pair.

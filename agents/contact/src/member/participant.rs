@@ -10,6 +10,7 @@ use crate::member::{ContactMemory, GuardedMember};
 use crate::solve::Side;
 use glam::DVec3;
 use metachron_core::{AgentId, Grip, StepError};
+use metachron_geometry::Place;
 
 /// A body in its cluster's step.
 pub struct Participant<'a> {
@@ -111,6 +112,8 @@ pub(crate) struct Progress {
     pub dx_impacts: Vec<DVec3>,
     /// The greatest strain of its steps that they were not divided for, as a share of the strain that it can take; 0 where they were.
     pub strain_left: f64,
+    /// The places of its skin, as a surface, on which contacts have given impulses since its step began.
+    pub pressed: Vec<Place>,
     /// Work of its steps within the macro step, in the unit of its model.
     pub work: f64,
     /// Why its last begin or end failed, until that is taken.
@@ -132,6 +135,7 @@ impl Progress {
         reset(&mut self.dv_impulses, now.len(), DVec3::ZERO);
         self.v_before.clone_from(&self.v_start);
         self.owed_n_s.clear();
+        self.pressed.clear();
         reset(&mut self.unanswered, member.system().unanswered.len(), DVec3::ZERO);
         (self.touched, self.held) = (false, false);
     }

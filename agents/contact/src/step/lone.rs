@@ -53,6 +53,8 @@ impl LoneStepper {
         let at_rest = stepper.lets_rest() && member.can_sleep();
         if at_rest {
             member.change(|m| m.sleep());
+        } else {
+            member.change(|m| m.adapt());
         }
         Ok(StepReport { work: report.work, substeps: report.fine_steps, at_rest })
     }

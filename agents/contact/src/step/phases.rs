@@ -98,8 +98,8 @@ impl ClusterStepper {
             if state.part < state.share {
                 one.member.change(|m| m.move_to(&state.v_before, since_s));
             } else {
-                let Progress { v_before: v, touched, unanswered, .. } = &*state;
-                let end = StepEnd { v, h_s: since_s, touched: *touched, unanswered };
+                let Progress { v_before: v, touched, unanswered, pressed, .. } = &*state;
+                let end = StepEnd { v, h_s: since_s, touched: *touched, unanswered, pressed };
                 state.failure = one.member.end(&end).err();
                 if state.failure.is_none() && !state.dx_impacts.is_empty() {
                     // by the impulses that move it so far; how it has gone is not needed any more

@@ -15,6 +15,7 @@ use crate::step::ClusterStepper;
 use crate::step::report::{PairTotal, give, total_of};
 use glam::DVec3;
 use metachron_core::{SimSpan, SimTime};
+use metachron_geometry::Place;
 
 /// Bodies that meet deeper inside each other than this many times the depth of contacts began so: a load in motion goes less deep.
 const OVERLAP_SHARE: f64 = 2.0;
@@ -93,10 +94,15 @@ impl ClusterStepper {
                 let total = total_of(&mut self.sums.totals, owner.member, owner.partner);
                 total.add(impulse, -contact.gap_m);
                 let skin = all[owner.member].member.skin();
-                let point_m = skin.map_or(DVec3::NAN, |skin| skin.point(&owner.place, -contact.normal));
+                let point_m = skin.map_or(DVec3::NAN, |skin| skin.point(&owner.places[0], -contact.normal));
                 let given = std::iter::once((owner.member, impulse)).chain(owner.other.map(|at| (at, -impulse)));
                 for (member, impulse_n_s) in given {
                     give(&mut self.sums.wrenches[member], &all[member].member, impulse_n_s, point_m);
+                }
+                for (member, place) in owner.both().zip(owner.places) {
+                    if let Place::Surface { .. } = place {
+                        self.progress[member].pressed.push(place);
+                    }
                 }
                 if impulse.length() > total.most_n_s {
                     (total.most_n_s, total.point_m, total.normal) = (impulse.length(), point_m, contact.normal);

@@ -3,13 +3,13 @@
 //! In: a closed surface and a spacing. Out: nodes, cells with the volume inside the surface that belongs to each corner, and the four
 //! nodes that carry any point. Never here: masses, forces, what the cells are made of. Theory: docs/theory/soft.md, eq. 15, 16.
 
+mod halves;
+mod volumes;
+
 use crate::{Aabb, Triangles};
 use glam::DVec3;
+pub use halves::{Halving, HangingNode};
 
-/// Columns along each of x and y, in a cell, along which volume is integrated; along z it is exact.
-const COLUMNS: usize = 6;
-/// How far columns are from the middles of their squares, as a share of a cell: few surfaces have vertices or edges in such columns.
-const COLUMN_SHIFT: [f64; 2] = [1.137e-5, -0.731e-5];
 /// A cell filled less than this share of the fullest one is no cell of the cage: its nodes would weigh next to nothing.
 const FILL_LEAST: f64 = 0.01;
 /// How far inward a point of the surface is taken to be when its cell is looked for, as a share of a cell.
@@ -26,6 +26,8 @@ pub struct CageCell {
     pub fill: f64,
     /// The volume inside the surface that belongs to each corner, m³.
     pub volumes_m3: [f64; 8],
+    /// Whether it is an eighth of a place of the lattice.
+    pub is_half: bool,
 }
 
 /// A point that moves with four nodes, or with one.
@@ -65,12 +67,18 @@ pub struct Cage {
     cell_m: DVec3,
     /// Cells along each axis.
     counts: [usize; 3],
-    /// The cell of each place of the lattice, or the nearest one where nothing is inside.
+    /// Parts of the lattice along a cell: 2 where any cell is halved.
+    parts: usize,
+    /// The places of whole cells that are halved where they have a cell, in rising order.
+    halved: Vec<usize>,
+    /// The cell of each part of the lattice, or the nearest one where nothing is inside.
     cell_at: Vec<u32>,
     cells: Vec<CageCell>,
     nodes_m: Vec<DVec3>,
     /// The node of each corner of the lattice.
     node_at: Vec<u32>,
+    /// By rising nodes.
+    hanging: Vec<HangingNode>,
 }
 
 /// Cells along each axis of a cage about a surface with cells of at most `eps_m`.
@@ -85,6 +93,12 @@ impl Cage {
     /// more than `nodes_max` nodes.
     #[must_use]
     pub fn new(surface: &Triangles, eps_m: f64, nodes_max: usize) -> Option<Self> {
+        Self::halved(surface, eps_m, nodes_max, Halving::NONE)
+    }
+
+    /// The same with cells that are `halving`.
+    #[must_use]
+    pub fn halved(surface: &Triangles, eps_m: f64, nodes_max: usize, halving: Halving<'_>) -> Option<Self> {
         let Aabb { low, high } = Aabb::of(&surface.points);
         let counts = cage_counts(surface, eps_m);
         // the inside fills no less than a hundredth of any box around an organ: far more places than nodes are a mistake
@@ -93,76 +107,42 @@ impl Cage {
             return None;
         }
         let cell_m = (high - low) / DVec3::from_array(counts.map(|count| count as f64));
-        let mut cage = Self { low, cell_m, counts, cell_at: vec![], cells: vec![], nodes_m: vec![], node_at: vec![] };
-        let volumes = cage.volumes(surface, places);
-        cage.keep_filled(&volumes, surface.volume_m3())?;
+        let mut cage = Self {
+            low,
+            cell_m,
+            counts,
+            parts: 1,
+            halved: vec![],
+            cell_at: vec![],
+            cells: vec![],
+            nodes_m: vec![],
+            node_at: vec![],
+            hanging: vec![],
+        };
+        let volumes = cage.volumes(surface);
+        cage.halved = cage.places_of(halving);
+        let mut halves = vec![];
+        if !cage.halved.is_empty() {
+            cage.parts = 2;
+            halves = cage.volumes(surface);
+        }
+        cage.keep_filled(&volumes, &halves, surface.volume_m3())?;
         (cage.nodes_m.len() <= nodes_max).then_some(cage)
     }
 
-    /// The volume inside that belongs to each corner of each cell of the lattice, m³ (eq. 15).
-    fn volumes(&self, surface: &Triangles, places: usize) -> Vec<[f64; 8]> {
-        let mut volumes = vec![[0.0; 8]; places];
-        let [nx, ny, nz] = self.counts;
-        let across = self.cell_m / COLUMNS as f64;
-        let area = across.x * across.y;
-        for (column, crossings) in self.crossings(surface).iter_mut().enumerate() {
-            let (a, b) = (column % (nx * COLUMNS), column / (nx * COLUMNS));
-            let (i, j) = (a / COLUMNS, b / COLUMNS);
-            let share = |at: usize| (0.5 + (at % COLUMNS) as f64) / COLUMNS as f64;
-            let (u, v) = (share(a), share(b));
-            crossings.sort_unstable_by(|one, other| one.z.total_cmp(&other.z));
-            let mut winding = 0;
-            for pair in crossings.windows(2) {
-                winding += pair[0].enters;
-                if winding <= 0 {
-                    continue;
-                }
-                let [from, to] = [pair[0].z, pair[1].z].map(|z| (z - self.low.z) / self.cell_m.z);
-                let last = (to.ceil().max(1.0) as usize).min(nz);
-                for k in (from.max(0.0) as usize)..last {
-                    let [start, end] = [from, to].map(|at| (at - k as f64).clamp(0.0, 1.0));
-                    let height = [(end - start) - 0.5 * (end * end - start * start), 0.5 * (end * end - start * start)];
-                    let into = &mut volumes[i + nx * (j + ny * k)];
-                    for (corner, volume) in into.iter_mut().enumerate() {
-                        let x = if corner & 1 == 1 { u } else { 1.0 - u };
-                        let y = if corner >> 1 & 1 == 1 { v } else { 1.0 - v };
-                        *volume += area * self.cell_m.z * x * y * height[corner >> 2];
-                    }
-                }
-            }
-        }
-        volumes
+    /// Parts of the lattice along each axis.
+    fn lattice(&self) -> [usize; 3] {
+        self.counts.map(|count| count * self.parts)
     }
 
-    /// Where each column along z goes through the surface.
-    fn crossings(&self, surface: &Triangles) -> Vec<Vec<Crossing>> {
-        let [nx, ny, _] = self.counts;
-        let [wide, deep] = [nx * COLUMNS, ny * COLUMNS];
-        let across = self.cell_m / COLUMNS as f64;
-        let mut columns = vec![vec![]; wide * deep];
-        let at = |index: usize, axis: usize| {
-            self.low[axis] + (index as f64 + 0.5) * across[axis] + COLUMN_SHIFT[axis] * self.cell_m[axis]
-        };
-        for corners in &surface.triangles {
-            let corners = corners.map(|corner| surface.points[corner as usize]);
-            let Aabb { low, high } = Aabb::of(&corners);
-            let range = |axis: usize, count: usize| {
-                let place = |x: f64| (x - self.low[axis]) / across[axis] - 0.5;
-                let first = place(low[axis]).floor().max(0.0) as usize;
-                first..(place(high[axis]).ceil() as usize + 1).min(count)
-            };
-            for b in range(1, deep) {
-                for a in range(0, wide) {
-                    columns[a + wide * b].extend(Crossing::of(corners, [at(a, 0), at(b, 1)]));
-                }
-            }
-        }
-        columns
+    /// Length of a part of the lattice along each axis, metres.
+    fn part_m(&self) -> DVec3 {
+        self.cell_m / self.parts as f64
     }
 
-    /// Makes cells of the filled places, so that their volumes sum to `whole_m3`; `None` where none is filled.
-    fn keep_filled(&mut self, volumes: &[[f64; 8]], whole_m3: f64) -> Option<()> {
-        let [nx, ny, nz] = self.counts;
+    /// Makes cells of the filled places, of those to be halved by the volumes of their `halves`, so that all sum to `whole_m3`; `None` where
+    /// none is filled.
+    fn keep_filled(&mut self, volumes: &[[f64; 8]], halves: &[[f64; 8]], whole_m3: f64) -> Option<()> {
         let full = self.cell_m.element_product();
         let fill = |volumes: &[f64; 8]| volumes.iter().sum::<f64>() / full;
         let least = FILL_LEAST * volumes.iter().map(fill).fold(0.0, f64::max);
@@ -172,44 +152,68 @@ impl Cage {
             return None;
         }
         let scale = whole_m3 / sum;
+        let [nx, ny, nz] = self.lattice();
         self.node_at = vec![NONE; (nx + 1) * (ny + 1) * (nz + 1)];
-        self.cell_at = vec![NONE; volumes.len()];
+        self.cell_at = vec![NONE; nx * ny * nz];
         for (place, volumes) in volumes.iter().enumerate().filter(|(_, volumes)| kept(volumes)) {
-            let [i, j, k] = self.place(place);
-            let corners = std::array::from_fn(|bits| self.node([i + (bits & 1), j + (bits >> 1 & 1), k + (bits >> 2)]));
-            self.cell_at[place] = self.cells.len() as u32;
             let volumes_m3 = volumes.map(|volume| volume * scale);
-            self.cells.push(CageCell { corners, fill: (fill(volumes) * scale).min(1.0), volumes_m3 });
+            let is_halved = self.halved.binary_search(&place).is_ok();
+            if !(is_halved && self.halve(place, volumes_m3.iter().sum(), halves, least)) {
+                let low = place_of(place, self.counts).map(|count| count * self.parts);
+                self.add(low, CageCell { volumes_m3, fill: (fill(volumes) * scale).min(1.0), ..CageCell::WHOLE });
+            }
         }
         self.extend_cells();
+        self.find_hanging();
         Some(())
     }
 
-    const fn place(&self, index: usize) -> [usize; 3] {
-        let [nx, ny, _] = self.counts;
-        [index % nx, index / nx % ny, index / (nx * ny)]
+    /// Adds a cell whose first corner is this one of the lattice.
+    fn add(&mut self, low: [usize; 3], cell: CageCell) {
+        let parts = self.parts_of(&cell);
+        let corners = std::array::from_fn(|bits| self.node(corner_of(low, bits, parts)));
+        self.cover(low, self.cells.len() as u32, parts);
+        self.cells.push(CageCell { corners, ..cell });
+    }
+
+    /// How many parts of the lattice a cell is long.
+    const fn parts_of(&self, cell: &CageCell) -> usize {
+        if cell.is_half { 1 } else { self.parts }
+    }
+
+    /// Gives so many parts of the lattice along each axis the cell of this number.
+    fn cover(&mut self, low: [usize; 3], number: u32, parts: usize) {
+        let counts = self.lattice();
+        for bits in 0..parts.pow(3) {
+            self.cell_at[index_of(corner_of(low, bits, 1), counts)] = number;
+        }
     }
 
     /// The node at a corner of the lattice, made where there is none yet.
     fn node(&mut self, corner: [usize; 3]) -> u32 {
-        let [nx, ny, _] = self.counts;
-        let at = corner[0] + (nx + 1) * (corner[1] + (ny + 1) * corner[2]);
+        let at = index_of(corner, self.lattice().map(|count| count + 1));
         if self.node_at[at] == NONE {
             self.node_at[at] = self.nodes_m.len() as u32;
-            self.nodes_m.push(self.low + self.cell_m * DVec3::from_array(corner.map(|count| count as f64)));
+            self.nodes_m.push(self.low + self.part_m() * DVec3::from_array(corner.map(|count| count as f64)));
         }
         self.node_at[at]
+    }
+
+    /// The corner of the lattice, or its part, at which a cell begins.
+    fn low_of(&self, cell: &CageCell) -> [usize; 3] {
+        let place = (self.nodes_m[cell.corners[0] as usize] - self.low) / self.part_m();
+        place.to_array().map(|at| at.round() as usize)
     }
 
     /// Gives each place without a cell that of a neighbour, outwards from the cells.
     fn extend_cells(&mut self) {
         let mut reached: Vec<usize> = (0..self.cell_at.len()).filter(|at| self.cell_at[*at] != NONE).collect();
-        let mut next = 0;
+        let (mut next, counts) = (0, self.lattice());
         while next < reached.len() {
             let from = reached[next];
             next += 1;
             let mut stride = 1;
-            for (at, count) in self.place(from).into_iter().zip(self.counts) {
+            for (at, count) in place_of(from, counts).into_iter().zip(counts) {
                 let beside = [(at > 0).then(|| from - stride), (at + 1 < count).then(|| from + stride)];
                 for to in beside.into_iter().flatten() {
                     if self.cell_at[to] == NONE {
@@ -256,18 +260,18 @@ impl Cage {
     /// Three nodes in a row, for each node between two others along an axis.
     #[must_use]
     pub fn rows(&self) -> Vec<[u32; 3]> {
-        let [nx, ny, nz] = self.counts.map(|count| count + 1);
+        let counts = self.lattice().map(|count| count + 1);
+        let [nx, ny, nz] = counts;
         let mut rows = vec![];
         for (axis, stride) in [1, nx, nx * ny].into_iter().enumerate() {
             for at in 0..nx * ny * nz {
-                let place = [at % nx, at / nx % ny, at / (nx * ny)][axis];
-                if place == 0 || place == self.counts[axis] {
-                    continue;
-                }
-                let row = [at - stride, at, at + stride].map(|at| self.node_at[at]);
-                if !row.contains(&NONE) {
-                    rows.push(row);
-                }
+                let place = place_of(at, counts)[axis];
+                // between halves, or between whole cells
+                let row = (1..=self.parts).filter(|by| place >= *by && place + by < counts[axis]).find_map(|by| {
+                    let row = [at - by * stride, at, at + by * stride].map(|at| self.node_at[at]);
+                    (!row.contains(&NONE)).then_some(row)
+                });
+                rows.extend(row);
             }
         }
         rows
@@ -276,17 +280,24 @@ impl Cage {
     /// The cell that a point at rest belongs to: the one around it, or the nearest.
     #[must_use]
     pub fn cell_at(&self, at_m: DVec3) -> usize {
-        let place = (at_m - self.low) / self.cell_m;
-        let index: [usize; 3] = std::array::from_fn(|axis| (place[axis].max(0.0) as usize).min(self.counts[axis] - 1));
-        let [nx, ny, _] = self.counts;
-        self.cell_at[index[0] + nx * (index[1] + ny * index[2])] as usize
+        let counts = self.lattice();
+        self.cell_at[index_of(nearest((at_m - self.low) / self.part_m(), counts), counts)] as usize
+    }
+
+    /// Length of a cell along each axis, metres.
+    fn length_of(&self, cell: &CageCell) -> DVec3 {
+        if cell.is_half { self.cell_m * 0.5 } else { self.cell_m }
     }
 
     /// The cell that a point at rest belongs to, and where it is in it, 0 … 1 along each axis and beyond for a point that is in no cell.
     #[must_use]
     pub fn locate(&self, at_m: DVec3) -> (&CageCell, DVec3) {
         let cell = &self.cells[self.cell_at(at_m)];
-        (cell, (at_m - self.nodes_m[cell.corners[0] as usize]) / self.cell_m)
+        (cell, self.share_of(cell, at_m))
+    }
+
+    fn share_of(&self, cell: &CageCell, at_m: DVec3) -> DVec3 {
+        (at_m - self.nodes_m[cell.corners[0] as usize]) / self.length_of(cell)
     }
 
     /// The cell that a point of the surface at rest belongs to, on the side of the unit vector `inward`.
@@ -302,20 +313,26 @@ impl Cage {
         self.cells.retain(|_| !gone.next().copied().unwrap_or_default());
         // from the cells alone: whatever went first, the same are left
         self.cell_at.fill(NONE);
-        for (number, cell) in (0..).zip(&self.cells) {
-            let place = (self.nodes_m[cell.corners[0] as usize] - self.low) / self.cell_m;
-            let [i, j, k] = place.to_array().map(|at| at.round() as usize);
-            self.cell_at[i + self.counts[0] * (j + self.counts[1] * k)] = number;
+        for number in 0..self.cells.len() {
+            let cell = self.cells[number];
+            self.cover(self.low_of(&cell), number as u32, self.parts_of(&cell));
         }
         self.extend_cells();
+        self.find_hanging();
     }
 
     /// How a point of the surface at rest moves with the cage: linear in one of the six tetrahedra of its cell, continuous from cell to cell
-    /// (eq. 16). The cell is the one on the side of the unit vector `inward`: a surface may lie between two cells.
+    /// (eq. 16), or in that of the whole cell at which one of those nodes hangs, beyond it. The cell is the one on the side of the unit vector
+    /// `inward`: a surface may lie between two cells.
     #[must_use]
     pub fn carry(&self, at_m: DVec3, inward: DVec3) -> Carried {
-        let cell = &self.cells[self.cell_under(at_m, inward)];
-        let share = (at_m - self.nodes_m[cell.corners[0] as usize]) / self.cell_m;
+        let carried = self.carried_in(&self.cells[self.cell_under(at_m, inward)], at_m);
+        let hangs = carried.terms().find_map(|(node, _)| self.hanging_at(node as u32));
+        hangs.map_or(carried, |hanging| self.carried_in(&self.cells[hanging.cell as usize], at_m))
+    }
+
+    fn carried_in(&self, cell: &CageCell, at_m: DVec3) -> Carried {
+        let share = self.share_of(cell, at_m);
         let mut axes = [0, 1, 2];
         axes.sort_by(|a, b| share[*b].total_cmp(&share[*a]));
         let [first, second, third] = axes.map(|axis| share[axis]);
@@ -327,33 +344,23 @@ impl Cage {
     }
 }
 
-/// Where a column goes through a triangle.
-#[derive(Debug, Clone, Copy)]
-struct Crossing {
-    z: f64,
-    /// 1 where it goes in, upwards, −1 where out.
-    enters: i32,
+/// The place of this index, of so many along each axis.
+const fn place_of(index: usize, [nx, ny, _]: [usize; 3]) -> [usize; 3] {
+    [index % nx, index / nx % ny, index / (nx * ny)]
 }
 
-impl Crossing {
-    /// The crossing of the column at `at` with a triangle; none where it passes beside, or the triangle is upright.
-    fn of(corners: [DVec3; 3], at: [f64; 2]) -> Option<Self> {
-        // an edge is judged in one direction whichever triangle asks: of two that share it exactly one has the column
-        let left = |a: DVec3, b: DVec3| {
-            let swap = (a.x, a.y) > (b.x, b.y);
-            let (from, to) = if swap { (b, a) } else { (a, b) };
-            let turn = (to.x - from.x) * (at[1] - from.y) - (to.y - from.y) * (at[0] - from.x);
-            (turn >= 0.0) != swap
-        };
-        let [a, b, c] = corners;
-        let sides = [left(a, b), left(b, c), left(c, a)];
-        if sides != [true; 3] && sides != [false; 3] {
-            return None;
-        }
-        let normal = (b - a).cross(c - a);
-        let z = a.z - (normal.x * (at[0] - a.x) + normal.y * (at[1] - a.y)) / normal.z;
-        z.is_finite().then_some(Self { z, enters: if normal.z < 0.0 { 1 } else { -1 } })
-    }
+const fn index_of([i, j, k]: [usize; 3], [nx, ny, _]: [usize; 3]) -> usize {
+    i + nx * (j + ny * k)
+}
+
+/// The place that this one belongs to, or the nearest of so many along each axis.
+fn nearest(place: DVec3, counts: [usize; 3]) -> [usize; 3] {
+    std::array::from_fn(|axis| (place[axis].max(0.0) as usize).min(counts[axis] - 1))
+}
+
+/// The corner with these bits of what begins at `low` and is so many parts long.
+const fn corner_of([i, j, k]: [usize; 3], bits: usize, parts: usize) -> [usize; 3] {
+    [i + parts * (bits & 1), j + parts * (bits >> 1 & 1), k + parts * (bits >> 2)]
 }
 
 #[cfg(test)]
@@ -369,7 +376,7 @@ mod tests {
     }
 
     /// A ball of points on a grid of angles.
-    fn ball(radius_m: f64) -> Triangles {
+    pub(super) fn ball(radius_m: f64) -> Triangles {
         let (rings, around) = (40_u32, 60_u32);
         let mut points = vec![DVec3::Z * radius_m, -DVec3::Z * radius_m];
         for ring in 1..rings {
@@ -392,12 +399,12 @@ mod tests {
         Triangles { points, triangles }
     }
 
-    fn volume(cage: &Cage) -> f64 {
+    pub(super) fn volume(cage: &Cage) -> f64 {
         cage.cells().iter().flat_map(|cell| cell.volumes_m3).sum()
     }
 
     /// The centre of the volume that the corners share.
-    fn centre(cage: &Cage) -> DVec3 {
+    pub(super) fn centre(cage: &Cage) -> DVec3 {
         let moments = cage.cells().iter().flat_map(|cell| cell.corners.into_iter().zip(cell.volumes_m3));
         moments.map(|(node, volume)| cage.nodes_m()[node as usize] * volume).sum::<DVec3>() / volume(cage)
     }
@@ -420,7 +427,7 @@ mod tests {
             let cage = Cage::new(&surface, eps_m, 10_000).unwrap();
             assert!((volume(&cage) - surface.volume_m3()).abs() < 1e-12 * surface.volume_m3());
             assert!(centre(&cage).length() < 2e-4, "{eps_m}: {}", centre(&cage));
-            let integrated: f64 = cage.volumes(&surface, cage.cell_at.len()).iter().flatten().sum();
+            let integrated: f64 = cage.volumes(&surface).iter().flatten().sum();
             let off = (integrated / surface.volume_m3() - 1.0).abs();
             assert!(off < if eps_m > 0.1 { 0.05 } else { 0.01 }, "{eps_m}: {off}");
         }

@@ -4,6 +4,7 @@
 
 use super::body::SoftBody;
 use super::division::{Division, form};
+use super::touched::Touches;
 use metachron_core::{Archive, ArchiveError, archive_values};
 
 impl SoftBody {
@@ -11,7 +12,11 @@ impl SoftBody {
     pub(super) fn archive_state(&mut self, archive: &mut Archive<'_>) -> Result<(), ArchiveError> {
         let (mut eps_m, mut gone) = (self.eps_m, self.gone.clone());
         archive_values!(archive, eps_m, gone, self.removed, self.level)?;
-        self.divide_for(eps_m, &gone)?;
+        let mut touches = self.touches.clone();
+        if self.spec.eps_touched_m.is_some() {
+            archive.value(&mut touches)?;
+        }
+        self.divide_for(eps_m, &gone, touches)?;
         archive.fixed("the number of cells", self.cells())?;
         let nodes = self.positions.len();
         let mut turns: Vec<_> = self.mesh.turns().collect();
@@ -28,10 +33,12 @@ impl SoftBody {
         unknowns.archive(archive)
     }
 
-    /// Takes the nodes of another ε and the cells but for those that are `gone`, without a state on them. A skin that has lost nothing
-    /// before or after stays the same.
-    fn divide_for(&mut self, eps_m: f64, gone: &[bool]) -> Result<(), ArchiveError> {
-        if eps_m.to_bits() == self.eps_m.to_bits() && gone == self.gone {
+    /// Takes the nodes of another ε and the cells but for those that are `gone`, halved as after these touches, without a state on them. A skin
+    /// that has lost nothing before or after stays the same.
+    fn divide_for(&mut self, eps_m: f64, gone: &[bool], touches: Touches) -> Result<(), ArchiveError> {
+        let before = std::mem::replace(&mut self.touches, touches);
+        let halved_m = &self.touches.halved_m;
+        if eps_m.to_bits() == self.eps_m.to_bits() && gone == self.gone && *halved_m == before.halved_m {
             return Ok(());
         }
         let mismatch =
@@ -39,7 +46,7 @@ impl SoftBody {
         let range = self.spec.resolutions().map(|range| range.eps_m);
         let is_taken = eps_m.to_bits() == self.eps_m.to_bits()
             || range.is_some_and(|(finest_m, coarsest_m)| (finest_m..=coarsest_m).contains(&eps_m));
-        let division = if is_taken { Division::of(&self.spec, eps_m).ok() } else { None };
+        let division = if is_taken { Division::of(&self.spec, eps_m, halved_m).ok() } else { None };
         let Some(Division { mesh, surface, skin }) = division else {
             return mismatch("the spacing ε of nodes", format!("{eps_m} m"), format!("one of {range:?}"));
         };

@@ -10,6 +10,7 @@ use super::member::Unknowns;
 use super::skin::Skin;
 use super::spec::{SoftError, SoftSpec};
 use super::system::System;
+use super::touched::Touches;
 use crate::set_motion::{WholeMotion, check_nodes};
 use glam::DVec3;
 use metachron_contact::{Agent, Carving, Input, Inputs, SetMotion, Stepping};
@@ -30,6 +31,8 @@ pub struct SoftBody {
     pub(super) removed: Removed,
     /// The ε for which its cage or lattice was made, metres; no meaning where its vertices are its skin.
     pub(super) eps_m: f64,
+    /// Where it was touched lately, and about which places its cells are halved.
+    pub(super) touches: Touches,
     /// The level n that was asked for: its picture's.
     pub(super) level: u8,
     pub(super) positions: Vec<DVec3>,
@@ -56,7 +59,7 @@ impl SoftSpec {
     pub fn check(&self) -> Result<(), SoftError> {
         self.check_numbers()?;
         let Some(eps_m) = self.spacing().map(|spacing| spacing.range_m.0) else { return Ok(()) };
-        Carrier::new(self, eps_m).map(drop).ok_or(SoftError::FineCage { eps_m })
+        Carrier::new(self, eps_m, &[]).map(drop).ok_or(SoftError::FineCage { eps_m })
     }
 }
 
@@ -68,7 +71,7 @@ impl SoftBody {
     pub fn new(spec: SoftSpec) -> Result<Self, SoftError> {
         spec.check()?;
         let eps_m = spec.spacing().map_or(0.0, |spacing| spacing.eps_m);
-        let Division { mut mesh, surface, skin } = Division::of(&spec, eps_m)?;
+        let Division { mut mesh, surface, skin } = Division::of(&spec, eps_m, &[])?;
         let rotation = spec.rotation.normalize();
         let positions: Vec<_> = mesh.rest.iter().map(|rest| spec.position + rotation * *rest).collect();
         let velocities: Vec<_> = mesh.held.iter().map(|&held| if held { DVec3::ZERO } else { spec.velocity }).collect();
@@ -80,6 +83,7 @@ impl SoftBody {
             gone: vec![],
             removed: Removed::default(),
             eps_m,
+            touches: Touches::default(),
             level: 0,
             impulses: vec![],
             free: positions.clone(),
@@ -96,6 +100,12 @@ impl SoftBody {
         };
         body.follow();
         Ok(body)
+    }
+
+    /// Moves the nodes that hang between others with these.
+    pub(super) fn hang(&mut self) {
+        self.system.spread(&mut self.positions);
+        self.system.spread(&mut self.velocities);
     }
 
     /// Moves its skin to where its vertices are.
@@ -204,6 +214,7 @@ impl Agent for SoftBody {
         if whole.shifts() {
             mesh.begin_turns(positions);
         }
+        self.hang();
         self.woken();
         true
     }
@@ -217,12 +228,14 @@ impl Agent for SoftBody {
                 return Err(format!("it is carried by {} nodes; the state has none", self.positions.len()));
             }
         };
-        let Self { positions, velocities, mesh, skin, .. } = self;
+        let Self { positions, velocities, mesh, skin, system, .. } = self;
         // a held vertex stays where it is
         check_nodes(positions, [to, to_m_s], |_| false)?;
         for (at, (x, v)) in to.iter().zip(to_m_s).enumerate().filter(|(at, _)| !mesh.held[*at]) {
             (positions[at], velocities[at]) = (*x, *v);
         }
+        system.spread(positions);
+        system.spread(velocities);
         mesh.begin_turns(positions);
         skin.iter_mut().for_each(Skin::end_easing);
         self.woken();

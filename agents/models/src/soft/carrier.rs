@@ -30,18 +30,23 @@ pub(super) struct SkinPoints {
 }
 
 impl Carrier {
-    /// The carrier of the skin of `spec` with cells of at most `eps_m`; `None` where there can be none.
-    pub fn new(spec: &SoftSpec, eps_m: f64) -> Option<Self> {
+    /// The carrier of the skin of `spec` with cells of at most `eps_m`, those of a cage halved about some of its points; `None` where there can be
+    /// none.
+    pub fn new(spec: &SoftSpec, eps_m: f64, halved_m: &[DVec3]) -> Option<Self> {
         match &spec.shape {
-            SoftShape::Embedded { surface, .. } => Cage::new(surface, eps_m, VERTICES_MAX as usize).map(Self::Cage),
+            SoftShape::Embedded { surface, .. } => {
+                Cage::halved(surface, eps_m, VERTICES_MAX as usize, spec.halving(halved_m)).map(Self::Cage)
+            }
             shape => Lattice::of(shape.divided_by(eps_m)?).map(Self::Lattice),
         }
     }
 
-    /// Whether [`Self::new`] would make the same of this ε.
-    pub fn is_as_wanted(&self, spec: &SoftSpec, eps_m: f64) -> bool {
+    /// Whether [`Self::new`] would make the same of these.
+    pub fn is_as_wanted(&self, spec: &SoftSpec, eps_m: f64, halved_m: &[DVec3]) -> bool {
         match (self, &spec.shape) {
-            (Self::Cage(cage), SoftShape::Embedded { surface, .. }) => cage.counts() == cage_counts(surface, eps_m),
+            (Self::Cage(cage), SoftShape::Embedded { surface, .. }) => {
+                cage.counts() == cage_counts(surface, eps_m) && cage.is_halved(spec.halving(halved_m))
+            }
             (Self::Lattice(lattice), shape) => counts_at(shape, eps_m) == Some(lattice.counts()),
             (Self::Cage(_), _) => false,
         }

@@ -6,6 +6,7 @@ use super::carrier::{Carrier, SkinPoints};
 use super::fe_mesh::FeMesh;
 use super::skin::Skin;
 use super::spec::{SoftError, SoftSpec};
+use glam::DVec3;
 use metachron_geometry::{CollisionShape, ShapeKind, SurfaceShape};
 use std::sync::Arc;
 
@@ -19,16 +20,16 @@ pub(super) struct Division {
 }
 
 impl Division {
-    /// The body of `spec` with cells of at most `eps_m`, which has no meaning where its shape divides it.
+    /// The body of `spec` with cells of at most `eps_m`, which has no meaning where its shape divides it, halved about some material points.
     ///
     /// # Errors
     /// [`SoftError::FineCage`] where these are too many.
-    pub fn of(spec: &SoftSpec, eps_m: f64) -> Result<Self, SoftError> {
+    pub fn of(spec: &SoftSpec, eps_m: f64, halved_m: &[DVec3]) -> Result<Self, SoftError> {
         if spec.spacing().is_none() {
             let mesh = FeMesh::new(&spec.shape, spec);
             return Ok(Self { surface: mesh.surface(), mesh, skin: None });
         }
-        let carrier = Carrier::new(spec, eps_m).ok_or(SoftError::FineCage { eps_m })?;
+        let carrier = Carrier::new(spec, eps_m, halved_m).ok_or(SoftError::FineCage { eps_m })?;
         let points = SkinPoints::of(spec);
         let (mesh, surface) = (carrier.mesh(spec), points.surface.clone());
         Ok(Self { mesh, surface, skin: Some(Skin::new(points, carrier)) })

@@ -14,7 +14,7 @@ use super::system::System;
 use super::tetrahedron::Tetrahedron;
 use glam::{DQuat, DVec3};
 use metachron_geometry::narrow_phase::VoronoiRegions;
-use metachron_geometry::{Cage, CageCell, SurfaceShape, Triangles, near_triangle};
+use metachron_geometry::{Cage, CageCell, HangingNode, SurfaceShape, Triangles, near_triangle};
 
 /// How near the surface comes to nodes that hold it, as a share of the finest ε.
 const HELD_SHARE: f64 = 0.5;
@@ -28,6 +28,8 @@ pub(super) struct FeMesh {
     pub mass_kg: Vec<f64>,
     /// Whether each vertex is fixed.
     pub held: Vec<bool>,
+    /// The vertices that move with others, by rising numbers.
+    pub(super) hanging: Vec<HangingNode>,
     bars: Vec<Bar>,
     pub(super) membranes: Vec<Membrane>,
     pub(super) bending: Vec<BendingElement>,
@@ -59,13 +61,18 @@ impl FeMesh {
         };
         spec.held.iter().for_each(|side| mesh.hold_cage(cage, *side, &spec.shape));
         let place = |bits: usize| DVec3::from_array([0, 1, 2].map(|axis| (bits >> axis & 1) as f64));
-        mesh.kinds.push(HexahedronKind::new(std::array::from_fn(|bits| place(bits) * cage.cell_m()), &spec.material));
-        for CageCell { corners, fill, volumes_m3 } in cage.cells() {
+        let kind =
+            |length_m: DVec3| HexahedronKind::new(std::array::from_fn(|bits| place(bits) * length_m), &spec.material);
+        mesh.kinds.push(kind(cage.cell_m()));
+        if cage.cells().iter().any(|cell| cell.is_half) {
+            mesh.kinds.push(kind(cage.cell_m() * 0.5));
+        }
+        for CageCell { corners, fill, volumes_m3, is_half } in cage.cells() {
             let mass_kg = volumes_m3.map(|volume| volume * spec.material.density_kg_m3);
             corners.iter().zip(mass_kg).for_each(|(node, mass)| mesh.mass_kg[*node as usize] += mass);
             mesh.hexahedra.push(Hexahedron {
                 vertices: *corners,
-                kind: 0,
+                kind: usize::from(*is_half),
                 fill: *fill,
                 mass_kg,
                 turn: DQuat::IDENTITY,
@@ -79,7 +86,18 @@ impl FeMesh {
         mesh.edges.dedup();
         // a cage is straight at rest
         mesh.rows = cage.rows().into_iter().map(|row| (row, 0.0)).collect();
+        mesh.hang(cage);
         mesh
+    }
+
+    /// Lets the nodes of `cage` that hang move with others: these have their masses, and where all of them are held, it is.
+    pub(super) fn hang(&mut self, cage: &Cage) {
+        self.hanging = cage.hanging().to_vec();
+        for HangingNode { node, carried, .. } in &self.hanging {
+            let mass = std::mem::take(&mut self.mass_kg[*node as usize]);
+            carried.terms().for_each(|(by, weight)| self.mass_kg[by] += mass * weight);
+            self.held[*node as usize] = carried.terms().all(|(by, _)| self.held[by]);
+        }
     }
 
     /// Holds the nodes on a side of a cage that the surface comes as near to as half the finest ε, whatever the present one is: a coarse cage
@@ -210,7 +228,8 @@ impl FeMesh {
     /// The system of this body.
     pub fn system(&mut self, positions: &[DVec3]) -> System {
         let (held, bulky) = (self.held.clone(), self.is_solid());
-        System::new(&held, bulky, |system| self.add(positions, system))
+        let hanging = self.hanging.clone();
+        System::new(&held, &hanging, bulky, |system| self.add(positions, system))
     }
 
     /// Adds the forces and stiffness of all elements at these positions; updates the cells' rotations.

@@ -6,13 +6,14 @@
 use super::body::SoftBody;
 use super::skin::Apart;
 use super::system::Purpose;
+use super::touched::Touches;
 use crate::limits::{QUIET_ACCELERATION_M_S2, QUIET_S, QUIET_SPEED_M_S};
 use glam::{DQuat, DVec3};
-use metachron_contact::Agent;
 use metachron_contact::member::{
     Attachments, ClusterMember, MaterialPoint, MemberMotion, Role, SkinPoint, StepEnd, StepSystem,
 };
 use metachron_contact::solve::{Response, Side, SideTerm};
+use metachron_contact::{Agent, StepContext};
 use metachron_core::{Anchor, Archive, ArchiveError, StepError};
 use metachron_geometry::narrow_phase::RestShape;
 use metachron_geometry::{Carried, ContactSide, Place, PlacedShape, ShapePose};
@@ -44,6 +45,7 @@ struct SavedState {
     quiet_s: f64,
     at_rest: bool,
     steps: u64,
+    touches: Touches,
 }
 
 impl Unknowns {
@@ -54,6 +56,17 @@ impl Unknowns {
 }
 
 impl SoftBody {
+    /// Lists the velocities of moving vertices, now and without contact.
+    pub(super) fn list_velocities(&mut self) {
+        let Self { system, free, velocities, unknowns, .. } = self;
+        let moving = |list: &[DVec3], into: &mut Vec<DVec3>| {
+            into.clear();
+            into.extend(system.rows().iter().zip(list).filter_map(|(row, v)| row.map(|_| *v)));
+        };
+        moving(free, &mut unknowns.free);
+        moving(velocities, &mut unknowns.now);
+    }
+
     /// Places all vertices where they are `t_s` seconds after the start of the step begun, by the velocities of moving ones.
     fn place_after(&mut self, v: &[DVec3], t_s: f64) {
         let Self { system, positions, unknowns, .. } = self;
@@ -63,6 +76,7 @@ impl SoftBody {
                 *position += v[row as usize] * t_s;
             }
         }
+        system.spread(positions);
     }
 
     /// Adds the velocity that keeps momentum to rounding to the velocities and places at the end of a step.
@@ -73,11 +87,13 @@ impl SoftBody {
             return;
         }
         for ((position, velocity), _) in
-            positions.iter_mut().zip(velocities).zip(system.rows()).filter(|(_, row)| row.is_some())
+            positions.iter_mut().zip(&mut *velocities).zip(system.rows()).filter(|(_, row)| row.is_some())
         {
             *velocity += owed_m_s;
             *position += owed_m_s * h_s;
         }
+        system.spread(positions);
+        system.spread(velocities);
         unknowns.now.iter_mut().for_each(|velocity| *velocity += owed_m_s);
     }
 
@@ -103,13 +119,8 @@ impl ClusterMember for SoftBody {
 
     fn begin(&mut self, h_s: f64) -> Result<(), StepError> {
         self.predict(h_s, Purpose::Shared).map_err(|what| self.diverged(what, h_s))?;
-        let Self { system, free, velocities, positions, unknowns, .. } = self;
-        let moving = |list: &[DVec3], into: &mut Vec<DVec3>| {
-            into.clear();
-            into.extend(system.rows().iter().zip(list).filter_map(|(row, v)| row.map(|_| *v)));
-        };
-        moving(free, &mut unknowns.free);
-        moving(velocities, &mut unknowns.now);
+        self.list_velocities();
+        let Self { positions, unknowns, .. } = self;
         unknowns.start.clone_from(positions);
         Ok(())
     }
@@ -140,9 +151,7 @@ impl ClusterMember for SoftBody {
     }
 
     fn strain(&self, v: &[DVec3], h_s: f64) -> f64 {
-        let rows = self.system.rows();
-        let of = |vertex: u32| rows[vertex as usize].map_or(DVec3::ZERO, |row| v[row as usize]);
-        self.mesh.edge_change(of, h_s) / TURN_MAX_RAD
+        self.mesh.edge_change(|vertex| self.system.velocity(vertex, v), h_s) / TURN_MAX_RAD
     }
 
     fn keep(&mut self) {
@@ -154,6 +163,7 @@ impl ClusterMember for SoftBody {
         self.skin.iter_mut().for_each(|skin| saved.apart.clone_from(skin.apart()));
         saved.acceleration = self.acceleration;
         (saved.quiet_s, saved.at_rest, saved.steps) = (self.quiet_s, self.at_rest, self.steps);
+        saved.touches.clone_from(&self.touches);
     }
 
     fn go_back(&mut self) {
@@ -164,6 +174,7 @@ impl ClusterMember for SoftBody {
         self.skin.iter_mut().for_each(|skin| skin.apart().clone_from(&saved.apart));
         self.acceleration = saved.acceleration;
         (self.quiet_s, self.at_rest, self.steps) = (saved.quiet_s, saved.at_rest, saved.steps);
+        self.touches.clone_from(&saved.touches);
         self.follow();
     }
 
@@ -172,7 +183,17 @@ impl ClusterMember for SoftBody {
         self.follow();
     }
 
-    fn end(&mut self, &StepEnd { v, h_s, unanswered, .. }: &StepEnd<'_>) -> Result<(), StepError> {
+    fn look(&mut self, context: &StepContext<'_>, _dt_s: f64) {
+        if self.spec.eps_touched_m.is_some() {
+            context.anchor_springs().for_each(|spring| self.note_held(spring.anchor));
+        }
+    }
+
+    fn adapt(&mut self) {
+        self.divide_where_touched();
+    }
+
+    fn end(&mut self, &StepEnd { v, h_s, unanswered, pressed, .. }: &StepEnd<'_>) -> Result<(), StepError> {
         self.unknowns.owed_m_s = self.system.together(unanswered);
         self.place_after(v, h_s);
         let finite = self.positions.iter().all(|x| x.is_finite() && x.abs().max_element() <= super::step::REACH_MAX);
@@ -186,6 +207,7 @@ impl ClusterMember for SoftBody {
         for (velocity, row) in velocities.iter_mut().zip(system.rows()) {
             *velocity = row.map_or(DVec3::ZERO, |row| v[row as usize]);
         }
+        system.spread(velocities);
         let Self { unknowns, .. } = self;
         let quiet = v
             .iter()
@@ -194,6 +216,7 @@ impl ClusterMember for SoftBody {
         unknowns.now.copy_from_slice(v);
         self.pay_owed(h_s);
         self.ease(h_s);
+        self.note_pressed(pressed, h_s);
         self.acceleration = (self.linear_momentum() - before) / (self.mass_kg() * h_s);
         self.quiet_s = if quiet { self.quiet_s + h_s } else { 0.0 };
         self.at_rest = false;

@@ -34,6 +34,7 @@ mod system;
 #[cfg(test)]
 mod tests;
 mod tetrahedron;
+mod touched;
 
 pub use body::SoftBody;
 pub use grid::Side;

@@ -44,17 +44,23 @@ impl SoftBody {
         let (Some(range), Some(skin)) = (self.spec.resolutions(), &self.skin) else { return };
         let wanted = range.clamp(wanted);
         self.level = wanted.n;
-        if !self.gone.is_empty() || skin.carrier.is_as_wanted(&self.spec, wanted.eps_m) {
+        let halved_m = &mut self.touches.halved_m;
+        if !self.gone.is_empty() || skin.carrier.is_as_wanted(&self.spec, wanted.eps_m, halved_m) {
             return;
         }
-        if let Some(carrier) = Carrier::new(&self.spec, wanted.eps_m) {
+        let carrier = Carrier::new(&self.spec, wanted.eps_m, halved_m).or_else(|| {
+            // with halves it may have too many nodes
+            halved_m.clear();
+            Carrier::new(&self.spec, wanted.eps_m, halved_m)
+        });
+        if let Some(carrier) = carrier {
             self.eps_m = wanted.eps_m;
             self.move_onto(carrier);
         }
     }
 
     /// Moves the state onto `carrier`; a change of energy by that is undone by rest and, at last, by slower deformation.
-    fn move_onto(&mut self, carrier: Carrier) {
+    pub(super) fn move_onto(&mut self, carrier: Carrier) {
         let before = self.kept();
         let mesh = carrier.mesh(&self.spec);
         let (positions, velocities) = self.at_nodes(&carrier, &mesh);
@@ -67,6 +73,7 @@ impl SoftBody {
         self.mesh.set_turns(&turns);
         (self.positions, self.velocities) = (positions, velocities);
         self.system = self.mesh.system(&self.positions);
+        self.hang();
         self.free.clone_from(&self.velocities);
         self.balance(&elastic_m_s2, before.energy_j);
         self.keep_momentum(&before);
@@ -74,8 +81,13 @@ impl SoftBody {
         // nodes that have moved have other arms
         self.keep_momentum(&before);
         self.slow(before.energy_j);
+        // where some of those that a node hangs at are held
+        self.hang();
         let Self { skin, positions, .. } = self;
         skin.iter_mut().for_each(|skin| skin.stay(positions));
+        // others may ask how points of it move before its next step begins
+        self.free.clone_from(&self.velocities);
+        self.list_velocities();
         self.woken();
     }
 
@@ -111,7 +123,8 @@ impl SoftBody {
         let nodes = self.system.forces.iter().zip(&self.mesh.mass_kg).zip(&self.mesh.held);
         // the hold of a node bears its weight as well
         let of = |((force, mass), held): ((&DVec3, &f64), &bool)| if *held { -weight } else { *force / *mass };
-        let elastic_m_s2: Vec<DVec3> = nodes.map(of).collect();
+        let mut elastic_m_s2: Vec<DVec3> = nodes.map(of).collect();
+        self.system.spread(&mut elastic_m_s2);
         let Some(skin) = &self.skin else { return vec![] };
         carrier.nodes_m().iter().map(|node_m| skin.carrier.interpolate(*node_m, &elastic_m_s2)).collect()
     }

@@ -4,6 +4,7 @@
 //! Theory: docs/theory/soft.md, section 11.
 
 use super::body::SoftBody;
+use super::carrier::Carrier;
 use super::division::form;
 use super::fe_mesh::{FeMesh, edges_of};
 use super::spec::{SoftError, SoftMaterial, SoftShape};
@@ -128,6 +129,7 @@ impl SoftBody {
                 *velocity = DVec3::ZERO;
             }
         }
+        self.hang();
         self.woken();
         let triangles = (before as i64 - self.skin_triangles() as i64) as i32;
         let went = Removed { triangles, ..went };
@@ -143,7 +145,11 @@ impl SoftBody {
         let triangles = match (skin, &form.kind) {
             (Some(skin), ShapeKind::Surface(surface)) => {
                 let is_left: Vec<bool> = mesh.mass_kg.iter().map(|mass| *mass > 0.0).collect();
-                skin.without_cells(is_gone, &is_left, &surface.triangles)
+                let triangles = skin.without_cells(is_gone, &is_left, &surface.triangles);
+                if let Carrier::Cage(cage) = &skin.carrier {
+                    mesh.hang(cage);
+                }
+                triangles
             }
             _ => {
                 let outside = mesh.outside();

@@ -172,7 +172,7 @@ impl Skin {
     }
 
     /// Where the same point is in material coordinates, and the direction into the body there.
-    fn material_at(&self, vertices: [u32; 3], shares: [f64; 3]) -> (DVec3, DVec3) {
+    pub fn material_at(&self, vertices: [u32; 3], shares: [f64; 3]) -> (DVec3, DVec3) {
         let mean = |of: &[DVec3]| vertices.into_iter().zip(shares).map(|(v, share)| of[v as usize] * share).sum();
         // a place on an edge has two vertices alone
         let inward = into_body(vertices.map(|vertex| self.rest[vertex as usize])).try_normalize();

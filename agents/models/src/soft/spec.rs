@@ -5,7 +5,7 @@ use super::material::Lame;
 use glam::{DQuat, DVec3};
 use metachron_core::{NumberRange, OutOfRange, Ranges, ResolutionRange, unit_rotation};
 use metachron_geometry::{
-    ContactTraits, FRICTION, Tetrahedra, TetrahedraFault, Triangles, branch, cage_counts, is_closed, opposed,
+    ContactTraits, FRICTION, Halving, Tetrahedra, TetrahedraFault, Triangles, branch, cage_counts, is_closed, opposed,
 };
 use std::sync::Arc;
 
@@ -30,6 +30,8 @@ pub struct SoftSpec {
     /// The spacing of the nodes of a sheet or rope whose ε may change: its skin is then the lattice that its shape names, which moves with
     /// coarser nodes. `None`: the vertices of the shape's lattice are the nodes.
     pub nodes: Option<NodeSpacing>,
+    /// Cells of a cage longer than this are halved where something touches the body, metres, within [`LENGTH`]; `None`: nowhere.
+    pub eps_touched_m: Option<f64>,
     /// Its material.
     pub material: SoftMaterial,
     /// Position of its first corner, or of a ball's centre, at the start, metres.
@@ -209,6 +211,12 @@ pub enum SoftError {
     /// A shape whose cells cannot change has an ε.
     #[error("a lattice of a {model} has no spacing of nodes beside its segments: only sheets and ropes have")]
     NoSpacing {
+        /// The model.
+        model: &'static str,
+    },
+    /// A body without a cage has an ε where it is touched.
+    #[error("a {model} without a cage has no ε where it is touched: only the inside of a closed surface has one")]
+    NoCage {
         /// The model.
         model: &'static str,
     },
@@ -456,6 +464,11 @@ impl SoftSpec {
         }
     }
 
+    /// Where the cells of its cage are halved that was touched at these points.
+    pub(super) fn halving<'a>(&self, about_m: &'a [DVec3]) -> Halving<'a> {
+        self.eps_touched_m.map_or(Halving::NONE, |longer_than_m| Halving { about_m, longer_than_m })
+    }
+
     /// Whether every number is in its range.
     pub(super) fn check_numbers(&self) -> Result<(), SoftError> {
         self.shape.check()?;
@@ -463,6 +476,12 @@ impl SoftSpec {
             nodes.check()?;
             let finest = self.shape.divided_by(nodes.eps_m.min(nodes.range_m.0));
             finest.ok_or(SoftError::NoSpacing { model: self.shape.model() })?.check()?;
+        }
+        if let Some(eps_m) = self.eps_touched_m {
+            LENGTH.check("ε where it is touched", eps_m)?;
+            if !matches!(self.shape, SoftShape::Embedded { .. }) {
+                return Err(SoftError::NoCage { model: self.shape.model() });
+            }
         }
         self.material.check()?;
         FRICTION.check("friction", self.friction)?;

@@ -7,6 +7,8 @@ use super::gradients::Gradients;
 use glam::{DMat3, DVec3};
 use metachron_contact::solve::{Block, Response, SparseFactor};
 use metachron_core::PlainLoop;
+use metachron_geometry::{Carried, HangingNode};
+use std::cmp::Ordering;
 
 /// Products that conjugate gradients take at least, and for each root of how far stiffness outweighs inertia, in solids of some hundred to
 /// some thousand vertices; multiplications of a product for each block.
@@ -35,8 +37,11 @@ pub(super) struct System {
     by_factor: bool,
     /// The residual of a solution that is left to others to find, moving vertices alone; else empty.
     unanswered: Vec<DVec3>,
-    /// The row of each vertex; none for held ones. Rows rise with the vertices.
+    /// The row of each vertex; none for held and hanging ones. Rows rise with the vertices.
     rows: Vec<Option<u32>>,
+    /// The vertices that move with others, by rising numbers, and the place of each vertex among them; empty where none hangs.
+    hanging: Vec<HangingNode>,
+    hangs: Vec<Option<u32>>,
     /// How many vertices move.
     moving: usize,
     /// Force on each vertex at the start of the substep, N.
@@ -67,14 +72,17 @@ pub(super) enum Purpose {
 }
 
 impl System {
-    /// A system of vertices of which some are held; `bulky` where its vertices fill a volume, so that a factor is dear and conjugate gradients
-    /// end soon. `add_all` adds all stiffness once, as every substep will.
-    pub fn new(held: &[bool], bulky: bool, add_all: impl FnOnce(&mut Self)) -> Self {
+    /// A system of vertices of which some are held, and some hang between others; `bulky` where its vertices fill a volume, so that a factor is
+    /// dear and conjugate gradients end soon. `add_all` adds all stiffness once, as every substep will.
+    pub fn new(held: &[bool], hanging: &[HangingNode], bulky: bool, add_all: impl FnOnce(&mut Self)) -> Self {
+        let mut hangs = if hanging.is_empty() { vec![] } else { vec![None; held.len()] };
+        (0..).zip(hanging).for_each(|(place, one)| hangs[one.node as usize] = Some(place));
+        let is_row = |vertex: usize| !held[vertex] && hangs.get(vertex).is_none_or(Option::is_none);
         let mut next = 0..;
-        let rows: Vec<Option<u32>> = held.iter().map(|&held| if held { None } else { next.next() }).collect();
-        let moving = held.iter().filter(|held| !**held).count();
-        let inertia_kg = vec![0.0; moving];
-        let mut system = Self { rows, moving, inertia_kg, forces: vec![DVec3::ZERO; held.len()], ..Self::default() };
+        let rows: Vec<_> = (0..held.len()).map(|vertex| if is_row(vertex) { next.next() } else { None }).collect();
+        let moving = rows.iter().flatten().count();
+        let (inertia_kg, forces, hanging) = (vec![0.0; moving], vec![DVec3::ZERO; held.len()], hanging.to_vec());
+        let mut system = Self { rows, hanging, hangs, moving, inertia_kg, forces, ..Self::default() };
         add_all(&mut system);
         system.merge();
         let fits = moving <= FACTOR_VERTICES_MAX;
@@ -131,7 +139,31 @@ impl System {
 
     /// Adds a force on a vertex, N.
     pub fn push(&mut self, vertex: u32, force: DVec3) {
-        self.forces[vertex as usize] += force;
+        match self.carried(vertex as usize) {
+            None => self.forces[vertex as usize] += force,
+            Some(carried) => carried.terms().for_each(|(node, weight)| self.forces[node] += force * weight),
+        }
+    }
+
+    /// The vertices that a hanging one moves with; `None` for one that does not hang.
+    fn carried(&self, vertex: usize) -> Option<Carried> {
+        let place = self.hangs.get(vertex).copied().flatten()?;
+        Some(self.hanging[place as usize].carried)
+    }
+
+    /// Gives hanging vertices the mean of the values of those that they move with.
+    pub fn spread(&self, list: &mut [DVec3]) {
+        self.hanging.iter().for_each(|one| list[one.node as usize] = one.carried.mean(list));
+    }
+
+    /// The velocity of a vertex with those of moving ones, m/s.
+    pub fn velocity(&self, vertex: u32, v: &[DVec3]) -> DVec3 {
+        let of = |vertex: usize| self.rows[vertex].map_or(DVec3::ZERO, |row| v[row as usize]);
+        let hanging = self.carried(vertex as usize);
+        hanging.map_or_else(
+            || of(vertex as usize),
+            |carried| carried.terms().map(|(node, weight)| of(node) * weight).sum(),
+        )
     }
 
     /// Adds the stiffness −∂fᵢ/∂xⱼ, N/m, where `i` is not below `j`: the matrix is symmetric.
@@ -139,8 +171,32 @@ impl System {
         if i < j {
             return;
         }
-        let (Some(row), Some(column)) = (self.rows[i as usize], self.rows[j as usize]) else { return };
-        let (row, column) = (row as usize, column as usize);
+        match (self.rows[i as usize], self.rows[j as usize]) {
+            (Some(row), Some(column)) => self.add(row as usize, column as usize, stiffness),
+            _ if self.hangs.is_empty() => {}
+            _ => self.stiffen_hanging(i as usize, j as usize, stiffness),
+        }
+    }
+
+    /// The same where a vertex may hang: the stiffness is that between those that it moves with, by their weights.
+    fn stiffen_hanging(&mut self, i: usize, j: usize, stiffness: DMat3) {
+        let [of_i, of_j] = [i, j].map(|vertex| self.carried(vertex).unwrap_or_else(|| Carried::by_node(vertex as u32)));
+        for ((a, of_a), (b, of_b)) in of_i.terms().flat_map(|a| of_j.terms().map(move |b| (a, b))) {
+            let (Some(row), Some(column)) = (self.rows[a], self.rows[b]) else { continue };
+            let (row, column, part) = (row as usize, column as usize, stiffness * (of_a * of_b));
+            // that of j on i is the transpose; of one vertex with itself both are the same
+            match row.cmp(&column) {
+                Ordering::Greater => self.add(row, column, part),
+                Ordering::Equal if i != j => self.add(row, column, part + part.transpose()),
+                Ordering::Equal => self.add(row, column, part),
+                Ordering::Less if i != j => self.add(column, row, part.transpose()),
+                Ordering::Less => {}
+            }
+        }
+    }
+
+    /// Adds to the block of two rows.
+    fn add(&mut self, row: usize, column: usize, stiffness: DMat3) {
         if !self.merged {
             return self.blocks.push(Block { row, column, value: DMat3::ZERO });
         }
@@ -190,6 +246,7 @@ impl System {
         for (x, row) in x.iter_mut().zip(rows) {
             *x = row.map_or(DVec3::ZERO, |row| solution[row as usize]);
         }
+        self.spread(x);
         solved
     }
 
@@ -213,7 +270,7 @@ impl System {
         &self.blocks
     }
 
-    /// The row of each vertex among the moving ones; none for held ones.
+    /// The row of each vertex among the moving ones; none for held and hanging ones.
     pub fn rows(&self) -> &[Option<u32>] {
         &self.rows
     }

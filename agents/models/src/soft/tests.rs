@@ -3,6 +3,7 @@
 mod beam;
 mod embedded;
 mod error;
+mod halved;
 mod large;
 mod materials;
 mod patch;
@@ -37,6 +38,7 @@ fn spec(shape: SoftShape) -> SoftSpec {
     SoftSpec {
         shape,
         nodes: None,
+        eps_touched_m: None,
         material: MATERIAL,
         position: DVec3::ZERO,
         rotation: DQuat::IDENTITY,

@@ -69,6 +69,7 @@ fn column(young_pa: f64) -> SoftBody {
     let spec = SoftSpec {
         shape: SoftShape::Box { size_m: SIZE_M, segments: [2, 2, 4] },
         nodes: None,
+        eps_touched_m: None,
         material: SoftMaterial {
             young_pa,
             poisson: 0.3,

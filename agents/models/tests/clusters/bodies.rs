@@ -22,6 +22,7 @@ fn soft(shape: SoftShape, position: DVec3, young_pa: f64) -> SoftSpec {
     SoftSpec {
         shape,
         nodes: None,
+        eps_touched_m: None,
         material: material(young_pa),
         position,
         rotation: DQuat::IDENTITY,

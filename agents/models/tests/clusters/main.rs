@@ -6,6 +6,7 @@ mod compounds;
 mod errors;
 mod fine_skin;
 mod grasp;
+mod halved;
 mod heaps;
 mod hung;
 mod joints;

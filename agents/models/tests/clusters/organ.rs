@@ -34,6 +34,7 @@ fn organ(eps_m: f64) -> SoftBody {
         traits: metachron_geometry::ContactTraits::default(),
         shape: SoftShape::Embedded { surface, eps_m, range_m: (FINEST_M, 0.035) },
         nodes: None,
+        eps_touched_m: None,
         material,
         position: DVec3::Z * 0.027,
         rotation: DQuat::IDENTITY,

@@ -81,7 +81,7 @@ fn a_step_that_is_made_again_begins_with_the_same_forces() {
         let first = member.system().free.to_vec();
         // far from where it was: its forces are others
         let struck: Vec<_> = (0..).zip(&first).map(|(k, v)| *v + DVec3::Y * f64::from(k % 5)).collect();
-        member.end(&StepEnd { v: &struck, h_s, touched: true, unanswered: &[] }).unwrap();
+        member.end(&StepEnd { v: &struck, h_s, touched: true, ..StepEnd::default() }).unwrap();
         member.go_back();
         member.begin(h_s).unwrap();
         assert_eq!(member.system().free, first, "{model}");

@@ -227,6 +227,7 @@ impl Table {
         if let Some(doubling) = &mut self.doubling {
             doubling.compare(&all);
         }
+        all.iter_mut().for_each(|one| one.member.change(|m| m.adapt()));
         self.time += dt;
         self.last_s = dt.as_secs_f64();
         (report, self.last_s)

@@ -63,7 +63,11 @@ impl Making<'_, '_> {
             doubling.compare(list);
         }
         let may_rest = stepper.lets_rest() && list.iter().all(|one| one.member.can_sleep());
-        may_rest && !sides.iter().flatten().any(|pairs| pairs.is_active())
+        let rests = may_rest && !sides.iter().flatten().any(|pairs| pairs.is_active());
+        if !rests {
+            list.iter_mut().for_each(|one| one.member.change(|m| m.adapt()));
+        }
+        rests
     }
 }
 

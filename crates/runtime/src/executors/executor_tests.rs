@@ -151,6 +151,7 @@ fn heaped() -> Vec<AgentSpawn> {
         traits: metachron_geometry::ContactTraits::default(),
         shape: SoftShape::Box { size_m: DVec3::new(0.2, 0.2, 0.05), segments: [6, 6, 2] },
         nodes: None,
+        eps_touched_m: None,
         material,
         position: DVec3::new(-0.1, -0.1, 1e-4),
         rotation: DQuat::IDENTITY,

@@ -101,7 +101,9 @@ pub(super) fn solid(
     let half = if let SoftShape::Box { size_m, .. } = shape { 0.5 * size_m } else { DVec3::ZERO };
     let (rotation, self_contact) = (rotation(file.rotation_deg), soft.self_contact.unwrap_or(false));
     let position = point(file.position_m) - rotation * half;
-    let spec = SoftSpec { position, rotation, material, held, self_contact, ..spec(context, shape, soft) };
+    let eps_touched_m = file.eps_touched_m.filter(|_| eps_m.is_some());
+    let spec =
+        SoftSpec { position, rotation, material, held, self_contact, eps_touched_m, ..spec(context, shape, soft) };
     Some(BuiltSoft { spec, eps_m })
 }
 
@@ -122,6 +124,10 @@ fn check_solid_keys(c: &mut Checker<'_, '_>, place: &Place, file: &SolidFile) {
         (Some(_), Some(_)) => c.wrong(place, "segments", "contradicts `eps_m`", "expected one of them"),
         (None, None) if name != "mesh" => c.wrong(place, "segments", "is missing", "expected `segments` or `eps_m`"),
         _ => {}
+    }
+    if file.eps_m.is_none() {
+        let what = "has no cage whose cells it would halve";
+        c.refuse(place, &["eps_touched_m"], what, "expected `eps_m`, or no such key here");
     }
 }
 
@@ -310,6 +316,7 @@ fn spec(context: &ModelContext<'_>, shape: SoftShape, soft: &SoftFile) -> SoftSp
     SoftSpec {
         shape,
         nodes: None,
+        eps_touched_m: None,
         material: material(soft),
         position: DVec3::ZERO,
         rotation: DQuat::IDENTITY,

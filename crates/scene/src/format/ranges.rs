@@ -64,6 +64,7 @@ const KEYS: Ranges = Ranges(&[
     ("size_m", LENGTH),
     ("thickness_m", LENGTH),
     ("eps_m", LENGTH),
+    ("eps_touched_m", LENGTH),
     ("segments", SEGMENTS),
     ("length_m", LENGTH),
     ("rest_m", NumberRange::new(0.0, 1e4, "m")),

@@ -77,6 +77,9 @@ pub struct SolidFile {
     /// Largest length ε of a cell of the cage that is laid around its surface, metres: one number, or `[finest, coarsest]`, of which the
     /// controllers choose while it runs. At most 10,000 vertices at the finest.
     pub eps_m: Option<OneOrRange<f64>>,
+    /// Where something touches, grasps or pulls it, cells of the cage longer than this are halved, and their neighbours, until a second after,
+    /// metres. Default: nowhere.
+    pub eps_touched_m: Option<f64>,
     /// A closed surface as a file of triangles, STL (binary or text, +z up), binary glTF (.glb, +y up) or OBJ (+z up), its path relative to
     /// the scene file: one piece, triangles counter-clockwise seen from outside, with `eps_m`. Or a mesh of tetrahedra, gmsh (.msh 2.2 or 4.1,
     /// text), legacy VTK (.vtk) or VTK's XML (.vtu), which is taken as it is.

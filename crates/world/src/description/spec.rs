@@ -199,6 +199,7 @@ fn rope_of(tube: &TubeSpec, segments: u32) -> Option<SoftSpec> {
     let spec = SoftSpec {
         shape: SoftShape::Rope { path_m: centre_line(tube)?, radius_m, segments },
         nodes: None,
+        eps_touched_m: None,
         material: SoftMaterial {
             young_pa: tube.section.ea_n / area_m2,
             poisson: 0.3,

@@ -33,6 +33,7 @@ pub(crate) fn plain_soft(shape: SoftShape, material: SoftMaterial) -> SoftSpec {
     SoftSpec {
         shape,
         nodes: None,
+        eps_touched_m: None,
         material,
         position: DVec3::ZERO,
         rotation: DQuat::IDENTITY,

@@ -46,6 +46,7 @@ impl Soft {
         let spec = SoftSpec {
             shape,
             nodes: None,
+            eps_touched_m: None,
             material,
             position: DVec3::ZERO,
             rotation: DQuat::IDENTITY,
@@ -113,6 +114,8 @@ impl Soft {
         friction: f64 => spec.friction;
         /// Whether it touches itself; by default sheets and ropes do.
         self_contact: bool => spec.self_contact;
+        /// Where something touches it, cells of its cage longer than this are halved, metres.
+        eps_touched_m: f64 => spec.eps_touched_m;
         /// Its contact traits.
         contact: ContactTraits => spec.traits;
         /// Steps a simulated second, 1 … 100000.

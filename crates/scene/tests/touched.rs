@@ -1,0 +1,67 @@
+//! A solid of a scene file whose cells are halved where something touches it, in a running world.
+
+use metachron_core::SimSpan;
+use metachron_scene::{Source, load};
+use metachron_world::kinds::ExecutorKind;
+use metachron_world::{Scene, World};
+
+/// A block on which a tool presses from the first half second to the second one, and goes.
+fn text(keys: &str) -> String {
+    format!(
+        r#"
+format = 1
+object = [
+    {{ name = "block", model = "solid", shape = "box", size_m = [0.4, 0.4, 0.15], {keys}, young_pa = 1e4, damping_per_s = 5,
+      damping_s = 0.01, hold = ["bottom"], rate_hz = 60 }},
+    {{ name = "probe", model = "tool", grasps = [], rate_hz = 120, keyframe = [
+        {{ at_s = 0, tip_m = [0.03, 0.02, 0.15], rotation_deg = [180, 0, 0], jaw = 0 }}, {{ at_s = 0.5, tip_m = [0.03, 0.02, 0.068] }},
+        {{ at_s = 1, tip_m = [0.05, 0.02, 0.068] }}, {{ at_s = 1.2, tip_m = [0.03, 0.02, 0.15] }},
+    ] }},
+]
+"#
+    )
+}
+
+fn scene(keys: &str) -> Result<Scene, String> {
+    load(&Source::memory("touched", text(keys).as_bytes()).unwrap(), &[]).map_err(|error| format!("{:?}", error.problems))
+}
+
+fn nodes(world: &World) -> u32 {
+    world.latest(world.object("block").unwrap()).unwrap().nodes.unwrap()
+}
+
+#[test]
+fn cells_are_halved_under_a_tool_until_a_second_after_it_is_gone_and_a_checkpoint_holds_them() {
+    let scene = scene("eps_m = 0.05, eps_touched_m = 0.03").unwrap();
+    let ms = SimSpan::from_millis;
+    let world = World::start(&scene, ExecutorKind::Lockstep).unwrap();
+    world.advance(ms(100));
+    let whole = nodes(&world);
+    world.advance(ms(800));
+    let halved = nodes(&world);
+    assert!(halved > whole + 20, "{halved} nodes of {whole}");
+    let mark = world.checkpoint().unwrap();
+    world.advance(ms(300));
+    let hash = world.hash();
+    let opened = World::open(&scene, ExecutorKind::Lockstep, &mark).unwrap();
+    opened.advance(ms(300));
+    assert_eq!((opened.hash(), nodes(&opened)), (hash, nodes(&world)));
+    world.advance(ms(1400));
+    assert_eq!(nodes(&world), whole);
+    // from a state with whole cells back to one with halves
+    world.restore(&mark).unwrap();
+    world.advance(ms(300));
+    assert_eq!(world.hash(), hash);
+}
+
+#[test]
+fn an_eps_where_it_is_touched_is_refused_without_a_cage_and_out_of_its_range() {
+    for (keys, words) in [
+        ("segments = [4, 4, 2], eps_touched_m = 0.02", "has no cage whose cells it would halve"),
+        ("eps_m = 0.05, eps_touched_m = 0", "`eps_touched_m` of `block` is 0"),
+        ("eps_m = 0.05, eps_touched_m = nan", "eps_touched_m"),
+    ] {
+        let said = scene(keys).expect_err("must be refused");
+        assert!(said.contains(words), "{words:?} is not said: {said}");
+    }
+}
