@@ -52,6 +52,10 @@ impl Ghost {
         let gauges = &runner.shared.gauges;
         gauges.set_resting(state.at_rest);
         gauges.steps.store(state.steps, Relaxed);
+        // its rests are not known here
+        let lived = state.time.since(SimTime::ZERO);
+        gauges.stepped.store(lived.as_nanos(), Relaxed);
+        gauges.mean_hz.set(state.steps as f64 / lived.as_secs_f64().max(f64::MIN_POSITIVE));
         let (since, steps) = self.counted;
         let passed_s = state.time.secs_after(since);
         // one that was put back to an earlier state counts anew
@@ -200,6 +204,8 @@ mod tests {
             assert_eq!((shown.steps, shown.state), (is.steps, AgentState::Running));
             // a window of half a second has at most one step more or less
             assert!((shown.rate_hz - is.wanted_hz).abs() <= 2.01, "{} Hz", shown.rate_hz);
+            assert!((shown.mean_hz - is.mean_hz).abs() <= 2.01, "{} and {} Hz", shown.mean_hz, is.mean_hz);
+            assert_eq!(shown.lived, is.lived);
         }
     }
 

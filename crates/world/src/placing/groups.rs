@@ -6,6 +6,7 @@
 use glam::DVec3;
 use metachron_core::{AgentId, DisjointSets, SimSpan};
 use metachron_runtime::Reach;
+use std::collections::BTreeMap;
 
 /// Speed may change by so much, m/s², before an object leaves its box: twice free fall.
 const ACCELERATION_M_S2: f64 = 20.0;
@@ -21,6 +22,19 @@ pub(super) fn fences(reaches: &[Reach], window: SimSpan, room: f64) -> Vec<Reach
     let span_s = window.as_secs_f64();
     let way_m = |reach: &Reach| (reach.speed_m_s.max(SPEED_LEAST_M_S) + ACCELERATION_M_S2 * span_s) * span_s;
     reaches.iter().map(|reach| reach.wider(room * way_m(reach))).collect()
+}
+
+/// Gives each object the greatest speed in its group: what it meets may give it its own.
+pub(super) fn share_speeds(reaches: &mut [Reach], groups: &[Vec<AgentId>]) {
+    let members = (0..).zip(groups).flat_map(|(number, group)| group.iter().map(move |id| (*id, number)));
+    let numbers: BTreeMap<AgentId, usize> = members.collect();
+    let mut fastest = vec![0.0_f64; groups.len()];
+    for reach in &*reaches {
+        numbers.get(&reach.id).iter().for_each(|at| fastest[**at] = fastest[**at].max(reach.speed_m_s));
+    }
+    for reach in reaches {
+        reach.speed_m_s = numbers.get(&reach.id).map_or(reach.speed_m_s, |at| fastest[*at]);
+    }
 }
 
 /// The groups of `objects` whose boxes meet or that are tied: each by rising numbers, and the groups by their first ones.

@@ -150,6 +150,7 @@ impl PlacedWorld {
                 Fault::Escaped => {
                     placing.seen.escapes += 1;
                     placing.room *= ROOM_RISES;
+                    placing.escaped = placing.seen.time;
                 }
                 Fault::Lost(host, error) => {
                     placing.seen.lost[host] = Some(error.to_string());

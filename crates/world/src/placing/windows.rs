@@ -3,7 +3,7 @@
 //! In: the hosts of a placed world, an act. Out: the same act done once, whatever was done again for it. Never here: the calls of a world.
 
 use super::divided::{DividedCalls, PartAdvanced};
-use super::groups::{PlacedGroup, fences, groups, place};
+use super::groups::{PlacedGroup, fences, groups, place, share_speeds};
 use super::kept::{Kept, Pack};
 use super::placed_world::{PlacedHost, PlacedWorld};
 use crate::error::WorldError;
@@ -13,7 +13,7 @@ use std::collections::{BTreeMap, BTreeSet, VecDeque};
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
-/// How much room for more speed objects have at first; what there is more falls from window to window.
+/// How much room for more speed objects have at first; what there is more falls from window to window, past the one from which an object escaped.
 const ROOM: f64 = 2.0;
 const ROOM_FALLS: f64 = 0.98;
 
@@ -27,6 +27,8 @@ pub(super) struct Placing {
     pub(super) reaches: Vec<Vec<Reach>>,
     bonds: Vec<Vec<[AgentId; 2]>>,
     pub(super) room: f64,
+    /// How far time had come when an object left its box last.
+    pub(super) escaped: SimTime,
     pub(super) kept: Kept,
     /// Acts since states were kept.
     pub(super) since: Vec<Act>,
@@ -140,6 +142,7 @@ impl Placing {
             reaches,
             bonds,
             room: ROOM,
+            escaped: SimTime::ZERO,
             kept,
             since,
             leaving,
@@ -316,7 +319,9 @@ impl PlacedWorld {
         }
         placing.seen.time += window;
         self.forget_left(placing);
-        placing.room = (placing.room * ROOM_FALLS).max(ROOM);
+        if placing.seen.time > placing.escaped {
+            placing.room = (placing.room * ROOM_FALLS).max(ROOM);
+        }
         Ok(())
     }
 
@@ -340,9 +345,11 @@ impl PlacedWorld {
         if living.is_empty() {
             return Err(Fault::Refused(self.silent()));
         }
-        let reaches: Vec<Reach> = placing.reaches.iter().flatten().copied().collect();
-        let fences = fences(&reaches, window, placing.room);
+        let mut reaches: Vec<Reach> = placing.reaches.iter().flatten().copied().collect();
         let (ties, evens) = (self.ties_of(placing), std::mem::take(&mut placing.evens));
+        let near = fences(&reaches, window, placing.room);
+        share_speeds(&mut reaches, &groups(&placing.objects_of(&near, &ties), &near, &ties));
+        let fences = fences(&reaches, window, placing.room);
         // those that can meet nothing stay where they are until loads are evened
         let objects = if evens { placing.objects() } else { placing.objects_of(&fences, &ties) };
         let mut placed: Vec<PlacedGroup> =
