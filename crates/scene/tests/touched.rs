@@ -23,7 +23,8 @@ object = [
 }
 
 fn scene(keys: &str) -> Result<Scene, String> {
-    load(&Source::memory("touched", text(keys).as_bytes()).unwrap(), &[]).map_err(|error| format!("{:?}", error.problems))
+    load(&Source::memory("touched", text(keys).as_bytes()).unwrap(), &[])
+        .map_err(|error| format!("{:?}", error.problems))
 }
 
 fn nodes(world: &World) -> u32 {
