@@ -275,7 +275,9 @@ fn a_spring_that_pulls_at_a_vertex_counts_as_a_touch() {
     let pull = AnchorSpring { by: None, anchor, target, target_velocity: DVec3::ZERO, stiffness_n_m, damping_n_s_m };
     let context = StepContext { user_springs: &[pull], ..StepContext::alone(AgentId(0), SimTime::ZERO) };
     let (mut stepper, whole) = (LoneStepper::default(), body.nodes());
-    (0..30).for_each(|_| drop(stepper.step(&mut body, dt(0.01), context).unwrap()));
+    for _ in 0..30 {
+        stepper.step(&mut body, dt(0.01), context).unwrap();
+    }
     let halves = body.mesh.hexahedra.iter().filter(|cell| cell.kind == 1);
     let near = |cell: &crate::soft::hexahedron::Hexahedron| {
         let middle = cell.vertices.iter().map(|node| body.mesh.rest[*node as usize]).sum::<DVec3>() / 8.0;
