@@ -94,7 +94,7 @@ const RINGS: [(&str, usize); 20] = [
 
 /// Most production lines of Rust in all crates and the Python module: neither blank, comment nor test code. Work that needs
 /// more raises it beforehand, in a commit that names what the lines are for.
-const LINES_MAX: usize = 110_920;
+const LINES_MAX: usize = 111_000;
 
 fn root() -> PathBuf {
     PathBuf::from(env!("CARGO_MANIFEST_DIR"))
