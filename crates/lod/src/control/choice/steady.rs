@@ -4,8 +4,8 @@
 //! a policy's own rule. Theory: `docs/theory/budget.md`, eq. 16a.
 //!
 //! Two frames are one problem: every object has the level of the frame before or the new one, a change costs all pixels of the object at
-//! first and less in every frame that its level lasts, and the time is bounded. It is solved by its relaxation: levels
-//! that save time stay, then those that are worth most for a second, as far as the time goes.
+//! first and less in every frame that its level lasts, and the time is bounded. It is solved by its relaxation: what has just changed stays, and
+//! until that fits, what loses least for a second gives way: a level that stays, or a rise, which waits.
 
 use super::groups::Groups;
 use super::hierarchy::leave_out_members;
@@ -14,8 +14,13 @@ use crate::control::demand::plan::LevelDemand;
 use crate::control::demand::query::{FrameQuery, Promise};
 use crate::control::flicker::Changes;
 
-/// Frames after which a change costs nothing.
-const DWELL: f64 = 8.0;
+/// Frames after which a change costs nothing: twice those within which a level that returns flickers. With four `hierarchical-flat` has 0.54 % of
+/// reversals in the grove, with eight every policy is slower to use time that comes free.
+const DWELL: f64 = 6.0;
+
+/// The fraction of the budget that rises leave free, so that no small move of the camera takes them back; with 2 % the library under
+/// `hierarchical` has 0.7 % of reversals, with this 0.5 %.
+const ROOM: f64 = 0.03;
 
 /// Cost and benefit of levels that are drawn.
 pub(crate) struct Worth<'a> {
@@ -53,16 +58,22 @@ impl TwoFrames<'_> {
     /// Keeps levels of the frame before where that is worth more.
     pub fn keep_levels(&self, worth: &Worth<'_>, levels: &mut [LevelDemand], promise: &mut Promise) {
         let mut parts = self.parts(worth, levels);
-        let mut spare_s = promise.budget_s - (promise.predicted_s - self.query.fixed_s);
-        let mut order: Vec<usize> = (0..parts.len()).filter(|at| parts[*at].is_worth_more()).collect();
-        order.sort_by(|a, b| parts[*b].px_a_second().total_cmp(&parts[*a].px_a_second()));
+        parts.iter_mut().for_each(|part| part.stays = part.is_worth_more());
+        let spare_s = promise.budget_s - (promise.predicted_s - self.query.fixed_s);
+        let more_s: f64 = parts.iter().filter(|part| part.stays).map(|part| part.more_s).sum();
+        let (mut lacking_s, room_s) = (more_s - spare_s.max(0.0), ROOM * promise.budget_s);
+        let mut order: Vec<usize> = (0..parts.len()).filter(|at| parts[*at].saves_turned()).collect();
+        order.sort_by(|a, b| parts[*a].px_a_second().total_cmp(&parts[*b].px_a_second()));
         for at in order {
             let part = &mut parts[at];
-            if part.more_s > spare_s.max(0.0) {
-                continue;
+            let saved_s = part.more_s.abs();
+            // no rise waits for the room that takes more than all of it
+            if lacking_s > if part.stays || saved_s > room_s { 0.0 } else { -room_s } {
+                part.stays = !part.stays;
+                lacking_s -= saved_s;
             }
-            part.stays = true;
-            spare_s -= part.more_s;
+        }
+        for part in parts.iter().filter(|part| part.stays) {
             promise.predicted_s += part.more_s;
             promise.value += worth.parts * part.more_px;
             // members of a closed group are no holes
@@ -122,7 +133,13 @@ impl Part {
         !self.is_new && self.changes_px > 0.0 && self.changes_px + self.more_px > 0.0
     }
 
+    /// Whether it takes less time the other way round: not to stay, or to stay.
+    fn saves_turned(&self) -> bool {
+        !self.is_new && if self.stays { self.more_s > 0.0 } else { self.more_s < 0.0 }
+    }
+
+    /// What that loses, for a second that it saves.
     fn px_a_second(&self) -> f64 {
-        (self.changes_px + self.more_px) / self.more_s.max(0.0)
+        (self.changes_px + self.more_px) / self.more_s
     }
 }

@@ -11,7 +11,7 @@ use super::numeric::metrics::Row;
 use crate::chart::{Axis, Colour, Layer, Panel};
 use metachron_lod::control::Policy;
 use metachron_scene::papers::{Choices, Paper};
-pub(super) use row::table;
+pub(super) use row::{of_frames, table};
 pub(super) use walk::{Shown, Times};
 
 /// A scene, its frames, and the ratio of full detail's time to the target.

@@ -7,7 +7,7 @@ use crate::chart::{Table, table};
 use metachron_session::FrameRecord;
 
 /// The numbers of every frame in a text of a row, of those separated by `/` the one at `place`, with the frame's own.
-pub(super) fn of_frames(text: &str, place: usize) -> impl Iterator<Item = (f64, f64)> {
+pub(in super::super) fn of_frames(text: &str, place: usize) -> impl Iterator<Item = (f64, f64)> {
     let numbered = text.split(' ').enumerate();
     numbered.filter_map(move |(frame, numbers)| Some((frame as f64, numbers.split('/').nth(place)?.parse().ok()?)))
 }
