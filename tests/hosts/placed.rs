@@ -110,7 +110,8 @@ fn a_pinned_object_is_on_its_host() {
     let wrong = run(&scene, "1", &["--hosts", &both, "--host-of", "ball5=lab3"]);
     let said = String::from_utf8_lossy(&wrong.stderr).into_owned();
     assert!(
-        wrong.status.code() == Some(2) && said.contains("ball5=lab3: expected one of the hosts bench, lab2"),
+        wrong.status.code() == Some(2)
+            && said.contains("object \"ball5\" is \"lab3\": expected one of the hosts bench, lab2"),
         "{said}"
     );
 }
@@ -162,7 +163,7 @@ fn hosts_that_cannot_be_are_told_in_a_sentence() {
     let serves = Waiting::named("bench");
     let twice = format!("{},{}", serves.wish, serves.wish);
     for (wish, what) in [
-        (&*twice, "\"bench\" or its endpoint is empty or there twice"),
+        (&*twice, "\"bench\" is empty or there twice"),
         ("bench=tcp/127.0.0.1:9", "Unable to connect"),
         ("a=b", "is no endpoint"),
     ] {

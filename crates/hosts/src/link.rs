@@ -110,10 +110,10 @@ impl Link {
 
     /// Calls the host, and waits for all that it answers.
     fn call(&self, call: Call) -> Result<Vec<Reply>, WorldError> {
+        let (asked, silences) = (Instant::now(), self.mirror.silences());
         if let Some(silent) = self.mirror.silence() {
             return Err(silent);
         }
-        let (asked, silences) = (Instant::now(), self.mirror.silences());
         let answers =
             self.send(call, |get| get.timeout(ANSWER_WITHIN).consolidation(ConsolidationMode::None).wait())?;
         let mut replies = Vec::new();

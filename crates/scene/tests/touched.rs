@@ -1,6 +1,6 @@
 //! A solid of a scene file whose cells are halved where something touches it, in a running world.
 
-use metachron_core::SimSpan;
+use metachron_core::{Body, SimSpan};
 use metachron_scene::{Source, load};
 use metachron_world::kinds::ExecutorKind;
 use metachron_world::{Scene, World};
@@ -65,4 +65,25 @@ fn an_eps_where_it_is_touched_is_refused_without_a_cage_and_out_of_its_range() {
         let said = scene(keys).expect_err("must be refused");
         assert!(said.contains(words), "{words:?} is not said: {said}");
     }
+}
+
+/// How high a soft block that lies on a floor ends up, metres.
+fn height_m(keys: &str) -> f64 {
+    let text = format!(
+        "format = 1\n\
+         object = [ {{ name = 'floor', model = 'rigid', shape = 'plane' }}, {{ name = 'block', model = 'solid', shape = 'box', \
+         size_m = [0.2, 0.2, 0.1], position_m = [0, 0, 0.001], {keys}, young_pa = 1e4, damping_per_s = 5, damping_s = 0.01, rate_hz = 60 }} ]"
+    );
+    let scene = load(&Source::memory("lies", text.as_bytes()).unwrap(), &[]).unwrap();
+    let world = World::start(&scene, ExecutorKind::Lockstep).unwrap();
+    world.advance(SimSpan::from_millis(3000));
+    let state = world.latest(world.object("block").unwrap()).unwrap();
+    let Body::Soft(soft) = &state.body else { panic!("it is soft") };
+    soft.positions.iter().map(|at| at.z).fold(0.0, f64::max)
+}
+
+#[test]
+fn a_block_whose_cells_are_halved_along_its_bottom_lies_as_high_as_one_of_fine_cells() {
+    let [fine, halved] = ["eps_m = 0.025", "eps_m = 0.05, eps_touched_m = 0.03"].map(height_m);
+    assert!((fine - halved).abs() < 5e-4, "{fine} and {halved} m");
 }

@@ -42,7 +42,18 @@ pub(in super::super) fn place(args: &RunArgs, request: &mut Request) -> anyhow::
     }
     let wishes: Vec<HostWish<'_>> = args.hosts.iter().map(|host| HostWish::of(host)).collect();
     let names: Vec<&str> = wishes.iter().map(|wish| wish.name).collect();
-    let refuse = |object: &str, host: &str, expected: &str| BadInput(format!("{object}={host}: expected {expected}"));
+    let mut endpoints = BTreeSet::new();
+    for (number, HostWish { name, endpoint }) in wishes.iter().enumerate() {
+        if name.is_empty() || names[..number].contains(name) {
+            return Err(BadInput(format!("--hosts: \"{name}\" is empty or there twice")).into());
+        }
+        if !endpoints.insert(endpoint) {
+            return Err(BadInput(format!("--hosts: \"{name}\" is at {endpoint}, and another host too")).into());
+        }
+    }
+    let refuse = |object: &str, host: &str, expected: &str| {
+        BadInput(format!("the host of object \"{object}\" is \"{host}\": expected {expected}"))
+    };
     for Pin { object, host } in &args.host_of {
         let pinned = request.scene.agents.iter_mut().find(|agent| agent.name == *object);
         let expected = "an object that moves, by its name in the scene";
@@ -55,14 +66,7 @@ pub(in super::super) fn place(args: &RunArgs, request: &mut Request) -> anyhow::
         return Err(refuse(&agent.name, host, &expected).into());
     }
     let files = scene_files(&request.source, &request.overrides)?;
-    let mut endpoints = BTreeSet::new();
     for HostWish { name, endpoint } in wishes {
-        if name.is_empty()
-            || request.hosts.iter().any(|known| known.name == name)
-            || !endpoints.insert(endpoint.clone())
-        {
-            return Err(BadInput(format!("--hosts: \"{name}\" or its endpoint is empty or there twice")).into());
-        }
         let world = Arc::new(begun(&endpoint, &args.call, &files, request.scene.mark())?);
         request.hosts.push(PlacedHost { name: name.to_owned(), world });
     }

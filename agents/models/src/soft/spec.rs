@@ -329,12 +329,21 @@ impl SoftShape {
 const SKIN_LATTICE_MAX: u64 = 1_000_000;
 
 impl SoftSpec {
+    /// The length of the finest cells that a cage may have, metres, of its ε, finest and coarsest, and what longer ones are halved: its skin is as
+    /// fine, as a contact on a coarser one would press on some of the nodes under it alone.
+    #[must_use]
+    pub fn finest_m(range_m: (f64, f64), eps_touched_m: Option<f64>) -> f64 {
+        let halved_m = eps_touched_m.filter(|longest_m| *longest_m < range_m.1);
+        halved_m.map_or(range_m.0, |longest_m| range_m.0.min(0.5 * longest_m.max(range_m.0)))
+    }
+
     /// The same body with nodes that are spaced by its ε, finest and coarsest, metres, instead of by the cells of its lattice: it begins with the
-    /// finest, and its skin is as fine as that. A box or ball becomes the inside of its skin. `None` where the finest is too fine for its
+    /// finest, and its skin is as fine as its finest cells. A box or ball becomes the inside of its skin. `None` where the finest is too fine for its
     /// size; other shapes stay as they are.
     #[must_use]
     pub fn spaced(self, range_m: (f64, f64)) -> Option<Self> {
-        let fitted = |size: f64| SEGMENTS.nearest((size / range_m.0).ceil()) as u32;
+        let finest_m = Self::finest_m(range_m, self.eps_touched_m);
+        let fitted = |size: f64| SEGMENTS.nearest((size / finest_m).ceil()) as u32;
         let lattice = match &self.shape {
             SoftShape::Sheet { .. } | SoftShape::Rope { .. } => {
                 let most = |shape: &SoftShape| match *shape {

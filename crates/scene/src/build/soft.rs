@@ -149,11 +149,13 @@ fn solid_shape(
         }
         let (surface, range_m) = (closed_surface(c, file, context)?, eps_m?);
         // a surface between its points bends with the cage, and would go through bodies that its points alone touch
-        let surface = subdivided(&surface, CELL_DIAGONAL * range_m.0, SKIN_TRIANGLES_MAX);
+        let finest_m = SoftSpec::finest_m(range_m, file.eps_touched_m);
+        let surface = subdivided(&surface, CELL_DIAGONAL * finest_m, SKIN_TRIANGLES_MAX);
         return Some(SoftShape::Embedded { surface: Arc::new(surface), eps_m: range_m.0, range_m });
     }
-    // so is the skin of a box or ball with an ε as fine as its finest cage
-    let fitted = |size: f64| eps_m.map(|range| (size / range.0).ceil().clamp(1.0, 2047.0) as u32);
+    // so is the skin of a box or ball with an ε as fine as its finest cells
+    let finest_m = eps_m.map(|range| SoftSpec::finest_m(range, file.eps_touched_m));
+    let fitted = |size: f64| finest_m.map(|finest_m| (size / finest_m).ceil().clamp(1.0, 2047.0) as u32);
     let lattice = if file.shape == SoftShapeKind::Box {
         let size = file.size_m?;
         let segments = file.segments.or_else(|| Some([fitted(size[0])?, fitted(size[1])?, fitted(size[2])?]))?;

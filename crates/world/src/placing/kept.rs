@@ -159,7 +159,8 @@ impl PlacedWorld {
             }
             let has_states = !placing.kept.packs.is_empty() || placing.seen.owners.is_empty();
             if !has_states || !self.await_any(placing) {
-                return Err(lost.unwrap_or_else(|| self.silent()));
+                self.show(&placing.seen);
+                return Err(lost.filter(|_| !placing.living().is_empty()).unwrap_or_else(|| self.silent()));
             }
             fault = self.try_back(placing).err();
         }
@@ -256,7 +257,7 @@ impl PlacedWorld {
         }
         let first = *placing.living().first().ok_or_else(|| self.silent())?;
         placing.seen.owners = Placing::of(&self.hosts[first..=first], checkpoint.time(), &self.rates_hz)?.seen.owners;
-        placing.seen.time = checkpoint.time();
+        (placing.seen.time, placing.escaped) = (checkpoint.time(), checkpoint.time());
         let objects = placing.objects();
         placing.give(&objects, first);
         Ok(self.begin(placing)?)

@@ -11,7 +11,7 @@ use glam::DVec3;
 pub struct Halving<'a> {
     /// The cells of these points at rest and their neighbours are halved, metres.
     pub about_m: &'a [DVec3],
-    /// As far as they are longer than this, metres.
+    /// Only if they are longer than this, metres.
     pub longer_than_m: f64,
 }
 
@@ -39,7 +39,8 @@ impl CageCell {
 impl Cage {
     /// The places of whole cells that are `halving`, in rising order.
     pub(super) fn places_of(&self, halving: Halving<'_>) -> Vec<usize> {
-        if self.cell_m.max_element() <= halving.longer_than_m {
+        // by more than rounding
+        if self.cell_m.max_element() * (1.0 - 1e-9) <= halving.longer_than_m {
             return vec![];
         }
         let mut places = vec![];
