@@ -126,8 +126,8 @@ impl PlacedWorld {
         self.take_back(placing, &moment);
         let living = placing.living();
         let mut kept = Kept { time: placing.seen.time, moment, ..Kept::default() };
-        // without another host they could not go on
-        if living.len() > 1 {
+        // where there is one host they could not go on without it; of several a lost one may come back
+        if self.hosts.len() > 1 {
             let reaches: Vec<Reach> = placing.reaches.iter().flatten().copied().collect();
             let groups = groups(&placing.objects(), &reaches, &self.ties_of(placing));
             for host in living {
