@@ -39,6 +39,19 @@ fn two_ends(executor: ExecutorKind) -> (World, Host, RemoteWorld) {
     (here, host, elsewhere)
 }
 
+/// A world in lockstep at the free pace: one that hosts step together has its states.
+fn in_lockstep(scene: &Scene) -> World {
+    let world = World::start(scene, ExecutorKind::Lockstep).unwrap();
+    world.set_pace(Pace::Free).unwrap();
+    world
+}
+
+/// Two hosts of worlds of a scene, with their endpoints.
+fn two_hosts(scene: &Scene) -> [(Host, String); 2] {
+    [free_endpoint(), free_endpoint()]
+        .map(|endpoint| (serve(Arc::new(in_lockstep(scene)), Serving::new("bench", &endpoint)).unwrap(), endpoint))
+}
+
 fn until(mut holds: impl FnMut() -> bool, what: &str) {
     let begun = Instant::now();
     while !holds() {
@@ -322,20 +335,14 @@ fn two_hosts_over_links_of_20_ms_have_the_bits_of_one_process() {
         scene.add(format!("ball {number}"), ball)
     };
     let scene = (0..6).fold(Scene::builder().fixed("floor", Solid::Plane), ball).build().unwrap();
-    let world = || {
-        let world = World::start(&scene, ExecutorKind::Lockstep).unwrap();
-        world.set_pace(Pace::Free).unwrap();
-        world
-    };
     let link = Arc::new(BadLink { delay: Duration::from_millis(20), ..BadLink::default() });
-    let served = [free_endpoint(), free_endpoint()]
-        .map(|endpoint| (serve(Arc::new(world()), Serving::new("bench", &endpoint)).unwrap(), endpoint));
+    let served = two_hosts(&scene);
     let host = |(_, endpoint): &(Host, String)| {
         let world = Arc::new(connect(&link.to(endpoint)).unwrap());
         PlacedHost { name: endpoint.clone(), world }
     };
     let placed = PlacedWorld::start(&scene, served.iter().map(host).collect()).unwrap();
-    let (whole, half) = (world(), SimSpan::from_millis(500));
+    let (whole, half) = (in_lockstep(&scene), SimSpan::from_millis(500));
     for _ in 0..2 {
         let begun = Instant::now();
         placed.advance(half).unwrap();
@@ -388,19 +395,13 @@ fn objects_that_fill_more_than_a_message_change_hosts() {
         scene.add(format!("ballast {number}"), ballast.rate_hz(60.0))
     };
     let scene = (0..420).fold(Scene::builder(), add).build().unwrap();
-    let world = || {
-        let world = World::start(&scene, ExecutorKind::Lockstep).unwrap();
-        world.set_pace(Pace::Free).unwrap();
-        world
-    };
-    let served = [free_endpoint(), free_endpoint()]
-        .map(|endpoint| (serve(Arc::new(world()), Serving::new("bench", &endpoint)).unwrap(), endpoint));
+    let served = two_hosts(&scene);
     let host = |(_, endpoint): &(Host, String)| PlacedHost {
         name: endpoint.clone(),
         world: Arc::new(connect(endpoint).unwrap()),
     };
     let placed = PlacedWorld::start(&scene, served.iter().map(host).collect()).unwrap();
-    let whole = world();
+    let whole = in_lockstep(&scene);
     placed.advance(SimSpan::from_millis(100)).unwrap();
     whole.advance(SimSpan::from_millis(100));
     assert_eq!(placed.hash().unwrap(), whole.hash(), "{:?}", placed.loads());

@@ -58,6 +58,24 @@ fn run(scene: &str, seconds: &str, more: &[&str]) -> Output {
     process.args(["run", scene, "--seconds", seconds]).args(FREE).args(more).output().unwrap()
 }
 
+/// A run that lasts as long as the time that passes in it.
+fn beside_the_clock(scene: &str, seconds: &str, hosts: &str) -> Child {
+    let mut process = Command::new(cargo_bin("metachron"));
+    process.args(["run", scene, "--seconds", seconds, "--headless", "--report", "-", "-q", "--hosts", hosts]);
+    process.stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap()
+}
+
+/// Stops a process in three seconds, for longer than a link lasts.
+#[cfg(unix)]
+fn suspend(process: u32) {
+    use nix::sys::signal::{Signal, kill};
+    let send = |signal: Signal| kill(nix::unistd::Pid::from_raw(process as i32), signal).unwrap();
+    thread::sleep(Duration::from_millis(3000));
+    send(Signal::SIGSTOP);
+    thread::sleep(Duration::from_millis(3500));
+    send(Signal::SIGCONT);
+}
+
 fn report(output: &Output) -> serde_json::Value {
     serde_json::from_slice(&output.stdout)
         .unwrap_or_else(|_| panic!("no report: {}", String::from_utf8_lossy(&output.stderr)))
@@ -123,10 +141,7 @@ fn a_host_that_is_killed_loses_nothing() {
     let whole = report(&run(&scene, "4", &["--executor", "lockstep"]));
     let (stays, mut dies) = (Waiting::named("bench"), Waiting::named("lab2"));
     let both = format!("{},{}", stays.wish, dies.wish);
-    // beside the clock it lasts four seconds
-    let mut process = Command::new(cargo_bin("metachron"));
-    process.args(["run", &scene, "--seconds", "4", "--headless", "--report", "-", "-q", "--hosts", &both]);
-    let process = process.stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap();
+    let process = beside_the_clock(&scene, "4", &both);
     thread::sleep(Duration::from_millis(3000));
     dies.process.kill().unwrap();
     let placed = report(&process.wait_with_output().unwrap());
@@ -139,20 +154,13 @@ fn a_host_that_is_killed_loses_nothing() {
 #[test]
 #[cfg(unix)]
 fn a_run_that_is_suspended_goes_on_with_its_hosts() {
-    use nix::sys::signal::{Signal, kill};
     let folder = tempfile::tempdir().unwrap();
     let scene = balls(folder.path());
     let whole = report(&run(&scene, "4", &["--executor", "lockstep"]));
     let hosts = ["bench", "lab2"].map(Waiting::named);
     let both = format!("{},{}", hosts[0].wish, hosts[1].wish);
-    let mut process = Command::new(cargo_bin("metachron"));
-    process.args(["run", &scene, "--seconds", "4", "--headless", "--report", "-", "-q", "--hosts", &both]);
-    let process = process.stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap();
-    let send = |signal: Signal| kill(nix::unistd::Pid::from_raw(process.id() as i32), signal).unwrap();
-    thread::sleep(Duration::from_millis(3000));
-    send(Signal::SIGSTOP);
-    thread::sleep(Duration::from_millis(3500));
-    send(Signal::SIGCONT);
+    let process = beside_the_clock(&scene, "4", &both);
+    suspend(process.id());
     let placed = report(&process.wait_with_output().unwrap());
     assert_eq!(placed["state_hash"], whole["state_hash"], "{}", placed["hosts"]);
     assert!(placed["hosts"].as_array().unwrap().iter().any(|host| host["lost"].is_null()), "{}", placed["hosts"]);
@@ -176,20 +184,13 @@ fn hosts_that_cannot_be_are_told_in_a_sentence() {
 #[test]
 #[cfg(unix)]
 fn a_host_that_comes_back_late_is_told_and_steps_again() {
-    use nix::sys::signal::{Signal, kill};
     let folder = tempfile::tempdir().unwrap();
     let scene = balls(folder.path());
     let whole = report(&run(&scene, "8", &["--executor", "lockstep"]));
     let (stays, sleeps) = (Waiting::named("bench"), Waiting::named("lab2"));
     let both = format!("{},{}", stays.wish, sleeps.wish);
-    let mut process = Command::new(cargo_bin("metachron"));
-    process.args(["run", &scene, "--seconds", "8", "--headless", "--report", "-", "-q", "--hosts", &both]);
-    let process = process.stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap();
-    let send = |signal: Signal| kill(nix::unistd::Pid::from_raw(sleeps.process.id() as i32), signal).unwrap();
-    thread::sleep(Duration::from_millis(3000));
-    send(Signal::SIGSTOP);
-    thread::sleep(Duration::from_millis(3500));
-    send(Signal::SIGCONT);
+    let process = beside_the_clock(&scene, "8", &both);
+    suspend(sleeps.process.id());
     let placed = report(&process.wait_with_output().unwrap());
     assert_eq!(placed["state_hash"], whole["state_hash"], "{}", placed["hosts"]);
     let [first, second] = [0, 1].map(|host| &placed["hosts"][host]);

@@ -39,10 +39,6 @@ impl Touches {
         self.lately.retain(|touched| touched.ago_s < HALVED_S);
         self.divided_s += h_s;
     }
-
-    fn places_m(&self) -> Vec<DVec3> {
-        self.lately.iter().map(|touched| touched.at_m).collect()
-    }
 }
 
 impl SoftBody {
@@ -79,12 +75,12 @@ impl SoftBody {
 
     /// Halves cells where it is touched, and makes those whole again that were not for a while; nothing where cells were removed.
     pub(super) fn divide_where_touched(&mut self) {
-        let Some(skin) = self.skin.as_ref().filter(|_| self.spec.eps_touched_m.is_some() && self.gone.is_empty())
-        else {
+        let may_change = self.spec.eps_touched_m.is_some() && self.gone.is_empty();
+        let Some(skin) = self.skin.as_ref().filter(|_| may_change && self.touches.divided_s >= DIVIDED_S) else {
             return;
         };
-        let halved_m = self.touches.places_m();
-        if self.touches.divided_s < DIVIDED_S || skin.carrier.is_as_wanted(&self.spec, self.eps_m, &halved_m) {
+        let halved_m: Vec<DVec3> = self.touches.lately.iter().map(|touched| touched.at_m).collect();
+        if skin.carrier.is_as_wanted(&self.spec, self.eps_m, &halved_m) {
             return;
         }
         self.touches.divided_s = 0.0;

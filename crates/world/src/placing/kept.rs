@@ -170,10 +170,9 @@ impl PlacedWorld {
     /// Waits for a host that answers where none does: one process that stood still for a while has lost all of them, and they live. Whether there
     /// is one.
     fn await_any(&self, placing: &mut Placing) -> bool {
-        let begun = Instant::now();
+        let (begun, moment) = (Instant::now(), placing.kept.moment.clone());
         while placing.living().is_empty() && begun.elapsed() < BACK_WITHIN {
             wait_until(&SystemClock::new(), BACK_EVERY);
-            let moment = placing.kept.moment.clone();
             self.take_back(placing, &moment);
         }
         !placing.living().is_empty()

@@ -138,7 +138,7 @@ impl Part {
         !self.is_new && if self.stays { self.more_s > 0.0 } else { self.more_s < 0.0 }
     }
 
-    /// What that loses, for a second that it saves.
+    /// The pixels that this loses, for each second that it saves.
     fn px_a_second(&self) -> f64 {
         (self.changes_px + self.more_px) / self.more_s
     }

@@ -19,7 +19,7 @@ const POLICIES: [Policy; 2] = [Policy::Adaptive, Policy::Hierarchical];
 const FRAMES: [usize; 2] = [150, 10];
 /// Ratios of the mean time of full detail to the target.
 const TIMES_OVER: [f64; 3] = [100.0, 200.0, 400.0];
-/// One that no cut keeps: everything is in its lowest form, whatever the policy.
+/// A ratio that no cut keeps: everything is in its lowest form, whatever the policy.
 const CHEAPEST: f64 = 1e4;
 /// The levels of every wood, with the line of its table in the scene file.
 const LEVELS: [(&str, &str); 4] =
