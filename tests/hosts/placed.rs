@@ -95,6 +95,10 @@ fn a_scene_has_the_same_bits_on_one_and_two_hosts_and_in_one_process() {
         assert_eq!(placed["sim_s"], whole["sim_s"]);
         let agents: u64 = placed["hosts"].as_array().unwrap().iter().map(|host| host["agents"].as_u64().unwrap()).sum();
         assert_eq!(agents, 12);
+        let steps = |report: &serde_json::Value| -> Vec<_> {
+            report["agents"].as_array().unwrap().iter().map(|agent| agent["steps"].clone()).collect()
+        };
+        assert_eq!(steps(&placed), steps(&whole));
     }
 }
 

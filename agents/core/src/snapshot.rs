@@ -14,7 +14,7 @@ pub struct Snapshot {
     pub time: SimTime,
     /// Delay of its time behind the scene's, written likewise: an agent that cannot keep up with its neighbours continues delayed.
     pub clock_offset: SimSpan,
-    /// Number of steps so far.
+    /// Number of its steps so far, written likewise; steps that a cluster divides further count once.
     pub steps: u64,
     /// The resolution that the simulation runs at; `None` for a model that has none.
     pub resolution: Option<Resolution>,

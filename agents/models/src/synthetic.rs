@@ -70,7 +70,6 @@ pub struct Synthetic {
     range: ResolutionRange,
     resolution: Resolution,
     does_work: bool,
-    steps: u64,
     sink: u64,
 }
 
@@ -100,7 +99,7 @@ impl Synthetic {
         if !(finest_m > 0.0 && finest_m <= coarsest_m && coarsest_m.is_finite()) {
             return Err(SyntheticError::BadRange { finest_m, coarsest_m });
         }
-        Ok(Self { spec, range, resolution: range.clamp(start), does_work: true, steps: 0, sink: 0 })
+        Ok(Self { spec, range, resolution: range.clamp(start), does_work: true, sink: 0 })
     }
 
     /// The same agent, declaring its cost without burning it: for lockstep, where only declared costs matter.
@@ -153,7 +152,6 @@ impl Agent for Synthetic {
     }
 
     fn write_snapshot(&self, into: &mut Snapshot) {
-        into.steps = self.steps;
         into.resolution = Some(self.resolution);
         into.body = Body::Nothing;
         into.energy_j = 0.0;
@@ -163,7 +161,7 @@ impl Agent for Synthetic {
     }
 
     fn archive(&mut self, archive: &mut Archive<'_>) -> Result<(), ArchiveError> {
-        archive_values!(archive, self.resolution, self.steps, self.sink)
+        archive_values!(archive, self.resolution, self.sink)
     }
 }
 
@@ -174,7 +172,6 @@ impl OwnSteps for Synthetic {
         if self.does_work {
             self.do_work();
         }
-        self.steps += 1;
         Ok(StepReport { work: self.cost_us(), substeps: 1, at_rest: false })
     }
 }

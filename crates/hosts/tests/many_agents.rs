@@ -23,7 +23,6 @@ const AGENTS: &str = "METACHRON_AGENTS";
 
 /// An agent that touches nothing: its step is some hundred multiplications.
 struct Mill {
-    steps: u64,
     sum: f64,
 }
 
@@ -37,18 +36,16 @@ impl Agent for Mill {
     }
 
     fn write_snapshot(&self, into: &mut Snapshot) {
-        (into.energy_j, into.steps) = (self.sum, self.steps);
+        into.energy_j = self.sum;
     }
 
     fn archive(&mut self, archive: &mut Archive<'_>) -> Result<(), ArchiveError> {
-        archive.value(&mut self.steps)?;
         archive.value(&mut self.sum)
     }
 }
 
 impl OwnSteps for Mill {
     fn step(&mut self, dt: SimSpan, _context: &StepContext<'_>) -> Result<StepReport, StepError> {
-        self.steps += 1;
         self.sum = (0..400).fold(self.sum + dt.as_secs_f64(), |sum, _| sum.mul_add(0.999, 1e-3));
         Ok(StepReport { work: 1.0, substeps: 1, at_rest: false })
     }
@@ -60,7 +57,7 @@ fn count() -> usize {
 
 fn scene() -> Scene {
     let add = |scene: metachron_world::SceneBuilder, number: usize| {
-        scene.add(format!("mill {number}"), Custom::made_by(|_| Box::new(Mill { steps: 0, sum: 0.0 })).rate_hz(60.0))
+        scene.add(format!("mill {number}"), Custom::made_by(|_| Box::new(Mill { sum: 0.0 })).rate_hz(60.0))
     };
     (0..count()).fold(Scene::builder(), add).build().unwrap()
 }

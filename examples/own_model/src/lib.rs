@@ -40,12 +40,11 @@ impl Hull {
     }
 }
 
-/// Height of its middle, metres, how fast that rises, m/s, and steps so far.
+/// Height of its middle, metres, and how fast that rises, m/s.
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct State {
     height_m: f64,
     velocity_m_s: f64,
-    steps: u64,
 }
 
 /// The pontoon.
@@ -70,7 +69,7 @@ impl Pontoon {
     /// A size that is no box's.
     pub fn new(hull: Hull) -> Result<Self, Box<dyn std::error::Error>> {
         let solid = SolidShape::new(Solid::Box { half_extents_m: hull.half_m }, DVec3::ZERO)?;
-        let now = State { height_m: hull.half_m.z - hull.draught_m(0.0), velocity_m_s: 0.0, steps: 0 };
+        let now = State { height_m: hull.half_m.z - hull.draught_m(0.0), velocity_m_s: 0.0 };
         Ok(Self {
             hull,
             form: Arc::new(CollisionShape::new(ShapeKind::Solid(solid), 0.5)),
@@ -149,14 +148,14 @@ impl ClusterMember for Pontoon {
     }
 
     fn end(&mut self, &StepEnd { v, h_s, .. }: &StepEnd<'_>) -> Result<(), StepError> {
-        let State { height_m, steps, .. } = self.now;
+        let State { height_m, .. } = self.now;
         let velocity_m_s = v[0].z;
         let height_m = height_m + velocity_m_s * h_s;
         if !height_m.is_finite() {
             let what = format!("its height is {height_m} m");
             return Err(StepError::Diverged { model: "pontoon", dt_s: h_s, what });
         }
-        self.take(State { height_m, velocity_m_s, steps: steps + 1 });
+        self.take(State { height_m, velocity_m_s });
         Ok(())
     }
 
@@ -187,7 +186,6 @@ impl Agent for Pontoon {
     fn write_snapshot(&self, into: &mut Snapshot) {
         let (position, velocity) = (self.middle(), self.velocity[0]);
         into.clear();
-        into.steps = self.now.steps;
         into.body = Body::Rigid(RigidState { position, velocity, ..RigidState::default() });
         let Hull { half_m, mass_kg, .. } = self.hull;
         // where others may meet it: they look for nothing that has no bounds
@@ -199,7 +197,7 @@ impl Agent for Pontoon {
     }
 
     fn archive(&mut self, archive: &mut Archive<'_>) -> Result<(), ArchiveError> {
-        archive_values!(archive, self.now.height_m, self.now.velocity_m_s, self.now.steps)?;
+        archive_values!(archive, self.now.height_m, self.now.velocity_m_s)?;
         self.take(self.now);
         Ok(())
     }

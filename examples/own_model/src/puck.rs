@@ -15,9 +15,10 @@ use std::sync::Arc;
 pub struct Puck {
     half_m: f64,
     form: Arc<CollisionShape>,
-    /// Its place, metres, and steps so far.
-    now: (DVec3, u64),
-    kept: (DVec3, u64, DVec3),
+    /// Its place, metres.
+    at_m: DVec3,
+    /// Its place and velocity when they were last kept.
+    kept: [DVec3; 2],
     mass: [Block; 1],
     free: [DVec3; 1],
     velocity: [DVec3; 1],
@@ -33,7 +34,7 @@ impl Puck {
         let form = Arc::new(CollisionShape::new(ShapeKind::Solid(solid), 0.5));
         let mass = [Block { row: 0, column: 0, value: DMat3::from_diagonal(DVec3::splat(mass_kg)) }];
         let (free, velocity) = ([DVec3::ZERO], [DVec3::ZERO]);
-        Ok(Self { half_m, form, now: (at_m, 0), kept: (at_m, 0, DVec3::ZERO), mass, free, velocity })
+        Ok(Self { half_m, form, at_m, kept: [at_m, DVec3::ZERO], mass, free, velocity })
     }
 }
 
@@ -52,7 +53,7 @@ impl ClusterMember for Puck {
     }
 
     fn skin(&self) -> Option<PlacedShape<'_>> {
-        let view = ShapePose::Solid { position: self.now.0, rotation: DQuat::IDENTITY };
+        let view = ShapePose::Solid { position: self.at_m, rotation: DQuat::IDENTITY };
         Some(PlacedShape { form: &self.form, view })
     }
 
@@ -61,20 +62,20 @@ impl ClusterMember for Puck {
     }
 
     fn end(&mut self, step: &StepEnd<'_>) -> Result<(), StepError> {
-        let (at_m, steps) = (self.now.0 + step.v[0] * step.h_s, self.now.1 + 1);
+        let at_m = self.at_m + step.v[0] * step.h_s;
         if !at_m.is_finite() {
             return Err(StepError::Diverged { model: "puck", dt_s: step.h_s, what: format!("it is at {at_m} m") });
         }
-        (self.now, self.velocity) = ((at_m, steps), [step.v[0]]);
+        (self.at_m, self.velocity) = (at_m, [step.v[0]]);
         Ok(())
     }
 
     fn keep(&mut self) {
-        self.kept = (self.now.0, self.now.1, self.velocity[0]);
+        self.kept = [self.at_m, self.velocity[0]];
     }
 
     fn go_back(&mut self) {
-        (self.now, self.velocity) = ((self.kept.0, self.kept.1), [self.kept.2]);
+        (self.at_m, self.velocity) = (self.kept[0], [self.kept[1]]);
     }
 }
 
@@ -88,9 +89,8 @@ impl Agent for Puck {
     }
 
     fn write_snapshot(&self, into: &mut Snapshot) {
-        let ((position, steps), velocity, half_m) = (self.now, self.velocity[0], DVec3::splat(self.half_m));
+        let (position, velocity, half_m) = (self.at_m, self.velocity[0], DVec3::splat(self.half_m));
         into.clear();
-        into.steps = steps;
         into.body = Body::Rigid(RigidState { position, velocity, ..RigidState::default() });
         into.bounds = Some(Bounds { low: position - half_m, high: position + half_m, speed_m_s: velocity.length() });
         into.energy_j = self.mass_kg() * (0.5 * velocity.length_squared() + 9.81 * position.z);
@@ -98,7 +98,7 @@ impl Agent for Puck {
 
     fn momentum(&self) -> (DVec3, DVec3) {
         let linear = self.velocity[0] * self.mass_kg();
-        (linear, self.now.0.cross(linear))
+        (linear, self.at_m.cross(linear))
     }
 
     fn mass_kg(&self) -> f64 {

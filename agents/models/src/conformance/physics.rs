@@ -11,19 +11,14 @@ const ROUNDING: f64 = 1e-12;
 /// Factor by which a finer resolution may leave a larger residual.
 const RESIDUAL_SLACK: f64 = 1.1;
 
-/// Steps of any length, also mixed, reach the closed form at the sum of their lengths; each is counted once.
+/// Steps of any length, also mixed, reach the closed form at the sum of their lengths.
 pub(super) fn exact_time(suite: &Suite<'_>) -> Result<(), String> {
     let nanos = suite.dt.as_nanos();
     let mixed = [nanos, nanos / 3, nanos * 2, nanos / 7].map(|n| SimSpan::from_nanos(n.max(1)));
     for spans in [&[suite.dt][..], &mixed[..]] {
         let mut run = suite.start();
-        let steps_before = run.snapshot().steps;
         for i in 0..suite.steps {
             run.must_step(spans[i as usize % spans.len()], &[])?;
-        }
-        let counted = run.snapshot().steps - steps_before;
-        if counted != u64::from(suite.steps) {
-            return Err(format!("{} steps were made, the snapshot counts {counted}", suite.steps));
         }
         if let Some((deviation, allowed)) = suite.closed_form {
             let wrong = deviation(run.agent.as_ref(), run.time.as_secs_f64());

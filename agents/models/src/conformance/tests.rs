@@ -16,7 +16,6 @@ struct Row {
     breaks: Option<Promise>,
     speed: f64,
     height: f64,
-    steps: u64,
     held: Resolution,
 }
 
@@ -64,7 +63,6 @@ impl Agent for Row {
     }
 
     fn write_snapshot(&self, into: &mut Snapshot) {
-        into.steps = self.steps;
         let wrong = if self.breaks(Promise::Residual) { 1.0 / self.held.eps_m } else { self.held.eps_m };
         into.residual_m = wrong;
         let n = self.points();
@@ -106,7 +104,6 @@ impl OwnSteps for Row {
         let lost = if self.breaks(Promise::ExactTime) { 0.99 } else { 1.0 };
         self.height += self.speed * dt_s + noise;
         self.speed -= G * dt_s * lost;
-        self.steps += 1;
         Ok(StepReport { work: 1.0, substeps: 1, at_rest: false })
     }
 }
@@ -114,7 +111,7 @@ impl OwnSteps for Row {
 fn broken(breaks: Option<Promise>) -> Vec<Promise> {
     let make = || {
         let held = Resolution { eps_m: 0.1, n: 0 };
-        Box::new(Row { breaks, speed: 0.0, height: 3.0, steps: 0, held }) as Box<dyn Agent>
+        Box::new(Row { breaks, speed: 0.0, height: 3.0, held }) as Box<dyn Agent>
     };
     let deviation = |agent: &dyn Agent, t: f64| crate::conformance::fall_deviation(agent, DVec3::Z * -G, t);
     let count = |work: &mut dyn FnMut()| {

@@ -27,7 +27,6 @@ pub struct RigidBody {
     pub(super) angular_acceleration: DVec3,
     pub(super) at_rest: bool,
     pub(super) quiet_s: f64,
-    pub(super) steps: u64,
     /// Its unknowns in a contact cluster.
     pub(super) unknowns: Unknowns,
 }
@@ -70,7 +69,6 @@ impl RigidBody {
             angular_acceleration: DVec3::ZERO,
             at_rest: false,
             quiet_s: 0.0,
-            steps: 0,
             unknowns: Unknowns::default(),
         };
         body.unknowns.start([body.motion.velocity, body.motion.spin(&body.distribution)]);
@@ -152,7 +150,6 @@ impl Agent for RigidBody {
     /// Its estimate of its own error is the rounding of its coordinates.
     fn write_snapshot(&self, into: &mut Snapshot) {
         into.clear();
-        into.steps = self.steps;
         into.resolution = None;
         into.body = Body::Rigid(RigidState {
             position: self.motion.position,
@@ -170,7 +167,7 @@ impl Agent for RigidBody {
 
     fn archive(&mut self, archive: &mut Archive<'_>) -> Result<(), ArchiveError> {
         archive_values!(archive, self.motion, self.acceleration, self.angular_acceleration)?;
-        archive_values!(archive, self.at_rest, self.quiet_s, self.steps)?;
+        archive_values!(archive, self.at_rest, self.quiet_s)?;
         self.unknowns.archive(archive)
     }
 

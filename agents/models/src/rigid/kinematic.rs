@@ -57,7 +57,6 @@ struct Now {
     /// Where the user leads it now.
     goal: Option<PoseGoal>,
     at_rest: bool,
-    steps: u64,
 }
 
 impl KinematicBody {
@@ -78,7 +77,7 @@ impl KinematicBody {
         let (origin, rotation) = start.map_or((spec.position, spec.rotation.normalize()), |at| (at.tip, at.rotation));
         let at = BodyPose { position: origin + rotation * com_local, rotation };
         let (velocity, spin) = (DVec3::ZERO, DVec3::ZERO);
-        let now = Now { time: SimTime::ZERO, at, velocity, spin, goal: None, at_rest: false, steps: 0 };
+        let now = Now { time: SimTime::ZERO, at, velocity, spin, goal: None, at_rest: false };
         let (led_m_s, led_rad_s) = (velocity, spin);
         let (form, may_sleep) = (Arc::new(form), spec.sleep);
         Ok(Self { form, com_local, radius_m, script, may_sleep, now, led_m_s, led_rad_s, to: at, kept: None })
@@ -166,7 +165,7 @@ impl ClusterMember for KinematicBody {
     }
 
     fn end(&mut self, &StepEnd { h_s, .. }: &StepEnd<'_>) -> Result<(), StepError> {
-        let Now { time, goal, steps, .. } = self.now;
+        let Now { time, goal, .. } = self.now;
         self.now = Now {
             time: time + SimSpan::from_secs_f64(h_s).unwrap_or(SimSpan::ZERO),
             at: self.to,
@@ -174,7 +173,6 @@ impl ClusterMember for KinematicBody {
             spin: self.led_rad_s,
             goal: goal.map(|goal| goal.after(h_s)),
             at_rest: false,
-            steps: steps + 1,
         };
         Ok(())
     }
@@ -258,9 +256,8 @@ impl Agent for KinematicBody {
 
     /// Its estimate of its own error is the rounding of its coordinates.
     fn write_snapshot(&self, into: &mut Snapshot) {
-        let Now { at: BodyPose { position, rotation }, velocity, spin, at_rest, steps, .. } = self.now;
+        let Now { at: BodyPose { position, rotation }, velocity, spin, at_rest, .. } = self.now;
         into.clear();
-        into.steps = steps;
         into.resolution = None;
         into.body = Body::Rigid(RigidState { position, rotation, velocity, spin });
         into.inertia = Inertia::Immovable;

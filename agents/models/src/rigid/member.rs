@@ -52,7 +52,6 @@ struct SavedState {
     angular_acceleration: DVec3,
     quiet_s: f64,
     at_rest: bool,
-    steps: u64,
 }
 
 impl Default for Unknowns {
@@ -178,15 +177,15 @@ impl ClusterMember for RigidBody {
     }
 
     fn keep(&mut self) {
-        let Self { motion, acceleration, angular_acceleration, quiet_s, at_rest, steps, .. } = *self;
-        self.unknowns.saved = Some(SavedState { motion, acceleration, angular_acceleration, quiet_s, at_rest, steps });
+        let Self { motion, acceleration, angular_acceleration, quiet_s, at_rest, .. } = *self;
+        self.unknowns.saved = Some(SavedState { motion, acceleration, angular_acceleration, quiet_s, at_rest });
     }
 
     fn go_back(&mut self) {
         let Some(saved) = self.unknowns.saved else { return };
-        let SavedState { motion, acceleration, angular_acceleration, quiet_s, at_rest, steps } = saved;
+        let SavedState { motion, acceleration, angular_acceleration, quiet_s, at_rest } = saved;
         (self.motion, self.acceleration, self.angular_acceleration) = (motion, acceleration, angular_acceleration);
-        (self.quiet_s, self.at_rest, self.steps) = (quiet_s, at_rest, steps);
+        (self.quiet_s, self.at_rest) = (quiet_s, at_rest);
     }
 
     fn end(&mut self, &StepEnd { v, h_s, touched, .. }: &StepEnd<'_>) -> Result<(), StepError> {
@@ -200,7 +199,6 @@ impl ClusterMember for RigidBody {
         self.acceleration = (self.motion.velocity - before.velocity) / h_s;
         self.angular_acceleration = (spin - before.spin(&self.distribution)) / h_s;
         self.unknowns.now = [self.motion.velocity, spin];
-        self.steps += 1;
         self.at_rest = false;
         self.count_still(&before, h_s, touched);
         Ok(())

@@ -11,7 +11,7 @@ impl Tube {
         archive_values!(archive, self.resolution, self.division, self.now, self.stepper.past)?;
         archive_values!(archive, self.let_go, self.springs, self.spec.pressure_pa, self.spec.pressure_keys)?;
         archive_values!(archive, self.rest, self.at_rest, self.acceleration, self.time)?;
-        archive_values!(archive, self.script_from_s, self.steps)?;
+        archive_values!(archive, self.script_from_s)?;
         let Self { wall, unknowns, .. } = self;
         archive.fixed("whether its wall gives", wall.is_some())?;
         wall.iter_mut().try_for_each(|wall| archive.value(&mut wall.now))?;

@@ -59,7 +59,6 @@ struct SavedState {
     was_at_rest: bool,
     acceleration: DVec3,
     at_rest: bool,
-    steps: u64,
     own_substeps: u32,
 }
 
@@ -189,7 +188,7 @@ impl ClusterMember for Tube {
     }
 
     fn keep(&mut self) {
-        let Self { now, wall, rest, time, acceleration, at_rest, steps, unknowns, stepper, springs, .. } = self;
+        let Self { now, wall, rest, time, acceleration, at_rest, unknowns, stepper, springs, .. } = self;
         let saved = &mut unknowns.saved;
         saved.slid.clear();
         saved.slid.extend(springs.iter().map(|spring| spring.slid));
@@ -197,14 +196,13 @@ impl ClusterMember for Tube {
         wall.iter().for_each(|wall| saved.wall.copy_from(&wall.now));
         saved.past.copy_from(&stepper.past);
         saved.rest.copy_from(rest);
-        (saved.time, saved.at_rest, saved.steps, saved.was_at_rest) = (*time, *at_rest, *steps, unknowns.was_at_rest);
+        (saved.time, saved.at_rest, saved.was_at_rest) = (*time, *at_rest, unknowns.was_at_rest);
         saved.acceleration = *acceleration;
         saved.own_substeps = unknowns.own_substeps;
     }
 
     fn go_back(&mut self) {
-        let Self { now, wall, rest, time, acceleration, at_rest, steps, unknowns, material, division, stepper, .. } =
-            self;
+        let Self { now, wall, rest, time, acceleration, at_rest, unknowns, material, division, stepper, .. } = self;
         let saved = &unknowns.saved;
         self.springs.iter_mut().zip(&saved.slid).for_each(|(spring, slid)| spring.slid = *slid);
         now.copy_from(&saved.now);
@@ -213,7 +211,7 @@ impl ClusterMember for Tube {
         // a copy has no forces
         now.strain(material, division);
         rest.copy_from(&saved.rest);
-        (*time, *at_rest, *steps, unknowns.was_at_rest) = (saved.time, saved.at_rest, saved.steps, saved.was_at_rest);
+        (*time, *at_rest, unknowns.was_at_rest) = (saved.time, saved.at_rest, saved.was_at_rest);
         *acceleration = saved.acceleration;
         unknowns.own_substeps = saved.own_substeps;
         self.follow_pressure(self.time);
@@ -253,7 +251,6 @@ impl ClusterMember for Tube {
         self.time += SimSpan::from_secs_f64(h_s).unwrap_or(SimSpan::ZERO);
         self.unknowns.was_at_rest = self.observe_rest(h_s);
         self.at_rest = false;
-        self.steps += 1;
         self.present_velocities();
         Ok(())
     }

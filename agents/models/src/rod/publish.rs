@@ -23,7 +23,6 @@ impl Tube {
     /// Writes everything except the time.
     pub(super) fn publish(&self, into: &mut Snapshot) {
         into.clear();
-        into.steps = self.steps;
         into.resolution = Some(self.resolution);
         into.nodes = Some(self.now.x.len() as u32);
         into.energy_j = self.energy_j();

@@ -53,7 +53,6 @@ pub struct Tube {
     pub(super) time: SimTime,
     /// Own time at which its wave and its pressure start, seconds.
     pub(super) script_from_s: f64,
-    pub(super) steps: u64,
     /// Its unknowns in a contact cluster.
     pub(super) unknowns: Unknowns,
 }
@@ -107,7 +106,6 @@ impl Tube {
             form: Arc::new(form),
             time: SimTime::ZERO,
             script_from_s: 0.0,
-            steps: 0,
             unknowns: Unknowns::default(),
         };
         tube.lay_out_springs();

@@ -27,7 +27,7 @@ impl SoftBody {
             return Err(ArchiveError::Mismatch { what: "the number of nodes", found, expected });
         }
         self.mesh.set_turns(&turns);
-        archive_values!(archive, self.acceleration, self.at_rest, self.quiet_s, self.steps)?;
+        archive_values!(archive, self.acceleration, self.at_rest, self.quiet_s)?;
         let Self { skin, unknowns, .. } = self;
         skin.iter_mut().try_for_each(|skin| skin.archive(archive))?;
         unknowns.archive(archive)

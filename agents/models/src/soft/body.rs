@@ -46,7 +46,6 @@ pub struct SoftBody {
     pub(super) acceleration: DVec3,
     pub(super) at_rest: bool,
     pub(super) quiet_s: f64,
-    pub(super) steps: u64,
     /// Its unknowns in a contact cluster.
     pub(super) unknowns: Unknowns,
 }
@@ -94,7 +93,6 @@ impl SoftBody {
             acceleration: spec.gravity,
             at_rest: false,
             quiet_s: 0.0,
-            steps: 0,
             unknowns: Unknowns::default(),
             spec,
         };

@@ -44,7 +44,6 @@ struct SavedState {
     acceleration: DVec3,
     quiet_s: f64,
     at_rest: bool,
-    steps: u64,
     touches: Touches,
 }
 
@@ -162,7 +161,7 @@ impl ClusterMember for SoftBody {
         saved.turns.extend(self.mesh.turns());
         self.skin.iter_mut().for_each(|skin| saved.apart.clone_from(skin.apart()));
         saved.acceleration = self.acceleration;
-        (saved.quiet_s, saved.at_rest, saved.steps) = (self.quiet_s, self.at_rest, self.steps);
+        (saved.quiet_s, saved.at_rest) = (self.quiet_s, self.at_rest);
         saved.touches.clone_from(&self.touches);
     }
 
@@ -173,7 +172,7 @@ impl ClusterMember for SoftBody {
         self.mesh.set_turns(&saved.turns);
         self.skin.iter_mut().for_each(|skin| skin.apart().clone_from(&saved.apart));
         self.acceleration = saved.acceleration;
-        (self.quiet_s, self.at_rest, self.steps) = (saved.quiet_s, saved.at_rest, saved.steps);
+        (self.quiet_s, self.at_rest) = (saved.quiet_s, saved.at_rest);
         self.touches.clone_from(&saved.touches);
         self.follow();
     }
@@ -216,11 +215,10 @@ impl ClusterMember for SoftBody {
         unknowns.now.copy_from_slice(v);
         self.pay_owed(h_s);
         self.ease(h_s);
-        self.note_pressed(pressed, h_s);
         self.acceleration = (self.linear_momentum() - before) / (self.mass_kg() * h_s);
         self.quiet_s = if quiet { self.quiet_s + h_s } else { 0.0 };
+        self.note_pressed(pressed, h_s);
         self.at_rest = false;
-        self.steps += 1;
         Ok(())
     }
 

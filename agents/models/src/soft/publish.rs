@@ -9,7 +9,6 @@ impl SoftBody {
     /// Writes everything but the time.
     pub(super) fn publish(&self, into: &mut Snapshot) {
         into.clear();
-        into.steps = self.steps;
         into.resolution = self.present_resolution();
         into.nodes = Some(self.nodes());
         into.energy_j = self.energy_j();

@@ -41,7 +41,6 @@ pub struct Tool {
     /// Speed of its fastest point in the last step, m/s.
     pub(super) speed_m_s: f64,
     pub(super) at_rest: bool,
-    pub(super) steps: u64,
     /// Its unknowns in a contact cluster.
     pub(super) unknowns: Unknowns,
 }
@@ -100,7 +99,6 @@ impl Tool {
             form,
             speed_m_s: 0.0,
             at_rest: false,
-            steps: 0,
             unknowns,
         })
     }
@@ -212,7 +210,6 @@ impl Agent for Tool {
 
     fn write_snapshot(&self, into: &mut Snapshot) {
         into.clear();
-        into.steps = self.steps;
         into.resolution = None;
         into.body = Body::Tool(ToolState { led: self.commanded.position, ..self.tool });
         into.energy_j = 0.0;
@@ -225,7 +222,7 @@ impl Agent for Tool {
 
     fn archive(&mut self, archive: &mut Archive<'_>) -> Result<(), ArchiveError> {
         archive_values!(archive, self.tool, self.commanded, self.drive, self.lag_m, self.jaws)?;
-        archive_values!(archive, self.speed_m_s, self.at_rest, self.steps)?;
+        archive_values!(archive, self.speed_m_s, self.at_rest)?;
         self.script.archive(archive)?;
         self.unknowns.archive(archive)
     }

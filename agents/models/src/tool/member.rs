@@ -49,7 +49,6 @@ struct SavedState {
     lag_m: f64,
     speed_m_s: f64,
     at_rest: bool,
-    steps: u64,
     time: SimTime,
     hand: Option<AnchorSpring>,
 }
@@ -173,17 +172,17 @@ impl ClusterMember for Tool {
 
     fn keep(&mut self) {
         let Unknowns { time, hand, .. } = self.unknowns;
-        let Self { tool, commanded, lag_m, speed_m_s, at_rest, steps, .. } = *self;
+        let Self { tool, commanded, lag_m, speed_m_s, at_rest, .. } = *self;
         let (drive, jaws) = (self.drive, self.jaws);
-        let saved = SavedState { tool, commanded, drive, jaws, lag_m, speed_m_s, at_rest, steps, time, hand };
+        let saved = SavedState { tool, commanded, drive, jaws, lag_m, speed_m_s, at_rest, time, hand };
         self.unknowns.saved = Some(saved);
     }
 
     fn go_back(&mut self) {
         let Some(saved) = self.unknowns.saved else { return };
-        let SavedState { tool, commanded, drive, jaws, lag_m, speed_m_s, at_rest, steps, time, hand } = saved;
+        let SavedState { tool, commanded, drive, jaws, lag_m, speed_m_s, at_rest, time, hand } = saved;
         (self.tool, self.commanded, self.drive, self.jaws) = (tool, commanded, drive, jaws);
-        (self.lag_m, self.speed_m_s, self.at_rest, self.steps) = (lag_m, speed_m_s, at_rest, steps);
+        (self.lag_m, self.speed_m_s, self.at_rest) = (lag_m, speed_m_s, at_rest);
         (self.unknowns.time, self.unknowns.hand) = (time, hand);
     }
 
@@ -221,7 +220,6 @@ impl ClusterMember for Tool {
         self.tool = ToolState { spin: led_rad_s + turned_rad_s, is_idle, force_n, ..tip };
         self.jaws.age(h_s);
         self.tool.grasp = self.jaws.grasp(&self.spec);
-        self.steps += 1;
         self.at_rest = false;
         Ok(())
     }

@@ -284,7 +284,6 @@ impl Agent for Dummy {
     fn write_snapshot(&self, into: &mut Snapshot) {
         let position = DVec3::new(self.x, 0.0, self.z);
         into.body = Body::Rigid(RigidState { position, rotation: DQuat::IDENTITY, ..RigidState::default() });
-        into.steps = self.steps;
         into.resolution = Some(self.resolution);
         (into.energy_j, into.residual_m) = (self.taken, self.given);
         into.touches.extend(self.touches.filter(|(from, _)| self.steps >= *from).map(|(_, id)| id));

@@ -361,6 +361,11 @@ impl MetricsWriter {
         self.turns
     }
 
+    /// Steps recorded so far.
+    pub const fn steps(&self) -> u64 {
+        self.steps
+    }
+
     /// Reads a word of the memory that a turn will write to ([`crate::turn::prefetch`]).
     pub fn fetch(&self) {
         self.late.fetch();

@@ -45,7 +45,9 @@ impl AgentRunner {
     /// Writes the state at `time`, to be published later; `at_rest`: the agent is about to rest in it.
     pub fn write_snapshot(&mut self, time: SimTime, at_rest: bool) -> Result<(), String> {
         let cluster = self.cluster.as_deref();
+        let made = if time > self.pace.time() { self.own_steps() } else { 0 };
         let (model, clock_offset) = (&mut self.model, self.pace.clock_offset());
+        let steps = self.metrics.steps() + u64::from(made);
         self.withheld = false;
         let finite = self.writer.fill(|into| {
             into.clear();
@@ -53,7 +55,7 @@ impl AgentRunner {
             if let Some(member) = cluster {
                 member.complete(into);
             }
-            (into.time, into.clock_offset, into.at_rest) = (time, clock_offset, at_rest);
+            (into.time, into.clock_offset, into.steps, into.at_rest) = (time, clock_offset, steps, at_rest);
             Ok::<_, String>(into.is_finite())
         })?;
         let model = self.shared.model();

@@ -16,7 +16,7 @@ use std::path::{Path, PathBuf};
 /// The first bytes of every file.
 const MAGIC: [u8; 8] = *b"METACHRN";
 /// The version of the format: it changes with the meaning of the bytes.
-const FORMAT: u32 = 13;
+const FORMAT: u32 = 14;
 /// Bytes before the checksummed ones.
 const HEAD: usize = MAGIC.len() + 4 + 8 + 8;
 /// The version of the program, which reads its own checkpoints alone: states are saved field by field as this version
