@@ -67,15 +67,20 @@ fn an_eps_where_it_is_touched_is_refused_without_a_cage_and_out_of_its_range() {
     }
 }
 
-/// How high a soft block that lies on a floor ends up, metres.
-fn height_m(keys: &str) -> f64 {
+/// A soft block that is put onto a floor.
+fn lying(keys: &str) -> World {
     let text = format!(
         "format = 1\n\
          object = [ {{ name = 'floor', model = 'rigid', shape = 'plane' }}, {{ name = 'block', model = 'solid', shape = 'box', \
          size_m = [0.2, 0.2, 0.1], position_m = [0, 0, 0.001], {keys}, young_pa = 1e4, damping_per_s = 5, damping_s = 0.01, rate_hz = 60 }} ]"
     );
     let scene = load(&Source::memory("lies", text.as_bytes()).unwrap(), &[]).unwrap();
-    let world = World::start(&scene, ExecutorKind::Lockstep).unwrap();
+    World::start(&scene, ExecutorKind::Lockstep).unwrap()
+}
+
+/// How high it ends up, metres.
+fn height_m(keys: &str) -> f64 {
+    let world = lying(keys);
     world.advance(SimSpan::from_millis(3000));
     let state = world.latest(world.object("block").unwrap()).unwrap();
     let Body::Soft(soft) = &state.body else { panic!("it is soft") };
@@ -86,4 +91,13 @@ fn height_m(keys: &str) -> f64 {
 fn a_block_whose_cells_are_halved_along_its_bottom_lies_as_high_as_one_of_fine_cells() {
     let [fine, halved] = ["eps_m = 0.025", "eps_m = 0.05, eps_touched_m = 0.03"].map(height_m);
     assert!((fine - halved).abs() < 5e-4, "{fine} and {halved} m");
+}
+
+#[test]
+fn a_block_whose_cells_are_halved_along_its_bottom_sleeps() {
+    let world = lying("eps_m = 0.05, eps_touched_m = 0.03");
+    let block = world.object("block").unwrap();
+    world.advance(SimSpan::from_millis(8000));
+    let state = world.latest(block).unwrap();
+    assert!(state.at_rest && state.nodes > Some(300), "{} nodes, {} s", state.nodes.unwrap(), state.time.as_secs_f64());
 }

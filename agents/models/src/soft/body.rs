@@ -120,11 +120,6 @@ impl SoftBody {
         self.follow();
     }
 
-    /// Whether its skin is where its vertices carry it.
-    pub(super) fn is_eased(&self) -> bool {
-        self.skin.as_ref().is_none_or(Skin::is_eased)
-    }
-
     /// Positions of its skin's vertices, metres: its shape as others see it.
     pub(super) fn seen(&self) -> &[DVec3] {
         self.skin.as_ref().map_or(&self.positions, |skin| &skin.positions)

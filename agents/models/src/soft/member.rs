@@ -4,7 +4,7 @@
 //! Theory: docs/theory/soft.md, eq. 1, 3, 4; docs/theory/clusters.md, section 9.
 
 use super::body::SoftBody;
-use super::skin::Apart;
+use super::skin::{Apart, Skin};
 use super::system::Purpose;
 use super::touched::Touches;
 use crate::limits::{QUIET_ACCELERATION_M_S2, QUIET_S, QUIET_SPEED_M_S};
@@ -223,7 +223,7 @@ impl ClusterMember for SoftBody {
     }
 
     fn can_sleep(&self) -> bool {
-        self.spec.sleep && self.quiet_s >= QUIET_S && self.is_eased()
+        self.spec.sleep && self.quiet_s >= QUIET_S && self.skin.as_ref().is_none_or(Skin::is_quiet)
     }
 
     fn sleep(&mut self) {

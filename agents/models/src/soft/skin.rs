@@ -5,6 +5,7 @@
 
 use super::carrier::{Carrier, SkinPoints, into_body};
 use super::deformation::{follow_turn, outer};
+use crate::limits::QUIET_SPEED_M_S;
 use glam::{DMat3, DQuat, DVec3};
 use metachron_core::{Archive, ArchiveError, archive_values};
 use metachron_geometry::Carried;
@@ -131,6 +132,11 @@ impl Skin {
     /// Whether it is where its nodes carry it.
     pub fn is_eased(&self) -> bool {
         self.apart.by.is_empty()
+    }
+
+    /// Whether it moves on to there no faster than what is at rest may move.
+    pub fn is_quiet(&self) -> bool {
+        self.apart.by.iter().all(|apart| apart.length() <= QUIET_SPEED_M_S * EASE_S)
     }
 
     /// How far a point is from where its nodes carry it, metres.
