@@ -106,11 +106,14 @@ impl SoftBody {
         self.system.spread(&mut self.velocities);
     }
 
-    /// Moves its skin to where its vertices are.
+    /// Moves its skin to where its vertices are. One at rest stays there, also where its skin is still on its way to its nodes.
     pub(super) fn follow(&mut self) {
-        let Self { skin, positions, velocities, .. } = self;
+        let Self { skin, positions, velocities, at_rest, .. } = self;
         if let Some(skin) = skin {
             skin.follow(positions, velocities);
+            if *at_rest {
+                skin.velocities.fill(DVec3::ZERO);
+            }
         }
     }
 

@@ -214,11 +214,11 @@ impl ClusterMember for SoftBody {
             .all(|(v, before)| v.length() <= QUIET_SPEED_M_S && v.distance(*before) <= QUIET_ACCELERATION_M_S2 * h_s);
         unknowns.now.copy_from_slice(v);
         self.pay_owed(h_s);
+        self.at_rest = false;
         self.ease(h_s);
         self.acceleration = (self.linear_momentum() - before) / (self.mass_kg() * h_s);
         self.quiet_s = if quiet { self.quiet_s + h_s } else { 0.0 };
         self.note_pressed(pressed, h_s);
-        self.at_rest = false;
         Ok(())
     }
 
