@@ -36,13 +36,14 @@ impl Drop for Waiting {
     }
 }
 
-/// Twelve balls in each other's ways on a floor.
+/// Twelve balls of two rates in each other's ways on a floor.
 fn balls(folder: &Path) -> String {
     let ball = |number: i32| {
         let (x, y, towards) = (f64::from(number % 4), 0.6 * f64::from(number / 4), 1.5 - 2.5 * f64::from(number % 2));
         format!(
             "[[object]]\nname = 'ball{number}'\nmodel = 'rigid'\nshape = 'ball'\nradius_m = 0.05\nmass_kg = 0.2\n\
-             position_m = [{x}, {y}, 0.06]\nvelocity_m_s = [{towards}, 0.1, 0]\n"
+             rate_hz = {}\nposition_m = [{x}, {y}, 0.06]\nvelocity_m_s = [{towards}, 0.1, 0]\n",
+            60 << (number % 2)
         )
     };
     let floor = "[[object]]\nname = 'floor'\nmodel = 'rigid'\nshape = 'plane'\n";

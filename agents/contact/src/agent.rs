@@ -85,7 +85,7 @@ pub trait Agent: Send {
         Inputs::NONE
     }
 
-    /// Writes the state into `into`, all of it except `time`, which the runtime stamps.
+    /// Writes the state into `into`, all of it except `time`, `clock_offset`, `steps` and `at_rest`, which the runtime stamps.
     fn write_snapshot(&self, into: &mut Snapshot);
 
     /// Writes the state to an archive, or reads it from one, field by field: all that the next bit of a run needs, guesses included, and

@@ -16,7 +16,7 @@ use serde::de::DeserializeOwned;
 use std::sync::Arc;
 
 /// The version of all messages: it changes with the meaning of their bytes.
-pub(crate) const VERSION: u8 = 6;
+pub(crate) const VERSION: u8 = 7;
 /// The version of the program, whose parts and states each version has its own of.
 pub(crate) const PROGRAM: &str = env!("CARGO_PKG_VERSION");
 /// The most bytes of one message.

@@ -32,6 +32,19 @@ const BACK_EVERY: Duration = Duration::from_millis(20);
 /// The room for more speed rises so each time that an object has left its box.
 const ROOM_RISES: f64 = 2.0;
 
+/// Calls hosts on which nothing is placed yet, and calls them again for 5 s where one is silent.
+pub(super) fn patient<T>(mut call: impl FnMut() -> Result<T, WorldError>) -> Result<T, WorldError> {
+    let begun = Instant::now();
+    loop {
+        match call() {
+            Err(WorldError::Silent { .. }) if begun.elapsed() < BACK_WITHIN => {
+                wait_until(&SystemClock::new(), BACK_EVERY);
+            }
+            answer => return answer,
+        }
+    }
+}
+
 /// States of all objects at one moment.
 #[derive(Default)]
 pub(super) struct Kept {

@@ -7,6 +7,7 @@
 
 use super::divided::DividedCalls;
 use super::flow::Flow;
+use super::kept::patient;
 use super::windows::{Act, HostRecord, Placing, PlacingSeen};
 use crate::calls::{EventReader, WorldCalls};
 use crate::description::couplings::CouplingKind;
@@ -87,14 +88,14 @@ impl PlacedWorld {
     /// ([`Self::pin`]).
     ///
     /// # Errors
-    /// [`WorldError::Undivided`] without hosts, for an object that names another host, and for a world of another scene or in another state; the errors
-    /// of its calls.
+    /// [`WorldError::Undivided`] without hosts, for an object that names another host, and for a world of another scene or in another state;
+    /// [`WorldError::Silent`] for one that is silent for 5 s; the other errors of its calls.
     pub fn start(scene: &Scene, hosts: Vec<PlacedHost>) -> Result<Self, WorldError> {
         let undivided = |reason: String| WorldError::Undivided { reason };
         let first = hosts.first().ok_or_else(|| undivided("there is no host".to_owned()))?;
-        let (mark, time, hash) = (scene.mark(), first.world.time(), first.world.hash()?);
+        let (mark, time, hash) = (scene.mark(), first.world.time(), patient(|| first.world.hash())?);
         for PlacedHost { name, world } in &hosts {
-            if world.scene().hash != mark.hash || world.time() != time || world.hash()? != hash {
+            if world.scene().hash != mark.hash || world.time() != time || patient(|| world.hash())? != hash {
                 return Err(undivided(format!(
                     "the world on host \"{name}\" is of another scene, or in another state"
                 )));
@@ -113,7 +114,7 @@ impl PlacedWorld {
         for (member, host) in scene.agents.iter().filter_map(|member| Some((member, member.host.as_ref()?))) {
             placed.pin(tag.object(member.id), host)?;
         }
-        placed.begin(&mut placed.placing())?;
+        patient(|| placed.begin(&mut placed.placing()))?;
         Ok(placed)
     }
 
