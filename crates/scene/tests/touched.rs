@@ -100,4 +100,7 @@ fn a_block_whose_cells_are_halved_along_its_bottom_sleeps() {
     world.advance(SimSpan::from_millis(8000));
     let state = world.latest(block).unwrap();
     assert!(state.at_rest && state.nodes > Some(300), "{} nodes, {} s", state.nodes.unwrap(), state.time.as_secs_f64());
+    // its skin is not yet where its nodes carry it, and waits there
+    let Body::Soft(soft) = &state.body else { panic!("it is soft") };
+    assert!(soft.velocities.iter().all(|v| *v == [0.0; 3].into()));
 }

@@ -177,6 +177,9 @@ pub(crate) struct Metrics {
     reason: ArcSwapOption<String>,
 }
 
+/// Counts in files are no larger: they go on rising.
+const COUNT_MAX: u64 = u64::MAX / 2;
+
 /// The part of [`Metrics`] that a checkpoint has.
 #[derive(Debug, Clone, Default, serde::Serialize, serde::Deserialize)]
 pub(crate) struct MetricsValues {
@@ -188,8 +191,8 @@ pub(crate) struct MetricsValues {
 
 impl MetricsValues {
     /// Whether an agent can be in that condition.
-    pub const fn is_sound(&self) -> bool {
-        matches!(self.state, RUNNING | RESTING | PARKED | GONE)
+    pub fn is_sound(&self) -> bool {
+        matches!(self.state, RUNNING | RESTING | PARKED | GONE) && self.counts.iter().all(|count| *count <= COUNT_MAX)
     }
 }
 
@@ -353,7 +356,12 @@ impl MetricsWriter {
     /// Writes or reads the counts, but for the times by which turns were late.
     pub fn archive(&mut self, archive: &mut Archive<'_>) -> Result<(), ArchiveError> {
         let Self { turns, steps, work_s, turn_s, window, first_window, .. } = self;
-        archive_values!(archive, *turns, *steps, *work_s, *turn_s, *window, *first_window)
+        archive_values!(archive, *turns, *steps, *work_s, *turn_s, *window, *first_window)?;
+        if window.1 <= *steps && *steps <= COUNT_MAX && *turns <= COUNT_MAX {
+            return Ok(());
+        }
+        let found = format!("{steps} after {} steps, in {turns} turns", window.1);
+        Err(ArchiveError::Mismatch { what: "the number of steps", found, expected: "one that rises".to_owned() })
     }
 
     /// Turns recorded so far.
@@ -452,5 +460,15 @@ mod tests {
         gauges.park("first".into());
         gauges.park("second".into());
         assert_eq!(gauges.state(), AgentState::Parked("first".into()));
+    }
+
+    #[test]
+    fn counts_that_cannot_go_on_rising_are_refused() {
+        for (turns, steps, before) in [(3, 3, 4), (3, u64::MAX, 0), (u64::MAX, 3, 0)] {
+            let mut counts = MetricsWriter { turns, steps, window: (SimTime::ZERO, before), ..MetricsWriter::new() };
+            assert!(counts.archive(&mut Archive::writer()).is_err());
+        }
+        let full = MetricsValues { counts: [u64::MAX; 8], state: RUNNING, ..MetricsValues::default() };
+        assert!(!full.is_sound());
     }
 }
