@@ -296,7 +296,10 @@ fn a_posted_call_that_is_answered_too_late_is_counted_and_is_the_newest_round_tr
         let get = slow.get(format!("metachron/bench/call/anyone/{caller}")).payload(encode(&advance).unwrap());
         get.callback(|_| {}).wait().unwrap();
     }
-    // each of the three lets a second pass before the turn of the next comes
+    // each of the three lets a second pass before the turn of the next comes; the first has begun
+    while calm.time() == SimTime::ZERO {
+        std::thread::yield_now();
+    }
     calm.post(calm.object("ball").unwrap(), Command::wake()).unwrap();
     assert_eq!(calm.lost(), 0);
     let begun = Instant::now();
